@@ -1,0 +1,54 @@
+# Helpers that make every module look the same.
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+add_compile_options(-Wall -Wextra -Wpedantic -Werror)
+# popcnt for Hamming distances. Nothing newer: Debian's Ceres and Eigen types must agree on
+# alignment, and the same binary must give the same bytes on every machine.
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  add_compile_options(-march=x86-64-v2 -ffp-contract=off)
+endif()
+if(PANGEA_SANITIZE)
+  add_compile_options(-fsanitize=${PANGEA_SANITIZE} -fno-omit-frame-pointer -O1)
+  add_link_options(-fsanitize=${PANGEA_SANITIZE})
+endif()
+
+# pangea_library(name SOURCES ... DEPENDS ...): a static library included as "<module>/<header>.h".
+function(pangea_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR}/modules)
+  target_link_libraries(${name} PUBLIC ${ARG_DEPENDS})
+endfunction()
+
+# pangea_program(name SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
+function(pangea_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+  add_test(NAME ${name}.help COMMAND ${name} --help)
+  set_tests_properties(${name}.help PROPERTIES LABELS unit)
+endfunction()
+
+# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one GoogleTest binary.
+function(pangea_test name)
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  if(NOT ARG_LABEL)
+    set(ARG_LABEL unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE PANGEA_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+    PANGEA_BINARY_DIR="${CMAKE_BINARY_DIR}")
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+endfunction()

@@ -1,0 +1,83 @@
+#pragma once
+
+// A message bus, as thin as LCM's: channels of bytes. Three implementations: LcmBus (a real one, by
+// URL), LocalBus (in one process, one thread, first in first out: tests and deterministic replay),
+// and whatever a test needs.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace pangea {
+
+using Bytes = std::span<const uint8_t>;
+
+class Bus {
+ public:
+  using Handler = std::function<void(const std::string& channel, Bytes data)>;
+
+  virtual ~Bus() = default;
+  virtual void Publish(const std::string& channel, Bytes data) = 0;
+  // `channel_regex` is anchored at both ends (LCM's rule). Lasts as long as the bus.
+  virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
+};
+
+// Publish queues; Drain delivers, including what the handlers publish, until nothing is left.
+class LocalBus : public Bus {
+ public:
+  LocalBus();
+  ~LocalBus() override;
+  void Publish(const std::string& channel, Bytes data) override;
+  void Subscribe(const std::string& channel_regex, Handler handler) override;
+  void Drain();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// A bus by LCM URL, e.g. "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304".
+// Not for concurrent Handle calls; Publish may be called from any thread.
+class LcmBus : public Bus {
+ public:
+  // Throws std::runtime_error naming the URL and the likely mend when it cannot be opened.
+  explicit LcmBus(const std::string& url);
+  ~LcmBus() override;
+  void Publish(const std::string& channel, Bytes data) override;
+  void Subscribe(const std::string& channel_regex, Handler handler) override;
+  // Delivers what is waiting, at most for `timeout_ms`; returns whether anything came.
+  // An exception from a handler is rethrown here, not through LCM's C frames.
+  bool Handle(int timeout_ms);
+  // File descriptor to poll on; -1 when the connection is gone.
+  int fd();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Encodes an lcm-gen type.
+template <typename Message>
+void PublishMessage(Bus& bus, const std::string& channel, const Message& message) {
+  std::vector<uint8_t> bytes(message.getEncodedSize());
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  bus.Publish(channel, bytes);
+}
+
+// Decodes an lcm-gen type; false on a wrong fingerprint, a short or long payload, or absurd counts.
+// (LCM's own typed subscriptions abort the process on these.)
+template <typename Message>
+bool DecodeMessage(Bytes data, Message* message) {
+  try {
+    *message = Message{};
+    return message->decode(data.data(), 0, static_cast<int>(data.size())) ==
+           static_cast<int>(data.size());
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,75 @@
+#pragma once
+
+// What every process on the bus needs once: typed subscriptions that survive bad bytes, counting,
+// and the 1 Hz status message. A process class owns a Node and is otherwise plain code.
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "common/bus/bus.h"
+#include "pangea/status_t.hpp"
+
+namespace pangea {
+
+class Node {
+ public:
+  // `name` is the process' name in STATUS_<name> and AGAIN_<name>, e.g. "fusion" or "vio_2".
+  Node(Bus& bus, std::string name) : bus_(bus), name_(std::move(name)) {}
+
+  const std::string& name() const { return name_; }
+  Bus& bus() { return bus_; }
+
+  // handler(channel, message). What does not decode is counted and dropped.
+  template <typename Message, typename Handler>
+  void Subscribe(const std::string& channel_regex, Handler handler) {
+    bus_.Subscribe(channel_regex,
+                   [this, handler = std::move(handler)](const std::string& channel, Bytes data) {
+                     Message message{};
+                     ++messages_in_;
+                     const int64_t begin_ns = MonotonicNs();
+                     if (DecodeMessage(data, &message)) {
+                       handler(channel, message);
+                     } else {
+                       Refuse(std::string(Message::getTypeName()) + " does not decode");
+                     }
+                     NoteHandling(MonotonicNs() - begin_ns);
+                   });
+  }
+
+  template <typename Message>
+  void Publish(const std::string& channel, const Message& message) {
+    ++messages_out_;
+    PublishMessage(bus_, channel, message);
+  }
+
+  // Counts a refused message by its reason; at most 50 distinct reasons are told apart.
+  void Refuse(const std::string& reason);
+  void Count(const std::string& counter, int64_t by = 1) { counters_[counter] += by; }
+  void Set(const std::string& counter, int64_t value) { counters_[counter] = value; }
+  void NoteDropped(int64_t count = 1) { dropped_ += count; }
+  void NoteResendAsked(int64_t count = 1) { resends_asked_ += count; }
+
+  // `pending`: work waiting, 0 when idle. Measures process memory and CPU itself.
+  status_t Status(int64_t now_utime, int64_t pending, const std::string& summary) const;
+  void PublishStatus(int64_t now_utime, int64_t pending, const std::string& summary);
+
+ private:
+  static int64_t MonotonicNs();
+  void NoteHandling(int64_t ns);
+
+  Bus& bus_;
+  std::string name_;
+  int64_t started_utime_ = 0;
+  int64_t messages_in_ = 0;
+  int64_t messages_out_ = 0;
+  int64_t dropped_ = 0;
+  int64_t resends_asked_ = 0;
+  std::map<std::string, int64_t> refused_;
+  std::map<std::string, int64_t> counters_;
+  std::deque<float> handling_ms_;  // of the newest 1000 messages
+};
+
+}  // namespace pangea

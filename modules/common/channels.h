@@ -1,0 +1,37 @@
+#pragma once
+
+// Channel names, built in this one place. lcmtypes/README.md is their table.
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace pangea::channels {
+
+inline constexpr std::string_view kPlaceMatch = "PLACE_MATCH";
+inline constexpr std::string_view kConstraint = "CONSTRAINT";
+inline constexpr std::string_view kMapState = "MAP_STATE";
+inline constexpr std::string_view kHave = "HAVE";
+inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
+
+// LCM subscriptions are anchored regular expressions without grouping of alternatives.
+inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";
+inline constexpr std::string_view kAllCorrections = "CORRECTION_[0-9]+";
+inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
+inline constexpr std::string_view kAllStatus = "STATUS_.*";
+
+inline std::string Imu(int32_t agent_id) { return fmt::format("IMU_{}", agent_id); }
+inline std::string Image(int32_t agent_id) { return fmt::format("IMAGE_{}", agent_id); }
+inline std::string Camera(int32_t agent_id) { return fmt::format("CAMERA_{}", agent_id); }
+inline std::string Pose(int32_t agent_id) { return fmt::format("POSE_{}", agent_id); }
+inline std::string Keyframe(int32_t agent_id) { return fmt::format("KEYFRAME_{}", agent_id); }
+inline std::string Correction(int32_t agent_id) { return fmt::format("CORRECTION_{}", agent_id); }
+inline std::string LinkUp(int32_t agent_id) { return fmt::format("LINK_UP_{}", agent_id); }
+inline std::string LinkDown(int32_t agent_id) { return fmt::format("LINK_DOWN_{}", agent_id); }
+inline std::string Status(std::string_view process) { return fmt::format("STATUS_{}", process); }
+inline std::string Again(std::string_view process) { return fmt::format("AGAIN_{}", process); }
+
+}  // namespace pangea::channels

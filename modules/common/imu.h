@@ -1,0 +1,28 @@
+#pragma once
+
+// Inertial samples and the sensor's noise, as in EuRoC's sensor.yaml.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace pangea {
+
+// Gravity in a gravity-aligned frame (z up), m/s^2.
+constexpr double kGravity = 9.81;
+
+struct ImuSample {
+  int64_t utime = 0;                               // microseconds, sensor clock
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  // rad/s, body
+  // Specific force, m/s^2, body: at rest it points up with length kGravity.
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+};
+
+struct ImuNoise {
+  double gyro_noise_density = 1.6968e-4;   // rad/s/sqrt(Hz)
+  double gyro_random_walk = 1.9393e-5;     // rad/s^2/sqrt(Hz)
+  double accel_noise_density = 2.0000e-3;  // m/s^2/sqrt(Hz)
+  double accel_random_walk = 3.0000e-3;    // m/s^3/sqrt(Hz)
+  double rate_hz = 200;
+};
+
+}  // namespace pangea

@@ -1,0 +1,98 @@
+#include "common/rigid3.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+namespace pangea {
+namespace {
+
+class Rigid3Test : public ::testing::Test {
+ protected:
+  Eigen::Vector3d RandomVector(double scale) {
+    std::normal_distribution<double> normal(0, scale);
+    return {normal(rng_), normal(rng_), normal(rng_)};
+  }
+  Rigid3 RandomRigid3() { return {ExpSo3(RandomVector(1.0)), RandomVector(3.0)}; }
+  Matrix6d RandomCovariance() {
+    Matrix6d A;
+    std::normal_distribution<double> normal(0, 1);
+    for (double& a : A.reshaped()) {
+      a = normal(rng_);
+    }
+    return A * A.transpose() + 0.1 * Matrix6d::Identity();
+  }
+  std::mt19937 rng_{7};
+};
+
+TEST_F(Rigid3Test, GroupAxioms) {
+  for (int i = 0; i < 100; ++i) {
+    const Rigid3 A = RandomRigid3();
+    const Rigid3 B = RandomRigid3();
+    const Eigen::Vector3d p = RandomVector(2);
+    EXPECT_LT(((A * B) * p - A * (B * p)).norm(), 1e-12);
+    EXPECT_LT((A.Inverse() * A).Minus(Rigid3()).norm(), 1e-12);
+    EXPECT_LT(A.Plus(B.Minus(A)).Minus(B).norm(), 1e-12);
+  }
+}
+
+TEST_F(Rigid3Test, ExpAndLogInvertEachOtherAtEveryScale) {
+  for (const double scale : {1e-12, 1e-9, 1e-5, 1e-2, 1.0}) {
+    for (int i = 0; i < 50; ++i) {
+      const Eigen::Vector3d w = RandomVector(scale);
+      if (w.norm() < std::numbers::pi) {
+        EXPECT_LT((LogSo3(ExpSo3(w)) - w).norm(), 1e-9 * scale + 1e-15);
+      }
+    }
+  }
+}
+
+TEST_F(Rigid3Test, RightJacobianMatchesCentralDifferences) {
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d w = RandomVector(i < 10 ? 1e-5 : 0.8);
+    Eigen::Matrix3d numeric;
+    constexpr double kStep = 1e-6;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d d = kStep * Eigen::Vector3d::Unit(k);
+      numeric.col(k) = (LogSo3(ExpSo3(w).conjugate() * ExpSo3(w + d)) -
+                        LogSo3(ExpSo3(w).conjugate() * ExpSo3(w - d))) /
+                       (2 * kStep);
+    }
+    EXPECT_LT((RightJacobian(w) - numeric).norm(), 1e-8);
+    EXPECT_LT((RightJacobian(w) * RightJacobianInverse(w) - Eigen::Matrix3d::Identity()).norm(),
+              1e-9);
+  }
+}
+
+TEST_F(Rigid3Test, YawSurvivesItsOwnRotation) {
+  for (double yaw = -3.1; yaw < 3.1; yaw += 0.1) {
+    EXPECT_NEAR(YawOf(YawRotation(yaw)), yaw, 1e-12);
+    EXPECT_NEAR(WrapAngle(yaw + 4 * std::numbers::pi), yaw, 1e-12);
+  }
+}
+
+// First-order propagation against the Jacobian taken numerically.
+TEST_F(Rigid3Test, CovarianceOfProductAndInverse) {
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3 A = RandomRigid3();
+    const Rigid3 B = RandomRigid3();
+    const Matrix6d cov_A = RandomCovariance();
+    const Matrix6d cov_B = RandomCovariance();
+    Matrix6d J_A, J_B, J_inv;
+    constexpr double kStep = 1e-6;
+    for (int k = 0; k < 6; ++k) {
+      const Vector6d d = kStep * Vector6d::Unit(k);
+      J_A.col(k) = (A.Plus(d) * B).Minus(A.Plus(-d) * B) / (2 * kStep);
+      J_B.col(k) = (A * B.Plus(d)).Minus(A * B.Plus(-d)) / (2 * kStep);
+      J_inv.col(k) = A.Plus(d).Inverse().Minus(A.Plus(-d).Inverse()) / (2 * kStep);
+    }
+    const Matrix6d product = J_A * cov_A * J_A.transpose() + J_B * cov_B * J_B.transpose();
+    EXPECT_LT((ComposeCovariance(A, cov_A, B, cov_B) - product).norm(), 1e-6 * product.norm());
+    const Matrix6d inverse = J_inv * cov_A * J_inv.transpose();
+    EXPECT_LT((InverseCovariance(A, cov_A) - inverse).norm(), 1e-6 * inverse.norm());
+  }
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,25 @@
+#pragma once
+
+// What the front end hands to the estimator: where the tracked features are in one image.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace pangea::vio {
+
+struct Observation {
+  int32_t landmark_id = 0;                          // the same for the whole track
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // raw (distorted)
+  // (x, y) with the ray (x, y, 1) through the pixel, camera frame.
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+  // Standard deviation of the pixel, pixels.
+  double sigma_px = 1.0;
+};
+
+struct TrackedFrame {
+  int64_t utime = 0;  // microseconds, IMU clock as far as the known time offset goes
+  std::vector<Observation> observations;
+};
+
+}  // namespace pangea::vio
