@@ -1,0 +1,89 @@
+#include "common/bus/bus.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/bus/in_order.h"
+#include "common/bus/node.h"
+#include "pangea/have_t.hpp"
+
+namespace pangea {
+namespace {
+
+have_t MakeHave(int32_t seq) {
+  have_t have{};
+  have.num_maps = 1;
+  have.maps.resize(1);
+  have.maps[0].agent_id = 1;
+  have.highest_seq = {seq};
+  return have;
+}
+
+TEST(LocalBus, DeliversInOrderIncludingWhatHandlersPublish) {
+  LocalBus bus;
+  std::vector<std::string> seen;
+  bus.Subscribe("A", [&](const std::string& channel, Bytes) {
+    seen.push_back(channel);
+    bus.Publish("B", {});
+  });
+  bus.Subscribe("[AB]",
+                [&](const std::string& channel, Bytes) { seen.push_back("any " + channel); });
+  bus.Publish("A", {});
+  bus.Publish("AB", {});  // anchored: matches neither
+  bus.Drain();
+  EXPECT_THAT(seen, testing::ElementsAre("A", "any A", "any B"));
+}
+
+TEST(Node, CountsWhatDoesNotDecode) {
+  LocalBus bus;
+  Node node(bus, "test");
+  int32_t got = -1;
+  node.Subscribe<have_t>("HAVE",
+                         [&](const std::string&, const have_t& m) { got = m.highest_seq[0]; });
+  PublishMessage(bus, "HAVE", MakeHave(5));
+  bus.Publish("HAVE", std::vector<uint8_t>{1, 2, 3});
+  bus.Drain();
+  EXPECT_EQ(got, 5);
+  const status_t status = node.Status(0, 0, "");
+  ASSERT_EQ(status.num_refused, 1);
+  EXPECT_EQ(status.refused[0].count, 1);
+  EXPECT_EQ(status.messages_in, 2);
+}
+
+// Every truncation and every single corrupted byte must come back as an answer, not as a crash.
+TEST(DecodeMessage, SurvivesDamage) {
+  const have_t have = MakeHave(7);
+  std::vector<uint8_t> bytes(have.getEncodedSize());
+  have.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  have_t out{};
+  for (size_t length = 0; length < bytes.size(); ++length) {
+    EXPECT_FALSE(DecodeMessage(Bytes(bytes).first(length), &out));
+  }
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    std::vector<uint8_t> damaged = bytes;
+    damaged[i] ^= 0xFF;
+    DecodeMessage(damaged, &out);
+  }
+  EXPECT_TRUE(DecodeMessage(bytes, &out));
+}
+
+TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {
+  const MapId map{1, 10};
+  InOrder<int> stream;
+  EXPECT_THAT(stream.Add(map, 1, 101), testing::IsEmpty());
+  EXPECT_THAT(stream.Add(map, 3, 103), testing::IsEmpty());
+  ASSERT_EQ(stream.Gaps().size(), 1u);
+  EXPECT_EQ(stream.Gaps()[0].from_seq, 0);
+  EXPECT_EQ(stream.Gaps()[0].to_seq, 0);
+  EXPECT_THAT(stream.Add(map, 0, 100), testing::ElementsAre(100, 101));
+  EXPECT_THAT(stream.Add(map, 0, 100), testing::IsEmpty());
+  EXPECT_THAT(stream.Add(map, 2, 102), testing::ElementsAre(102, 103));
+  EXPECT_TRUE(stream.Gaps().empty());
+  stream.Announce(map, 9);
+  ASSERT_EQ(stream.Gaps().size(), 1u);
+  EXPECT_EQ(stream.Gaps()[0].from_seq, 4);
+  EXPECT_EQ(stream.Gaps()[0].to_seq, 9);
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <deque>
+#include <exception>
+#include <lcm/lcm-cpp.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "common/bus/bus.h"
+
+namespace pangea {
+namespace {
+
+// LCM drops the newest messages of a subscription beyond this many unhandled ones. Keyframes are
+// the largest (28 kB), so at most 56 MB wait per subscription; what is lost beyond that is asked
+// for again.
+constexpr int kQueueCapacity = 2000;
+
+}  // namespace
+
+struct LcmBus::Impl {
+  explicit Impl(const std::string& url) : lcm(url) {}
+
+  struct Subscription {
+    Impl* owner;
+    Handler handler;
+    void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+      try {
+        handler(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
+      } catch (...) {  // must not cross LCM's C frames; Handle() rethrows it
+        owner->failure = std::current_exception();
+      }
+    }
+  };
+
+  lcm::LCM lcm;
+  std::deque<Subscription> subscriptions;
+  std::exception_ptr failure;
+};
+
+LcmBus::LcmBus(const std::string& url) : impl_(std::make_unique<Impl>(url)) {
+  if (!impl_->lcm.good()) {
+    throw std::runtime_error(fmt::format(
+        "cannot open the bus '{}': check the URL, and that the machine has a multicast route "
+        "(ip route add 224.0.0.0/4 dev lo)",
+        url));
+  }
+}
+LcmBus::~LcmBus() = default;
+
+void LcmBus::Publish(const std::string& channel, Bytes data) {
+  impl_->lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
+}
+
+void LcmBus::Subscribe(const std::string& channel_regex, Handler handler) {
+  impl_->subscriptions.push_back({impl_.get(), std::move(handler)});
+  lcm::Subscription* subscription = impl_->lcm.subscribe(
+      channel_regex, &Impl::Subscription::OnMessage, &impl_->subscriptions.back());
+  subscription->setQueueCapacity(kQueueCapacity);
+}
+
+int LcmBus::fd() { return impl_->lcm.getFileno(); }
+
+bool LcmBus::Handle(int timeout_ms) {
+  // A tcpq connection that broke has fd -1, and handling it would abort.
+  if (fd() < 0) {
+    throw std::runtime_error("the bus connection is gone");
+  }
+  const bool handled = impl_->lcm.handleTimeout(timeout_ms) > 0;
+  if (impl_->failure) {
+    std::rethrow_exception(std::exchange(impl_->failure, nullptr));
+  }
+  return handled;
+}
+
+}  // namespace pangea

@@ -1,0 +1,75 @@
+#include "common/bus/process.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <csignal>
+#include <iostream>
+
+namespace pangea {
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+constexpr int64_t kTickInterval_us = 100'000;
+constexpr int kHandleTimeout_ms = 50;
+
+}  // namespace
+
+int64_t WallUtime() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void InstallSignalHandlers() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool StopRequested() { return stop_requested != 0; }
+
+int RunProcess(LcmBus& bus, Process& process) {
+  InstallSignalHandlers();
+  int64_t next_tick = 0;
+  while (!StopRequested()) {
+    bus.Handle(kHandleTimeout_ms);
+    const int64_t now = WallUtime();
+    if (now >= next_tick) {
+      process.Tick(now);
+      next_tick = now + kTickInterval_us;
+    }
+  }
+  return 0;
+}
+
+int ProcessMain(int argc, char** argv, const ProcessDescription& description,
+                const ProcessFactory& factory) {
+  CLI::App app(description.summary, description.name);
+  std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string options_file;
+  bool print_options = false;
+  app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
+  if (!description.default_options_yaml.empty()) {
+    app.add_option("--options", options_file, "YAML file with options");
+    app.add_flag("--print-options", print_options, "print the default options and exit");
+  }
+  CLI11_PARSE(app, argc, argv);
+  if (print_options) {
+    std::cout << description.default_options_yaml;
+    return 0;
+  }
+  try {
+    LcmBus bus(url);
+    const std::unique_ptr<Process> process = factory(bus, options_file);
+    return RunProcess(bus, *process);
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("{}: {}\n", description.name, error.what());
+    return 1;
+  }
+}
+
+}  // namespace pangea
