@@ -1,0 +1,120 @@
+#include "eval/command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "common/euroc.h"
+
+namespace pangea {
+namespace {
+
+void Warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) {
+    fmt::print(stderr, "warning: {}\n", warning);
+  }
+}
+
+// A TUM or EuRoC ground-truth file, or a recording's folder.
+Trajectory ReadReference(const std::string& path) {
+  std::vector<std::string> warnings;
+  const Trajectory reference = std::filesystem::is_directory(path)
+                                   ? ReadEurocGroundTruthOf(path, &warnings)
+                                   : ReadTrajectory(path, &warnings);
+  Warn(warnings);
+  if (reference.empty()) {
+    throw std::runtime_error(fmt::format("{}: the recording has no ground truth", path));
+  }
+  return reference;
+}
+
+void WriteJson(const nlohmann::ordered_json& json, const std::string& path) {
+  std::ofstream file(path);
+  file << json.dump(2) << '\n';
+  file.close();
+  if (!file) {
+    throw std::runtime_error(fmt::format("{}: cannot be written", path));
+  }
+}
+
+}  // namespace
+
+EvalCommandLine::EvalCommandLine(CLI::App& app) {
+  app.require_subcommand(1);
+  CLI::App* ate = app.add_subcommand("ate", "absolute error of one trajectory");
+  CLI::App* joint = app.add_subcommand(
+      "joint", "absolute error of several agents' trajectories in one map: one alignment for all");
+  CLI::App* rpe = app.add_subcommand("rpe", "relative error over stretches of path and of time");
+  for (CLI::App* command : {ate, joint, rpe}) {
+    auto* files = command->add_option(
+        "files", files_,
+        "ESTIMATE REFERENCE" + std::string(command == joint ? " [ESTIMATE REFERENCE]..." : "") +
+            ": TUM files or EuRoC ground-truth csv; REFERENCE may be a recording's folder");
+    files->required();
+    if (command != joint) {
+      files->expected(2);
+    }
+    AddCommon(*command);
+  }
+  for (CLI::App* command : {ate, joint}) {
+    command->add_option("--plot", plot_prefix_,
+                        "write PREFIX.trajectory.png and PREFIX.error.png (SE(3) alignment)");
+    command->callback([this] { chosen_ = [this] { RunAbsolute(); }; });
+  }
+  rpe->add_option("--distances", distances_m_, "metres of path")->delimiter(',');
+  rpe->add_option("--durations", durations_s_, "seconds")->delimiter(',');
+  rpe->callback([this] { chosen_ = [this] { RunRelative(); }; });
+}
+
+void EvalCommandLine::AddCommon(CLI::App& command) {
+  command.add_option("--max-gap", max_gap_s_,
+                     "seconds between reference poses across which it is still interpolated");
+  command.add_option("--json", json_path_, "write the figures to this file");
+}
+
+void EvalCommandLine::Run() { chosen_(); }
+
+std::vector<EvaluationInput> EvalCommandLine::ReadInputs() const {
+  if (files_.size() % 2 != 0) {
+    throw std::runtime_error("each ESTIMATE needs its REFERENCE behind it");
+  }
+  std::vector<EvaluationInput> inputs;
+  for (size_t i = 0; i < files_.size(); i += 2) {
+    std::vector<std::string> warnings;
+    inputs.push_back({std::filesystem::path(files_[i]).filename().string(),
+                      ReadTrajectory(files_[i], &warnings), ReadReference(files_[i + 1])});
+    Warn(warnings);
+  }
+  return inputs;
+}
+
+void EvalCommandLine::RunAbsolute() const {
+  const std::vector<EvaluationInput> inputs = ReadInputs();
+  const AbsoluteEvaluation evaluation = EvaluateAbsolute(inputs, max_gap_s_);
+  fmt::print("{}", ToText(evaluation));
+  if (!json_path_.empty()) {
+    WriteJson(ToJson(evaluation), json_path_);
+  }
+  if (!plot_prefix_.empty()) {
+    const JointAte& se3 = evaluation.by_alignment.front().second;
+    const std::string title = fmt::format("ATE {:.3f} m", se3.position_m.rmse);
+    WritePng(TrajectoryPlot(title, inputs, se3.alignment), plot_prefix_ + ".trajectory.png");
+    WritePng(ErrorPlot(title, inputs, se3), plot_prefix_ + ".error.png");
+  }
+}
+
+void EvalCommandLine::RunRelative() const {
+  const std::vector<EvaluationInput> inputs = ReadInputs();
+  const RelativeEvaluation evaluation =
+      EvaluateRelative(inputs.front(), distances_m_, durations_s_, max_gap_s_);
+  fmt::print("{}", ToText(evaluation));
+  if (!json_path_.empty()) {
+    WriteJson(ToJson(evaluation), json_path_);
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,226 @@
+#include "eval/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <stdexcept>
+
+#include "eval/table.h"
+
+namespace pangea {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr int64_t kLineBreakUs = 1'000'000;
+
+ordered_json ToJson(const Statistics& s, double factor) {
+  return {{"count", s.count},
+          {"rmse", factor * s.rmse},
+          {"mean", factor * s.mean},
+          {"median", factor * s.median},
+          {"max", factor * s.max}};
+}
+
+std::vector<std::string> Cells(const std::string& alignment, const std::string& name,
+                               const Ate& ate, const std::string& coverage) {
+  const Statistics& p = ate.position_m;
+  return {alignment,
+          name,
+          fmt::format("{}", p.count),
+          fmt::format("{:.4f}", p.rmse),
+          fmt::format("{:.4f}", p.mean),
+          fmt::format("{:.4f}", p.median),
+          fmt::format("{:.4f}", p.max),
+          fmt::format("{:.3f}", kDegrees * ate.rotation_rad.rmse),
+          fmt::format("{:.4f}", ate.alignment.scale),
+          coverage};
+}
+
+void AddRows(const std::vector<RelativeRow>& rows, const std::string& unit, Table* table) {
+  for (const auto& [length, rpe] : rows) {
+    if (!rpe) {
+      table->Add({fmt::format("{} {}", length, unit), "0", "-", "-", "-", "-", "-"});
+      continue;
+    }
+    const std::string share = unit == "m"
+                                  ? fmt::format("{:.2f} %", 100 * rpe->position_m.mean / length)
+                                  : std::string("-");
+    table->Add({fmt::format("{} {}", length, unit), fmt::format("{}", rpe->position_m.count),
+                fmt::format("{:.4f}", rpe->position_m.rmse),
+                fmt::format("{:.4f}", rpe->position_m.median),
+                fmt::format("{:.4f}", rpe->position_m.max), share,
+                fmt::format("{:.3f}", kDegrees * rpe->rotation_rad.rmse)});
+  }
+}
+
+ordered_json RowsJson(const std::vector<RelativeRow>& rows, const std::string& length_key) {
+  ordered_json list = ordered_json::array();
+  for (const auto& [length, rpe] : rows) {
+    ordered_json row = {{length_key, length}};
+    row["position_m"] = rpe ? ToJson(rpe->position_m, 1) : ordered_json();
+    row["rotation_deg"] = rpe ? ToJson(rpe->rotation_rad, kDegrees) : ordered_json();
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
+}  // namespace
+
+AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s) {
+  AbsoluteEvaluation evaluation;
+  std::vector<std::vector<PosePair>> pairs;
+  for (const EvaluationInput& input : inputs) {
+    evaluation.names.push_back(input.name);
+    evaluation.coverage.push_back(Coverage(input.estimate, input.reference));
+    pairs.push_back(Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s)));
+    if (pairs.back().empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: none of its {} poses lies within the reference's time ({:.3f} .. {:.3f} s)",
+          input.name, input.estimate.size(), 1e-6 * input.reference.front().utime,
+          1e-6 * input.reference.back().utime));
+    }
+  }
+  for (const AlignmentKind kind :
+       {AlignmentKind::kSe3, AlignmentKind::kYaw, AlignmentKind::kSim3}) {
+    auto joint = JointAbsoluteError(pairs, kind);
+    if (!joint) {
+      throw std::runtime_error(
+          fmt::format("fewer than {} poses have a reference: no error can be told", kMinPairs));
+    }
+    evaluation.by_alignment.emplace_back(kind, std::move(*joint));
+  }
+  return evaluation;
+}
+
+std::string ToText(const AbsoluteEvaluation& evaluation) {
+  Table table({"alignment", "trajectory", "poses", "ATE rmse m", "mean m", "median m", "max m",
+               "rotation rmse deg", "scale", "coverage"});
+  for (const auto& [kind, joint] : evaluation.by_alignment) {
+    for (size_t i = 0; i < joint.agents.size(); ++i) {
+      const auto& coverage = evaluation.coverage[i];
+      table.Add(Cells(ToString(kind), evaluation.names[i], joint.agents[i],
+                      coverage ? fmt::format("{:.3f}", *coverage) : "-"));
+    }
+    if (joint.agents.size() > 1) {
+      const Statistics& p = joint.position_m;
+      table.Add({ToString(kind), "all together", fmt::format("{}", p.count),
+                 fmt::format("{:.4f}", p.rmse), fmt::format("{:.4f}", p.mean),
+                 fmt::format("{:.4f}", p.median), fmt::format("{:.4f}", p.max), "-",
+                 fmt::format("{:.4f}", joint.alignment.scale), "-"});
+    }
+  }
+  return table.Text();
+}
+
+ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
+  ordered_json json;
+  for (const auto& [kind, joint] : evaluation.by_alignment) {
+    const Alignment& a = joint.alignment;
+    const Rigid3& T = a.T_reference_estimate;
+    ordered_json& entry = json[ToString(kind)];
+    entry["scale"] = a.scale;
+    entry["rotation_wxyz"] = {T.q.w(), T.q.x(), T.q.y(), T.q.z()};
+    entry["translation_m"] = {T.t.x(), T.t.y(), T.t.z()};
+    entry["ate_m"] = ToJson(joint.position_m, 1);
+    for (size_t i = 0; i < joint.agents.size(); ++i) {
+      const auto& coverage = evaluation.coverage[i];
+      entry["trajectories"].push_back(
+          {{"name", evaluation.names[i]},
+           {"ate_m", ToJson(joint.agents[i].position_m, 1)},
+           {"rotation_deg", ToJson(joint.agents[i].rotation_rad, kDegrees)},
+           {"coverage", coverage ? ordered_json(*coverage) : ordered_json()}});
+    }
+  }
+  return json;
+}
+
+RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
+                                    const std::vector<double>& distances_m,
+                                    const std::vector<double>& durations_s, double max_gap_s) {
+  const std::vector<PosePair> pairs =
+      Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s));
+  RelativeEvaluation evaluation;
+  for (const double distance_m : distances_m) {
+    evaluation.over_distance_m.push_back(
+        {distance_m, RelativeErrorOverDistance(pairs, distance_m)});
+  }
+  for (const double duration_s : durations_s) {
+    evaluation.over_time_s.push_back({duration_s, RelativeErrorOverTime(pairs, duration_s)});
+  }
+  return evaluation;
+}
+
+std::string ToText(const RelativeEvaluation& evaluation) {
+  Table table(
+      {"over", "stretches", "RPE rmse m", "median m", "max m", "mean share", "rotation rmse deg"});
+  AddRows(evaluation.over_distance_m, "m", &table);
+  AddRows(evaluation.over_time_s, "s", &table);
+  return table.Text();
+}
+
+ordered_json ToJson(const RelativeEvaluation& evaluation) {
+  return {{"over_distance", RowsJson(evaluation.over_distance_m, "distance_m")},
+          {"over_time", RowsJson(evaluation.over_time_s, "duration_s")}};
+}
+
+std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory, const Alignment& alignment) {
+  std::vector<Eigen::Vector2d> points;
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    if (i > 0 && trajectory[i].utime - trajectory[i - 1].utime > kLineBreakUs) {
+      points.push_back(kPlotBreak);
+    }
+    points.emplace_back((alignment * trajectory[i].T.t).head<2>());
+  }
+  return points;
+}
+
+std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin) {
+  std::vector<Eigen::Vector2d> points;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    if (i > 0 && errors[i].utime - errors[i - 1].utime > kLineBreakUs) {
+      points.push_back(kPlotBreak);
+    }
+    points.emplace_back(1e-6 * static_cast<double>(errors[i].utime - begin), errors[i].position_m);
+  }
+  return points;
+}
+
+Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
+                    const Alignment& alignment) {
+  Plot plot{.title = title, .x_label = "x [m]", .y_label = "y [m]", .equal_axes = true};
+  for (const EvaluationInput& input : inputs) {
+    plot.lines.push_back({.label = plot.lines.empty() ? "ground truth" : "",
+                          .colour = kGroundTruthColour,
+                          .width = 5,
+                          .points = TopView(input.reference, Alignment())});
+  }
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    plot.lines.push_back({.label = inputs[i].name,
+                          .colour = AgentColour(i),
+                          .points = TopView(inputs[i].estimate, alignment),
+                          .mark_start = true});
+  }
+  return plot;
+}
+
+Plot ErrorPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
+               const JointAte& joint) {
+  Plot plot{.title = title,
+            .x_label = "time since the ground truth's beginning [s]",
+            .y_label = "position error [m]",
+            .y_from_zero = true};
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    plot.lines.push_back(
+        {.label =
+             fmt::format("{} (rmse {:.3f} m)", inputs[i].name, joint.agents[i].position_m.rmse),
+         .colour = AgentColour(i),
+         .points = ErrorOverTime(joint.agents[i].errors, inputs[i].reference.front().utime)});
+  }
+  return plot;
+}
+
+}  // namespace pangea

@@ -1,0 +1,58 @@
+#pragma once
+
+// What pangea-eval prints, as text, JSON and plots, from pairs of trajectories.
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "common/trajectory.h"
+#include "eval/metrics.h"
+#include "eval/plot.h"
+
+namespace pangea {
+
+// One agent: what was estimated and what is true.
+struct EvaluationInput {
+  std::string name;
+  Trajectory estimate;
+  Trajectory reference;
+};
+
+// Absolute error under one alignment for all inputs, by SE(3), yaw and Sim(3).
+struct AbsoluteEvaluation {
+  std::vector<std::string> names;
+  std::vector<std::optional<double>> coverage;
+  std::vector<std::pair<AlignmentKind, JointAte>> by_alignment;
+};
+// Throws std::runtime_error when too few poses have ground truth.
+AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s);
+std::string ToText(const AbsoluteEvaluation& evaluation);
+nlohmann::ordered_json ToJson(const AbsoluteEvaluation& evaluation);
+
+struct RelativeRow {
+  double length = 0;  // metres or seconds
+  std::optional<Rpe> rpe;
+};
+struct RelativeEvaluation {
+  std::vector<RelativeRow> over_distance_m;
+  std::vector<RelativeRow> over_time_s;
+};
+RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
+                                    const std::vector<double>& distances_m,
+                                    const std::vector<double>& durations_s, double max_gap_s);
+std::string ToText(const RelativeEvaluation& evaluation);
+nlohmann::ordered_json ToJson(const RelativeEvaluation& evaluation);
+
+// Top view (x, y of the reference frame), ground truth in grey, each input under `alignment`.
+Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
+                    const Alignment& alignment);
+// Position error over each input's own time since its reference's beginning.
+Plot ErrorPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
+               const JointAte& joint);
+
+// The line of a trajectory in top view, broken where poses are more than a second apart.
+std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory, const Alignment& alignment);
+std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin);
+
+}  // namespace pangea

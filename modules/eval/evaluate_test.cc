@@ -1,0 +1,78 @@
+#include "eval/evaluate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "eval/table.h"
+
+namespace pangea {
+namespace {
+
+using ::testing::HasSubstr;
+
+EvaluationInput Input(const std::string& name, double offset_m) {
+  EvaluationInput input{name, {}, {}};
+  for (int i = 0; i < 300; ++i) {
+    const double s = 0.05 * i;
+    const Rigid3 T(YawRotation(s), {std::cos(s), s, std::sin(2 * s)});
+    input.reference.push_back({i * int64_t{50'000}, T});
+    input.estimate.push_back({i * int64_t{50'000}, Rigid3({1, 0, 0, 0}, {7 + offset_m, 8, 9}) * T});
+  }
+  return input;
+}
+
+TEST(Evaluate, TablesAndJsonAgree) {
+  const AbsoluteEvaluation evaluation =
+      EvaluateAbsolute({Input("one.tum", 0), Input("two.tum", 0.2)}, 0.1);
+  const auto json = ToJson(evaluation);
+  EXPECT_NEAR(json["SE(3)"]["ate_m"]["rmse"].get<double>(), 0.1, 1e-9);
+  EXPECT_EQ(json["SE(3)"]["trajectories"][1]["name"], "two.tum");
+  EXPECT_NEAR(json["yaw"]["trajectories"][0]["coverage"].get<double>(), 14.95 / 9.95, 1e-9);
+  const std::string text = ToText(evaluation);
+  EXPECT_THAT(text, HasSubstr("| SE(3)     | all together | 600   | 0.1000"));
+  EXPECT_THAT(text, HasSubstr("two.tum"));
+}
+
+TEST(Evaluate, RelativeRowsWithoutAStretchSayNothing) {
+  const RelativeEvaluation evaluation = EvaluateRelative(Input("one", 0), {1, 1000}, {2}, 0.1);
+  const auto json = ToJson(evaluation);
+  EXPECT_LT(json["over_distance"][0]["position_m"]["max"].get<double>(), 1e-9);
+  EXPECT_TRUE(json["over_distance"][1]["position_m"].is_null());
+  EXPECT_EQ(json["over_time"][0]["duration_s"], 2.0);
+  EXPECT_THAT(ToText(evaluation), HasSubstr("| 1000 m | 0"));
+}
+
+TEST(Evaluate, NoCommonTimeIsAnError) {
+  EvaluationInput input = Input("late.tum", 0);
+  for (StampedPose& pose : input.estimate) {
+    pose.utime += 1'000'000'000;
+  }
+  try {
+    EvaluateAbsolute({input}, 0.1);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("late.tum: none of its 300 poses"));
+  }
+}
+
+TEST(Evaluate, LinesBreakAtHoles) {
+  const Trajectory trajectory = {{0, {}}, {500'000, {}}, {5'000'000, {}}};
+  const auto points = TopView(trajectory, Alignment());
+  ASSERT_EQ(points.size(), 4U);
+  EXPECT_FALSE(points[2].allFinite());
+}
+
+TEST(TableText, ColumnsArePadded) {
+  Table table({"a", "long header"});
+  table.Add({"wide cell", "1"});
+  EXPECT_EQ(table.Text(),
+            "| a         | long header |\n|-----------|-------------|\n| wide cell | 1           "
+            "|\n");
+}
+
+}  // namespace
+}  // namespace pangea

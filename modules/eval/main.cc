@@ -1,0 +1,21 @@
+// pangea-eval: errors of estimated trajectories against ground truth.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+
+#include "eval/command_line.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Errors of trajectories against ground truth");
+  pangea::EvalCommandLine commands(app);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    commands.Run();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "pangea-eval: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

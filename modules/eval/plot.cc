@@ -1,0 +1,148 @@
+#include "eval/plot.h"
+
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leaves it to the user
+
+namespace pangea {
+namespace {
+
+// A gnuplot string literal: in single quotes nothing is special but the quote itself.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    quoted += c == '\'' ? "''" : std::string(1, c);
+  }
+  return quoted + "'";
+}
+
+std::string Script(const Plot& plot, const std::string& path) {
+  std::string script;
+  for (size_t i = 0; i < plot.lines.size(); ++i) {
+    script += fmt::format("$line{} << EOD\n", i);
+    for (const Eigen::Vector2d& p : plot.lines[i].points) {
+      script += p.allFinite() ? fmt::format("{:.6f} {:.6f}\n", p.x(), p.y()) : "\n";
+    }
+    script += "EOD\n";
+  }
+  script +=
+      "set terminal pngcairo noenhanced size 1400,1000 font 'sans,14' background '#ffffff'\n"
+      "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
+      "set grid linecolor '#dddddd' linewidth 1\n"
+      "set key outside below center horizontal samplen 2\n"
+      "set lmargin 11\nset rmargin 5\n";
+  script +=
+      fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
+                  Quoted(path), Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
+  if (plot.equal_axes) {
+    script += "set size ratio -1\n";
+  }
+  if (plot.y_from_zero) {
+    script += "set yrange [0:*]\n";
+  }
+  std::string commands;
+  for (size_t i = 0; i < plot.lines.size(); ++i) {
+    const PlotLine& line = plot.lines[i];
+    if (std::ranges::none_of(line.points, [](const auto& p) { return p.allFinite(); })) {
+      continue;
+    }
+    commands += fmt::format("{}$line{} with lines linewidth {:.1f} linecolor '{}' {}",
+                            commands.empty() ? "plot " : ", ", i, line.width, line.colour,
+                            line.label.empty() ? "notitle" : "title " + Quoted(line.label));
+    if (line.mark_start) {
+      commands += fmt::format(
+          ", $line{} every ::0::0 with points pointtype 7 pointsize 1.6 linecolor '{}' notitle", i,
+          line.colour);
+    }
+  }
+  if (commands.empty()) {  // nothing to draw is still a picture that says so
+    commands =
+        "set xrange [0:1]\nset yrange [0:1]\nset label 'no data' at 0.5,0.5 center\n"
+        "plot NaN notitle";
+  }
+  return script + commands + "\n";
+}
+
+// A file without a name that lives as long as its descriptor.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const char* name) : fd_(memfd_create(name, MFD_CLOEXEC)) {
+    if (fd_ < 0) {
+      throw std::runtime_error(fmt::format("memfd_create: {}", std::strerror(errno)));
+    }
+  }
+  ~MemoryFile() { close(fd_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  int fd() const { return fd_; }
+  void Write(const std::string& text) const {
+    for (size_t done = 0; done < text.size();) {
+      const ssize_t n = write(fd_, text.data() + done, text.size() - done);
+      if (n < 0) {
+        throw std::runtime_error(fmt::format("write: {}", std::strerror(errno)));
+      }
+      done += static_cast<size_t>(n);
+    }
+    lseek(fd_, 0, SEEK_SET);
+  }
+  std::string Read() const {
+    lseek(fd_, 0, SEEK_SET);
+    std::string text;
+    std::array<char, 4096> buffer;
+    for (ssize_t n = 0; (n = read(fd_, buffer.data(), buffer.size())) > 0;) {
+      text.append(buffer.data(), static_cast<size_t>(n));
+    }
+    return text;
+  }
+
+ private:
+  int fd_;
+};
+
+}  // namespace
+
+std::string AgentColour(size_t index) {
+  constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                   "#e69f00", "#56b4e9", "#000000"};
+  return kColours[index % kColours.size()];
+}
+
+void WritePng(const Plot& plot, const std::string& path) {
+  const MemoryFile script("gnuplot script");
+  const MemoryFile complaints("gnuplot stderr");
+  script.Write(Script(plot, path));
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, complaints.fd(), STDERR_FILENO);
+  std::array<char*, 2> argv = {const_cast<char*>("gnuplot"), nullptr};
+  pid_t pid = 0;
+  const int error = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) {
+    throw std::runtime_error(
+        fmt::format("{}: cannot be drawn, gnuplot does not start ({}); install gnuplot-nox", path,
+                    std::strerror(error)));
+  }
+  int status = 0;
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw std::runtime_error(fmt::format("{}: gnuplot failed: {}", path, complaints.Read()));
+  }
+}
+
+}  // namespace pangea

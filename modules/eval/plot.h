@@ -1,0 +1,41 @@
+#pragma once
+
+// Line plots as PNG files, drawn by gnuplot (Debian package gnuplot-nox) as a child process.
+// The same lines give the same bytes.
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace pangea {
+
+// A point that breaks the line.
+inline const Eigen::Vector2d kPlotBreak =
+    Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+
+struct PlotLine {
+  std::string label = {};  // in the legend; empty for none
+  std::string colour;      // "#rrggbb"
+  double width = 2;
+  std::vector<Eigen::Vector2d> points = {};
+  bool mark_start = false;  // a dot at the first point
+};
+
+struct Plot {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  bool equal_axes = false;  // one unit is as long on both axes
+  bool y_from_zero = false;
+  std::vector<PlotLine> lines = {};  // later ones are drawn above earlier ones
+};
+
+// Colours that people with any colour vision tell apart (Okabe & Ito 2008), repeating after seven.
+std::string AgentColour(size_t index);
+inline constexpr const char* kGroundTruthColour = "#999999";
+
+// Throws std::runtime_error when gnuplot is absent, naming the package, or when it fails.
+void WritePng(const Plot& plot, const std::string& path);
+
+}  // namespace pangea

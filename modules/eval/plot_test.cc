@@ -1,0 +1,79 @@
+#include "eval/plot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <stdexcept>
+
+namespace pangea {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class PlotTest : public ::testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::remove(path_); }
+  std::string Bytes() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+  static Plot Circle() {
+    Plot plot{.title = "agent's circle", .x_label = "x", .y_label = "y", .equal_axes = true};
+    plot.lines.push_back({.label = "it's a circle_1", .colour = AgentColour(0)});
+    for (int i = 0; i < 100; ++i) {
+      plot.lines[0].points.emplace_back(std::cos(0.06 * i), std::sin(0.06 * i));
+    }
+    plot.lines[0].points.insert(plot.lines[0].points.begin() + 50, kPlotBreak);
+    plot.lines[0].mark_start = true;
+    return plot;
+  }
+  const std::string path_ = ::testing::TempDir() + "pangea plot's test.png";
+};
+
+TEST_F(PlotTest, WritesTheSamePngTwice) {
+  WritePng(Circle(), path_);
+  const std::string first = Bytes();
+  EXPECT_THAT(first, StartsWith("\x89PNG"));
+  EXPECT_GT(first.size(), 5000U);
+  WritePng(Circle(), path_);
+  EXPECT_EQ(Bytes(), first);
+}
+
+TEST_F(PlotTest, NothingToDrawIsAPictureToo) {
+  Plot plot;
+  plot.lines.push_back({.label = "empty", .colour = AgentColour(0), .points = {kPlotBreak}});
+  WritePng(plot, path_);
+  EXPECT_THAT(Bytes(), StartsWith("\x89PNG"));
+}
+
+TEST_F(PlotTest, FailuresAreToldWithTheMend) {
+  EXPECT_THROW(WritePng(Circle(), "/nonexistent/folder/a.png"), std::runtime_error);
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nonexistent", 1);
+  try {
+    WritePng(Circle(), path_);
+    ADD_FAILURE() << "gnuplot is not there, yet no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("install gnuplot-nox"));
+  }
+  setenv("PATH", path.c_str(), 1);
+}
+
+TEST_F(PlotTest, SevenAgentsHaveSevenColours) {
+  std::set<std::string> colours;
+  for (size_t i = 0; i < 7; ++i) {
+    colours.insert(AgentColour(i));
+  }
+  EXPECT_EQ(colours.size(), 7U);
+  EXPECT_FALSE(colours.contains(kGroundTruthColour));
+}
+
+}  // namespace
+}  // namespace pangea
