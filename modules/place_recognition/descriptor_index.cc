@@ -1,0 +1,119 @@
+#include "place_recognition/descriptor_index.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <span>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+constexpr int kDescriptorBits = 256;
+
+uint32_t GatherBits(const Descriptor& descriptor, std::span<const uint8_t> bits) {
+  uint32_t word = 0;
+  for (const uint8_t bit : bits) {
+    word = (word << 1) | static_cast<uint32_t>((descriptor[bit / 64] >> (bit % 64)) & 1);
+  }
+  return word;
+}
+
+}  // namespace
+
+uint32_t DescriptorIndex::Table::Word(const Descriptor& descriptor) const {
+  return GatherBits(descriptor, word_bits);
+}
+
+uint32_t DescriptorIndex::Table::Signature(const Descriptor& descriptor) const {
+  return GatherBits(descriptor, signature_bits);
+}
+
+DescriptorIndex::DescriptorIndex() {
+  std::mt19937_64 rng(20200513);
+  std::array<uint8_t, kDescriptorBits> order{};
+  for (Table& table : tables_) {
+    std::iota(order.begin(), order.end(), uint8_t{0});
+    for (size_t i = 0; i < kWordBits + kSignatureBits; ++i) {
+      std::swap(order[i], order[i + rng() % (order.size() - i)]);
+    }
+    for (int i = 0; i < kWordBits; ++i) {
+      table.word_bits[i] = order[i];
+    }
+    for (int i = 0; i < kSignatureBits; ++i) {
+      table.signature_bits[i] = order[kWordBits + i];
+    }
+    table.postings.resize(size_t{1} << kWordBits);
+  }
+}
+
+int DescriptorIndex::Add(const std::vector<Corner>& corners) {
+  const int keyframe = size();
+  num_corners_.push_back(static_cast<int>(corners.size()));
+  for (Table& table : tables_) {
+    for (const Corner& corner : corners) {
+      table.postings[table.Word(corner.descriptor)].push_back(
+          {keyframe, table.Signature(corner.descriptor)});
+    }
+  }
+  return keyframe;
+}
+
+template <typename Visit>
+void DescriptorIndex::Probe(const Descriptor& descriptor, Visit visit) const {
+  for (const Table& table : tables_) {
+    const uint32_t word = table.Word(descriptor);
+    const uint32_t signature = table.Signature(descriptor);
+    for (int flip = -1; flip < kWordBits; ++flip) {
+      const uint32_t probe = flip < 0 ? word : word ^ (uint32_t{1} << flip);
+      const std::vector<Posting>& postings = table.postings[probe];
+      if (!postings.empty() && postings.size() <= kStopWordPostings) {
+        visit(postings, signature);
+      }
+    }
+  }
+}
+
+std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) const {
+  std::vector<float> votes(size(), 0.0f);
+  std::vector<int> last_voter(size(), -1);
+  std::vector<int32_t> met;
+  const double most = std::log(1.0 + size());
+  for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
+    met.clear();
+    Probe(corners[i].descriptor, [&](const std::vector<Posting>& postings, uint32_t signature) {
+      for (const Posting& posting : postings) {
+        if (last_voter[posting.keyframe] != i &&
+            std::popcount(posting.signature ^ signature) <= kMaxSignatureDistance) {
+          last_voter[posting.keyframe] = i;
+          met.push_back(posting.keyframe);
+        }
+      }
+    });
+    if (met.empty()) {
+      continue;
+    }
+    const double weight = std::log((1.0 + size()) / static_cast<double>(met.size()));
+    for (const int32_t keyframe : met) {
+      votes[keyframe] += static_cast<float>(weight);
+    }
+  }
+  for (float& vote : votes) {
+    vote /= static_cast<float>(most * std::max<double>(1.0, static_cast<double>(corners.size())));
+  }
+  return votes;
+}
+
+int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
+  int64_t count = 0;
+  for (const Corner& corner : corners) {
+    Probe(corner.descriptor, [&](const std::vector<Posting>& postings, uint32_t) {
+      count += static_cast<int64_t>(postings.size());
+    });
+  }
+  return count;
+}
+
+}  // namespace pangea

@@ -1,0 +1,65 @@
+#pragma once
+
+// Which keyframes share descriptors with this one: an inverted index that needs no vocabulary file.
+//
+// The words are locality-sensitive hashes: table t's word is a fixed random choice of kWordBits of
+// the 256 descriptor bits (Indyk & Motwani, STOC 1998). A query also visits the words one bit away
+// (multi-probe; Lv et al., VLDB 2007). Every posting carries a signature of 32 other bits, so that
+// most chance collisions are seen without touching the descriptor (Hamming embedding; Jegou et al.,
+// ECCV 2008). A query corner votes once for each keyframe it meets, weighted by
+// log(keyframes / keyframes met), the idf of Sivic & Zisserman.
+//
+// Deterministic; no result depends on time. Memory: kTables * 8 bytes a corner, plus the heads.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/keyframe.h"
+
+namespace pangea {
+
+class DescriptorIndex {
+ public:
+  DescriptorIndex();
+
+  // Keyframes are numbered in the order they come: the first Add returns 0.
+  int Add(const std::vector<Corner>& corners);
+  int size() const { return static_cast<int>(num_corners_.size()); }
+
+  // For each keyframe how much of the query it shares: its votes as a share of what it would have
+  // if every query corner met it alone, 0 .. 1.
+  std::vector<float> Query(const std::vector<Corner>& corners) const;
+
+  // Postings a query compares against; the cost of one is constant.
+  int64_t CountPostings(const std::vector<Corner>& corners) const;
+
+ private:
+  static constexpr int kTables = 4;
+  static constexpr int kWordBits = 18;
+  static constexpr int kSignatureBits = 32;
+  static constexpr int kMaxSignatureDistance = 7;
+  // A word met more often than this tells nothing: bounds the time of a query.
+  static constexpr size_t kStopWordPostings = 2000;
+
+  struct Posting {
+    int32_t keyframe = 0;
+    uint32_t signature = 0;
+  };
+  struct Table {
+    std::array<uint8_t, kWordBits> word_bits{};
+    std::array<uint8_t, kSignatureBits> signature_bits{};
+    std::vector<std::vector<Posting>> postings;  // by word
+
+    uint32_t Word(const Descriptor& descriptor) const;
+    uint32_t Signature(const Descriptor& descriptor) const;
+  };
+  // Calls visit(posting list, signature) for each probed word.
+  template <typename Visit>
+  void Probe(const Descriptor& descriptor, Visit visit) const;
+
+  std::array<Table, kTables> tables_;
+  std::vector<int> num_corners_;  // of each keyframe
+};
+
+}  // namespace pangea

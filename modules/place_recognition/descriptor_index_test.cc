@@ -1,0 +1,63 @@
+#include "place_recognition/descriptor_index.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "place_recognition/test_world.h"
+
+namespace pangea {
+namespace {
+
+const MapId kMap{1, 1000};
+
+TEST(DescriptorIndex, TheSamePlaceScoresHighest) {
+  test::TestWorld world(1);
+  DescriptorIndex index;
+  for (int i = 0; i < 12; ++i) {  // all around the room
+    index.Add(world.See({kMap, i}, {0, 0, 1.5}, i * 0.5236).corners);
+  }
+  for (int i = 0; i < 12; ++i) {
+    const auto scores =
+        index.Query(world.See({kMap, 100 + i}, {0.5, 0.3, 1.6}, i * 0.5236).corners);
+    const auto best = std::max_element(scores.begin(), scores.end());
+    EXPECT_LE(std::abs(WrapAngle((best - scores.begin() - i) * 0.5236)), 0.53);
+    EXPECT_LE(*best, 1.0f);
+  }
+}
+
+TEST(DescriptorIndex, AnotherWorldScoresNearNothing) {
+  test::TestWorld world(1);
+  test::TestWorld other(2);
+  DescriptorIndex index;
+  for (int i = 0; i < 12; ++i) {
+    index.Add(world.See({kMap, i}, {0, 0, 1.5}, i * 0.5236).corners);
+  }
+  const auto strange = index.Query(other.See({kMap, 50}, {0, 0, 1.5}, 0).corners);
+  const auto same = index.Query(world.See({kMap, 50}, {0.2, 0, 1.5}, 0).corners);
+  EXPECT_LT(*std::max_element(strange.begin(), strange.end()),
+            0.5f * *std::max_element(same.begin(), same.end()));
+}
+
+TEST(DescriptorIndex, EmptyIndexAndEmptyKeyframe) {
+  test::TestWorld world(1);
+  DescriptorIndex index;
+  EXPECT_TRUE(index.Query(world.See({kMap, 0}, {0, 0, 1.5}, 0).corners).empty());
+  index.Add({});
+  EXPECT_EQ(index.Query(world.See({kMap, 0}, {0, 0, 1.5}, 0).corners), std::vector<float>{0.0f});
+  EXPECT_EQ(index.Query(std::vector<Corner>{}), std::vector<float>{0.0f});
+}
+
+TEST(DescriptorIndex, AQueryOfFiveThousandKeyframesComparesAFewPostingsPerCorner) {
+  test::TestWorld world(3, {.num_points = 100, .max_corners = 0, .clutter = 600});
+  DescriptorIndex index;
+  for (int i = 0; i < 5000; ++i) {
+    index.Add(world.See({kMap, i}, {0, 0, 1.5}, 0).corners);
+  }
+  const auto corners = world.See({kMap, 6000}, {0, 0, 1.5}, 0).corners;
+  // 3 million descriptors, exhaustively; here well below a thousandth of them.
+  EXPECT_LT(index.CountPostings(corners) / static_cast<int64_t>(corners.size()), 3000);
+}
+
+}  // namespace
+}  // namespace pangea

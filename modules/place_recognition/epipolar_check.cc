@@ -1,0 +1,303 @@
+#include "place_recognition/epipolar_check.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "common/rigid3.h"
+
+namespace pangea {
+namespace {
+
+using Pairs = std::vector<std::pair<CornerRay, CornerRay>>;
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+using Vector5d = Eigen::Matrix<double, 5, 1>;
+
+constexpr int kSampleSize = 3;
+constexpr int kRefinedDof = 5;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Below this parallax (in sigmas) the sign of a depth is noise.
+constexpr double kParallaxSigmas = 6.0;
+
+// The epipolar plane's normal of a pair as a function of yaw psi, with x = tan(psi / 2):
+//   (1 + x^2) (Rz(psi) a) x b = power[0] + power[1] x + power[2] x^2.
+struct Normal {
+  std::array<Eigen::Vector3d, 3> power;
+  Eigen::Vector3d At(double x) const { return power[0] + x * (power[1] + x * power[2]); }
+};
+
+Normal MakeNormal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const Eigen::Vector3d constant = Eigen::Vector3d(0, 0, a.z()).cross(b);
+  const Eigen::Vector3d cosine = Eigen::Vector3d(a.x(), a.y(), 0).cross(b);
+  const Eigen::Vector3d sine = Eigen::Vector3d(-a.y(), a.x(), 0).cross(b);
+  return {{constant + cosine, 2 * sine, constant - cosine}};
+}
+
+// det[n1 n2 n3] (1 + x^2)^3 has degree 6 and, as at x = i all three normals are perpendicular to
+// (1, i, 0), the factor 1 + x^2; what is left is a quartic. Coefficients from x^0 up.
+std::vector<double> YawPolynomial(const std::array<Normal, kSampleSize>& normals) {
+  std::array<Eigen::Vector3d, 5> cross;
+  cross.fill(Eigen::Vector3d::Zero());
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      cross[i + j] += normals[0].power[i].cross(normals[1].power[j]);
+    }
+  }
+  std::array<double, 7> sextic{};
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      sextic[i + j] += cross[i].dot(normals[2].power[j]);
+    }
+  }
+  std::vector<double> quartic(5);
+  for (int i = 4; i >= 0; --i) {
+    quartic[i] = sextic[i + 2] - (i + 2 <= 4 ? quartic[i + 2] : 0.0);
+  }
+  return quartic;
+}
+
+double Evaluate(const std::vector<double>& polynomial, double x) {
+  double value = 0;
+  for (size_t i = polynomial.size(); i-- > 0;) {
+    value = value * x + polynomial[i];
+  }
+  return value;
+}
+
+// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees), by bisection between the
+// roots of the derivative.
+std::vector<double> RealRoots(const std::vector<double>& polynomial) {
+  constexpr double kLargestRoot = 1e3;
+  constexpr int kHalvings = 50;
+  if (polynomial.size() < 2) {
+    return {};
+  }
+  std::vector<double> derivative;
+  for (size_t i = 1; i < polynomial.size(); ++i) {
+    derivative.push_back(static_cast<double>(i) * polynomial[i]);
+  }
+  std::vector<double> borders = RealRoots(derivative);
+  borders.push_back(kLargestRoot);
+  std::vector<double> roots;
+  double low = -kLargestRoot;
+  for (const double border : borders) {
+    const bool negative = Evaluate(polynomial, low) < 0;
+    if ((Evaluate(polynomial, border) < 0) != negative) {
+      double inside = low;
+      double outside = border;
+      for (int i = 0; i < kHalvings; ++i) {
+        const double middle = 0.5 * (inside + outside);
+        ((Evaluate(polynomial, middle) < 0) == negative ? inside : outside) = middle;
+      }
+      roots.push_back(0.5 * (inside + outside));
+    }
+    low = border;
+  }
+  return roots;
+}
+
+// Perpendicular to all three normals: the longest of their cross products.
+Eigen::Vector3d Translation(const std::array<Normal, kSampleSize>& normals, double x) {
+  Eigen::Vector3d longest = Eigen::Vector3d::Zero();
+  for (int i = 0; i < kSampleSize; ++i) {
+    const Eigen::Vector3d t = normals[i].At(x).cross(normals[(i + 1) % kSampleSize].At(x));
+    if (t.squaredNorm() > longest.squaredNorm()) {
+      longest = t;
+    }
+  }
+  return longest.isZero(0) ? Eigen::Vector3d::UnitX() : Eigen::Vector3d(longest.normalized());
+}
+
+std::vector<int> Inliers(const EpipolarModel& model, const Pairs& pairs, double max_residual) {
+  std::vector<int> inliers;
+  for (int i = 0; i < static_cast<int>(pairs.size()); ++i) {
+    if (model.Residual(pairs[i].first, pairs[i].second) <= max_residual) {
+      inliers.push_back(i);
+    }
+  }
+  return inliers;
+}
+
+// One Gauss-Newton step on the Sampson residuals of `inliers`; the tangent is a rotation about the
+// b axes and t's two directions on its sphere. Damped, because a rotation in place leaves t free.
+void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, double gravity_sigma,
+                EpipolarModel* model) {
+  const Eigen::Vector3d t = model->t_b_a;
+  const Eigen::Vector3d basis_1 = t.unitOrthogonal();
+  const Eigen::Vector3d basis_2 = t.cross(basis_1);
+  const Eigen::Matrix3d R = model->R_b_a.toRotationMatrix();
+  Matrix5d hessian = Matrix5d::Identity();
+  Vector5d gradient = Vector5d::Zero();
+  for (const int i : inliers) {
+    const auto& [a, b] = pairs[i];
+    const Eigen::Vector3d w = R * a.direction;
+    const Eigen::Vector3d v_cross_t = b.direction.cross(t);
+    const Eigen::Vector3d w_cross_t = w.cross(t);
+    // e = b . (t x w); its noise is a's turned by (b x t) and b's by (t x w), across the rays.
+    const double e = v_cross_t.dot(w);
+    const double variance = a.sigma * a.sigma * w.cross(v_cross_t).squaredNorm() +
+                            b.sigma * b.sigma * b.direction.cross(w_cross_t).squaredNorm();
+    const double weight = 1.0 / std::max(variance, 1e-18);
+    Vector5d jacobian;
+    jacobian.head<3>() = w.cross(v_cross_t);
+    const Eigen::Vector3d by_t = w.cross(b.direction);
+    jacobian[3] = basis_1.dot(by_t);
+    jacobian[4] = basis_2.dot(by_t);
+    hessian += weight * jacobian * jacobian.transpose();
+    gradient += weight * e * jacobian;
+  }
+  // The gravity prior: the part of the rotation that is no yaw.
+  const Eigen::Vector3d tilt = LogSo3(YawRotation(-YawOf(model->R_b_a)) * model->R_b_a);
+  for (int axis = 0; axis < 2; ++axis) {
+    hessian(axis, axis) += 1.0 / (gravity_sigma * gravity_sigma);
+    gradient[axis] += tilt[axis] / (gravity_sigma * gravity_sigma);
+  }
+  const Vector5d step = -hessian.ldlt().solve(gradient);
+  model->R_b_a = (ExpSo3(step.head<3>()) * model->R_b_a).normalized();
+  model->t_b_a = (t + step[3] * basis_1 + step[4] * basis_2).normalized();
+}
+
+// Local optimisation (Chum et al., DAGM 2003): from a wide inlier set to a narrow one.
+EpipolarModel Refine(const Pairs& pairs, EpipolarModel model, const EpipolarOptions& options) {
+  for (const double widen : {3.0, 2.0, 1.5, 1.0, 1.0}) {
+    const std::vector<int> inliers = Inliers(model, pairs, widen * options.max_residual);
+    if (static_cast<int>(inliers.size()) < kRefinedDof) {
+      break;
+    }
+    RefineStep(pairs, inliers, options.gravity_sigma, &model);
+  }
+  return model;
+}
+
+// How often wrongly paired corners of these keyframes obey the model.
+double ChanceOfInlier(const EpipolarModel& model, const Pairs& pairs, double max_residual) {
+  const int n = static_cast<int>(pairs.size());
+  int hits = 0;
+  int trials = 0;
+  for (int shift = 1; shift < n && trials < 1000; ++shift) {
+    for (int i = 0; i < n; ++i) {
+      hits += model.Residual(pairs[i].first, pairs[(i + shift) % n].second) <= max_residual;
+      ++trials;
+    }
+  }
+  return (hits + 1.0) / (trials + 2.0);
+}
+
+// log10 of P(at least k of n), each with chance p.
+double Log10BinomialTail(int n, int k, double p) {
+  double tail = 0;
+  double largest = -kInfinity;
+  std::vector<double> logs;
+  for (int j = k; j <= n; ++j) {
+    logs.push_back(std::lgamma(n + 1.0) - std::lgamma(j + 1.0) - std::lgamma(n - j + 1.0) +
+                   j * std::log(p) + (n - j) * std::log1p(-p));
+    largest = std::max(largest, logs.back());
+  }
+  for (const double log : logs) {
+    tail += std::exp(log - largest);
+  }
+  return (largest + std::log(tail)) / std::numbers::ln10;
+}
+
+int IterationsNeeded(double inlier_ratio, const EpipolarOptions& options) {
+  const double good_sample = std::pow(inlier_ratio, kSampleSize);
+  if (good_sample > 1 - 1e-9) {
+    return 1;
+  }
+  const double needed = std::log(1 - options.confidence) / std::log1p(-good_sample);
+  return static_cast<int>(std::min<double>(options.max_iterations, std::ceil(needed)));
+}
+
+std::vector<int> DrawSample(int n, std::mt19937_64& rng) {
+  std::vector<int> sample;
+  while (sample.size() < kSampleSize) {
+    const int i = static_cast<int>(rng() % static_cast<uint64_t>(n));
+    if (std::find(sample.begin(), sample.end(), i) == sample.end()) {
+      sample.push_back(i);
+    }
+  }
+  return sample;
+}
+
+}  // namespace
+
+double EpipolarModel::Residual(const CornerRay& a, const CornerRay& b) const {
+  const Eigen::Vector3d w = R_b_a * a.direction;
+  const Eigen::Vector3d b_cross_t = b.direction.cross(t_b_a);
+  const Eigen::Vector3d w_cross_t = w.cross(t_b_a);
+  const double e = b_cross_t.dot(w);
+  const double variance = a.sigma * a.sigma * w.cross(b_cross_t).squaredNorm() +
+                          b.sigma * b.sigma * b.direction.cross(w_cross_t).squaredNorm();
+  // depth_b b = depth_a w + s t, so depth_a (w x b) = s (b x t) and depth_b (w x b) = s (w x t).
+  const Eigen::Vector3d w_cross_b = w.cross(b.direction);
+  const double parallax = kParallaxSigmas * std::max(a.sigma, b.sigma);
+  if (w_cross_b.squaredNorm() > parallax * parallax &&
+      (w_cross_b.dot(b_cross_t) < 0 || w_cross_b.dot(w_cross_t) < 0)) {
+    return kInfinity;
+  }
+  return std::abs(e) / std::sqrt(std::max(variance, 1e-18));
+}
+
+std::vector<EpipolarModel> SolveThreePairs(const Pairs& pairs, const std::vector<int>& sample) {
+  std::array<Normal, kSampleSize> normals;
+  for (int i = 0; i < kSampleSize; ++i) {
+    normals[i] = MakeNormal(pairs[sample[i]].first.direction, pairs[sample[i]].second.direction);
+  }
+  std::vector<EpipolarModel> models;
+  for (const double x : RealRoots(YawPolynomial(normals))) {
+    const Eigen::Vector3d t = Translation(normals, x);
+    models.push_back({YawRotation(2 * std::atan(x)), t});
+    models.push_back({YawRotation(2 * std::atan(x)), -t});
+  }
+  std::erase_if(models, [&](const EpipolarModel& model) {
+    return std::any_of(sample.begin(), sample.end(), [&](int i) {
+      return model.Residual(pairs[i].first, pairs[i].second) == kInfinity;
+    });
+  });
+  return models;
+}
+
+EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed, const EpipolarOptions& options) {
+  EpipolarResult best;
+  const int n = static_cast<int>(pairs.size());
+  if (n < std::max(options.min_inliers, kRefinedDof + 1)) {
+    return best;
+  }
+  std::mt19937_64 rng(seed);
+  // A hypothesis still carries gravity's error: counted generously, then refined.
+  const double generous = 2.0 * options.max_residual;
+  size_t most = 0;
+  int iterations = options.max_iterations;
+  for (int i = 0; i < iterations; ++i) {
+    for (const EpipolarModel& model : SolveThreePairs(pairs, DrawSample(n, rng))) {
+      const size_t count = Inliers(model, pairs, generous).size();
+      if (count <= most) {
+        continue;
+      }
+      most = count;
+      const EpipolarModel refined = Refine(pairs, model, options);
+      std::vector<int> inliers = Inliers(refined, pairs, options.max_residual);
+      if (inliers.size() > best.inliers.size()) {
+        best.model = refined;
+        best.inliers = std::move(inliers);
+        iterations = IterationsNeeded(static_cast<double>(best.inliers.size()) / n, options);
+      }
+    }
+  }
+  const int count = static_cast<int>(best.inliers.size());
+  if (count < options.min_inliers) {
+    return best;
+  }
+  // The refined model's own degrees of freedom prove nothing.
+  const double chance = ChanceOfInlier(best.model, pairs, options.max_residual);
+  best.log10_false_alarms = std::log10(static_cast<double>(options.max_iterations)) +
+                            Log10BinomialTail(n - kRefinedDof, count - kRefinedDof, chance);
+  best.accepted = best.log10_false_alarms <= options.max_log10_false_alarms;
+  return best;
+}
+
+}  // namespace pangea

@@ -1,0 +1,66 @@
+#pragma once
+
+// Do matched corners of two keyframes obey one relative pose?
+//
+// Both cameras know gravity, so the relative rotation of their odom frames is a yaw and three
+// correspondences fix an essential matrix (Fraundorfer et al., IROS 2010): far fewer samples than
+// with five, and far fewer chance agreements. What survives is refined in all five degrees of
+// freedom, with the gravity known to a prior sigma only.
+//
+// How many inliers are enough follows from the matches themselves (a contrario, Moisan & Stival,
+// IJCV 2004): the chance that unrelated matches agree this well is measured on wrongly paired
+// corners of the same two keyframes. Nothing here asks for parallax: a rotation in place or a plane
+// fits many essential matrices, and any of them is a yes.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace pangea {
+
+struct EpipolarOptions {
+  double max_residual = 3.0;  // in sigmas: pixels at the image centre, on octave 0
+  // Gravity's own error between the two odom frames, radians, 1 sigma.
+  double gravity_sigma = 0.01;
+  int max_iterations = 500;
+  double confidence = 0.999;
+  int min_inliers = 10;
+  // log10 of how many sets of unrelated matches would be expected to pass: at most.
+  double max_log10_false_alarms = -2.0;
+};
+
+// A corner's ray: unit length, in its keyframe's odom (gravity-aligned) axes; sigma in radians.
+struct CornerRay {
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double sigma = 1e-3;
+};
+
+// p_b = R_b_a p_a + s * t_b_a, |t| = 1, s >= 0 unknown; a and b are axes parallel to the odom
+// frames, with the origins in the two cameras.
+struct EpipolarModel {
+  Eigen::Quaterniond R_b_a = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d t_b_a = Eigen::Vector3d::UnitX();
+
+  // First-order (Sampson) residual in sigmas; infinite where the point would lie behind a camera.
+  double Residual(const CornerRay& a, const CornerRay& b) const;
+};
+
+struct EpipolarResult {
+  EpipolarModel model;
+  std::vector<int> inliers;  // indices into the pairs, ascending
+  double log10_false_alarms = 0;
+  bool accepted = false;
+};
+
+// All models that fit three pairs exactly; exposed for its test.
+std::vector<EpipolarModel> SolveThreePairs(
+    const std::vector<std::pair<CornerRay, CornerRay>>& pairs, const std::vector<int>& sample);
+
+// The same pairs and the same seed give the same result.
+EpipolarResult CheckEpipolar(const std::vector<std::pair<CornerRay, CornerRay>>& pairs,
+                             uint64_t seed, const EpipolarOptions& options);
+
+}  // namespace pangea

@@ -1,0 +1,28 @@
+#pragma once
+
+// A second matching once a relative pose is known: along the epipolar line a corner has few rivals,
+// so repeated texture that failed the ratio test of the first matching finds its partner.
+
+#include <utility>
+#include <vector>
+
+#include "common/matching.h"
+#include "place_recognition/epipolar_check.h"
+
+namespace pangea {
+
+// A keyframe's corners and their rays, index by index; a ray of sigma 0 is unusable.
+struct CornersAndRays {
+  const std::vector<Corner>& corners;
+  const std::vector<CornerRay>& rays;
+};
+
+// Mutual nearest neighbours among the pairs within `max_residual` of the model (which takes a to
+// b), as (corner of a, corner of b), in the order of a.
+std::vector<std::pair<int, int>> MatchAlongEpipolarLines(const CornersAndRays& a,
+                                                         const CornersAndRays& b,
+                                                         const EpipolarModel& model,
+                                                         double max_residual,
+                                                         const MatchingOptions& options);
+
+}  // namespace pangea

@@ -1,0 +1,17 @@
+// pangea-place-recognition: KEYFRAME_*, MAP_STATE, HAVE -> PLACE_MATCH, on the server bus.
+
+#include <memory>
+
+#include "common/bus/process.h"
+#include "place_recognition/place_recognition_process.h"
+
+int main(int argc, char** argv) {
+  return pangea::ProcessMain(
+      argc, argv,
+      {"pangea-place-recognition",
+       "Finds, for each keyframe, the older keyframes of all maps that show the same place.", ""},
+      [](pangea::Bus& bus, const std::string&) {
+        return std::make_unique<pangea::PlaceRecognitionProcess>(bus,
+                                                                 pangea::PlaceRecognitionOptions{});
+      });
+}

@@ -1,0 +1,106 @@
+#pragma once
+
+// Which places does this keyframe show again? (the paper, section IV.C)
+//
+// In: keyframes of any number of maps, and which maps are fused. Out: for each keyframe one
+// PlaceMatch with the older keyframes that show the same place, with their corner matches.
+// Two searches by one inverted index: in the keyframe's own map, without what odometry still
+// connects it to, and in all other maps. The best few places of each are verified: corners matched
+// by descriptor, then one relative pose has to explain them (epipolar_check.h), which then guides a
+// second matching. Whether a candidate is true is for the geometry of inter_map_ba and fusion to
+// decide: this module would rather ask once too often.
+//
+// Deterministic: the same calls in the same order give the same matches. One thread.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "common/matching.h"
+#include "common/server_messages.h"
+#include "place_recognition/descriptor_index.h"
+#include "place_recognition/epipolar_check.h"
+
+namespace pangea {
+
+struct PlaceRecognitionOptions {
+  // Own map: a keyframe is recent while it is this near in seq or still shares a tracked landmark.
+  int min_seq_gap = 20;
+  // Places verified for each keyframe; a place is a run of 2 * place_half_width + 1 keyframes.
+  int own_places = 5;
+  int other_places = 8;
+  int place_half_width = 5;
+  // Keyframes beyond this many are still recognised but no longer remembered (about 90 kB each).
+  int max_keyframes = 20000;
+  MatchingOptions matching;
+  // Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
+  MatchingOptions guided_matching{.max_distance = 64, .max_ratio = 0.9, .other_corner_px = 5.0};
+  EpipolarOptions epipolar;
+};
+
+class PlaceRecognition {
+ public:
+  struct Counters {
+    int64_t keyframes = 0;
+    int64_t places_own = 0;  // verified
+    int64_t places_other = 0;
+    int64_t candidates_own = 0;  // published
+    int64_t candidates_other = 0;
+    int64_t rejected_matching = 0;
+    int64_t rejected_epipolar = 0;
+  };
+
+  explicit PlaceRecognition(PlaceRecognitionOptions options);
+
+  // Recognises, then remembers.
+  PlaceMatch Add(const Keyframe& keyframe);
+  // Remembers only: for keyframes whose match is known from an earlier run.
+  void Remember(const Keyframe& keyframe, const PlaceMatch& known);
+
+  // The maps of one group (a MAP_STATE). The highest revision wins, map by map.
+  void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps);
+
+  const Counters& counters() const { return counters_; }
+
+ private:
+  // What is kept of a keyframe.
+  struct Stored {
+    KeyframeId id;
+    std::vector<Corner> corners;
+    std::vector<CornerRay> rays;     // zero direction where a pixel cannot be undistorted
+    std::vector<int32_t> landmarks;  // ascending
+  };
+  struct Place {
+    int keyframe = 0;  // index into stored_
+    float score = 0;
+  };
+  struct MapGroup {
+    MapId group;
+    int64_t revision = -1;
+    bool fused = false;
+  };
+
+  static Stored MakeStored(const Keyframe& keyframe);
+  void Store(Stored stored);
+  bool IsRecent(const Stored& query, const Stored& other) const;
+  // Best first, one per run of neighbouring keyframes.
+  std::vector<Place> Places(const std::vector<Place>& hits) const;
+  // Of places in many maps, so that no map crowds out another.
+  std::vector<Place> Spread(const std::vector<Place>& places, int limit) const;
+  // Where the previous keyframe of this map was recognised, one step further.
+  std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits) const;
+  void Verify(const Stored& query, const Place& place, PlaceMatch* match);
+  PlaceKind Kind(const MapId& a, const MapId& b) const;
+  void RememberPlaces(const PlaceMatch& match);
+
+  PlaceRecognitionOptions options_;
+  DescriptorIndex index_;
+  std::vector<Stored> stored_;                             // numbered as in index_
+  std::map<MapId, std::vector<KeyframeId>> last_matches_;  // of each map's newest keyframe
+  std::map<MapId, MapGroup> groups_;
+  Counters counters_;
+};
+
+}  // namespace pangea

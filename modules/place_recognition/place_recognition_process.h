@@ -1,0 +1,70 @@
+#pragma once
+
+// place_recognition on a bus: KEYFRAME_* and MAP_STATE in, one PLACE_MATCH per keyframe out.
+//
+// Keyframes are taken in seq order, map by map; what is missing is asked for at ticks. After a
+// restart the journal's PLACE_MATCHes are asked for along with its keyframes: a keyframe that has
+// its match is only remembered, and those without one wait until all the others are in, so that no
+// pair of keyframes goes unseen. It answers requests for the newest PLACE_MATCHes itself.
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/in_order.h"
+#include "common/bus/node.h"
+#include "common/bus/process.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/map_state_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "pangea/resend_request_t.hpp"
+#include "place_recognition/place_recognition.h"
+
+namespace pangea {
+
+class PlaceRecognitionProcess : public Process {
+ public:
+  PlaceRecognitionProcess(Bus& bus, PlaceRecognitionOptions options);
+
+  void Tick(int64_t now_utime) override;
+
+ private:
+  // Nothing: a seq that will never come (the next keyframe's odometry edge bridges it).
+  using Item = std::optional<Keyframe>;
+
+  struct Asked {
+    int32_t next = -1;  // what was missing first when we asked
+    int64_t utime = 0;
+  };
+
+  void OnKeyframe(const keyframe_t& message);
+  void OnHave(const have_t& message);
+  void OnAgain(const again_t& message);
+  void OnMapState(const map_state_t& message);
+  void OnResendRequest(const resend_request_t& message);
+
+  void Enqueue(const MapId& map, int32_t seq, Item item);
+  void Handle(const Keyframe& keyframe);
+  void Recognise(const Keyframe& keyframe);
+  void ReleaseHeld();
+  void AskForGaps(int64_t now_utime);
+  void PublishStatus(int64_t now_utime);
+
+  Node node_;
+  PlaceRecognition recognition_;
+  InOrder<Item> keyframes_;
+  std::map<MapId, Asked> asked_;
+  // Catching up after a restart.
+  bool catching_up_ = false;
+  int ticks_without_keyframe_ = 0;
+  std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
+  std::deque<Keyframe> held_;                       // without a match
+  std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again
+  int64_t next_status_utime_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,256 @@
+#include "place_recognition/place_recognition_process.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <utility>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/status_t.hpp"
+#include "place_recognition/test_world.h"
+
+namespace pangea {
+namespace {
+
+constexpr int kRound = 32;
+const MapId kMapA{1, 1000};
+const MapId kMapB{2, 2000};
+
+using Payload = std::vector<uint8_t>;
+
+template <typename Message>
+Payload Encode(const Message& message) {
+  Payload bytes(message.getEncodedSize());
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+std::vector<keyframe_t> Round(test::TestWorld& world, const MapId& map, int count) {
+  std::vector<keyframe_t> keyframes;
+  for (int seq = 0; seq < count; ++seq) {
+    const double yaw = 2 * M_PI * seq / kRound;
+    Keyframe keyframe = world.See({map, seq}, {2 * std::cos(yaw), 2 * std::sin(yaw), 1.5}, yaw);
+    if (seq > 0) {
+      keyframe.edge = OdometryEdge{seq - 1, {}, Matrix6d::Identity()};
+    }
+    keyframes.push_back(ToMessage(keyframe));
+  }
+  return keyframes;
+}
+
+// A server bus with the process on it, and all that it publishes.
+struct Server {
+  Server() : process(bus, {}) {
+    bus.Subscribe("PLACE_MATCH", [this](const std::string&, Bytes data) {
+      matches.emplace_back(data.begin(), data.end());
+    });
+    bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
+      requests.emplace_back();
+      ASSERT_TRUE(DecodeMessage(data, &requests.back()));
+    });
+    bus.Subscribe("STATUS_place_recognition", [this](const std::string&, Bytes data) {
+      ASSERT_TRUE(DecodeMessage(data, &status));
+    });
+  }
+  void Send(const keyframe_t& keyframe) {
+    PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), keyframe);
+    bus.Drain();
+  }
+  void Again(const std::string& channel, const Payload& payload) {
+    again_t again{};
+    again.channel = channel;
+    again.data.assign(payload.begin(), payload.end());
+    again.num_bytes = static_cast<int16_t>(payload.size());
+    PublishMessage(bus, "AGAIN_place_recognition", again);
+    bus.Drain();
+  }
+  void Have(const std::vector<std::pair<MapId, int>>& maps) {
+    have_t have{};
+    for (const auto& [map, seq] : maps) {
+      have.maps.push_back(ToMessage(map));
+      have.highest_seq.push_back(seq);
+    }
+    have.num_maps = static_cast<int16_t>(maps.size());
+    PublishMessage(bus, "HAVE", have);
+    bus.Drain();
+  }
+  void Tick() {
+    process.Tick(now += 1'000'000);
+    bus.Drain();
+  }
+  place_match_t Match(size_t i) const {
+    place_match_t match{};
+    EXPECT_TRUE(DecodeMessage(matches.at(i), &match));
+    return match;
+  }
+
+  LocalBus bus;
+  PlaceRecognitionProcess process;
+  std::vector<Payload> matches;
+  std::vector<resend_request_t> requests;
+  status_t status{};
+  int64_t now = 0;
+};
+
+TEST(PlaceRecognitionProcess, OneMatchPerKeyframeInOrderWhateverTheOrderAndRepeats) {
+  test::TestWorld world(1);
+  const auto keyframes = Round(world, kMapA, 8);
+  Server straight;
+  for (const keyframe_t& keyframe : keyframes) {
+    straight.Send(keyframe);
+  }
+  Server shuffled;
+  for (const int i : {0, 0, 2, 1, 3, 6, 6, 5, 4, 7, 1, 7}) {
+    shuffled.Send(keyframes[i]);
+  }
+  ASSERT_EQ(straight.matches.size(), 8u);
+  EXPECT_EQ(straight.matches, shuffled.matches);
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_EQ(straight.Match(i).query.seq, i);
+  }
+}
+
+TEST(PlaceRecognitionProcess, MatchesTwoMapsAndObeysTheGroups) {
+  test::TestWorld world(2);
+  Server server;
+  const auto keyframes = Round(world, kMapA, kRound + 5);
+  for (int i = 0; i < kRound + 4; ++i) {
+    server.Send(keyframes[i]);
+  }
+  const auto keyframes_b = Round(world, kMapB, 2);
+  server.Send(keyframes_b[0]);
+  ASSERT_EQ(server.matches.size(), kRound + 5u);
+  const place_match_t own = server.Match(kRound + 3);
+  ASSERT_GT(own.num_candidates, 0);
+  EXPECT_EQ(own.candidates[0].kind, place_candidate_t::KIND_INTRA);
+  const place_match_t other = server.Match(kRound + 4);
+  ASSERT_GT(other.num_candidates, 0);
+  EXPECT_EQ(other.candidates[0].kind, place_candidate_t::KIND_INTER);
+  MapState fused;
+  fused.group = kMapA;
+  fused.revision = 1;
+  fused.maps = {kMapA, kMapB};
+  for (const map_state_t& chunk : ToMessages(fused)) {
+    PublishMessage(server.bus, "MAP_STATE", chunk);
+  }
+  server.Send(keyframes[kRound + 4]);
+  const place_match_t in_group = server.Match(kRound + 5);
+  ASSERT_GT(in_group.num_candidates, 0);
+  for (const place_candidate_t& candidate : in_group.candidates) {
+    EXPECT_EQ(candidate.kind, place_candidate_t::KIND_INTER);
+  }
+}
+
+TEST(PlaceRecognitionProcess, AsksForAGapAndForALostTail) {
+  test::TestWorld world(3);
+  const auto keyframes = Round(world, kMapA, 4);
+  Server server;
+  server.Send(keyframes[0]);
+  server.Send(keyframes[2]);
+  server.Tick();
+  ASSERT_EQ(server.requests.size(), 1u);
+  EXPECT_EQ(server.requests[0].channel, "KEYFRAME_1");
+  EXPECT_EQ(server.requests[0].requester, "place_recognition");
+  EXPECT_EQ(server.requests[0].from_seq, 1);
+  EXPECT_EQ(server.requests[0].to_seq, 1);
+  EXPECT_EQ(server.status.pending, 1);
+  server.Again("KEYFRAME_1", Encode(keyframes[1]));
+  EXPECT_EQ(server.matches.size(), 3u);
+  server.Have({{kMapA, 3}});
+  server.Tick();
+  ASSERT_EQ(server.requests.size(), 2u);
+  EXPECT_EQ(server.requests[1].from_seq, 3);
+  server.Again("KEYFRAME_1", Encode(keyframes[3]));
+  server.Tick();
+  EXPECT_EQ(server.matches.size(), 4u);
+  EXPECT_EQ(server.requests.size(), 2u);
+  EXPECT_EQ(server.status.pending, 0);
+}
+
+TEST(PlaceRecognitionProcess, AGapBridgedByTheNextEdgeIsNotWaitedFor) {
+  test::TestWorld world(4);
+  auto keyframes = Round(world, kMapA, 5);
+  Server server;
+  server.Send(keyframes[0]);
+  keyframes[4].edge_from_seq = 0;
+  server.Send(keyframes[4]);
+  server.Tick();
+  ASSERT_EQ(server.matches.size(), 2u);
+  EXPECT_EQ(server.Match(1).query.seq, 4);
+  EXPECT_TRUE(server.requests.empty());
+  EXPECT_EQ(server.status.dropped, 3);
+}
+
+TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesNoPair) {
+  test::TestWorld world(5);
+  const auto a = Round(world, kMapA, 4);
+  const auto b = Round(world, kMapB, 4);
+  Server before;
+  for (int i = 0; i < 3; ++i) {
+    before.Send(a[i]);
+    before.Send(b[i]);
+  }
+  Server after;  // a#3 and b#3 arrived while it was down
+  after.Have({{kMapA, 3}, {kMapB, 3}});
+  after.Tick();
+  ASSERT_EQ(after.requests.size(), 4u);
+  EXPECT_EQ(after.requests[0].channel, "PLACE_MATCH");
+  EXPECT_EQ(after.requests[1].channel, "KEYFRAME_1");
+  for (const Payload& match : before.matches) {
+    after.Again("PLACE_MATCH", match);
+  }
+  for (const keyframe_t& keyframe : a) {
+    after.Again("KEYFRAME_1", Encode(keyframe));
+  }
+  EXPECT_TRUE(after.matches.empty());  // a#3 waits for map B
+  for (const keyframe_t& keyframe : b) {
+    after.Again("KEYFRAME_2", Encode(keyframe));
+  }
+  ASSERT_EQ(after.matches.size(), 2u);
+  EXPECT_EQ(after.Match(0).query.seq, 3);
+  EXPECT_GT(after.Match(0).num_candidates, 0);
+  EXPECT_EQ(after.Match(1).query.seq, 3);
+  EXPECT_GT(after.Match(1).num_candidates, 0);
+}
+
+TEST(PlaceRecognitionProcess, SendsItsMatchesAgainAsTheyWere) {
+  test::TestWorld world(6);
+  Server server;
+  for (const keyframe_t& keyframe : Round(world, kMapA, 3)) {
+    server.Send(keyframe);
+  }
+  std::vector<again_t> answers;
+  server.bus.Subscribe("AGAIN_fusion", [&](const std::string&, Bytes data) {
+    answers.emplace_back();
+    ASSERT_TRUE(DecodeMessage(data, &answers.back()));
+  });
+  resend_request_t request{};
+  request.requester = "fusion";
+  request.channel = "PLACE_MATCH";
+  request.map = ToMessage(kMapA);
+  request.from_seq = 1;
+  request.to_seq = 9;
+  PublishMessage(server.bus, "RESEND_REQUEST", request);
+  server.bus.Drain();
+  ASSERT_EQ(answers.size(), 2u);
+  EXPECT_EQ(Payload(answers[0].data.begin(), answers[0].data.end()), server.matches[1]);
+}
+
+TEST(PlaceRecognitionProcess, GarbageIsCountedNotObeyed) {
+  test::TestWorld world(7);
+  Server server;
+  auto keyframe = Round(world, kMapA, 1)[0];
+  keyframe.camera.fx = NAN;
+  server.Send(keyframe);
+  const Payload junk(50, 0xAB);
+  server.bus.Publish("KEYFRAME_1", junk);
+  server.Again("KEYFRAME_1", junk);
+  server.Again("PLACE_MATCH", junk);
+  server.Tick();
+  EXPECT_TRUE(server.matches.empty());
+  EXPECT_GE(server.status.num_refused, 3);
+}
+
+}  // namespace
+}  // namespace pangea
