@@ -1,0 +1,371 @@
+// Sender and receiver against each other over a channel that loses, doubles, delays and reorders by
+// a seeded script.
+
+#include <gtest/gtest.h>
+
+#include <queue>
+#include <random>
+
+#include "common/link/receiver.h"
+#include "common/link/sender.h"
+
+namespace pangea {
+namespace {
+
+const MapId kMap{1, 1000};
+const MapId kLaterMap{1, 2000};
+
+std::vector<uint8_t> Content(const KeyframeId& id) {
+  std::mt19937_64 rng(StableHash(id, id, 0));
+  std::vector<uint8_t> bytes(5'000 + rng() % 35'000);
+  for (uint8_t& byte : bytes) {
+    byte = static_cast<uint8_t>(rng());
+  }
+  return bytes;
+}
+
+struct Channel {
+  double loss = 0;
+  double doubled = 0;
+  int64_t delay_us = 0;
+  int64_t jitter_us = 0;
+};
+
+template <typename T>
+class Pipe {
+ public:
+  Pipe(const Channel& channel, uint64_t seed) : channel_(channel), rng_(seed) {}
+  void Push(int64_t now, const T& item) {
+    const int copies = 1 + (Unit() < channel_.doubled ? 1 : 0);
+    for (int i = 0; i < copies; ++i) {
+      if (Unit() >= channel_.loss) {
+        const auto jitter = static_cast<int64_t>(Unit() * static_cast<double>(channel_.jitter_us));
+        waiting_.emplace(now + channel_.delay_us + jitter, item);
+      }
+    }
+  }
+  std::vector<T> Pop(int64_t now) {
+    std::vector<T> out;
+    while (!waiting_.empty() && waiting_.begin()->first <= now) {
+      out.push_back(waiting_.begin()->second);
+      waiting_.erase(waiting_.begin());
+    }
+    return out;
+  }
+
+ private:
+  double Unit() { return std::uniform_real_distribution<double>(0, 1)(rng_); }
+  Channel channel_;
+  std::mt19937_64 rng_;
+  std::multimap<int64_t, T> waiting_;
+};
+
+// One agent, one server, an hour of simulated milliseconds at most.
+class World {
+ public:
+  World(const Channel& channel, uint64_t seed, const SenderOptions& options = {})
+      : sender(1, 10, options),
+        receiver(std::make_unique<Receiver>(ReceiverOptions{}, CheckContent)),
+        up_(channel, seed),
+        down_(channel, seed + 1) {}
+
+  static std::string CheckContent(const KeyframeId& id, Bytes bytes) {
+    const auto expected = Content(id);
+    return std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end()) ? "" : "wrong";
+  }
+
+  void Spool(const MapId& map, int count) {
+    for (int seq = 0; seq < count; ++seq) {
+      ASSERT_TRUE(sender.Add({map, seq}, Content({map, seq})));
+    }
+    sender.SetNext(map, 0);
+  }
+
+  void Hello(const std::vector<MapId>& maps) {
+    LinkHello hello;
+    for (const MapId& map : maps) {
+      hello.maps.push_back({map, 0, 0});
+    }
+    receiver->OnHello(hello);
+    SendAck();
+  }
+
+  void SendAck() {
+    LinkAck ack;
+    ack.agent_id = 1;
+    ack.run = 1;
+    ack.number = ++acks_;
+    ack.highest_number = highest_number_;
+    receiver->FillAck(&ack);
+    const auto parsed = Parse(ToMessage(ack));
+    ASSERT_TRUE(parsed.value) << parsed.refused;
+    EXPECT_LE(ToMessage(ack).getEncodedSize(), 1400);
+    down_.Push(now, *parsed.value);
+  }
+
+  void Step() {
+    now += 5'000;
+    for (const LinkPacket& packet : sender.Poll(now)) {
+      const link_packet_t message = ToMessage(packet);
+      largest_packet = std::max(largest_packet, message.getEncodedSize());
+      ++packets_sent;
+      up_.Push(now, message);
+    }
+    most_in_flight = std::max(most_in_flight, sender.in_flight_bytes());
+    for (const link_packet_t& message : up_.Pop(now)) {
+      const auto parsed = Parse(message);
+      ASSERT_TRUE(parsed.value) << parsed.refused;
+      highest_number_ = std::max(highest_number_, parsed.value->number);
+      refusals += receiver->Add(*parsed.value).empty() ? 0 : 1;
+      most_cached = std::max(most_cached, receiver->cached_bytes());
+    }
+    for (const auto& keyframe : receiver->TakeReady()) {
+      taken.push_back(keyframe.id);
+      receiver->Journalled(keyframe.id);
+    }
+    if (now % 20'000 == 0) {
+      SendAck();
+    }
+    for (const LinkAck& ack : down_.Pop(now)) {
+      if (ack.number <= newest_ack_) {
+        continue;
+      }
+      newest_ack_ = ack.number;
+      sender.OnAck(ack, now);
+      for (const auto& [map, seq] : ack.journalled_seq) {
+        sender.SetNext(map, seq + 1);
+      }
+    }
+  }
+
+  void RunUntilDelivered(int64_t limit_s) {
+    while (sender.spooled() > 0 && now < limit_s * 1'000'000) {
+      Step();
+    }
+  }
+
+  Sender sender;
+  std::unique_ptr<Receiver> receiver;
+  int64_t now = 0;
+  std::vector<KeyframeId> taken;
+  int most_in_flight = 0;
+  int64_t most_cached = 0;
+  int largest_packet = 0;
+  int64_t packets_sent = 0;
+  int refusals = 0;
+
+ private:
+  Pipe<link_packet_t> up_;
+  Pipe<LinkAck> down_;
+  int64_t acks_ = 0;
+  int64_t newest_ack_ = 0;
+  int64_t highest_number_ = 0;
+};
+
+std::vector<KeyframeId> InOrderIds(const MapId& map, int count) {
+  std::vector<KeyframeId> ids;
+  for (int seq = 0; seq < count; ++seq) {
+    ids.push_back({map, seq});
+  }
+  return ids;
+}
+
+class LossyLink : public testing::TestWithParam<std::tuple<Channel, uint64_t>> {};
+
+TEST_P(LossyLink, EverythingArrivesOnceInOrderInBoundedMemory) {
+  const auto& [channel, seed] = GetParam();
+  World world(channel, seed);
+  world.Hello({kMap});
+  world.Spool(kMap, 60);
+  world.RunUntilDelivered(600);
+  EXPECT_EQ(world.taken, InOrderIds(kMap, 60));
+  EXPECT_EQ(world.sender.spooled(), 0u);
+  EXPECT_EQ(world.sender.spooled_bytes(), 0);
+  EXPECT_EQ(world.sender.in_flight_bytes(), 0);
+  EXPECT_EQ(world.receiver->pending(), 0u);
+  EXPECT_EQ(world.receiver->cached_bytes(), 0);
+  EXPECT_LE(world.most_cached, 210 * 1024);
+  EXPECT_LE(world.most_in_flight, 64'000);
+  EXPECT_LE(world.largest_packet, 1400);
+}
+
+INSTANTIATE_TEST_SUITE_P(Channels, LossyLink,
+                         testing::Combine(testing::Values(Channel{}, Channel{0, 0, 50'000, 0},
+                                                          Channel{0.05, 0.05, 20'000, 10'000},
+                                                          Channel{0.1, 0, 5'000, 100'000},
+                                                          Channel{0.3, 0.2, 30'000, 60'000},
+                                                          Channel{0.1, 0, 2'000'000, 0}),
+                                          testing::Values(1, 2, 3)));
+
+// Overhead without loss: nothing is sent twice, and headers are below 6 %.
+TEST(Link, CleanChannelSendsNothingTwice) {
+  World world({0, 0, 10'000, 0}, 1);
+  world.Hello({kMap});
+  world.Spool(kMap, 60);
+  const int64_t spooled = world.sender.spooled_bytes();
+  world.RunUntilDelivered(60);
+  EXPECT_EQ(world.sender.resent(), 0);
+  EXPECT_EQ(world.refusals, 0);
+  EXPECT_LE(world.packets_sent * 1200, spooled + 60 * 1200);
+}
+
+// At 10 % loss (of acknowledgements too) the traffic stays below 1.3 times the keyframes.
+TEST(Link, RepeatsStayModestUnderLoss) {
+  World world({0.1, 0, 20'000, 5'000}, 4);
+  world.Hello({kMap});
+  world.Spool(kMap, 200);
+  const int64_t spooled = world.sender.spooled_bytes();
+  world.RunUntilDelivered(600);
+  EXPECT_EQ(world.sender.spooled(), 0u);
+  EXPECT_LT(static_cast<double>(world.packets_sent * 1200), 1.3 * static_cast<double>(spooled));
+}
+
+TEST(Link, TwoMapsAreDeliveredEachInOrder) {
+  World world({0.1, 0.1, 10'000, 30'000}, 5);
+  world.Hello({kMap, kLaterMap});
+  world.Spool(kMap, 20);
+  world.Spool(kLaterMap, 20);
+  world.RunUntilDelivered(600);
+  auto expected = InOrderIds(kMap, 20);
+  const auto later = InOrderIds(kLaterMap, 20);
+  std::vector<KeyframeId> got_first, got_later;
+  for (const KeyframeId& id : world.taken) {
+    (id.map == kMap ? got_first : got_later).push_back(id);
+  }
+  EXPECT_EQ(got_first, expected);
+  EXPECT_EQ(got_later, later);
+}
+
+TEST(Link, AnotherPacketSizeWorksToo) {
+  for (const int payload : {256, 4096, 30'000}) {
+    SenderOptions options;
+    options.payload_bytes = payload;
+    ASSERT_FALSE(options.Invalid());
+    World world({0.1, 0, 10'000, 10'000}, 6, options);
+    world.Hello({kMap});
+    world.Spool(kMap, 20);
+    world.RunUntilDelivered(600);
+    EXPECT_EQ(world.taken, InOrderIds(kMap, 20)) << payload;
+  }
+}
+
+// The receiver forgets everything but its journal.
+TEST(Link, RestartedReceiverGoesOnFromItsJournal) {
+  World world({0.1, 0, 10'000, 10'000}, 7);
+  world.Hello({kMap});
+  world.Spool(kMap, 40);
+  while (world.taken.size() < 15) {
+    world.Step();
+  }
+  const int32_t journalled = world.taken.back().seq;
+  world.receiver = std::make_unique<Receiver>(ReceiverOptions{}, World::CheckContent);
+  world.receiver->Resume(kMap, journalled);
+  world.RunUntilDelivered(600);
+  EXPECT_EQ(world.taken, InOrderIds(kMap, 40));
+}
+
+TEST(Sender, FullSpoolRefusesTheNewest) {
+  SenderOptions options;
+  options.max_spool_bytes = 100'000;
+  Sender sender(1, 1, options);
+  EXPECT_TRUE(sender.Add({kMap, 0}, std::vector<uint8_t>(60'000)));
+  EXPECT_FALSE(sender.Add({kMap, 1}, std::vector<uint8_t>(60'000)));
+  EXPECT_TRUE(sender.Has({kMap, 0}));
+  sender.SetNext(kMap, 1);
+  EXPECT_TRUE(sender.Add({kMap, 1}, std::vector<uint8_t>(60'000)));
+}
+
+TEST(Sender, PacesToItsRate) {
+  SenderOptions options;
+  options.rate_bytes_per_s = 100'000;
+  World world({}, 1, options);
+  world.Hello({kMap});
+  world.Spool(kMap, 60);
+  const int64_t bytes = world.sender.spooled_bytes();
+  world.RunUntilDelivered(600);
+  EXPECT_GE(static_cast<double>(world.now) * 1e-6, static_cast<double>(bytes) / 100'000 - 0.5);
+  EXPECT_LE(static_cast<double>(world.now) * 1e-6, static_cast<double>(bytes) / 100'000 * 1.2);
+}
+
+LinkPacket PacketOf(const KeyframeId& id, int index) {
+  Sender sender(id.map.agent_id, 1, {});
+  const auto content = Content(id);
+  LinkPacket packet = sender.Wrap(LinkPacket::Kind::kKeyframe, {});
+  const Bytes piece = Piece(content, 1200, index);
+  packet.keyframe = id;
+  packet.index = index;
+  packet.count = NumPieces(static_cast<int>(content.size()), 1200);
+  packet.offset = index * 1200;
+  packet.total_bytes = static_cast<int>(content.size());
+  packet.crc32 = Crc32(content);
+  packet.data.assign(piece.begin(), piece.end());
+  return packet;
+}
+
+void AddAll(Receiver* receiver, const KeyframeId& id) {
+  for (int i = 0; i < PacketOf(id, 0).count; ++i) {
+    receiver->Add(PacketOf(id, i));
+  }
+}
+
+TEST(Receiver, RefusesWhatNobodyAnnounced) {
+  Receiver receiver({}, World::CheckContent);
+  EXPECT_NE(receiver.Add(PacketOf({kMap, 0}, 0)), "");
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  EXPECT_EQ(receiver.Add(PacketOf({kMap, 0}, 0)), "");
+  EXPECT_NE(receiver.Add(PacketOf({kMap, 500}, 0)), "");
+}
+
+TEST(Receiver, ForgedPiecesCostARepeatOnly) {
+  Receiver receiver({}, World::CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  LinkPacket forged = PacketOf({kMap, 0}, 0);
+  forged.crc32 ^= 1;
+  receiver.Add(forged);
+  AddAll(&receiver, {kMap, 0});
+  ASSERT_EQ(receiver.TakeReady().size(), 1u);
+  // A forged piece under the true checksum spoils the keyframe, which is then sent again.
+  LinkPacket spoiled = PacketOf({kMap, 1}, 0);
+  spoiled.data[0] ^= 1;
+  receiver.Add(spoiled);
+  AddAll(&receiver, {kMap, 1});
+  EXPECT_TRUE(receiver.TakeReady().empty());
+  AddAll(&receiver, {kMap, 1});
+  EXPECT_EQ(receiver.TakeReady().size(), 1u);
+}
+
+TEST(Receiver, EarlierKeyframesMakeRoomInAFullCache) {
+  Receiver receiver({100'000}, World::CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  for (int seq = 1; seq < 10; ++seq) {
+    AddAll(&receiver, {kMap, seq});
+  }
+  EXPECT_LE(receiver.cached_bytes(), 100'000);
+  EXPECT_TRUE(receiver.TakeReady().empty());
+  AddAll(&receiver, {kMap, 0});
+  EXPECT_LE(receiver.cached_bytes(), 100'000);
+  EXPECT_FALSE(receiver.TakeReady().empty());
+}
+
+TEST(Receiver, WhatTheUplinkCannotDeliverIsGivenUpAndCounted) {
+  Receiver receiver({}, World::CheckContent);
+  receiver.OnHello({"", {{kMap, 5, 0}}});
+  EXPECT_EQ(receiver.given_up(), 5);
+  AddAll(&receiver, {kMap, 5});
+  const auto ready = receiver.TakeReady();
+  ASSERT_EQ(ready.size(), 1u);
+  EXPECT_EQ(ready[0].id.seq, 5);
+}
+
+TEST(Receiver, AnnouncedMapsThatBringNothingAreForgotten) {
+  Receiver receiver({}, World::CheckContent);
+  for (int i = 1; i < 1000; ++i) {
+    receiver.OnHello({"", {{{1, i}, 0, 0}}});
+    receiver.Add(PacketOf({{1, i}, 0}, 0));
+  }
+  EXPECT_EQ(receiver.num_maps(), 1u);
+  EXPECT_EQ(receiver.pending(), 1u);
+}
+
+}  // namespace
+}  // namespace pangea

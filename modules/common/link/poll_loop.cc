@@ -1,0 +1,50 @@
+#include "common/link/poll_loop.h"
+
+#include <poll.h>
+
+#include <chrono>
+#include <stdexcept>
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kTickInterval_us = 100'000;
+// Messages handled of one bus before the other has its turn and Poll may send.
+constexpr int kBatch = 32;
+
+void HandleWaiting(LcmBus& bus) {
+  for (int i = 0; i < kBatch && bus.Handle(0); ++i) {
+  }
+}
+
+}  // namespace
+
+int64_t SteadyMicros() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process) {
+  InstallSignalHandlers();
+  int64_t next_tick = 0;
+  int timeout_ms = 0;
+  while (!StopRequested()) {
+    pollfd fds[2] = {{a.fd(), POLLIN, 0}, {b.fd(), POLLIN, 0}};
+    if (fds[0].fd < 0 || fds[1].fd < 0) {
+      throw std::runtime_error("the bus connection is gone");
+    }
+    poll(fds, 2, timeout_ms);
+    HandleWaiting(a);
+    HandleWaiting(b);
+    timeout_ms = process.Poll(SteadyMicros());
+    const int64_t now = SteadyMicros();
+    if (now >= next_tick) {
+      process.Tick(WallUtime());
+      next_tick = now + kTickInterval_us;
+    }
+  }
+  return 0;
+}
+
+}  // namespace pangea

@@ -1,0 +1,83 @@
+#pragma once
+
+// The server's half of the link, for one agent: puts packets together to keyframes in a bounded
+// receive cache (paper, IV.A: 210 KiB), checks them, hands them over in seq order per map, and says
+// what it has. A state machine: no clock, no bus, one thread.
+//
+// A keyframe stays in the cache's account until it is journalled. Full cache: a packet of a later
+// keyframe is dropped (it will be sent again); for an earlier one the latest make room.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/link/wire.h"
+
+namespace pangea {
+
+struct ReceiverOptions {
+  int cache_bytes = 210 * 1024;
+};
+
+class Receiver {
+ public:
+  // Why a complete message is no valid keyframe of this id; empty if it is one.
+  using Check = std::function<std::string(const KeyframeId&, Bytes)>;
+
+  struct Keyframe {
+    KeyframeId id;
+    std::vector<uint8_t> bytes;
+  };
+
+  Receiver(const ReceiverOptions& options, Check check);
+
+  // The journal already has this map up to `journalled_seq`.
+  void Resume(const MapId& map, int32_t journalled_seq);
+  // Only maps of a hello (or of the journal) are received. What the uplink cannot deliver any more
+  // is given up here, and counted.
+  void OnHello(const LinkHello& hello);
+  // A keyframe packet; why it was refused, or an empty string (a repeat is no fault).
+  std::string Add(const LinkPacket& packet);
+  // The keyframes that are complete and next in their map, each once. Say when they are on disk.
+  std::vector<Keyframe> TakeReady();
+  void Journalled(const KeyframeId& id);
+
+  void FillAck(LinkAck* ack) const;
+
+  // Keyframes in the cache: being put together, or not yet journalled.
+  size_t pending() const { return cache_.size(); }
+  int64_t cached_bytes() const { return cached_bytes_; }
+  int64_t given_up() const { return given_up_; }
+  size_t num_maps() const { return maps_.size(); }
+
+ private:
+  struct Map {
+    int32_t next = 0;  // to hand over
+    int32_t journalled = -1;
+  };
+  struct Entry {
+    std::vector<uint8_t> bytes;
+    std::vector<uint8_t> received;  // bits
+    uint32_t crc32 = 0;
+    int count = 0;
+    int missing = 0;
+    int total_bytes = 0;
+    bool taken = false;
+  };
+
+  bool MakeRoom(const KeyframeId& id, int bytes);
+  Entry* FindOrStart(const LinkPacket& packet);
+  std::string Complete(const KeyframeId& id, const Entry& entry);
+  void Erase(std::map<KeyframeId, Entry>::iterator it);
+
+  const ReceiverOptions options_;
+  Check check_;
+  std::map<MapId, Map> maps_;
+  std::map<KeyframeId, Entry> cache_;
+  int64_t cached_bytes_ = 0;
+  int64_t given_up_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,106 @@
+#pragma once
+
+// The agent's half of the link: keeps keyframes until they are acknowledged, cuts them into
+// packets, paces them, and sends again what is missing. A state machine: time goes in, packets come
+// out; no clock, no bus, one thread.
+//
+// In each map keyframes go out in seq order without gaps, so the other side never has to hold more
+// than the few that are under way. What is lost is seen in the order of transmission numbers (a
+// packet sent 24 numbers before one that arrived is gone), or after a time-out that follows the
+// measured round trip (RFC 6298's estimator) and doubles with each try.
+//
+// Bounds: the spool (options) refuses new keyframes when it is full: the oldest are the ones the
+// pose chain hangs on, and the newest can still be asked from the odometry. In flight: options.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/link/pacer.h"
+#include "common/link/wire.h"
+
+namespace pangea {
+
+struct SenderOptions {
+  int payload_bytes = 1200;  // data per packet; 1200 fits one Ethernet frame, the paper has 4096
+  double rate_bytes_per_s = 4e6;
+  int max_in_flight_bytes = 64'000;     // sent, neither arrived nor given up
+  int64_t max_spool_bytes = 256 << 20;  // about 9,000 keyframes, an hour's walk
+  // Why the options cannot be used, or nothing.
+  std::optional<std::string> Invalid() const;
+};
+
+class Sender {
+ public:
+  // `run`: wall clock at the start, microseconds.
+  Sender(int32_t agent_id, int64_t run, const SenderOptions& options);
+
+  // Takes an encoded keyframe. False if the spool is full.
+  bool Add(const KeyframeId& id, std::vector<uint8_t> bytes);
+  bool Has(const KeyframeId& id) const { return spool_.contains(id); }
+  // The first spooled keyframe of the map at or after `seq`.
+  std::optional<int32_t> FirstSeqFrom(const MapId& map, int32_t seq) const;
+  // Only maps that the other side knows are sent, from this seq on; before it all is acknowledged.
+  void SetNext(const MapId& map, int32_t next_seq);
+
+  void OnAck(const LinkAck& ack, int64_t now_us);
+  // The keyframe packets due now. Call it every few milliseconds while there is something to send.
+  std::vector<LinkPacket> Poll(int64_t now_us);
+  // A packet of its own, neither kept nor repeated.
+  LinkPacket Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data);
+
+  size_t spooled() const { return spool_.size(); }
+  int64_t spooled_bytes() const { return spooled_bytes_; }
+  int64_t resent() const { return resent_; }
+  int in_flight_bytes() const { return in_flight_bytes_; }
+
+ private:
+  struct Piece {
+    int64_t number = 0;  // of its last transmission
+    int64_t sent_us = 0;
+    int tries = 0;
+    bool in_flight = false;
+    bool received = false;
+  };
+  struct Item {
+    std::vector<uint8_t> bytes;
+    uint32_t crc32 = 0;
+    std::vector<Piece> pieces;  // empty until it is under way
+  };
+  struct Transmission {
+    int64_t number;
+    int64_t sent_us;
+  };
+
+  void Release(const MapId& map, int32_t journalled_seq);
+  void Settle(const Item& item, Piece* piece);  // no longer in flight
+  void MeasureRoundTrip(int64_t highest_number, int64_t now_us);
+  void FindLost(int64_t highest_number, int64_t now_us);
+  int64_t Timeout_us(int tries) const;
+  std::vector<KeyframeId> UnderWay() const;
+  void SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<LinkPacket>* out);
+  int PieceBytes(const Item& item, const Piece& piece) const;
+
+  const int32_t agent_id_;
+  const int64_t run_;
+  const SenderOptions options_;
+  Pacer pacer_;
+  std::map<KeyframeId, Item> spool_;
+  std::set<KeyframeId> started_;  // those with pieces
+  std::map<MapId, int32_t> next_;
+  int64_t spooled_bytes_ = 0;
+  int in_flight_bytes_ = 0;
+  int cache_bytes_ = 0;  // the receiver's
+  int64_t last_number_ = 0;
+  int64_t highest_acked_ = 0;
+  int64_t resent_ = 0;
+  std::deque<Transmission> recent_;  // at most kRecent, to measure the round trip
+  double round_trip_us_ = 0;
+  double round_trip_var_us_ = 0;
+};
+
+}  // namespace pangea
