@@ -1,0 +1,363 @@
+#include "common/alignment/aligner.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "common/alignment/epipolar_filter.h"
+
+namespace pangea {
+namespace {
+
+constexpr int kCellCols = 6, kCellRows = 4;
+
+int CellOf(const CameraModel& camera, const Eigen::Vector2d& pixel) {
+  const int col = std::clamp(static_cast<int>(pixel.x() * kCellCols / camera.width), 0, kCellCols - 1);
+  const int row = std::clamp(static_cast<int>(pixel.y() * kCellRows / camera.height), 0, kCellRows - 1);
+  return row * kCellCols + col;
+}
+
+// One candidate on its way through the steps; each returns why it is refused, or an empty string.
+class Alignment {
+ public:
+  Alignment(const AlignmentOptions& options, const KeyframeWindow& frames_m,
+            const KeyframeWindow& frames_c)
+      : options_(options),
+        window_m_(MakeWindow(frames_m, options.window)),
+        window_c_(MakeWindow(frames_c, options.window)) {
+    double tilt_var = 0;
+    for (const Window* window : {&window_m_, &window_c_}) {
+      const double floor = options.tilt_floor;
+      tilt_var += window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2 + floor * floor;
+    }
+    tilt_sigma_ = std::sqrt(tilt_var);
+  }
+
+  std::string FirstGuess(const PlaceCandidate& candidate, uint64_t seed) {
+    std::vector<PointMatch> matches = CandidateMatches(candidate);
+    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+      const std::vector<PointMatch> nearest =
+          MatchByDescriptor(window_m_, window_c_, direction, options_.first_max_hamming,
+                            options_.first_max_ratio);
+      matches.insert(matches.end(), nearest.begin(), nearest.end());
+    }
+    matches = Distinct(matches);
+    if (static_cast<int>(matches.size()) < options_.min_pnp_inliers) {
+      return "too few matched points with a depth";
+    }
+    const std::vector<PointObservation> observations = Observations(matches);
+    const auto pnp = SolveUprightPnp(observations, RayPairs(candidate), window_c_.T_w_cam.back().t,
+                                     window_m_.T_w_cam.back().t, tilt_sigma_, seed, options_.pnp);
+    if (!pnp) {
+      return "PnP found no pose";
+    }
+    std::set<std::pair<Direction, int>> landmarks;
+    for (const int i : pnp->inliers) {
+      landmarks.emplace(matches[i].direction, matches[i].landmark);
+    }
+    pose_ = pnp->pose;
+    return static_cast<int>(landmarks.size()) < options_.min_pnp_inliers
+               ? "PnP found too few inliers"
+               : "";
+  }
+
+  std::string CheckViews() const {
+    const Eigen::Vector3d sight_m = window_m_.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d sight_c =
+        pose_.T_m_c.q * (window_c_.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
+    const double angle = std::acos(std::clamp(sight_m.dot(sight_c), -1.0, 1.0));
+    if (angle > options_.max_view_angle || pose_.T_m_c.t.norm() > options_.max_distance_m) {
+      return "views do not overlap";
+    }
+    return "";
+  }
+
+  // Looks for the points around the guess in the two keyframes themselves, and counts what should
+  // be there and is not.
+  std::string CheckSurroundings() {
+    std::vector<PointMatch> matches;
+    // The second round looks again from the refined pose.
+    for (int round = 0; round < 2; ++round) {
+      matches.clear();
+      surroundings_ = {};
+      for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+        const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
+        const SearchResult result = SearchByProjection(
+            window_m_, window_c_, direction, observer.newest(), pose_, options_.search);
+        matches.insert(matches.end(), result.matches.begin(), result.matches.end());
+        CountSurroundings(observer.keyframe(observer.newest()).camera, result);
+      }
+      if (static_cast<int>(matches.size()) < options_.min_pnp_inliers) {
+        return "too few points found by projection";
+      }
+      pose_ = RefinePose(Observations(matches), pose_.T_m_c, tilt_sigma_);
+    }
+    if (static_cast<int>(matches.size()) < options_.min_inliers) {
+      return "too few points found by projection";
+    }
+    if (surroundings_.comparable < options_.min_comparable) {
+      return "too few points ought to be seen from both";
+    }
+    if (surroundings_.found < options_.min_found_share * surroundings_.comparable ||
+        surroundings_.supported < options_.min_supported_cells * surroundings_.cells) {
+      return "the surroundings contradict";
+    }
+    return "";
+  }
+
+  std::string Optimise() {
+    matches_.clear();
+    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+      const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
+      for (int frame = 0; frame <= observer.newest(); ++frame) {
+        const SearchResult result = SearchByProjection(window_m_, window_c_, direction, frame,
+                                                       pose_, options_.search);
+        matches_.insert(matches_.end(), result.matches.begin(), result.matches.end());
+      }
+    }
+    constexpr double kMaxEpipolarError_px = 4;
+    constexpr int kMinEpipolarPairs = 16;
+    matches_ = FilterByFundamental(window_m_, window_c_, Agreeing(matches_), kMaxEpipolarError_px,
+                                   kMinEpipolarPairs);
+    if (static_cast<int>(matches_.size()) < options_.min_inliers) {
+      return "too few points found by projection";
+    }
+    ba_ = SolveJointBa(window_m_, window_c_, matches_, pose_.T_m_c, options_.ba);
+    return ba_ ? "" : "the window optimisation failed";
+  }
+
+  std::string CheckGravity() const {
+    const Eigen::Vector2d tilt = (ba_->T_m_c.q * Eigen::Vector3d::UnitZ()).head<2>();
+    const double visual_var = ba_->covariance.bottomRightCorner<3, 3>().eigenvalues().real().maxCoeff();
+    const double sigma = std::sqrt(tilt_sigma_ * tilt_sigma_ + visual_var);
+    return tilt.norm() > std::min(options_.max_tilt, options_.max_tilt_sigmas * sigma)
+               ? "roll or pitch contradicts gravity"
+               : "";
+  }
+
+  std::string Accept() const {
+    std::set<std::pair<Direction, int>> landmarks;
+    std::map<Direction, std::set<int>> cells;
+    for (size_t i = 0; i < matches_.size(); ++i) {
+      if (!ba_->inlier[i]) {
+        continue;
+      }
+      const PointMatch& match = matches_[i];
+      landmarks.emplace(match.direction, match.landmark);
+      const Window& observer = match.direction == Direction::kForward ? window_c_ : window_m_;
+      if (match.observed.frame == observer.newest()) {
+        cells[match.direction].insert(CellOf(observer.keyframe(observer.newest()).camera,
+                                             observer.corner(match.observed).pixel.cast<double>()));
+      }
+    }
+    if (static_cast<int>(landmarks.size()) < options_.min_inliers) {
+      return "too few inliers";
+    }
+    if (InlierRatio() < options_.min_inlier_ratio) {
+      return "too many outliers";
+    }
+    size_t most_cells = 0;
+    for (const auto& [direction, occupied] : cells) {
+      most_cells = std::max(most_cells, occupied.size());
+    }
+    if (static_cast<int>(most_cells) < options_.min_occupied_cells) {
+      return "inliers too close together";
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> translation(
+        ba_->covariance.topLeftCorner<3, 3>());
+    const Eigen::Matrix3d R_w_Km = window_m_.T_w_body.back().R();
+    const double yaw_var =
+        (R_w_Km * ba_->covariance.bottomRightCorner<3, 3>() * R_w_Km.transpose())(2, 2);
+    if (translation.eigenvalues().maxCoeff() > options_.max_sigma_m * options_.max_sigma_m ||
+        yaw_var > options_.max_sigma_yaw * options_.max_sigma_yaw) {
+      return "too uncertain";
+    }
+    return "";
+  }
+
+  // T_odom_m_odom_c of the present guess.
+  Rigid3 OdomAlignment() const {
+    const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(),
+                          window_m_.keyframe(window_m_.newest()).T_odom_body.t);
+    const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(),
+                          window_c_.keyframe(window_c_.newest()).T_odom_body.t);
+    return T_odom_m * (ba_ ? ba_->T_m_c : pose_.T_m_c) * T_odom_c.Inverse();
+  }
+
+  void Report(Constraint* constraint) const {
+    if (!ba_) {
+      return;
+    }
+    constraint->T_from_to = ba_->T_Km_Kc;
+    constraint->covariance = ba_->covariance;
+    constraint->num_inliers = ba_->num_inlier_observations;
+    constraint->inlier_ratio = InlierRatio();
+    constraint->rms_px = ba_->rms_px;
+  }
+
+ private:
+  double InlierRatio() const {
+    return static_cast<double>(ba_->num_inlier_observations) / static_cast<double>(matches_.size());
+  }
+
+  // The candidate's matched corners that have a depth, in either keyframe or by their landmark in
+  // a neighbour.
+  std::vector<PointMatch> CandidateMatches(const PlaceCandidate& candidate) const {
+    std::vector<PointMatch> matches;
+    const int m = window_m_.newest(), c = window_c_.newest();
+    for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
+      if (!window_c_.frames[c]->has_ray(corner_c) || !window_m_.frames[m]->has_ray(corner_m)) {
+        continue;
+      }
+      if (const int landmark = window_m_.landmark_of_corner[m][corner_m]; landmark >= 0) {
+        matches.push_back({Direction::kForward, landmark, {c, corner_c}, 0});
+      }
+      if (const int landmark = window_c_.landmark_of_corner[c][corner_c]; landmark >= 0) {
+        matches.push_back({Direction::kReverse, landmark, {m, corner_m}, 0});
+      }
+    }
+    return matches;
+  }
+
+  std::vector<RayPair> RayPairs(const PlaceCandidate& candidate) const {
+    std::vector<RayPair> pairs;
+    const KeyframeView& m = *window_m_.frames.back();
+    const KeyframeView& c = *window_c_.frames.back();
+    for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
+      if (!c.has_ray(corner_c) || !m.has_ray(corner_m)) {
+        continue;
+      }
+      const double sigma_c =
+          CornerSigma(c.keyframe().corners[corner_c], options_.search.pixel_sigma) *
+          c.keyframe().camera.PixelAngle();
+      const double sigma_m =
+          CornerSigma(m.keyframe().corners[corner_m], options_.search.pixel_sigma) *
+          m.keyframe().camera.PixelAngle();
+      const double sigma = std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m + tilt_sigma_ * tilt_sigma_);
+      const auto unit = [](const Rigid3& T_w_cam, const Eigen::Vector2d& ray) {
+        return Eigen::Vector3d(T_w_cam.q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized());
+      };
+      pairs.push_back({unit(window_m_.T_w_cam.back(), m.ray(corner_m)),
+                       unit(window_c_.T_w_cam.back(), c.ray(corner_c)), sigma});
+    }
+    return pairs;
+  }
+
+  static std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches) {
+    std::set<std::tuple<Direction, int, int>> seen;
+    std::vector<PointMatch> distinct;
+    for (const PointMatch& match : matches) {
+      if (seen.emplace(match.direction, match.landmark, match.observed.corner).second) {
+        distinct.push_back(match);
+      }
+    }
+    return distinct;
+  }
+
+  // Of the keyframes' votes on which landmark of the other window this landmark is, the majority
+  // stays; corners that are no landmark vote for nothing and stay.
+  std::vector<PointMatch> Agreeing(const std::vector<PointMatch>& matches) const {
+    std::map<std::pair<Direction, int>, std::map<int, int>> votes;
+    const auto other_of = [this](const PointMatch& match) {
+      const Window& observer = match.direction == Direction::kForward ? window_c_ : window_m_;
+      return observer.landmark_of_corner[match.observed.frame][match.observed.corner];
+    };
+    for (const PointMatch& match : matches) {
+      if (const int other = other_of(match); other >= 0) {
+        ++votes[{match.direction, match.landmark}][other];
+      }
+    }
+    std::vector<PointMatch> agreeing;
+    for (const PointMatch& match : matches) {
+      const int other = other_of(match);
+      if (other >= 0) {
+        const auto& ballot = votes.at({match.direction, match.landmark});
+        const auto most = std::max_element(
+            ballot.begin(), ballot.end(),
+            [](const auto& a, const auto& b) { return a.second < b.second; });
+        if (most->first != other) {
+          continue;
+        }
+      }
+      agreeing.push_back(match);
+    }
+    return agreeing;
+  }
+
+  std::vector<PointObservation> Observations(const std::vector<PointMatch>& matches) const {
+    std::vector<PointObservation> observations;
+    observations.reserve(matches.size());
+    for (const PointMatch& match : matches) {
+      observations.push_back(
+          MakeObservation(window_m_, window_c_, match, options_.search.pixel_sigma));
+    }
+    return observations;
+  }
+
+  void CountSurroundings(const CameraModel& camera, const SearchResult& result) {
+    constexpr int kMinInCell = 3;
+    std::map<int, std::pair<int, int>> cells;  // comparable, found
+    for (const Projection& projection : result.projections) {
+      if (projection.comparable) {
+        auto& [comparable, found] = cells[CellOf(camera, projection.pixel)];
+        ++comparable;
+        found += projection.found ? 1 : 0;
+      }
+    }
+    for (const auto& [cell, counts] : cells) {
+      const auto& [comparable, found] = counts;
+      surroundings_.comparable += comparable;
+      surroundings_.found += found;
+      if (comparable >= kMinInCell) {
+        ++surroundings_.cells;
+        surroundings_.supported += found >= options_.min_found_share * comparable ? 1 : 0;
+      }
+    }
+  }
+
+  const AlignmentOptions& options_;
+  Window window_m_;
+  Window window_c_;
+  double tilt_sigma_ = 0;
+  PoseEstimate pose_;
+  Surroundings surroundings_;
+  std::vector<PointMatch> matches_;
+  std::optional<JointBaResult> ba_;
+};
+
+}  // namespace
+
+Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
+                          const PlaceCandidate& candidate, const AlignmentGate& gate) const {
+  Constraint constraint;
+  constraint.from = candidate.match;
+  constraint.to = frames_c.back()->keyframe().id;
+  constraint.kind = candidate.kind;
+
+  Alignment alignment(options_, frames_m, frames_c);
+  const uint64_t seed = StableHash(constraint.from, constraint.to, 1);
+  constraint.reason = alignment.FirstGuess(candidate, seed);
+  const auto step = [&constraint](auto&& check) {
+    if (constraint.reason.empty()) {
+      constraint.reason = check();
+    }
+  };
+  step([&] { return alignment.CheckViews(); });
+  step([&] { return gate(alignment.OdomAlignment()); });
+  step([&] { return alignment.CheckSurroundings(); });
+  step([&] { return alignment.Optimise(); });
+  alignment.Report(&constraint);
+  step([&] { return alignment.CheckGravity(); });
+  step([&] { return alignment.CheckViews(); });
+  step([&] { return gate(alignment.OdomAlignment()); });
+  step([&] { return alignment.Accept(); });
+  constraint.accepted = constraint.reason.empty();
+  return constraint;
+}
+
+}  // namespace pangea

@@ -1,0 +1,87 @@
+#pragma once
+
+// From a candidate pair of keyframes to a verdict: the geometry that inter_map_ba and fusion share
+// (the paper, section IV.D).
+//
+// In: the windows of keyframes up to the match (m) and up to the query (c), and the candidate's
+// matched corners. Out: a Constraint between the two bodies, accepted with its covariance or
+// refused with the reason. The same input gives the same verdict.
+//
+//   candidate's corners + nearest descriptors -> upright PnP RANSAC -> views and gravity gates
+//   -> projection search in the two keyframes -> surroundings gate
+//   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance
+//
+// The cheap steps come first: a bad candidate dies in the first two.
+
+#include <functional>
+#include <string>
+
+#include "common/alignment/joint_ba.h"
+#include "common/alignment/projection_search.h"
+#include "common/alignment/upright_pnp.h"
+#include "common/alignment/window.h"
+#include "common/server_messages.h"
+
+namespace pangea {
+
+struct AlignmentOptions {
+  WindowOptions window;
+  UprightPnpOptions pnp;
+  SearchOptions search;
+  JointBaOptions ba;
+
+  // Matching without a prediction.
+  int first_max_hamming = 64;
+  double first_max_ratio = 0.85;
+  int min_pnp_inliers = 6;
+
+  // Two keyframes that see the same: the angle between their lines of sight (for level cameras the
+  // paper's yaw; a camera that looks down may be turned any way), and their distance.
+  double max_view_angle = 1.3;    // radians
+  double max_distance_m = 15;
+
+  // Roll and pitch between two gravity-aligned frames are zero within what the odometries say,
+  // and never better than this.
+  double tilt_floor = 0.006;      // radians, of each odometry
+  double max_tilt_sigmas = 4;
+  double max_tilt = 0.06;         // radians, whatever the odometries say
+
+  // Surroundings: of the points that ought to be seen in the other keyframe, the share that is
+  // found there, and the share of image cells in which they are.
+  int min_comparable = 15;
+  double min_found_share = 0.2;
+  double min_supported_cells = 0.45;
+
+  // Acceptance.
+  int min_inliers = 20;           // distinct landmarks
+  double min_inlier_ratio = 0.5;  // of the matches the BA used
+  int min_occupied_cells = 7;     // of 6 x 4, in one of the two keyframes
+  double max_sigma_m = 0.25;      // standard deviation of the translation, its worst direction
+  double max_sigma_yaw = 0.03;    // radians
+};
+
+// What the search around a hypothesis saw: for verdicts, tests and tuning.
+struct Surroundings {
+  int comparable = 0;  // points that ought to be found
+  int found = 0;
+  int cells = 0;       // image cells with enough of them to tell
+  int supported = 0;   // cells in which enough are found
+};
+
+// A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
+// alignment of the two maps' odom frames.
+using AlignmentGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
+
+class Aligner {
+ public:
+  explicit Aligner(AlignmentOptions options) : options_(options) {}
+
+  // `frames_m` ends with the candidate's match, `frames_c` with the query.
+  Constraint Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
+                   const PlaceCandidate& candidate, const AlignmentGate& gate) const;
+
+ private:
+  AlignmentOptions options_;
+};
+
+}  // namespace pangea

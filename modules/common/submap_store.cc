@@ -1,0 +1,138 @@
+#include "common/submap_store.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pangea {
+
+KeyframeView::KeyframeView(std::shared_ptr<const Keyframe> keyframe)
+    : keyframe_(std::move(keyframe)), T_odom_cam_(keyframe_->T_odom_cam()) {
+  const CameraModel& camera = keyframe_->camera;
+  const int n = static_cast<int>(keyframe_->corners.size());
+  has_ray_.assign(n, false);
+  rays_.assign(n, Eigen::Vector2f::Zero());
+  pixel_jacobians_.assign(n, Eigen::Matrix2f::Identity());
+  point_of_corner_.assign(n, -1);
+  grid_cols_ = camera.width / kCellPx + 1;
+  grid_rows_ = camera.height / kCellPx + 1;
+  grid_.resize(static_cast<size_t>(grid_cols_) * grid_rows_);
+
+  for (int i = 0; i < n; ++i) {
+    const Corner& corner = keyframe_->corners[i];
+    const int col = std::clamp(static_cast<int>(corner.pixel.x()) / kCellPx, 0, grid_cols_ - 1);
+    const int row = std::clamp(static_cast<int>(corner.pixel.y()) / kCellPx, 0, grid_rows_ - 1);
+    grid_[static_cast<size_t>(row) * grid_cols_ + col].push_back(static_cast<int16_t>(i));
+    if (corner.landmark_id != kNoLandmark) {
+      landmark_corners_.emplace_back(corner.landmark_id, i);
+    }
+    const auto ray = camera.Unproject(corner.pixel.cast<double>());
+    if (!ray) {
+      continue;
+    }
+    Eigen::Matrix<double, 2, 3> J;
+    if (!camera.Project(Eigen::Vector3d(ray->x(), ray->y(), 1.0), &J)) {
+      continue;
+    }
+    has_ray_[i] = true;
+    rays_[i] = ray->cast<float>();
+    pixel_jacobians_[i] = J.leftCols<2>().cast<float>();
+  }
+  std::sort(landmark_corners_.begin(), landmark_corners_.end());
+  for (size_t i = 0; i < keyframe_->points.size(); ++i) {
+    point_of_corner_[keyframe_->points[i].corner] = static_cast<int16_t>(i);
+  }
+}
+
+int KeyframeView::CornerOfLandmark(int32_t landmark_id) const {
+  const auto it = std::lower_bound(landmark_corners_.begin(), landmark_corners_.end(),
+                                   std::make_pair(landmark_id, 0));
+  return it != landmark_corners_.end() && it->first == landmark_id ? it->second : -1;
+}
+
+void KeyframeView::CornersNear(const Eigen::Vector2d& pixel, double radius,
+                               std::vector<int>* corners) const {
+  corners->clear();
+  const auto cell = [](double value, int count) {
+    return std::clamp(static_cast<int>(std::floor(value / kCellPx)), 0, count - 1);
+  };
+  const int col_end = cell(pixel.x() + radius, grid_cols_);
+  const int row_end = cell(pixel.y() + radius, grid_rows_);
+  for (int row = cell(pixel.y() - radius, grid_rows_); row <= row_end; ++row) {
+    for (int col = cell(pixel.x() - radius, grid_cols_); col <= col_end; ++col) {
+      for (const int16_t i : grid_[static_cast<size_t>(row) * grid_cols_ + col]) {
+        if ((keyframe_->corners[i].pixel.cast<double>() - pixel).squaredNorm() <=
+            radius * radius) {
+          corners->push_back(i);
+        }
+      }
+    }
+  }
+  std::sort(corners->begin(), corners->end());
+}
+
+void SubmapStore::Add(Keyframe keyframe) {
+  const KeyframeId id = keyframe.id;
+  if (keyframes_.contains(id)) {
+    return;
+  }
+  double path_m = 0;
+  if (keyframe.edge) {
+    const auto from = keyframes_.find({id.map, keyframe.edge->from_seq});
+    path_m = keyframe.edge->T_from_this.t.norm() +
+             (from == keyframes_.end() ? 0 : from->second.path_m);
+  }
+  keyframe.preintegration.reset();  // nothing that matches places needs it
+  keyframes_.emplace(id, Stored{std::make_shared<const Keyframe>(std::move(keyframe)), path_m});
+  arrival_.push_back(id);
+  if (arrival_.size() > static_cast<size_t>(options_.max_keyframes)) {
+    keyframes_.erase(arrival_.front());
+    if (const auto cached = views_.find(arrival_.front()); cached != views_.end()) {
+      uses_.erase(cached->second.use);
+      views_.erase(cached);
+    }
+    arrival_.pop_front();
+  }
+}
+
+std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
+  if (const auto cached = views_.find(id); cached != views_.end()) {
+    uses_.splice(uses_.begin(), uses_, cached->second.use);
+    return cached->second.view;
+  }
+  const auto stored = keyframes_.find(id);
+  if (stored == keyframes_.end()) {
+    return nullptr;
+  }
+  auto view = std::make_shared<const KeyframeView>(stored->second.keyframe);
+  uses_.push_front(id);
+  views_.emplace(id, Cached{view, uses_.begin()});
+  if (uses_.size() > static_cast<size_t>(options_.max_views)) {
+    views_.erase(uses_.back());
+    uses_.pop_back();
+  }
+  return view;
+}
+
+KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
+  KeyframeWindow window;
+  KeyframeId next = id;
+  while (static_cast<int>(window.size()) < count) {
+    auto view = Find(next);
+    if (view == nullptr) {
+      break;
+    }
+    window.push_back(view);
+    if (!view->keyframe().edge) {
+      break;
+    }
+    next.seq = view->keyframe().edge->from_seq;
+  }
+  std::reverse(window.begin(), window.end());
+  return window;
+}
+
+double SubmapStore::PathBetween(const KeyframeId& a, const KeyframeId& b) const {
+  return std::abs(keyframes_.at(a).path_m - keyframes_.at(b).path_m);
+}
+
+}  // namespace pangea

@@ -1,0 +1,106 @@
+#pragma once
+
+// The keyframes of all maps that a server module keeps, and what matching derives from each once:
+// undistorted rays, a grid over the corners, landmark look-ups.
+//
+// In: keyframes of each map in order of seq. Out: views by id, and the window of keyframes up to
+// one of them. Bounded: beyond max_keyframes the keyframe added first is dropped; derived data is
+// kept for the max_views keyframes used last and made again when asked for. Not thread safe.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "common/keyframe.h"
+
+namespace pangea {
+
+// One keyframe ready for matching. Indices named `corner` are indices into keyframe->corners.
+class KeyframeView {
+ public:
+  explicit KeyframeView(std::shared_ptr<const Keyframe> keyframe);
+
+  const Keyframe& keyframe() const { return *keyframe_; }
+  const Rigid3& T_odom_cam() const { return T_odom_cam_; }
+
+  // False where the pixel has no ray; then neither ray nor pixel_jacobian may be used.
+  bool has_ray(int corner) const { return has_ray_[corner]; }
+  // (x, y) on the plane z = 1 of the camera.
+  Eigen::Vector2d ray(int corner) const { return rays_[corner].cast<double>(); }
+  // d(raw pixel)/d(ray) at the corner: turns a difference of rays into pixels.
+  Eigen::Matrix2d pixel_jacobian(int corner) const {
+    return pixel_jacobians_[corner].cast<double>();
+  }
+
+  // The corner that is a landmark, or -1.
+  int CornerOfLandmark(int32_t landmark_id) const;
+  // Index into keyframe().points of the point that is this corner, or -1.
+  int PointOfCorner(int corner) const { return point_of_corner_[corner]; }
+  // Corners within `radius` pixels, ascending index.
+  void CornersNear(const Eigen::Vector2d& pixel, double radius, std::vector<int>* corners) const;
+
+ private:
+  static constexpr int kCellPx = 32;
+
+  std::shared_ptr<const Keyframe> keyframe_;
+  Rigid3 T_odom_cam_;
+  std::vector<bool> has_ray_;
+  std::vector<Eigen::Vector2f> rays_;
+  std::vector<Eigen::Matrix2f> pixel_jacobians_;
+  std::vector<std::pair<int32_t, int>> landmark_corners_;  // sorted by landmark
+  std::vector<int16_t> point_of_corner_;
+  int grid_cols_ = 0, grid_rows_ = 0;
+  std::vector<std::vector<int16_t>> grid_;  // corners per cell, ascending
+};
+
+// Keyframes of one map, ascending seq, joined by their odometry edges; the newest is the one asked
+// for.
+using KeyframeWindow = std::vector<std::shared_ptr<const KeyframeView>>;
+
+struct SubmapStoreOptions {
+  // A keyframe of 700 corners takes about 40 kB, its view about 25 kB more.
+  int max_keyframes = 20000;
+  int max_views = 256;
+};
+
+class SubmapStore {
+ public:
+  explicit SubmapStore(SubmapStoreOptions options = {}) : options_(options) {}
+
+  // A keyframe that is already there stays as it is.
+  void Add(Keyframe keyframe);
+
+  bool Contains(const KeyframeId& id) const { return keyframes_.contains(id); }
+  size_t size() const { return keyframes_.size(); }
+
+  // Null when it is not there.
+  std::shared_ptr<const KeyframeView> Find(const KeyframeId& id);
+  // The keyframe and up to `count` - 1 before it, along the odometry edges; shorter where the map
+  // begins or an edge is missing, empty when the keyframe is not there.
+  KeyframeWindow WindowUpTo(const KeyframeId& id, int count);
+  // Metres travelled between two keyframes of one map that are both there, along the edges.
+  double PathBetween(const KeyframeId& a, const KeyframeId& b) const;
+
+ private:
+  struct Stored {
+    std::shared_ptr<const Keyframe> keyframe;
+    double path_m = 0;  // from the map's first keyframe, along the edges
+  };
+  struct Cached {
+    std::shared_ptr<const KeyframeView> view;
+    std::list<KeyframeId>::iterator use;
+  };
+
+  SubmapStoreOptions options_;
+  std::map<KeyframeId, Stored> keyframes_;
+  std::deque<KeyframeId> arrival_;
+  std::map<KeyframeId, Cached> views_;
+  std::list<KeyframeId> uses_;  // newest first
+};
+
+}  // namespace pangea
