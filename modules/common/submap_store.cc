@@ -6,22 +6,18 @@
 namespace pangea {
 
 KeyframeView::KeyframeView(std::shared_ptr<const Keyframe> keyframe)
-    : keyframe_(std::move(keyframe)), T_odom_cam_(keyframe_->T_odom_cam()) {
+    : keyframe_(std::move(keyframe)),
+      T_odom_cam_(keyframe_->T_odom_cam()),
+      grid_(keyframe_->corners) {
   const CameraModel& camera = keyframe_->camera;
   const int n = static_cast<int>(keyframe_->corners.size());
   has_ray_.assign(n, false);
   rays_.assign(n, Eigen::Vector2f::Zero());
   pixel_jacobians_.assign(n, Eigen::Matrix2f::Identity());
   point_of_corner_.assign(n, -1);
-  grid_cols_ = camera.width / kCellPx + 1;
-  grid_rows_ = camera.height / kCellPx + 1;
-  grid_.resize(static_cast<size_t>(grid_cols_) * grid_rows_);
 
   for (int i = 0; i < n; ++i) {
     const Corner& corner = keyframe_->corners[i];
-    const int col = std::clamp(static_cast<int>(corner.pixel.x()) / kCellPx, 0, grid_cols_ - 1);
-    const int row = std::clamp(static_cast<int>(corner.pixel.y()) / kCellPx, 0, grid_rows_ - 1);
-    grid_[static_cast<size_t>(row) * grid_cols_ + col].push_back(static_cast<int16_t>(i));
     if (corner.landmark_id != kNoLandmark) {
       landmark_corners_.emplace_back(corner.landmark_id, i);
     }
@@ -49,40 +45,13 @@ int KeyframeView::CornerOfLandmark(int32_t landmark_id) const {
   return it != landmark_corners_.end() && it->first == landmark_id ? it->second : -1;
 }
 
-void KeyframeView::CornersNear(const Eigen::Vector2d& pixel, double radius,
-                               std::vector<int>* corners) const {
-  corners->clear();
-  const auto cell = [](double value, int count) {
-    return std::clamp(static_cast<int>(std::floor(value / kCellPx)), 0, count - 1);
-  };
-  const int col_end = cell(pixel.x() + radius, grid_cols_);
-  const int row_end = cell(pixel.y() + radius, grid_rows_);
-  for (int row = cell(pixel.y() - radius, grid_rows_); row <= row_end; ++row) {
-    for (int col = cell(pixel.x() - radius, grid_cols_); col <= col_end; ++col) {
-      for (const int16_t i : grid_[static_cast<size_t>(row) * grid_cols_ + col]) {
-        if ((keyframe_->corners[i].pixel.cast<double>() - pixel).squaredNorm() <=
-            radius * radius) {
-          corners->push_back(i);
-        }
-      }
-    }
-  }
-  std::sort(corners->begin(), corners->end());
-}
-
 void SubmapStore::Add(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   if (keyframes_.contains(id)) {
     return;
   }
-  double path_m = 0;
-  if (keyframe.edge) {
-    const auto from = keyframes_.find({id.map, keyframe.edge->from_seq});
-    path_m = keyframe.edge->T_from_this.t.norm() +
-             (from == keyframes_.end() ? 0 : from->second.path_m);
-  }
   keyframe.preintegration.reset();  // nothing that matches places needs it
-  keyframes_.emplace(id, Stored{std::make_shared<const Keyframe>(std::move(keyframe)), path_m});
+  keyframes_.emplace(id, std::make_shared<const Keyframe>(std::move(keyframe)));
   arrival_.push_back(id);
   if (arrival_.size() > static_cast<size_t>(options_.max_keyframes)) {
     keyframes_.erase(arrival_.front());
@@ -103,7 +72,7 @@ std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
   if (stored == keyframes_.end()) {
     return nullptr;
   }
-  auto view = std::make_shared<const KeyframeView>(stored->second.keyframe);
+  auto view = std::make_shared<const KeyframeView>(stored->second);
   uses_.push_front(id);
   views_.emplace(id, Cached{view, uses_.begin()});
   if (uses_.size() > static_cast<size_t>(options_.max_views)) {
@@ -131,8 +100,49 @@ KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
   return window;
 }
 
-double SubmapStore::PathBetween(const KeyframeId& a, const KeyframeId& b) const {
-  return std::abs(keyframes_.at(a).path_m - keyframes_.at(b).path_m);
+bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
+  KeyframeId next = id;
+  for (int i = 0; i < count; ++i) {
+    const auto it = keyframes_.find(next);
+    if (it == keyframes_.end()) {
+      return false;
+    }
+    if (!it->second->edge) {
+      return true;
+    }
+    next.seq = it->second->edge->from_seq;
+  }
+  return true;
+}
+
+bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const {
+  KeyframeId next = newer;
+  while (next.seq > older.seq) {
+    const auto it = keyframes_.find(next);
+    if (it == keyframes_.end()) {
+      return false;
+    }
+    if (!it->second->edge) {
+      return true;
+    }
+    next.seq = it->second->edge->from_seq;
+  }
+  return true;
+}
+
+std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
+                                               const KeyframeId& newer) const {
+  double path_m = 0;
+  KeyframeId next = newer;
+  while (next.seq > older.seq) {
+    const auto it = keyframes_.find(next);
+    if (it == keyframes_.end() || !it->second->edge) {
+      return std::nullopt;
+    }
+    path_m += it->second->edge->T_from_this.t.norm();
+    next.seq = it->second->edge->from_seq;
+  }
+  return next == older ? std::make_optional(path_m) : std::nullopt;
 }
 
 }  // namespace pangea

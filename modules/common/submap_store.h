@@ -3,7 +3,7 @@
 // The keyframes of all maps that a server module keeps, and what matching derives from each once:
 // undistorted rays, a grid over the corners, landmark look-ups.
 //
-// In: keyframes of each map in order of seq. Out: views by id, and the window of keyframes up to
+// In: keyframes in any order. Out: views by id, and the window of keyframes up to
 // one of them. Bounded: beyond max_keyframes the keyframe added first is dropped; derived data is
 // kept for the max_views keyframes used last and made again when asked for. Not thread safe.
 
@@ -13,10 +13,12 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "common/keyframe.h"
+#include "common/matching.h"
 
 namespace pangea {
 
@@ -41,12 +43,9 @@ class KeyframeView {
   int CornerOfLandmark(int32_t landmark_id) const;
   // Index into keyframe().points of the point that is this corner, or -1.
   int PointOfCorner(int corner) const { return point_of_corner_[corner]; }
-  // Corners within `radius` pixels, ascending index.
-  void CornersNear(const Eigen::Vector2d& pixel, double radius, std::vector<int>* corners) const;
+  const CornerGrid& grid() const { return grid_; }
 
  private:
-  static constexpr int kCellPx = 32;
-
   std::shared_ptr<const Keyframe> keyframe_;
   Rigid3 T_odom_cam_;
   std::vector<bool> has_ray_;
@@ -54,8 +53,7 @@ class KeyframeView {
   std::vector<Eigen::Matrix2f> pixel_jacobians_;
   std::vector<std::pair<int32_t, int>> landmark_corners_;  // sorted by landmark
   std::vector<int16_t> point_of_corner_;
-  int grid_cols_ = 0, grid_rows_ = 0;
-  std::vector<std::vector<int16_t>> grid_;  // corners per cell, ascending
+  CornerGrid grid_;
 };
 
 // Keyframes of one map, ascending seq, joined by their odometry edges; the newest is the one asked
@@ -83,21 +81,23 @@ class SubmapStore {
   // The keyframe and up to `count` - 1 before it, along the odometry edges; shorter where the map
   // begins or an edge is missing, empty when the keyframe is not there.
   KeyframeWindow WindowUpTo(const KeyframeId& id, int count);
-  // Metres travelled between two keyframes of one map that are both there, along the edges.
-  double PathBetween(const KeyframeId& a, const KeyframeId& b) const;
+  // Whether WindowUpTo would be cut short by a keyframe that is missing: more may arrive.
+  bool WindowIsComplete(const KeyframeId& id, int count) const;
+  // Whether the walk from the newer keyframe back along the edges meets no missing keyframe before
+  // it reaches or passes the older one, or the beginning of a piece of map.
+  bool ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const;
+  // Metres travelled along the edges from the older to the newer keyframe of one map; nothing where
+  // the edges do not lead from one to the other.
+  std::optional<double> PathBetween(const KeyframeId& older, const KeyframeId& newer) const;
 
  private:
-  struct Stored {
-    std::shared_ptr<const Keyframe> keyframe;
-    double path_m = 0;  // from the map's first keyframe, along the edges
-  };
   struct Cached {
     std::shared_ptr<const KeyframeView> view;
     std::list<KeyframeId>::iterator use;
   };
 
   SubmapStoreOptions options_;
-  std::map<KeyframeId, Stored> keyframes_;
+  std::map<KeyframeId, std::shared_ptr<const Keyframe>> keyframes_;
   std::deque<KeyframeId> arrival_;
   std::map<KeyframeId, Cached> views_;
   std::list<KeyframeId> uses_;  // newest first

@@ -17,8 +17,10 @@ namespace {
 constexpr int kCellCols = 6, kCellRows = 4;
 
 int CellOf(const CameraModel& camera, const Eigen::Vector2d& pixel) {
-  const int col = std::clamp(static_cast<int>(pixel.x() * kCellCols / camera.width), 0, kCellCols - 1);
-  const int row = std::clamp(static_cast<int>(pixel.y() * kCellRows / camera.height), 0, kCellRows - 1);
+  const int col =
+      std::clamp(static_cast<int>(pixel.x() * kCellCols / camera.width), 0, kCellCols - 1);
+  const int row =
+      std::clamp(static_cast<int>(pixel.y() * kCellRows / camera.height), 0, kCellRows - 1);
   return row * kCellCols + col;
 }
 
@@ -33,7 +35,8 @@ class Alignment {
     double tilt_var = 0;
     for (const Window* window : {&window_m_, &window_c_}) {
       const double floor = options.tilt_floor;
-      tilt_var += window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2 + floor * floor;
+      tilt_var +=
+          window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2 + floor * floor;
     }
     tilt_sigma_ = std::sqrt(tilt_var);
   }
@@ -41,9 +44,8 @@ class Alignment {
   std::string FirstGuess(const PlaceCandidate& candidate, uint64_t seed) {
     std::vector<PointMatch> matches = CandidateMatches(candidate);
     for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
-      const std::vector<PointMatch> nearest =
-          MatchByDescriptor(window_m_, window_c_, direction, options_.first_max_hamming,
-                            options_.first_max_ratio);
+      const std::vector<PointMatch> nearest = MatchByDescriptor(
+          window_m_, window_c_, direction, options_.first_max_hamming, options_.first_max_ratio);
       matches.insert(matches.end(), nearest.begin(), nearest.end());
     }
     matches = Distinct(matches);
@@ -87,8 +89,8 @@ class Alignment {
       surroundings_ = {};
       for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
         const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
-        const SearchResult result = SearchByProjection(
-            window_m_, window_c_, direction, observer.newest(), pose_, options_.search);
+        const SearchResult result = SearchByProjection(window_m_, window_c_, direction,
+                                                       observer.newest(), pose_, options_.search);
         matches.insert(matches.end(), result.matches.begin(), result.matches.end());
         CountSurroundings(observer.keyframe(observer.newest()).camera, result);
       }
@@ -115,8 +117,8 @@ class Alignment {
     for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
       const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
       for (int frame = 0; frame <= observer.newest(); ++frame) {
-        const SearchResult result = SearchByProjection(window_m_, window_c_, direction, frame,
-                                                       pose_, options_.search);
+        const SearchResult result =
+            SearchByProjection(window_m_, window_c_, direction, frame, pose_, options_.search);
         matches_.insert(matches_.end(), result.matches.begin(), result.matches.end());
       }
     }
@@ -133,7 +135,8 @@ class Alignment {
 
   std::string CheckGravity() const {
     const Eigen::Vector2d tilt = (ba_->T_m_c.q * Eigen::Vector3d::UnitZ()).head<2>();
-    const double visual_var = ba_->covariance.bottomRightCorner<3, 3>().eigenvalues().real().maxCoeff();
+    const double visual_var =
+        ba_->covariance.bottomRightCorner<3, 3>().eigenvalues().real().maxCoeff();
     const double sigma = std::sqrt(tilt_sigma_ * tilt_sigma_ + visual_var);
     return tilt.norm() > std::min(options_.max_tilt, options_.max_tilt_sigmas * sigma)
                ? "roll or pitch contradicts gravity"
@@ -238,7 +241,8 @@ class Alignment {
       const double sigma_m =
           CornerSigma(m.keyframe().corners[corner_m], options_.search.pixel_sigma) *
           m.keyframe().camera.PixelAngle();
-      const double sigma = std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m + tilt_sigma_ * tilt_sigma_);
+      const double sigma =
+          std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m + tilt_sigma_ * tilt_sigma_);
       const auto unit = [](const Rigid3& T_w_cam, const Eigen::Vector2d& ray) {
         return Eigen::Vector3d(T_w_cam.q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized());
       };
@@ -277,9 +281,9 @@ class Alignment {
       const int other = other_of(match);
       if (other >= 0) {
         const auto& ballot = votes.at({match.direction, match.landmark});
-        const auto most = std::max_element(
-            ballot.begin(), ballot.end(),
-            [](const auto& a, const auto& b) { return a.second < b.second; });
+        const auto most =
+            std::max_element(ballot.begin(), ballot.end(),
+                             [](const auto& a, const auto& b) { return a.second < b.second; });
         if (most->first != other) {
           continue;
         }

@@ -37,14 +37,14 @@ struct AlignmentOptions {
 
   // Two keyframes that see the same: the angle between their lines of sight (for level cameras the
   // paper's yaw; a camera that looks down may be turned any way), and their distance.
-  double max_view_angle = 1.3;    // radians
+  double max_view_angle = 1.3;  // radians
   double max_distance_m = 15;
 
   // Roll and pitch between two gravity-aligned frames are zero within what the odometries say,
   // and never better than this.
-  double tilt_floor = 0.006;      // radians, of each odometry
+  double tilt_floor = 0.006;  // radians, of each odometry
   double max_tilt_sigmas = 4;
-  double max_tilt = 0.06;         // radians, whatever the odometries say
+  double max_tilt = 0.06;  // radians, whatever the odometries say
 
   // Surroundings: of the points that ought to be seen in the other keyframe, the share that is
   // found there, and the share of image cells in which they are.
@@ -64,8 +64,8 @@ struct AlignmentOptions {
 struct Surroundings {
   int comparable = 0;  // points that ought to be found
   int found = 0;
-  int cells = 0;       // image cells with enough of them to tell
-  int supported = 0;   // cells in which enough are found
+  int cells = 0;      // image cells with enough of them to tell
+  int supported = 0;  // cells in which enough are found
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the

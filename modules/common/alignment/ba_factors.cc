@@ -15,7 +15,8 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 }  // namespace
 
 Rigid3 PoseFromBlock(const double* block) {
-  return {Eigen::Map<const Eigen::Quaterniond>(block), Eigen::Map<const Eigen::Vector3d>(block + 4)};
+  return {Eigen::Map<const Eigen::Quaterniond>(block),
+          Eigen::Map<const Eigen::Vector3d>(block + 4)};
 }
 
 void PoseToBlock(const Rigid3& pose, double* block) {
@@ -125,8 +126,7 @@ bool EdgeFactor::Evaluate(double const* const* parameters, double* residuals,
   const Rigid3 T_to = PoseFromBlock(parameters[1]);
   const Eigen::Vector3d scaled_t = std::exp(parameters[2][0]) * T_from_to_.t;
   const Eigen::Matrix3d R_from_w = T_from.R().transpose();
-  const Eigen::Vector3d r_theta =
-      LogSo3(T_from.q.conjugate() * T_to.q * T_from_to_.q.conjugate());
+  const Eigen::Vector3d r_theta = LogSo3(T_from.q.conjugate() * T_to.q * T_from_to_.q.conjugate());
   Vector6d r;
   r << R_from_w * (T_to.t - T_from.t) - scaled_t, r_theta;
   Eigen::Map<Vector6d>(residuals, 6) = sqrt_info_ * r;

@@ -19,9 +19,8 @@ std::vector<PointMatch> FilterByFundamental(const Window& window_m, const Window
       continue;
     }
     // Undistorted pixels of an ideal camera, always (m, c).
-    const Eigen::Vector2d a =
-        holder.frames.back()->ray(landmark.observations.back().corner) /
-        holder.frames.back()->keyframe().camera.PixelAngle();
+    const Eigen::Vector2d a = holder.frames.back()->ray(landmark.observations.back().corner) /
+                              holder.frames.back()->keyframe().camera.PixelAngle();
     const Eigen::Vector2d b = observer.frames.back()->ray(matches[i].observed.corner) /
                               observer.frames.back()->keyframe().camera.PixelAngle();
     holder_points.emplace_back(forward ? a.x() : b.x(), forward ? a.y() : b.y());

@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -14,8 +15,6 @@
 namespace pangea {
 namespace {
 
-using Block7 = std::array<double, 7>;
-using Block3 = std::array<double, 3>;
 using PointKey = std::pair<int, int>;  // (side, landmark)
 
 constexpr int kSideM = 0, kSideC = 1;
@@ -39,10 +38,29 @@ class JointProblem {
   JointProblem(const Window& window_m, const Window& window_c, const Rigid3& T_m_c,
                const JointBaOptions& options)
       : windows_{&window_m, &window_c}, options_(options) {
+    size_t size = 0;
     for (const int side : {kSideM, kSideC}) {
-      for (const Rigid3& T_w_body : windows_[side]->T_w_body) {
-        poses_[side].emplace_back();
-        PoseToBlock(side == kSideM ? T_w_body : T_m_c * T_w_body, poses_[side].back().data());
+      pose_offset_[side] = size;
+      size += 7 * windows_[side]->frames.size();
+      scale_offset_[side] = size;
+      size += 1;
+    }
+    for (const int side : {kSideM, kSideC}) {
+      point_offset_[side] = size;
+      size += 3 * windows_[side]->landmarks.size();
+    }
+    blocks_.resize(size);
+    for (const int side : {kSideM, kSideC}) {
+      const Window& window = *windows_[side];
+      for (int f = 0; f <= window.newest(); ++f) {
+        PoseToBlock(side == kSideM ? window.T_w_body[f] : T_m_c * window.T_w_body[f],
+                    Pose(side, f));
+      }
+      for (size_t l = 0; l < window.landmarks.size(); ++l) {
+        const WindowLandmark& landmark = window.landmarks[l];
+        const Eigen::Vector2d ray = window.frames[landmark.host.frame]->ray(landmark.host.corner);
+        const PointKey key{side, static_cast<int>(l)};
+        std::copy_n(std::array{ray.x(), ray.y(), landmark.inverse_depth}.data(), 3, Point(key));
       }
     }
   }
@@ -65,12 +83,12 @@ class JointProblem {
       }
     }
     for (const auto& [key, unused] : added) {
-      ordering->AddElementToGroup(points_.at(key).data(), 0);
+      ordering->AddElementToGroup(Point(key), 0);
     }
     for (double* block : FrameBlocks()) {
       ordering->AddElementToGroup(block, 1);
     }
-    ordering->AddElementToGroup(poses_[kSideM].back().data(), 1);
+    ordering->AddElementToGroup(Newest(kSideM), 1);
 
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_SCHUR;
@@ -87,7 +105,7 @@ class JointProblem {
   // Squared residuals of the matches in use; a point whose depth denies its prior counts as far
   // off in all its matches.
   void Classify(const std::vector<PointMatch>& matches, std::vector<bool>* inlier,
-                double* chi2_sum) const {
+                double* chi2_sum) {
     *chi2_sum = 0;
     for (const Reprojection& reprojection : reprojections_) {
       const PointMatch& match = matches[reprojection.match];
@@ -95,20 +113,20 @@ class JointProblem {
       const double* blocks[] = {reprojection.host, reprojection.target, reprojection.point};
       const bool valid = reprojection.factor->Evaluate(blocks, r.data(), nullptr);
       const WindowLandmark& landmark = Landmark(match);
-      const double kappa = scales_[HolderSide(match)];
+      const double kappa = *Scale(HolderSide(match));
       const double depth_error =
           (reprojection.point[2] - std::exp(-kappa) * landmark.inverse_depth) /
           landmark.inverse_depth_sigma;
       const double chi2 = r.squaredNorm() / (reprojection.share * reprojection.share);
-      (*inlier)[reprojection.match] = valid && chi2 < options_.max_chi2 &&
-                                      depth_error * depth_error < options_.max_depth_chi2;
+      (*inlier)[reprojection.match] =
+          valid && chi2 < options_.max_chi2 && depth_error * depth_error < options_.max_depth_chi2;
       if ((*inlier)[reprojection.match]) {
         *chi2_sum += chi2;
       }
     }
   }
 
-  Rigid3 NewestPose(int side) const { return PoseFromBlock(poses_[side].back().data()); }
+  Rigid3 NewestPose(int side) { return PoseFromBlock(Newest(side)); }
 
   // Marginal covariance of the newest c keyframe's pose, in window m's frame: the inverse of the
   // Schur complement of the points in J^T J.
@@ -120,7 +138,7 @@ class JointProblem {
     evaluate.parameter_blocks = frames;
     const int num_frame_columns = 6 * (static_cast<int>(frames.size()) - 2) + 2;
     for (const auto& [key, unused] : used_points_) {
-      evaluate.parameter_blocks.push_back(points_.at(key).data());
+      evaluate.parameter_blocks.push_back(Point(key));
     }
     ceres::CRSMatrix jacobian;
     if (!problem_->Evaluate(evaluate, nullptr, nullptr, nullptr, &jacobian)) {
@@ -157,8 +175,7 @@ class JointProblem {
     if (llt.info() != Eigen::Success) {
       return std::nullopt;
     }
-    const Eigen::MatrixXd columns =
-        llt.solve(Eigen::MatrixXd::Identity(num_frame_columns, 6));
+    const Eigen::MatrixXd columns = llt.solve(Eigen::MatrixXd::Identity(num_frame_columns, 6));
     const Matrix6d covariance = columns.topRows<6>();
     return covariance.allFinite() ? std::make_optional(covariance) : std::nullopt;
   }
@@ -181,36 +198,41 @@ class JointProblem {
     return windows_[HolderSide(match)]->landmarks[match.landmark];
   }
 
+  double* Pose(int side, int frame) { return &blocks_[pose_offset_[side] + 7 * frame]; }
+  double* Newest(int side) { return Pose(side, windows_[side]->newest()); }
+  double* Scale(int side) { return &blocks_[scale_offset_[side]]; }
+  double* Point(const PointKey& key) {
+    return &blocks_[point_offset_[key.first] + 3 * static_cast<size_t>(key.second)];
+  }
+
   // Everything but the points and the fixed newest keyframe of m; the newest of c first.
   std::vector<double*> FrameBlocks() {
-    std::vector<double*> blocks = {poses_[kSideC].back().data()};
-    for (size_t f = 0; f + 1 < poses_[kSideC].size(); ++f) {
-      blocks.push_back(poses_[kSideC][f].data());
+    std::vector<double*> blocks = {Newest(kSideC)};
+    for (int f = 0; f < windows_[kSideC]->newest(); ++f) {
+      blocks.push_back(Pose(kSideC, f));
     }
-    for (size_t f = 0; f + 1 < poses_[kSideM].size(); ++f) {
-      blocks.push_back(poses_[kSideM][f].data());
+    for (int f = 0; f < windows_[kSideM]->newest(); ++f) {
+      blocks.push_back(Pose(kSideM, f));
     }
-    blocks.push_back(&scales_[kSideM]);
-    blocks.push_back(&scales_[kSideC]);
+    blocks.push_back(Scale(kSideM));
+    blocks.push_back(Scale(kSideC));
     return blocks;
   }
 
   void AddPosesAndEdges() {
     for (const int side : {kSideM, kSideC}) {
-      for (Block7& pose : poses_[side]) {
-        problem_->AddParameterBlock(pose.data(), 7, new RigidManifold);
+      for (int f = 0; f <= windows_[side]->newest(); ++f) {
+        problem_->AddParameterBlock(Pose(side, f), 7, new RigidManifold);
       }
-      problem_->AddParameterBlock(&scales_[side], 1);
-      problem_->AddResidualBlock(new ScalePriorFactor(options_.scale_sigma), nullptr,
-                                 &scales_[side]);
-      for (size_t f = 1; f < poses_[side].size(); ++f) {
-        const OdometryEdge& edge = *windows_[side]->keyframe(static_cast<int>(f)).edge;
+      problem_->AddParameterBlock(Scale(side), 1);
+      problem_->AddResidualBlock(new ScalePriorFactor(options_.scale_sigma), nullptr, Scale(side));
+      for (int f = 1; f <= windows_[side]->newest(); ++f) {
+        const OdometryEdge& edge = *windows_[side]->keyframe(f).edge;
         problem_->AddResidualBlock(new EdgeFactor(edge.T_from_this, Floored(edge.covariance)),
-                                   nullptr, poses_[side][f - 1].data(), poses_[side][f].data(),
-                                   &scales_[side]);
+                                   nullptr, Pose(side, f - 1), Pose(side, f), Scale(side));
       }
     }
-    problem_->SetParameterBlockConstant(poses_[kSideM].back().data());
+    problem_->SetParameterBlockConstant(Newest(kSideM));
   }
 
   // Matches whose two corners meet in both directions: the same two pixels twice, so each counts
@@ -247,36 +269,32 @@ class JointProblem {
     const KeyframeView& host = *holder.frames[landmark.host.frame];
     const KeyframeView& target = *observer.frames[match.observed.frame];
     const PointKey key{side, match.landmark};
-    const auto [it, is_new] = points_.try_emplace(key);
-    if (is_new) {
-      const Eigen::Vector2d ray = host.ray(landmark.host.corner);
-      it->second = {ray.x(), ray.y(), landmark.inverse_depth};
-    }
-    double* point = it->second.data();
+    double* point = Point(key);
     if (added->emplace(key, true).second) {
       const double sigma = CornerSigma(holder.corner(landmark.host), options_.pixel_sigma);
       problem_->AddResidualBlock(
           new PointPriorFactor(host.ray(landmark.host.corner),
                                share / sigma * host.pixel_jacobian(landmark.host.corner),
                                landmark.inverse_depth, landmark.inverse_depth_sigma),
-          nullptr, point, &scales_[side]);
+          nullptr, point, Scale(side));
     }
     const double sigma = CornerSigma(observer.corner(match.observed), options_.pixel_sigma);
     auto* factor = new ReprojectionFactor(
         host.keyframe().camera.T_body_cam, target.keyframe().camera.T_body_cam,
         target.ray(match.observed.corner),
         share / sigma * target.pixel_jacobian(match.observed.corner));
-    double* host_pose = poses_[side][landmark.host.frame].data();
-    double* target_pose = poses_[1 - side][match.observed.frame].data();
+    double* host_pose = Pose(side, landmark.host.frame);
+    double* target_pose = Pose(1 - side, match.observed.frame);
     problem_->AddResidualBlock(factor, loss, host_pose, target_pose, point);
     reprojections_.push_back({factor, host_pose, target_pose, point, share, 0});
   }
 
   std::array<const Window*, 2> windows_;
   JointBaOptions options_;
-  std::array<std::vector<Block7>, 2> poses_;
-  std::array<double, 2> scales_{};
-  std::map<PointKey, Block3> points_;
+  // All parameters in one piece: Ceres orders blocks by address, and so the order, and with it the
+  // last digit, is the same in every run.
+  std::vector<double> blocks_;
+  std::array<size_t, 2> pose_offset_{}, scale_offset_{}, point_offset_{};
   std::map<PointKey, bool> used_points_;
   std::vector<Reprojection> reprojections_;
   std::optional<ceres::Problem> problem_;

@@ -19,16 +19,16 @@
 namespace pangea {
 
 struct JointBaOptions {
-  double pixel_sigma = 1.0;    // of a corner on octave 0
-  double scale_sigma = 0.01;   // share by which a window may be larger than its odometry says
-  double max_chi2 = 9.2;       // of an inlier: 99 % of 2 degrees of freedom
+  double pixel_sigma = 1.0;      // of a corner on octave 0
+  double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says
+  double max_chi2 = 9.2;         // of an inlier: 99 % of 2 degrees of freedom
   double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
-  int iterations = 8;          // each of the two rounds
+  int iterations = 8;            // each of the two rounds
 };
 
 struct JointBaResult {
-  Rigid3 T_m_c;      // windows
-  Rigid3 T_Km_Kc;    // bodies of the newest keyframes
+  Rigid3 T_m_c;                                // windows
+  Rigid3 T_Km_Kc;                              // bodies of the newest keyframes
   Matrix6d covariance = Matrix6d::Identity();  // of T_Km_Kc, in Km's body frame
   std::vector<bool> inlier;                    // by match
   int num_inlier_observations = 0;

@@ -74,8 +74,7 @@ double Chi2(const PointObservation& observation, const Rigid3& T_m_c, double ext
   // r^T (v I + u u^T)^-1 r by Sherman and Morrison.
   const double v = 1.0 + extra_var;
   const double along = residual->r.dot(residual->depth_sigma);
-  return (residual->r.squaredNorm() -
-          along * along / (v + residual->depth_sigma.squaredNorm())) /
+  return (residual->r.squaredNorm() - along * along / (v + residual->depth_sigma.squaredNorm())) /
          v;
 }
 

@@ -78,9 +78,9 @@ struct Prediction {
 };
 
 std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& landmark,
-                                  const Window& observer, int frame, const Rigid3& T_observer_holder,
-                                  Direction direction, const PoseEstimate& pose,
-                                  const SearchOptions& options) {
+                                  const Window& observer, int frame,
+                                  const Rigid3& T_observer_holder, Direction direction,
+                                  const PoseEstimate& pose, const SearchOptions& options) {
   const CameraModel& camera = observer.keyframe(frame).camera;
   const Rigid3& T_w_cam = observer.T_w_cam[frame];
   const Eigen::Vector3d y = T_observer_holder * landmark.p_w;
@@ -94,7 +94,8 @@ std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& la
   const Eigen::Vector3d sight = y - T_w_cam.t;
   const Eigen::Vector3d host_sight = y - T_observer_holder * holder.T_w_cam[landmark.host.frame].t;
   const double scale = std::abs(std::log(sight.norm() / host_sight.norm()));
-  const double angle = std::acos(std::clamp(sight.normalized().dot(host_sight.normalized()), -1.0, 1.0));
+  const double angle =
+      std::acos(std::clamp(sight.normalized().dot(host_sight.normalized()), -1.0, 1.0));
   if (angle > options.max_view_angle || scale > std::log(options.max_scale)) {
     return std::nullopt;
   }
@@ -112,16 +113,14 @@ std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& la
     J_pose << J_y, -J_y * Hat(pose.T_m_c.q * landmark.p_w);
   }
   const Eigen::Vector2d depth = J_y * (T_observer_holder.q * landmark.depth_sigma_w);
-  prediction.covariance =
-      J_pose * pose.covariance * J_pose.transpose() + depth * depth.transpose();
+  prediction.covariance = J_pose * pose.covariance * J_pose.transpose() + depth * depth.transpose();
   return prediction;
 }
 
 }  // namespace
 
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c,
-                                Direction direction, int frame, const PoseEstimate& pose,
-                                const SearchOptions& options) {
+SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
+                                int frame, const PoseEstimate& pose, const SearchOptions& options) {
   const bool forward = direction == Direction::kForward;
   const Window& holder = forward ? window_m : window_c;
   const Window& observer = forward ? window_c : window_m;
@@ -134,18 +133,17 @@ SearchResult SearchByProjection(const Window& window_m, const Window& window_c,
   std::vector<int> near;
   for (size_t l = 0; l < holder.landmarks.size(); ++l) {
     const WindowLandmark& landmark = holder.landmarks[l];
-    const auto prediction = Predict(holder, landmark, observer, frame, T_observer_holder,
-                                    direction, pose, options);
+    const auto prediction =
+        Predict(holder, landmark, observer, frame, T_observer_holder, direction, pose, options);
     if (!prediction) {
       continue;
     }
     result.projections.push_back(
         {static_cast<int>(l), prediction->pixel, false, prediction->comparable});
     const double host_sigma = CornerSigma(holder.corner(landmark.host), options.pixel_sigma);
-    const double spread =
-        std::sqrt(prediction->covariance.trace() + 2 * host_sigma * host_sigma);
-    view.CornersNear(prediction->pixel,
-                     std::clamp(3 * spread, options.min_radius_px, options.max_radius_px), &near);
+    const double spread = std::sqrt(prediction->covariance.trace() + 2 * host_sigma * host_sigma);
+    near = view.grid().Within(prediction->pixel,
+                              std::clamp(3 * spread, options.min_radius_px, options.max_radius_px));
     std::erase_if(near, [&](int i) {
       const double sigma = CornerSigma(keyframe.corners[i], options.pixel_sigma);
       Eigen::Matrix2d covariance = prediction->covariance;
@@ -195,7 +193,8 @@ std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& 
     });
     if (nearest.corner >= 0 && nearest.distance <= max_hamming &&
         nearest.distance < max_ratio * nearest.second) {
-      matches.push_back({direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
+      matches.push_back(
+          {direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
     }
   }
   return ResolveCorners(matches);

@@ -11,15 +11,15 @@
 namespace pangea {
 
 struct SearchOptions {
-  double pixel_sigma = 1.0;    // of a corner on octave 0
-  int max_hamming = 70;        // of 256 bits
-  double max_ratio = 0.9;      // best to second-best distance, corners 4 px and further apart
-  double max_chi2 = 11.8;      // within 3 sigma of the prediction (2 degrees of freedom)
-  double min_radius_px = 4;    // of the search, whatever the prediction claims
+  double pixel_sigma = 1.0;  // of a corner on octave 0
+  int max_hamming = 70;      // of 256 bits
+  double max_ratio = 0.9;    // best to second-best distance, corners 4 px and further apart
+  double max_chi2 = 11.8;    // within 3 sigma of the prediction (2 degrees of freedom)
+  double min_radius_px = 4;  // of the search, whatever the prediction claims
   double max_radius_px = 40;
-  double max_depth_m = 60;     // the deeper, the worse triangulated
-  double max_view_angle = 0.9; // radians between the two lines of sight
-  double max_scale = 2.2;      // ratio of the two distances
+  double max_depth_m = 60;      // the deeper, the worse triangulated
+  double max_view_angle = 0.9;  // radians between the two lines of sight
+  double max_scale = 2.2;       // ratio of the two distances
 };
 
 // A point that should be seen in the keyframe.
@@ -37,9 +37,8 @@ struct SearchResult {
 };
 
 // `pose` is T_m_c and its covariance whatever the direction.
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c,
-                                Direction direction, int frame, const PoseEstimate& pose,
-                                const SearchOptions& options);
+SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
+                                int frame, const PoseEstimate& pose, const SearchOptions& options);
 
 // Nearest descriptors without any prediction: the newest keyframe's corners against the window's
 // points. For a first guess; a third of these may be wrong.

@@ -16,8 +16,8 @@ double SigmaPerRadian(const PointObservation& observation) {
 double EpipolarChi2(const RayPair& pair, const Rigid3& T_m_c, const Eigen::Vector3d& baseline_m) {
   const Eigen::Vector3d ray_c_m = T_m_c.q * pair.ray_c;
   const double triple = ray_c_m.dot(baseline_m.cross(pair.ray_m));
-  const double area2 = std::max(baseline_m.cross(pair.ray_m).squaredNorm(),
-                                baseline_m.cross(ray_c_m).squaredNorm());
+  const double area2 =
+      std::max(baseline_m.cross(pair.ray_m).squaredNorm(), baseline_m.cross(ray_c_m).squaredNorm());
   return triple * triple / (area2 + 1e-12) / (pair.sigma * pair.sigma);
 }
 
@@ -103,8 +103,7 @@ std::vector<Rigid3> SolveUprightTwoPoint(const Eigen::Vector3d& p1_w, const Eige
       continue;  // behind the camera
     }
     const Eigen::Vector3d v = l.x() * d1 - l.y() * d2;
-    const Eigen::Quaterniond q =
-        YawRotation(std::atan2(D.y(), D.x()) - std::atan2(v.y(), v.x()));
+    const Eigen::Quaterniond q = YawRotation(std::atan2(D.y(), D.x()) - std::atan2(v.y(), v.x()));
     poses.emplace_back(q, 0.5 * (p1_w + p2_w - q * (l.x() * d1 + l.y() * d2)));
   }
   return poses;

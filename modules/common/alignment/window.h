@@ -26,8 +26,8 @@ struct CornerRef {
 
 struct WindowLandmark {
   int32_t id = kNoLandmark;
-  CornerRef host;              // where its depth is best known
-  double inverse_depth = 0;    // 1/m, host camera's z axis
+  CornerRef host;            // where its depth is best known
+  double inverse_depth = 0;  // 1/m, host camera's z axis
   double inverse_depth_sigma = 0;
   Eigen::Vector3d p_w = Eigen::Vector3d::Zero();
   // What one sigma of inverse depth moves p_w by, first order.

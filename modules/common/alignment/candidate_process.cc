@@ -1,0 +1,166 @@
+#include "common/alignment/candidate_process.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+// One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
+constexpr int32_t kMaxAsked = 50;
+
+}  // namespace
+
+std::vector<SeqGap> CandidateProcess::Tracker::Due(int64_t now_utime) {
+  std::vector<SeqGap> due;
+  for (const SeqGap& gap : stream_.Gaps()) {
+    const auto [it, is_new] = asked_.try_emplace(gap.map, Asked{-1, 0});
+    Asked& asked = it->second;
+    if (asked.from_seq != gap.from_seq) {
+      asked = {gap.from_seq, now_utime + kSecond};
+    } else if (now_utime >= asked.next_utime) {
+      asked.next_utime = now_utime + 2 * kSecond;
+      due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
+    }
+  }
+  return due;
+}
+
+CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
+                                   std::unique_ptr<PairJudge> judge)
+    : node_(bus, name), kind_(kind), judge_(std::move(judge)) {
+  node_.Subscribe<keyframe_t>(
+      std::string(channels::kAllKeyframes),
+      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
+  node_.Subscribe<place_match_t>(
+      std::string(channels::kPlaceMatch),
+      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
+  node_.Subscribe<have_t>(std::string(channels::kHave),
+                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Subscribe<again_t>(
+      channels::Again(name),
+      [this](const std::string&, const again_t& message) { OnAgain(message); });
+}
+
+void CandidateProcess::OnKeyframe(const keyframe_t& message) {
+  Parsed<Keyframe> keyframe = Parse(message);
+  if (!keyframe.value) {
+    node_.Refuse(keyframe.refused);
+    return;
+  }
+  keyframes_.Note(keyframe.value->id.map, keyframe.value->id.seq);
+  judge_->Add(std::move(*keyframe.value));
+  JudgeReady();
+}
+
+void CandidateProcess::OnPlaceMatch(const place_match_t& message) {
+  const Parsed<PlaceMatch> match = Parse(message);
+  if (!match.value) {
+    node_.Refuse(match.refused);
+    return;
+  }
+  if (waiting_.size() + match.value->candidates.size() > kMaxWaiting) {
+    node_.Refuse("too many candidates wait for keyframes");
+    return;
+  }
+  matches_.Note(match.value->query.map, match.value->query.seq);
+  for (const PlaceCandidate& candidate : match.value->candidates) {
+    Constraint constraint;
+    constraint.from = candidate.match;
+    constraint.to = match.value->query;
+    constraint.kind = candidate.kind;
+    if (candidate.kind == kind_ && !judged_.contains(constraint.Id())) {
+      waiting_.emplace(std::make_pair(match.value->query, candidate.match), candidate);
+    }
+  }
+  JudgeReady();
+}
+
+void CandidateProcess::OnHave(const have_t& message) {
+  for (int i = 0; i < message.num_maps; ++i) {
+    const Parsed<MapId> map = Parse(message.maps[i]);
+    if (!map.value || message.highest_seq[i] < 0) {
+      node_.Refuse("have: invalid map or seq");
+      continue;
+    }
+    // Verdicts of a former run: no need to repeat them.
+    if (verdicts_asked_.insert(*map.value).second) {
+      Ask(std::string(channels::kConstraint), {*map.value, 0, message.highest_seq[i]});
+    }
+    keyframes_.Announce(*map.value, message.highest_seq[i]);
+    matches_.Announce(*map.value, message.highest_seq[i]);
+  }
+}
+
+void CandidateProcess::OnAgain(const again_t& message) {
+  const Bytes data(message.data.data(), message.data.size());
+  keyframe_t keyframe{};
+  place_match_t match{};
+  constraint_t constraint{};
+  if (DecodeMessage(data, &keyframe)) {
+    OnKeyframe(keyframe);
+  } else if (DecodeMessage(data, &match)) {
+    OnPlaceMatch(match);
+  } else if (DecodeMessage(data, &constraint)) {
+    judged_.insert(constraint.id);
+  } else {
+    node_.Refuse("again: neither keyframe, match nor constraint");
+  }
+}
+
+void CandidateProcess::JudgeReady() {
+  for (auto it = waiting_.begin(); it != waiting_.end();) {
+    const KeyframeId& query = it->first.first;
+    if (!judge_->Ready(query, it->second)) {
+      ++it;
+      continue;
+    }
+    const Constraint constraint = judge_->Judge(query, it->second);
+    if (judged_.insert(constraint.Id()).second) {
+      node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
+      if (constraint.accepted) {
+        node_.Count("accepted");
+        ++num_accepted_;
+      } else {
+        node_.Refuse(constraint.reason);
+      }
+    }
+    it = waiting_.erase(it);
+  }
+}
+
+void CandidateProcess::Ask(const std::string& channel, const SeqGap& gap) {
+  resend_request_t request{};
+  request.requester = node_.name();
+  request.channel = channel;
+  request.map = ToMessage(gap.map);
+  request.from_seq = gap.from_seq;
+  request.to_seq = gap.to_seq;
+  node_.Publish(std::string(channels::kResendRequest), request);
+  node_.NoteResendAsked();
+}
+
+void CandidateProcess::Tick(int64_t now_utime) {
+  for (const SeqGap& gap : keyframes_.Due(now_utime)) {
+    Ask(channels::Keyframe(gap.map.agent_id), gap);
+  }
+  for (const SeqGap& gap : matches_.Due(now_utime)) {
+    Ask(std::string(channels::kPlaceMatch), gap);
+  }
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond;
+    const auto waiting = static_cast<int64_t>(waiting_.size());
+    node_.PublishStatus(
+        now_utime, waiting,
+        fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes",
+                    num_accepted_, judged_.size(), waiting));
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,16 @@
+#pragma once
+
+// KEYFRAME_*, PLACE_MATCH (candidates of kind inter) in; CONSTRAINT, STATUS_fusion out.
+
+#include "common/alignment/candidate_process.h"
+#include "fusion/fusion.h"
+
+namespace pangea {
+
+class FusionProcess : public CandidateProcess {
+ public:
+  FusionProcess(Bus& bus, const FusionOptions& options)
+      : CandidateProcess(bus, "fusion", PlaceKind::kInter, std::make_unique<Fusion>(options)) {}
+};
+
+}  // namespace pangea

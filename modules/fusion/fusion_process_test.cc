@@ -1,0 +1,191 @@
+#include "fusion/fusion_process.h"
+
+#include <gtest/gtest.h>
+
+#include "common/alignment/alignment_test_world.h"
+#include "common/channels.h"
+#include "common/messages.h"
+#include "inter_map_ba/inter_map_ba_process.h"
+#include "pangea/resend_request_t.hpp"
+#include "pangea/status_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+
+// Two agents in one room on a LocalBus with both processes; what they say is kept.
+class VerdictProcesses : public testing::Test {
+ protected:
+  VerdictProcesses() {
+    TestAgentOptions first, second;
+    first.num_keyframes = 12;
+    second.map = {2, 2000};
+    second.radius = 2.3;
+    second.start_angle = 0.15;
+    second.num_keyframes = 12;
+    const auto room = MakeTestRoom({.seed = 5});
+    agent_m_ = RunTestAgent(room, first);
+    agent_c_ = RunTestAgent(room, second);
+    listener_.Subscribe<constraint_t>(std::string(channels::kConstraint),
+                                      [this](const std::string&, const constraint_t& message) {
+                                        constraints_.push_back(*Parse(message).value);
+                                      });
+    listener_.Subscribe<resend_request_t>(
+        std::string(channels::kResendRequest),
+        [this](const std::string&, const resend_request_t& message) {
+          requests_.push_back(message);
+        });
+    listener_.Subscribe<status_t>(
+        channels::Status("fusion"),
+        [this](const std::string&, const status_t& message) { status_ = message; });
+  }
+
+  void SendKeyframes(const TestAgent& agent, int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      const Keyframe& keyframe = agent.keyframes[k];
+      PublishMessage(bus_, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
+      bus_.Drain();
+    }
+  }
+  void SendMatch(PlaceKind kind) {
+    PlaceMatch match{
+        agent_c_.keyframes[9].id, {MakeTestCandidate(agent_c_, 9, agent_m_, 10, 40, 10)}, {}};
+    match.candidates[0].kind = kind;
+    PublishMessage(bus_, std::string(channels::kPlaceMatch), ToMessage(match));
+    bus_.Drain();
+  }
+
+  LocalBus bus_;
+  FusionProcess fusion_{bus_, FusionOptions{}};
+  InterMapBaProcess inter_map_ba_{bus_, InterMapBaOptions{}};
+  Node listener_{bus_, "listener"};
+  TestAgent agent_m_, agent_c_;
+  std::vector<Constraint> constraints_;
+  std::vector<resend_request_t> requests_;
+  status_t status_{};
+};
+
+TEST_F(VerdictProcesses, OneVerdictFromTheProcessOfItsKind) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  SendMatch(PlaceKind::kInter);
+  SendMatch(PlaceKind::kInter);  // a repeat gives no second verdict
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
+  EXPECT_EQ(constraints_[0].from, agent_m_.keyframes[10].id);
+  EXPECT_EQ(constraints_[0].to, agent_c_.keyframes[9].id);
+  EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
+}
+
+TEST_F(VerdictProcesses, IntraOfTwoMapsIsRefusedByInterMapBa) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  SendMatch(PlaceKind::kIntra);
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_FALSE(constraints_[0].accepted);
+  EXPECT_EQ(constraints_[0].reason, "intra, but of two maps");
+}
+
+// The verdict is the same whether the match comes after the keyframes, before them, or before
+// keyframes that come in another order.
+TEST_F(VerdictProcesses, VerdictDoesNotDependOnArrival) {
+  SendMatch(PlaceKind::kInter);
+  SendKeyframes(agent_c_, 4, 12);
+  SendKeyframes(agent_m_, 9, 12);
+  EXPECT_TRUE(constraints_.empty());
+  fusion_.Tick(kSecond);
+  bus_.Drain();
+  EXPECT_EQ(status_.pending, 1);
+  SendKeyframes(agent_m_, 0, 9);
+  SendKeyframes(agent_c_, 0, 4);
+  ASSERT_EQ(constraints_.size(), 1u);
+
+  Fusion fusion{FusionOptions{}};
+  for (const TestAgent* agent : {&agent_c_, &agent_m_}) {
+    for (const Keyframe& keyframe : agent->keyframes) {
+      // As it comes off the wire, where pixels are rounded.
+      fusion.Add(*Parse(ToMessage(keyframe)).value);
+    }
+  }
+  PlaceCandidate candidate = MakeTestCandidate(agent_c_, 9, agent_m_, 10, 40, 10);
+  const Constraint direct = fusion.Judge(agent_c_.keyframes[9].id, candidate);
+  EXPECT_EQ(direct.T_from_to.t, constraints_[0].T_from_to.t);
+  EXPECT_TRUE(direct.covariance.isApprox(constraints_[0].covariance, 1e-12));
+}
+
+TEST_F(VerdictProcesses, AsksForAGapThatStays) {
+  SendKeyframes(agent_m_, 0, 3);
+  SendKeyframes(agent_m_, 5, 8);
+  fusion_.Tick(10 * kSecond);
+  bus_.Drain();
+  EXPECT_TRUE(requests_.empty());  // it may be on its way
+  fusion_.Tick(12 * kSecond);
+  bus_.Drain();
+  ASSERT_EQ(requests_.size(), 1u);
+  EXPECT_EQ(requests_[0].requester, "fusion");
+  EXPECT_EQ(requests_[0].channel, "KEYFRAME_1");
+  EXPECT_EQ(requests_[0].from_seq, 3);
+  EXPECT_EQ(requests_[0].to_seq, 4);
+
+  // The answer closes it.
+  for (int k = 3; k < 5; ++k) {
+    const keyframe_t keyframe = ToMessage(agent_m_.keyframes[k]);
+    again_t again{};
+    again.channel = "KEYFRAME_1";
+    again.data.resize(keyframe.getEncodedSize());
+    keyframe.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
+    again.num_bytes = static_cast<int32_t>(again.data.size());
+    PublishMessage(bus_, channels::Again("fusion"), again);
+  }
+  bus_.Drain();
+  fusion_.Tick(20 * kSecond);
+  bus_.Drain();
+  fusion_.Tick(30 * kSecond);
+  bus_.Drain();
+  EXPECT_EQ(requests_.size(), 1u);
+}
+
+TEST_F(VerdictProcesses, AfterARestartKnownVerdictsAreNotRepeated) {
+  have_t have{};
+  have.num_maps = 1;
+  have.maps = {ToMessage(agent_c_.keyframes[0].id.map)};
+  have.highest_seq = {11};
+  PublishMessage(bus_, std::string(channels::kHave), have);
+  bus_.Drain();
+  ASSERT_EQ(requests_.size(), 2u);  // each process its own
+  EXPECT_EQ(requests_[0].channel, channels::kConstraint);
+  EXPECT_EQ(requests_[0].to_seq, 11);
+
+  Constraint known;
+  known.from = agent_m_.keyframes[10].id;
+  known.to = agent_c_.keyframes[9].id;
+  known.kind = PlaceKind::kInter;
+  const constraint_t message = ToMessage(known);
+  again_t again{};
+  again.channel = channels::kConstraint;
+  again.data.resize(message.getEncodedSize());
+  message.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
+  again.num_bytes = static_cast<int32_t>(again.data.size());
+  PublishMessage(bus_, channels::Again("fusion"), again);
+  bus_.Drain();
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  SendMatch(PlaceKind::kInter);
+  EXPECT_TRUE(constraints_.empty());
+}
+
+TEST_F(VerdictProcesses, ACornerThatDoesNotExistIsRefused) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  PlaceMatch match{
+      agent_c_.keyframes[9].id, {MakeTestCandidate(agent_c_, 9, agent_m_, 10, 40, 10)}, {}};
+  match.candidates[0].corner_matches[0].second = kMaxCorners - 1;
+  PublishMessage(bus_, std::string(channels::kPlaceMatch), ToMessage(match));
+  bus_.Drain();
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_FALSE(constraints_[0].accepted);
+}
+
+}  // namespace
+}  // namespace pangea

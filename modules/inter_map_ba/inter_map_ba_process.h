@@ -1,0 +1,17 @@
+#pragma once
+
+// KEYFRAME_*, PLACE_MATCH (candidates of kind intra) in; CONSTRAINT, STATUS_inter_map_ba out.
+
+#include "common/alignment/candidate_process.h"
+#include "inter_map_ba/inter_map_ba.h"
+
+namespace pangea {
+
+class InterMapBaProcess : public CandidateProcess {
+ public:
+  InterMapBaProcess(Bus& bus, const InterMapBaOptions& options)
+      : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra,
+                         std::make_unique<InterMapBa>(options)) {}
+};
+
+}  // namespace pangea
