@@ -247,6 +247,21 @@ cv::Mat EurocRecording::LoadImage(size_t index, std::string* why) const {
   return pixels;
 }
 
+std::optional<int64_t> FirstImageUtimeOf(const std::string& folder) {
+  std::optional<int64_t> first;
+  try {
+    for (const CsvRow& row : ReadCsv(FindMav0(folder) + "/cam0/data.csv")) {
+      int64_t ns = 0;
+      if (ParseNumber(row.fields[0], &ns)) {
+        first = std::min(first.value_or(UtimeFromNs(ns)), UtimeFromNs(ns));
+      }
+    }
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
+  return first;
+}
+
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings) {
   const std::string mav0 = FindMav0(folder);
   return ReadGroundTruthIn(mav0, ReadEurocExtrinsics(mav0 + "/imu0/sensor.yaml"), warnings);

@@ -28,6 +28,7 @@
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -80,5 +81,7 @@ class EurocRecording {
 
 // The ground truth alone, without opening the rest: empty when the recording has none.
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings);
+// Stamp of the first image in the csv; nothing when there is none to be read.
+std::optional<int64_t> FirstImageUtimeOf(const std::string& folder);
 
 }  // namespace pangea

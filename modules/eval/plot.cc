@@ -40,7 +40,7 @@ std::string Script(const Plot& plot, const std::string& path) {
       "set terminal pngcairo noenhanced size 1400,1000 font 'sans,14' background '#ffffff'\n"
       "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
       "set grid linecolor '#dddddd' linewidth 1\n"
-      "set key outside below center horizontal samplen 2\n"
+      "set key tmargin center horizontal samplen 2\n"
       "set lmargin 11\nset rmargin 5\n";
   script +=
       fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
@@ -57,8 +57,9 @@ std::string Script(const Plot& plot, const std::string& path) {
     if (std::ranges::none_of(line.points, [](const auto& p) { return p.allFinite(); })) {
       continue;
     }
-    commands += fmt::format("{}$line{} with lines linewidth {:.1f} linecolor '{}' {}",
+    commands += fmt::format("{}$line{} with lines linewidth {:.1f} linecolor '{}' dashtype {} {}",
                             commands.empty() ? "plot " : ", ", i, line.width, line.colour,
+                            line.dashed ? 2 : 1,
                             line.label.empty() ? "notitle" : "title " + Quoted(line.label));
     if (line.mark_start) {
       commands += fmt::format(

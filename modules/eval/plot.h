@@ -18,6 +18,7 @@ struct PlotLine {
   std::string label = {};  // in the legend; empty for none
   std::string colour;      // "#rrggbb"
   double width = 2;
+  bool dashed = false;
   std::vector<Eigen::Vector2d> points = {};
   bool mark_start = false;  // a dot at the first point
 };

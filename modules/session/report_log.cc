@@ -1,0 +1,219 @@
+#include "session/report_log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string_view>
+
+#include "common/channels.h"
+#include "common/keyframe.h"
+#include "common/messages.h"
+#include "pangea/pose_t.hpp"
+#include "session/log_reader.h"
+
+namespace pangea::session {
+namespace {
+
+CapturedKeyframe Captured(const Keyframe& keyframe) {
+  CapturedKeyframe captured{keyframe.utime, keyframe.T_odom_body, {}};
+  for (const MapPoint& point : keyframe.points) {
+    if (const auto p_cam = PointInCamera(keyframe, point)) {
+      captured.points.push_back(
+          {keyframe.camera.T_body_cam * *p_cam,
+           keyframe.corners[static_cast<size_t>(point.corner)].landmark_id,
+           std::sqrt(static_cast<double>(point.inverse_depth_var)) / point.inverse_depth});
+    }
+  }
+  return captured;
+}
+
+// Puts the chunks of MAP_STATE together and keeps what counts.
+class States {
+ public:
+  explicit States(CapturedSession* session) : session_(session) {}
+
+  void AddChunk(const map_state_t& message, MapState chunk, double session_s) {
+    // Revisions increase over all groups, so one names a state; its chunks come in any order.
+    auto& chunks = pending_[{chunk.revision, chunk.group}];
+    chunks.emplace(message.chunk, std::move(chunk));
+    if (chunks.size() < static_cast<size_t>(message.num_chunks)) {
+      return;
+    }
+    MapState whole = std::move(chunks.begin()->second);
+    for (auto it = std::next(chunks.begin()); it != chunks.end(); ++it) {
+      std::ranges::move(it->second.keyframes, std::back_inserter(whole.keyframes));
+    }
+    pending_.erase({whole.revision, whole.group});
+    std::ranges::sort(whole.maps);
+    Add(std::make_shared<const MapState>(std::move(whole)), session_s);
+  }
+
+  int pending() const { return static_cast<int>(pending_.size()); }
+
+ private:
+  std::set<MapId> Together(const MapId& map) const {
+    const auto state = session_->states.find(map);
+    std::set<MapId> together = {map};
+    for (const auto& [other, others_state] : session_->states) {
+      if (state != session_->states.end() && others_state == state->second) {
+        together.insert(other);
+      }
+    }
+    return together;
+  }
+
+  void Add(const std::shared_ptr<const MapState>& state, double session_s) {
+    bool fused = false;
+    bool split = false;
+    for (const MapId& map : state->maps) {
+      const std::set<MapId> before = Together(map);
+      fused |= !std::ranges::includes(before, state->maps);
+      split |= !std::ranges::includes(state->maps, before);
+    }
+    bool newest = false;
+    for (const MapId& map : state->maps) {
+      auto& current = session_->states[map];
+      if (current == nullptr || current->revision < state->revision) {
+        current = state;
+        newest = true;
+      }
+    }
+    if (newest && (fused || split)) {
+      GroupChange change{fused, session_s, state->maps, {}};
+      for (const KeyframePose& pose : state->keyframes) {
+        auto& utime = change.newest_utime[pose.id.map.agent_id];
+        utime = std::max(utime, pose.utime);
+      }
+      session_->changes.push_back(std::move(change));
+    }
+  }
+
+  CapturedSession* session_;
+  std::map<std::pair<int64_t, MapId>, std::map<int, MapState>> pending_;
+};
+
+// POSE_<id>, by its digits; 0 for any other channel.
+int32_t AgentOf(std::string_view channel, std::string_view prefix) {
+  if (!channel.starts_with(prefix) || channel.size() > prefix.size() + 5) {
+    return 0;
+  }
+  int32_t id = 0;
+  for (const char c : channel.substr(prefix.size())) {
+    if (c < '0' || c > '9') {
+      return 0;
+    }
+    id = 10 * id + (c - '0');
+  }
+  return id;
+}
+
+void AddPose(Bytes data, PoseTrack* track) {
+  pose_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  track->first_utime = std::min(track->first_utime.value_or(message.utime), message.utime);
+  if (message.state != pose_t::STATE_TRACKING) {
+    return;
+  }
+  const auto map = Parse(message.map);
+  const auto T_odom_body = Parse(message.T_odom_body);
+  if (!map.value || !T_odom_body.value) {
+    return;
+  }
+  auto& first = track->first_tracking_utime;
+  first = std::min(first.value_or(message.utime), message.utime);
+  track->odometry[*map.value].push_back({message.utime, *T_odom_body.value});
+}
+
+void Finish(PoseTrack* track) {
+  for (auto& [map, odometry] : track->odometry) {
+    SortByTime(&odometry);
+  }
+}
+
+bool AddKeyframe(Bytes data, CapturedSession* session) {
+  keyframe_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto keyframe = Parse(message);
+  if (keyframe.value) {
+    session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value));
+  }
+  return keyframe.value.has_value();
+}
+
+bool AddConstraint(Bytes data, CapturedSession* session) {
+  constraint_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto constraint = Parse(message);
+  if (constraint.value) {
+    session->constraints.insert_or_assign(constraint.value->Id(), *constraint.value);
+  }
+  return constraint.value.has_value();
+}
+
+bool AddState(Bytes data, double session_s, States* states) {
+  map_state_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  auto state = Parse(message);
+  if (state.value) {
+    states->AddChunk(message, std::move(*state.value), session_s);
+  }
+  return state.value.has_value();
+}
+
+bool AddStatus(Bytes data, CapturedSession* session) {
+  status_t message{};
+  const bool good = DecodeMessage(data, &message);
+  if (good) {
+    session->statuses.insert_or_assign(message.process, message);
+  }
+  return good;
+}
+
+}  // namespace
+
+CapturedSession ReadServerLog(const std::string& path) {
+  CapturedSession session;
+  States states(&session);
+  std::optional<int64_t> begin;
+  ReadLog(path, [&](const LogEvent& event) {
+    begin = begin.value_or(event.utime);
+    const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
+    bool good = true;
+    if (AgentOf(event.channel, "KEYFRAME_") > 0) {
+      good = AddKeyframe(event.data, &session);
+    } else if (event.channel == channels::kConstraint) {
+      good = AddConstraint(event.data, &session);
+    } else if (event.channel == channels::kMapState) {
+      good = AddState(event.data, session_s, &states);
+    } else if (event.channel.starts_with("STATUS_")) {
+      good = AddStatus(event.data, &session);
+    }
+    if (!good) {
+      ++session.unreadable[event.channel];
+    }
+  });
+  session.incomplete_states = states.pending();
+  return session;
+}
+
+PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
+  PoseTrack track;
+  const std::string channel = channels::Pose(agent_id);
+  ReadLog(path, [&](const LogEvent& event) {
+    if (event.channel == channel) {
+      AddPose(event.data, &track);
+    }
+  });
+  Finish(&track);
+  return track;
+}
+
+}  // namespace pangea::session

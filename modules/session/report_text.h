@@ -1,0 +1,19 @@
+#pragma once
+
+// report.json and report.md.
+
+#include <string>
+
+#include "session/report_figures.h"
+
+namespace pangea::session {
+
+// "1_1700000000000000": a map's name in file names.
+std::string FileName(const MapId& map);
+
+std::string ReportJson(const ReportInput& input, const CapturedSession& session,
+                       const ReportFigures& figures);
+std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
+                           const ReportFigures& figures);
+
+}  // namespace pangea::session
