@@ -46,6 +46,8 @@ class Sender {
   std::optional<int32_t> FirstSeqFrom(const MapId& map, int32_t seq) const;
   // Only maps that the other side knows are sent, from this seq on; before it all is acknowledged.
   void SetNext(const MapId& map, int32_t next_seq);
+  // The map is done with; nothing of it may be in the spool.
+  void Forget(const MapId& map) { next_.erase(map); }
 
   void OnAck(const LinkAck& ack, int64_t now_us);
   // The keyframe packets due now. Call it every few milliseconds while there is something to send.

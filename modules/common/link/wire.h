@@ -48,7 +48,7 @@ struct LinkPacket {
 
 struct LinkMap {
   MapId map;
-  int32_t first_seq = 0;  // the first keyframe the uplink may still deliver
+  int32_t first_seq = 0;  // keyframes before are lost for good, unless they are journalled
   int64_t correction_revision = 0;
 };
 

@@ -1,0 +1,40 @@
+// pangea-uplink: joins one agent's bus and the link bus.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "uplink/uplink_process.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Carries one agent's keyframes to the server, and its corrections back",
+               "pangea-uplink");
+  int32_t agent_id = 0;
+  std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
+  pangea::UplinkOptions options;
+  app.add_option("--agent", agent_id, "agent id")->required()->check(CLI::Range(1, 65535));
+  app.add_option("--bus", bus, "LCM URL of the agent's bus")->capture_default_str();
+  app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
+  app.add_option("--packet-bytes", options.sender.payload_bytes, "data bytes per packet")
+      ->capture_default_str();
+  app.add_option("--rate", options.sender.rate_bytes_per_s, "bytes per second at most")
+      ->capture_default_str();
+  app.add_option("--spool-bytes", options.sender.max_spool_bytes,
+                 "unacknowledged keyframes kept; beyond it the newest are not taken")
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (const auto invalid = options.sender.Invalid()) {
+      throw std::runtime_error(*invalid);
+    }
+    pangea::LcmBus agent_bus(bus);
+    pangea::LcmBus link_bus(link);
+    pangea::UplinkProcess process(agent_bus, link_bus, agent_id, pangea::WallUtime(), options);
+    return pangea::RunPolledProcess(agent_bus, link_bus, process);
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-uplink: {}\n", error.what());
+    return 1;
+  }
+}

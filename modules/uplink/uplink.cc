@@ -1,0 +1,253 @@
+#include "uplink/uplink.h"
+
+#include <algorithm>
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond_us = 1'000'000;
+// No acknowledgement for this long: the handler is away, only hellos are sent.
+constexpr int64_t kConnected_us = 3 * kSecond_us;
+constexpr int64_t kHelloInterval_us = kSecond_us;
+constexpr int64_t kHelloUrgent_us = kSecond_us / 4;
+// Asking the odometry for what is missing, and for what may exist beyond the newest known.
+constexpr int64_t kAskInterval_us = 3 * kSecond_us / 10;
+constexpr int64_t kProbeInterval_us = kSecond_us;
+constexpr int32_t kMaxAsked = 50;
+// A gap the odometry has not filled after so many asks is lost for good.
+constexpr int kMaxUnanswered = 30;
+// An agent opens a map each time its odometry starts anew; the oldest that are done are
+// forgotten.
+constexpr size_t kMaxMaps = 200;
+
+}  // namespace
+
+Uplink::Uplink(int32_t agent_id, int64_t run, std::string software, const UplinkOptions& options)
+    : agent_id_(agent_id),
+      run_(run),
+      software_(std::move(software)),
+      options_(options),
+      sender_(agent_id, run, options.sender) {}
+
+Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
+  const auto [it, added] = maps_.try_emplace(id);
+  if (added) {
+    hello_due_ = true;
+    for (auto old = maps_.begin(); maps_.size() > kMaxMaps && old != maps_.end();) {
+      const bool done = old != it && !sender_.FirstSeqFrom(old->first, 0);
+      if (done) {
+        sender_.Forget(old->first);
+      }
+      old = done ? maps_.erase(old) : std::next(old);
+    }
+  }
+  return it->second;
+}
+
+Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes,
+                                  int64_t now_us) {
+  Map& map = FindOrAdd(id.map);
+  map.heard_us = now_us;
+  map.highest = std::max(map.highest, id.seq);
+  if (id.seq < map.next || sender_.Has(id)) {
+    return Taken::kRepeat;
+  }
+  return sender_.Add(id, std::move(bytes)) ? Taken::kNew : Taken::kSpoolFull;
+}
+
+void Uplink::AddPose(const MapId& map_id, int64_t group_revision, std::vector<uint8_t> bytes) {
+  pose_ = std::move(bytes);
+  // The pose names the map even if every keyframe of it was missed.
+  FindOrAdd(map_id).applied_revision = group_revision;
+}
+
+void Uplink::SetNext(const MapId& id, Map* map, int32_t next) {
+  map->next = std::max(next, map->given_up);
+  map->highest = std::max(map->highest, map->next - 1);
+  if (map->listed) {
+    sender_.SetNext(id, map->next);
+  }
+}
+
+std::string Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
+  if (ack.agent_id != agent_id_) {
+    return "acknowledgement for another agent";
+  }
+  if (ack.run != handler_run_ && ack.run < handler_run_ && Connected(now_us)) {
+    return "acknowledgement of an earlier handler";
+  }
+  if (ack.run == handler_run_ && ack.number <= newest_ack_) {
+    return "";  // overtaken
+  }
+  NoteHandler(ack.run);
+  newest_ack_ = ack.number;
+  if (ack.uplink_run != run_) {
+    hello_due_ = true;  // it answers the uplink before this one
+    return "";
+  }
+  last_ack_us_ = now_us;
+  const size_t spooled = sender_.spooled();
+  sender_.OnAck(ack, now_us);
+  for (const auto& [id, seq] : ack.journalled_seq) {
+    Map& map = FindOrAdd(id);
+    map.listed = true;
+    SetNext(id, &map, seq + 1);
+  }
+  keyframes_acked_ += static_cast<int64_t>(spooled - sender_.spooled());
+  for (const Correction& correction : ack.corrections) {
+    Map& map = FindOrAdd(correction.map);
+    if (!map.correction || map.correction->revision < correction.revision) {
+      map.correction = correction;
+      map.told_us = 0;
+    }
+    hello_due_ = true;  // confirms it
+  }
+  return "";
+}
+
+// A new handler may have another journal: what it has, it says anew, and it may be less.
+void Uplink::NoteHandler(int64_t run) {
+  if (run == handler_run_) {
+    return;
+  }
+  handler_run_ = run;
+  hello_due_ = true;
+  for (auto& [id, map] : maps_) {
+    map.listed = false;
+  }
+}
+
+bool Uplink::Connected(int64_t now_us) const {
+  return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
+}
+
+LinkPacket Uplink::Hello() {
+  LinkHello hello;
+  hello.software = software_;
+  const auto announce = [&](const MapId& id, const Map& map) {
+    hello.maps.push_back({id, map.given_up, map.correction ? map.correction->revision : 0});
+  };
+  for (const auto& [id, map] : maps_) {
+    if (hello.maps.size() < kMaxLinkMaps - 1 && sender_.FirstSeqFrom(id, 0)) {
+      announce(id, map);
+    }
+  }
+  if (!maps_.empty() && (hello.maps.empty() || hello.maps.back().map != maps_.rbegin()->first)) {
+    announce(maps_.rbegin()->first, maps_.rbegin()->second);
+  }
+  return sender_.Wrap(LinkPacket::Kind::kHello, EncodeMessage(ToMessage(hello)));
+}
+
+bool Uplink::HelloIsUrgent(int64_t now_us) const {
+  const auto waits_for_listing = [&](const auto& item) {
+    return !item.second.listed && sender_.FirstSeqFrom(item.first, 0);
+  };
+  return !Connected(now_us) || hello_due_ ||
+         std::any_of(maps_.begin(), maps_.end(), waits_for_listing);
+}
+
+std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
+  std::vector<LinkPacket> packets;
+  const int64_t since_hello = last_hello_us_ ? now_us - *last_hello_us_ : kHelloInterval_us;
+  if (since_hello >= (HelloIsUrgent(now_us) ? kHelloUrgent_us : kHelloInterval_us)) {
+    packets.push_back(Hello());
+    last_hello_us_ = now_us;
+    hello_due_ = false;
+  }
+  if (!Connected(now_us)) {
+    return packets;
+  }
+  const auto pose_interval_us =
+      options_.pose_hz > 0 ? static_cast<int64_t>(1e6 / options_.pose_hz) : 0;
+  if (!pose_.empty() && pose_interval_us > 0 && now_us - last_pose_us_ >= pose_interval_us) {
+    packets.push_back(sender_.Wrap(LinkPacket::Kind::kPose, std::move(pose_)));
+    pose_.clear();
+    last_pose_us_ = now_us;
+  }
+  for (LinkPacket& packet : sender_.Poll(now_us)) {
+    packets.push_back(std::move(packet));
+  }
+  return packets;
+}
+
+// The first seqs of a map that were published but are neither acknowledged nor in the spool.
+std::optional<SeqGap> Uplink::Missing(const MapId& id, const Map& map) const {
+  int32_t from = map.next;
+  while (sender_.Has({id, from})) {
+    ++from;
+  }
+  if (from > map.highest) {
+    return std::nullopt;
+  }
+  const auto present = sender_.FirstSeqFrom(id, from);
+  return SeqGap{id, from, present ? *present - 1 : map.highest};
+}
+
+bool Uplink::GiveUp(const MapId& id, Map* map, const SeqGap& gap) {
+  const bool first = gap.from_seq == map->next;
+  if (map->unanswered < kMaxUnanswered || !first || !map->listed || gap.to_seq >= map->highest) {
+    return false;
+  }
+  keyframes_lost_ += gap.to_seq + 1 - map->next;
+  map->given_up = gap.to_seq + 1;
+  SetNext(id, map, map->given_up);
+  map->unanswered = 0;
+  hello_due_ = true;
+  return true;
+}
+
+std::vector<SeqGap> Uplink::Asks(int64_t now_us) {
+  std::vector<SeqGap> asks;
+  const bool full = sender_.spooled_bytes() + kMaxKeyframeBytes > options_.sender.max_spool_bytes;
+  for (auto& [id, map] : maps_) {
+    const bool newest = id == maps_.rbegin()->first;
+    if (full || now_us - map.asked_us < kAskInterval_us) {
+      continue;
+    }
+    auto gap = Missing(id, map);
+    if (!gap && newest && now_us - std::max(map.heard_us, map.asked_us) > kProbeInterval_us) {
+      // Nothing is known to be missing; but after a restart, or a lost last datagram, nothing
+      // would be known. Silence is the usual answer.
+      map.asked_us = now_us;
+      asks.push_back({id, map.highest + 1, map.highest + kMaxAsked});
+      continue;
+    }
+    if (!gap) {
+      map.unanswered = 0;
+      continue;
+    }
+    map.unanswered = gap->from_seq == map.asked_from ? map.unanswered + 1 : 0;
+    if (GiveUp(id, &map, *gap)) {
+      continue;
+    }
+    map.asked_us = now_us;
+    map.asked_from = gap->from_seq;
+    gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
+    asks.push_back(*gap);
+  }
+  return asks;
+}
+
+std::vector<Correction> Uplink::TakeCorrections(int64_t now_us) {
+  std::vector<Correction> due;
+  for (auto& [id, map] : maps_) {
+    const bool applied = map.correction && map.applied_revision >= map.correction->revision;
+    const bool newest = id == maps_.rbegin()->first;
+    if (map.correction && !applied &&
+        (map.told_us == 0 || (newest && now_us - map.told_us >= kSecond_us))) {
+      due.push_back(*map.correction);
+      map.told_us = now_us;
+    }
+  }
+  return due;
+}
+
+std::map<MapId, int32_t> Uplink::Acknowledged() const {
+  std::map<MapId, int32_t> acknowledged;
+  for (const auto& [id, map] : maps_) {
+    acknowledged[id] = map.next - 1;
+  }
+  return acknowledged;
+}
+
+}  // namespace pangea

@@ -1,0 +1,92 @@
+#pragma once
+
+// One agent's end of the link: keyframes and poses in, packets out; acknowledgements in,
+// corrections and "have up to" out. Asks the odometry for keyframes it missed, so a restarted
+// uplink or a lost datagram on the agent's bus costs nothing the odometry still has.
+//
+// A state machine: time goes in (monotonic microseconds); no clock, no bus, one thread.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/in_order.h"
+#include "common/link/sender.h"
+
+namespace pangea {
+
+struct UplinkOptions {
+  SenderOptions sender;
+  double pose_hz = 10;  // poses sent up at most this often; 0 for none
+};
+
+class Uplink {
+ public:
+  // `run`: wall clock at the start, microseconds. `software`: for people.
+  Uplink(int32_t agent_id, int64_t run, std::string software, const UplinkOptions& options);
+
+  enum class Taken { kNew, kRepeat, kSpoolFull };
+  // An encoded keyframe_t that has passed Parse.
+  Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);
+  // An encoded pose_t; its map, and the revision of the correction it had applied.
+  void AddPose(const MapId& map, int64_t group_revision, std::vector<uint8_t> bytes);
+  // Why it was ignored, or an empty string.
+  std::string OnAck(const LinkAck& ack, int64_t now_us);
+
+  std::vector<LinkPacket> Poll(int64_t now_us);
+  // What to ask of the odometry now; each gap is repeated until it is filled or given up.
+  std::vector<SeqGap> Asks(int64_t now_us);
+  // Corrections the agent has to be told now: new ones, and one per second it has not applied.
+  std::vector<Correction> TakeCorrections(int64_t now_us);
+  // The highest acknowledged seq of each map; -1 for none.
+  std::map<MapId, int32_t> Acknowledged() const;
+
+  bool Connected(int64_t now_us) const;
+  bool Idle() const { return sender_.spooled() == 0; }
+  const Sender& sender() const { return sender_; }
+  int64_t keyframes_acked() const { return keyframes_acked_; }
+  int64_t keyframes_lost() const { return keyframes_lost_; }
+
+ private:
+  struct Map {
+    int32_t next = 0;      // the first that is not journalled (or given up)
+    int32_t given_up = 0;  // those before are lost for good, unless they are journalled
+    int32_t highest = -1;  // the highest the agent is known to have published
+    bool listed = false;   // the handler knows the map
+    int64_t asked_us = 0;
+    int32_t asked_from = -1;
+    int unanswered = 0;
+    int64_t heard_us = 0;  // when the newest keyframe came
+    std::optional<Correction> correction;
+    int64_t applied_revision = 0;  // as the agent's poses say
+    int64_t told_us = 0;
+  };
+
+  Map& FindOrAdd(const MapId& id);
+  void SetNext(const MapId& id, Map* map, int32_t next);
+  std::optional<SeqGap> Missing(const MapId& id, const Map& map) const;
+  void NoteHandler(int64_t run);
+  bool HelloIsUrgent(int64_t now_us) const;
+  bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
+  LinkPacket Hello();
+
+  const int32_t agent_id_;
+  const int64_t run_;
+  const std::string software_;
+  const UplinkOptions options_;
+  Sender sender_;
+  std::map<MapId, Map> maps_;
+  int64_t handler_run_ = 0;
+  int64_t newest_ack_ = 0;
+  std::optional<int64_t> last_ack_us_;
+  std::optional<int64_t> last_hello_us_;
+  bool hello_due_ = true;
+  std::vector<uint8_t> pose_;
+  int64_t last_pose_us_ = 0;
+  int64_t keyframes_acked_ = 0;
+  int64_t keyframes_lost_ = 0;
+};
+
+}  // namespace pangea

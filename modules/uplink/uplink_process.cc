@@ -1,0 +1,162 @@
+#include "uplink/uplink_process.h"
+
+#include <fmt/format.h>
+
+#include "common/channels.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr char kSoftware[] = "pangea 0.1.0";
+constexpr int64_t kHaveInterval_us = 400'000;
+constexpr int64_t kStatusInterval_us = 1'000'000;
+constexpr int kBusy_ms = 4;
+constexpr int kIdle_ms = 20;
+
+}  // namespace
+
+UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, int64_t run,
+                             const UplinkOptions& options)
+    : agent_id_(agent_id),
+      link_bus_(link_bus),
+      node_(agent_bus, fmt::format("uplink_{}", agent_id)),
+      uplink_(agent_id, run, kSoftware, options) {
+  agent_bus.Subscribe(channels::Keyframe(agent_id),
+                      [this](const std::string&, Bytes data) { OnKeyframe(data); });
+  agent_bus.Subscribe(channels::Pose(agent_id),
+                      [this](const std::string&, Bytes data) { OnPose(data); });
+  link_bus.Subscribe(channels::LinkDown(agent_id),
+                     [this](const std::string&, Bytes data) { OnLinkDown(data); });
+  node_.Subscribe<again_t>(channels::Again(node_.name()),
+                           [this](const std::string&, const again_t& again) {
+                             if (again.channel == channels::Keyframe(agent_id_)) {
+                               node_.Count("keyframes_again");
+                               OnKeyframe(again.data);
+                             }
+                           });
+}
+
+void UplinkProcess::OnKeyframe(Bytes data) {
+  keyframe_t message{};
+  if (data.size() > static_cast<size_t>(kMaxKeyframeBytes) || !DecodeMessage(data, &message)) {
+    return node_.Refuse("keyframe_t does not decode, or is too large");
+  }
+  const auto keyframe = Parse(message);
+  if (!keyframe.value) {
+    return node_.Refuse(keyframe.refused);
+  }
+  if (keyframe.value->id.map.agent_id != agent_id_) {
+    return node_.Refuse("another agent's keyframe");
+  }
+  switch (uplink_.AddKeyframe(keyframe.value->id, {data.begin(), data.end()}, now_us_)) {
+    case Uplink::Taken::kNew:
+      return node_.Count("keyframes");
+    case Uplink::Taken::kRepeat:
+      return node_.Count("keyframes_repeated");
+    case Uplink::Taken::kSpoolFull:
+      return node_.Count("keyframes_spool_full");
+  }
+}
+
+void UplinkProcess::OnPose(Bytes data) {
+  pose_t message{};
+  const bool decoded =
+      data.size() <= static_cast<size_t>(kMaxPayloadBytes) && DecodeMessage(data, &message);
+  if (!decoded) {
+    return node_.Refuse("pose_t does not decode, or is too large");
+  }
+  const auto map = Parse(message.map);
+  // While it initialises there is no map yet.
+  if (map.value && map.value->agent_id == agent_id_) {
+    uplink_.AddPose(*map.value, message.group_revision, {data.begin(), data.end()});
+  }
+}
+
+void UplinkProcess::OnLinkDown(Bytes data) {
+  node_.Count("bytes_down", static_cast<int64_t>(data.size()) + kDatagramOverheadBytes);
+  link_ack_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return node_.Refuse("link_ack_t does not decode");
+  }
+  const auto ack = Parse(message);
+  const std::string reason = ack.value ? uplink_.OnAck(*ack.value, now_us_) : ack.refused;
+  if (!reason.empty()) {
+    node_.Refuse(reason);
+  }
+}
+
+int UplinkProcess::Poll(int64_t steady_us) {
+  now_us_ = steady_us;
+  for (const LinkPacket& packet : uplink_.Poll(steady_us)) {
+    const std::vector<uint8_t> bytes = EncodeMessage(ToMessage(packet));
+    link_bus_.Publish(channels::LinkUp(agent_id_), bytes);
+    node_.Count("packets_up");
+    node_.Count("bytes_up", static_cast<int64_t>(bytes.size()) + kDatagramOverheadBytes);
+  }
+  PublishHave();
+  PublishAsks();
+  PublishCorrections();
+  return uplink_.Idle() ? kIdle_ms : kBusy_ms;
+}
+
+void UplinkProcess::PublishHave() {
+  std::map<MapId, int32_t> have = uplink_.Acknowledged();
+  if (have == last_have_ && now_us_ < next_have_us_) {
+    return;
+  }
+  have_t message{};
+  for (const auto& [map, seq] : have) {
+    if (seq >= 0) {
+      message.maps.push_back(ToMessage(map));
+      message.highest_seq.push_back(seq);
+    }
+  }
+  message.num_maps = static_cast<int16_t>(message.maps.size());
+  node_.Publish(std::string(channels::kHave), message);
+  last_have_ = std::move(have);
+  next_have_us_ = now_us_ + kHaveInterval_us;
+}
+
+void UplinkProcess::PublishAsks() {
+  for (const SeqGap& gap : uplink_.Asks(now_us_)) {
+    resend_request_t request{};
+    request.requester = node_.name();
+    request.channel = channels::Keyframe(agent_id_);
+    request.map = ToMessage(gap.map);
+    request.from_seq = gap.from_seq;
+    request.to_seq = gap.to_seq;
+    node_.Publish(std::string(channels::kResendRequest), request);
+    node_.NoteResendAsked();
+  }
+}
+
+void UplinkProcess::PublishCorrections() {
+  for (const Correction& correction : uplink_.TakeCorrections(now_us_)) {
+    node_.Publish(channels::Correction(agent_id_), ToMessage(correction));
+    node_.Count("corrections");
+  }
+}
+
+void UplinkProcess::Tick(int64_t now_utime) {
+  if (now_utime < next_status_utime_) {
+    return;
+  }
+  next_status_utime_ = now_utime + kStatusInterval_us;
+  const Sender& sender = uplink_.sender();
+  const auto pending = static_cast<int64_t>(sender.spooled());
+  node_.Set("keyframes_acked", uplink_.keyframes_acked());
+  node_.Set("keyframes_lost", uplink_.keyframes_lost());
+  node_.Set("packets_resent", sender.resent());
+  node_.Set("spool", pending);
+  node_.Set("spool_bytes", sender.spooled_bytes());
+  node_.PublishStatus(now_utime, pending,
+                      fmt::format("{}, {} keyframes acknowledged, {} in the spool",
+                                  uplink_.Connected(now_us_) ? "connected" : "handler is away",
+                                  uplink_.keyframes_acked(), pending));
+}
+
+}  // namespace pangea

@@ -1,0 +1,43 @@
+#pragma once
+
+// The uplink between its agent's bus and the link bus.
+//   agent bus: KEYFRAME_k, AGAIN_uplink_k, POSE_k in; HAVE, CORRECTION_k, RESEND_REQUEST,
+//              STATUS_uplink_k out
+//   link bus:  LINK_DOWN_k in, LINK_UP_k out
+
+#include <string>
+
+#include "common/bus/node.h"
+#include "common/link/poll_loop.h"
+#include "uplink/uplink.h"
+
+namespace pangea {
+
+class UplinkProcess : public PolledProcess {
+ public:
+  // `run`: wall clock now, microseconds.
+  UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, int64_t run,
+                const UplinkOptions& options);
+
+  int Poll(int64_t steady_us) override;
+  void Tick(int64_t now_utime) override;
+
+ private:
+  void OnKeyframe(Bytes data);
+  void OnPose(Bytes data);
+  void OnLinkDown(Bytes data);
+  void PublishHave();
+  void PublishAsks();
+  void PublishCorrections();
+
+  const int32_t agent_id_;
+  Bus& link_bus_;
+  Node node_;
+  Uplink uplink_;
+  int64_t now_us_ = 0;
+  int64_t next_have_us_ = 0;
+  int64_t next_status_utime_ = 0;
+  std::map<MapId, int32_t> last_have_;
+};
+
+}  // namespace pangea

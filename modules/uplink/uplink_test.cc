@@ -1,0 +1,192 @@
+#include "uplink/uplink.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+const MapId kMap{1, 1000};
+
+LinkAck Ack(int64_t run, int64_t number, int32_t journalled, const MapId& map = kMap) {
+  LinkAck ack;
+  ack.agent_id = 1;
+  ack.run = run;
+  ack.number = number;
+  ack.uplink_run = 5;
+  ack.cache_bytes = 210 * 1024;
+  ack.journalled_seq[map] = journalled;
+  return ack;
+}
+
+std::vector<int32_t> SentSeqs(const std::vector<LinkPacket>& packets) {
+  std::vector<int32_t> seqs;
+  for (const LinkPacket& packet : packets) {
+    if (packet.kind == LinkPacket::Kind::kKeyframe) {
+      seqs.push_back(packet.keyframe.seq);
+    }
+  }
+  return seqs;
+}
+
+LinkHello HelloIn(const std::vector<LinkPacket>& packets) {
+  for (const LinkPacket& packet : packets) {
+    if (packet.kind == LinkPacket::Kind::kHello) {
+      link_hello_t message{};
+      EXPECT_TRUE(DecodeMessage(packet.data, &message));
+      return *Parse(message).value;
+    }
+  }
+  ADD_FAILURE() << "no hello";
+  return {};
+}
+
+class UplinkTest : public testing::Test {
+ protected:
+  void Add(int32_t seq, int64_t now = 0) {
+    uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(500), now);
+  }
+  Uplink uplink{1, 5, "test", {}};
+};
+
+TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {
+  Add(0);
+  int hellos = 0;
+  for (int64_t now = 0; now < 10 * kSecond; now += 10'000) {
+    const auto packets = uplink.Poll(now);
+    EXPECT_TRUE(SentSeqs(packets).empty());
+    hellos += static_cast<int>(packets.size());
+  }
+  EXPECT_GE(hellos, 9);
+  EXPECT_LE(hellos, 41);
+  EXPECT_EQ(uplink.OnAck(Ack(1, 1, -1), 10 * kSecond), "");
+  EXPECT_THAT(SentSeqs(uplink.Poll(10 * kSecond)), testing::ElementsAre(0));
+}
+
+TEST_F(UplinkTest, WhatTheJournalHasIsReleased) {
+  for (int seq = 0; seq < 5; ++seq) {
+    Add(seq);
+  }
+  uplink.OnAck(Ack(1, 1, 2), kSecond);
+  EXPECT_EQ(uplink.Acknowledged().at(kMap), 2);
+  EXPECT_EQ(uplink.sender().spooled(), 2u);
+  EXPECT_EQ(uplink.keyframes_acked(), 3);
+  EXPECT_EQ(uplink.AddKeyframe({kMap, 1}, {1}, 0), Uplink::Taken::kRepeat);
+}
+
+// An uplink started late hears keyframe 7 first.
+TEST_F(UplinkTest, AsksTheOdometryForWhatItMissed) {
+  Add(7);
+  auto asks = uplink.Asks(kSecond);
+  ASSERT_EQ(asks.size(), 1u);
+  EXPECT_EQ(asks[0].from_seq, 0);
+  EXPECT_EQ(asks[0].to_seq, 6);
+  uplink.OnAck(Ack(1, 1, 4), kSecond);
+  EXPECT_TRUE(SentSeqs(uplink.Poll(kSecond)).empty()) << "never out of order";
+  asks = uplink.Asks(2 * kSecond);
+  ASSERT_EQ(asks.size(), 1u);
+  EXPECT_EQ(asks[0].from_seq, 5);
+  Add(5);
+  Add(6);
+  EXPECT_THAT(SentSeqs(uplink.Poll(2 * kSecond)), testing::ElementsAre(5, 6, 7));
+}
+
+// The last keyframe's datagram was lost, or the uplink has just started: nothing shows it.
+TEST_F(UplinkTest, ProbesForALostTail) {
+  uplink.AddPose(kMap, 0, {1});
+  const auto asks = uplink.Asks(3 * kSecond);
+  ASSERT_EQ(asks.size(), 1u);
+  EXPECT_EQ(asks[0].from_seq, 0);
+  EXPECT_TRUE(uplink.Asks(3 * kSecond + 500'000).empty());
+}
+
+TEST_F(UplinkTest, GivesUpWhatNobodyHas) {
+  Add(3);
+  int64_t now = 0;
+  for (int i = 1; i < 60; ++i) {
+    now += kSecond / 2;
+    uplink.OnAck(Ack(1, i, -1), now);
+    uplink.Asks(now);
+  }
+  EXPECT_EQ(uplink.keyframes_lost(), 3);
+  const auto packets = uplink.Poll(now);
+  EXPECT_EQ(HelloIn(packets).maps[0].first_seq, 3);
+  EXPECT_THAT(SentSeqs(packets), testing::ElementsAre(3));
+}
+
+// A handler that comes back without its journal: the odometry may still have it all.
+TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
+  for (int seq = 0; seq < 3; ++seq) {
+    Add(seq);
+  }
+  uplink.OnAck(Ack(1, 1, 2), kSecond);
+  EXPECT_TRUE(uplink.Idle());
+  uplink.OnAck(Ack(2, 1, -1), 2 * kSecond);
+  const auto asks = uplink.Asks(3 * kSecond);
+  ASSERT_EQ(asks.size(), 1u);
+  EXPECT_EQ(asks[0].from_seq, 0);
+  EXPECT_EQ(asks[0].to_seq, 2);
+  EXPECT_EQ(HelloIn(uplink.Poll(3 * kSecond)).maps[0].first_seq, 0);
+}
+
+TEST_F(UplinkTest, OvertakenAndForeignAcksChangeNothing) {
+  for (int seq = 0; seq < 3; ++seq) {
+    Add(seq);
+  }
+  uplink.OnAck(Ack(2, 5, 0), kSecond);
+  uplink.OnAck(Ack(2, 4, 1), kSecond);
+  EXPECT_NE(uplink.OnAck(Ack(1, 9, 2), kSecond), "");
+  LinkAck foreign = Ack(2, 6, 2);
+  foreign.agent_id = 2;
+  EXPECT_NE(uplink.OnAck(foreign, kSecond), "");
+  LinkAck to_another_run = Ack(2, 7, 2);
+  to_another_run.uplink_run = 4;
+  uplink.OnAck(to_another_run, kSecond);
+  EXPECT_EQ(uplink.Acknowledged().at(kMap), 0);
+}
+
+TEST_F(UplinkTest, TheHighestCorrectionWinsAndIsConfirmed) {
+  LinkAck ack = Ack(1, 1, -1);
+  Correction correction;
+  correction.map = kMap;
+  correction.revision = 4;
+  ack.corrections = {correction};
+  uplink.OnAck(ack, kSecond);
+  ack.number = 2;
+  ack.corrections[0].revision = 3;
+  uplink.OnAck(ack, kSecond);
+  const auto told = uplink.TakeCorrections(kSecond);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].revision, 4);
+  EXPECT_EQ(HelloIn(uplink.Poll(2 * kSecond)).maps[0].correction_revision, 4);
+  EXPECT_TRUE(uplink.TakeCorrections(kSecond + 1).empty());
+  EXPECT_EQ(uplink.TakeCorrections(3 * kSecond).size(), 1u) << "not applied yet";
+  uplink.AddPose(kMap, 4, {1});
+  EXPECT_TRUE(uplink.TakeCorrections(9 * kSecond).empty());
+}
+
+TEST_F(UplinkTest, PosesGoUpAtTenHertz) {
+  int poses = 0;
+  for (int i = 1; i <= 300; ++i) {
+    const int64_t now = i * 10'000;
+    uplink.AddPose(kMap, 0, {1, 2, 3});
+    uplink.OnAck(Ack(1, i, -1), now);
+    for (const LinkPacket& packet : uplink.Poll(now)) {
+      poses += packet.kind == LinkPacket::Kind::kPose ? 1 : 0;
+    }
+  }
+  EXPECT_GE(poses, 29);
+  EXPECT_LE(poses, 31);
+}
+
+TEST_F(UplinkTest, ManyMapsStayBounded) {
+  for (int i = 1; i < 5000; ++i) {
+    uplink.AddPose({1, i}, 0, {1});
+  }
+  EXPECT_LE(uplink.Acknowledged().size(), 201u);
+  EXPECT_LE(HelloIn(uplink.Poll(kSecond)).maps.size(), 20u);
+}
+
+}  // namespace
+}  // namespace pangea
