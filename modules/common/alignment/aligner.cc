@@ -14,16 +14,6 @@
 namespace pangea {
 namespace {
 
-constexpr int kCellCols = 6, kCellRows = 4;
-
-int CellOf(const CameraModel& camera, const Eigen::Vector2d& pixel) {
-  const int col =
-      std::clamp(static_cast<int>(pixel.x() * kCellCols / camera.width), 0, kCellCols - 1);
-  const int row =
-      std::clamp(static_cast<int>(pixel.y() * kCellRows / camera.height), 0, kCellRows - 1);
-  return row * kCellCols + col;
-}
-
 // One candidate on its way through the steps; each returns why it is refused, or an empty string.
 class Alignment {
  public:
@@ -63,9 +53,8 @@ class Alignment {
       landmarks.emplace(matches[i].direction, matches[i].landmark);
     }
     pose_ = pnp->pose;
-    return static_cast<int>(landmarks.size()) < options_.min_pnp_inliers
-               ? "PnP found too few inliers"
-               : "";
+    report_.pnp_inliers = static_cast<int>(landmarks.size());
+    return report_.pnp_inliers < options_.min_pnp_inliers ? "PnP found too few inliers" : "";
   }
 
   std::string CheckViews() const {
@@ -86,27 +75,30 @@ class Alignment {
     // The second round looks again from the refined pose.
     for (int round = 0; round < 2; ++round) {
       matches.clear();
-      surroundings_ = {};
+      Surroundings surroundings;
       for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
         const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
         const SearchResult result = SearchByProjection(window_m_, window_c_, direction,
                                                        observer.newest(), pose_, options_.search);
         matches.insert(matches.end(), result.matches.begin(), result.matches.end());
-        CountSurroundings(observer.keyframe(observer.newest()).camera, result);
+        surroundings.Add(observer.keyframe(observer.newest()).camera, result);
       }
       if (static_cast<int>(matches.size()) < options_.min_pnp_inliers) {
         return "too few points found by projection";
       }
       pose_ = RefinePose(Observations(matches), pose_.T_m_c, tilt_sigma_);
+      report_.comparable = surroundings.comparable();
+      report_.found_share = surroundings.found_share();
+      report_.supported_share = surroundings.supported_share();
     }
     if (static_cast<int>(matches.size()) < options_.min_inliers) {
       return "too few points found by projection";
     }
-    if (surroundings_.comparable < options_.min_comparable) {
+    if (report_.comparable < options_.min_comparable) {
       return "too few points ought to be seen from both";
     }
-    if (surroundings_.found < options_.min_found_share * surroundings_.comparable ||
-        surroundings_.supported < options_.min_supported_cells * surroundings_.cells) {
+    if (report_.found_share < options_.min_found_share ||
+        report_.supported_share < options_.min_supported_share) {
       return "the surroundings contradict";
     }
     return "";
@@ -133,8 +125,9 @@ class Alignment {
     return ba_ ? "" : "the window optimisation failed";
   }
 
-  std::string CheckGravity() const {
+  std::string CheckGravity() {
     const Eigen::Vector2d tilt = (ba_->T_m_c.q * Eigen::Vector3d::UnitZ()).head<2>();
+    report_.tilt = tilt.norm();
     const double visual_var =
         ba_->covariance.bottomRightCorner<3, 3>().eigenvalues().real().maxCoeff();
     const double sigma = std::sqrt(tilt_sigma_ * tilt_sigma_ + visual_var);
@@ -143,7 +136,7 @@ class Alignment {
                : "";
   }
 
-  std::string Accept() const {
+  std::string Accept() {
     std::set<std::pair<Direction, int>> landmarks;
     std::map<Direction, std::set<int>> cells;
     for (size_t i = 0; i < matches_.size(); ++i) {
@@ -154,21 +147,22 @@ class Alignment {
       landmarks.emplace(match.direction, match.landmark);
       const Window& observer = match.direction == Direction::kForward ? window_c_ : window_m_;
       if (match.observed.frame == observer.newest()) {
-        cells[match.direction].insert(CellOf(observer.keyframe(observer.newest()).camera,
-                                             observer.corner(match.observed).pixel.cast<double>()));
+        cells[match.direction].insert(
+            ImageCell(observer.keyframe(observer.newest()).camera,
+                      observer.corner(match.observed).pixel.cast<double>()));
       }
     }
-    if (static_cast<int>(landmarks.size()) < options_.min_inliers) {
+    for (const auto& [direction, occupied] : cells) {
+      report_.cells = std::max(report_.cells, static_cast<int>(occupied.size()));
+    }
+    report_.landmarks = static_cast<int>(landmarks.size());
+    if (report_.landmarks < options_.min_inliers) {
       return "too few inliers";
     }
     if (InlierRatio() < options_.min_inlier_ratio) {
       return "too many outliers";
     }
-    size_t most_cells = 0;
-    for (const auto& [direction, occupied] : cells) {
-      most_cells = std::max(most_cells, occupied.size());
-    }
-    if (static_cast<int>(most_cells) < options_.min_occupied_cells) {
+    if (report_.cells < options_.min_occupied_cells) {
       return "inliers too close together";
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> translation(
@@ -192,7 +186,9 @@ class Alignment {
     return T_odom_m * (ba_ ? ba_->T_m_c : pose_.T_m_c) * T_odom_c.Inverse();
   }
 
-  void Report(Constraint* constraint) const {
+  const AlignmentReport& report() const { return report_; }
+
+  void FillIn(Constraint* constraint) const {
     if (!ba_) {
       return;
     }
@@ -303,33 +299,12 @@ class Alignment {
     return observations;
   }
 
-  void CountSurroundings(const CameraModel& camera, const SearchResult& result) {
-    constexpr int kMinInCell = 3;
-    std::map<int, std::pair<int, int>> cells;  // comparable, found
-    for (const Projection& projection : result.projections) {
-      if (projection.comparable) {
-        auto& [comparable, found] = cells[CellOf(camera, projection.pixel)];
-        ++comparable;
-        found += projection.found ? 1 : 0;
-      }
-    }
-    for (const auto& [cell, counts] : cells) {
-      const auto& [comparable, found] = counts;
-      surroundings_.comparable += comparable;
-      surroundings_.found += found;
-      if (comparable >= kMinInCell) {
-        ++surroundings_.cells;
-        surroundings_.supported += found >= options_.min_found_share * comparable ? 1 : 0;
-      }
-    }
-  }
-
   const AlignmentOptions& options_;
   Window window_m_;
   Window window_c_;
   double tilt_sigma_ = 0;
   PoseEstimate pose_;
-  Surroundings surroundings_;
+  AlignmentReport report_;
   std::vector<PointMatch> matches_;
   std::optional<JointBaResult> ba_;
 };
@@ -337,7 +312,8 @@ class Alignment {
 }  // namespace
 
 Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                          const PlaceCandidate& candidate, const AlignmentGate& gate) const {
+                          const PlaceCandidate& candidate, const AlignmentGate& gate,
+                          AlignmentReport* report) const {
   Constraint constraint;
   constraint.from = candidate.match;
   constraint.to = frames_c.back()->keyframe().id;
@@ -355,12 +331,15 @@ Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& 
   step([&] { return gate(alignment.OdomAlignment()); });
   step([&] { return alignment.CheckSurroundings(); });
   step([&] { return alignment.Optimise(); });
-  alignment.Report(&constraint);
+  alignment.FillIn(&constraint);
   step([&] { return alignment.CheckGravity(); });
   step([&] { return alignment.CheckViews(); });
   step([&] { return gate(alignment.OdomAlignment()); });
   step([&] { return alignment.Accept(); });
   constraint.accepted = constraint.reason.empty();
+  if (report != nullptr) {
+    *report = alignment.report();
+  }
   return constraint;
 }
 

@@ -18,6 +18,7 @@
 
 #include "common/alignment/joint_ba.h"
 #include "common/alignment/projection_search.h"
+#include "common/alignment/surroundings.h"
 #include "common/alignment/upright_pnp.h"
 #include "common/alignment/window.h"
 #include "common/server_messages.h"
@@ -47,10 +48,10 @@ struct AlignmentOptions {
   double max_tilt = 0.06;  // radians, whatever the odometries say
 
   // Surroundings: of the points that ought to be seen in the other keyframe, the share that is
-  // found there, and the share of image cells in which they are.
+  // found there; of the image cells that tell, the share that supports (surroundings.h).
   int min_comparable = 15;
   double min_found_share = 0.2;
-  double min_supported_cells = 0.45;
+  double min_supported_share = 0.5;
 
   // Acceptance.
   int min_inliers = 20;           // distinct landmarks
@@ -60,12 +61,15 @@ struct AlignmentOptions {
   double max_sigma_yaw = 0.03;    // radians
 };
 
-// What the search around a hypothesis saw: for verdicts, tests and tuning.
-struct Surroundings {
-  int comparable = 0;  // points that ought to be found
-  int found = 0;
-  int cells = 0;      // image cells with enough of them to tell
-  int supported = 0;  // cells in which enough are found
+// What the steps saw, beside the verdict: for tests and for choosing the options.
+struct AlignmentReport {
+  int pnp_inliers = 0;
+  int comparable = 0;  // points that ought to be found in the two keyframes
+  double found_share = 0;
+  double supported_share = 0;  // of the image cells that tell (surroundings.h)
+  int landmarks = 0;           // distinct inliers of the BA
+  int cells = 0;               // image cells these occupy in one of the keyframes
+  double tilt = 0;             // radians
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
@@ -78,7 +82,8 @@ class Aligner {
 
   // `frames_m` ends with the candidate's match, `frames_c` with the query.
   Constraint Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                   const PlaceCandidate& candidate, const AlignmentGate& gate) const;
+                   const PlaceCandidate& candidate, const AlignmentGate& gate,
+                   AlignmentReport* report = nullptr) const;
 
  private:
   AlignmentOptions options_;

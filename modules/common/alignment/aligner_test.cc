@@ -1,12 +1,15 @@
 #include "common/alignment/aligner.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <iostream>
 #include <map>
+#include <numbers>
 
 #include "common/alignment/alignment_test_world.h"
+#include "common/alignment/drift_gate.h"
 
 namespace pangea {
 namespace {
@@ -77,6 +80,110 @@ TEST(AlignerTest, ErrorsAreWhatTheCovarianceSays) {
   EXPECT_GT(nees / accepted, 3.0);
   EXPECT_LT(nees / accepted, 12.0);
   EXPECT_LT(error_m / accepted, 0.04);
+}
+
+TEST(AlignerTest, SameInputSameVerdict) {
+  const auto room = MakeTestRoom({.seed = 3});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  const TestAgent c = RunTestAgent(room, SecondAgent(0));
+  const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
+  const Constraint first = Align(c, 9, m, 10, candidate);
+  const Constraint second = Align(c, 9, m, 10, candidate);
+  EXPECT_EQ(first.T_from_to.t, second.T_from_to.t);
+  EXPECT_EQ(first.covariance, second.covariance);
+}
+
+// A handful of corners with a depth is enough: the rest is found by projection.
+TEST(AlignerTest, FewCandidateMatchesSuffice) {
+  const auto room = MakeTestRoom({.seed = 4});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  const TestAgent c = RunTestAgent(room, SecondAgent(0));
+  const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 12, 12));
+  EXPECT_TRUE(constraint.accepted) << constraint.reason;
+}
+
+TEST(AlignerTest, RefusesAnotherRoom) {
+  for (int run = 0; run < 20; ++run) {
+    const TestAgent m = RunTestAgent(MakeTestRoom({.seed = 200u + run}), FirstAgent(run));
+    const TestAgent c = RunTestAgent(MakeTestRoom({.seed = 300u + run}), SecondAgent(run));
+    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 0, 30));
+    EXPECT_FALSE(constraint.accepted);
+    EXPECT_THAT(constraint.reason, testing::AnyOf("PnP found too few inliers", "PnP found no pose",
+                                                  "too few matched points with a depth"));
+  }
+}
+
+// Two rooms with the same dozen objects, at other places: the objects match perfectly, everything
+// around them does not. The candidates are the pairs that share most, as a place recognition would
+// send them.
+TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
+  int sharing = 0;
+  std::map<std::string, int> reasons;
+  for (int run = 0; run < 20; ++run) {
+    TestRoomOptions first{.seed = 400u + run, .num_points = 1500, .num_objects = 12};
+    TestRoomOptions second = first;
+    second.seed = 500u + run;
+    TestAgentOptions walk_m = FirstAgent(run), walk_c = SecondAgent(run);
+    walk_m.num_keyframes = walk_c.num_keyframes = 20;
+    walk_m.step_angle = walk_c.step_angle = 0.3;
+    const TestAgent m = RunTestAgent(MakeTestRoom(first), walk_m);
+    const TestAgent c = RunTestAgent(MakeTestRoom(second), walk_c);
+    for (const auto& [query, match] : PairsThatShareMost(c, m, 3)) {
+      const PlaceCandidate candidate = MakeTestCandidateByDescriptor(c, query, m, match);
+      sharing += candidate.corner_matches.size() > 20 ? 1 : 0;
+      const Constraint constraint = Align(c, query, m, match, candidate);
+      ++reasons[constraint.reason];
+      EXPECT_FALSE(constraint.accepted)
+          << run << " " << query << " " << match << " inliers " << constraint.num_inliers;
+    }
+  }
+  for (const auto& [reason, count] : reasons) {
+    std::cout << reason << ": " << count << "\n";
+  }
+  EXPECT_GT(sharing, 40);  // or nothing was tested
+}
+
+TEST(AlignerTest, RefusesWhatContradictsGravity) {
+  const auto room = MakeTestRoom({.seed = 6});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  TestAgentOptions tilted = SecondAgent(0);
+  tilted.odom_tilt = 0.08;
+  const TestAgent c = RunTestAgent(room, tilted);
+  const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+  EXPECT_FALSE(constraint.accepted);
+  EXPECT_EQ(constraint.reason, "roll or pitch contradicts gravity");
+}
+
+TEST(AlignerTest, RefusesTooFewPoints) {
+  const auto room = MakeTestRoom({.seed = 7, .num_points = 150});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  const TestAgent c = RunTestAgent(room, SecondAgent(0));
+  const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+  EXPECT_FALSE(constraint.accepted);
+  EXPECT_FALSE(constraint.reason.empty());
+}
+
+TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
+  const auto room = MakeTestRoom({.seed = 8});
+  TestAgentOptions walk = FirstAgent(0);
+  walk.num_keyframes = 80;
+  walk.step_angle = 2 * std::numbers::pi / 68;
+  const TestAgent agent = RunTestAgent(room, walk);
+  SubmapStore store;
+  for (const Keyframe& keyframe : agent.keyframes) {
+    store.Add(keyframe);
+  }
+  const PlaceCandidate candidate = MakeTestCandidate(agent, 76, agent, 9, 40, 10);
+  const auto align = [&](const DriftGateOptions& options) {
+    return Aligner({}).Align(
+        store.WindowUpTo({walk.map, 9}, 5), store.WindowUpTo({walk.map, 76}, 5), candidate,
+        MakeDriftGate(options, *store.PathBetween({walk.map, 9}, {walk.map, 76}),
+                      agent.keyframes[76].T_odom_body.t));
+  };
+  EXPECT_TRUE(align({}).accepted) << align({}).reason;
+  DriftGateOptions none;
+  none.max_drift_m = none.max_drift_share = 0;
+  EXPECT_EQ(align(none).reason, "more drift than odometry makes");
 }
 
 }  // namespace

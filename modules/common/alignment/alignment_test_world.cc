@@ -5,6 +5,10 @@
 #include <map>
 #include <numbers>
 #include <random>
+#include <set>
+#include <tuple>
+
+#include "common/matching.h"
 
 namespace pangea {
 namespace {
@@ -89,6 +93,7 @@ class AgentWalk {
 
   TestAgent Run() {
     TestAgent agent;
+    agent.room = room_;
     Rigid3 T_odom_body;
     for (int k = 0; k < options_.num_keyframes; ++k) {
       agent.T_room_body.push_back(PoseAt(options_, k, random_));
@@ -242,6 +247,51 @@ PlaceCandidate MakeTestCandidate(const TestAgent& query_agent, int query,
                                           static_cast<int>(random() % points_m.size()));
   }
   return candidate;
+}
+
+PlaceCandidate MakeTestCandidateByDescriptor(const TestAgent& query_agent, int query,
+                                             const TestAgent& match_agent, int match) {
+  const Keyframe& keyframe_c = query_agent.keyframes[query];
+  const Keyframe& keyframe_m = match_agent.keyframes[match];
+  PlaceCandidate candidate;
+  candidate.match = keyframe_m.id;
+  for (const CornerMatch& corners : MatchCorners(keyframe_c.corners, keyframe_m.corners, {})) {
+    candidate.corner_matches.emplace_back(corners.a, corners.b);
+  }
+  return candidate;
+}
+
+std::vector<std::pair<int, int>> PairsThatShareMost(const TestAgent& query_agent,
+                                                    const TestAgent& match_agent, int count) {
+  // By room points of equal descriptor: far quicker than matching every pair of images.
+  std::vector<std::tuple<int, int, int>> pairs;
+  const auto seen = [](const TestAgent& agent, int k) {
+    std::set<Descriptor> descriptors;
+    for (const int point : agent.point_of_corner[k]) {
+      if (point >= 0) {
+        descriptors.insert(agent.room[point].descriptor);
+      }
+    }
+    return descriptors;
+  };
+  std::vector<std::set<Descriptor>> seen_m;
+  for (size_t m = 0; m < match_agent.keyframes.size(); ++m) {
+    seen_m.push_back(seen(match_agent, static_cast<int>(m)));
+  }
+  for (size_t c = 0; c < query_agent.keyframes.size(); ++c) {
+    const std::set<Descriptor> seen_c = seen(query_agent, static_cast<int>(c));
+    for (size_t m = 0; m < seen_m.size(); ++m) {
+      const auto shared = std::count_if(seen_c.begin(), seen_c.end(),
+                                        [&](const Descriptor& d) { return seen_m[m].contains(d); });
+      pairs.emplace_back(-static_cast<int>(shared), static_cast<int>(c), static_cast<int>(m));
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<std::pair<int, int>> most;
+  for (size_t i = 0; i < pairs.size() && static_cast<int>(i) < count; ++i) {
+    most.emplace_back(std::get<1>(pairs[i]), std::get<2>(pairs[i]));
+  }
+  return most;
 }
 
 }  // namespace pangea

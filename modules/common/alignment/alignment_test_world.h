@@ -4,6 +4,7 @@
 // agents that walk through it, and the keyframes their odometry would send, noise as it claims.
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/keyframe.h"
@@ -45,6 +46,7 @@ struct TestAgentOptions {
 };
 
 struct TestAgent {
+  std::vector<TestPoint> room;
   std::vector<Keyframe> keyframes;
   std::vector<Rigid3> T_room_body;                // truth
   std::vector<std::vector<int>> point_of_corner;  // room point or -1, by keyframe and corner
@@ -55,5 +57,13 @@ TestAgent RunTestAgent(const std::vector<TestPoint>& room, const TestAgentOption
 // random.
 PlaceCandidate MakeTestCandidate(const TestAgent& query_agent, int query,
                                  const TestAgent& match_agent, int match, int count, int wrong);
+
+// As a place recognition would send it: mutual nearest descriptors, right or wrong.
+PlaceCandidate MakeTestCandidateByDescriptor(const TestAgent& query_agent, int query,
+                                             const TestAgent& match_agent, int match);
+
+// The (query, match) pairs with most corners matched by descriptor, at most `count`.
+std::vector<std::pair<int, int>> PairsThatShareMost(const TestAgent& query_agent,
+                                                    const TestAgent& match_agent, int count);
 
 }  // namespace pangea

@@ -35,7 +35,7 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   yaml.Add("max_tilt", &options.max_tilt);
   yaml.Add("min_comparable", &options.min_comparable);
   yaml.Add("min_found_share", &options.min_found_share);
-  yaml.Add("min_supported_cells", &options.min_supported_cells);
+  yaml.Add("min_supported_share", &options.min_supported_share);
   yaml.Add("min_inliers", &options.min_inliers);
   yaml.Add("min_inlier_ratio", &options.min_inlier_ratio);
   yaml.Add("min_occupied_cells", &options.min_occupied_cells);
