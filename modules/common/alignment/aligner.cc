@@ -14,14 +14,21 @@
 namespace pangea {
 namespace {
 
+KeyframeWindow Last(const KeyframeWindow& frames, int count) {
+  const auto n = std::min(frames.size(), static_cast<size_t>(count));
+  return {frames.end() - static_cast<std::ptrdiff_t>(n), frames.end()};
+}
+
 // One candidate on its way through the steps; each returns why it is refused, or an empty string.
 class Alignment {
  public:
   Alignment(const AlignmentOptions& options, const KeyframeWindow& frames_m,
             const KeyframeWindow& frames_c)
       : options_(options),
-        window_m_(MakeWindow(frames_m, options.window)),
-        window_c_(MakeWindow(frames_c, options.window)) {
+        frames_m_(frames_m),
+        frames_c_(frames_c),
+        window_m_(MakeWindow(Last(frames_m, options.window.num_keyframes), options.window)),
+        window_c_(MakeWindow(Last(frames_c, options.window.num_keyframes), options.window)) {
     double tilt_var = 0;
     for (const Window* window : {&window_m_, &window_c_}) {
       const double floor = options.tilt_floor;
@@ -83,22 +90,19 @@ class Alignment {
         matches.insert(matches.end(), result.matches.begin(), result.matches.end());
         surroundings.Add(observer.keyframe(observer.newest()).camera, result);
       }
-      if (static_cast<int>(matches.size()) < options_.min_pnp_inliers) {
+      if (static_cast<int>(matches.size()) < options_.min_found) {
         return "too few points found by projection";
       }
       pose_ = RefinePose(Observations(matches), pose_.T_m_c, tilt_sigma_);
       report_.comparable = surroundings.comparable();
       report_.found_share = surroundings.found_share();
-      report_.supported_share = surroundings.supported_share();
-    }
-    if (static_cast<int>(matches.size()) < options_.min_inliers) {
-      return "too few points found by projection";
+      report_.first_supported_share = surroundings.supported_share();
     }
     if (report_.comparable < options_.min_comparable) {
       return "too few points ought to be seen from both";
     }
     if (report_.found_share < options_.min_found_share ||
-        report_.supported_share < options_.min_supported_share) {
+        report_.first_supported_share < options_.min_first_supported_share) {
       return "the surroundings contradict";
     }
     return "";
@@ -123,6 +127,26 @@ class Alignment {
     }
     ba_ = SolveJointBa(window_m_, window_c_, matches_, pose_.T_m_c, options_.ba);
     return ba_ ? "" : "the window optimisation failed";
+  }
+
+  // The same count along the way to the two keyframes, where more than the object before them is in
+  // view.
+  std::string CheckWiderSurroundings() {
+    const Window wide_m = MakeWindow(frames_m_, options_.window);
+    const Window wide_c = MakeWindow(frames_c_, options_.window);
+    const PoseEstimate pose{ba_->T_m_c, pose_.covariance};
+    Surroundings surroundings;
+    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+      const Window& observer = direction == Direction::kForward ? wide_c : wide_m;
+      for (int frame = observer.newest(); frame >= 0; frame -= options_.surroundings_stride) {
+        surroundings.Add(
+            observer.keyframe(frame).camera,
+            SearchByProjection(wide_m, wide_c, direction, frame, pose, options_.search));
+      }
+    }
+    report_.supported_share = surroundings.supported_share();
+    return report_.supported_share < options_.min_supported_share ? "the surroundings contradict"
+                                                                  : "";
   }
 
   std::string CheckGravity() {
@@ -300,6 +324,8 @@ class Alignment {
   }
 
   const AlignmentOptions& options_;
+  const KeyframeWindow& frames_m_;
+  const KeyframeWindow& frames_c_;
   Window window_m_;
   Window window_c_;
   double tilt_sigma_ = 0;
@@ -336,6 +362,7 @@ Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& 
   step([&] { return alignment.CheckViews(); });
   step([&] { return gate(alignment.OdomAlignment()); });
   step([&] { return alignment.Accept(); });
+  step([&] { return alignment.CheckWiderSurroundings(); });
   constraint.accepted = constraint.reason.empty();
   if (report != nullptr) {
     *report = alignment.report();

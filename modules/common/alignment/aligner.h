@@ -10,9 +10,11 @@
 //   candidate's corners + nearest descriptors -> upright PnP RANSAC -> views and gravity gates
 //   -> projection search in the two keyframes -> surroundings gate
 //   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance
+//   -> projection search along the way
 //
 // The cheap steps come first: a bad candidate dies in the first two.
 
+#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -47,14 +49,19 @@ struct AlignmentOptions {
   double max_tilt_sigmas = 4;
   double max_tilt = 0.06;  // radians, whatever the odometries say
 
-  // Surroundings: of the points that ought to be seen in the other keyframe, the share that is
-  // found there; of the image cells that tell, the share that supports (surroundings.h).
+  // Surroundings, first in the two keyframes, then along the way to them: of the points that ought
+  // to be seen the share that is found, and the share of the view where they are
+  // (surroundings.h).
+  int min_found = 10;
   int min_comparable = 15;
-  double min_found_share = 0.2;
-  double min_supported_share = 0.5;
+  double min_found_share = 0.12;
+  double min_first_supported_share = 0.3;
+  double min_supported_share = 0.55;
+  int surroundings_keyframes = 10;  // up to each of the two; not fewer than the window
+  int surroundings_stride = 3;      // every third of these is looked into
 
   // Acceptance.
-  int min_inliers = 20;           // distinct landmarks
+  int min_inliers = 16;           // distinct landmarks
   double min_inlier_ratio = 0.5;  // of the matches the BA used
   int min_occupied_cells = 7;     // of 6 x 4, in one of the two keyframes
   double max_sigma_m = 0.25;      // standard deviation of the translation, its worst direction
@@ -66,10 +73,11 @@ struct AlignmentReport {
   int pnp_inliers = 0;
   int comparable = 0;  // points that ought to be found in the two keyframes
   double found_share = 0;
-  double supported_share = 0;  // of the image cells that tell (surroundings.h)
-  int landmarks = 0;           // distinct inliers of the BA
-  int cells = 0;               // image cells these occupy in one of the keyframes
-  double tilt = 0;             // radians
+  double first_supported_share = 0;
+  double supported_share = 0;
+  int landmarks = 0;  // distinct inliers of the BA
+  int cells = 0;      // image cells these occupy in one of the keyframes
+  double tilt = 0;    // radians
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
@@ -80,7 +88,13 @@ class Aligner {
  public:
   explicit Aligner(AlignmentOptions options) : options_(options) {}
 
-  // `frames_m` ends with the candidate's match, `frames_c` with the query.
+  // Keyframes a verdict depends on: that many up to each of the two.
+  int num_keyframes() const {
+    return std::max(options_.window.num_keyframes, options_.surroundings_keyframes);
+  }
+
+  // `frames_m` ends with the candidate's match, `frames_c` with the query; num_keyframes() each, or
+  // fewer where their map begins.
   Constraint Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
                    const PlaceCandidate& candidate, const AlignmentGate& gate,
                    AlignmentReport* report = nullptr) const;

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <map>
 #include <numbers>
+#include <random>
 
 #include "common/alignment/alignment_test_world.h"
 #include "common/alignment/drift_gate.h"
@@ -25,8 +26,8 @@ Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match
     }
   }
   return Aligner(options).Align(
-      store.WindowUpTo(match_agent.keyframes[match].id, options.window.num_keyframes),
-      store.WindowUpTo(query_agent.keyframes[query].id, options.window.num_keyframes), candidate,
+      store.WindowUpTo(match_agent.keyframes[match].id, options.surroundings_keyframes),
+      store.WindowUpTo(query_agent.keyframes[query].id, options.surroundings_keyframes), candidate,
       kNoGate);
 }
 
@@ -141,6 +142,35 @@ TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
     std::cout << reason << ": " << count << "\n";
   }
   EXPECT_GT(sharing, 40);  // or nothing was tested
+}
+
+// The worst case: one object large in view, from the same side in both rooms, so that it aligns
+// perfectly; only what is around it tells. The same walks in one room are accepted.
+TEST(AlignerTest, RefusesOneObjectSeenFromTheSameSide) {
+  for (int run = 0; run < 10; ++run) {
+    std::mt19937_64 random(run);
+    auto room = MakeTestRoom({.seed = 600u + run});
+    auto other = MakeTestRoom({.seed = 700u + run});
+    TestAgentOptions walk_m = FirstAgent(run), walk_c = SecondAgent(run);
+    walk_c.radius = 2.1;
+    walk_c.look_outward = 0.8;
+    const Eigen::Vector3d ahead(2.0, 3.6, 1.6);
+    std::uniform_real_distribution<double> side(-0.6, 0.6);
+    for (int i = 0; i < 200; ++i) {
+      const TestPoint point{ahead + Eigen::Vector3d(side(random), side(random), side(random)),
+                            {random(), random(), random(), random()}};
+      room.insert(room.begin(), point);
+      other.insert(other.begin(), point);
+    }
+    const TestAgent m = RunTestAgent(room, walk_m);
+    const TestAgent c_same = RunTestAgent(room, walk_c), c_other = RunTestAgent(other, walk_c);
+    EXPECT_TRUE(Align(c_same, 9, m, 10, MakeTestCandidateByDescriptor(c_same, 9, m, 10)).accepted);
+    const Constraint constraint =
+        Align(c_other, 9, m, 10, MakeTestCandidateByDescriptor(c_other, 9, m, 10));
+    EXPECT_FALSE(constraint.accepted);
+    EXPECT_THAT(constraint.reason,
+                testing::AnyOf("the surroundings contradict", "inliers too close together"));
+  }
 }
 
 TEST(AlignerTest, RefusesWhatContradictsGravity) {

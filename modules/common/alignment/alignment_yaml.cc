@@ -33,9 +33,13 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   yaml.Add("tilt_floor", &options.tilt_floor);
   yaml.Add("max_tilt_sigmas", &options.max_tilt_sigmas);
   yaml.Add("max_tilt", &options.max_tilt);
+  yaml.Add("min_found", &options.min_found);
   yaml.Add("min_comparable", &options.min_comparable);
   yaml.Add("min_found_share", &options.min_found_share);
+  yaml.Add("min_first_supported_share", &options.min_first_supported_share);
   yaml.Add("min_supported_share", &options.min_supported_share);
+  yaml.Add("surroundings_keyframes", &options.surroundings_keyframes);
+  yaml.Add("surroundings_stride", &options.surroundings_stride);
   yaml.Add("min_inliers", &options.min_inliers);
   yaml.Add("min_inlier_ratio", &options.min_inlier_ratio);
   yaml.Add("min_occupied_cells", &options.min_occupied_cells);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -74,7 +73,7 @@ class JointProblem {
     AddPosesAndEdges();
     const std::set<size_t> halved = MutualMatches(matches, use);
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    std::map<PointKey, bool> added;
+    std::set<PointKey> added;
     for (size_t i = 0; i < matches.size(); ++i) {
       if (use[i]) {
         const double share = halved.contains(i) ? std::sqrt(0.5) : 1.0;
@@ -82,7 +81,7 @@ class JointProblem {
         reprojections_.back().match = i;
       }
     }
-    for (const auto& [key, unused] : added) {
+    for (const PointKey& key : added) {
       ordering->AddElementToGroup(Point(key), 0);
     }
     for (double* block : FrameBlocks()) {
@@ -137,7 +136,7 @@ class JointProblem {
     const std::vector<double*> frames = FrameBlocks();
     evaluate.parameter_blocks = frames;
     const int num_frame_columns = 6 * (static_cast<int>(frames.size()) - 2) + 2;
-    for (const auto& [key, unused] : used_points_) {
+    for (const PointKey& key : used_points_) {
       evaluate.parameter_blocks.push_back(Point(key));
     }
     ceres::CRSMatrix jacobian;
@@ -261,7 +260,7 @@ class JointProblem {
   }
 
   void AddMatch(const PointMatch& match, double share, ceres::LossFunction* loss,
-                std::map<PointKey, bool>* added) {
+                std::set<PointKey>* added) {
     const int side = HolderSide(match);
     const Window& holder = *windows_[side];
     const Window& observer = *windows_[1 - side];
@@ -270,7 +269,7 @@ class JointProblem {
     const KeyframeView& target = *observer.frames[match.observed.frame];
     const PointKey key{side, match.landmark};
     double* point = Point(key);
-    if (added->emplace(key, true).second) {
+    if (added->insert(key).second) {
       const double sigma = CornerSigma(holder.corner(landmark.host), options_.pixel_sigma);
       problem_->AddResidualBlock(
           new PointPriorFactor(host.ray(landmark.host.corner),
@@ -295,7 +294,7 @@ class JointProblem {
   // last digit, is the same in every run.
   std::vector<double> blocks_;
   std::array<size_t, 2> pose_offset_{}, scale_offset_{}, point_offset_{};
-  std::map<PointKey, bool> used_points_;
+  std::set<PointKey> used_points_;
   std::vector<Reprojection> reprojections_;
   std::optional<ceres::Problem> problem_;
 };

@@ -13,16 +13,16 @@ Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& cand
 }
 
 bool PairJudge::Ready(const KeyframeId& query, const PlaceCandidate& candidate) const {
-  if (!store_.WindowIsComplete(query, num_keyframes_) ||
-      !store_.WindowIsComplete(candidate.match, num_keyframes_)) {
+  if (!store_.WindowIsComplete(query, aligner_.num_keyframes()) ||
+      !store_.WindowIsComplete(candidate.match, aligner_.num_keyframes())) {
     return false;
   }
   return query.map != candidate.match.map || store_.ChainIsComplete(candidate.match, query);
 }
 
 Constraint PairJudge::Judge(const KeyframeId& query, const PlaceCandidate& candidate) {
-  const KeyframeWindow frames_c = store_.WindowUpTo(query, num_keyframes_);
-  const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, num_keyframes_);
+  const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
+  const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
   for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
     if (corner_c >= static_cast<int>(frames_c.back()->keyframe().corners.size()) ||
         corner_m >= static_cast<int>(frames_m.back()->keyframe().corners.size())) {

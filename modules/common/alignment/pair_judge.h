@@ -1,7 +1,7 @@
 #pragma once
 
 // The core that inter_map_ba and fusion build on: keyframes in, one verdict a candidate out. A
-// verdict depends on the two keyframes, the M - 1 before each and, within one map, the odometry
+// verdict depends on the two keyframes, those just before each and, within one map, the odometry
 // edges between them; so it is the same whatever the order of arrival. Not thread safe.
 
 #include "common/alignment/aligner.h"
@@ -13,7 +13,7 @@ namespace pangea {
 class PairJudge {
  public:
   PairJudge(const AlignmentOptions& alignment, const DriftGateOptions& drift)
-      : num_keyframes_(alignment.window.num_keyframes), drift_(drift), aligner_(alignment) {}
+      : drift_(drift), aligner_(alignment) {}
   virtual ~PairJudge() = default;
 
   // In any order; a repeat changes nothing.
@@ -25,7 +25,6 @@ class PairJudge {
   virtual Constraint Judge(const KeyframeId& query, const PlaceCandidate& candidate);
 
  private:
-  int num_keyframes_;
   DriftGateOptions drift_;
   Aligner aligner_;
   SubmapStore store_;

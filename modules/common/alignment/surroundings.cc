@@ -30,40 +30,31 @@ void Surroundings::Add(const CameraModel& camera, const SearchResult& result) {
 }
 
 double Surroundings::supported_share() const {
-  // Supported: a quarter of its points found, and not one alone.
-  constexpr double kShare = 0.25;
-  constexpr int kMinFound = 2;
-  // Contradicted: what is found, or less, would be a chance of one in five or rarer.
-  constexpr double kChance = 0.2;
-  const auto supports = [](const Cell& cell) {
-    return cell.found >= kMinFound && cell.found >= kShare * cell.comparable;
-  };
-  int supported = 0, comparable = 0, found = 0;
-  for (const Cell& cell : cells_) {
-    if (supports(cell)) {
-      ++supported;
-      comparable += cell.comparable;
-      found += cell.found;
-    }
-  }
-  if (supported == 0) {
+  // Expectation maximisation over the rate and the share; the rate of chance finds is a property
+  // of the search: a corner within its radius, with a descriptor that near by accident.
+  constexpr double kChanceRate = 0.03;
+  constexpr int kIterations = 30;
+  if (cells_.empty() || found_ == 0) {
     return 0;
   }
-  const double rate = std::min(0.95, static_cast<double>(found) / comparable);
-  int contradicted = 0;
-  for (const Cell& cell : cells_) {
-    if (supports(cell)) {
-      continue;
+  double rate = std::clamp(1.5 * found_share(), 0.1, 0.9);
+  double share = 0.5;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    double supporting = 0, comparable = 0, found = 0;
+    for (const Cell& cell : cells_) {
+      const int missed = cell.comparable - cell.found;
+      const double log_odds = cell.found * std::log(rate / kChanceRate) +
+                              missed * std::log((1 - rate) / (1 - kChanceRate)) +
+                              std::log(share / (1 - share));
+      const double weight = 1 / (1 + std::exp(-log_odds));
+      supporting += weight;
+      comparable += weight * cell.comparable;
+      found += weight * cell.found;
     }
-    // P(at most `found` of `comparable`) at that rate.
-    double probability = 0, term = std::pow(1 - rate, cell.comparable);
-    for (int k = 0; k <= cell.found; ++k) {
-      probability += term;
-      term *= rate / (1 - rate) * (cell.comparable - k) / (k + 1);
-    }
-    contradicted += probability < kChance ? 1 : 0;
+    rate = std::clamp(found / std::max(comparable, 1e-9), 0.1, 0.95);
+    share = std::clamp(supporting / static_cast<double>(cells_.size()), 0.01, 0.99);
   }
-  return static_cast<double>(supported) / (supported + contradicted);
+  return share;
 }
 
 }  // namespace pangea

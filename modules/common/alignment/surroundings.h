@@ -3,12 +3,12 @@
 // Negative evidence: what ought to be seen in a keyframe, were an alignment right, and is not.
 //
 // Identical objects at different places align perfectly with each other and with nothing around
-// them. So the image is cut into cells, and each cell with points that ought to be found there
-// votes: supported where a good share is found; contradicted where none is although, at the rate
-// of the supported cells, that is unlikely. A right alignment finds its points all over the shared
-// view, at whatever rate corners repeat; a wrong one finds them on the object alone.
+// them. A right alignment finds its points all over the shared view, at whatever rate corners
+// repeat; a wrong one finds them on the object alone. So the image is cut into cells, and the
+// counts of points found in them are explained by a mixture: cells where points are found at one
+// common rate, and cells where they are found by chance only. The share of the first kind is what
+// counts; it does not depend on how well corners repeat.
 
-#include <map>
 #include <vector>
 
 #include "common/alignment/projection_search.h"
@@ -23,7 +23,8 @@ class Surroundings {
   int comparable() const { return comparable_; }  // points that ought to be found
   int found() const { return found_; }
   double found_share() const { return comparable_ == 0 ? 0.0 : double(found_) / comparable_; }
-  // Of the cells that tell, the share that supports.
+  // The share of cells where points are found at the common rate; the rest contradicts, or is
+  // hidden.
   double supported_share() const;
 
  private:
