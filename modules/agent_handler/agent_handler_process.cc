@@ -1,0 +1,374 @@
+#include "agent_handler/agent_handler_process.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/channels.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/pose_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond_us = 1'000'000;
+constexpr double kResendBurst = 64'000;
+constexpr size_t kMaxJournalledBytes = 65'000;
+constexpr int kBusy_ms = 4;
+constexpr int kIdle_ms = 20;
+// What a keyframe's match and verdicts may take before they are asked for; then ever more rarely.
+constexpr int64_t kFirstAsk_us = 3 * kSecond_us;
+constexpr int64_t kMaxAsk_us = 60 * kSecond_us;
+constexpr int32_t kMaxAsked = 100;
+constexpr size_t kMaxHaveMaps = 2000;  // about 34 kB
+
+// Unreadable though it says it is of this type (or has lost even that): damaged. A type this
+// version does not know is left alone.
+template <typename Message>
+bool IsDamaged(Bytes data) {
+  Message message{};
+  if (DecodeMessage(data, &message) || data.size() < 8) {
+    return data.size() < 8;
+  }
+  const std::vector<uint8_t> fresh = EncodeMessage(Message{});
+  const bool same_type = std::equal(fresh.begin(), fresh.begin() + 8, data.begin());
+  const bool zeros = std::all_of(data.begin(), data.begin() + 8, [](uint8_t b) { return b == 0; });
+  return same_type || zeros;
+}
+
+template <typename Message>
+auto DecodeAndParse(Bytes data) -> decltype(Parse(Message{})) {
+  Message message{};
+  if (!DecodeMessage(data, &message)) {
+    return {std::nullopt, std::string(Message::getTypeName()) + " does not decode"};
+  }
+  return Parse(message);
+}
+
+}  // namespace
+
+AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
+                                         const std::string& journal_path, int64_t run,
+                                         const AgentHandlerOptions& options)
+    : link_bus_(link_bus),
+      run_(run),
+      options_(options),
+      node_(server_bus, "agent_handler"),
+      resend_pacer_(options.resend_bytes_per_s, kResendBurst),
+      now_utime_(run) {
+  journal_ = std::make_unique<Journal>(
+      journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
+        return LoadEvent(channel, data, place);
+      });
+  node_.Set("journal_bytes_cut", journal_->cut_bytes());
+  link_bus.Subscribe("LINK_UP_[0-9]+",
+                     [this](const std::string& channel, Bytes data) { OnLinkUp(channel, data); });
+  server_bus.Subscribe(std::string(channels::kPlaceMatch),
+                       [this](const std::string&, Bytes data) { OnPlaceMatch(data); });
+  server_bus.Subscribe(std::string(channels::kConstraint),
+                       [this](const std::string&, Bytes data) { OnConstraint(data); });
+  node_.Subscribe<correction_t>(std::string(channels::kAllCorrections),
+                                [this](const std::string&, const correction_t& message) {
+                                  const auto correction = Parse(message);
+                                  if (!correction.value) {
+                                    return node_.Refuse(correction.refused);
+                                  }
+                                  const auto agent = agents_.find(correction.value->map.agent_id);
+                                  if (agent != agents_.end()) {
+                                    agent->second.handler.OnCorrection(*correction.value);
+                                  }
+                                });
+  node_.Subscribe<resend_request_t>(std::string(channels::kResendRequest),
+                                    [this](const std::string&, const resend_request_t& request) {
+                                      if (request.requester == node_.name()) {
+                                        return;
+                                      }
+                                      const std::string reason = resend_queue_.Add(request, index_);
+                                      if (!reason.empty()) {
+                                        node_.Refuse(reason);
+                                      }
+                                    });
+  node_.Subscribe<again_t>(channels::Again(node_.name()),
+                           [this](const std::string&, const again_t& again) {
+                             if (again.channel == channels::kPlaceMatch) {
+                               OnPlaceMatch(again.data);
+                             } else if (again.channel == channels::kConstraint) {
+                               OnConstraint(again.data);
+                             }
+                           });
+}
+
+bool AgentHandlerProcess::LoadEvent(const std::string& channel, Bytes data,
+                                    const JournalPlace& place) {
+  if (channel.starts_with("KEYFRAME_")) {
+    if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {
+      const KeyframeId& id = keyframe.value->id;
+      index_.AddKeyframe(id, place);
+      have_[id.map] = std::max(have_.try_emplace(id.map, -1).first->second, id.seq);
+      return true;
+    }
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<keyframe_t>(data);
+  }
+  if (channel == channels::kPlaceMatch) {
+    if (const auto match = DecodeAndParse<place_match_t>(data); match.value) {
+      if (index_.Look(*match.value) == JournalIndex::Added::kNew) {
+        index_.Add(*match.value, place);
+      }
+      return true;
+    }
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<place_match_t>(data);
+  }
+  if (channel == channels::kConstraint) {
+    if (const auto constraint = DecodeAndParse<constraint_t>(data); constraint.value) {
+      if (index_.Look(*constraint.value) == JournalIndex::Added::kNew) {
+        index_.Add(*constraint.value, place);
+      }
+      return true;
+    }
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<constraint_t>(data);
+  }
+  return true;
+}
+
+AgentHandlerProcess::Agent* AgentHandlerProcess::FindOrCreate(const LinkPacket& packet) {
+  const auto it = agents_.find(packet.agent_id);
+  if (it != agents_.end()) {
+    return &it->second;
+  }
+  if (packet.kind != LinkPacket::Kind::kHello || agents_.size() >= kMaxAgents) {
+    return nullptr;
+  }
+  AgentHandler handler(packet.agent_id, run_, options_.receiver);
+  for (auto have = have_.lower_bound({packet.agent_id, 0});
+       have != have_.end() && have->first.agent_id == packet.agent_id; ++have) {
+    handler.Resume(have->first, have->second);
+  }
+  return &agents_.emplace(packet.agent_id, Agent(std::move(handler))).first->second;
+}
+
+void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
+  const auto packet = DecodeAndParse<link_packet_t>(data);
+  if (!packet.value) {
+    return node_.Refuse(packet.refused);
+  }
+  if (channel != channels::LinkUp(packet.value->agent_id)) {
+    return node_.Refuse("packet on another agent's channel");
+  }
+  Agent* agent = FindOrCreate(*packet.value);
+  if (agent == nullptr) {
+    return node_.Refuse("packet of an agent without a hello");
+  }
+  agent->bytes_up += static_cast<int64_t>(data.size()) + kDatagramOverheadBytes;
+  const std::string reason = agent->handler.OnPacket(*packet.value, now_us_);
+  if (!reason.empty()) {
+    node_.Refuse(reason);
+  }
+  if (const std::vector<uint8_t> pose = agent->handler.TakePose(); !pose.empty()) {
+    node_.bus().Publish(channels::Pose(packet.value->agent_id), pose);
+  }
+  JournalReady();
+}
+
+void AgentHandlerProcess::JournalReady() {
+  for (auto& [agent_id, agent] : agents_) {
+    if (journal_->Full()) {
+      return;  // it stays in the receive cache
+    }
+    for (Receiver::Keyframe& keyframe : agent.handler.TakeReady()) {
+      if (unsynced_.empty()) {
+        oldest_unsynced_us_ = now_us_;
+      }
+      const JournalPlace place =
+          journal_->Append(now_utime_, channels::Keyframe(agent_id), keyframe.bytes);
+      unsynced_.push_back({keyframe.id, std::move(keyframe.bytes), place});
+    }
+  }
+}
+
+void AgentHandlerProcess::SyncJournal() {
+  if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < options_.sync_interval_us) {
+    return;
+  }
+  oldest_unsynced_us_ = now_us_;
+  disk_refuses_ = !journal_->Sync();
+  if (disk_refuses_) {
+    return node_.Count("journal_writes_failed");
+  }
+  for (const Unsynced& keyframe : unsynced_) {
+    index_.AddKeyframe(keyframe.id, keyframe.place);
+    have_[keyframe.id.map] = keyframe.id.seq;
+    Agent& agent = agents_.at(keyframe.id.map.agent_id);
+    ++agent.keyframes;
+    agent.handler.Journalled(keyframe.id);
+    node_.bus().Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe.bytes);
+  }
+  unsynced_.clear();
+}
+
+void AgentHandlerProcess::OnPlaceMatch(Bytes data) {
+  const auto match = DecodeAndParse<place_match_t>(data);
+  if (!match.value || data.size() > kMaxJournalledBytes) {
+    return node_.Refuse(match.value ? "place_match_t is too large" : match.refused);
+  }
+  if (index_.Look(*match.value) == JournalIndex::Added::kUnknownKeyframe) {
+    return node_.Refuse("match of a keyframe that is not journalled");
+  }
+  if (index_.Look(*match.value) == JournalIndex::Added::kNew && !journal_->Full()) {
+    index_.Add(*match.value,
+               journal_->Append(now_utime_, std::string(channels::kPlaceMatch), data));
+  }
+}
+
+void AgentHandlerProcess::OnConstraint(Bytes data) {
+  const auto constraint = DecodeAndParse<constraint_t>(data);
+  if (!constraint.value || data.size() > kMaxJournalledBytes) {
+    return node_.Refuse(constraint.value ? "constraint_t is too large" : constraint.refused);
+  }
+  if (index_.Look(*constraint.value) == JournalIndex::Added::kUnknownKeyframe) {
+    return node_.Refuse("verdict on a keyframe that is not journalled");
+  }
+  if (index_.Look(*constraint.value) == JournalIndex::Added::kNew && !journal_->Full()) {
+    index_.Add(*constraint.value,
+               journal_->Append(now_utime_, std::string(channels::kConstraint), data));
+  }
+}
+
+void AgentHandlerProcess::SendAcks() {
+  for (auto& [agent_id, agent] : agents_) {
+    if (const auto ack = agent.handler.TakeAck(now_us_)) {
+      const std::vector<uint8_t> bytes = EncodeMessage(ToMessage(*ack));
+      link_bus_.Publish(channels::LinkDown(agent_id), bytes);
+      agent.bytes_down += static_cast<int64_t>(bytes.size()) + kDatagramOverheadBytes;
+    }
+  }
+}
+
+void AgentHandlerProcess::AnswerResendRequests() {
+  // Also bounds the work of one call when keyframes have no match or verdict to send.
+  constexpr int kMaxKeyframes = 200;
+  resend_pacer_.Refill(now_us_);
+  for (int i = 0; i < kMaxKeyframes && resend_pacer_.Ready(); ++i) {
+    const auto answer = resend_queue_.Next(index_);
+    if (!answer) {
+      return;
+    }
+    for (const JournalPlace& place : answer->places) {
+      again_t again{};
+      again.channel = answer->channel;
+      again.data = journal_->Read(place);
+      again.num_bytes = static_cast<int32_t>(again.data.size());
+      if (again.data.empty()) {
+        node_.Count("journal_reads_failed");
+        continue;
+      }
+      node_.Publish(channels::Again(answer->requester), again);
+      node_.Count("sent_again");
+      resend_pacer_.Take(again.num_bytes);
+    }
+  }
+}
+
+int AgentHandlerProcess::Poll(int64_t steady_us) {
+  now_us_ = steady_us;
+  JournalReady();
+  SyncJournal();
+  SendAcks();
+  AnswerResendRequests();
+  const bool busy = journal_->HasUnsynced() || resend_queue_.waiting() > 0 ||
+                    std::any_of(agents_.begin(), agents_.end(), [](const auto& item) {
+                      return item.second.handler.receiver().pending() > 0;
+                    });
+  return busy ? kBusy_ms : kIdle_ms;
+}
+
+void AgentHandlerProcess::PublishHave() {
+  auto it = have_.begin();
+  do {
+    have_t message{};
+    for (; it != have_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
+      message.maps.push_back(ToMessage(it->first));
+      message.highest_seq.push_back(it->second);
+    }
+    message.num_maps = static_cast<int16_t>(message.maps.size());
+    node_.Publish(std::string(channels::kHave), message);
+  } while (it != have_.end());
+}
+
+void AgentHandlerProcess::Ask(const SeqGap& gap, std::string_view channel) {
+  resend_request_t request{};
+  request.requester = node_.name();
+  request.channel = channel;
+  request.map = ToMessage(gap.map);
+  request.from_seq = gap.from_seq;
+  request.to_seq = std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1);
+  node_.Publish(std::string(channels::kResendRequest), request);
+  node_.NoteResendAsked();
+}
+
+// Exactly one match per keyframe and one verdict per candidate are owed; the other processes may
+// only be slow, so it is asked seldom, and more seldom while nothing comes.
+void AgentHandlerProcess::AskForOwed(int64_t now_utime) {
+  const auto ask = [&](Owed* owed, const MapId& map, std::string_view channel, auto missing) {
+    if (now_utime < owed->next_ask_utime) {
+      return;
+    }
+    const std::optional<SeqGap> gap = missing(owed->seen_before);
+    const bool stuck = gap && gap->from_seq == owed->asked_from;
+    owed->wait_us = stuck ? std::min(2 * owed->wait_us, kMaxAsk_us) : kFirstAsk_us;
+    owed->next_ask_utime = now_utime + owed->wait_us;
+    owed->asked_from = gap ? gap->from_seq : -1;
+    owed->seen_before = index_.Highest(map);
+    if (gap) {
+      Ask(*gap, channel);
+    }
+  };
+  for (const MapId& map : index_.Maps()) {
+    ask(&owed_matches_[map], map, channels::kPlaceMatch,
+        [&](int32_t up_to) { return index_.MissingMatches(map, up_to); });
+    ask(&owed_verdicts_[map], map, channels::kConstraint,
+        [&](int32_t up_to) { return index_.MissingVerdicts(map, up_to); });
+  }
+}
+
+void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
+  int64_t pending = 0, given_up = 0, keyframes = 0;
+  for (const auto& [agent_id, agent] : agents_) {
+    pending += static_cast<int64_t>(agent.handler.receiver().pending());
+    given_up += agent.handler.receiver().given_up();
+    keyframes += agent.keyframes;
+    node_.Set(fmt::format("keyframes_{}", agent_id), agent.keyframes);
+    node_.Set(fmt::format("bytes_up_{}", agent_id), agent.bytes_up);
+    node_.Set(fmt::format("bytes_down_{}", agent_id), agent.bytes_down);
+  }
+  node_.Set("agents", static_cast<int64_t>(agents_.size()));
+  node_.Set("keyframes", keyframes);
+  node_.Set("keyframes_given_up", given_up);
+  node_.Set("journal_bytes", journal_->size());
+  node_.Set("journal_keyframes", index_.num_keyframes());
+  node_.Set("journal_matches", index_.num_matches());
+  node_.Set("journal_constraints", index_.num_constraints());
+  node_.Set("verdicts_missing", index_.num_missing_verdicts());
+  node_.PublishStatus(
+      now_utime, pending,
+      fmt::format("{} agents, {} keyframes in the journal{}", agents_.size(),
+                  index_.num_keyframes(), disk_refuses_ ? "; THE DISK REFUSES WRITES" : ""));
+}
+
+void AgentHandlerProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
+  if (now_utime >= next_have_utime_) {
+    next_have_utime_ = now_utime + kSecond_us;
+    PublishHave();
+    AskForOwed(now_utime);
+  }
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond_us;
+    PublishStatus(now_utime);
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,99 @@
+#pragma once
+
+// The agent_handler between the link bus and the server bus.
+//   link bus:   LINK_UP_* in; LINK_DOWN_k out
+//   server bus: KEYFRAME_k, POSE_k, HAVE, AGAIN_*, RESEND_REQUEST, STATUS_agent_handler out;
+//               PLACE_MATCH, CONSTRAINT, CORRECTION_k, RESEND_REQUEST, AGAIN_agent_handler in
+// Keyframes are acknowledged and published once the journal's disk has them.
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "agent_handler/agent_handler.h"
+#include "agent_handler/journal.h"
+#include "agent_handler/resend_queue.h"
+#include "common/bus/node.h"
+#include "common/link/pacer.h"
+#include "common/link/poll_loop.h"
+
+namespace pangea {
+
+struct AgentHandlerOptions {
+  ReceiverOptions receiver;
+  // Keyframes that arrive within this time share one write to the disk.
+  int64_t sync_interval_us = 20'000;
+  double resend_bytes_per_s = 6e6;
+};
+
+class AgentHandlerProcess : public PolledProcess {
+ public:
+  static constexpr size_t kMaxAgents = 64;
+
+  // `run`: wall clock now, microseconds. Throws if the journal cannot be used.
+  AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path, int64_t run,
+                      const AgentHandlerOptions& options);
+
+  int Poll(int64_t steady_us) override;
+  void Tick(int64_t now_utime) override;
+
+ private:
+  struct Agent {
+    explicit Agent(AgentHandler h) : handler(std::move(h)) {}
+    AgentHandler handler;
+    int64_t bytes_up = 0;
+    int64_t bytes_down = 0;
+    int64_t keyframes = 0;
+  };
+  // A keyframe in the journal's queue.
+  struct Unsynced {
+    KeyframeId id;
+    std::vector<uint8_t> bytes;
+    JournalPlace place;
+  };
+  // The questions for what the other processes owe a map.
+  struct Owed {
+    int32_t seen_before = -1;  // keyframes there were at the last round
+    int32_t asked_from = -1;
+    int64_t next_ask_utime = 0;
+    int64_t wait_us = 0;
+  };
+
+  bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
+  void OnLinkUp(const std::string& channel, Bytes data);
+  Agent* FindOrCreate(const LinkPacket& packet);
+  void OnPlaceMatch(Bytes data);
+  void OnConstraint(Bytes data);
+  void JournalReady();
+  void SyncJournal();
+  void SendAcks();
+  void AnswerResendRequests();
+  void PublishHave();
+  void AskForOwed(int64_t now_utime);
+  void Ask(const SeqGap& gap, std::string_view channel);
+  void PublishStatus(int64_t now_utime);
+
+  Bus& link_bus_;
+  const int64_t run_;
+  const AgentHandlerOptions options_;
+  Node node_;
+  JournalIndex index_;
+  std::unique_ptr<Journal> journal_;
+  std::map<int32_t, Agent> agents_;
+  std::deque<Unsynced> unsynced_;
+  int64_t oldest_unsynced_us_ = 0;
+  std::map<MapId, int32_t> have_;  // highest seq on the disk
+  std::map<MapId, Owed> owed_matches_;
+  std::map<MapId, Owed> owed_verdicts_;
+  ResendQueue resend_queue_;
+  Pacer resend_pacer_;
+  int64_t now_us_ = 0;
+  int64_t now_utime_ = 0;
+  int64_t next_have_utime_ = 0;
+  int64_t next_status_utime_ = 0;
+  bool disk_refuses_ = false;
+};
+
+}  // namespace pangea

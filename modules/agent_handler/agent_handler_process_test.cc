@@ -1,0 +1,422 @@
+// Uplink and agent_handler together on in-process buses, with an odometry and a lossy link between.
+
+#include "agent_handler/agent_handler_process.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <random>
+
+#include "agent_handler/test_keyframes.h"
+#include "common/channels.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "uplink/uplink_process.h"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+const MapId kMap{1, 1000};
+
+class LossyBus : public Bus {
+ public:
+  void Publish(const std::string& channel, Bytes data) override {
+    if (std::uniform_real_distribution<double>(0, 1)(rng_) >= loss) {
+      inner.Publish(channel, data);
+    }
+  }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    inner.Subscribe(channel_regex, std::move(handler));
+  }
+  LocalBus inner;
+  double loss = 0;
+
+ private:
+  std::mt19937_64 rng_{3};
+};
+
+// Each restart of a process gets fresh buses on its side would be the true thing; here a bus that
+// lets go of a process when it dies does.
+class SwitchedBus : public Bus {
+ public:
+  explicit SwitchedBus(Bus& bus) : bus_(bus) {}
+  void Publish(const std::string& channel, Bytes data) override {
+    if (*on_) {
+      bus_.Publish(channel, data);
+    }
+  }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    bus_.Subscribe(channel_regex, [on = on_, handler](const std::string& channel, Bytes data) {
+      if (*on) {
+        handler(channel, data);
+      }
+    });
+  }
+  void Off() { *on_ = false; }
+
+ private:
+  Bus& bus_;
+  std::shared_ptr<bool> on_ = std::make_shared<bool>(true);
+};
+
+class LinkWorld : public testing::Test {
+ protected:
+  void SetUp() override {
+    journal_path = testing::TempDir() + "pangea_link_" + std::to_string(getpid()) + ".lcm";
+    std::filesystem::remove(journal_path);
+    // The odometry keeps its newest 200 keyframes and answers requests.
+    agent_bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
+      resend_request_t request{};
+      ASSERT_TRUE(DecodeMessage(data, &request));
+      ++asks;
+      for (int32_t seq = std::max(request.from_seq, published - 200);
+           seq <= request.to_seq && seq < published; ++seq) {
+        again_t again{};
+        again.channel = request.channel;
+        again.data = EncodeTestKeyframe({kMap, seq});
+        again.num_bytes = static_cast<int32_t>(again.data.size());
+        PublishMessage(agent_bus, channels::Again(request.requester), again);
+      }
+    });
+    agent_bus.Subscribe("HAVE", [this](const std::string&, Bytes data) {
+      have_t have{};
+      ASSERT_TRUE(DecodeMessage(data, &have));
+      acknowledged = have.num_maps > 0 ? have.highest_seq[0] : -1;
+    });
+    server_bus.Subscribe("KEYFRAME_1", [this](const std::string&, Bytes data) {
+      delivered.emplace_back(data.begin(), data.end());
+    });
+    StartUplink();
+    StartHandler();
+  }
+  void TearDown() override {
+    handler.reset();
+    std::filesystem::remove(journal_path);
+  }
+
+  void StartUplink() {
+    uplink_agent_side = std::make_unique<SwitchedBus>(agent_bus);
+    uplink_link_side = std::make_unique<SwitchedBus>(link_bus);
+    uplink =
+        std::make_unique<UplinkProcess>(*uplink_agent_side, *uplink_link_side, 1, ++run, options);
+  }
+  void KillUplink() {
+    uplink_agent_side->Off();
+    uplink_link_side->Off();
+    dead_uplinks.push_back(std::move(uplink));
+    dead_buses.push_back(std::move(uplink_agent_side));
+    dead_buses.push_back(std::move(uplink_link_side));
+  }
+  void StartHandler() {
+    handler_link_side = std::make_unique<SwitchedBus>(link_bus);
+    handler_server_side = std::make_unique<SwitchedBus>(server_bus);
+    handler = std::make_unique<AgentHandlerProcess>(*handler_link_side, *handler_server_side,
+                                                    journal_path, ++run, AgentHandlerOptions{});
+  }
+  void KillHandler() {
+    handler_link_side->Off();
+    handler_server_side->Off();
+    handler.reset();
+    dead_buses.push_back(std::move(handler_link_side));
+    dead_buses.push_back(std::move(handler_server_side));
+  }
+  void PublishKeyframes(int count) {
+    for (int i = 0; i < count; ++i) {
+      agent_bus.Publish("KEYFRAME_1", EncodeTestKeyframe({kMap, published++}));
+    }
+  }
+  void Run(double seconds) {
+    const int64_t end = now + static_cast<int64_t>(seconds * 1e6);
+    for (; now < end; now += 5'000) {
+      agent_bus.Drain();
+      if (uplink) {
+        uplink->Poll(now);
+      }
+      link_bus.inner.Drain();
+      if (handler) {
+        handler->Poll(now);
+      }
+      if (now % 100'000 == 0) {
+        if (uplink) {
+          uplink->Tick(kWall + now);
+        }
+        if (handler) {
+          handler->Tick(kWall + now);
+        }
+      }
+      link_bus.inner.Drain();
+      server_bus.Drain();
+      agent_bus.Drain();
+    }
+  }
+  void ExpectDelivered(int count) {
+    ASSERT_EQ(delivered.size(), static_cast<size_t>(count));
+    for (int seq = 0; seq < count; ++seq) {
+      EXPECT_EQ(delivered[static_cast<size_t>(seq)], EncodeTestKeyframe({kMap, seq})) << seq;
+    }
+  }
+
+  static constexpr int64_t kWall = 1'700'000'000 * kSecond;
+  LocalBus agent_bus, server_bus;
+  LossyBus link_bus;
+  UplinkOptions options;
+  std::string journal_path;
+  std::vector<std::unique_ptr<SwitchedBus>> dead_buses;
+  std::vector<std::unique_ptr<UplinkProcess>> dead_uplinks;
+  std::unique_ptr<SwitchedBus> uplink_agent_side, uplink_link_side;
+  std::unique_ptr<SwitchedBus> handler_link_side, handler_server_side;
+  std::unique_ptr<UplinkProcess> uplink;
+  std::unique_ptr<AgentHandlerProcess> handler;
+  std::vector<std::vector<uint8_t>> delivered;
+  int64_t now = kSecond;
+  int64_t run = 100;
+  int32_t published = 0;
+  int32_t acknowledged = -1;
+  int asks = 0;
+};
+
+TEST_F(LinkWorld, KeyframesArriveOnceInOrderByteIdentical) {
+  link_bus.loss = 0.1;
+  PublishKeyframes(50);
+  Run(20);
+  ExpectDelivered(50);
+  EXPECT_EQ(acknowledged, 49);
+}
+
+TEST_F(LinkWorld, HandlerKilledAndRestartedGoesOnFromItsJournal) {
+  link_bus.loss = 0.05;
+  PublishKeyframes(60);
+  while (acknowledged < 20) {
+    Run(0.05);
+  }
+  KillHandler();
+  PublishKeyframes(10);
+  Run(5);
+  StartHandler();
+  Run(20);
+  EXPECT_EQ(acknowledged, 69);
+  KillHandler();
+  std::vector<std::vector<uint8_t>> journalled;
+  const Journal journal(journal_path, [&](const std::string&, Bytes data, const JournalPlace&) {
+    journalled.emplace_back(data.begin(), data.end());
+    return true;
+  });
+  // What was journalled but not yet published at the end is announced and served, not published.
+  EXPECT_GE(delivered.size(), 60u);
+  delivered = journalled;
+  ExpectDelivered(70);
+}
+
+TEST_F(LinkWorld, ATornJournalIsHealedByRetransmission) {
+  PublishKeyframes(5);
+  Run(3);
+  KillHandler();
+  std::filesystem::resize_file(journal_path, std::filesystem::file_size(journal_path) - 1000);
+  StartHandler();
+  // The last keyframe had been acknowledged: only the odometry has it still.
+  Run(10);
+  EXPECT_EQ(acknowledged, 4);
+  ASSERT_EQ(delivered.size(), 6u);
+  EXPECT_EQ(delivered[5], EncodeTestKeyframe({kMap, 4}));
+}
+
+TEST_F(LinkWorld, UplinkKilledAndRestartedAsksTheOdometry) {
+  link_bus.loss = 0.05;
+  PublishKeyframes(60);
+  Run(0.3);
+  KillUplink();
+  PublishKeyframes(20);
+  Run(5);
+  StartUplink();
+  PublishKeyframes(1);
+  Run(30);
+  ExpectDelivered(81);
+  EXPECT_EQ(acknowledged, 80);
+}
+
+// Nothing is published after the restart: the handler's list of maps shows where to look.
+TEST_F(LinkWorld, UplinkRestartedAfterTheLastKeyframeFindsTheTail) {
+  PublishKeyframes(20);
+  while (acknowledged < 3) {
+    Run(0.01);
+  }
+  KillUplink();
+  Run(5);
+  StartUplink();
+  Run(10);
+  ExpectDelivered(20);
+}
+
+TEST_F(LinkWorld, WithoutAHandlerEverythingWaits) {
+  KillHandler();
+  PublishKeyframes(100);
+  Run(10);
+  EXPECT_EQ(acknowledged, -1);
+  StartHandler();
+  Run(10);
+  ExpectDelivered(100);
+}
+
+TEST_F(LinkWorld, CorrectionsReachTheAgentAndPosesTheServer) {
+  link_bus.loss = 0.2;
+  std::vector<int64_t> revisions;
+  agent_bus.Subscribe("CORRECTION_1", [&](const std::string&, Bytes data) {
+    correction_t message{};
+    ASSERT_TRUE(DecodeMessage(data, &message));
+    revisions.push_back(message.revision);
+  });
+  int poses = 0;
+  server_bus.Subscribe("POSE_1", [&](const std::string&, Bytes) { ++poses; });
+  PublishKeyframes(1);
+  Run(3);
+  Correction correction;
+  correction.map = correction.group = kMap;
+  for (const int revision : {1, 2, 9, 4}) {
+    correction.revision = revision;
+    PublishMessage(server_bus, "CORRECTION_1", ToMessage(correction));
+  }
+  Run(5);
+  EXPECT_THAT(revisions, testing::Each(9));
+  EXPECT_FALSE(revisions.empty());
+  pose_t pose{};
+  pose.state = pose_t::STATE_TRACKING;
+  pose.map = ToMessage(kMap);
+  pose.T_odom_body = pose.T_map_body = ToMessage(Rigid3());
+  pose.group_revision = 9;
+  for (int i = 0; i < 100; ++i) {
+    PublishMessage(agent_bus, "POSE_1", pose);
+    Run(0.05);
+  }
+  EXPECT_GE(poses, 30);
+  EXPECT_LE(poses, 51);
+}
+
+TEST_F(LinkWorld, JournalledKeyframesAreServedAgain) {
+  PublishKeyframes(10);
+  Run(3);
+  std::vector<std::vector<uint8_t>> again;
+  server_bus.Subscribe("AGAIN_fusion", [&](const std::string&, Bytes data) {
+    again_t message{};
+    ASSERT_TRUE(DecodeMessage(data, &message));
+    EXPECT_EQ(message.channel, "KEYFRAME_1");
+    again.push_back(message.data);
+  });
+  KillHandler();
+  StartHandler();
+  int32_t announced = -1;
+  server_bus.Subscribe("HAVE", [&](const std::string&, Bytes data) {
+    have_t have{};
+    ASSERT_TRUE(DecodeMessage(data, &have));
+    announced = have.num_maps == 1 ? have.highest_seq[0] : -2;
+  });
+  resend_request_t request{};
+  request.requester = "fusion";
+  request.channel = "KEYFRAME_1";
+  request.map = ToMessage(kMap);
+  request.to_seq = 1000;
+  PublishMessage(server_bus, "RESEND_REQUEST", request);
+  Run(3);
+  EXPECT_EQ(announced, 9);
+  EXPECT_EQ(again, delivered);
+}
+
+TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
+  PublishKeyframes(4);
+  Run(3);
+  std::vector<std::string> asked;
+  server_bus.Subscribe("RESEND_REQUEST", [&](const std::string&, Bytes data) {
+    resend_request_t request{};
+    ASSERT_TRUE(DecodeMessage(data, &request));
+    if (request.requester == "agent_handler") {
+      asked.push_back(request.channel + " " + std::to_string(request.from_seq) + " " +
+                      std::to_string(request.to_seq));
+    }
+  });
+  PlaceMatch match;
+  for (const int seq : {0, 3, 3, 7}) {
+    match.query = {kMap, seq};
+    if (seq == 3) {
+      match.candidates = {{{kMap, 0}, PlaceKind::kIntra, 1.0f, {}}};
+    }
+    PublishMessage(server_bus, "PLACE_MATCH", ToMessage(match));
+  }
+  Run(8);
+  EXPECT_THAT(asked, testing::IsSupersetOf({"PLACE_MATCH 1 2", "CONSTRAINT 3 3"}));
+  for (const int seq : {1, 2}) {
+    match.query = {kMap, seq};
+    match.candidates.clear();
+    again_t again{};
+    again.channel = "PLACE_MATCH";
+    again.data = EncodeMessage(ToMessage(match));
+    again.num_bytes = static_cast<int32_t>(again.data.size());
+    PublishMessage(server_bus, "AGAIN_agent_handler", again);
+  }
+  Constraint verdict;
+  verdict.from = {kMap, 0};
+  verdict.to = {kMap, 3};
+  verdict.kind = PlaceKind::kIntra;
+  PublishMessage(server_bus, "CONSTRAINT", ToMessage(verdict));
+  PublishMessage(server_bus, "CONSTRAINT", ToMessage(verdict));
+  Run(10);
+  asked.clear();
+  Run(100);
+  EXPECT_THAT(asked, testing::IsEmpty());
+  KillHandler();
+  std::map<std::string, int> channels;
+  const Journal journal(journal_path, [&](const std::string& channel, Bytes, const JournalPlace&) {
+    ++channels[channel];
+    return true;
+  });
+  EXPECT_THAT(channels,
+              testing::ElementsAre(testing::Pair("CONSTRAINT", 1), testing::Pair("KEYFRAME_1", 4),
+                                   testing::Pair("PLACE_MATCH", 4)));
+}
+
+// Noise, and every message with damaged bytes, on every channel that is listened to.
+TEST_F(LinkWorld, NothingOnABusCrashesAProcess) {
+  std::vector<std::vector<uint8_t>> link_messages;
+  link_bus.Subscribe("LINK_.*", [&](const std::string&, Bytes data) {
+    if (link_messages.size() < 50) {
+      link_messages.emplace_back(data.begin(), data.end());
+    }
+  });
+  PublishKeyframes(5);
+  Run(2);
+  std::vector<std::vector<uint8_t>> payloads = link_messages;
+  payloads.push_back(EncodeTestKeyframe({kMap, 6}));
+  payloads.push_back(EncodeMessage(pose_t{}));
+  payloads.push_back(EncodeMessage(ToMessage(Constraint{})));
+  payloads.push_back(EncodeMessage(ToMessage(PlaceMatch{})));
+  payloads.push_back(EncodeMessage(again_t{}));
+  std::mt19937_64 rng(8);
+  for (int i = 0; i < 3000; ++i) {
+    std::vector<uint8_t> data = payloads[rng() % payloads.size()];
+    for (int flips = static_cast<int>(rng() % 4); flips >= 0; --flips) {
+      data[rng() % std::min<size_t>(data.size(), 120)] ^= static_cast<uint8_t>(1 + rng() % 255);
+    }
+    data.resize(rng() % 5 == 0 ? rng() % data.size() : data.size());
+    for (const char* channel : {"KEYFRAME_1", "POSE_1", "AGAIN_uplink_1"}) {
+      agent_bus.Publish(channel, data);
+    }
+    for (const char* channel : {"LINK_UP_1", "LINK_UP_7", "LINK_DOWN_1"}) {
+      link_bus.Publish(channel, data);
+    }
+    for (const char* channel :
+         {"PLACE_MATCH", "CONSTRAINT", "CORRECTION_1", "RESEND_REQUEST", "AGAIN_agent_handler"}) {
+      server_bus.Publish(channel, data);
+    }
+    if (i % 100 == 0) {
+      Run(0.01);
+    }
+  }
+  PublishKeyframes(5);
+  Run(30);
+  EXPECT_GE(acknowledged, 9);
+}
+
+}  // namespace
+}  // namespace pangea

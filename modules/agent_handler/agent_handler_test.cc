@@ -1,0 +1,205 @@
+#include "agent_handler/agent_handler.h"
+
+#include <fmt/format.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "agent_handler/resend_queue.h"
+#include "agent_handler/test_keyframes.h"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+const MapId kMap{1, 1000};
+
+LinkPacket HelloPacket(int64_t run, const std::vector<LinkMap>& maps, int64_t number = 1) {
+  LinkPacket packet;
+  packet.agent_id = 1;
+  packet.run = run;
+  packet.number = number;
+  packet.data = EncodeMessage(ToMessage(LinkHello{"test", maps}));
+  return packet;
+}
+
+LinkPacket WholeKeyframe(int64_t run, const KeyframeId& id, std::vector<uint8_t> bytes) {
+  LinkPacket packet;
+  packet.agent_id = 1;
+  packet.run = run;
+  packet.number = 2;
+  packet.kind = LinkPacket::Kind::kKeyframe;
+  packet.keyframe = id;
+  packet.total_bytes = static_cast<int>(bytes.size());
+  packet.crc32 = Crc32(bytes);
+  packet.data = std::move(bytes);
+  return packet;
+}
+
+class AgentHandlerTest : public testing::Test {
+ protected:
+  AgentHandler handler{1, 77, {}};
+};
+
+TEST_F(AgentHandlerTest, AcknowledgesOnlyWhatIsOnTheDisk) {
+  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
+  const auto bytes = EncodeTestKeyframe({kMap, 0});
+  EXPECT_EQ(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, bytes), kSecond), "");
+  const auto ready = handler.TakeReady();
+  ASSERT_EQ(ready.size(), 1u);
+  EXPECT_EQ(ready[0].bytes, bytes);
+  auto ack = handler.TakeAck(2 * kSecond);
+  ASSERT_TRUE(ack);
+  EXPECT_EQ(ack->journalled_seq.at(kMap), -1);
+  EXPECT_EQ(ack->partial.size(), 1u) << "it is there, and needs no repeat";
+  handler.Journalled({kMap, 0});
+  ack = handler.TakeAck(3 * kSecond);
+  ASSERT_TRUE(ack);
+  EXPECT_EQ(ack->journalled_seq.at(kMap), 0);
+  EXPECT_TRUE(ack->partial.empty());
+  EXPECT_FALSE(handler.TakeAck(4 * kSecond)) << "nothing new";
+}
+
+TEST_F(AgentHandlerTest, RefusesWhatDoesNotParse) {
+  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
+  keyframe_t absurd = ToMessage(TestKeyframe({kMap, 0}));
+  absurd.T_odom_body.translation.x = 1e12;
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, EncodeMessage(absurd)), kSecond), "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, {1, 2, 3}), kSecond), "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, EncodeTestKeyframe({kMap, 1})), kSecond),
+            "");
+  EXPECT_TRUE(handler.TakeReady().empty());
+  EXPECT_EQ(handler.receiver().cached_bytes(), 0);
+}
+
+TEST_F(AgentHandlerTest, AnotherRunNeedsAHelloAndALaterOrSilentClock) {
+  EXPECT_EQ(handler.OnPacket(HelloPacket(5, {}), kSecond), "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(6, {kMap, 0}, {1}), kSecond), "");
+  EXPECT_NE(handler.OnPacket(HelloPacket(4, {}), kSecond), "");
+  EXPECT_EQ(handler.OnPacket(HelloPacket(6, {}), kSecond), "");
+  EXPECT_EQ(handler.OnPacket(HelloPacket(4, {}), 10 * kSecond), "");
+  EXPECT_NE(handler.OnPacket(HelloPacket(7, {{{2, 1}, 0, 0}}), 10 * kSecond), "");
+}
+
+TEST_F(AgentHandlerTest, TellsTheHighestCorrectionUntilItIsConfirmed) {
+  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
+  Correction correction;
+  correction.map = kMap;
+  for (const int revision : {3, 7, 5}) {
+    correction.revision = revision;
+    handler.OnCorrection(correction);
+  }
+  for (int i = 2; i < 6; ++i) {
+    const auto ack = handler.TakeAck(i * kSecond);
+    ASSERT_TRUE(ack);
+    ASSERT_EQ(ack->corrections.size(), 1u);
+    EXPECT_EQ(ack->corrections[0].revision, 7);
+  }
+  handler.OnPacket(HelloPacket(5, {{kMap, 0, 7}}, 9), 6 * kSecond);
+  EXPECT_TRUE(handler.TakeAck(7 * kSecond)->corrections.empty());
+  EXPECT_FALSE(handler.TakeAck(8 * kSecond));
+}
+
+PlaceMatch MatchOf(int32_t seq, int num_candidates) {
+  PlaceMatch match;
+  match.query = {kMap, seq};
+  for (int i = 0; i < num_candidates; ++i) {
+    match.candidates.push_back({{{2, 9}, i}, PlaceKind::kInter, 1.0f, {}});
+  }
+  return match;
+}
+
+TEST(JournalIndex, KnowsWhatIsOwed) {
+  JournalIndex index;
+  for (int seq = 0; seq < 6; ++seq) {
+    index.AddKeyframe({kMap, seq}, {seq, 1});
+  }
+  EXPECT_EQ(index.Look(MatchOf(6, 0)), JournalIndex::Added::kUnknownKeyframe);
+  for (const int seq : {0, 1, 4}) {
+    EXPECT_EQ(index.Look(MatchOf(seq, 0)), JournalIndex::Added::kNew);
+    index.Add(MatchOf(seq, seq == 1 ? 2 : 0), {100 + seq, 1});
+    EXPECT_EQ(index.Look(MatchOf(seq, 0)), JournalIndex::Added::kRepeat);
+  }
+  auto gap = index.MissingMatches(kMap, 5);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->from_seq, 2);
+  EXPECT_EQ(gap->to_seq, 3);
+  EXPECT_FALSE(index.MissingMatches(kMap, 1));
+  EXPECT_EQ(index.num_missing_verdicts(), 2);
+  gap = index.MissingVerdicts(kMap, 5);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->from_seq, 1);
+  Constraint verdict;
+  verdict.from = {{2, 9}, 0};
+  verdict.to = {kMap, 1};
+  EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kNew);
+  index.Add(verdict, {200, 1});
+  EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kRepeat);
+  verdict.from.seq = 1;
+  index.Add(verdict, {201, 1});
+  EXPECT_FALSE(index.MissingVerdicts(kMap, 5));
+  EXPECT_EQ(index.Find(JournalChannel::kConstraint, {kMap, 1}).size(), 2u);
+}
+
+// A verdict that was journalled before its match is not owed any more.
+TEST(JournalIndex, VerdictBeforeItsMatch) {
+  JournalIndex index;
+  index.AddKeyframe({kMap, 0}, {});
+  Constraint verdict;
+  verdict.from = {{2, 9}, 0};
+  verdict.to = {kMap, 0};
+  index.Add(verdict, {});
+  index.Add(MatchOf(0, 1), {});
+  EXPECT_EQ(index.num_missing_verdicts(), 0);
+}
+
+resend_request_t RequestOf(const std::string& requester, int32_t from, int32_t to) {
+  resend_request_t request{};
+  request.requester = requester;
+  request.channel = "KEYFRAME_1";
+  request.map = ToMessage(kMap);
+  request.from_seq = from;
+  request.to_seq = to;
+  return request;
+}
+
+TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
+  JournalIndex index;
+  for (int seq = 0; seq < 6; ++seq) {
+    index.AddKeyframe({kMap, seq}, {seq, 1});
+  }
+  ResendQueue queue;
+  EXPECT_EQ(queue.Add(RequestOf("fusion", 1, 1'000'000'000), index), "");
+  EXPECT_EQ(queue.Add(RequestOf("fusion", 2, 4), index), "");
+  EXPECT_EQ(queue.Add(RequestOf("posegraph", 5, 5), index), "");
+  EXPECT_EQ(queue.waiting(), 2u);
+  std::vector<std::pair<std::string, int64_t>> answers;
+  while (const auto answer = queue.Next(index)) {
+    answers.emplace_back(answer->requester, answer->places.at(0).offset);
+  }
+  EXPECT_THAT(answers,
+              testing::ElementsAre(testing::Pair("fusion", 1), testing::Pair("fusion", 2),
+                                   testing::Pair("fusion", 3), testing::Pair("fusion", 4),
+                                   testing::Pair("fusion", 5), testing::Pair("posegraph", 5)));
+}
+
+TEST(ResendQueue, RefusesTheAbsurdAndStaysBounded) {
+  JournalIndex index;
+  index.AddKeyframe({kMap, 0}, {});
+  ResendQueue queue;
+  EXPECT_NE(queue.Add(RequestOf("", 0, 0), index), "");
+  EXPECT_NE(queue.Add(RequestOf("a b", 0, 0), index), "");
+  EXPECT_NE(queue.Add(RequestOf(std::string(500, 'a'), 0, 0), index), "");
+  EXPECT_NE(queue.Add(RequestOf("fusion", -1, 0), index), "");
+  EXPECT_NE(queue.Add(RequestOf("fusion", 2, 1), index), "");
+  resend_request_t other = RequestOf("fusion", 0, 0);
+  other.channel = "STATUS_x";
+  EXPECT_NE(queue.Add(other, index), "");
+  for (int i = 0; i < 1000; ++i) {
+    queue.Add(RequestOf(fmt::format("p{}", i), 0, 0), index);
+  }
+  EXPECT_EQ(queue.waiting(), ResendQueue::kMaxRequests);
+}
+
+}  // namespace
+}  // namespace pangea
