@@ -95,7 +95,7 @@ std::vector<std::string> RowComplaints::Lines() const {
 }
 
 void RowComplaints::ThrowIfTooMany(size_t num_rows, const std::string& expected) const {
-  if (count_ > 0 && count_ * 10 > static_cast<int64_t>(num_rows)) {
+  if (count_ > 1 && static_cast<size_t>(count_) > num_rows / 10) {
     throw std::runtime_error(fmt::format("{} (and {} more of {} rows); expected: {}", kept_.front(),
                                          count_ - 1, num_rows, expected));
   }

@@ -33,7 +33,7 @@ class RowComplaints {
   int count() const { return count_; }
   // One line of text per kept complaint, and "... and n more".
   std::vector<std::string> Lines() const;
-  // Throws when more than a tenth of the rows are malformed: then it is another format, and
+  // Throws when more than one row and a tenth of all are malformed: then it is another format, and
   // dropping rows would hide that.
   void ThrowIfTooMany(size_t num_rows, const std::string& expected) const;
 

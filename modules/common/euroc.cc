@@ -48,9 +48,10 @@ void SortUnique(std::vector<T>* items, const std::string& path,
     out_of_order += (*items)[i].utime < (*items)[i - 1].utime ? 1 : 0;
   }
   std::ranges::stable_sort(*items, {}, &T::utime);
-  const auto repeated = std::ranges::unique(*items, {}, &T::utime);
-  const size_t duplicates = repeated.size();
-  items->erase(repeated.begin(), repeated.end());
+  const auto repeated = std::unique(items->begin(), items->end(),
+                                    [](const T& a, const T& b) { return a.utime == b.utime; });
+  const auto duplicates = items->end() - repeated;
+  items->erase(repeated, items->end());
   if (out_of_order > 0) {
     warnings->push_back(fmt::format("{}: {} rows out of order; sorted", path, out_of_order));
   }

@@ -64,9 +64,11 @@ SortOutcome SortByTime(Trajectory* trajectory) {
     outcome.out_of_order += (*trajectory)[i].utime < (*trajectory)[i - 1].utime ? 1 : 0;
   }
   std::ranges::stable_sort(*trajectory, {}, &StampedPose::utime);
-  const auto repeated = std::ranges::unique(*trajectory, {}, &StampedPose::utime);
-  outcome.duplicates = static_cast<int>(repeated.size());
-  trajectory->erase(repeated.begin(), repeated.end());
+  const auto repeated =
+      std::unique(trajectory->begin(), trajectory->end(),
+                  [](const StampedPose& a, const StampedPose& b) { return a.utime == b.utime; });
+  outcome.duplicates = static_cast<int>(trajectory->end() - repeated);
+  trajectory->erase(repeated, trajectory->end());
   return outcome;
 }
 

@@ -43,7 +43,7 @@ TEST_F(TrajectoryTest, TumComesBackAsWritten) {
   for (int i = 0; i < 100; ++i) {
     const Eigen::Vector3d t(normal(rng), normal(rng), normal(rng));
     const Eigen::Vector3d w(normal(rng), normal(rng), normal(rng));
-    written.push_back({1403636584763555 + i * 49999, Rigid3(ExpSo3(w), t)});
+    written.push_back({1403636584763555 + i * int64_t{49999}, Rigid3(ExpSo3(w), t)});
   }
   WriteTum(folder_ + "out.tum", written);
   const Trajectory read = ReadTrajectory(folder_ + "out.tum", &warnings_);

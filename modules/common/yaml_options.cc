@@ -163,8 +163,9 @@ void YamlOptions::Add(const std::string& key, std::vector<std::string>* value) {
   AddScalars(key, "a text", value);
 }
 
-void YamlOptions::AddNamed(const std::string& key, std::vector<std::string> names,
-                           std::function<void(size_t)> set, std::function<size_t()> get) {
+void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string>& names,
+                           const std::function<void(size_t)>& set,
+                           const std::function<size_t()>& get) {
   Entry& entry = NewEntry(key);
   entry.read = [names, set](const YAML::Node& node, const std::string& file,
                             const std::string& path) {

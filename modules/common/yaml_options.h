@@ -51,11 +51,12 @@ class YamlOptions {
   void AddChoice(const std::string& key, Enum* value,
                  std::vector<std::pair<std::string, Enum>> choices) {
     std::vector<std::string> names;
+    names.reserve(choices.size());
     for (const auto& [name, choice] : choices) {
       names.push_back(name);
     }
     AddNamed(
-        key, std::move(names), [value, choices](size_t index) { *value = choices[index].second; },
+        key, names, [value, choices](size_t index) { *value = choices[index].second; },
         [value, choices] {
           size_t index = 0;
           while (index + 1 < choices.size() && choices[index].second != *value) {
@@ -102,8 +103,8 @@ class YamlOptions {
     return bound;
   }
 
-  void AddNamed(const std::string& key, std::vector<std::string> names,
-                std::function<void(size_t)> set, std::function<size_t()> get);
+  void AddNamed(const std::string& key, const std::vector<std::string>& names,
+                const std::function<void(size_t)>& set, const std::function<size_t()>& get);
   void AddSequence(const std::string& key, std::function<std::vector<YamlOptions>(size_t)> resize,
                    std::function<std::vector<YamlOptions>()> current);
   template <typename T>

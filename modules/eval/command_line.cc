@@ -22,9 +22,9 @@ void Warn(const std::vector<std::string>& warnings) {
 // A TUM or EuRoC ground-truth file, or a recording's folder.
 Trajectory ReadReference(const std::string& path) {
   std::vector<std::string> warnings;
-  const Trajectory reference = std::filesystem::is_directory(path)
-                                   ? ReadEurocGroundTruthOf(path, &warnings)
-                                   : ReadTrajectory(path, &warnings);
+  Trajectory reference = std::filesystem::is_directory(path)
+                             ? ReadEurocGroundTruthOf(path, &warnings)
+                             : ReadTrajectory(path, &warnings);
   Warn(warnings);
   if (reference.empty()) {
     throw std::runtime_error(fmt::format("{}: the recording has no ground truth", path));

@@ -127,6 +127,7 @@ std::optional<Rpe> RelativeErrorOverDistance(const std::vector<PosePair>& pairs,
 
 std::optional<Rpe> RelativeErrorOverTime(const std::vector<PosePair>& pairs, double duration_s) {
   std::vector<double> time_s;
+  time_s.reserve(pairs.size());
   for (const PosePair& pair : pairs) {
     time_s.push_back(1e-6 * static_cast<double>(pair.utime - pairs.front().utime));
   }

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -27,6 +28,26 @@ std::string Quoted(const std::string& text) {
   return quoted + "'";
 }
 
+// Pixels: with equal axes the picture has the shape of what is drawn.
+Eigen::Vector2i CanvasSize(const Plot& plot) {
+  constexpr int kWidth = 1400;
+  constexpr int kHeight = 1000;
+  constexpr int kMargins = 170;  // title, legend, axis labels
+  Eigen::AlignedBox2d box;
+  for (const PlotLine& line : plot.lines) {
+    for (const Eigen::Vector2d& p : line.points) {
+      if (p.allFinite()) {
+        box.extend(p);
+      }
+    }
+  }
+  if (!plot.equal_axes || box.isEmpty() || box.sizes().x() <= 0) {
+    return {kWidth, kHeight};
+  }
+  const double height = kWidth * std::min(box.sizes().y() / box.sizes().x(), 10.0);
+  return {kWidth, std::clamp(static_cast<int>(height), 400, 1200) + kMargins};
+}
+
 std::string Script(const Plot& plot, const std::string& path) {
   std::string script;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
@@ -36,12 +57,14 @@ std::string Script(const Plot& plot, const std::string& path) {
     }
     script += "EOD\n";
   }
-  script +=
-      "set terminal pngcairo noenhanced size 1400,1000 font 'sans,14' background '#ffffff'\n"
+  const Eigen::Vector2i size = CanvasSize(plot);
+  script += fmt::format(
+      "set terminal pngcairo noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
       "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
       "set grid linecolor '#dddddd' linewidth 1\n"
       "set key tmargin center horizontal samplen 2\n"
-      "set lmargin 11\nset rmargin 5\n";
+      "set lmargin 11\nset rmargin 5\n",
+      size.x(), size.y());
   script +=
       fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
                   Quoted(path), Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));

@@ -66,7 +66,7 @@ std::string WriteReport(const ReportInput& input, const std::string& folder) {
     figures.notes.emplace_back(error.what());
   }
   WriteText(folder + "/report.json", ReportJson(input, session, figures));
-  const std::string markdown = ReportMarkdown(input, session, figures);
+  std::string markdown = ReportMarkdown(input, session, figures);
   WriteText(folder + "/report.md", markdown);
   return markdown;
 }

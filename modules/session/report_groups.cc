@@ -49,7 +49,7 @@ FinalGroup Solved(const CapturedSession& session, const MapState& state, std::ve
   for (const MapId& map : maps) {
     CarryOn(session, map, &poses);
   }
-  return {state.group, std::move(maps), Values(poses)};
+  return {state.group, std::move(maps), Values(poses), state.num_switched_off};
 }
 
 FinalGroup Alone(const CapturedSession& session, const MapId& map) {
@@ -58,7 +58,7 @@ FinalGroup Alone(const CapturedSession& session, const MapId& map) {
        it != session.keyframes.end() && it->first.map == map; ++it) {
     poses[it->first] = {it->first, it->second.utime, it->second.T_odom_body};
   }
-  return {map, {map}, Values(poses)};
+  return {map, {map}, Values(poses), 0};
 }
 
 }  // namespace
@@ -106,6 +106,7 @@ std::vector<FinalGroup> FinalGroups(const CapturedSession& session) {
     entry.second.push_back(map);
   }
   std::vector<FinalGroup> groups;
+  groups.reserve(by_state.size());
   for (const auto& [key, entry] : by_state) {
     groups.push_back(Solved(session, *entry.first, entry.second));
   }

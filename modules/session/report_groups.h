@@ -18,6 +18,7 @@ struct FinalGroup {
   MapId frame;                           // the map whose odom frame is the map frame
   std::vector<MapId> maps;               // ascending
   std::vector<FinalKeyframe> keyframes;  // ascending by id
+  int num_switched_off = 0;              // constraints the robust solve switched off
 
   std::vector<int32_t> Agents() const;     // ascending, each once
   size_t CountOf(int32_t agent_id) const;  // keyframes of that agent

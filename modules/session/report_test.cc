@@ -100,7 +100,9 @@ class ReportTest : public ::testing::Test {
 
   std::string Recording(int32_t agent) const { return fmt::format("{}/rec_{}", folder_, agent); }
   std::string AgentLog(int32_t agent) const { return fmt::format("{}/a{}.lcm", folder_, agent); }
-  static MapId Map(int32_t agent, int nth = 0) { return {agent, kOpened + agent * 1000 + nth}; }
+  static MapId Map(int32_t agent, int nth = 0) {
+    return {agent, kOpened + agent * int64_t{1000} + nth};
+  }
 
   void WriteRecording(int32_t agent) const {
     const std::string mav0 = Recording(agent) + "/mav0";
@@ -227,7 +229,9 @@ TEST_F(ReportTest, TwoAgentsFused) {
   LogConstraint(4, false, "yaw of 31.5 deg is above the gate of 30 deg");
   LogConstraint(5, false, "yaw of 40 deg is above the gate of 30 deg");
   LogState(State(1, {Map(1), Map(2)}, 20));
-  LogState(State(2, {Map(1), Map(2)}, NumKeyframes(), {0.1, 0, 0}));
+  MapState final_state = State(2, {Map(1), Map(2)}, NumKeyframes(), {0.1, 0, 0});
+  final_state.num_switched_off = 3;
+  LogState(final_state);
   const json report = Report();
 
   const json& agent = report["agents"][1];
@@ -252,6 +256,7 @@ TEST_F(ReportTest, TwoAgentsFused) {
   ASSERT_EQ(report["groups"].size(), 1U);
   EXPECT_EQ(report["groups"][0]["agents"], json::array({1, 2}));
   EXPECT_EQ(report["groups"][0]["map_ids"].size(), 2U);
+  EXPECT_EQ(report["groups"][0]["constraints_switched_off"], 3);
   // One agent is 0.1 m off the other; the joint alignment halves it, and turns a little.
   EXPECT_NEAR(report["ate_joint_m"].get<double>(), 0.05, 0.01);
   EXPECT_EQ(report["groups"][0]["ate_joint_m"], report["ate_joint_m"]);

@@ -146,7 +146,7 @@ double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t 
 ordered_json ChangeJson(const GroupChange& change, const ReportFigures& figures) {
   ordered_json json = {{"change", change.fused ? "fused" : "taken apart"},
                        {"session_s", Number(change.session_s)}};
-  json["agents"] = FinalGroup{{}, change.maps, {}}.Agents();
+  json["agents"] = FinalGroup{{}, change.maps, {}, 0}.Agents();
   json["map_ids"] = MapIds(change.maps);
   json["recording_s"] = ordered_json::object();
   for (const auto& [agent, utime] : change.newest_utime) {
@@ -197,13 +197,13 @@ std::string AgentTable(const ReportFigures& figures) {
 }
 
 std::string GroupTable(const ReportFigures& figures) {
-  Table table({"group", "agents", "keyframes", "joint ATE m", "maps"});
+  Table table({"group", "agents", "keyframes", "joint ATE m", "switched off", "maps"});
   for (size_t i = 0; i < figures.groups.size(); ++i) {
     const GroupFigures& group = figures.groups[i];
     table.Add({fmt::format("{}", i + 1), fmt::format("{}", fmt::join(group.group.Agents(), ", ")),
                fmt::format("{}", group.group.keyframes.size()),
                group.joint ? fmt::format("{:.3f}", group.joint->position_m.rmse) : "-",
-               Joined(group.group.maps)});
+               fmt::format("{}", group.group.num_switched_off), Joined(group.group.maps)});
   }
   return table.Text();
 }
@@ -274,6 +274,8 @@ std::string ReportJson(const ReportInput& input, const CapturedSession& session,
     json["groups"].push_back({{"agents", group.group.Agents()},
                               {"map_ids", MapIds(group.group.maps)},
                               {"keyframes", group.group.keyframes.size()},
+                              {"constraints_switched_off", group.group.num_switched_off},
+                              {"constraints_switched_off", group.group.num_switched_off},
                               {"ate_joint_m", JointJson(group)}});
   }
   // The first group has most agents.
