@@ -62,16 +62,13 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
 }
 
 template <typename Visit>
-void DescriptorIndex::Probe(const Descriptor& descriptor, Visit visit) const {
+void DescriptorIndex::Probe(const Descriptor& descriptor, size_t turn, Visit visit) const {
   for (const Table& table : tables_) {
-    const uint32_t word = table.Word(descriptor);
     const uint32_t signature = table.Signature(descriptor);
-    for (int flip = -1; flip < kWordBits; ++flip) {
-      const uint32_t probe = flip < 0 ? word : word ^ (uint32_t{1} << flip);
-      const std::vector<Posting>& postings = table.postings[probe];
-      if (!postings.empty() && postings.size() <= kStopWordPostings) {
-        visit(postings, signature);
-      }
+    const std::vector<Posting>& postings = table.postings[table.Word(descriptor)];
+    const size_t stride = 1 + postings.size() / kMaxPostingsPerWord;
+    for (size_t i = turn % stride; i < postings.size(); i += stride) {
+      visit(postings[i], signature);
     }
   }
 }
@@ -83,13 +80,11 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
   const double most = std::log(1.0 + size());
   for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
     met.clear();
-    Probe(corners[i].descriptor, [&](const std::vector<Posting>& postings, uint32_t signature) {
-      for (const Posting& posting : postings) {
-        if (last_voter[posting.keyframe] != i &&
-            std::popcount(posting.signature ^ signature) <= kMaxSignatureDistance) {
-          last_voter[posting.keyframe] = i;
-          met.push_back(posting.keyframe);
-        }
+    Probe(corners[i].descriptor, i, [&](const Posting& posting, uint32_t signature) {
+      if (last_voter[posting.keyframe] != i &&
+          std::popcount(posting.signature ^ signature) <= kMaxSignatureDistance) {
+        last_voter[posting.keyframe] = i;
+        met.push_back(posting.keyframe);
       }
     });
     if (met.empty()) {
@@ -108,10 +103,8 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
 
 int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
   int64_t count = 0;
-  for (const Corner& corner : corners) {
-    Probe(corner.descriptor, [&](const std::vector<Posting>& postings, uint32_t) {
-      count += static_cast<int64_t>(postings.size());
-    });
+  for (size_t i = 0; i < corners.size(); ++i) {
+    Probe(corners[i].descriptor, i, [&](const Posting&, uint32_t) { ++count; });
   }
   return count;
 }

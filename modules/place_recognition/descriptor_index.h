@@ -3,11 +3,11 @@
 // Which keyframes share descriptors with this one: an inverted index that needs no vocabulary file.
 //
 // The words are locality-sensitive hashes: table t's word is a fixed random choice of kWordBits of
-// the 256 descriptor bits (Indyk & Motwani, STOC 1998). A query also visits the words one bit away
-// (multi-probe; Lv et al., VLDB 2007). Every posting carries a signature of 32 other bits, so that
-// most chance collisions are seen without touching the descriptor (Hamming embedding; Jegou et al.,
-// ECCV 2008). A query corner votes once for each keyframe it meets, weighted by
-// log(keyframes / keyframes met), the idf of Sivic & Zisserman.
+// the 256 descriptor bits (Indyk & Motwani, STOC 1998). Every posting carries a signature of 32
+// other bits, so that most chance collisions are seen without touching the descriptor (Hamming
+// embedding; Jegou et al., ECCV 2008). A query corner votes once for each keyframe it meets,
+// weighted by log(keyframes / keyframes met), the idf of Sivic & Zisserman. The constants were
+// measured: docs/decisions/place_recognition_index.md.
 //
 // Deterministic; no result depends on time. Memory: kTables * 8 bytes a corner, plus the heads.
 
@@ -35,12 +35,13 @@ class DescriptorIndex {
   int64_t CountPostings(const std::vector<Corner>& corners) const;
 
  private:
-  static constexpr int kTables = 4;
+  static constexpr int kTables = 6;
   static constexpr int kWordBits = 18;
   static constexpr int kSignatureBits = 32;
-  static constexpr int kMaxSignatureDistance = 7;
-  // A word met more often than this tells nothing: bounds the time of a query.
-  static constexpr size_t kStopWordPostings = 2000;
+  static constexpr int kMaxSignatureDistance = 6;
+  // Of a word met more often (a place seen thousands of times) a query compares an even sample of
+  // about this many: bounds its time without forgetting the place.
+  static constexpr size_t kMaxPostingsPerWord = 128;
 
   struct Posting {
     int32_t keyframe = 0;
@@ -54,9 +55,9 @@ class DescriptorIndex {
     uint32_t Word(const Descriptor& descriptor) const;
     uint32_t Signature(const Descriptor& descriptor) const;
   };
-  // Calls visit(posting list, signature) for each probed word.
+  // Calls visit(posting, signature) for each posting a corner meets; `turn` rotates the sample.
   template <typename Visit>
-  void Probe(const Descriptor& descriptor, Visit visit) const;
+  void Probe(const Descriptor& descriptor, size_t turn, Visit visit) const;
 
   std::array<Table, kTables> tables_;
   std::vector<int> num_corners_;  // of each keyframe

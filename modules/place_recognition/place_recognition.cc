@@ -41,8 +41,7 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 
 }  // namespace
 
-PlaceRecognition::PlaceRecognition(PlaceRecognitionOptions options)
-    : options_(std::move(options)) {}
+PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options) : options_(options) {}
 
 PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe) {
   Stored query = MakeStored(keyframe);
@@ -62,24 +61,57 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe) {
       own.push_back({i, scores[i]});
     }
   }
-  for (auto* hits : {&own, &others}) {
-    std::vector<Place> chosen =
-        Spread(Places(*hits), hits == &own ? options_.own_places : options_.other_places);
-    for (const Place& place : Continued(query.id, *hits)) {
-      if (std::none_of(chosen.begin(), chosen.end(),
-                       [&](const Place& c) { return c.keyframe == place.keyframe; })) {
-        chosen.push_back(place);
-      }
-    }
-    (hits == &own ? counters_.places_own : counters_.places_other) +=
-        static_cast<int64_t>(chosen.size());
-    for (const Place& place : chosen) {
-      Verify(query, place, &match);
-    }
-  }
+  Search(query, own, options_.own, &match);
+  Search(query, others, options_.others, &match);
   RememberPlaces(match);
   Store(std::move(query));
   return match;
+}
+
+void PlaceRecognition::Search(const Stored& query, const std::vector<Place>& hits,
+                              const PlaceRecognitionOptions::Search& options, PlaceMatch* match) {
+  std::vector<Place> places = Spread(Places(hits), options.places);
+  for (const Place& place : Continued(query.id, hits, options.continued_places)) {
+    if (std::none_of(places.begin(), places.end(),
+                     [&](const Place& chosen) { return chosen.keyframe == place.keyframe; })) {
+      places.push_back(place);
+    }
+  }
+  counters_.places += static_cast<int64_t>(places.size());
+  std::vector<PlaceCandidate> verified;
+  for (const Place& place : places) {
+    if (auto candidate = Verify(query, place, match)) {
+      verified.push_back(std::move(*candidate));
+    }
+  }
+  Publish(std::move(verified), options.candidates, match);
+}
+
+void PlaceRecognition::Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match) {
+  // The best of each map before the second best of any.
+  std::stable_sort(verified.begin(), verified.end(),
+                   [](const PlaceCandidate& a, const PlaceCandidate& b) {
+                     return a.corner_matches.size() > b.corner_matches.size();
+                   });
+  std::map<MapId, int> rank_in_map;
+  std::vector<std::pair<int, size_t>> order;
+  for (size_t i = 0; i < verified.size(); ++i) {
+    order.emplace_back(rank_in_map[verified[i].match.map]++, i);
+  }
+  std::sort(order.begin(), order.end());
+  for (size_t i = 0; i < order.size(); ++i) {
+    PlaceCandidate& candidate = verified[order[i].second];
+    if (static_cast<int>(i) < limit) {
+      ++(candidate.match.map == match->query.map ? counters_.candidates_own
+                                                 : counters_.candidates_other);
+      match->candidates.push_back(std::move(candidate));
+    } else {
+      ++counters_.rejected_surplus;
+      match->rejected.push_back(fmt::format("{}: {} corner matches, others have more",
+                                            ToString(candidate.match),
+                                            candidate.corner_matches.size()));
+    }
+  }
 }
 
 void PlaceRecognition::Remember(const Keyframe& keyframe, const PlaceMatch& known) {
@@ -187,12 +219,13 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Spread(const std::vector<
   return chosen;
 }
 
-std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(
-    const KeyframeId& query, const std::vector<Place>& hits) const {
+std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(const KeyframeId& query,
+                                                                 const std::vector<Place>& hits,
+                                                                 int limit) const {
   std::vector<Place> continued;
   const auto last = last_matches_.find(query.map);
   if (last == last_matches_.end()) {
-    return continued;
+    return {};
   }
   for (const KeyframeId& match : last->second) {
     Place best{-1, 0};
@@ -207,10 +240,16 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(
       continued.push_back(best);
     }
   }
+  std::stable_sort(continued.begin(), continued.end(),
+                   [](const Place& a, const Place& b) { return a.score > b.score; });
+  if (static_cast<int>(continued.size()) > limit) {
+    continued.resize(limit);
+  }
   return continued;
 }
 
-void PlaceRecognition::Verify(const Stored& query, const Place& place, PlaceMatch* match) {
+std::optional<PlaceCandidate> PlaceRecognition::Verify(const Stored& query, const Place& place,
+                                                       PlaceMatch* match) {
   const Stored& other = stored_[place.keyframe];
   std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, options_.matching);
   std::erase_if(matches, [&](const CornerMatch& m) {
@@ -220,7 +259,7 @@ void PlaceRecognition::Verify(const Stored& query, const Place& place, PlaceMatc
     ++counters_.rejected_matching;
     match->rejected.push_back(
         fmt::format("{}: {} corner matches", ToString(other.id), matches.size()));
-    return;
+    return std::nullopt;
   }
   const EpipolarResult epipolar =
       CheckEpipolar(RayPairs(query.rays, other.rays, matches),
@@ -230,7 +269,7 @@ void PlaceRecognition::Verify(const Stored& query, const Place& place, PlaceMatc
     match->rejected.push_back(fmt::format("{}: {} of {} matches agree on a pose",
                                           ToString(other.id), epipolar.inliers.size(),
                                           matches.size()));
-    return;
+    return std::nullopt;
   }
   PlaceCandidate candidate;
   candidate.match = other.id;
@@ -239,8 +278,7 @@ void PlaceRecognition::Verify(const Stored& query, const Place& place, PlaceMatc
   candidate.corner_matches = MatchAlongEpipolarLines(
       {query.corners, query.rays}, {other.corners, other.rays}, epipolar.model,
       options_.epipolar.max_residual, options_.guided_matching);
-  ++(query.id.map == other.id.map ? counters_.candidates_own : counters_.candidates_other);
-  match->candidates.push_back(std::move(candidate));
+  return candidate;
 }
 
 PlaceKind PlaceRecognition::Kind(const MapId& a, const MapId& b) const {

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,10 +29,15 @@ namespace pangea {
 struct PlaceRecognitionOptions {
   // Own map: a keyframe is recent while it is this near in seq or still shares a tracked landmark.
   int min_seq_gap = 20;
-  // Places verified for each keyframe; a place is a run of 2 * place_half_width + 1 keyframes.
-  int own_places = 5;
-  int other_places = 8;
+  // A place is a run of 2 * place_half_width + 1 keyframes of one map.
   int place_half_width = 5;
+  struct Search {
+    int places = 0;            // verified: the best by retrieval
+    int continued_places = 0;  // and those next to where the previous keyframe was recognised
+    int candidates = 0;        // published at most: each costs its consumer a bundle adjustment
+  };
+  Search own{.places = 5, .continued_places = 2, .candidates = 3};
+  Search others{.places = 8, .continued_places = 3, .candidates = 5};
   // Keyframes beyond this many are still recognised but no longer remembered (about 90 kB each).
   int max_keyframes = 20000;
   MatchingOptions matching;
@@ -44,15 +50,15 @@ class PlaceRecognition {
  public:
   struct Counters {
     int64_t keyframes = 0;
-    int64_t places_own = 0;  // verified
-    int64_t places_other = 0;
+    int64_t places = 0;          // looked at by descriptor matching
     int64_t candidates_own = 0;  // published
     int64_t candidates_other = 0;
     int64_t rejected_matching = 0;
     int64_t rejected_epipolar = 0;
+    int64_t rejected_surplus = 0;
   };
 
-  explicit PlaceRecognition(PlaceRecognitionOptions options);
+  explicit PlaceRecognition(const PlaceRecognitionOptions& options);
 
   // Recognises, then remembers.
   PlaceMatch Add(const Keyframe& keyframe);
@@ -90,8 +96,13 @@ class PlaceRecognition {
   // Of places in many maps, so that no map crowds out another.
   std::vector<Place> Spread(const std::vector<Place>& places, int limit) const;
   // Where the previous keyframe of this map was recognised, one step further.
-  std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits) const;
-  void Verify(const Stored& query, const Place& place, PlaceMatch* match);
+  std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits,
+                               int limit) const;
+  // One of the two searches: from keyframes that share descriptors to published candidates.
+  void Search(const Stored& query, const std::vector<Place>& hits,
+              const PlaceRecognitionOptions::Search& options, PlaceMatch* match);
+  std::optional<PlaceCandidate> Verify(const Stored& query, const Place& place, PlaceMatch* match);
+  void Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match);
   PlaceKind Kind(const MapId& a, const MapId& b) const;
   void RememberPlaces(const PlaceMatch& match);
 

@@ -25,8 +25,8 @@ constexpr int kGiveUpCatchingUpTicks = 50;
 
 }  // namespace
 
-PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, PlaceRecognitionOptions options)
-    : node_(bus, "place_recognition"), recognition_(std::move(options)) {
+PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options)
+    : node_(bus, "place_recognition"), recognition_(options) {
   node_.Subscribe<keyframe_t>(
       std::string(channels::kAllKeyframes),
       [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
@@ -172,7 +172,7 @@ void PlaceRecognitionProcess::OnResendRequest(const resend_request_t& message) {
     again_t again{};
     again.channel = channels::kPlaceMatch;
     again.data.resize(it->second.getEncodedSize());
-    again.num_bytes = static_cast<int16_t>(again.data.size());
+    again.num_bytes = static_cast<int32_t>(again.data.size());
     it->second.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
     node_.Publish(channels::Again(message.requester), again);
   }
@@ -203,12 +203,12 @@ void PlaceRecognitionProcess::AskForGaps(int64_t now_utime) {
 void PlaceRecognitionProcess::PublishStatus(int64_t now_utime) {
   const PlaceRecognition::Counters& counters = recognition_.counters();
   node_.Set("keyframes", counters.keyframes);
-  node_.Set("places_own", counters.places_own);
-  node_.Set("places_other", counters.places_other);
+  node_.Set("places", counters.places);
   node_.Set("candidates_own", counters.candidates_own);
   node_.Set("candidates_other", counters.candidates_other);
   node_.Set("rejected_matching", counters.rejected_matching);
   node_.Set("rejected_epipolar", counters.rejected_epipolar);
+  node_.Set("rejected_surplus", counters.rejected_surplus);
   const auto waiting = static_cast<int64_t>(keyframes_.parked() + held_.size());
   node_.PublishStatus(
       now_utime, waiting,

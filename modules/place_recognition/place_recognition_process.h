@@ -28,7 +28,7 @@ namespace pangea {
 
 class PlaceRecognitionProcess : public Process {
  public:
-  PlaceRecognitionProcess(Bus& bus, PlaceRecognitionOptions options);
+  PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options);
 
   void Tick(int64_t now_utime) override;
 

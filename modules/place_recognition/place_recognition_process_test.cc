@@ -61,7 +61,7 @@ struct Server {
     again_t again{};
     again.channel = channel;
     again.data.assign(payload.begin(), payload.end());
-    again.num_bytes = static_cast<int16_t>(payload.size());
+    again.num_bytes = static_cast<int32_t>(payload.size());
     PublishMessage(bus, "AGAIN_place_recognition", again);
     bus.Drain();
   }

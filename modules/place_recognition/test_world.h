@@ -42,7 +42,7 @@ class TestWorld {
                const Rigid3& T_odom_world = {}, bool tracked = false, double pitch = 0) {
     Keyframe keyframe;
     keyframe.id = id;
-    keyframe.utime = id.seq * 250'000;
+    keyframe.utime = int64_t{id.seq} * 250'000;
     keyframe.camera = Camera();
     const Rigid3 T_world_body(YawRotation(yaw) * ExpSo3(Eigen::Vector3d(0, pitch, 0)), p_world);
     keyframe.T_odom_body = T_odom_world * T_world_body;
