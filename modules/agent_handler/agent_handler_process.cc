@@ -15,13 +15,15 @@ namespace {
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr double kResendBurst = 64'000;
 constexpr size_t kMaxJournalledBytes = 65'000;
+constexpr size_t kMaxCorrections = 1000;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 // What a keyframe's match and verdicts may take before they are asked for; then ever more rarely.
 constexpr int64_t kFirstAsk_us = 3 * kSecond_us;
 constexpr int64_t kMaxAsk_us = 60 * kSecond_us;
 constexpr int32_t kMaxAsked = 100;
-constexpr size_t kMaxHaveMaps = 2000;  // about 34 kB
+constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
+constexpr size_t kMaxHaveGaps = 1000;
 
 // Unreadable though it says it is of this type (or has lost even that): damaged. A type this
 // version does not know is left alone.
@@ -35,6 +37,14 @@ bool IsDamaged(Bytes data) {
   const bool same_type = std::equal(fresh.begin(), fresh.begin() + 8, data.begin());
   const bool zeros = std::all_of(data.begin(), data.begin() + 8, [](uint8_t b) { return b == 0; });
   return same_type || zeros;
+}
+
+seq_gap_t ToMessage(const SeqGap& gap) {
+  seq_gap_t message{};
+  message.map = pangea::ToMessage(gap.map);
+  message.from_seq = gap.from_seq;
+  message.to_seq = gap.to_seq;
+  return message;
 }
 
 template <typename Message>
@@ -134,6 +144,21 @@ bool AgentHandlerProcess::LoadEvent(const std::string& channel, Bytes data,
   return true;
 }
 
+void AgentHandlerProcess::OnCorrection(const Correction& correction) {
+  // Kept for an agent whose hello is still to come: after a restart, it is.
+  Correction& newest = corrections_[correction.map];
+  if (newest.revision < correction.revision) {
+    newest = correction;
+  }
+  if (corrections_.size() > kMaxCorrections) {
+    corrections_.erase(corrections_.begin());
+  }
+  const auto agent = agents_.find(correction.map.agent_id);
+  if (agent != agents_.end()) {
+    agent->second.handler.OnCorrection(correction);
+  }
+}
+
 AgentHandlerProcess::Agent* AgentHandlerProcess::FindOrCreate(const LinkPacket& packet) {
   const auto it = agents_.find(packet.agent_id);
   if (it != agents_.end()) {
@@ -146,6 +171,11 @@ AgentHandlerProcess::Agent* AgentHandlerProcess::FindOrCreate(const LinkPacket& 
   for (auto have = have_.lower_bound({packet.agent_id, 0});
        have != have_.end() && have->first.agent_id == packet.agent_id; ++have) {
     handler.Resume(have->first, have->second);
+  }
+  for (const auto& [map, correction] : corrections_) {
+    if (map.agent_id == packet.agent_id) {
+      handler.OnCorrection(correction);
+    }
   }
   return &agents_.emplace(packet.agent_id, Agent(std::move(handler))).first->second;
 }
@@ -292,8 +322,14 @@ void AgentHandlerProcess::PublishHave() {
     for (; it != have_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
       message.maps.push_back(ToMessage(it->first));
       message.highest_seq.push_back(it->second);
+      for (const SeqGap& gap : index_.Gaps(it->first)) {
+        if (message.gaps.size() < kMaxHaveGaps) {
+          message.gaps.push_back(ToMessage(gap));
+        }
+      }
     }
     message.num_maps = static_cast<int16_t>(message.maps.size());
+    message.num_gaps = static_cast<int16_t>(message.gaps.size());
     node_.Publish(std::string(channels::kHave), message);
   } while (it != have_.end());
 }

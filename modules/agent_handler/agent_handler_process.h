@@ -64,6 +64,7 @@ class AgentHandlerProcess : public PolledProcess {
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   void OnLinkUp(const std::string& channel, Bytes data);
   Agent* FindOrCreate(const LinkPacket& packet);
+  void OnCorrection(const Correction& correction);
   void OnPlaceMatch(Bytes data);
   void OnConstraint(Bytes data);
   void JournalReady();
@@ -87,6 +88,7 @@ class AgentHandlerProcess : public PolledProcess {
   std::map<MapId, int32_t> have_;  // highest seq on the disk
   std::map<MapId, Owed> owed_matches_;
   std::map<MapId, Owed> owed_verdicts_;
+  std::map<MapId, Correction> corrections_;  // the newest of each map, at most 1000
   ResendQueue resend_queue_;
   Pacer resend_pacer_;
   int64_t now_us_ = 0;

@@ -68,12 +68,12 @@ class LinkWorld : public testing::Test {
   void SetUp() override {
     journal_path = testing::TempDir() + "pangea_link_" + std::to_string(getpid()) + ".lcm";
     std::filesystem::remove(journal_path);
-    // The odometry keeps its newest 200 keyframes and answers requests.
+    // The odometry keeps its keyframes and answers requests.
     agent_bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
       resend_request_t request{};
       ASSERT_TRUE(DecodeMessage(data, &request));
       ++asks;
-      for (int32_t seq = std::max(request.from_seq, published - 200);
+      for (int32_t seq = std::max(request.from_seq, oldest_kept);
            seq <= request.to_seq && seq < published; ++seq) {
         again_t again{};
         again.channel = request.channel;
@@ -175,6 +175,7 @@ class LinkWorld : public testing::Test {
   int64_t now = kSecond;
   int64_t run = 100;
   int32_t published = 0;
+  int32_t oldest_kept = 0;
   int32_t acknowledged = -1;
   int asks = 0;
 };
@@ -259,6 +260,23 @@ TEST_F(LinkWorld, WithoutAHandlerEverythingWaits) {
   StartHandler();
   Run(10);
   ExpectDelivered(100);
+}
+
+TEST_F(LinkWorld, WhatNobodyHasIsGivenUpAndSaid) {
+  std::vector<seq_gap_t> gaps;
+  server_bus.Subscribe("HAVE", [&](const std::string&, Bytes data) {
+    have_t have{};
+    ASSERT_TRUE(DecodeMessage(data, &have));
+    gaps = have.gaps;
+  });
+  published = oldest_kept = 5;
+  PublishKeyframes(3);
+  Run(20);
+  EXPECT_EQ(acknowledged, 7);
+  EXPECT_EQ(delivered.size(), 3u);
+  ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_EQ(gaps[0].from_seq, 0);
+  EXPECT_EQ(gaps[0].to_seq, 4);
 }
 
 TEST_F(LinkWorld, CorrectionsReachTheAgentAndPosesTheServer) {

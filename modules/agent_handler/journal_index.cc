@@ -107,6 +107,22 @@ std::vector<MapId> JournalIndex::Maps() const {
   return ids;
 }
 
+std::vector<SeqGap> JournalIndex::Gaps(const MapId& id) const {
+  const Map* map = FindMap(id);
+  std::vector<SeqGap> gaps;
+  if (map == nullptr || static_cast<int64_t>(map->keyframes.size()) == Highest(id) + 1) {
+    return gaps;
+  }
+  int32_t next = 0;
+  for (const auto& [seq, place] : map->keyframes) {
+    if (seq > next) {
+      gaps.push_back({id, next, seq - 1});
+    }
+    next = seq + 1;
+  }
+  return gaps;
+}
+
 std::optional<SeqGap> JournalIndex::MissingMatches(const MapId& id, int32_t up_to) const {
   const Map* map = FindMap(id);
   if (map == nullptr) {

@@ -42,6 +42,8 @@ class JournalIndex {
   // The highest keyframe of a map; -1 for none.
   int32_t Highest(const MapId& map) const;
   std::vector<MapId> Maps() const;
+  // Keyframes below a map's highest that are not there.
+  std::vector<SeqGap> Gaps(const MapId& map) const;
 
   // Keyframes up to `up_to` whose match, or a verdict, is not there: the first gap of the map.
   std::optional<SeqGap> MissingMatches(const MapId& map, int32_t up_to) const;

@@ -196,8 +196,8 @@ bool Uplink::GiveUp(const MapId& id, Map* map, const SeqGap& gap) {
   return true;
 }
 
-std::vector<SeqGap> Uplink::Asks(int64_t now_us) {
-  std::vector<SeqGap> asks;
+std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
+  std::vector<Ask> asks;
   const bool full = sender_.spooled_bytes() + kMaxKeyframeBytes > options_.sender.max_spool_bytes;
   for (auto& [id, map] : maps_) {
     const bool newest = id == maps_.rbegin()->first;
@@ -209,7 +209,7 @@ std::vector<SeqGap> Uplink::Asks(int64_t now_us) {
       // Nothing is known to be missing; but after a restart, or a lost last datagram, nothing
       // would be known. Silence is the usual answer.
       map.asked_us = now_us;
-      asks.push_back({id, map.highest + 1, map.highest + kMaxAsked});
+      asks.push_back({{id, map.highest + 1, map.highest + kMaxAsked}, false});
       continue;
     }
     if (!gap) {
@@ -223,7 +223,7 @@ std::vector<SeqGap> Uplink::Asks(int64_t now_us) {
     map.asked_us = now_us;
     map.asked_from = gap->from_seq;
     gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
-    asks.push_back(*gap);
+    asks.push_back({*gap, true});
   }
   return asks;
 }

@@ -36,8 +36,12 @@ class Uplink {
   std::string OnAck(const LinkAck& ack, int64_t now_us);
 
   std::vector<LinkPacket> Poll(int64_t now_us);
+  struct Ask {
+    SeqGap gap;
+    bool known = true;  // false: only looking whether there is more than was heard of
+  };
   // What to ask of the odometry now; each gap is repeated until it is filled or given up.
-  std::vector<SeqGap> Asks(int64_t now_us);
+  std::vector<Ask> Asks(int64_t now_us);
   // Corrections the agent has to be told now: new ones, and one per second it has not applied.
   std::vector<Correction> TakeCorrections(int64_t now_us);
   // The highest acknowledged seq of each map; -1 for none.

@@ -122,7 +122,7 @@ void UplinkProcess::PublishHave() {
 }
 
 void UplinkProcess::PublishAsks() {
-  for (const SeqGap& gap : uplink_.Asks(now_us_)) {
+  for (const auto& [gap, known] : uplink_.Asks(now_us_)) {
     resend_request_t request{};
     request.requester = node_.name();
     request.channel = channels::Keyframe(agent_id_);
@@ -130,7 +130,9 @@ void UplinkProcess::PublishAsks() {
     request.from_seq = gap.from_seq;
     request.to_seq = gap.to_seq;
     node_.Publish(std::string(channels::kResendRequest), request);
-    node_.NoteResendAsked();
+    if (known) {
+      node_.NoteResendAsked();
+    }
   }
 }
 

@@ -80,13 +80,13 @@ TEST_F(UplinkTest, AsksTheOdometryForWhatItMissed) {
   Add(7);
   auto asks = uplink.Asks(kSecond);
   ASSERT_EQ(asks.size(), 1u);
-  EXPECT_EQ(asks[0].from_seq, 0);
-  EXPECT_EQ(asks[0].to_seq, 6);
+  EXPECT_EQ(asks[0].gap.from_seq, 0);
+  EXPECT_EQ(asks[0].gap.to_seq, 6);
   uplink.OnAck(Ack(1, 1, 4), kSecond);
   EXPECT_TRUE(SentSeqs(uplink.Poll(kSecond)).empty()) << "never out of order";
   asks = uplink.Asks(2 * kSecond);
   ASSERT_EQ(asks.size(), 1u);
-  EXPECT_EQ(asks[0].from_seq, 5);
+  EXPECT_EQ(asks[0].gap.from_seq, 5);
   Add(5);
   Add(6);
   EXPECT_THAT(SentSeqs(uplink.Poll(2 * kSecond)), testing::ElementsAre(5, 6, 7));
@@ -97,7 +97,7 @@ TEST_F(UplinkTest, ProbesForALostTail) {
   uplink.AddPose(kMap, 0, {1});
   const auto asks = uplink.Asks(3 * kSecond);
   ASSERT_EQ(asks.size(), 1u);
-  EXPECT_EQ(asks[0].from_seq, 0);
+  EXPECT_EQ(asks[0].gap.from_seq, 0);
   EXPECT_TRUE(uplink.Asks(3 * kSecond + 500'000).empty());
 }
 
@@ -125,8 +125,8 @@ TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
   uplink.OnAck(Ack(2, 1, -1), 2 * kSecond);
   const auto asks = uplink.Asks(3 * kSecond);
   ASSERT_EQ(asks.size(), 1u);
-  EXPECT_EQ(asks[0].from_seq, 0);
-  EXPECT_EQ(asks[0].to_seq, 2);
+  EXPECT_EQ(asks[0].gap.from_seq, 0);
+  EXPECT_EQ(asks[0].gap.to_seq, 2);
   EXPECT_EQ(HelloIn(uplink.Poll(3 * kSecond)).maps[0].first_seq, 0);
 }
 

@@ -85,5 +85,16 @@ TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {
   EXPECT_EQ(stream.Gaps()[0].to_seq, 9);
 }
 
+TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
+  const MapId map{1, 10};
+  InOrder<int> stream;
+  stream.Add(map, 0, 100);
+  stream.Add(map, 4, 104);
+  EXPECT_THAT(stream.Skip({map, 2, 3}), testing::IsEmpty()) << "1 may still come";
+  EXPECT_THAT(stream.Skip({map, 1, 3}), testing::ElementsAre(104));
+  EXPECT_EQ(stream.next(map), 5);
+  EXPECT_TRUE(stream.Gaps().empty());
+}
+
 }  // namespace
 }  // namespace pangea

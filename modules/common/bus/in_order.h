@@ -36,10 +36,19 @@ class InOrder {
     }
     stream.parked.emplace(seq, std::move(item));
     stream.highest = std::max(stream.highest, seq);
-    for (auto it = stream.parked.begin(); it != stream.parked.end() && it->first == stream.next;
-         it = stream.parked.erase(it)) {
-      ready.push_back(std::move(it->second));
-      ++stream.next;
+    TakeReady(&stream, &ready);
+    return ready;
+  }
+
+  // Nobody has these any more (the gaps in HAVE): the stream goes on after them. The items that are
+  // now in order.
+  std::vector<T> Skip(const SeqGap& gap) {
+    Stream& stream = streams_[gap.map];
+    std::vector<T> ready;
+    if (gap.from_seq <= stream.next && stream.next <= gap.to_seq) {
+      stream.next = gap.to_seq + 1;
+      stream.parked.erase(stream.parked.begin(), stream.parked.lower_bound(stream.next));
+      TakeReady(&stream, &ready);
     }
     return ready;
   }
@@ -81,6 +90,14 @@ class InOrder {
     int32_t highest = -1;
     std::map<int32_t, T> parked;
   };
+  static void TakeReady(Stream* stream, std::vector<T>* ready) {
+    for (auto it = stream->parked.begin(); it != stream->parked.end() && it->first == stream->next;
+         it = stream->parked.erase(it)) {
+      ready->push_back(std::move(it->second));
+      ++stream->next;
+    }
+  }
+
   std::map<MapId, Stream> streams_;
 };
 

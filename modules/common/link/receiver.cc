@@ -153,8 +153,8 @@ void Receiver::Journalled(const KeyframeId& id) {
 void Receiver::FillAck(LinkAck* ack) const {
   ack->cache_bytes = options_.cache_bytes;
   // The newest maps; and of those an uplink may still be sending none is older than its hello's.
-  for (auto it = maps_.rbegin();
-       it != maps_.rend() && ack->journalled_seq.size() < 2 * kMaxLinkMaps; ++it) {
+  for (auto it = maps_.rbegin(); it != maps_.rend() && ack->journalled_seq.size() < kMaxAckMaps;
+       ++it) {
     ack->journalled_seq[it->first] = it->second.journalled;
   }
   for (const auto& [id, entry] : cache_) {

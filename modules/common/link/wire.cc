@@ -8,7 +8,6 @@ namespace {
 
 constexpr size_t kMaxSoftwareName = 100;
 constexpr int kMaxPieces = kMaxKeyframeBytes / kMinPayloadBytes + 1;
-constexpr int kMaxAckMaps = 2 * kMaxLinkMaps;
 
 template <typename T>
 Parsed<T> Refused(std::string reason) {

@@ -27,6 +27,7 @@ inline constexpr int kMaxPayloadBytes = 30'000;
 // so that both fit one Ethernet frame.
 inline constexpr int kMaxPartialKeyframes = 16;
 inline constexpr int kMaxLinkMaps = 20;
+inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
 // What UDP, IP and LCM's small-message header (8 bytes, channel, 0) add to a packet of bytes.
 inline constexpr int kDatagramOverheadBytes = 28 + 8 + 12;
