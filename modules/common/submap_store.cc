@@ -14,7 +14,6 @@ KeyframeView::KeyframeView(std::shared_ptr<const Keyframe> keyframe)
   has_ray_.assign(n, false);
   rays_.assign(n, Eigen::Vector2f::Zero());
   pixel_jacobians_.assign(n, Eigen::Matrix2f::Identity());
-  point_of_corner_.assign(n, -1);
 
   for (int i = 0; i < n; ++i) {
     const Corner& corner = keyframe_->corners[i];
@@ -34,15 +33,16 @@ KeyframeView::KeyframeView(std::shared_ptr<const Keyframe> keyframe)
     pixel_jacobians_[i] = J.leftCols<2>().cast<float>();
   }
   std::sort(landmark_corners_.begin(), landmark_corners_.end());
-  for (size_t i = 0; i < keyframe_->points.size(); ++i) {
-    point_of_corner_[keyframe_->points[i].corner] = static_cast<int16_t>(i);
-  }
 }
 
-int KeyframeView::CornerOfLandmark(int32_t landmark_id) const {
-  const auto it = std::lower_bound(landmark_corners_.begin(), landmark_corners_.end(),
-                                   std::make_pair(landmark_id, 0));
-  return it != landmark_corners_.end() && it->first == landmark_id ? it->second : -1;
+std::vector<int> KeyframeView::CornersOfLandmark(int32_t landmark_id) const {
+  std::vector<int> corners;
+  for (auto it = std::lower_bound(landmark_corners_.begin(), landmark_corners_.end(),
+                                  std::make_pair(landmark_id, 0));
+       it != landmark_corners_.end() && it->first == landmark_id; ++it) {
+    corners.push_back(it->second);
+  }
+  return corners;
 }
 
 void SubmapStore::Add(Keyframe keyframe) {

@@ -39,10 +39,8 @@ class KeyframeView {
     return pixel_jacobians_[corner].cast<double>();
   }
 
-  // The corner that is a landmark, or -1.
-  int CornerOfLandmark(int32_t landmark_id) const;
-  // Index into keyframe().points of the point that is this corner, or -1.
-  int PointOfCorner(int corner) const { return point_of_corner_[corner]; }
+  // The corners that are a landmark, ascending: one for each octave it was described on.
+  std::vector<int> CornersOfLandmark(int32_t landmark_id) const;
   const CornerGrid& grid() const { return grid_; }
 
  private:
@@ -52,7 +50,6 @@ class KeyframeView {
   std::vector<Eigen::Vector2f> rays_;
   std::vector<Eigen::Matrix2f> pixel_jacobians_;
   std::vector<std::pair<int32_t, int>> landmark_corners_;  // sorted by landmark
-  std::vector<int16_t> point_of_corner_;
   CornerGrid grid_;
 };
 

@@ -36,8 +36,8 @@ TEST(SubmapStore, ViewUndistortsAndFindsLandmarks) {
   EXPECT_TRUE(view->has_ray(1));
   EXPECT_NEAR(view->ray(1).x(), 0.25, 1e-6);
   EXPECT_NEAR(view->pixel_jacobian(1)(0, 0), 400, 1e-3);
-  EXPECT_EQ(view->CornerOfLandmark(77), 1);
-  EXPECT_EQ(view->CornerOfLandmark(78), -1);
+  EXPECT_EQ(view->CornersOfLandmark(77), std::vector<int>{1});
+  EXPECT_TRUE(view->CornersOfLandmark(78).empty());
   EXPECT_EQ(store.Find({kMap, 1}), nullptr);
 }
 

@@ -54,7 +54,7 @@ struct AlignmentOptions {
   // (surroundings.h).
   int min_found = 10;
   int min_comparable = 15;
-  double min_found_share = 0.12;
+  double min_found_share = 0.08;
   double min_first_supported_share = 0.3;
   double min_supported_share = 0.55;
   int surroundings_keyframes = 10;  // up to each of the two; not fewer than the window
@@ -63,7 +63,7 @@ struct AlignmentOptions {
   // Acceptance.
   int min_inliers = 16;           // distinct landmarks
   double min_inlier_ratio = 0.5;  // of the matches the BA used
-  int min_occupied_cells = 7;     // of 6 x 4, in one of the two keyframes
+  int min_occupied_cells = 6;     // of 6 x 4, in one of the two keyframes
   double max_sigma_m = 0.25;      // standard deviation of the translation, its worst direction
   double max_sigma_yaw = 0.03;    // radians
 };

@@ -255,6 +255,7 @@ PlaceCandidate MakeTestCandidateByDescriptor(const TestAgent& query_agent, int q
   const Keyframe& keyframe_m = match_agent.keyframes[match];
   PlaceCandidate candidate;
   candidate.match = keyframe_m.id;
+  candidate.kind = candidate.match.map == keyframe_c.id.map ? PlaceKind::kIntra : PlaceKind::kInter;
   for (const CornerMatch& corners : MatchCorners(keyframe_c.corners, keyframe_m.corners, {})) {
     candidate.corner_matches.emplace_back(corners.a, corners.b);
   }

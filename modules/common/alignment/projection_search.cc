@@ -186,10 +186,11 @@ std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& 
   std::vector<PointMatch> matches;
   for (size_t l = 0; l < holder.landmarks.size(); ++l) {
     // The newest view of it stands for all: M times the comparisons gain little here.
-    const Descriptor& descriptor =
-        holder.corner(holder.landmarks[l].observations.back()).descriptor;
+    WindowLandmark newest = holder.landmarks[l];
+    std::erase_if(newest.observations, [last = newest.observations.back().frame](
+                                           const CornerRef& ref) { return ref.frame != last; });
     const Nearest nearest = FindNearest(keyframe, corners, [&](int i) {
-      return HammingDistance(descriptor, keyframe.corners[i].descriptor);
+      return LandmarkDistance(holder, newest, keyframe.corners[i].descriptor);
     });
     if (nearest.corner >= 0 && nearest.distance <= max_hamming &&
         nearest.distance < max_ratio * nearest.second) {

@@ -12,7 +12,7 @@ namespace pangea {
 
 struct SearchOptions {
   double pixel_sigma = 1.0;  // of a corner on octave 0
-  int max_hamming = 70;      // of 256 bits
+  int max_hamming = 75;      // of 256 bits
   double max_ratio = 0.9;    // best to second-best distance, corners 4 px and further apart
   double max_chi2 = 11.8;    // within 3 sigma of the prediction (2 degrees of freedom)
   double min_radius_px = 4;  // of the search, whatever the prediction claims

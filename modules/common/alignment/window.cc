@@ -69,12 +69,17 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
     WindowLandmark landmark = MakeLandmark(window, id, estimate);
     const int index = static_cast<int>(window.landmarks.size());
     for (int f = 0; f <= window.newest(); ++f) {
-      const int corner = f == estimate.host.frame ? estimate.host.corner
-                         : id == kNoLandmark      ? -1
-                                                  : window.frames[f]->CornerOfLandmark(id);
-      if (corner >= 0 && window.frames[f]->has_ray(corner)) {
-        landmark.observations.push_back({f, corner});
-        window.landmark_of_corner[f][corner] = index;
+      std::vector<int> corners;
+      if (id != kNoLandmark) {
+        corners = window.frames[f]->CornersOfLandmark(id);
+      } else if (f == estimate.host.frame) {
+        corners = {estimate.host.corner};
+      }
+      for (const int corner : corners) {
+        if (window.frames[f]->has_ray(corner)) {
+          landmark.observations.push_back({f, corner});
+          window.landmark_of_corner[f][corner] = index;
+        }
       }
     }
     window.landmarks.push_back(std::move(landmark));

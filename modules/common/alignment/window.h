@@ -32,7 +32,8 @@ struct WindowLandmark {
   Eigen::Vector3d p_w = Eigen::Vector3d::Zero();
   // What one sigma of inverse depth moves p_w by, first order.
   Eigen::Vector3d depth_sigma_w = Eigen::Vector3d::Zero();
-  std::vector<CornerRef> observations;  // in frames of this window, ascending, host included
+  // Every corner that is this landmark, ascending, host included; one or more in a frame (octaves).
+  std::vector<CornerRef> observations;
 };
 
 struct Window {
