@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "common/imu.h"
+
 namespace pangea {
 
 // In the body frame of the first of the two frames, gravity not included. Error-state order of
@@ -20,5 +22,31 @@ struct Preintegration {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   // rad/s, linearisation point
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  // m/s^2
 };
+
+// Builds one from consecutive samples.
+class Preintegrator {
+ public:
+  Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
+                const Eigen::Vector3d& accel_bias);
+  // Motion from `a` to `b`: the mean of the two samples holds in between. Samples must be in order.
+  void Add(const ImuSample& a, const ImuSample& b);
+  const Preintegration& result() const { return result_; }
+
+ private:
+  ImuNoise noise_;
+  Preintegration result_;
+};
+
+// First-order change of the measurement when the biases move away from where it was linearised.
+struct CorrectedDelta {
+  Eigen::Quaterniond q;
+  Eigen::Vector3d v;
+  Eigen::Vector3d p;
+};
+CorrectedDelta CorrectForBias(const Preintegration& preintegration,
+                              const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias);
+
+// The sample at `utime` between two others, linear.
+ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime);
 
 }  // namespace pangea

@@ -1,0 +1,76 @@
+#include "common/preintegration.h"
+
+#include "common/rigid3.h"
+
+namespace pangea {
+
+Preintegrator::Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
+                             const Eigen::Vector3d& accel_bias)
+    : noise_(noise) {
+  result_.gyro_bias = gyro_bias;
+  result_.accel_bias = accel_bias;
+}
+
+void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
+  const double dt = 1e-6 * static_cast<double>(b.utime - a.utime);
+  if (dt <= 0) {
+    return;
+  }
+  Preintegration& p = result_;
+  const Eigen::Vector3d omega = 0.5 * (a.gyro + b.gyro) - p.gyro_bias;
+  // Specific force at the middle of the interval, turned by half of its rotation.
+  const Eigen::Vector3d accel = 0.5 * (a.accel + b.accel) - p.accel_bias;
+  const Eigen::Quaterniond half = ExpSo3(0.5 * dt * omega);
+  const Eigen::Matrix3d R_mid = (p.delta_q * half).toRotationMatrix();
+  const Eigen::Quaterniond step = ExpSo3(dt * omega);
+  const Eigen::Matrix3d R_hat = R_mid * Hat(accel);
+  const Eigen::Matrix3d half_R = half.toRotationMatrix();
+
+  // Error transition, order (rotation, velocity, position): Forster et al., appendix, with the
+  // force taken at the middle.
+  Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
+  const Eigen::Matrix3d dv_dtheta = -R_hat * half_R.transpose() * dt;
+  A.block<3, 3>(0, 0) = step.toRotationMatrix().transpose();
+  A.block<3, 3>(3, 0) = dv_dtheta;
+  A.block<3, 3>(6, 0) = 0.5 * dt * dv_dtheta;
+  A.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
+
+  Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();  // wrt (gyro, accel)
+  const Eigen::Matrix3d dtheta_dgyro = RightJacobian(dt * omega) * dt;
+  const Eigen::Matrix3d dv_dgyro = -R_hat * RightJacobian(0.5 * dt * omega) * 0.5 * dt * dt;
+  B.block<3, 3>(0, 0) = dtheta_dgyro;
+  B.block<3, 3>(3, 0) = dv_dgyro;
+  B.block<3, 3>(6, 0) = 0.5 * dt * dv_dgyro;
+  B.block<3, 3>(3, 3) = R_mid * dt;
+  B.block<3, 3>(6, 3) = R_mid * (0.5 * dt * dt);
+
+  Eigen::Matrix<double, 6, 1> noise;  // white noise density to variance over dt
+  noise.head<3>().setConstant(noise_.gyro_noise_density * noise_.gyro_noise_density / dt);
+  noise.tail<3>().setConstant(noise_.accel_noise_density * noise_.accel_noise_density / dt);
+  p.covariance = A * p.covariance * A.transpose() + B * noise.asDiagonal() * B.transpose();
+  p.bias_jacobian = A * p.bias_jacobian - B;
+
+  const Eigen::Vector3d dv = R_mid * accel * dt;
+  p.delta_p += p.delta_v * dt + 0.5 * dt * dv;
+  p.delta_v += dv;
+  p.delta_q = (p.delta_q * step).normalized();
+  p.duration_s += dt;
+}
+
+CorrectedDelta CorrectForBias(const Preintegration& p, const Eigen::Vector3d& gyro_bias,
+                              const Eigen::Vector3d& accel_bias) {
+  Eigen::Matrix<double, 6, 1> db;
+  db << gyro_bias - p.gyro_bias, accel_bias - p.accel_bias;
+  const Eigen::Matrix<double, 9, 1> d = p.bias_jacobian * db;
+  return {(p.delta_q * ExpSo3(d.head<3>())).normalized(), p.delta_v + d.segment<3>(3),
+          p.delta_p + d.tail<3>()};
+}
+
+ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime) {
+  const double share = b.utime > a.utime ? static_cast<double>(utime - a.utime) /
+                                               static_cast<double>(b.utime - a.utime)
+                                         : 0.0;
+  return {utime, a.gyro + share * (b.gyro - a.gyro), a.accel + share * (b.accel - a.accel)};
+}
+
+}  // namespace pangea

@@ -1,0 +1,52 @@
+#pragma once
+
+// The steps of a moving start (initialiser.h), each a function of its own.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/imu.h"
+#include "common/rigid3.h"
+#include "vio/window_state.h"
+
+namespace pangea::vio {
+
+// One image of the start-up window.
+struct StartFrame {
+  int64_t utime = 0;
+  std::map<int32_t, Eigen::Vector2d> rays;  // by landmark
+  std::vector<ImuSample> imu;  // from the previous image to this one; empty in the first
+};
+
+// Gyro bias that makes the images' rotations epipolar; nothing when the tracks do not determine it.
+std::optional<Eigen::Vector3d> SolveGyroBias(std::span<const StartFrame> frames,
+                                             const Rigid3& T_body_cam, const ImuNoise& noise);
+
+// All vectors in the first body frame.
+struct LinearStart {
+  Eigen::Vector3d v0 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
+  std::vector<Rigid3> T_first_body;            // of each frame
+  std::vector<Eigen::Vector3d> v_first_body;   // m/s
+  std::map<int32_t, Eigen::Vector3d> p_first;  // points
+};
+std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                                       const ImuNoise& noise, const Eigen::Vector3d& gyro_bias);
+
+// Refined by bundle adjustment; poses are in a gravity-aligned frame with its origin in the last
+// body.
+struct RefinedStart {
+  ImuState last;
+  Eigen::Matrix<double, 15, 15> covariance;  // (dtheta left, dp, dv, gyro bias, accel bias)
+  double rms_sigma = 0;                      // reprojection residual of the inliers, in sigmas
+  double inlier_share = 0;
+};
+std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                                   const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
+                                   const LinearStart& start, double ray_sigma);
+
+}  // namespace pangea::vio

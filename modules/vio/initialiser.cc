@@ -1,0 +1,193 @@
+#include "vio/initialiser.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "common/preintegration.h"
+#include "vio/initial_solution.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
+constexpr double kMinSpan_s = 1.0;        // shortest start-up window, and
+constexpr double kMaxSpan_s = 2.2;        // the longest: older images are forgotten
+constexpr size_t kMinTracks = 20;
+
+// At rest: the image stands, the accelerometer and the gyro are quiet.
+constexpr double kRestSpan_s = 1.0;
+constexpr double kRestPixels = 0.7;
+constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
+constexpr double kRestGyro = 0.03;   // rad/s
+
+// A moving start must be at least this certain and explain this much.
+constexpr double kMaxVelocitySigma = 0.12;  // m/s
+constexpr double kMaxTiltSigma = 0.035;     // rad
+constexpr double kMinInlierShare = 0.8;
+constexpr double kMaxRmsSigmas = 1.8;
+constexpr double kMaxAccelBias = 0.8;  // m/s^2
+
+double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
+  std::vector<double> displacement;
+  for (const Observation& first : a.observations) {
+    for (const Observation& second : b.observations) {
+      if (first.landmark_id == second.landmark_id) {
+        displacement.push_back((first.pixel - second.pixel).norm());
+      }
+    }
+  }
+  *shared = displacement.size();
+  if (displacement.empty()) {
+    return 1e9;
+  }
+  std::nth_element(displacement.begin(), displacement.begin() + displacement.size() / 2,
+                   displacement.end());
+  return displacement[displacement.size() / 2];
+}
+
+double SpanSeconds(int64_t from_utime, int64_t to_utime) {
+  return 1e-6 * static_cast<double>(to_utime - from_utime);
+}
+
+}  // namespace
+
+Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)
+    : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma) {}
+
+InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
+  pending_.insert(pending_.end(), imu.begin(), imu.end());
+  const auto after = std::find_if(pending_.begin(), pending_.end(), [&](const ImuSample& sample) {
+    return sample.utime >= frame.utime;
+  });
+  if (after == pending_.end()) {
+    return {std::nullopt, "no inertial samples up to the image's time"};
+  }
+  const bool spaced =
+      frames_.empty() || SpanSeconds(frames_.back().frame.utime, frame.utime) >= kFrameSpacing_s;
+  if (!spaced) {
+    return {std::nullopt, "collecting images"};
+  }
+  BufferedFrame buffered{frame, {pending_.begin(), after}};
+  const ImuSample end =
+      after == pending_.begin() ? *after : InterpolateImu(*(after - 1), *after, frame.utime);
+  buffered.imu.push_back(end);
+  pending_.erase(pending_.begin(), after);
+  pending_.insert(pending_.begin(), end);
+  frames_.push_back(std::move(buffered));
+  while (SpanSeconds(frames_.front().frame.utime, frame.utime) > kMaxSpan_s) {
+    frames_.erase(frames_.begin());
+  }
+  const double span = SpanSeconds(frames_.front().frame.utime, frame.utime);
+  if (span < kMinSpan_s) {
+    return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
+  }
+  if (auto at_rest = TryAtRest()) {
+    return {at_rest, ""};
+  }
+  return TryMoving();
+}
+
+std::optional<InitialState> Initialiser::TryAtRest() const {
+  const int64_t now = frames_.back().frame.utime;
+  std::vector<ImuSample> samples;
+  const TrackedFrame* oldest = nullptr;
+  for (const BufferedFrame& buffered : frames_) {
+    if (SpanSeconds(buffered.frame.utime, now) <= kRestSpan_s + kFrameSpacing_s) {
+      if (oldest == nullptr) {
+        oldest = &buffered.frame;
+      } else {
+        samples.insert(samples.end(), buffered.imu.begin(), buffered.imu.end());
+      }
+    }
+  }
+  size_t shared = 0;
+  const double moved = MedianDisplacement(*oldest, frames_.back().frame, &shared);
+  if (samples.size() < 20 || shared < kMinTracks || moved > kRestPixels) {
+    return std::nullopt;
+  }
+  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
+  for (const ImuSample& sample : samples) {
+    mean_gyro += sample.gyro / static_cast<double>(samples.size());
+    mean_accel += sample.accel / static_cast<double>(samples.size());
+  }
+  double var_gyro = 0, var_accel = 0;
+  for (const ImuSample& sample : samples) {
+    var_gyro += (sample.gyro - mean_gyro).squaredNorm() / static_cast<double>(samples.size());
+    var_accel += (sample.accel - mean_accel).squaredNorm() / static_cast<double>(samples.size());
+  }
+  if (var_accel > kRestAccel * kRestAccel || var_gyro > kRestGyro * kRestGyro) {
+    return std::nullopt;
+  }
+  InitialState state;
+  state.utime = now;
+  state.at_rest = true;
+  state.imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(mean_accel, Vector3d::UnitZ());
+  state.imu.gyro_bias = mean_gyro;
+  // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
+  Eigen::Matrix<double, 15, 1> sigma;
+  constexpr double kAccelBiasSigma = 0.1;
+  sigma << Vector3d(kAccelBiasSigma / kGravity, kAccelBiasSigma / kGravity, 1e-4),
+      Vector3d::Constant(1e-4), Vector3d::Constant(0.01), Vector3d::Constant(0.002),
+      Vector3d::Constant(kAccelBiasSigma);
+  state.covariance = sigma.cwiseAbs2().asDiagonal();
+  return state;
+}
+
+InitialResult Initialiser::TryMoving() const {
+  std::vector<StartFrame> frames;
+  for (const BufferedFrame& buffered : frames_) {
+    StartFrame start{buffered.frame.utime, {}, buffered.imu};
+    for (const Observation& observation : buffered.frame.observations) {
+      start.rays[observation.landmark_id] = observation.ray;
+    }
+    frames.push_back(std::move(start));
+  }
+  frames.front().imu.clear();
+  const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
+  if (!gyro_bias) {
+    return {std::nullopt, "too few features are tracked from image to image"};
+  }
+  const auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
+  if (!linear) {
+    return {std::nullopt, "the motion does not determine velocity and gravity yet"};
+  }
+  const auto refined = Refine(frames, camera_.T_body_cam, noise_, *gyro_bias, *linear,
+                              pixel_sigma_ * camera_.PixelAngle());
+  if (!refined) {
+    return {std::nullopt, "the start-up bundle adjustment did not converge"};
+  }
+  if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
+    return {std::nullopt,
+            fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
+                        100 * refined->inlier_share, refined->rms_sigma)};
+  }
+  const double velocity_sigma =
+      std::sqrt(Eigen::SelfAdjointEigenSolver<Matrix3d>(
+                    Matrix3d(refined->covariance.block<3, 3>(kVelocity, kVelocity)))
+                    .eigenvalues()[2]);
+  const double tilt_sigma =
+      std::sqrt(std::max(refined->covariance(0, 0), refined->covariance(1, 1)));
+  if (velocity_sigma > kMaxVelocitySigma || tilt_sigma > kMaxTiltSigma) {
+    return {
+        std::nullopt,
+        fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
+                    velocity_sigma, tilt_sigma * 57.3)};
+  }
+  if (refined->last.accel_bias.norm() > kMaxAccelBias) {
+    return {std::nullopt, "the start needs an implausible accelerometer bias"};
+  }
+  InitialState state;
+  state.utime = frames_.back().frame.utime;
+  state.imu = refined->last;
+  state.covariance = refined->covariance;
+  return {state, ""};
+}
+
+}  // namespace pangea::vio

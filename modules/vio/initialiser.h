@@ -1,0 +1,61 @@
+#pragma once
+
+// The first state of a map, from a second or two of tracks and inertial samples.
+//
+// At rest: gravity from the accelerometer, gyro bias from the gyro. Moving: the gyro bias that
+// makes every pair of images epipolar (Kneip & Lynen, ICCV 2013; He et al., CVPR 2023), then
+// velocity and gravity in closed form with |g| known (Dong-Si & Mourikis, IROS 2012), then bundle
+// adjustment with preintegrated IMU. A solution that is not well determined, or does not explain
+// the images, is refused with a reason: a bad start costs more than a late one.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/imu.h"
+#include "vio/tracks.h"
+#include "vio/window_state.h"
+
+namespace pangea::vio {
+
+struct InitialState {
+  int64_t utime = 0;  // of the newest frame
+  ImuState imu;       // odom: z up, origin at the body now, yaw free
+  // Of (dtheta left, dp, dv, gyro bias, accel bias), in odom.
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
+  bool at_rest = false;
+};
+
+struct InitialResult {
+  std::optional<InitialState> state;
+  std::string reason;  // why there is none yet
+};
+
+class Initialiser {
+ public:
+  Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma);
+
+  // Frames in time order, with the samples since the previous frame (the last one at or after the
+  // frame).
+  InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
+
+ private:
+  struct BufferedFrame {
+    TrackedFrame frame;
+    std::vector<ImuSample> imu;  // from the previous frame's time to this one's, ends interpolated
+  };
+  std::optional<InitialState> TryAtRest() const;
+  InitialResult TryMoving() const;
+
+  CameraModel camera_;
+  ImuNoise noise_;
+  double pixel_sigma_;
+  std::vector<BufferedFrame> frames_;
+  std::vector<ImuSample> pending_;  // samples from the newest frame's time on
+};
+
+}  // namespace pangea::vio

@@ -1,0 +1,101 @@
+#include "vio/keyframe_finisher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vio/point_geometry.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+// A depth is worth sending when it is known to this share of itself.
+constexpr double kMaxRelativeSigma = 0.3;
+constexpr size_t kMinRays = 4;
+
+// A floor on what is never better known than this, whatever the window's rays say: poses are not
+// exact.
+constexpr double kMinRelativeSigma = 0.005;
+
+std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state,
+                                     const TrackHistory& history, int clone) {
+  double rho = 0, variance = 0;
+  const int landmark = state.LandmarkIndex(id);
+  if (landmark >= 0) {
+    const auto here = Reanchor(state, landmark, clone);
+    if (!here) {
+      return std::nullopt;
+    }
+    rho = here->point.ray_rho.z();
+    // The poses' common error cancels in J P J'.
+    variance = (here->J.row(2) * state.covariance * here->J.row(2).transpose()).value();
+  } else {
+    const std::vector<ClonedRay> rays = history.RaysOf(id, state, 0);
+    if (rays.size() < kMinRays) {
+      return std::nullopt;
+    }
+    const auto point = Triangulate(state, rays, clone);
+    if (!point || point->rms > 2.0) {
+      return std::nullopt;
+    }
+    rho = point->point.ray_rho.z();
+    variance = point->covariance(2, 2);
+  }
+  const double floor = kMinRelativeSigma * rho;
+  variance = std::max(variance, floor * floor);
+  if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
+    return std::nullopt;
+  }
+  return LandmarkDepth{id, rho, variance};
+}
+
+}  // namespace
+
+Matrix6d RelativeCovariance(const WindowState& state, int i, int j) {
+  // p_ij = R_i^T (p_j - p_i), with p = Exp(dtheta) p^ + xi for both.
+  const Rigid3& T_i = state.clones[i].T_odom_body;
+  const Rigid3& T_j = state.clones[j].T_odom_body;
+  const Matrix3d R = T_i.R().transpose();
+  MatrixXd J = MatrixXd::Zero(6, 12);  // (dtheta_i, xi_i, dtheta_j, xi_j)
+  J.block<3, 3>(0, 0) = R * Hat(T_j.t);
+  J.block<3, 3>(0, 3) = -R;
+  J.block<3, 3>(0, 6) = -R * Hat(T_j.t);
+  J.block<3, 3>(0, 9) = R;
+  J.block<3, 3>(3, 0) = -R;
+  J.block<3, 3>(3, 6) = R;
+  const int at_i = state.CloneOffset(i), at_j = state.CloneOffset(j);
+  MatrixXd P(12, 12);
+  P << state.covariance.block<6, 6>(at_i, at_i), state.covariance.block<6, 6>(at_i, at_j),
+      state.covariance.block<6, 6>(at_j, at_i), state.covariance.block<6, 6>(at_j, at_j);
+  Matrix6d covariance = J * P * J.transpose();
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  // At rest two poses are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
+  Eigen::Matrix<double, 6, 1> floor;
+  floor << Vector3d::Constant(1e-8), Vector3d::Constant(1e-10);
+  covariance.diagonal() += floor;
+  return covariance;
+}
+
+FinishedKeyframe FinishKeyframe(const WindowState& state, const TrackHistory& history, int index) {
+  const Clone& clone = state.clones[index];
+  FinishedKeyframe keyframe;
+  keyframe.utime = clone.utime;
+  keyframe.T_odom_body = clone.T_odom_body;
+  keyframe.v_odom_body = clone.v_odom_body;
+  keyframe.gyro_bias = clone.gyro_bias;
+  keyframe.accel_bias = clone.accel_bias;
+  const int at = state.CloneOffset(index);
+  keyframe.roll_pitch_covariance =
+      state.covariance.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
+  for (const auto& [id, ray] : history.Frame(clone.utime)) {
+    if (const auto depth = DepthOf(id, state, history, index)) {
+      keyframe.landmarks.push_back(*depth);
+    }
+  }
+  return keyframe;
+}
+
+}  // namespace pangea::vio
