@@ -5,26 +5,9 @@
 // Times become microseconds, rounded down; file names keep their nanoseconds. `body` is the IMU.
 // Images are read when asked for.
 //
-// What is wrong with a recording either makes it unusable (the constructor throws, naming file,
-// line or field, and the mend) or is mended and named in warnings():
-//
-//   folder, csv or sensor.yaml missing          throws
-//   field missing or unknown camera model       throws
-//   first image's size is not the calibration's throws
-//   more than a tenth of a csv's rows malformed throws (another format)
-//   a few malformed rows                        dropped
-//   csv's last row cut off (no line end)        dropped
-//   rows out of order                           sorted
-//   rows with a stamp already seen              dropped, the first one counts
-//   image file missing                          dropped; throws when none is there
-//   images outside the IMU's time               dropped; throws when none is left
-//   gap in IMU or images                        kept as it is: the odometry decides
-//   no ground truth                             ground_truth() is empty
-//   ground truth unreadable                     ground_truth() is empty
-//   a corrupt image, or one of another size     LoadImage says so and gives nothing
-//
-// Beyond EuRoC's own keys cam0/sensor.yaml may hold `time_offset_s` (or Kalibr's
-// `timeshift_cam_imu`; t_imu = t_image + offset) and `readout_s` (first row to last).
+// What is wrong with a recording either makes it unusable (the constructor throws, naming file, line
+// or field, and the mend) or is mended and named in warnings(): docs/recordings.md has the table, and
+// the optional keys of sensor.yaml.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -46,7 +29,7 @@ struct EurocImage {
 
 class EurocRecording {
  public:
-  // `folder` holds mav0 or is mav0. Throws std::runtime_error as in the table above.
+  // `folder` holds mav0 or is mav0. Throws std::runtime_error as in that table.
   explicit EurocRecording(const std::string& folder);
 
   const std::string& mav0() const { return mav0_; }
