@@ -68,11 +68,32 @@ double Evaluate(const std::vector<double>& polynomial, double x) {
   return value;
 }
 
-// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees), by bisection between the
-// roots of the derivative.
+// The root between two places of opposite sign: Newton's method, kept inside by bisection.
+double RootBetween(const std::vector<double>& polynomial, const std::vector<double>& derivative,
+                   double low, double high) {
+  constexpr int kMaxSteps = 60;
+  const bool low_negative = Evaluate(polynomial, low) < 0;
+  double x = 0.5 * (low + high);
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const double value = Evaluate(polynomial, x);
+    ((value < 0) == low_negative ? low : high) = x;
+    double next = x - value / Evaluate(derivative, x);
+    if (!(next > low && next < high)) {
+      next = 0.5 * (low + high);
+    }
+    const double step = std::abs(next - x);
+    x = next;
+    if (step < 1e-13 * (1 + std::abs(x))) {
+      break;
+    }
+  }
+  return x;
+}
+
+// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees), each between two roots of
+// the derivative.
 std::vector<double> RealRoots(const std::vector<double>& polynomial) {
   constexpr double kLargestRoot = 1e3;
-  constexpr int kHalvings = 50;
   if (polynomial.size() < 2) {
     return {};
   }
@@ -85,15 +106,8 @@ std::vector<double> RealRoots(const std::vector<double>& polynomial) {
   std::vector<double> roots;
   double low = -kLargestRoot;
   for (const double border : borders) {
-    const bool negative = Evaluate(polynomial, low) < 0;
-    if ((Evaluate(polynomial, border) < 0) != negative) {
-      double inside = low;
-      double outside = border;
-      for (int i = 0; i < kHalvings; ++i) {
-        const double middle = 0.5 * (inside + outside);
-        ((Evaluate(polynomial, middle) < 0) == negative ? inside : outside) = middle;
-      }
-      roots.push_back(0.5 * (inside + outside));
+    if ((Evaluate(polynomial, low) < 0) != (Evaluate(polynomial, border) < 0)) {
+      roots.push_back(RootBetween(polynomial, derivative, low, border));
     }
     low = border;
   }

@@ -25,7 +25,7 @@ struct EpipolarOptions {
   double max_residual = 3.0;  // in sigmas: pixels at the image centre, on octave 0
   // Gravity's own error between the two odom frames, radians, 1 sigma.
   double gravity_sigma = 0.01;
-  int max_iterations = 500;
+  int max_iterations = 300;
   double confidence = 0.999;
   int min_inliers = 10;
   // log10 of how many sets of unrelated matches would be expected to pass: at most.
