@@ -1,0 +1,179 @@
+#include "sim/command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <stdexcept>
+
+#include "sim/frame_cache.h"
+
+namespace pangea::sim {
+namespace {
+
+SceneKind KindOf(const std::string& name) {
+  if (name == "hall") {
+    return SceneKind::kHall;
+  }
+  if (name == "room") {
+    return SceneKind::kRoom;
+  }
+  return name == "twin_objects_a" ? SceneKind::kTwinObjectsA : SceneKind::kTwinObjectsB;
+}
+
+}  // namespace
+
+CommandLine::CommandLine(CLI::App& app) {
+  app.add_option("--out", options_.out, "folder that will hold mav0/")->required();
+  app.add_option("--seed", options_.seed,
+                 "of pixel noise, exposure changes, IMU noise and biases; nothing else")
+      ->capture_default_str();
+  AddPath(app);
+  AddScene(app);
+  AddSensors(app);
+  options_.cache_dir = DefaultCacheRoot();
+  app.add_option("--cache", options_.cache_dir, "folder of noise-free frames, kept between runs")
+      ->capture_default_str();
+  app.add_flag("--no-cache", no_cache_, "keep no noise-free frames");
+  app.add_option("--threads", options_.threads, "0: one per core; the result is the same")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
+}
+
+void CommandLine::AddPath(CLI::App& app) {
+  const std::string group = "Path";
+  auto* path = app.add_option("--path", options_.path_file,
+                              "follow this file: EuRoC ground-truth csv, or TUM")
+                   ->check(CLI::ExistingFile)
+                   ->group(group);
+  app.add_option("--generate", generate_, "make a path: a hand-held walk, or a drone's flight")
+      ->check(CLI::IsMember({"walk", "flight"}))
+      ->capture_default_str()
+      ->excludes(path)
+      ->group(group);
+  app.add_option("--path-seed", options_.generated.seed, "of the generated path")
+      ->capture_default_str()
+      ->excludes(path)
+      ->group(group);
+  app.add_option("--static-start", options_.generated.static_start_s,
+                 "seconds a generated path stands still first")
+      ->capture_default_str()
+      ->excludes(path)
+      ->group(group);
+  app.add_option("--start", options_.start_s, "seconds of the path to leave out")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
+      ->group(group);
+  app.add_option("--duration", options_.duration_s,
+                 "seconds to record; default: a file's whole path, or 60")
+      ->check(CLI::PositiveNumber)
+      ->group(group);
+  app.add_option("--knot-spacing", knot_spacing_s_,
+                 "seconds between the spline's knots on positions (half of it on rotations); "
+                 "default 0.1, with --imu 0.05")
+      ->check(CLI::Range(0.01, 1.0))
+      ->group(group);
+}
+
+void CommandLine::AddScene(CLI::App& app) {
+  const std::string group = "Scene";
+  app.add_option("--scene", scene_,
+                 "hall, room, or one of two rooms that share a dozen identical objects")
+      ->check(CLI::IsMember({"hall", "room", "twin_objects_a", "twin_objects_b"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--scene-seed", options_.scene.seed, "changes everything in the scene")
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--keep-clear", options_.keep_clear_files,
+                 "further paths the scene must hold and stay clear of. A scene is built around "
+                 "--path and these, so recordings of one scene need the same set, in any order")
+      ->check(CLI::ExistingFile)
+      ->group(group);
+}
+
+void CommandLine::AddSensors(CLI::App& app) {
+  const std::string group = "Sensors";
+  app.add_option("--camera", camera_, "EuRoC's cam0, or a phone (fisheye lens, rolling shutter)")
+      ->check(CLI::IsMember({"euroc", "phone"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--shrink", shrink_, "divide the image's size by this")
+      ->check(CLI::Range(1.0, 8.0))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--image-rate", options_.image_rate_hz, "Hz")
+      ->check(CLI::Range(1.0, 100.0))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--exposure-ms", exposure_ms_, "motion blur; EuRoC's dark flights: 8")
+      ->check(CLI::Range(0.0, 30.0))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--brightness", options_.sensor.brightness,
+                 "of the pictures; EuRoC's dark flights: 0.35")
+      ->check(CLI::Range(0.05, 2.0))
+      ->capture_default_str()
+      ->group(group);
+  auto* imu = app.add_option("--imu", options_.imu_file,
+                             "put this recorded IMU (EuRoC csv) beside the rendered images")
+                  ->check(CLI::ExistingFile)
+                  ->group(group);
+  auto* stamps = app.add_option("--stamps", options_.stamps_file,
+                                "stamps of the images to render, ns, one a line (with --imu)")
+                     ->check(CLI::ExistingFile)
+                     ->needs(imu)
+                     ->group(group);
+  imu->needs(stamps);
+  app.add_flag("--perfect", options_.perfect, "no noise, no blur, no exposure changes, no biases")
+      ->group(group);
+  app.add_flag("--tracks", options_.tracks,
+               "write exact feature tracks to mav0/cam0/tracks.csv: stamp, landmark id, u, v")
+      ->group(group);
+}
+
+void CommandLine::Apply() {
+  options_.generated.motion = generate_ == "walk" ? Motion::kWalk : Motion::kFlight;
+  if (options_.path_file.empty()) {
+    constexpr double kDefaultDuration = 60;
+    const double duration = options_.duration_s > 0 ? options_.duration_s : kDefaultDuration;
+    constexpr double kMargins = 0.21;
+    options_.generated.duration_s = options_.start_s + duration + kMargins;
+  }
+  options_.scene.kind = KindOf(scene_);
+  options_.camera = camera_ == "euroc" ? EurocCamera() : PhoneCamera();
+  if (shrink_ > 1) {
+    options_.camera = Shrunk(options_.camera, shrink_);
+  }
+  const double spacing = knot_spacing_s_ > 0         ? knot_spacing_s_
+                         : options_.imu_file.empty() ? 0.1
+                                                     : 0.05;
+  options_.spline.position_spacing_s = spacing;
+  options_.spline.rotation_spacing_s = 0.5 * spacing;
+  options_.sensor.exposure_s = 1e-3 * exposure_ms_;
+  if (no_cache_) {
+    options_.cache_dir.clear();
+  }
+}
+
+void CommandLine::Run() {
+  Apply();
+  const RecordingSummary summary = RenderRecording(options_, [](size_t done, size_t all) {
+    constexpr size_t kEvery = 20;
+    if (done % kEvery == 0 || done == all) {
+      fmt::print(stderr, "\r{} of {} frames", done, all);
+      std::fflush(stderr);
+    }
+  });
+  fmt::print(stderr, "\n");
+  fmt::print(
+      "{}: {} frames ({} rendered, {} from the cache), {:.1f} m of path, at most {:.1f} m/s^2",
+      options_.out, summary.images, summary.rendered, summary.images - summary.rendered,
+      summary.path_m, summary.largest_acceleration);
+  if (summary.steps_spread > 0) {
+    fmt::print(", {} position steps spread", summary.steps_spread);
+  }
+  fmt::print("\n");
+}
+
+}  // namespace pangea::sim

@@ -1,0 +1,44 @@
+#pragma once
+
+// Writes a recording in EuRoC's on-disk format: the sensors' folders, yaml and csv files.
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/imu.h"
+#include "sim/imu_simulator.h"
+
+namespace pangea::sim {
+
+class EurocWriter {
+ public:
+  // Creates `folder`/mav0 and its folders. Refuses one that holds a recording already.
+  explicit EurocWriter(const std::string& folder);
+  // Writes on into one that was created before.
+  static EurocWriter Existing(const std::string& folder);
+
+  const std::string& mav0() const { return mav0_; }
+  void WriteBody(const std::string& comment) const;
+  void WriteCamera(const CameraModel& camera, double rate_hz, const std::string& comment) const;
+  void WriteImuCalibration(const ImuNoise& noise) const;
+  void WriteImu(const SimulatedImu& imu) const;
+  // 17 columns with the biases of `imu`; 8 where they are not known (nullptr).
+  void WriteGroundTruth(const SplinePath& path, const std::vector<int64_t>& stamps_ns,
+                        const SimulatedImu* imu) const;
+  void WriteImageList(const std::vector<int64_t>& stamps_ns) const;
+  // From any thread.
+  void WriteImage(int64_t stamp_ns, const cv::Mat& image) const;
+  void WriteText(const std::string& file, const std::string& text) const;
+
+ private:
+  EurocWriter() = default;
+  std::string mav0_;
+};
+
+// 8-bit PNG at the fastest compression; throws when it cannot be written.
+void WritePng(const std::string& path, const cv::Mat& image);
+
+}  // namespace pangea::sim

@@ -1,0 +1,30 @@
+#pragma once
+
+// Noise-free frames on disk, one folder per (scene, path, camera, optics), one PNG per stamp. They
+// can be deleted at any time; several programs may share them.
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+namespace pangea::sim {
+
+class FrameCache {
+ public:
+  // An empty `root` keeps nothing.
+  FrameCache(const std::string& root, uint64_t key);
+
+  // Empty when it is not there.
+  cv::Mat Load(int64_t stamp_ns) const;
+  // Failures (a full disk) are ignored: the cache only saves time.
+  void Store(int64_t stamp_ns, const cv::Mat& frame) const;
+
+ private:
+  std::string PathOf(int64_t stamp_ns) const;
+  std::string folder_;
+};
+
+// ${XDG_CACHE_HOME:-~/.cache}/pangea/frames; empty without either variable.
+std::string DefaultCacheRoot();
+
+}  // namespace pangea::sim

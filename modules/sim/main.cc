@@ -1,0 +1,21 @@
+// pangea-sim: renders recordings in EuRoC's format, with exact ground truth.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+
+#include "sim/command_line.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Renders a visual-inertial recording in EuRoC's format, with exact ground truth");
+  pangea::sim::CommandLine command(app);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    command.Run();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "pangea-sim: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,453 @@
+#include "sim/recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "common/csv.h"
+#include "sim/euroc_writer.h"
+#include "sim/frame_cache.h"
+#include "sim/imu_simulator.h"
+#include "sim/random.h"
+#include "sim/renderer.h"
+#include "sim/tracks.h"
+
+namespace pangea::sim {
+namespace {
+
+// Counts up whenever the same options give other noise-free frames.
+constexpr uint64_t kRenderVersion = 1;
+
+std::vector<Eigen::Vector3d> PointsOf(const Trajectory& trajectory) {
+  std::vector<Eigen::Vector3d> points;
+  for (const StampedPose& pose : trajectory) {
+    points.push_back(pose.T.t);
+  }
+  return points;
+}
+
+template <typename T>
+uint64_t HashValue(const T& value, uint64_t hash) {
+  return HashBytes(&value, sizeof(value), hash);
+}
+
+// Of everything a noise-free frame depends on, but its stamp.
+uint64_t FrameKey(const SceneOptions& scene, const SplinePath& path, const CameraModel& camera,
+                  const SensorOptions& sensor) {
+  uint64_t hash = HashValue(kRenderVersion, path.Hash());
+  for (const double value :
+       {static_cast<double>(scene.kind), scene.clearance_m, scene.coarseness,
+        static_cast<double>(camera.kind), camera.fx, camera.fy, camera.cx, camera.cy,
+        camera.distortion[0], camera.distortion[1], camera.distortion[2], camera.distortion[3],
+        camera.time_offset_s, camera.readout_s, sensor.exposure_s, sensor.vignetting}) {
+    hash = HashValue(value, hash);
+  }
+  hash = HashValue(scene.seed, hash);
+  hash = HashValue(camera.width, HashValue(camera.height, hash));
+  for (int i = 0; i < 4; ++i) {
+    hash = HashValue(camera.T_body_cam.q.coeffs()[i], hash);
+  }
+  for (int i = 0; i < 3; ++i) {
+    hash = HashValue(camera.T_body_cam.t[i], hash);
+  }
+  for (const Eigen::Vector3d& point : scene.keep_clear) {
+    hash = HashBytes(point.data(), 3 * sizeof(double), hash);
+  }
+  return hash;
+}
+
+// A stretch of time to record: image stamps, and the IMU's span around them.
+struct Schedule {
+  std::vector<int64_t> images_ns;
+  int64_t imu_begin_ns = 0;
+  int64_t imu_end_ns = 0;
+};
+
+// Exposure and read-out reach this far beyond a stamp.
+constexpr int64_t kMarginNs = 100'000'000;
+
+int64_t Nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
+
+struct Span {
+  int64_t begin_ns, end_ns;
+};
+
+Span SpanOf(const SplinePath& path, const RecordingOptions& options) {
+  Span span{path.begin_ns() + kMarginNs, path.end_ns() - kMarginNs};
+  span.begin_ns += Nanoseconds(options.start_s);
+  if (options.duration_s > 0) {
+    span.end_ns = std::min(span.end_ns, span.begin_ns + Nanoseconds(options.duration_s));
+  }
+  if (span.end_ns <= span.begin_ns) {
+    throw std::runtime_error(fmt::format(
+        "nothing to record: the path lasts {:.2f} s and the recording would start at {:.2f} s",
+        1e-9 * static_cast<double>(path.end_ns() - path.begin_ns()), options.start_s));
+  }
+  return span;
+}
+
+// Every stamp is also an IMU sample's, as in EuRoC.
+Schedule MakeSchedule(const Span& span, const RecordingOptions& options) {
+  Schedule schedule;
+  schedule.imu_begin_ns = span.begin_ns;
+  schedule.imu_end_ns = span.end_ns;
+  const int64_t imu_period = Nanoseconds(1.0 / options.imu.rate_hz);
+  const auto every =
+      std::max<int64_t>(1, std::llround(options.imu.rate_hz / options.image_rate_hz));
+  for (int64_t t = span.begin_ns + imu_period; t + imu_period <= span.end_ns;
+       t += every * imu_period) {
+    schedule.images_ns.push_back(t);
+  }
+  return schedule;
+}
+
+// Rows of a recorded IMU as they stand in the file.
+struct RecordedImu {
+  std::vector<int64_t> stamps_ns;
+  std::vector<std::string> lines;
+};
+
+RecordedImu ReadRecordedImu(const std::string& path) {
+  RecordedImu imu;
+  for (const CsvRow& row : ReadCsv(path)) {
+    int64_t ns = 0;
+    if (row.fields.size() != 7 || !ParseNumber(row.fields[0], &ns)) {
+      throw std::runtime_error(
+          fmt::format("{}:{}: not 'nanoseconds, gyro x y z, accel x y z'", path, row.line));
+    }
+    imu.stamps_ns.push_back(ns);
+    imu.lines.push_back(fmt::format("{}\n", fmt::join(row.fields, ",")));
+  }
+  if (!std::ranges::is_sorted(imu.stamps_ns) || imu.stamps_ns.empty()) {
+    throw std::runtime_error(fmt::format("{}: must hold rows in order of time", path));
+  }
+  return imu;
+}
+
+std::vector<int64_t> ReadStamps(const std::string& path) {
+  std::vector<int64_t> stamps;
+  for (const CsvRow& row : ReadCsv(path)) {
+    int64_t ns = 0;
+    if (!ParseNumber(row.fields[0], &ns)) {
+      throw std::runtime_error(fmt::format("{}:{}: not a stamp in nanoseconds", path, row.line));
+    }
+    stamps.push_back(ns);
+  }
+  std::ranges::sort(stamps);
+  return stamps;
+}
+
+Schedule HybridSchedule(const Span& span, const RecordedImu& imu, const std::string& stamps_file) {
+  Schedule schedule;
+  for (const int64_t stamp : ReadStamps(stamps_file)) {
+    if (stamp >= std::max(span.begin_ns, imu.stamps_ns.front()) &&
+        stamp <= std::min(span.end_ns, imu.stamps_ns.back())) {
+      schedule.images_ns.push_back(stamp);
+    }
+  }
+  if (schedule.images_ns.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no stamp lies within both the path's and the IMU's time", stamps_file));
+  }
+  constexpr int64_t kAround = 10'000'000;
+  schedule.imu_begin_ns = schedule.images_ns.front() - kAround;
+  schedule.imu_end_ns = schedule.images_ns.back() + kAround;
+  return schedule;
+}
+
+// Runs one recording's parts in order.
+class Recorder {
+ public:
+  explicit Recorder(const RecordingOptions& options);
+  RecordingSummary Run(const Progress& progress);
+
+ private:
+  void WriteInertial();
+  void WriteTracks() const;
+  void WriteImages(const Progress& progress);
+  cv::Mat NoiseFreeFrame(int64_t stamp_ns);
+  void EnsureScene();
+  Rigid3 CameraPose(int64_t stamp_ns, double row_delay_s) const;
+  std::vector<Rigid3> RowPoses(int64_t stamp_ns) const;
+  CameraRates RatesAt(int64_t stamp_ns) const;
+
+  const RecordingOptions options_;
+  RecordingSummary summary_;
+  SceneOptions scene_options_;
+  SensorOptions sensor_options_;
+  std::optional<SplinePath> path_;
+  Schedule schedule_;
+  std::optional<RecordedImu> recorded_imu_;
+  std::optional<Sensor> sensor_;
+  std::optional<FrameCache> cache_;
+  std::once_flag scene_once_;
+  Scene scene_;
+  std::optional<Renderer> renderer_;
+  std::atomic<size_t> rendered_ = 0;
+};
+
+Recorder::Recorder(const RecordingOptions& options)
+    : options_(options), scene_options_(options.scene), sensor_options_(options.sensor) {
+  if (const auto invalid = options.camera.Invalid()) {
+    throw std::runtime_error("camera: " + *invalid);
+  }
+  Trajectory trajectory;
+  std::vector<std::string> warnings;
+  if (options.path_file.empty()) {
+    GeneratedPathOptions generated = options.generated;
+    generated.scene = options.scene.kind;
+    generated.q_body_cam = options.camera.T_body_cam.q;
+    trajectory = GeneratePath(generated);
+  } else {
+    const Trajectory raw = ReadTrajectory(options.path_file, &warnings);
+    summary_.steps_spread = FindSteps(raw, options.steps).size();
+    trajectory = SpreadSteps(raw, options.steps);
+    std::vector<std::string> files = options.keep_clear_files;
+    files.push_back(options.path_file);
+    // In an order of its own, so that every recording of the scene sees the same points.
+    std::vector<std::pair<uint64_t, std::vector<Eigen::Vector3d>>> sets;
+    for (const std::string& file : files) {
+      const auto points = PointsOf(ReadTrajectory(file, &warnings));
+      sets.emplace_back(HashBytes(points.data(), points.size() * sizeof(points[0])), points);
+    }
+    std::ranges::sort(sets, {}, &decltype(sets)::value_type::first);
+    const auto repeated = std::ranges::unique(sets, {}, &decltype(sets)::value_type::first);
+    sets.erase(repeated.begin(), repeated.end());
+    for (const auto& [hash, points] : sets) {
+      scene_options_.keep_clear.insert(scene_options_.keep_clear.end(), points.begin(),
+                                       points.end());
+    }
+  }
+  path_.emplace(trajectory, options.spline);
+  if (options.perfect) {
+    sensor_options_.exposure_s = 0;
+    sensor_options_.gain_variation = 0;
+    sensor_options_.read_noise = 0;
+    sensor_options_.shot_noise = 0;
+  }
+  const Span span = SpanOf(*path_, options);
+  if (options.imu_file.empty()) {
+    schedule_ = MakeSchedule(span, options);
+  } else {
+    recorded_imu_ = ReadRecordedImu(options.imu_file);
+    schedule_ = HybridSchedule(span, *recorded_imu_, options.stamps_file);
+  }
+  sensor_.emplace(options_.camera, sensor_options_);
+  cache_.emplace(options.cache_dir,
+                 FrameKey(scene_options_, *path_, options_.camera, sensor_options_));
+}
+
+void Recorder::EnsureScene() {
+  std::call_once(scene_once_, [this] {
+    scene_ = BuildScene(scene_options_);
+    renderer_.emplace(scene_, options_.camera);
+  });
+}
+
+Rigid3 Recorder::CameraPose(int64_t stamp_ns, double row_delay_s) const {
+  const double since = 1e-9 * static_cast<double>(stamp_ns - path_->begin_ns());
+  return path_->AtSeconds(since + options_.camera.time_offset_s + row_delay_s).T_ref_body *
+         options_.camera.T_body_cam;
+}
+
+std::vector<Rigid3> Recorder::RowPoses(int64_t stamp_ns) const {
+  const double readout = options_.camera.readout_s;
+  if (readout == 0) {
+    return {CameraPose(stamp_ns, 0)};
+  }
+  std::vector<Rigid3> poses;
+  for (int y = 0; y < options_.camera.height; ++y) {
+    poses.push_back(CameraPose(stamp_ns, readout * y / (options_.camera.height - 1)));
+  }
+  return poses;
+}
+
+CameraRates Recorder::RatesAt(int64_t stamp_ns) const {
+  const double middle_row = 0.5 * options_.camera.readout_s;
+  const PathState state =
+      path_->AtSeconds(1e-9 * static_cast<double>(stamp_ns - path_->begin_ns()) +
+                       options_.camera.time_offset_s + middle_row);
+  const Rigid3& T_body_cam = options_.camera.T_body_cam;
+  const Eigen::Vector3d v_body =
+      state.T_ref_body.q.conjugate() * state.v_ref_body + state.omega_body.cross(T_body_cam.t);
+  return {T_body_cam.q.conjugate() * state.omega_body, T_body_cam.q.conjugate() * v_body};
+}
+
+cv::Mat Recorder::NoiseFreeFrame(int64_t stamp_ns) {
+  cv::Mat frame = cache_->Load(stamp_ns);
+  if (frame.empty()) {
+    EnsureScene();
+    frame = sensor_->NoiseFree(renderer_->Render(RowPoses(stamp_ns)), RatesAt(stamp_ns));
+    cache_->Store(stamp_ns, frame);
+    ++rendered_;
+  }
+  return frame;
+}
+
+void Recorder::WriteImages(const Progress& progress) {
+  const EurocWriter writer = EurocWriter::Existing(options_.out);
+  const std::vector<int64_t>& stamps = schedule_.images_ns;
+  std::atomic<size_t> next = 0;
+  std::mutex mutex;
+  size_t done = 0;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    try {
+      for (size_t i = next++; i < stamps.size(); i = next++) {
+        const double time_s = 1e-9 * static_cast<double>(stamps[i] - stamps.front());
+        const cv::Mat frame = NoiseFreeFrame(stamps[i]);
+        writer.WriteImage(stamps[i], options_.perfect
+                                         ? frame
+                                         : sensor_->Develop(frame, options_.seed, time_s, i));
+        const std::lock_guard lock(mutex);
+        ++done;
+        if (progress) {
+          progress(done, stamps.size());
+        }
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      failure = std::current_exception();
+      next = stamps.size();
+    }
+  };
+  const int threads = options_.threads > 0
+                          ? options_.threads
+                          : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  std::vector<std::thread> helpers;
+  for (int i = 1; i < threads; ++i) {
+    helpers.emplace_back(work);
+  }
+  work();
+  for (std::thread& helper : helpers) {
+    helper.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+}
+
+void Recorder::WriteInertial() {
+  const EurocWriter writer(options_.out);
+  writer.WriteBody("rendered by pangea-sim");
+  writer.WriteCamera(options_.camera, options_.image_rate_hz, "rendered by pangea-sim");
+  writer.WriteImuCalibration(options_.imu);
+  writer.WriteImageList(schedule_.images_ns);
+  if (!recorded_imu_) {
+    const SimulatedImu imu = SimulateImu(*path_, schedule_.imu_begin_ns, schedule_.imu_end_ns,
+                                         options_.imu, options_.perfect, options_.seed);
+    writer.WriteImu(imu);
+    writer.WriteGroundTruth(*path_, imu.stamps_ns, &imu);
+    return;
+  }
+  std::string text =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  std::vector<int64_t> stamps;
+  for (size_t i = 0; i < recorded_imu_->lines.size(); ++i) {
+    const int64_t stamp = recorded_imu_->stamps_ns[i];
+    if (stamp >= schedule_.imu_begin_ns && stamp <= schedule_.imu_end_ns) {
+      text += recorded_imu_->lines[i];
+      stamps.push_back(stamp);
+    }
+  }
+  writer.WriteText("imu0/data.csv", text);
+  writer.WriteGroundTruth(*path_, stamps, nullptr);
+}
+
+void Recorder::WriteTracks() const {
+  constexpr int kPoints = 150;
+  TrackMaker tracks(scene_, options_.camera, kPoints, options_.scene.seed);
+  std::string text = "#timestamp [ns],landmark_id,u [px],v [px]\n";
+  for (const int64_t stamp : schedule_.images_ns) {
+    for (const TrackedPoint& point : tracks.Next(CameraPose(stamp, 0))) {
+      text += fmt::format("{},{},{:.4f},{:.4f}\n", stamp, point.landmark_id, point.pixel.x(),
+                          point.pixel.y());
+    }
+  }
+  EurocWriter::Existing(options_.out).WriteText("cam0/tracks.csv", text);
+}
+
+RecordingSummary Recorder::Run(const Progress& progress) {
+  WriteInertial();
+  if (options_.tracks) {
+    EnsureScene();
+    WriteTracks();
+  }
+  WriteImages(progress);
+  summary_.images = schedule_.images_ns.size();
+  summary_.rendered = rendered_;
+  Eigen::Vector3d previous = path_->At(schedule_.imu_begin_ns).T_ref_body.t;
+  constexpr int64_t kStep = 5'000'000;
+  for (int64_t t = schedule_.imu_begin_ns; t <= schedule_.imu_end_ns; t += kStep) {
+    const PathState state = path_->At(t);
+    summary_.path_m += (state.T_ref_body.t - previous).norm();
+    previous = state.T_ref_body.t;
+    summary_.largest_acceleration =
+        std::max(summary_.largest_acceleration, state.a_ref_body.norm());
+  }
+  return summary_;
+}
+
+}  // namespace
+
+CameraModel EurocCamera() {
+  CameraModel camera;
+  camera.width = 752;
+  camera.height = 480;
+  camera.fx = 458.654;
+  camera.fy = 457.296;
+  camera.cx = 367.215;
+  camera.cy = 248.375;
+  camera.distortion << -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05;
+  Eigen::Matrix3d R_body_cam;
+  R_body_cam << 0.0148655429818, -0.999880929698, 0.00414029679422, 0.999557249008, 0.0149672133247,
+      0.025715529948, -0.0257744366974, 0.00375618835797, 0.999660727178;
+  camera.T_body_cam = Rigid3(Eigen::Quaterniond(R_body_cam).normalized(),
+                             {-0.0216401454975, -0.064676986768, 0.00981073058949});
+  return camera;
+}
+
+CameraModel PhoneCamera() {
+  CameraModel camera;
+  camera.kind = CameraModel::Kind::kEquidistant;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = 445.2;
+  camera.fy = 445.9;
+  camera.cx = 318.4;
+  camera.cy = 243.1;
+  camera.distortion << 0.021, -0.012, 0.004, -0.001;
+  camera.readout_s = 0.012;
+  // Held upright in landscape, looking ahead: the body's z points out of the screen.
+  Eigen::Matrix3d R_body_cam;
+  R_body_cam << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  camera.T_body_cam = Rigid3(Eigen::Quaterniond(R_body_cam).normalized(), {0.04, 0.01, -0.005});
+  return camera;
+}
+
+CameraModel Shrunk(const CameraModel& camera, double factor) {
+  CameraModel shrunk = camera;
+  shrunk.width = static_cast<int>(camera.width / factor);
+  shrunk.height = static_cast<int>(camera.height / factor);
+  shrunk.fx /= factor;
+  shrunk.fy /= factor;
+  // Pixel centres are at whole numbers, so edges are at -0.5.
+  shrunk.cx = (camera.cx + 0.5) / factor - 0.5;
+  shrunk.cy = (camera.cy + 0.5) / factor - 0.5;
+  return shrunk;
+}
+
+RecordingSummary RenderRecording(const RecordingOptions& options, const Progress& progress) {
+  return Recorder(options).Run(progress);
+}
+
+}  // namespace pangea::sim

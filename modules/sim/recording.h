@@ -1,0 +1,78 @@
+#pragma once
+
+// Renders a whole recording: path, scene, IMU, images, ground truth, in EuRoC's format.
+//
+//   RecordingOptions options;
+//   options.out = "recording";
+//   options.generated.duration_s = 10;
+//   RenderRecording(options);
+//
+// The same options give the same bytes, on any number of threads.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/imu.h"
+#include "sim/path_generator.h"
+#include "sim/path_steps.h"
+#include "sim/scene_builder.h"
+#include "sim/sensor.h"
+#include "sim/spline_path.h"
+
+namespace pangea::sim {
+
+// EuRoC's cam0, and a phone's wide camera (equidistant lens, rolling shutter, late stamps).
+CameraModel EurocCamera();
+CameraModel PhoneCamera();
+// The same camera with its image (and all that is in pixels) shrunk by a factor.
+CameraModel Shrunk(const CameraModel& camera, double factor);
+
+struct RecordingOptions {
+  std::string out;  // folder that will hold mav0
+
+  // The path: a file (EuRoC ground-truth csv or TUM), or generated when there is none.
+  std::string path_file;
+  GeneratedPathOptions generated;
+  SplinePathOptions spline;
+  StepOptions steps;
+  double start_s = 0;
+  double duration_s = 0;  // 0: to the end
+
+  SceneOptions scene;
+  std::vector<std::string> keep_clear_files;  // beside the path's own file
+
+  CameraModel camera = EurocCamera();
+  double image_rate_hz = 20;
+  SensorOptions sensor;
+  ImuNoise imu;
+
+  // A recorded IMU and the stamps of its camera, instead of made ones.
+  std::string imu_file;
+  std::string stamps_file;
+
+  uint64_t seed = 1;     // pixel noise, exposure and IMU noise
+  bool perfect = false;  // no noise, no blur, no changing exposure, exact IMU
+  bool tracks = false;   // cam0/tracks.csv with exact feature tracks
+
+  std::string cache_dir;  // of noise-free frames; empty: none
+  int threads = 0;        // 0: one per core
+};
+
+struct RecordingSummary {
+  size_t images = 0;
+  size_t rendered = 0;  // the others came from the cache
+  double path_m = 0;
+  double largest_acceleration = 0;  // m/s^2
+  size_t steps_spread = 0;
+};
+
+// Called with (frames done, frames in all), from one thread at a time.
+using Progress = std::function<void(size_t, size_t)>;
+
+// Throws std::runtime_error with one line for the user.
+RecordingSummary RenderRecording(const RecordingOptions& options, const Progress& progress = {});
+
+}  // namespace pangea::sim
