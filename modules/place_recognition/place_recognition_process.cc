@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "common/channels.h"
@@ -61,24 +62,18 @@ void PlaceRecognitionProcess::OnKeyframe(const keyframe_t& message) {
     return;
   }
   const KeyframeId id = parsed.value->id;
-  const int32_t from = parsed.value->edge ? parsed.value->edge->from_seq : id.seq - 1;
-  // An edge that begins further back says that what lies between is lost for good.
-  const int32_t first_lost = std::max(from + 1, keyframes_.next(id.map));
-  const bool credible = id.seq - first_lost <= static_cast<int32_t>(InOrder<Item>::kMaxParked);
-  for (int32_t seq = first_lost; credible && seq < id.seq; ++seq) {
-    Enqueue(id.map, seq, std::nullopt);
+  const std::optional<OdometryEdge>& edge = parsed.value->edge;
+  if (edge && edge->from_seq < id.seq - 1) {
+    // What lies between was lost for good, or the edge would begin at the keyframe before.
+    HandleAll(keyframes_.Skip({id.map, edge->from_seq + 1, id.seq - 1}));
   }
-  Enqueue(id.map, id.seq, std::move(parsed.value));
+  HandleAll(keyframes_.Add(id.map, id.seq, std::move(*parsed.value)));
 }
 
-void PlaceRecognitionProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
+void PlaceRecognitionProcess::HandleAll(const std::vector<Keyframe>& ready) {
   ticks_without_keyframe_ = 0;
-  for (const Item& ready : keyframes_.Add(map, seq, std::move(item))) {
-    if (ready) {
-      Handle(*ready);
-    } else {
-      node_.NoteDropped();
-    }
+  for (const Keyframe& keyframe : ready) {
+    Handle(keyframe);
   }
   if (catching_up_ && (keyframes_.Gaps().empty() || held_.size() > kMaxHeld)) {
     ReleaseHeld();
@@ -126,6 +121,12 @@ void PlaceRecognitionProcess::OnHave(const have_t& message) {
       catching_up_ = true;
     }
     keyframes_.Announce(*map.value, message.highest_seq[i]);
+  }
+  for (const seq_gap_t& gap : message.gaps) {
+    if (const auto map = Parse(gap.map);
+        map.value && gap.to_seq < std::numeric_limits<int32_t>::max()) {
+      HandleAll(keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq}));
+    }
   }
 }
 

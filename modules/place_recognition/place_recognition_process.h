@@ -9,7 +9,6 @@
 
 #include <deque>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,9 +32,6 @@ class PlaceRecognitionProcess : public Process {
   void Tick(int64_t now_utime) override;
 
  private:
-  // Nothing: a seq that will never come (the next keyframe's odometry edge bridges it).
-  using Item = std::optional<Keyframe>;
-
   struct Asked {
     int32_t next = -1;  // what was missing first when we asked
     int64_t utime = 0;
@@ -47,7 +43,7 @@ class PlaceRecognitionProcess : public Process {
   void OnMapState(const map_state_t& message);
   void OnResendRequest(const resend_request_t& message);
 
-  void Enqueue(const MapId& map, int32_t seq, Item item);
+  void HandleAll(const std::vector<Keyframe>& ready);
   void Handle(const Keyframe& keyframe);
   void Recognise(const Keyframe& keyframe);
   void ReleaseHeld();
@@ -56,7 +52,7 @@ class PlaceRecognitionProcess : public Process {
 
   Node node_;
   PlaceRecognition recognition_;
-  InOrder<Item> keyframes_;
+  InOrder<Keyframe> keyframes_;
   std::map<MapId, Asked> asked_;
   // Catching up after a restart.
   bool catching_up_ = false;

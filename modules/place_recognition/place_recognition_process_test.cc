@@ -179,7 +179,29 @@ TEST(PlaceRecognitionProcess, AGapBridgedByTheNextEdgeIsNotWaitedFor) {
   ASSERT_EQ(server.matches.size(), 2u);
   EXPECT_EQ(server.Match(1).query.seq, 4);
   EXPECT_TRUE(server.requests.empty());
-  EXPECT_EQ(server.status.dropped, 3);
+}
+
+TEST(PlaceRecognitionProcess, AGapNamedByHaveIsNotWaitedFor) {
+  test::TestWorld world(8);
+  const auto keyframes = Round(world, kMapA, 4);
+  Server server;
+  server.Send(keyframes[0]);
+  server.Send(keyframes[3]);
+  EXPECT_EQ(server.matches.size(), 1u);
+  have_t have{};
+  have.num_maps = 1;
+  have.maps.push_back(ToMessage(kMapA));
+  have.highest_seq.push_back(3);
+  have.num_gaps = 1;
+  have.gaps.resize(1);
+  have.gaps[0].map = ToMessage(kMapA);
+  have.gaps[0].from_seq = 1;
+  have.gaps[0].to_seq = 2;
+  PublishMessage(server.bus, "HAVE", have);
+  server.bus.Drain();
+  EXPECT_EQ(server.matches.size(), 2u);
+  server.Tick();
+  EXPECT_TRUE(server.requests.empty());
 }
 
 TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesNoPair) {

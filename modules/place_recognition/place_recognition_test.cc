@@ -120,7 +120,7 @@ TEST(PlaceRecognition, WhatOdometryStillTracksIsNoLoop) {
 TEST(PlaceRecognition, OneMapDoesNotCrowdOutAnother) {
   test::TestWorld world(7);
   PlaceRecognition recognition({});
-  for (int seq = 0; seq < 189; ++seq) {  // three rounds
+  for (int seq = 0; seq < 100; ++seq) {  // a round and a half
     recognition.Add(OnTheRound(world, kMapA, seq, {}));
   }
   const MapId map_c{3, 3000};
@@ -162,7 +162,7 @@ TEST(PlaceRecognition, TheSameKeyframesGiveTheSameMatches) {
   for (auto& run : runs) {
     test::TestWorld world(9);
     PlaceRecognition recognition({});
-    for (int seq = 0; seq < 50; ++seq) {
+    for (int seq = 0; seq < 35; ++seq) {
       run.push_back(recognition.Add(OnTheRound(world, kMapA, seq, {})));
       run.push_back(recognition.Add(OnTheRound(world, kMapB, seq, kOdomB, 30)));
     }
