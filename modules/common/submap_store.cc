@@ -100,12 +100,24 @@ KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
   return window;
 }
 
+void SubmapStore::NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
+  lost_[{map, to_seq}] = from_seq;
+}
+
+std::optional<int32_t> SubmapStore::LostSince(const KeyframeId& id) const {
+  const auto it = lost_.lower_bound(id);
+  if (it != lost_.end() && it->first.map == id.map && it->second <= id.seq) {
+    return it->second;
+  }
+  return std::nullopt;
+}
+
 bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
   KeyframeId next = id;
   for (int i = 0; i < count; ++i) {
     const auto it = keyframes_.find(next);
     if (it == keyframes_.end()) {
-      return false;
+      return LostSince(next).has_value();
     }
     if (!it->second->edge) {
       return true;
@@ -119,13 +131,16 @@ bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& new
   KeyframeId next = newer;
   while (next.seq > older.seq) {
     const auto it = keyframes_.find(next);
-    if (it == keyframes_.end()) {
+    if (it != keyframes_.end()) {
+      if (!it->second->edge) {
+        return true;
+      }
+      next.seq = it->second->edge->from_seq;
+    } else if (const auto lost_since = LostSince(next)) {
+      next.seq = *lost_since - 1;
+    } else {
       return false;
     }
-    if (!it->second->edge) {
-      return true;
-    }
-    next.seq = it->second->edge->from_seq;
   }
   return true;
 }
@@ -134,15 +149,36 @@ std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
                                                const KeyframeId& newer) const {
   double path_m = 0;
   KeyframeId next = newer;
-  while (next.seq > older.seq) {
+  const Keyframe* after_gap = nullptr;
+  while (next.seq >= older.seq) {
     const auto it = keyframes_.find(next);
-    if (it == keyframes_.end() || !it->second->edge) {
+    if (it == keyframes_.end()) {
+      const auto lost_since = LostSince(next);
+      if (!lost_since) {
+        return std::nullopt;
+      }
+      next.seq = *lost_since - 1;
+      continue;
+    }
+    const Keyframe& keyframe = *it->second;
+    if (after_gap != nullptr) {
+      path_m += (after_gap->T_odom_body.t - keyframe.T_odom_body.t).norm();
+      after_gap = nullptr;
+    }
+    if (next == older) {
+      return path_m;
+    }
+    if (!keyframe.edge) {
       return std::nullopt;
     }
-    path_m += it->second->edge->T_from_this.t.norm();
-    next.seq = it->second->edge->from_seq;
+    next.seq = keyframe.edge->from_seq;
+    if (keyframes_.contains(next)) {
+      path_m += keyframe.edge->T_from_this.t.norm();
+    } else {
+      after_gap = &keyframe;
+    }
   }
-  return next == older ? std::make_optional(path_m) : std::nullopt;
+  return std::nullopt;
 }
 
 }  // namespace pangea

@@ -70,6 +70,9 @@ class SubmapStore {
   // A keyframe that is already there stays as it is.
   void Add(Keyframe keyframe);
 
+  // Nobody has these keyframes any more (the gaps in HAVE): nothing waits for them.
+  void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq);
+
   bool Contains(const KeyframeId& id) const { return keyframes_.contains(id); }
   size_t size() const { return keyframes_.size(); }
 
@@ -83,11 +86,14 @@ class SubmapStore {
   // Whether the walk from the newer keyframe back along the edges meets no missing keyframe before
   // it reaches or passes the older one, or the beginning of a piece of map.
   bool ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const;
-  // Metres travelled along the edges from the older to the newer keyframe of one map; nothing where
-  // the edges do not lead from one to the other.
+  // Metres travelled along the edges from the older to the newer keyframe of one map, straight over
+  // what was lost; nothing where they do not lead from one to the other.
   std::optional<double> PathBetween(const KeyframeId& older, const KeyframeId& newer) const;
 
  private:
+  // First seq of the lost run that this keyframe is in.
+  std::optional<int32_t> LostSince(const KeyframeId& id) const;
+
   struct Cached {
     std::shared_ptr<const KeyframeView> view;
     std::list<KeyframeId>::iterator use;
@@ -95,6 +101,7 @@ class SubmapStore {
 
   SubmapStoreOptions options_;
   std::map<KeyframeId, std::shared_ptr<const Keyframe>> keyframes_;
+  std::map<KeyframeId, int32_t> lost_;  // last of a run -> its first seq
   std::deque<KeyframeId> arrival_;
   std::map<KeyframeId, Cached> views_;
   std::list<KeyframeId> uses_;  // newest first

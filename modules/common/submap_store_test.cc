@@ -71,6 +71,24 @@ TEST(SubmapStore, ABridgedGapIsNoGap) {
   EXPECT_FALSE(store.PathBetween({kMap, 3}, {kMap, 5}));
 }
 
+TEST(SubmapStore, GoesOnAfterWhatWasLost) {
+  SubmapStore store;
+  for (const int seq : {0, 1, 4, 5}) {
+    Keyframe keyframe = MakeKeyframe(seq);
+    keyframe.T_odom_body.t = {2.0 * seq, 0, 0};
+    store.Add(keyframe);
+  }
+  EXPECT_FALSE(store.WindowIsComplete({kMap, 5}, 5));
+  EXPECT_FALSE(store.ChainIsComplete({kMap, 0}, {kMap, 5}));
+  store.NoteLost(kMap, 2, 3);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 5}, 5));
+  EXPECT_EQ(store.WindowUpTo({kMap, 5}, 5).size(), 2u);
+  EXPECT_TRUE(store.ChainIsComplete({kMap, 0}, {kMap, 5}));
+  EXPECT_NEAR(store.PathBetween({kMap, 0}, {kMap, 5}).value_or(0), 10.0, 1e-12);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 3}, 5));  // no more of it will come
+  EXPECT_TRUE(store.WindowUpTo({kMap, 3}, 5).empty());
+}
+
 TEST(SubmapStore, IsBounded) {
   SubmapStore store({.max_keyframes = 3, .max_views = 2});
   for (int seq = 0; seq < 5; ++seq) {

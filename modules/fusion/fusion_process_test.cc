@@ -175,6 +175,25 @@ TEST_F(VerdictProcesses, AfterARestartKnownVerdictsAreNotRepeated) {
   EXPECT_TRUE(constraints_.empty());
 }
 
+// What nobody has any more is not waited for: the windows end there.
+TEST_F(VerdictProcesses, WhatIsLostIsNotWaitedFor) {
+  SendKeyframes(agent_m_, 4, 12);
+  SendKeyframes(agent_c_, 3, 12);
+  SendMatch(PlaceKind::kInter);
+  EXPECT_TRUE(constraints_.empty());
+  have_t have{};
+  for (const auto& [agent, lost] : {std::pair(&agent_m_, 3), std::pair(&agent_c_, 2)}) {
+    have.gaps.emplace_back();
+    have.gaps.back().map = ToMessage(agent->keyframes[0].id.map);
+    have.gaps.back().to_seq = lost;
+  }
+  have.num_gaps = 2;
+  PublishMessage(bus_, std::string(channels::kHave), have);
+  bus_.Drain();
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
+}
+
 TEST_F(VerdictProcesses, ACornerThatDoesNotExistIsRefused) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);

@@ -25,11 +25,11 @@ double Normal(Random& random, double sigma) {
 
 Descriptor RandomDescriptor(Random& random) { return {random(), random(), random(), random()}; }
 
-Descriptor WithFlips(const Descriptor& descriptor, double probability, Random& random) {
+// Each bit flips with probability 1/16.
+Descriptor WithFlips(const Descriptor& descriptor, Random& random) {
   Descriptor flipped = descriptor;
-  std::bernoulli_distribution flip(probability);
-  for (int bit = 0; bit < 256; ++bit) {
-    flipped[bit / 64] ^= static_cast<uint64_t>(flip(random)) << (bit % 64);
+  for (uint64_t& word : flipped) {
+    word ^= random() & random() & random() & random();
   }
   return flipped;
 }
@@ -160,7 +160,7 @@ class AgentWalk {
       corner.pixel = (*pixel + Eigen::Vector2d(Normal(random_, options_.pixel_sigma),
                                                Normal(random_, options_.pixel_sigma)))
                          .cast<float>();
-      corner.descriptor = WithFlips(room_[i].descriptor, options_.flip_probability, random_);
+      corner.descriptor = WithFlips(room_[i].descriptor, random_);
       if (tracked_[i]) {
         corner.landmark_id = static_cast<int32_t>(i);
         if (keyframe->points.size() < kMaxPoints) {

@@ -42,7 +42,6 @@ struct TestAgentOptions {
   double edge_sigma_rad = 0.0004;  // yaw; roll and pitch a quarter of it
   double odom_tilt = 0;            // radians: an odometry whose gravity is wrong
   double detect_probability = 0.75;
-  double flip_probability = 0.07;  // of each descriptor bit
 };
 
 struct TestAgent {

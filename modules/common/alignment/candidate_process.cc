@@ -96,6 +96,19 @@ void CandidateProcess::OnHave(const have_t& message) {
     keyframes_.Announce(*map.value, message.highest_seq[i]);
     matches_.Announce(*map.value, message.highest_seq[i]);
   }
+  for (const seq_gap_t& gap : message.gaps) {
+    const Parsed<MapId> map = Parse(gap.map);
+    if (!map.value || gap.from_seq < 0 || gap.to_seq < gap.from_seq) {
+      node_.Refuse("have: invalid gap");
+      continue;
+    }
+    judge_->NoteLost(*map.value, gap.from_seq, gap.to_seq);
+    keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq});
+    matches_.Skip({*map.value, gap.from_seq, gap.to_seq});
+  }
+  if (message.num_gaps > 0) {
+    JudgeReady();
+  }
 }
 
 void CandidateProcess::OnAgain(const again_t& message) {

@@ -43,6 +43,7 @@ class CandidateProcess : public Process {
    public:
     void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
     void Announce(const MapId& map, int32_t highest_seq) { stream_.Announce(map, highest_seq); }
+    void Skip(const SeqGap& gap) { stream_.Skip(gap); }
     // The gaps that have stayed for a second, each at most every two.
     std::vector<SeqGap> Due(int64_t now_utime);
 

@@ -197,7 +197,9 @@ class JointProblem {
     return windows_[HolderSide(match)]->landmarks[match.landmark];
   }
 
-  double* Pose(int side, int frame) { return &blocks_[pose_offset_[side] + 7 * frame]; }
+  double* Pose(int side, int frame) {
+    return &blocks_[pose_offset_[side] + 7 * static_cast<size_t>(frame)];
+  }
   double* Newest(int side) { return Pose(side, windows_[side]->newest()); }
   double* Scale(int side) { return &blocks_[scale_offset_[side]]; }
   double* Point(const PointKey& key) {

@@ -23,6 +23,9 @@ bool PairJudge::Ready(const KeyframeId& query, const PlaceCandidate& candidate) 
 Constraint PairJudge::Judge(const KeyframeId& query, const PlaceCandidate& candidate) {
   const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
   const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
+  if (frames_c.empty() || frames_m.empty()) {
+    return RefusedConstraint(query, candidate, "a keyframe was lost");
+  }
   for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
     if (corner_c >= static_cast<int>(frames_c.back()->keyframe().corners.size()) ||
         corner_m >= static_cast<int>(frames_m.back()->keyframe().corners.size())) {

@@ -18,6 +18,10 @@ class PairJudge {
 
   // In any order; a repeat changes nothing.
   void Add(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
+  // Nobody has these any more: nothing waits for them.
+  void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
+    store_.NoteLost(map, from_seq, to_seq);
+  }
   // Whether every keyframe the verdict depends on is there.
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
   // Only when ready. Keyframes of one map pass the drift gate too; two maps' odom frames lie
