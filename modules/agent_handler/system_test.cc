@@ -31,6 +31,7 @@ class Program {
     pid_ = fork();
     if (pid_ == 0) {
       std::vector<char*> argv;
+      argv.reserve(args.size() + 1);
       for (std::string& arg : args) {
         argv.push_back(arg.data());
       }

@@ -169,7 +169,7 @@ TEST_F(UplinkTest, TheHighestCorrectionWinsAndIsConfirmed) {
 TEST_F(UplinkTest, PosesGoUpAtTenHertz) {
   int poses = 0;
   for (int i = 1; i <= 300; ++i) {
-    const int64_t now = i * 10'000;
+    const int64_t now = int64_t{10'000} * i;
     uplink.AddPose(kMap, 0, {1, 2, 3});
     uplink.OnAck(Ack(1, i, -1), now);
     for (const LinkPacket& packet : uplink.Poll(now)) {

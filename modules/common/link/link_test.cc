@@ -164,6 +164,7 @@ class World {
 
 std::vector<KeyframeId> InOrderIds(const MapId& map, int count) {
   std::vector<KeyframeId> ids;
+  ids.reserve(static_cast<size_t>(count));
   for (int seq = 0; seq < count; ++seq) {
     ids.push_back({map, seq});
   }
@@ -206,7 +207,7 @@ TEST(Link, CleanChannelSendsNothingTwice) {
   world.RunUntilDelivered(60);
   EXPECT_EQ(world.sender.resent(), 0);
   EXPECT_EQ(world.refusals, 0);
-  EXPECT_LE(world.packets_sent * 1200, spooled + 60 * 1200);
+  EXPECT_LE(world.packets_sent * 1200, spooled + int64_t{60} * 1200);
 }
 
 // At 10 % loss (of acknowledgements too) the traffic stays below 1.3 times the keyframes.
