@@ -30,6 +30,12 @@ void Tracker::Reset() {
   next_id_ = 0;
 }
 
+void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
+  std::erase_if(features_, [&](const Feature& feature) {
+    return std::find(landmark_ids.begin(), landmark_ids.end(), feature.id) != landmark_ids.end();
+  });
+}
+
 const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
                                    const Eigen::Quaterniond& q_cam_lastcam) {
   statistics_ = {};

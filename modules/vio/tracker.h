@@ -45,6 +45,8 @@ class Tracker {
   // `q_cam_lastcam` takes directions from the last image's camera frame to this one's.
   const TrackedFrame& Track(int64_t utime, const cv::Mat& image,
                             const Eigen::Quaterniond& q_cam_lastcam);
+  // Ends these tracks: the estimator has found them inconsistent.
+  void Drop(const std::vector<int32_t>& landmark_ids);
   // Forgets all tracks; ids start again at 0 (a new map).
   void Reset();
 

@@ -1,0 +1,142 @@
+#include "vio/command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <string>
+
+#include "common/bus/process.h"
+#include "common/euroc.h"
+#include "vio/live_input.h"
+#include "vio/playback.h"
+#include "vio/vio_process.h"
+#include "vio/vio_yaml.h"
+
+namespace pangea::vio {
+namespace {
+
+struct Arguments {
+  std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string recording;
+  bool live = false;
+  std::string rate = "1";
+  std::string options_file;
+  bool print_options = false;
+  PlaybackOptions playback;
+  VioProcessOptions process;
+};
+
+// `--bus none`: says everything into the void.
+class NoBus : public Bus {
+ public:
+  void Publish(const std::string&, Bytes) override {}
+  void Subscribe(const std::string&, Handler) override {}
+};
+
+void AddOptions(CLI::App& app, Arguments& a) {
+  app.add_option("--agent", a.process.agent_id, "agent id")->check(CLI::Range(1, 65535));
+  app.add_option("--bus", a.bus, "LCM URL of the agent's bus, or none")->capture_default_str();
+  app.add_option("--recording", a.recording, "folder in EuRoC's format: plays it");
+  app.add_flag("--live", a.live, "images and samples from IMU_k, IMAGE_k, CAMERA_k");
+  app.add_option("--start", a.playback.start_s, "seconds of the recording to skip")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--duration", a.playback.duration_s, "seconds of the recording to play")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--delay", a.playback.delay_s, "seconds to wait before the first image")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--rate", a.rate, "1, 2, ... times real time, or max")->capture_default_str();
+  app.add_option("--tracks", a.playback.tracks_csv,
+                 "exact tracks (stamp_ns, landmark_id, u, v) instead of the tracker's");
+  app.add_option("--options", a.options_file, "YAML file with options");
+  app.add_flag("--print-options", a.print_options, "print the options in force and exit");
+  app.add_option("--map-utime", a.process.map_utime,
+                 "opened_utime of the first map, instead of the wall clock");
+  app.add_option("--out-tum", a.process.out_tum, "write the raw odometry, TUM");
+  app.add_option("--out-keyframes", a.process.out_keyframes, "write the keyframes as an LCM log");
+}
+
+double ParseRate(const std::string& rate) {
+  if (rate == "max") {
+    return 0;
+  }
+  double value = 0;
+  if (!CLI::detail::lexical_cast(rate, value) || !(value > 0)) {
+    throw std::runtime_error(fmt::format("--rate {}: a number above 0, or max", rate));
+  }
+  return value;
+}
+
+void Run(const Arguments& a, const VioFileOptions& file_options) {
+  std::optional<EurocRecording> recording;
+  if (!a.live) {
+    recording.emplace(a.recording);
+    for (const std::string& warning : recording->warnings()) {
+      std::cerr << fmt::format("pangea-vio: {}\n", warning);
+    }
+  }
+  NoBus no_bus;
+  std::optional<LcmBus> lcm_bus;
+  if (a.bus != "none") {
+    lcm_bus.emplace(a.bus);
+  }
+  Bus& bus = lcm_bus ? static_cast<Bus&>(*lcm_bus) : no_bus;
+  InstallSignalHandlers();
+  VioProcess process(bus, a.process, WallUtime());
+  if (recording) {
+    process.Open(recording->camera(), recording->imu_noise());
+    Playback(lcm_bus ? &*lcm_bus : nullptr, process, *recording, a.playback).Run();
+    return;
+  }
+  LiveInput live(process, a.process.agent_id, file_options.live_imu);
+  RunProcess(*lcm_bus, process);
+  process.Flush();
+  process.PublishFinished(WallUtime());
+}
+
+void Check(const Arguments& a) {
+  if (a.process.agent_id == 0) {
+    throw std::runtime_error("--agent ID is missing: 1 to 65535, unique in the session");
+  }
+  if (a.live == !a.recording.empty()) {
+    throw std::runtime_error("either --recording DIR or --live is needed");
+  }
+  if (a.live && a.bus == "none") {
+    throw std::runtime_error("--live needs a bus");
+  }
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app("Visual-inertial odometry of one agent", "pangea-vio");
+  Arguments arguments;
+  AddOptions(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    VioFileOptions file_options;
+    YamlOptions yaml;
+    Bind(yaml, file_options);
+    if (!arguments.options_file.empty()) {
+      yaml.ReadFile(arguments.options_file);
+    }
+    if (arguments.print_options) {
+      std::cout << yaml.Print();
+      return 0;
+    }
+    Check(arguments);
+    arguments.playback.rate = ParseRate(arguments.rate);
+    arguments.process.vio = file_options.vio;
+    // The agent shares its machine with the other processes, and one thread gives the same bytes.
+    cv::setNumThreads(1);
+    Run(arguments, file_options);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-vio: {}\n", error.what());
+    return 1;
+  }
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,185 @@
+#include "vio/playback.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "common/csv.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr int64_t kTickInterval_us = 100'000;
+constexpr int64_t kImuBeforeStart_us = 500'000;
+constexpr int64_t kLastWait_us = 20'000'000;
+constexpr int64_t kLastWaitAlone_us = 1'000'000;
+
+int64_t ToUs(double seconds) { return static_cast<int64_t>(1e6 * seconds); }
+
+}  // namespace
+
+std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraModel& camera) {
+  std::ifstream file(csv);
+  std::map<int64_t, TrackedFrame> frames;
+  std::string line;
+  while (std::getline(file, line)) {
+    std::array<std::string, 4> field;
+    std::istringstream fields(line);
+    for (std::string& one : field) {
+      std::getline(fields, one, ',');
+    }
+    int64_t stamp_ns = 0, landmark_id = 0;
+    double u = 0, v = 0;
+    if (!ParseNumber(field[0], &stamp_ns) || !ParseNumber(field[1], &landmark_id) ||
+        !ParseNumber(field[2], &u) || !ParseNumber(field[3], &v)) {
+      continue;  // the header
+    }
+    const auto ray = camera.Unproject({u, v});
+    if (ray) {
+      TrackedFrame& frame = frames[UtimeFromNs(stamp_ns)];
+      frame.utime = UtimeFromNs(stamp_ns);
+      Observation observation;
+      observation.landmark_id = static_cast<int32_t>(landmark_id);
+      observation.pixel = Eigen::Vector2d(u, v).cast<float>();
+      observation.ray = *ray;
+      frame.observations.push_back(observation);
+    }
+  }
+  if (frames.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no rows of 'stamp_ns, landmark_id, u, v' in it", csv));
+  }
+  return frames;
+}
+
+Playback::Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
+                   const PlaybackOptions& options)
+    : bus_(bus), process_(process), recording_(recording), options_(options) {
+  if (!options_.tracks_csv.empty()) {
+    tracks_ = ReadTracks(options_.tracks_csv, recording.camera());
+  }
+}
+
+void Playback::Run() {
+  const std::vector<EurocImage>& images = recording_.images();
+  const int64_t first = images.front().utime + ToUs(options_.start_s);
+  const int64_t last =
+      options_.duration_s ? first + ToUs(*options_.duration_s) : images.back().utime;
+  size_t index = 0;
+  while (index < images.size() && images[index].utime < first) {
+    ++index;
+  }
+  if (index == images.size() || images[index].utime > last) {
+    throw std::runtime_error(fmt::format(
+        "{}: no image between {} s and the end asked for; it is {:.1f} s long", recording_.mav0(),
+        options_.start_s, 1e-6 * static_cast<double>(images.back().utime - images.front().utime)));
+  }
+  while (next_imu_ < recording_.imu().size() &&
+         recording_.imu()[next_imu_].utime < images[index].utime - kImuBeforeStart_us) {
+    ++next_imu_;
+  }
+  WaitUntil(WallUtime() + ToUs(options_.delay_s));
+  const int64_t begin_wall = WallUtime();
+  const int64_t begin = images[index].utime;
+  for (; index < images.size() && images[index].utime <= last && !StopRequested(); ++index) {
+    const int64_t played = images[index].utime - begin;
+    if (options_.rate > 0) {
+      WaitUntil(begin_wall + static_cast<int64_t>(static_cast<double>(played) / options_.rate));
+    } else {
+      WaitForAcknowledgements();
+    }
+    PlayImage(index);
+    const int64_t spent = std::max<int64_t>(1, WallUtime() - begin_wall);
+    process_.node().Set("realtime_factor_permille", 1000 * played / spent);
+    Serve(0);
+  }
+  process_.Flush();
+  WaitAtTheEnd();
+  process_.PublishFinished(WallUtime());
+}
+
+// What the odometry has not seen yet, up to and including the first sample at or after `utime`.
+std::span<const ImuSample> Playback::ImuUntil(int64_t utime) {
+  const std::vector<ImuSample>& imu = recording_.imu();
+  const size_t begin = next_imu_;
+  while (next_imu_ < imu.size() && (next_imu_ == begin || imu[next_imu_ - 1].utime < utime)) {
+    ++next_imu_;
+  }
+  // The sample at or after the last image may serve this one as well.
+  if (begin > 0 && begin < imu.size() && imu[begin - 1].utime >= utime) {
+    next_imu_ = begin;
+  }
+  return {imu.data() + begin, next_imu_ - begin};
+}
+
+void Playback::PlayImage(size_t index) {
+  const EurocImage& entry = recording_.images()[index];
+  std::string why;
+  const cv::Mat image = recording_.LoadImage(index, &why);
+  if (image.empty()) {
+    process_.node().Count("images_unreadable");
+    std::cerr << fmt::format("pangea-vio: {}\n", why);
+    return;
+  }
+  const std::span<const ImuSample> imu = ImuUntil(process_.ImuTimeOf(entry.utime));
+  if (options_.tracks_csv.empty()) {
+    process_.AddImage(entry.utime, image, imu);
+    return;
+  }
+  const auto tracks = tracks_.find(entry.utime);
+  process_.AddTracks(tracks == tracks_.end() ? TrackedFrame{entry.utime, {}} : tracks->second,
+                     image, imu);
+}
+
+// Handles what has arrived, waiting for the first message at most `timeout_ms`.
+void Playback::Serve(int timeout_ms) {
+  if (bus_ != nullptr) {
+    while (bus_->Handle(timeout_ms)) {
+      timeout_ms = 0;
+    }
+  } else if (timeout_ms > 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(timeout_ms));
+  }
+  const int64_t now = WallUtime();
+  if (now >= next_tick_utime_) {
+    process_.Tick(now);
+    next_tick_utime_ = now + kTickInterval_us;
+  }
+}
+
+void Playback::WaitUntil(int64_t wall_utime) {
+  for (int64_t now = WallUtime(); now < wall_utime && !StopRequested(); now = WallUtime()) {
+    Serve(static_cast<int>(std::clamp<int64_t>((wall_utime - now) / 1000, 1, 50)));
+  }
+}
+
+void Playback::WaitForAcknowledgements() {
+  int64_t unacknowledged = process_.Unacknowledged();
+  int64_t progress_utime = WallUtime();
+  while (bus_ != nullptr && !StopRequested() && process_.Unacknowledged() > kMaxAhead &&
+         WallUtime() - process_.uplink_heard_utime() < kUplinkSilence_us &&
+         WallUtime() - progress_utime < kNoProgress_us) {
+    Serve(50);
+    if (process_.Unacknowledged() < unacknowledged) {
+      unacknowledged = process_.Unacknowledged();
+      progress_utime = WallUtime();
+    }
+  }
+}
+
+void Playback::WaitAtTheEnd() {
+  const int64_t begin = WallUtime();
+  while (bus_ != nullptr && process_.Unacknowledged() > 0 && !StopRequested() &&
+         WallUtime() - begin < (process_.uplink_ever_heard() ? kLastWait_us : kLastWaitAlone_us)) {
+    Serve(50);
+  }
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,68 @@
+#pragma once
+
+// Plays a recording into the odometry, paced by the recording's own stamps. No image of a recording
+// is ever dropped: an odometry that cannot keep up falls behind, and its status says how far
+// (realtime_factor_permille).
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/bus.h"
+#include "common/euroc.h"
+#include "vio/tracks.h"
+#include "vio/vio_process.h"
+
+namespace pangea::vio {
+
+struct PlaybackOptions {
+  double start_s = 0;                // after the recording's first image
+  std::optional<double> duration_s;  // to the end without it
+  double delay_s = 0;                // wall clock, before the first image
+  // Recording seconds per second; 0 = as fast as possible, but never with more than kMaxAhead
+  // keyframes unacknowledged while there is an uplink to acknowledge them.
+  double rate = 1;
+  std::string tracks_csv;  // exact tracks instead of the tracker's; empty for none
+};
+
+// One csv row a feature: stamp_ns, landmark_id, u, v. By the image's stamp.
+// Throws std::runtime_error naming the file when nothing can be read from it.
+std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraModel& camera);
+
+class Playback {
+ public:
+  static constexpr int64_t kMaxAhead = 30;
+  static constexpr int64_t kUplinkSilence_us = 5'000'000;
+  // An uplink that is there but makes no progress for this long has no server behind it, and an
+  // agent does not wait for a server.
+  static constexpr int64_t kNoProgress_us = 20'000'000;
+
+  // `bus` may be null: nothing to listen to.
+  Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
+           const PlaybackOptions& options);
+
+  // To the end of the recording or to a signal, then until every keyframe is acknowledged or nobody
+  // will.
+  void Run();
+
+ private:
+  void PlayImage(size_t index);
+  std::span<const ImuSample> ImuUntil(int64_t utime);
+  void WaitUntil(int64_t wall_utime);
+  void WaitForAcknowledgements();
+  void WaitAtTheEnd();
+  void Serve(int timeout_ms);
+
+  LcmBus* bus_;
+  VioProcess& process_;
+  const EurocRecording& recording_;
+  PlaybackOptions options_;
+  std::map<int64_t, TrackedFrame> tracks_;
+  size_t next_imu_ = 0;
+  int64_t next_tick_utime_ = 0;
+};
+
+}  // namespace pangea::vio

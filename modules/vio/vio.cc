@@ -1,0 +1,157 @@
+#include "vio/vio.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/rigid3.h"
+
+namespace pangea::vio {
+
+Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
+         const VioOptions& options, OpenMap open_map)
+    : agent_id_(agent_id),
+      camera_(camera),
+      noise_(noise),
+      options_(options),
+      open_map_(std::move(open_map)),
+      tracker_(camera, options.tracker),
+      describer_(camera, options.describer) {
+  OpenNewMap();
+}
+
+void Vio::OpenNewMap() {
+  // A map nobody has seen a keyframe of keeps its name.
+  if (maps_opened_ == 0 || next_seq_ > 0) {
+    map_ = {agent_id_, open_map_()};
+    ++maps_opened_;
+  }
+  next_seq_ = 0;
+  group_revision_ = 0;
+  described_.clear();
+  tracker_.Reset();
+  estimator_.emplace(options_.estimator, camera_, noise_);
+}
+
+int64_t Vio::ImuTimeOf(int64_t image_utime) const {
+  return image_utime + std::llround(1e6 * camera_.time_offset_s);
+}
+
+// The gyroscope's rotation between the last image and this one, as a turn of the camera.
+Eigen::Quaterniond Vio::CameraTurn(int64_t utime) {
+  Eigen::Quaterniond q_last_now = Eigen::Quaterniond::Identity();
+  const int64_t end = ImuTimeOf(utime);
+  if (last_utime_) {
+    int64_t at = ImuTimeOf(*last_utime_);
+    for (const ImuSample& sample : turn_imu_) {
+      const int64_t until = std::min(sample.utime, end);
+      if (until > at) {
+        const double dt = 1e-6 * static_cast<double>(until - at);
+        q_last_now = q_last_now * ExpSo3((sample.gyro - gyro_bias_) * dt);
+        at = until;
+      }
+    }
+  }
+  std::erase_if(turn_imu_, [end](const ImuSample& sample) { return sample.utime <= end; });
+  last_utime_ = utime;
+  const Eigen::Quaterniond& q_body_cam = camera_.T_body_cam.q;
+  return (q_body_cam.conjugate() * q_last_now.conjugate() * q_body_cam).normalized();
+}
+
+VioOutput Vio::AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu) {
+  turn_imu_.insert(turn_imu_.end(), imu.begin(), imu.end());
+  return Estimate(tracker_.Track(utime, image, CameraTurn(utime)), image, imu);
+}
+
+VioOutput Vio::AddTracks(const TrackedFrame& frame, const cv::Mat& image,
+                         std::span<const ImuSample> imu) {
+  return Estimate(frame, image, imu);
+}
+
+VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
+                        std::span<const ImuSample> imu) {
+  FrameResult result = estimator_->AddFrame(frame, imu);
+  VioOutput output;
+  output.utime = frame.utime;
+  output.state = result.state;
+  output.reason = result.reason;
+  output.map = map_;
+  output.T_odom_body = result.T_odom_body;
+  output.v_odom_body = result.v_odom_body;
+  output.num_tracked = static_cast<int>(frame.observations.size());
+  output.keyframes = Complete(result.finished);
+  if (result.state == EstimatorState::kLost) {
+    OpenNewMap();
+    return output;
+  }
+  if (result.is_keyframe) {
+    described_[frame.utime] = describer_.Describe(image, frame);
+  }
+  if (result.state == EstimatorState::kTracking) {
+    gyro_bias_ = result.gyro_bias;
+  }
+  tracker_.Drop(result.outlier_landmarks);
+  return output;
+}
+
+std::vector<Keyframe> Vio::Flush() { return Complete(estimator_->Flush()); }
+
+std::vector<Keyframe> Vio::Complete(const std::vector<FinishedKeyframe>& finished) {
+  std::vector<Keyframe> keyframes;
+  for (const FinishedKeyframe& one : finished) {
+    keyframes.push_back(Complete(one));
+  }
+  return keyframes;
+}
+
+Keyframe Vio::Complete(const FinishedKeyframe& finished) {
+  Keyframe keyframe;
+  keyframe.id = {map_, next_seq_++};
+  keyframe.utime = finished.utime;
+  keyframe.camera = estimator_->camera();
+  keyframe.T_odom_body = finished.T_odom_body;
+  keyframe.v_odom_body = finished.v_odom_body;
+  keyframe.gyro_bias = finished.gyro_bias;
+  keyframe.accel_bias = finished.accel_bias;
+  keyframe.roll_pitch_covariance = finished.roll_pitch_covariance;
+  if (finished.edge) {
+    keyframe.edge = OdometryEdge{keyframe.id.seq - 1, finished.edge->T_previous_this,
+                                 finished.edge->covariance};
+  }
+  keyframe.preintegration = finished.preintegration;
+  if (auto node = described_.extract(finished.utime)) {
+    keyframe.corners = std::move(node.mapped());
+  }
+  keyframe.points = Points(finished, keyframe.corners);
+  keyframe.group_revision = group_revision_;
+  return keyframe;
+}
+
+std::vector<MapPoint> Vio::Points(const FinishedKeyframe& finished,
+                                  const std::vector<Corner>& corners) const {
+  std::map<int32_t, int> corner_of;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    if (corners[i].landmark_id != kNoLandmark) {
+      corner_of[corners[i].landmark_id] = static_cast<int>(i);
+    }
+  }
+  std::vector<MapPoint> points;
+  for (const LandmarkDepth& landmark : finished.landmarks) {
+    const auto corner = corner_of.find(landmark.landmark_id);
+    const auto depth = static_cast<float>(landmark.inverse_depth);
+    const auto variance = static_cast<float>(landmark.inverse_depth_var);
+    if (corner != corner_of.end() && depth > 0 && variance > 0 && std::isfinite(depth) &&
+        std::isfinite(variance)) {
+      points.push_back({corner->second, depth, variance});
+    }
+  }
+  // By relative uncertainty: a point at 10 m known to 10 cm is as good as one at 1 m known to 1 cm.
+  std::stable_sort(points.begin(), points.end(), [](const MapPoint& a, const MapPoint& b) {
+    return a.inverse_depth_var * b.inverse_depth * b.inverse_depth <
+           b.inverse_depth_var * a.inverse_depth * a.inverse_depth;
+  });
+  points.resize(std::min(points.size(), static_cast<size_t>(options_.max_points)));
+  return points;
+}
+
+}  // namespace pangea::vio

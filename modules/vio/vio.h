@@ -1,0 +1,96 @@
+#pragma once
+
+// Visual-inertial odometry of one agent (the paper, section III-A): images and inertial samples in,
+// the pose at every image and finished keyframes out.
+//
+// Tracker -> Estimator -> (at a keyframe) Describer. A keyframe comes out once, complete and final,
+// when the estimator's window lets it go. An estimator that is lost ends the map: its window is
+// dropped as suspect and a new map, with ids from 0, begins with the next image.
+// No thread, clock or file: the same input gives the same output.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "vio/describer.h"
+#include "vio/estimator.h"
+#include "vio/tracker.h"
+
+namespace pangea::vio {
+
+struct VioOptions {
+  TrackerOptions tracker;
+  DescriberOptions describer;
+  EstimatorOptions estimator;
+  int max_points = 150;  // map points of a keyframe, the best known ones
+};
+
+struct VioOutput {
+  int64_t utime = 0;  // of the image
+  EstimatorState state = EstimatorState::kInitialising;
+  std::string reason;  // why it is not tracking
+  MapId map;
+  Rigid3 T_odom_body;  // valid while tracking
+  Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  int num_tracked = 0;
+  std::vector<Keyframe> keyframes;  // finished by this image
+};
+
+class Vio {
+ public:
+  // `open_map` gives the opened_utime of each new map: the wall clock, or what a test fixes.
+  using OpenMap = std::function<int64_t()>;
+  Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise, const VioOptions& options,
+      OpenMap open_map);
+
+  // Images in time order. `imu`: all samples after those of the previous call, up to and including
+  // the first one at or after ImuTimeOf(utime).
+  VioOutput AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
+  // The same with given tracks instead of the tracker's.
+  VioOutput AddTracks(const TrackedFrame& frame, const cv::Mat& image,
+                      std::span<const ImuSample> imu);
+  // The keyframes still in the window, at the end.
+  std::vector<Keyframe> Flush();
+
+  // The IMU's time of an image.
+  int64_t ImuTimeOf(int64_t image_utime) const;
+  const MapId& map() const { return map_; }
+  int maps_opened() const { return maps_opened_; }
+  // Goes into the keyframes: the newest correction applied to this map.
+  void set_group_revision(int64_t revision) { group_revision_ = revision; }
+
+ private:
+  void OpenNewMap();
+  Eigen::Quaterniond CameraTurn(int64_t utime);
+  VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
+                     std::span<const ImuSample> imu);
+  std::vector<Keyframe> Complete(const std::vector<FinishedKeyframe>& finished);
+  Keyframe Complete(const FinishedKeyframe& finished);
+  std::vector<MapPoint> Points(const FinishedKeyframe& finished,
+                               const std::vector<Corner>& corners) const;
+
+  int32_t agent_id_;
+  CameraModel camera_;
+  ImuNoise noise_;
+  VioOptions options_;
+  OpenMap open_map_;
+  Tracker tracker_;
+  Describer describer_;
+  std::optional<Estimator> estimator_;
+  MapId map_;
+  int maps_opened_ = 0;
+  int32_t next_seq_ = 0;
+  int64_t group_revision_ = 0;
+  Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
+  std::vector<ImuSample> turn_imu_;  // samples the next turn of the camera needs
+  std::optional<int64_t> last_utime_;
+  std::map<int64_t, std::vector<Corner>> described_;  // keyframes in the window, by utime
+};
+
+}  // namespace pangea::vio
