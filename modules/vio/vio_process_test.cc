@@ -1,0 +1,352 @@
+#include "vio/vio_process.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <lcm/lcm-cpp.hpp>
+#include <random>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/again_t.hpp"
+#include "pangea/image_t.hpp"
+#include "pangea/imu_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "vio/live_input.h"
+#include "vio/test_images.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr int64_t kMapUtime = 1'000;
+constexpr int64_t kImuStep_us = 5'000;
+constexpr int64_t kImageStep_us = 50'000;
+
+// A hand-held loop of a few metres in a cloud of points, with exact tracks and exact samples.
+class World {
+ public:
+  explicit World(uint64_t seed) : camera_(PlainCamera()) {
+    camera_.T_body_cam.q = Eigen::Quaterniond(
+        (Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished());  // looks along body x
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (int i = 0; i < 1500; ++i) {
+      points_.emplace_back(7 + 3 * uniform(random), 8 * uniform(random), 5 * uniform(random));
+    }
+  }
+  const CameraModel& camera() const { return camera_; }
+
+  static Rigid3 Pose(double t) {
+    return {ExpSo3({0.1 * std::sin(1.1 * t), 0.12 * std::sin(0.9 * t), 0.3 * std::sin(0.7 * t)}),
+            {0.6 * std::sin(1.0 * t), 1.2 * std::sin(0.8 * t), 0.5 * std::sin(1.4 * t)}};
+  }
+  static ImuSample Sample(int64_t utime) {
+    const double t = 1e-6 * static_cast<double>(utime), h = 1e-4;
+    const Rigid3 before = Pose(t - h), now = Pose(t), after = Pose(t + h);
+    ImuSample sample;
+    sample.utime = utime;
+    sample.gyro = LogSo3(before.q.conjugate() * after.q) / (2 * h);
+    const Eigen::Vector3d accel = (after.t - 2 * now.t + before.t) / (h * h);
+    sample.accel = now.q.conjugate() * (accel + Eigen::Vector3d(0, 0, kGravity));
+    return sample;
+  }
+  TrackedFrame Frame(int64_t utime) const {
+    TrackedFrame frame;
+    frame.utime = utime;
+    const Rigid3 T_cam_world =
+        (Pose(1e-6 * static_cast<double>(utime)) * camera_.T_body_cam).Inverse();
+    for (size_t i = 0; i < points_.size() && frame.observations.size() < 130; ++i) {
+      const auto pixel = camera_.Project(T_cam_world * points_[i]);
+      if (pixel && camera_.Contains(*pixel, 8)) {
+        Observation observation;
+        observation.landmark_id = static_cast<int32_t>(i);
+        observation.pixel = pixel->cast<float>();
+        observation.ray = *camera_.Unproject(*pixel);
+        frame.observations.push_back(observation);
+      }
+    }
+    return frame;
+  }
+
+ private:
+  CameraModel camera_;
+  std::vector<Eigen::Vector3d> points_;
+};
+
+class VioProcessTest : public ::testing::Test {
+ protected:
+  VioProcessTest() : world_(1) {
+    options_.agent_id = 7;
+    options_.map_utime = kMapUtime;
+    bus_.Subscribe("KEYFRAME_7", [this](const std::string&, Bytes data) {
+      keyframe_t message{};
+      ASSERT_TRUE(DecodeMessage(data, &message));
+      const auto keyframe = Parse(message);
+      ASSERT_TRUE(keyframe.value) << keyframe.refused;
+      keyframes_.push_back(*keyframe.value);
+      bytes_ += data.size();
+    });
+    bus_.Subscribe("POSE_7", [this](const std::string&, Bytes data) {
+      poses_.emplace_back();
+      ASSERT_TRUE(DecodeMessage(data, &poses_.back()));
+    });
+    bus_.Subscribe("STATUS_vio_7", [this](const std::string&, Bytes data) {
+      ASSERT_TRUE(DecodeMessage(data, &status_));
+    });
+    bus_.Subscribe("AGAIN_uplink_7", [this](const std::string&, Bytes data) {
+      again_.emplace_back();
+      ASSERT_TRUE(DecodeMessage(data, &again_.back()));
+    });
+  }
+
+  void Play(VioProcess& process, double from_s, double to_s) {
+    const cv::Mat image = RandomTexture(752, 480, 11);
+    for (int64_t utime = static_cast<int64_t>(1e6 * from_s);
+         utime < static_cast<int64_t>(1e6 * to_s); utime += kImageStep_us) {
+      std::vector<ImuSample> imu;
+      for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+        imu.push_back(World::Sample(next_imu_));
+      }
+      process.AddTracks(world_.Frame(utime), image, imu);
+    }
+    bus_.Drain();
+  }
+  int64_t Counter(const std::string& name) const {
+    for (const counter_t& counter : status_.counters) {
+      if (counter.name == name) {
+        return counter.count;
+      }
+    }
+    return -1;
+  }
+
+  World world_;
+  LocalBus bus_;
+  VioProcessOptions options_;
+  int64_t next_imu_ = 0;
+  std::vector<Keyframe> keyframes_;
+  std::vector<pose_t> poses_;
+  std::vector<again_t> again_;
+  status_t status_{};
+  size_t bytes_ = 0;
+};
+
+TEST_F(VioProcessTest, PublishesPosesAndCompleteKeyframes) {
+  options_.out_tum = ::testing::TempDir() + "vio_process.tum";
+  options_.out_keyframes = ::testing::TempDir() + "vio_process.lcm";
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 10);
+  process.Flush();
+  process.PublishFinished(0);
+  bus_.Drain();
+  EXPECT_EQ(poses_.size(), 200u);
+  EXPECT_EQ(poses_.back().state, pose_t::STATE_TRACKING);
+  EXPECT_EQ(Counter("frames"), 200);
+  EXPECT_EQ(Counter("maps"), 1);
+  EXPECT_EQ(Counter("finished"), 1);
+  EXPECT_EQ(Counter("keyframes"), static_cast<int64_t>(keyframes_.size()));
+  ASSERT_GE(keyframes_.size(), 10u);
+  EXPECT_LT(bytes_ / keyframes_.size(), 28'000u);
+  for (size_t i = 0; i < keyframes_.size(); ++i) {
+    const Keyframe& keyframe = keyframes_[i];
+    EXPECT_EQ(keyframe.id, (KeyframeId{{7, kMapUtime}, static_cast<int32_t>(i)}));
+    EXPECT_EQ(keyframe.edge.has_value(), i > 0);
+    EXPECT_GE(keyframe.corners.size(), 400u);
+    EXPECT_EQ(keyframe.corners.front().landmark_id, keyframe.corners[0].landmark_id);
+    EXPECT_GE(keyframe.points.size(), 30u);
+    EXPECT_LE(keyframe.points.size(), 150u);
+    if (i > 0) {
+      EXPECT_EQ(keyframe.edge->from_seq, static_cast<int32_t>(i) - 1);
+      // The edge is the true motion.
+      const auto seconds = [](int64_t utime) { return 1e-6 * static_cast<double>(utime); };
+      const Rigid3 truth = World::Pose(seconds(keyframes_[i - 1].utime)).Inverse() *
+                           World::Pose(seconds(keyframe.utime));
+      EXPECT_LT((keyframe.edge->T_from_this.t - truth.t).norm(), 0.02);
+      EXPECT_TRUE(keyframe.preintegration.has_value());
+    }
+  }
+  // The log holds the same keyframes.
+  lcm::LogFile log(options_.out_keyframes, "r");
+  size_t logged = 0;
+  for (const lcm::LogEvent* event = log.readNextEvent(); event != nullptr;
+       event = log.readNextEvent()) {
+    EXPECT_EQ(event->channel, "KEYFRAME_7");
+    ++logged;
+  }
+  EXPECT_EQ(logged, keyframes_.size());
+  std::vector<std::string> warnings;
+  EXPECT_GE(ReadTum(options_.out_tum, &warnings).size(), 100u);
+}
+
+TEST_F(VioProcessTest, TheSameRecordingGivesTheSameBytes) {
+  std::vector<std::vector<uint8_t>> runs[2];
+  for (auto& run : runs) {
+    LocalBus bus;
+    bus.Subscribe("KEYFRAME_7", [&run](const std::string&, Bytes data) {
+      run.emplace_back(data.begin(), data.end());
+    });
+    VioProcess process(bus, options_, 0);
+    process.Open(world_.camera(), ImuNoise{});
+    next_imu_ = 0;
+    Play(process, 0, 5);
+    process.Flush();
+    bus.Drain();
+  }
+  ASSERT_FALSE(runs[0].empty());
+  EXPECT_EQ(runs[0], runs[1]);
+}
+
+TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 6);
+  process.Flush();
+  bus_.Drain();
+  ASSERT_GE(keyframes_.size(), 4u);
+  EXPECT_EQ(process.Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
+  EXPECT_FALSE(process.uplink_ever_heard());
+  have_t have{};
+  have.num_maps = 1;
+  have.maps.push_back(ToMessage(keyframes_[0].id.map));
+  have.highest_seq.push_back(1);
+  PublishMessage(bus_, "HAVE", have);
+  resend_request_t request{};
+  request.requester = "uplink_7";
+  request.channel = "KEYFRAME_7";
+  request.map = ToMessage(keyframes_[0].id.map);
+  request.from_seq = 2;
+  request.to_seq = 3;
+  PublishMessage(bus_, "RESEND_REQUEST", request);
+  request.requester = "no such/name";
+  PublishMessage(bus_, "RESEND_REQUEST", request);
+  bus_.Drain();
+  EXPECT_EQ(process.Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
+  EXPECT_TRUE(process.uplink_ever_heard());
+  ASSERT_EQ(again_.size(), 2u);
+  keyframe_t keyframe{};
+  ASSERT_TRUE(DecodeMessage(again_[0].data, &keyframe));
+  EXPECT_EQ(keyframe.id.seq, 2);
+}
+
+TEST_F(VioProcessTest, AppliesTheCorrectionToTheShownPoseAndSaysSo) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 5);
+  Correction correction;
+  correction.map = {7, kMapUtime};
+  correction.group = {2, 5};  // fused into another map: another frame, at once
+  correction.revision = 4;
+  correction.T_map_odom = {YawRotation(0.5), {3, 2, 1}};
+  correction.covariance *= 1e-4;
+  PublishMessage(bus_, "CORRECTION_7", ToMessage(correction));
+  PublishMessage(bus_, "CORRECTION_7", pose_t{});
+  bus_.Drain();
+  Play(process, 5, 9);
+  process.Flush();
+  bus_.Drain();
+  const pose_t& pose = poses_.back();
+  EXPECT_EQ(pose.group_revision, 4);
+  const Rigid3 shown = *Parse(pose.T_map_body).value;
+  const Rigid3 expected = correction.T_map_odom * *Parse(pose.T_odom_body).value;
+  EXPECT_LT(shown.Minus(expected).norm(), 1e-6);
+  EXPECT_EQ(keyframes_.back().group_revision, 4);
+  EXPECT_EQ(keyframes_.front().group_revision, 0);
+}
+
+TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 6);
+  next_imu_ = 9'000'000;  // three seconds of nothing
+  Play(process, 9, 15);
+  process.Flush();
+  bus_.Drain();
+  EXPECT_EQ(keyframes_.front().id.map, (MapId{7, kMapUtime}));
+  EXPECT_EQ(keyframes_.back().id.map, (MapId{7, kMapUtime + 1}));
+  int32_t expected = 0;
+  for (const Keyframe& keyframe : keyframes_) {
+    if (keyframe.id.map.opened_utime == kMapUtime + 1) {
+      EXPECT_EQ(keyframe.id.seq, expected++);
+      EXPECT_EQ(keyframe.edge.has_value(), keyframe.id.seq > 0);
+    }
+  }
+  EXPECT_GT(expected, 3);
+}
+
+std::vector<image_t> Chunks(int64_t utime, const cv::Mat& image) {
+  std::vector<image_t> chunks;
+  constexpr int32_t kChunk = 30'000;
+  const auto total = static_cast<int32_t>(image.total());
+  for (int32_t offset = 0; offset < total; offset += kChunk) {
+    image_t chunk{};
+    chunk.utime = utime;
+    chunk.encoding = image_t::ENCODING_RAW8;
+    chunk.width = image.cols;
+    chunk.height = image.rows;
+    chunk.chunk = static_cast<int16_t>(offset / kChunk);
+    chunk.num_chunks = static_cast<int16_t>((total + kChunk - 1) / kChunk);
+    chunk.total_bytes = total;
+    chunk.offset_bytes = offset;
+    chunk.num_bytes = static_cast<int16_t>(std::min(kChunk, total - offset));
+    chunk.data.assign(image.data + offset, image.data + offset + chunk.num_bytes);
+    chunks.push_back(chunk);
+  }
+  return chunks;
+}
+
+TEST_F(VioProcessTest, LiveImagesComeInChunksAndWaitForTheirSamples) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  std::vector<image_t> chunks = Chunks(100'000, image);
+  PublishMessage(bus_, "IMAGE_7", chunks[0]);  // before the calibration: refused
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  std::swap(chunks[0], chunks[5]);  // any order
+  for (const image_t& chunk : chunks) {
+    PublishMessage(bus_, "IMAGE_7", chunk);
+    PublishMessage(bus_, "IMAGE_7", chunk);  // a repeat is refused
+  }
+  bus_.Drain();
+  EXPECT_TRUE(poses_.empty()) << "its inertial samples have not come";
+  for (int64_t utime = 0; utime <= 100'000; utime += kImuStep_us) {
+    imu_t message{};
+    message.utime = utime;
+    message.accel_body.z = 9.81;
+    PublishMessage(bus_, "IMU_7", message);
+  }
+  bus_.Drain();
+  ASSERT_EQ(poses_.size(), 1u);
+  EXPECT_EQ(poses_[0].utime, 100'000);
+  EXPECT_EQ(poses_[0].state, pose_t::STATE_INITIALISING);
+  EXPECT_GT(poses_[0].num_tracked, 100);
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_GE(status_.num_refused, 2);
+}
+
+TEST_F(VioProcessTest, LiveNonsenseIsRefused) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", camera_t{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  image_t absurd = Chunks(1, cv::Mat(480, 752, CV_8U, cv::Scalar(1)))[0];
+  absurd.offset_bytes = absurd.total_bytes - 1;
+  PublishMessage(bus_, "IMAGE_7", absurd);
+  absurd.offset_bytes = -5;
+  PublishMessage(bus_, "IMAGE_7", absurd);
+  absurd.total_bytes = 2'000'000'000;
+  PublishMessage(bus_, "IMAGE_7", absurd);
+  imu_t imu{};
+  imu.gyro_body.x = std::nan("");
+  PublishMessage(bus_, "IMU_7", imu);
+  bus_.Drain();
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_TRUE(poses_.empty());
+  EXPECT_EQ(status_.num_refused, 3);
+}
+
+}  // namespace
+}  // namespace pangea::vio
