@@ -1,0 +1,99 @@
+#include "posegraph/odometry_chain.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pangea {
+namespace {
+
+// Of a keyframe without points: a room's usual depth, metres.
+constexpr double kUsualDepth = 3;
+
+Eigen::Vector3d MiddleOfScene(const Keyframe& keyframe) {
+  double depth = kUsualDepth;
+  if (!keyframe.points.empty()) {
+    std::vector<float> inverse_depths;
+    for (const MapPoint& point : keyframe.points) {
+      inverse_depths.push_back(point.inverse_depth);
+    }
+    const auto middle = inverse_depths.begin() + static_cast<int>(inverse_depths.size() / 2);
+    std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
+    depth = 1.0 / std::max(*middle, 1e-3f);
+  }
+  return keyframe.T_odom_cam() * Eigen::Vector3d(0, 0, depth);
+}
+
+}  // namespace
+
+bool OdometryChain::Add(const Keyframe& keyframe) {
+  if (!nodes_.empty() && keyframe.id.seq <= nodes_.back().seq) {
+    return false;
+  }
+  Node node;
+  node.seq = keyframe.id.seq;
+  node.utime = keyframe.utime;
+  node.T_odom_body = keyframe.T_odom_body;
+  node.roll_pitch_covariance = keyframe.roll_pitch_covariance;
+  node.scene_odom = MiddleOfScene(keyframe);
+  if (!nodes_.empty()) {
+    const std::optional<int> from = keyframe.edge ? Find(keyframe.edge->from_seq) : std::nullopt;
+    if (from) {
+      JoinByEdge(*keyframe.edge, *from, &node);
+    } else {
+      Bridge(&node);
+    }
+    Accumulate(&node);
+  }
+  nodes_.push_back(node);
+  return true;
+}
+
+void OdometryChain::JoinByEdge(const OdometryEdge& edge, int from, Node* node) const {
+  node->edge_from = from;
+  node->edge = MakeRelative4(edge.T_from_this, edge.covariance, nodes_[from].T_odom_body.q,
+                             nodes_[from].roll_pitch_covariance, node->T_odom_body.q);
+}
+
+void OdometryChain::Bridge(Node* node) {
+  constexpr size_t kUsual = 50;
+  Matrix4d usual = Vector4d(1e-4, 1e-4, 1e-4, 1e-4).asDiagonal();
+  double count = 1;
+  for (size_t i = nodes_.size(); i > 1 && nodes_.size() - i < kUsual; --i) {
+    usual += nodes_[i - 1].edge.covariance;
+    ++count;
+  }
+  const Node& from = nodes_.back();
+  node->edge_from = static_cast<int>(nodes_.size()) - 1;
+  node->edge.t = node->T_odom_body.t - from.T_odom_body.t;
+  node->edge.yaw = 0;
+  // Errors of the missing steps add up; each step's yaw error moves on average half the gap.
+  node->edge.covariance =
+      CovarianceAt(usual * ((node->seq - from.seq) / count), 0.5 * node->edge.t);
+  ++num_bridged_;
+}
+
+void OdometryChain::Accumulate(Node* node) const {
+  const Node& from = nodes_[node->edge_from];
+  node->path_m = from.path_m + node->edge.t.norm();
+  // The edge's error moves a point P by dt + z x (P - p_to) dyaw; at the origin P = 0.
+  node->drift_sum = from.drift_sum + CovarianceAt(node->edge.covariance, -node->T_odom_body.t);
+}
+
+std::optional<int> OdometryChain::Find(int32_t seq) const {
+  const auto it = std::ranges::lower_bound(nodes_, seq, {}, &Node::seq);
+  if (it == nodes_.end() || it->seq != seq) {
+    return std::nullopt;
+  }
+  return static_cast<int>(it - nodes_.begin());
+}
+
+Matrix4d OdometryChain::DriftBetween(int i, int j, const Eigen::Vector3d& point_odom) const {
+  const auto [first, last] = std::minmax(i, j);
+  return CovarianceAt(nodes_[last].drift_sum - nodes_[first].drift_sum, point_odom);
+}
+
+double OdometryChain::PathBetween(int i, int j) const {
+  return std::abs(nodes_[i].path_m - nodes_[j].path_m);
+}
+
+}  // namespace pangea

@@ -1,0 +1,241 @@
+#include "posegraph/pair_evidence.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace pangea {
+namespace {
+
+// Beyond this many a pair's verdict stands on what it has: agreement takes a pass over all.
+constexpr size_t kMaxCandidates = 600;
+constexpr size_t kMaxSeeds = 10;
+constexpr size_t kMaxCompared = 40;
+
+Matrix4d TurnAxes(const Matrix4d& covariance, double yaw) {
+  Matrix4d R = Matrix4d::Identity();
+  R.topLeftCorner<3, 3>() = YawRotation(yaw).toRotationMatrix();
+  return R * covariance * R.transpose();
+}
+
+bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l,
+               const MergeOptions& options) {
+  const Eigen::Vector3d view_k = (k.scene_odom - k.T_odom_body.t).normalized();
+  const Eigen::Vector3d view_l = (l.scene_odom - l.T_odom_body.t).normalized();
+  return (k.T_odom_body.t - l.T_odom_body.t).norm() > options.look_distance_m ||
+         view_k.dot(view_l) < std::cos(options.look_angle);
+}
+
+}  // namespace
+
+Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point,
+                         const MergeOptions& options) {
+  const double path = chain.PathBetween(i, j);
+  const double sigma_m = options.min_drift_per_m * path;
+  const double sigma_yaw = options.min_yaw_drift_per_m * path;
+  Matrix4d least = Matrix4d::Identity() * sigma_m * sigma_m;
+  least(3, 3) = sigma_yaw * sigma_yaw;
+  return chain.DriftBetween(i, j, point) + CovarianceAt(least, point - chain[j].T_odom_body.t);
+}
+
+PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candidate& l,
+                                               const MergeOptions& drift) const {
+  // Where l and the odometry of both maps put k's keyframe of map b, in the odom axes of a.
+  const Eigen::Vector3d& p_b = (*b_)[k.node_b].T_odom_body.t;
+  const Eigen::Vector3d p_a = l.T_odom_a_odom_b * p_b;
+  const Eigen::Vector3d& from_k = (*a_)[k.node_a].T_odom_body.t;
+  const Eigen::Vector3d to_l = (*a_)[l.node_a].T_odom_body.t + l.relative.t;
+  Innovation innovation;
+  innovation.error << from_k + k.relative.t - p_a, WrapAngle(k.relative.yaw - l.relative.yaw);
+  innovation.measurement = k.relative.covariance + CovarianceAt(l.relative.covariance, p_a - to_l);
+  innovation.odometry =
+      BelievableDrift(*a_, k.node_a, l.node_a, p_a, drift) +
+      TurnAxes(BelievableDrift(*b_, l.node_b, k.node_b, p_b, drift), l.relative.yaw);
+  return innovation;
+}
+
+bool PairEvidence::Agree(const Candidate& k, const Candidate& l) const {
+  const Innovation innovation = Compare(k, l, options_);
+  const Matrix4d covariance = innovation.measurement + innovation.odometry;
+  return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= options_.agree_chi2;
+}
+
+bool PairEvidence::AgreeAt(int k, int l) const {
+  return k == l || candidates_[std::max(k, l)].agrees[std::min(k, l)];
+}
+
+void PairEvidence::Add(int64_t id, int node_a, int node_b, const Relative4& relative,
+                       int num_inliers) {
+  if (candidates_.size() >= kMaxCandidates) {
+    return;
+  }
+  Candidate candidate{id, node_a, node_b, relative, num_inliers, {}, {}};
+  const Eigen::Vector3d& p_a = (*a_)[node_a].T_odom_body.t;
+  const Eigen::Vector3d& p_b = (*b_)[node_b].T_odom_body.t;
+  candidate.T_odom_a_odom_b = {p_a + relative.t - YawRotation(relative.yaw) * p_b, relative.yaw};
+  for (const Candidate& earlier : candidates_) {
+    // Both ways round, so that nothing depends on which came first.
+    candidate.agrees.push_back(Agree(candidate, earlier) && Agree(earlier, candidate));
+  }
+  candidates_.push_back(std::move(candidate));
+  Judge();
+}
+
+std::vector<int> PairEvidence::LargestAgreeing(std::vector<int> among) const {
+  std::vector<int> degree(candidates_.size(), 0);
+  for (const int k : among) {
+    for (const int l : among) {
+      degree[k] += AgreeAt(k, l) ? 1 : 0;
+    }
+  }
+  std::ranges::sort(among, [&](int k, int l) {
+    return std::pair(-degree[k], candidates_[k].id) < std::pair(-degree[l], candidates_[l].id);
+  });
+  std::vector<int> largest;
+  for (size_t seed = 0; seed < std::min(among.size(), kMaxSeeds); ++seed) {
+    std::vector<int> set = {among[seed]};
+    for (const int k : among) {
+      if (k != among[seed] && std::ranges::all_of(set, [&](int l) { return AgreeAt(k, l); })) {
+        set.push_back(k);
+      }
+    }
+    if (set.size() > largest.size()) {
+      largest = std::move(set);
+    }
+  }
+  return largest;
+}
+
+bool PairEvidence::DifferentLook(const Candidate& k, const Candidate& l) const {
+  return Elsewhere((*a_)[k.node_a], (*a_)[l.node_a], options_) ||
+         Elsewhere((*b_)[k.node_b], (*b_)[l.node_b], options_);
+}
+
+std::vector<int> PairEvidence::Looks(const std::vector<int>& candidates) const {
+  std::vector<int> sorted = candidates;
+  std::ranges::sort(sorted, [&](int k, int l) {
+    return std::pair(-candidates_[k].num_inliers, candidates_[k].id) <
+           std::pair(-candidates_[l].num_inliers, candidates_[l].id);
+  });
+  std::vector<int> looks;
+  for (const int k : sorted) {
+    if (std::ranges::all_of(looks,
+                            [&](int l) { return DifferentLook(candidates_[k], candidates_[l]); })) {
+      looks.push_back(k);
+    }
+  }
+  return looks;
+}
+
+double PairEvidence::SceneExtent(const std::vector<int>& candidates) const {
+  double extent_a = 0, extent_b = 0;
+  for (const int k : candidates) {
+    for (const int l : candidates) {
+      const auto apart = [](const OdometryChain& chain, int i, int j) {
+        return (chain[i].scene_odom - chain[j].scene_odom).norm();
+      };
+      extent_a = std::max(extent_a, apart(*a_, candidates_[k].node_a, candidates_[l].node_a));
+      extent_b = std::max(extent_b, apart(*b_, candidates_[k].node_b, candidates_[l].node_b));
+    }
+  }
+  return std::min(extent_a, extent_b);
+}
+
+bool PairEvidence::Enough(const std::vector<int>& looks) const {
+  const auto strong = std::ranges::count_if(
+      looks, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
+  return (static_cast<int>(looks.size()) >= options_.min_looks ||
+          strong >= options_.min_strong_looks) &&
+         SceneExtent(looks) >= options_.min_scene_extent_m;
+}
+
+int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
+  const size_t stride = 1 + agreeing.size() / kMaxCompared;
+  int best = agreeing.front();
+  double best_sum = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < agreeing.size(); i += stride) {
+    const int l = agreeing[i];
+    double sum = 0;
+    for (size_t j = 0; j < agreeing.size(); j += stride) {
+      const int k = agreeing[j];
+      const Innovation innovation = Compare(candidates_[k], candidates_[l], options_);
+      const Matrix4d covariance = innovation.measurement + innovation.odometry;
+      sum += innovation.error.dot(covariance.ldlt().solve(innovation.error));
+    }
+    if (sum < best_sum) {
+      best = l;
+      best_sum = sum;
+    }
+  }
+  return best;
+}
+
+Pose4 PairEvidence::Alignment() const {
+  constexpr int kIterations = 5;
+  const Candidate& best = candidates_[BestMember(agreeing_)];
+  Pose4 T = best.T_odom_a_odom_b;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    Matrix4d H = Matrix4d::Zero();
+    Vector4d g = Vector4d::Zero();
+    for (const int k : agreeing_) {
+      const Candidate& candidate = candidates_[k];
+      const Innovation innovation = Compare(candidate, best, options_);
+      const Matrix4d information = (innovation.measurement + innovation.odometry).inverse();
+      const Eigen::Vector3d& p_b = (*b_)[candidate.node_b].T_odom_body.t;
+      Vector4d error;
+      error << (*a_)[candidate.node_a].T_odom_body.t + candidate.relative.t - T * p_b,
+          WrapAngle(candidate.relative.yaw - T.yaw);
+      const Eigen::Vector3d arm = YawRotation(T.yaw) * p_b;
+      Matrix4d J = Matrix4d::Identity();  // d(T * p_b, yaw) / d(T.p, yaw)
+      J.topRightCorner<3, 1>() = Eigen::Vector3d(-arm.y(), arm.x(), 0);
+      H += J.transpose() * information * J;
+      g += J.transpose() * information * error;
+    }
+    const Vector4d step = H.ldlt().solve(g);
+    T.p += step.head<3>();
+    T.yaw = WrapAngle(T.yaw + step[3]);
+  }
+  return T;
+}
+
+void PairEvidence::Judge() {
+  std::vector<int> all;
+  for (size_t k = 0; k < candidates_.size(); ++k) {
+    all.push_back(static_cast<int>(k));
+  }
+  agreeing_ = LargestAgreeing(all);
+  // A rival contradicts most of them; a true one that is a little off does not.
+  std::erase_if(all, [&](int k) {
+    const auto agrees = std::ranges::count_if(agreeing_, [&](int l) { return AgreeAt(k, l); });
+    return 2 * agrees >= static_cast<int64_t>(agreeing_.size());
+  });
+  const std::vector<int> looks = Looks(agreeing_);
+  verdict_ = {};
+  verdict_.looks = static_cast<int>(looks.size());
+  verdict_.rival_looks = static_cast<int>(Looks(LargestAgreeing(all)).size());
+  verdict_.merge =
+      Enough(looks) && verdict_.rival_looks <= options_.max_rival_share * verdict_.looks;
+  for (const int k : agreeing_) {
+    verdict_.agreeing.push_back(candidates_[k].id);
+  }
+  std::ranges::sort(verdict_.agreeing);
+}
+
+std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {
+  std::vector<Innovation> innovations;
+  if (agreeing_.empty()) {
+    return innovations;
+  }
+  MergeOptions as_claimed = options_;
+  as_claimed.min_drift_per_m = as_claimed.min_yaw_drift_per_m = 0;
+  const int best = BestMember(agreeing_);
+  for (const int k : agreeing_) {
+    if (k != best) {
+      innovations.push_back(Compare(candidates_[k], candidates_[best], as_claimed));
+    }
+  }
+  return innovations;
+}
+
+}  // namespace pangea

@@ -1,0 +1,103 @@
+#pragma once
+
+// Are two maps one place? The evidence for one pair of maps, and the verdict.
+//
+// Each accepted constraint between the maps is a candidate alignment T_odom_a_odom_b. Two
+// candidates agree when the cycle through them and both maps' odometry closes within its covariance
+// (pairwise consistency: Mangelson et al., ICRA 2018; Mahalanobis distance, four degrees of
+// freedom). The largest set that agrees mutually carries the merge if it is large enough, was not
+// all won by one look, and its best rival is clearly smaller. A pure function of the evidence: not
+// of its order, and a merge once made is unmade when a rival grows.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "posegraph/loop.h"
+#include "posegraph/odometry_chain.h"
+
+namespace pangea {
+
+struct MergeOptions {
+  // Looks that must agree: constraints that differ by a keyframe elsewhere, in either map.
+  int min_looks = 3;
+  // So few are enough if each has this many inliers.
+  int min_strong_looks = 2;
+  int strong_inliers = 80;
+  // A keyframe is elsewhere by this distance or this turn of the view.
+  double look_distance_m = 0.25;
+  double look_angle = 0.15;
+  // What the agreeing looks see must not be one spot: an object has a look-alike somewhere.
+  double min_scene_extent_m = 1.5;
+  // The largest rival may have this share of the looks.
+  double max_rival_share = 0.5;
+  double agree_chi2 = 18.47;  // chi-squared(4): 0.999
+  // Odometry that claims less drift than this is not believed while maps are compared (it is no
+  // weight of the solve): standard deviations per metre of path.
+  double min_drift_per_m = 0.005;
+  double min_yaw_drift_per_m = 0.0003;
+};
+
+// Covariance of the odometry between two nodes of a map, at a point, with the options' least drift
+// added.
+Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point,
+                         const MergeOptions& options);
+
+class PairEvidence {
+ public:
+  PairEvidence(const OdometryChain& a, const OdometryChain& b, const MergeOptions& options)
+      : a_(&a), b_(&b), options_(options) {}
+
+  // `relative` from node_a of map a to node_b of map b.
+  void Add(int64_t id, int node_a, int node_b, const Relative4& relative, int num_inliers);
+
+  struct Verdict {
+    bool merge = false;
+    std::vector<int64_t> agreeing;  // constraint ids, ascending
+    int looks = 0;
+    int rival_looks = 0;
+  };
+  const Verdict& verdict() const { return verdict_; }
+  // Averaged over the agreeing candidates; only after a verdict to merge.
+  Pose4 Alignment() const;
+
+  // Of every agreeing candidate: the error against the one that agrees best with all, and the
+  // covariances it is made of (measurements, odometry).
+  struct Innovation {
+    Vector4d error;
+    Matrix4d measurement;
+    Matrix4d odometry;
+  };
+  std::vector<Innovation> Innovations() const;
+
+ private:
+  struct Candidate {
+    int64_t id = 0;
+    int node_a = 0, node_b = 0;
+    Relative4 relative;
+    int num_inliers = 0;
+    Pose4 T_odom_a_odom_b;
+    std::vector<bool> agrees;  // with each candidate before it
+  };
+
+  Innovation Compare(const Candidate& k, const Candidate& l, const MergeOptions& drift) const;
+  bool Agree(const Candidate& k, const Candidate& l) const;
+  bool AgreeAt(int k, int l) const;
+  // Greedy largest set of mutually agreeing candidates among `among`.
+  std::vector<int> LargestAgreeing(std::vector<int> among) const;
+  std::vector<int> Looks(const std::vector<int>& candidates) const;
+  double SceneExtent(const std::vector<int>& candidates) const;
+  bool Enough(const std::vector<int>& looks) const;
+  bool DifferentLook(const Candidate& k, const Candidate& l) const;
+  int BestMember(const std::vector<int>& agreeing) const;
+  void Judge();
+
+  const OdometryChain* a_;
+  const OdometryChain* b_;
+  MergeOptions options_;
+  std::vector<Candidate> candidates_;  // in the order they came
+  std::vector<int> agreeing_;
+  Verdict verdict_;
+};
+
+}  // namespace pangea

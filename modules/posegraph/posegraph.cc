@@ -1,0 +1,300 @@
+#include "posegraph/posegraph.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace pangea {
+namespace {
+
+// A merge needs this many loops that the robust solve keeps.
+constexpr int kMinLoopsInForce = 2;
+
+}  // namespace
+
+PoseGraph::PoseGraph(const PoseGraphOptions& options, int64_t first_revision)
+    : options_(options), next_revision_(first_revision) {}
+
+int PoseGraph::MapNumber(const MapId& id) {
+  const auto [it, is_new] = numbers_.try_emplace(id, static_cast<int>(maps_.size()));
+  if (is_new) {
+    maps_.emplace_back().id = id;
+    group_of_.push_back(it->second);
+    Group group;
+    group.maps = {it->second};
+    groups_[it->second] = group;
+  }
+  return it->second;
+}
+
+PoseGraphUpdate PoseGraph::AddKeyframe(const Keyframe& keyframe) {
+  const int number = MapNumber(keyframe.id.map);
+  Map& map = maps_[number];
+  if (!map.chain.Add(keyframe)) {
+    return {};
+  }
+  map.poses.push_back(map.T_map_odom * Pose4{keyframe.T_odom_body.t, 0});
+  Group& group = GroupOf(number);
+  group.unpublished = true;
+  ++group.keyframes_unpublished;
+  group.keyframes_waiting += group.waiting_loops > 0 ? 1 : 0;
+  size_t num_keyframes = 0;
+  for (const int m : group.maps) {
+    num_keyframes += maps_[m].chain.size();
+  }
+  if (group.keyframes_unpublished >=
+      std::max<int>(options_.state_every, static_cast<int>(num_keyframes / 50))) {
+    group.publish_now = true;
+  }
+  std::erase_if(parked_, [&](const Constraint& constraint) {
+    return (constraint.from == keyframe.id || constraint.to == keyframe.id) && TryAdd(constraint);
+  });
+  return Settle(false);
+}
+
+PoseGraphUpdate PoseGraph::AddConstraint(const Constraint& constraint) {
+  if (!constraint.accepted || seen_.contains(constraint.Id())) {
+    return {};
+  }
+  if (TryAdd(constraint)) {
+    seen_.insert(constraint.Id());
+    return Settle(false);
+  }
+  if (parked_.size() < kMaxParked) {
+    seen_.insert(constraint.Id());
+    parked_.push_back(constraint);
+  }
+  return {};
+}
+
+bool PoseGraph::TryAdd(const Constraint& constraint) {
+  const auto find = [this](const KeyframeId& id) -> std::optional<NodeRef> {
+    const auto map = numbers_.find(id.map);
+    if (map == numbers_.end()) {
+      return std::nullopt;
+    }
+    const std::optional<int> node = maps_[map->second].chain.Find(id.seq);
+    return node ? std::optional<NodeRef>({map->second, *node}) : std::nullopt;
+  };
+  const auto from = find(constraint.from);
+  const auto to = find(constraint.to);
+  if (from && to) {
+    AddLoop(constraint, *from, *to);
+  }
+  return from && to;
+}
+
+void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) {
+  const OdometryChain::Node& node_from = maps_[from.map].chain[from.node];
+  const OdometryChain::Node& node_to = maps_[to.map].chain[to.node];
+  Loop loop;
+  loop.id = constraint.Id();
+  loop.from = from;
+  loop.to = to;
+  loop.num_inliers = constraint.num_inliers;
+  loop.relative =
+      MakeRelative4(constraint.T_from_to, constraint.covariance, node_from.T_odom_body.q,
+                    node_from.roll_pitch_covariance, node_to.T_odom_body.q);
+  loops_.push_back(loop);
+  if (!loop.intra()) {
+    const bool forward = maps_[from.map].id < maps_[to.map].id;
+    const Pair pair = forward ? Pair(from.map, to.map) : Pair(to.map, from.map);
+    const auto it =
+        pairs_.try_emplace(pair, maps_[pair.first].chain, maps_[pair.second].chain, options_.merge)
+            .first;
+    it->second.Add(loop.id, forward ? from.node : to.node, forward ? to.node : from.node,
+                   forward ? loop.relative : loop.relative.Inverse(), loop.num_inliers);
+    undone_.erase(pair);
+    Regroup();
+  }
+  if (group_of_[from.map] == group_of_[to.map]) {
+    Group& group = GroupOf(from.map);
+    ++group.waiting_loops;
+    group.stale = true;
+  }
+}
+
+void PoseGraph::Regroup() {
+  std::vector<int> root(maps_.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int map) {
+    while (root[map] != map) {
+      map = root[map];
+    }
+    return map;
+  };
+  for (const auto& [pair, evidence] : pairs_) {
+    if (evidence.verdict().merge && !undone_.contains(pair)) {
+      const auto [older, newer] = std::minmax({find(pair.first), find(pair.second)});
+      root[newer] = older;
+    }
+  }
+  std::map<int, Group> groups;
+  for (int map = 0; map < static_cast<int>(maps_.size()); ++map) {
+    group_of_[map] = find(map);
+    groups[group_of_[map]].maps.push_back(map);
+  }
+  for (auto& [oldest, group] : groups) {
+    const auto before = groups_.find(oldest);
+    if (before != groups_.end() && before->second.maps == group.maps) {
+      group = before->second;
+    } else {
+      group.stale = group.publish_now = true;
+    }
+  }
+  groups_ = std::move(groups);
+}
+
+std::vector<Loop*> PoseGraph::LoopsOf(const Group& group) {
+  std::vector<Loop*> loops;
+  for (Loop& loop : loops_) {
+    if (group_of_[loop.from.map] == group.maps.front() &&
+        group_of_[loop.to.map] == group.maps.front()) {
+      loops.push_back(&loop);
+    }
+  }
+  return loops;
+}
+
+bool PoseGraph::SolveIsDue(const Group& group) const {
+  size_t num_keyframes = 0;
+  for (const int map : group.maps) {
+    num_keyframes += maps_[map].chain.size();
+  }
+  const int enough = 1 + static_cast<int>(num_keyframes) / options_.keyframes_per_waiting_loop;
+  return group.waiting_loops >= enough ||
+         (group.waiting_loops > 0 && group.keyframes_waiting >= options_.max_keyframes_waiting);
+}
+
+PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
+  const auto due = [&](const auto& entry) {
+    const Group& group = entry.second;
+    return (group.regrouped && group.stale) || SolveIsDue(group) ||
+           (from_the_beginning && group.stale);
+  };
+  for (auto it = std::ranges::find_if(groups_, due); it != groups_.end();
+       it = std::ranges::find_if(groups_, due)) {
+    Solve(&it->second, from_the_beginning);
+    if (UndoMerges(it->second)) {
+      Regroup();
+    }
+  }
+  PoseGraphUpdate update;
+  for (auto& [oldest, group] : groups_) {
+    if (group.publish_now || (from_the_beginning && group.unpublished)) {
+      Publish(&group, &update);
+    }
+  }
+  return update;
+}
+
+bool PoseGraph::UndoMerges(const Group& group) {
+  std::map<Pair, int> in_force;
+  for (const Loop* loop : LoopsOf(group)) {
+    const auto [a, b] = std::minmax(loop->from.map, loop->to.map);
+    in_force[{a, b}] += loop->on ? 1 : 0;
+  }
+  bool any = false;
+  for (const auto& [pair, evidence] : pairs_) {
+    const auto [a, b] = std::minmax(pair.first, pair.second);
+    const bool here = group_of_[a] == group.maps.front() && group_of_[b] == group.maps.front();
+    if (here && evidence.verdict().merge && !undone_.contains(pair) &&
+        in_force[{a, b}] < kMinLoopsInForce) {
+      undone_.insert(pair);
+      any = true;
+    }
+  }
+  return any;
+}
+
+PoseGraphUpdate PoseGraph::Finish() {
+  if (std::ranges::any_of(groups_, [](const auto& entry) { return entry.second.stale; })) {
+    undone_.clear();
+    Regroup();
+  }
+  return Settle(true);
+}
+
+MapState PoseGraph::StateOf(const Group& group) const {
+  MapState state;
+  state.group = maps_[group.maps.front()].id;
+  state.revision = next_revision_;
+  for (const int number : group.maps) {
+    const Map& map = maps_[number];
+    state.maps.push_back(map.id);
+    for (size_t i = 0; i < map.chain.size(); ++i) {
+      const OdometryChain::Node& node = map.chain[i];
+      const Eigen::Quaterniond q = YawRotation(map.poses[i].yaw) * node.T_odom_body.q;
+      state.keyframes.push_back({{map.id, node.seq}, node.utime, {q.normalized(), map.poses[i].p}});
+    }
+  }
+  for (const Loop& loop : loops_) {
+    if (group_of_[loop.from.map] == group.maps.front() &&
+        group_of_[loop.to.map] == group.maps.front()) {
+      ++(loop.on ? state.num_constraints : state.num_switched_off);
+    }
+  }
+  return state;
+}
+
+void PoseGraph::Publish(Group* group, PoseGraphUpdate* update) {
+  group->unpublished = group->publish_now = false;
+  group->keyframes_unpublished = 0;
+  const MapState state = StateOf(*group);
+  if (state.keyframes.empty()) {
+    return;
+  }
+  ++next_revision_;
+  for (const int number : group->maps) {
+    Map& map = maps_[number];
+    // Alone and never corrected, a map is where its odometry says.
+    if (map.newest_solved < 0 && !map.corrected) {
+      continue;
+    }
+    map.corrected = true;
+    Correction correction;
+    correction.map = map.id;
+    const OdometryChain::Node& node = map.chain[std::max(map.newest_solved, 0)];
+    correction.seq = node.seq;
+    correction.group = state.group;
+    correction.revision = state.revision;
+    correction.T_map_odom = map.T_map_odom.ToRigid3();
+    constexpr double kLeastVariance = 1e-12;
+    correction.covariance = kLeastVariance * Matrix6d::Identity();
+    correction.covariance.topLeftCorner<3, 3>() += map.covariance.topLeftCorner<3, 3>();
+    correction.covariance.block<3, 1>(0, 5) += map.covariance.topRightCorner<3, 1>();
+    correction.covariance.block<1, 3>(5, 0) += map.covariance.bottomLeftCorner<1, 3>();
+    correction.covariance(5, 5) += map.covariance(3, 3);
+    correction.covariance.block<2, 2>(3, 3) += node.roll_pitch_covariance;
+    update->corrections.push_back(correction);
+  }
+  update->states.push_back(state);
+}
+
+std::vector<MapState> PoseGraph::States() const {
+  std::vector<MapState> states;
+  for (const auto& [oldest, group] : groups_) {
+    states.push_back(StateOf(group));
+  }
+  return states;
+}
+
+PoseGraph::Counters PoseGraph::counters() const {
+  Counters counters;
+  counters.maps = static_cast<int64_t>(maps_.size());
+  counters.groups = static_cast<int64_t>(groups_.size());
+  for (const Loop& loop : loops_) {
+    const bool used = group_of_[loop.from.map] == group_of_[loop.to.map];
+    ++(!used ? counters.unused : loop.on ? counters.in_force : counters.switched_off);
+  }
+  counters.solves = num_solves_;
+  for (const Map& map : maps_) {
+    counters.bridged += map.chain.num_bridged();
+  }
+  counters.parked = static_cast<int64_t>(parked_.size());
+  for (const auto& [oldest, group] : groups_) {
+    counters.odometry_scale = std::max(counters.odometry_scale, std::sqrt(group.odometry_variance));
+  }
+  return counters;
+}
+
+}  // namespace pangea

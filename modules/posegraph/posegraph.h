@@ -1,0 +1,155 @@
+#pragma once
+
+// The pose graph of all maps (the paper, section IV.D, "optimization of pose graph"; design,
+// section 5): which maps are one, and where every keyframe is.
+//
+// In: keyframes of any maps, each map's in ascending seq, and verdicts (constraints). Out: after
+// each solve the corrections (T_map_odom of each map) and the group's state. A node is (x, y, z,
+// yaw); roll and pitch are the odometry's. Maps are grouped by the constraints in force: a pair is
+// merged once several candidate alignments agree (pair_evidence.h), loops that contradict the rest
+// are switched off by graduated non-convexity (group_solver.h), and a merge they no longer carry is
+// undone. Map frame: the odom of the group's map that was seen first.
+//
+// Odometry that claims too much: weights come from covariances, but when the loops' innovations
+// show that a group's odometry drifts more than it says, all its covariances are multiplied by one
+// factor, the one that brings the median innovation to that of chi-squared (variance component
+// estimation, robustly). Never below one.
+//
+// Deterministic: the same calls in the same order give the same bytes. When it solves depends on
+// counts of messages alone. One thread.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "common/server_messages.h"
+#include "posegraph/group_solver.h"
+#include "posegraph/loop.h"
+#include "posegraph/odometry_chain.h"
+#include "posegraph/pair_evidence.h"
+
+namespace pangea {
+
+struct PoseGraphOptions {
+  enum class Scope {
+    kAll,    // every keyframe of the group but one
+    kPaper,  // the main map from its first overlap on; the other maps from their first keyframe
+  };
+  Scope scope = Scope::kAll;
+  MergeOptions merge;
+  GroupSolverOptions solver;
+  // A group solves after each loop; a larger one waits for one more loop per so many keyframes,
+  // or for so many new keyframes since the first waiting loop.
+  int keyframes_per_waiting_loop = 300;
+  int max_keyframes_waiting = 10;
+  // A group's state is published again after so many new keyframes, and 2 % of the group.
+  int state_every = 10;
+};
+
+struct PoseGraphUpdate {
+  std::vector<Correction> corrections;
+  std::vector<MapState> states;
+};
+
+class PoseGraph {
+ public:
+  struct Counters {
+    int64_t maps = 0;
+    int64_t groups = 0;
+    int64_t in_force = 0;
+    int64_t switched_off = 0;  // by the robust solve
+    int64_t unused = 0;        // evidence between maps that are not merged
+    int64_t solves = 0;
+    int64_t bridged = 0;  // composite edges
+    int64_t parked = 0;
+    double odometry_scale = 1;  // largest of the groups, standard deviations
+  };
+
+  // Revisions count from `first_revision`.
+  explicit PoseGraph(const PoseGraphOptions& options, int64_t first_revision = 1);
+
+  // A repeat, or one older than the newest of its map, changes nothing.
+  PoseGraphUpdate AddKeyframe(const Keyframe& keyframe);
+  // A repeat or a refusal changes nothing; one about an unknown keyframe waits for it (bounded:
+  // beyond kMaxParked it is forgotten and may come again).
+  PoseGraphUpdate AddConstraint(const Constraint& constraint);
+  // Solves every group from the beginning, as if all had come at once, and publishes what is new.
+  PoseGraphUpdate Finish();
+
+  // The map has its place in the order of age from now on, keyframes or not.
+  void NoteMap(const MapId& map) { MapNumber(map); }
+
+  Counters counters() const;
+  // As the next state would say it.
+  std::vector<MapState> States() const;
+
+ private:
+  static constexpr size_t kMaxParked = 5000;
+
+  struct Map {
+    MapId id;
+    OdometryChain chain;
+    std::vector<Pose4> poses;  // of each node, in the map frame
+    Pose4 T_map_odom;
+    int newest_solved = -1;
+    Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom
+    bool corrected = false;                  // a correction was published
+  };
+  struct Group {
+    std::vector<int> maps;         // ascending: the first is the oldest
+    bool regrouped = true;         // since the last solve
+    bool stale = false;            // loops since the last solve from the beginning
+    int waiting_loops = 0;         // since the last solve
+    int keyframes_waiting = 0;     // since the first of them
+    int64_t known_loops = 0;       // loops_ that the last graduated solve saw
+    double odometry_variance = 1;  // its factor
+    bool unpublished = true;
+    bool publish_now = false;
+    int keyframes_unpublished = 0;
+  };
+  using Pair = std::pair<int, int>;
+
+  int MapNumber(const MapId& map);
+  void AddLoop(const Constraint& constraint, NodeRef from, NodeRef to);
+  bool TryAdd(const Constraint& constraint);
+  Group& GroupOf(int map) { return groups_.at(group_of_[map]); }
+  std::vector<Loop*> LoopsOf(const Group& group);
+  void Regroup();
+  bool SolveIsDue(const Group& group) const;
+  // Solves what is due until nothing is, then publishes.
+  PoseGraphUpdate Settle(bool from_the_beginning);
+  // Merges that their loops no longer carry; whether there were any.
+  bool UndoMerges(const Group& group);
+
+  void Solve(Group* group, bool from_the_beginning);
+  void Place(const Group& group);
+  void ResetLoops(const Group& group, const std::vector<Loop*>& loops);
+  bool FitsOdometry(const Loop& loop) const;
+  double OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const;
+  std::vector<PairEvidence::Innovation> Innovations(const Group& group,
+                                                    const std::vector<Loop*>& loops) const;
+  void Apply(const GroupSolver& solver, const std::map<int, Pair>& scope,
+             const std::map<int, int>& offset);
+
+  MapState StateOf(const Group& group) const;
+  void Publish(Group* group, PoseGraphUpdate* update);
+
+  PoseGraphOptions options_;
+  int64_t next_revision_;
+  std::deque<Map> maps_;  // in the order they were first seen
+  std::map<MapId, int> numbers_;
+  std::deque<Loop> loops_;
+  std::map<Pair, PairEvidence> pairs_;
+  std::set<Pair> undone_;        // merges that the robust solve does not carry, until new evidence
+  std::map<int, Group> groups_;  // by their oldest map
+  std::vector<int> group_of_;    // of each map
+  std::vector<Constraint> parked_;
+  std::set<int64_t> seen_;  // accepted constraints
+  int64_t num_solves_ = 0;
+};
+
+}  // namespace pangea

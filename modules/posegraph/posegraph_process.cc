@@ -1,0 +1,253 @@
+#include "posegraph/posegraph_process.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+constexpr int64_t kAskAgainAfter_us = kSecond;
+constexpr int64_t kVerdictAfter_us = 2 * kSecond;
+// One request's answers must fit the receive buffer: a keyframe is about 28 kB.
+constexpr int32_t kMaxKeyframesAsked = 50;
+constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
+// A gap that nobody fills after so many requests is bridged.
+constexpr int kMaxTimesAsked = 15;
+
+}  // namespace
+
+PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
+                                   int64_t first_revision)
+    : node_(bus, "posegraph"), graph_(options, first_revision) {
+  node_.Subscribe<keyframe_t>(
+      std::string(channels::kAllKeyframes),
+      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
+  node_.Subscribe<constraint_t>(
+      std::string(channels::kConstraint),
+      [this](const std::string&, const constraint_t& message) { OnConstraint(message); });
+  node_.Subscribe<place_match_t>(
+      std::string(channels::kPlaceMatch),
+      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
+  node_.Subscribe<have_t>(std::string(channels::kHave),
+                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Subscribe<again_t>(
+      channels::Again(node_.name()),
+      [this](const std::string&, const again_t& message) { OnAgain(message); });
+}
+
+void PoseGraphProcess::OnKeyframe(const keyframe_t& message) {
+  Parsed<Keyframe> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  const KeyframeId id = parsed.value->id;
+  graph_.NoteMap(id.map);
+  const int32_t from = parsed.value->edge ? parsed.value->edge->from_seq : id.seq - 1;
+  // An edge that begins further back says that what lies between is lost for good.
+  const int32_t first_lost = std::max(from + 1, keyframes_.next(id.map));
+  const bool credible = id.seq - first_lost <= static_cast<int32_t>(InOrder<Item>::kMaxParked);
+  for (int32_t seq = first_lost; credible && seq < id.seq; ++seq) {
+    Enqueue(id.map, seq, std::nullopt);
+  }
+  Enqueue(id.map, id.seq, std::move(parsed.value));
+}
+
+void PoseGraphProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
+  for (const Item& ready : keyframes_.Add(map, seq, std::move(item))) {
+    if (ready) {
+      ++num_arrived_;
+      Publish(graph_.AddKeyframe(*ready));
+    } else {
+      node_.NoteDropped();
+    }
+  }
+}
+
+void PoseGraphProcess::OnConstraint(const constraint_t& message) {
+  const Parsed<Constraint> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  due_.erase(message.id);
+  if (verdicts_.insert(message.id).second) {
+    ++num_arrived_;
+    node_.Count(parsed.value->accepted ? "verdicts_accepted" : "verdicts_refused");
+  } else {
+    node_.Count("verdicts_repeated");
+  }
+  Publish(graph_.AddConstraint(*parsed.value));
+}
+
+void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
+  const Parsed<PlaceMatch> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  const KeyframeId& query = parsed.value->query;
+  matches_.Add(query.map, query.seq, {});
+  for (const PlaceCandidate& candidate : parsed.value->candidates) {
+    Constraint promised;
+    promised.from = candidate.match;
+    promised.to = query;
+    promised.kind = candidate.kind;
+    if (!verdicts_.contains(promised.Id()) && due_.size() < kMaxDue) {
+      due_.try_emplace(promised.Id(), Due{query, now_utime_});
+    }
+  }
+}
+
+void PoseGraphProcess::OnHave(const have_t& message) {
+  for (int i = 0; i < message.num_maps; ++i) {
+    const Parsed<MapId> map = Parse(message.maps[i]);
+    if (!map.value || message.highest_seq[i] < 0) {
+      node_.Refuse("have: invalid map or seq");
+      continue;
+    }
+    graph_.NoteMap(*map.value);
+    // What was judged before this process started.
+    if (verdicts_asked_.insert(*map.value).second) {
+      for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
+        Ask(std::string(channels::kConstraint), *map.value, seq, seq + kMaxVerdictsAsked - 1);
+      }
+    }
+    keyframes_.Announce(*map.value, message.highest_seq[i]);
+    matches_.Announce(*map.value, message.highest_seq[i]);
+  }
+}
+
+void PoseGraphProcess::OnAgain(const again_t& message) {
+  const Bytes data(message.data.data(), message.data.size());
+  keyframe_t keyframe{};
+  constraint_t constraint{};
+  place_match_t match{};
+  if (message.channel == channels::kConstraint && DecodeMessage(data, &constraint)) {
+    OnConstraint(constraint);
+  } else if (message.channel == channels::kPlaceMatch && DecodeMessage(data, &match)) {
+    OnPlaceMatch(match);
+  } else if (DecodeMessage(data, &keyframe)) {
+    OnKeyframe(keyframe);
+  } else {
+    node_.Refuse("again: not what was asked for");
+  }
+}
+
+void PoseGraphProcess::Publish(const PoseGraphUpdate& update) {
+  for (const Correction& correction : update.corrections) {
+    node_.Publish(channels::Correction(correction.map.agent_id), ToMessage(correction));
+  }
+  for (const MapState& state : update.states) {
+    for (const map_state_t& chunk : ToMessages(state)) {
+      node_.Publish(std::string(channels::kMapState), chunk);
+    }
+  }
+}
+
+void PoseGraphProcess::Finish() { Publish(graph_.Finish()); }
+
+void PoseGraphProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
+  AskForKeyframes(now_utime);
+  AskForMatches(now_utime);
+  AskForVerdicts(now_utime);
+  if (num_arrived_ != num_arrived_at_change_) {
+    num_arrived_at_change_ = num_arrived_;
+    last_change_utime_ = now_utime;
+  } else if (num_finished_ != num_arrived_ && now_utime >= last_change_utime_ + kSecond) {
+    num_finished_ = num_arrived_;
+    Finish();
+  }
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond;
+    PublishStatus(now_utime);
+  }
+}
+
+void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
+  for (const SeqGap& gap : keyframes_.Gaps()) {
+    Asked& asked = keyframes_asked_[gap.map];
+    if (asked.from_seq != gap.from_seq) {
+      asked = {gap.from_seq, now_utime + kAskAgainAfter_us / 2, 0};
+    } else if (now_utime >= asked.next_utime && asked.times >= kMaxTimesAsked) {
+      Enqueue(gap.map, gap.from_seq, std::nullopt);
+    } else if (now_utime >= asked.next_utime) {
+      asked.next_utime = now_utime + kAskAgainAfter_us;
+      ++asked.times;
+      Ask(channels::Keyframe(gap.map.agent_id), gap.map, gap.from_seq,
+          std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1));
+    }
+  }
+}
+
+void PoseGraphProcess::AskForMatches(int64_t now_utime) {
+  for (const SeqGap& gap : matches_.Gaps()) {
+    Asked& asked = matches_asked_[gap.map];
+    if (asked.from_seq != gap.from_seq) {
+      asked = {gap.from_seq, now_utime + kVerdictAfter_us, 0};
+    } else if (now_utime >= asked.next_utime) {
+      asked.next_utime = now_utime + kVerdictAfter_us;
+      Ask(std::string(channels::kPlaceMatch), gap.map, gap.from_seq,
+          std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1));
+    }
+  }
+}
+
+void PoseGraphProcess::AskForVerdicts(int64_t now_utime) {
+  std::map<MapId, std::pair<int32_t, int32_t>> overdue;
+  for (auto& [id, due] : due_) {
+    if (now_utime >= due.since_utime + kVerdictAfter_us) {
+      due.since_utime = now_utime;
+      auto& [first, last] =
+          overdue.try_emplace(due.query.map, due.query.seq, due.query.seq).first->second;
+      first = std::min(first, due.query.seq);
+      last = std::max(last, due.query.seq);
+    }
+  }
+  for (const auto& [map, range] : overdue) {
+    Ask(std::string(channels::kConstraint), map, range.first,
+        std::min(range.second, range.first + kMaxVerdictsAsked - 1));
+  }
+}
+
+void PoseGraphProcess::Ask(const std::string& channel, const MapId& map, int32_t from_seq,
+                           int32_t to_seq) {
+  resend_request_t request{};
+  request.requester = node_.name();
+  request.channel = channel;
+  request.map = ToMessage(map);
+  request.from_seq = from_seq;
+  request.to_seq = to_seq;
+  node_.Publish(std::string(channels::kResendRequest), request);
+  node_.NoteResendAsked();
+}
+
+void PoseGraphProcess::PublishStatus(int64_t now_utime) {
+  const PoseGraph::Counters counters = graph_.counters();
+  node_.Set("maps", counters.maps);
+  node_.Set("groups", counters.groups);
+  node_.Set("constraints_in_force", counters.in_force);
+  node_.Set("constraints_switched_off", counters.switched_off);
+  node_.Set("constraints_between_unmerged_maps", counters.unused);
+  node_.Set("solves", counters.solves);
+  node_.Set("edges_bridged", counters.bridged);
+  node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
+  node_.Set("verdicts_due", static_cast<int64_t>(due_.size()));
+  node_.PublishStatus(
+      now_utime,
+      counters.parked + static_cast<int64_t>(keyframes_.parked()) +
+          (num_finished_ != num_arrived_ ? 1 : 0),
+      fmt::format("{} maps in {} groups, {} constraints in force, {} switched off", counters.maps,
+                  counters.groups, counters.in_force, counters.switched_off));
+}
+
+}  // namespace pangea

@@ -1,0 +1,89 @@
+#pragma once
+
+// KEYFRAME_*, CONSTRAINT, PLACE_MATCH in; CORRECTION_k, MAP_STATE, STATUS_posegraph out.
+//
+// Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
+// (RESEND_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of, verdicts that a
+// PLACE_MATCH promised and that did not come in two seconds, and after a restart all of them. Live,
+// when nothing has come for a second, and at the end of a replay (Finish) every group is solved
+// from the beginning and published in full.
+//
+// Bounds: InOrder's for keyframes, kMaxDue promised verdicts (then no more are watched), the pose
+// graph's own for constraints that wait for keyframes.
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <variant>
+
+#include "common/bus/in_order.h"
+#include "common/bus/node.h"
+#include "common/bus/process.h"
+#include "pangea/again_t.hpp"
+#include "pangea/constraint_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "posegraph/posegraph.h"
+
+namespace pangea {
+
+class PoseGraphProcess : public Process {
+ public:
+  // Live, the first revision is the wall clock at the start, so that revisions rise over restarts.
+  PoseGraphProcess(Bus& bus, const PoseGraphOptions& options, int64_t first_revision = 1);
+
+  void Tick(int64_t now_utime) override;
+  // Solves and publishes all that is not yet; a second call adds nothing.
+  void Finish();
+
+  const PoseGraph& graph() const { return graph_; }
+
+ private:
+  static constexpr size_t kMaxDue = 20000;
+
+  // Nothing: a seq that will never come.
+  using Item = std::optional<Keyframe>;
+  struct Asked {
+    int32_t from_seq = -1;
+    int64_t next_utime = 0;
+    int times = 0;
+  };
+  struct Due {
+    KeyframeId query;
+    int64_t since_utime = 0;
+  };
+
+  void OnKeyframe(const keyframe_t& message);
+  void OnConstraint(const constraint_t& message);
+  void OnPlaceMatch(const place_match_t& message);
+  void OnHave(const have_t& message);
+  void OnAgain(const again_t& message);
+
+  void Enqueue(const MapId& map, int32_t seq, Item item);
+  void Publish(const PoseGraphUpdate& update);
+  void AskForKeyframes(int64_t now_utime);
+  void AskForMatches(int64_t now_utime);
+  void AskForVerdicts(int64_t now_utime);
+  void Ask(const std::string& channel, const MapId& map, int32_t from_seq, int32_t to_seq);
+  void PublishStatus(int64_t now_utime);
+
+  Node node_;
+  PoseGraph graph_;
+  InOrder<Item> keyframes_;
+  InOrder<std::monostate> matches_;
+  std::map<MapId, Asked> keyframes_asked_;
+  std::map<MapId, Asked> matches_asked_;
+  std::map<int64_t, Due> due_;      // promised verdicts, by constraint id
+  std::set<int64_t> verdicts_;      // that came
+  std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
+  int64_t now_utime_ = 0;           // of the newest tick
+  int64_t num_arrived_ = 0;         // keyframes, verdicts
+  int64_t num_arrived_at_change_ = 0;
+  int64_t last_change_utime_ = 0;
+  int64_t num_finished_ = 0;  // num_arrived_ at the last Finish
+  int64_t next_status_utime_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,233 @@
+// How one group is solved: where its maps start, which loops are doubted, how far its odometry is
+// believed, and what becomes of the solution.
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "posegraph/posegraph.h"
+
+namespace pangea {
+namespace {
+
+// Chi-squared with four degrees of freedom: median, and quantile 0.95.
+constexpr double kMedianChi2 = 3.357;
+constexpr double kUnlikelyChi2 = 9.488;
+constexpr double kMaxVarianceFactor = 1e4;
+constexpr size_t kMaxInnovations = 200;
+
+double MedianDistance(const std::vector<PairEvidence::Innovation>& innovations, double factor) {
+  std::vector<double> distances;
+  for (const auto& [error, measurement, odometry] : innovations) {
+    const Matrix4d covariance = measurement + factor * odometry;
+    distances.push_back(error.dot(covariance.ldlt().solve(error)));
+  }
+  const auto middle = distances.begin() + static_cast<int>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+}  // namespace
+
+bool PoseGraph::FitsOdometry(const Loop& loop) const {
+  const OdometryChain& chain = maps_[loop.from.map].chain;
+  const Eigen::Vector3d& p_to = chain[loop.to.node].T_odom_body.t;
+  const Vector4d error =
+      Residual({chain[loop.from.node].T_odom_body.t, 0}, {p_to, 0}, loop.relative);
+  const Matrix4d covariance =
+      loop.relative.covariance +
+      BelievableDrift(chain, loop.from.node, loop.to.node, p_to, options_.merge);
+  return error.dot(covariance.ldlt().solve(error)) <= options_.merge.agree_chi2;
+}
+
+std::vector<PairEvidence::Innovation> PoseGraph::Innovations(
+    const Group& group, const std::vector<Loop*>& loops) const {
+  std::vector<PairEvidence::Innovation> innovations;
+  for (const Loop* loop : loops) {
+    if (!loop->intra() || !FitsOdometry(*loop)) {
+      continue;
+    }
+    const OdometryChain& chain = maps_[loop->from.map].chain;
+    const Eigen::Vector3d& p_to = chain[loop->to.node].T_odom_body.t;
+    innovations.push_back(
+        {Residual({chain[loop->from.node].T_odom_body.t, 0}, {p_to, 0}, loop->relative),
+         loop->relative.covariance, chain.DriftBetween(loop->from.node, loop->to.node, p_to)});
+  }
+  for (const auto& [pair, evidence] : pairs_) {
+    if (evidence.verdict().merge && group_of_[pair.first] == group.maps.front() &&
+        group_of_[pair.second] == group.maps.front()) {
+      const auto more = evidence.Innovations();
+      innovations.insert(innovations.end(), more.begin(), more.end());
+    }
+  }
+  std::vector<PairEvidence::Innovation> some;
+  const size_t stride = 1 + innovations.size() / kMaxInnovations;
+  for (size_t i = 0; i < innovations.size(); i += stride) {
+    some.push_back(innovations[i]);
+  }
+  return some;
+}
+
+double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const {
+  const auto innovations = Innovations(group, loops);
+  // Loops at one place share one drift, so the median counts as a single sample: only an unlikely
+  // one speaks against the odometry.
+  if (innovations.empty() || MedianDistance(innovations, 1) < kUnlikelyChi2) {
+    return 1;
+  }
+  double low = 0, high = std::log(kMaxVarianceFactor);
+  constexpr int kBisections = 20;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (low + high);
+    (MedianDistance(innovations, std::exp(middle)) > kMedianChi2 ? low : high) = middle;
+  }
+  return std::exp(high);
+}
+
+void PoseGraph::Place(const Group& group) {
+  // Along the merges with most agreeing looks, from the oldest map on.
+  std::set<int> placed = {group.maps.front()};
+  maps_[group.maps.front()].T_map_odom = {};
+  while (placed.size() < group.maps.size()) {
+    const std::pair<const Pair, PairEvidence>* best = nullptr;
+    for (const auto& entry : pairs_) {
+      const auto& [pair, evidence] = entry;
+      const bool leads_on = placed.contains(pair.first) != placed.contains(pair.second) &&
+                            group_of_[pair.first] == group_of_[pair.second];
+      const bool merged = evidence.verdict().merge && !undone_.contains(pair);
+      const auto rank = [this](const std::pair<const Pair, PairEvidence>& e) {
+        return std::tuple(-e.second.verdict().looks, maps_[e.first.first].id,
+                          maps_[e.first.second].id);
+      };
+      if (leads_on && merged && (best == nullptr || rank(entry) < rank(*best))) {
+        best = &entry;
+      }
+    }
+    const auto& [a, b] = best->first;
+    const Pose4 T_a_b = best->second.Alignment();
+    if (placed.contains(a)) {
+      maps_[b].T_map_odom = maps_[a].T_map_odom * T_a_b;
+      placed.insert(b);
+    } else {
+      maps_[a].T_map_odom = maps_[b].T_map_odom * T_a_b.Inverse();
+      placed.insert(a);
+    }
+  }
+  for (const int number : group.maps) {
+    Map& map = maps_[number];
+    for (size_t i = 0; i < map.chain.size(); ++i) {
+      map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
+    }
+    map.newest_solved = -1;
+    map.covariance.setZero();
+  }
+}
+
+void PoseGraph::ResetLoops(const Group& group, const std::vector<Loop*>& loops) {
+  std::set<int64_t> agreeing;
+  for (const auto& [pair, evidence] : pairs_) {
+    if (group_of_[pair.first] == group.maps.front()) {
+      agreeing.insert(evidence.verdict().agreeing.begin(), evidence.verdict().agreeing.end());
+    }
+  }
+  for (Loop* loop : loops) {
+    loop->on = loop->intra() ? FitsOdometry(*loop) : agreeing.contains(loop->id);
+  }
+}
+
+void PoseGraph::Solve(Group* group, bool from_the_beginning) {
+  ++num_solves_;
+  const std::vector<Loop*> loops = LoopsOf(*group);
+  const auto num_loops = static_cast<int64_t>(loops.size());
+  const bool cold = group->regrouped || from_the_beginning;
+  // Few loops are looked at anew each time, many when they have grown by a fifth.
+  constexpr int kShare = 5;
+  const bool graduated = cold || kShare * (num_loops - group->known_loops) >= num_loops;
+  if (cold) {
+    Place(*group);
+  }
+  if (graduated) {
+    ResetLoops(*group, loops);
+    group->odometry_variance = OdometryVariance(*group, loops);
+  }
+  group->publish_now = group->unpublished = true;
+  group->regrouped = false;
+  group->stale = !cold;
+  group->waiting_loops = group->keyframes_waiting = 0;
+  if (loops.empty()) {
+    return;
+  }
+
+  // First and last node of each map; what comes after is joined to the solution by odometry alone.
+  std::map<int, Pair> scope;
+  for (const Loop* loop : loops) {
+    for (const NodeRef& node : {loop->from, loop->to}) {
+      Pair& range = scope.try_emplace(node.map, node.node, node.node).first->second;
+      range = {std::min(range.first, node.node), std::max(range.second, node.node)};
+    }
+  }
+  const int main_map = group->maps.front();
+  GroupSolver solver(options_.solver);
+  std::map<int, int> offset;  // of each map's nodes in the solver, which counts from its own zero
+  int num_nodes = 0;
+  for (auto& [number, range] : scope) {
+    if (options_.scope == PoseGraphOptions::Scope::kAll || number != main_map) {
+      range.first = 0;
+    }
+    offset[number] = num_nodes - range.first;
+    for (int i = range.first; i <= range.second; ++i, ++num_nodes) {
+      const bool fixed = number == main_map && i == range.first;
+      solver.AddNode(maps_[number].poses[i], fixed);
+    }
+    const OdometryChain& chain = maps_[number].chain;
+    for (int i = range.first + 1; i <= range.second; ++i) {
+      if (chain[i].edge_from >= range.first) {
+        Relative4 edge = chain[i].edge;
+        edge.covariance *= group->odometry_variance;
+        solver.AddOdometry(offset[number] + chain[i].edge_from, offset[number] + i, edge);
+      }
+    }
+  }
+  std::vector<bool> may_go;
+  for (const Loop* loop : loops) {
+    solver.AddLoop(offset[loop->from.map] + loop->from.node, offset[loop->to.map] + loop->to.node,
+                   loop->relative, loop->on);
+    may_go.push_back(static_cast<int64_t>(may_go.size()) >= group->known_loops);
+  }
+  if (graduated) {
+    solver.SolveGraduated();
+    group->known_loops = num_loops;
+  } else {
+    solver.SolveWarm(may_go);
+  }
+  for (size_t i = 0; i < loops.size(); ++i) {
+    loops[i]->on = solver.loop_on(static_cast<int>(i));
+  }
+  Apply(solver, scope, offset);
+}
+
+void PoseGraph::Apply(const GroupSolver& solver, const std::map<int, Pair>& scope,
+                      const std::map<int, int>& offset) {
+  std::vector<int> newest;
+  for (const auto& [number, range] : scope) {
+    newest.push_back(offset.at(number) + range.second);
+  }
+  const std::vector<Matrix4d> marginals = solver.Marginals(newest);
+  size_t index = 0;
+  for (const auto& [number, range] : scope) {
+    Map& map = maps_[number];
+    for (int i = range.first; i <= range.second; ++i) {
+      map.poses[i] = solver.pose(offset.at(number) + i);
+    }
+    const Pose4& last = map.poses[range.second];
+    const Eigen::Vector3d arm = YawRotation(last.yaw) * map.chain[range.second].T_odom_body.t;
+    map.T_map_odom = {last.p - arm, last.yaw};
+    map.covariance = CovarianceAt(marginals[index++], -arm);
+    map.newest_solved = range.second;
+    for (size_t i = range.second + 1; i < map.chain.size(); ++i) {
+      map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
+    }
+  }
+}
+
+}  // namespace pangea

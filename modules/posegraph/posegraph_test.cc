@@ -1,0 +1,404 @@
+#include "posegraph/posegraph.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <random>
+
+#include "common/testing/synthetic_world.h"
+
+namespace pangea {
+namespace {
+
+using Random = std::mt19937_64;
+
+SyntheticWorldOptions PosesOnly(int num_agents, int num_keyframes, uint64_t seed = 1) {
+  SyntheticWorldOptions options;
+  options.seed = seed;
+  options.num_agents = num_agents;
+  options.num_keyframes = num_keyframes;
+  options.with_corners = false;
+  return options;
+}
+
+// About `count` of the overlapping pairs, evenly; a share of them false.
+std::vector<Constraint> MakeConstraints(const SyntheticWorld& world, int count, double false_share,
+                                        uint64_t seed = 11) {
+  Random random(seed);
+  const std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
+  std::vector<Constraint> constraints;
+  const size_t stride = std::max<size_t>(1, pairs.size() / count);
+  for (size_t i = 0; i < pairs.size(); i += stride) {
+    const bool is_false = std::uniform_real_distribution<double>(0, 1)(random) < false_share;
+    constraints.push_back((is_false ? MakeFalseConstraint : MakeTrueConstraint)(
+        world, pairs[i].from, pairs[i].to, {}, random));
+  }
+  return constraints;
+}
+
+void AddKeyframes(const SyntheticWorld& world, PoseGraph* graph) {
+  for (size_t k = 0; k < world.agents[0].keyframes.size(); ++k) {
+    for (const SyntheticAgent& agent : world.agents) {
+      graph->AddKeyframe(agent.keyframes[k]);
+    }
+  }
+}
+
+void AddConstraints(const std::vector<Constraint>& constraints, PoseGraph* graph) {
+  for (const Constraint& constraint : constraints) {
+    graph->AddConstraint(constraint);
+  }
+}
+
+// RMSE of positions after the best turn about z and shift: the joint ATE of a group.
+double JointAte(const SyntheticWorld& world, const MapState& state) {
+  Eigen::Vector3d mean_map = Eigen::Vector3d::Zero(), mean_hall = Eigen::Vector3d::Zero();
+  const auto count = static_cast<double>(state.keyframes.size());
+  for (const KeyframePose& pose : state.keyframes) {
+    mean_map += pose.T_map_body.t / count;
+    mean_hall += world.T_hall_body(pose.id).t / count;
+  }
+  double cross = 0, dot = 0;
+  for (const KeyframePose& pose : state.keyframes) {
+    const Eigen::Vector3d a = pose.T_map_body.t - mean_map;
+    const Eigen::Vector3d b = world.T_hall_body(pose.id).t - mean_hall;
+    cross += a.x() * b.y() - a.y() * b.x();
+    dot += a.x() * b.x() + a.y() * b.y();
+  }
+  const Eigen::Quaterniond q = YawRotation(std::atan2(cross, dot));
+  double sum = 0;
+  for (const KeyframePose& pose : state.keyframes) {
+    sum += (q * (pose.T_map_body.t - mean_map) - (world.T_hall_body(pose.id).t - mean_hall))
+               .squaredNorm();
+  }
+  return std::sqrt(sum / count);
+}
+
+double OdometryAte(const SyntheticWorld& world, int agent) {
+  MapState state;
+  for (const Keyframe& keyframe : world.agents[agent].keyframes) {
+    state.keyframes.push_back({keyframe.id, keyframe.utime, keyframe.T_odom_body});
+  }
+  return JointAte(world, state);
+}
+
+TEST(PoseGraph, ALoneMapIsWhereItsOdometrySays) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(1, 25));
+  PoseGraph graph({});
+  size_t states = 0;
+  for (const Keyframe& keyframe : world.agents[0].keyframes) {
+    const PoseGraphUpdate update = graph.AddKeyframe(keyframe);
+    EXPECT_TRUE(update.corrections.empty());
+    states += update.states.size();
+  }
+  EXPECT_EQ(states, 2u);
+  const PoseGraphUpdate last = graph.Finish();
+  ASSERT_EQ(last.states.size(), 1u);
+  EXPECT_EQ(last.states[0].revision, 3);
+  ASSERT_EQ(last.states[0].keyframes.size(), 25u);
+  EXPECT_LT(
+      (last.states[0].keyframes[24].T_map_body.t - world.agents[0].keyframes[24].T_odom_body.t)
+          .norm(),
+      1e-12);
+  EXPECT_TRUE(graph.Finish().states.empty());
+}
+
+TEST(PoseGraph, LoopsInALoneMapTakeItsDriftAway) {
+  SyntheticWorldOptions options = PosesOnly(1, 300);
+  options.edge_sigma_yaw = 0.003;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  AddConstraints(MakeConstraints(world, 60, 0), &graph);
+  const PoseGraphUpdate update = graph.Finish();
+  ASSERT_EQ(update.states.size(), 1u);
+  EXPECT_EQ(update.states[0].num_switched_off, 0);
+  EXPECT_LT(JointAte(world, update.states[0]), 0.3 * OdometryAte(world, 0));
+}
+
+TEST(PoseGraph, OneMatchDoesNotMergeThreeLooksDo) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  std::vector<Constraint> constraints;
+  for (const Constraint& constraint : MakeConstraints(world, 12, 0)) {
+    if (constraint.kind == PlaceKind::kInter) {
+      constraints.push_back(constraint);
+    }
+  }
+  ASSERT_GE(constraints.size(), 6u);
+  EXPECT_TRUE(graph.AddConstraint(constraints[0]).states.empty());
+  EXPECT_EQ(graph.counters().groups, 2);
+  AddConstraints(constraints, &graph);
+  EXPECT_EQ(graph.counters().groups, 1);
+  const std::vector<MapState> states = graph.States();
+  EXPECT_EQ(states[0].maps.size(), 2u);
+  EXPECT_EQ(states[0].group, world.agents[0].map);
+  EXPECT_LT(JointAte(world, states[0]), 0.1);
+}
+
+// The same three matches again and again are one look, however many keyframes stand there.
+TEST(PoseGraph, ManyMatchesOfOneLookDoNotMerge) {
+  SyntheticWorldOptions options = PosesOnly(2, 60);
+  options.step_m = 0.003;
+  options.start_apart = 0;
+  options.edge_sigma_m = 0.0003;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  AddConstraints(MakeConstraints(world, 100, 0), &graph);
+  EXPECT_GT(graph.counters().unused, 50);
+  EXPECT_EQ(graph.counters().groups, 2);
+}
+
+TEST(PoseGraph, SwitchesOffAThirdOfWrongConstraints) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 120, seed));
+    PoseGraph graph({});
+    AddKeyframes(world, &graph);
+    const std::vector<Constraint> constraints = MakeConstraints(world, 150, 0.3, seed);
+    AddConstraints(constraints, &graph);
+    const PoseGraphUpdate update = graph.Finish();
+    ASSERT_EQ(update.states.size(), 1u) << seed;
+    Random random(0);
+    int num_false = 0;
+    for (const Constraint& constraint : constraints) {
+      const Rigid3 truth =
+          world.T_hall_body(constraint.from).Inverse() * world.T_hall_body(constraint.to);
+      num_false += (constraint.T_from_to.t - truth.t).norm() > 1 ? 1 : 0;
+    }
+    EXPECT_NEAR(update.states[0].num_switched_off, num_false, 2) << seed;
+    EXPECT_LT(JointAte(world, update.states[0]), 0.05) << seed;
+  }
+}
+
+// Wrong constraints that agree with each other by chance or by a look-alike: too few, or rivalled.
+TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  for (const Constraint& constraint : MakeConstraints(world, 200, 1.0)) {
+    if (constraint.kind == PlaceKind::kInter) {
+      graph.AddConstraint(constraint);
+      EXPECT_EQ(graph.counters().groups, 2);
+    }
+  }
+}
+
+// A constraint as it would be if map b lay elsewhere by `T`: all of these agree.
+Constraint Shifted(const SyntheticWorld& world, const KeyframePair& pair, const Rigid3& T) {
+  Random random(StableHash(pair.from, pair.to, 1));
+  Constraint constraint = MakeTrueConstraint(world, pair.from, pair.to, {}, random);
+  constraint.T_from_to = world.T_hall_body(pair.from).Inverse() * T * world.T_hall_body(pair.to);
+  return constraint;
+}
+
+TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  std::vector<KeyframePair> pairs;
+  for (const KeyframePair& pair : OverlappingPairs(world, 1.5, 25)) {
+    if (pair.from.map != pair.to.map) {
+      pairs.push_back(pair);
+    }
+  }
+  const size_t stride = pairs.size() / 30;
+  const Rigid3 wrong(YawRotation(0.4), {5, 3, 0});
+  for (size_t i = 0; i < 6; ++i) {
+    graph.AddConstraint(Shifted(world, pairs[i * stride], wrong));
+  }
+  EXPECT_EQ(graph.counters().groups, 1);
+  bool undone = false;
+  for (size_t i = 6; i < 28; ++i) {
+    const PoseGraphUpdate update = graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+    if (graph.counters().groups == 2 && !update.corrections.empty()) {
+      undone = true;
+      // The newer map's agent is told that its odom frame is its own again.
+      EXPECT_EQ(update.corrections.back().map, world.agents[1].map);
+      EXPECT_EQ(update.corrections.back().group, world.agents[1].map);
+      EXPECT_LT(update.corrections.back().T_map_odom.t.norm(), 1e-12);
+    }
+  }
+  EXPECT_TRUE(undone);
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
+}
+
+TEST(PoseGraph, OptimisedRelativePosesAreAsGoodAsTheirCovariance) {
+  double sum = 0;
+  constexpr int kTrials = 20;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    SyntheticWorldOptions options = PosesOnly(2, 150, 100 + trial);
+    options.edge_sigma_yaw = 0.002;
+    const SyntheticWorld world = MakeSyntheticWorld(options);
+    PoseGraph graph({});
+    AddKeyframes(world, &graph);
+    AddConstraints(MakeConstraints(world, 40, 0, trial), &graph);
+    const PoseGraphUpdate update = graph.Finish();
+    ASSERT_EQ(update.states.size(), 1u);
+    const Correction& correction = update.corrections[1];
+    ASSERT_EQ(correction.map, world.agents[1].map);
+    // The map frame is the odom of the first map, fixed at its first keyframe.
+    const Keyframe& first = world.agents[0].keyframes[0];
+    const Keyframe& newest = world.agents[1].keyframes[correction.seq];
+    const double yaw_map_hall =
+        YawOf(first.T_odom_body.q) - YawOf(world.agents[0].T_hall_body[0].q);
+    const double yaw_odom_hall =
+        YawOf(newest.T_odom_body.q) - YawOf(world.T_hall_body(newest.id).q);
+    const Eigen::Vector3d p_map_body =
+        first.T_odom_body.t + YawRotation(yaw_map_hall) * (world.T_hall_body(newest.id).t -
+                                                           world.agents[0].T_hall_body[0].t);
+    const Rigid3& T_map_odom = correction.T_map_odom;
+    // In the error's covariance the keyframe, not the origin of odom, is what is known best.
+    Vector4d error;
+    error << T_map_odom * newest.T_odom_body.t - p_map_body,
+        WrapAngle(YawOf(T_map_odom.q) - (yaw_map_hall - yaw_odom_hall));
+    Matrix4d at_origin;
+    constexpr int kBlock[4] = {0, 1, 2, 5};
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 4; ++j) {
+        at_origin(i, j) = correction.covariance(kBlock[i], kBlock[j]);
+      }
+    }
+    const Matrix4d covariance = CovarianceAt(at_origin, T_map_odom.q * newest.T_odom_body.t);
+    sum += error.dot(covariance.ldlt().solve(error));
+  }
+  // Four degrees of freedom; the mean of 20 has a standard deviation of 0.63. Tilt errors wander
+  // from edge to edge instead of being independent, hence the wider side below.
+  EXPECT_GT(sum / kTrials, 2);
+  EXPECT_LT(sum / kTrials, 5.9);
+}
+
+// An odometry ten times worse than it claims: good loops must not be switched off for it.
+TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
+  SyntheticWorldOptions options = PosesOnly(1, 300);
+  options.edge_sigma_m = 0.02;
+  options.edge_sigma_yaw = 0.003;
+  options.claimed_sigma_scale = 0.1;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  AddConstraints(MakeConstraints(world, 60, 0.1), &graph);
+  const PoseGraphUpdate update = graph.Finish();
+  EXPECT_GT(graph.counters().odometry_scale, 3);
+  EXPECT_LT(graph.counters().odometry_scale, 30);
+  EXPECT_LE(update.states[0].num_switched_off, 10);
+  EXPECT_LT(JointAte(world, update.states[0]), 0.5 * OdometryAte(world, 0));
+}
+
+TEST(PoseGraph, TheOrderOfArrivalDoesNotChangeTheShape) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 80));
+  std::vector<Constraint> constraints = MakeConstraints(world, 80, 0.2);
+  std::vector<std::vector<KeyframePose>> results;
+  for (int order = 0; order < 3; ++order) {
+    PoseGraph graph({});
+    std::shuffle(constraints.begin(), constraints.end(), Random(order));
+    for (size_t a = 0; a < world.agents.size(); ++a) {
+      for (const Keyframe& keyframe : world.agents[(a + order) % 3].keyframes) {
+        graph.AddKeyframe(keyframe);
+      }
+    }
+    AddConstraints(constraints, &graph);
+    const PoseGraphUpdate update = graph.Finish();
+    const std::vector<MapState> states = graph.States();
+    ASSERT_EQ(states.size(), 1u);
+    EXPECT_EQ(states[0].group, world.agents[order].map);
+    std::vector<KeyframePose> poses = states[0].keyframes;
+    std::ranges::sort(poses, {}, &KeyframePose::id);
+    const Rigid3 T_first_map = poses[0].T_map_body.Inverse();
+    for (KeyframePose& pose : poses) {
+      pose.T_map_body = T_first_map * pose.T_map_body;
+    }
+    results.push_back(poses);
+  }
+  for (size_t i = 0; i < results[0].size(); ++i) {
+    for (int order = 1; order < 3; ++order) {
+      EXPECT_LT((results[0][i].T_map_body.t - results[order][i].T_map_body.t).norm(), 2e-4);
+    }
+  }
+}
+
+TEST(PoseGraph, TheSameCallsGiveTheSameBytes) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
+  const std::vector<Constraint> constraints = MakeConstraints(world, 40, 0.2);
+  std::vector<double> results[2];
+  for (std::vector<double>& result : results) {
+    PoseGraph graph({});
+    AddKeyframes(world, &graph);
+    AddConstraints(constraints, &graph);
+    for (const KeyframePose& pose : graph.Finish().states.at(0).keyframes) {
+      result.push_back(pose.T_map_body.t.x());
+      result.push_back(pose.T_map_body.q.z());
+    }
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST(PoseGraph, ConstraintsWaitForTheirKeyframes) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
+  const std::vector<Constraint> constraints = MakeConstraints(world, 20, 0);
+  PoseGraph graph({});
+  AddConstraints(constraints, &graph);
+  AddConstraints(constraints, &graph);
+  EXPECT_EQ(graph.counters().parked, static_cast<int64_t>(constraints.size()));
+  AddKeyframes(world, &graph);
+  graph.Finish();
+  EXPECT_EQ(graph.counters().parked, 0);
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_EQ(graph.counters().in_force, static_cast<int64_t>(constraints.size()));
+}
+
+TEST(PoseGraph, BridgesAGapThatNobodyFills) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  PoseGraph graph({});
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      if (keyframe.id.seq < 40 || keyframe.id.seq >= 46) {
+        graph.AddKeyframe(keyframe);
+      }
+    }
+  }
+  AddConstraints(MakeConstraints(world, 60, 0), &graph);
+  const PoseGraphUpdate update = graph.Finish();
+  EXPECT_EQ(graph.counters().bridged, 2);
+  ASSERT_EQ(update.states.size(), 1u);
+  EXPECT_LT(JointAte(world, update.states[0]), 0.06);
+}
+
+// As the paper has it, the main map's head stays with its odometry.
+TEST(PoseGraph, ScopeOfThePaper) {
+  SyntheticWorldOptions options = PosesOnly(2, 120);
+  options.start_apart = 0.3;
+  options.edge_sigma_yaw = 0.003;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  PoseGraphOptions paper;
+  paper.scope = PoseGraphOptions::Scope::kPaper;
+  PoseGraph graph(paper);
+  AddKeyframes(world, &graph);
+  int first_overlap = 1000;
+  for (const Constraint& constraint : MakeConstraints(world, 60, 0)) {
+    if (constraint.kind == PlaceKind::kInter) {
+      graph.AddConstraint(constraint);
+      first_overlap = std::min(first_overlap, constraint.from.seq);
+    }
+  }
+  const PoseGraphUpdate update = graph.Finish();
+  ASSERT_EQ(update.states.size(), 1u);
+  ASSERT_GT(first_overlap, 3);
+  double head = 0, rest = 0;
+  for (const KeyframePose& pose : update.states[0].keyframes) {
+    if (pose.id.map == world.agents[0].map) {
+      const Rigid3& T_odom_body = world.agents[0].keyframes[pose.id.seq].T_odom_body;
+      double& moved = pose.id.seq <= first_overlap ? head : rest;
+      moved = std::max(moved, (pose.T_map_body.t - T_odom_body.t).norm());
+    }
+  }
+  EXPECT_LT(head, 1e-12);
+  EXPECT_GT(rest, 1e-3);
+}
+
+}  // namespace
+}  // namespace pangea
