@@ -1,0 +1,97 @@
+#include "session/keyframe_log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <lcm/lcm-cpp.hpp>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "common/bus/bus.h"
+#include "common/messages.h"
+
+namespace pangea::session {
+namespace {
+
+// Names what is missing: "map 1/17…: keyframes 12 to 15 are missing".
+void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs) {
+  std::string gaps;
+  for (const auto& [map, present] : seqs) {
+    int32_t next = 0;
+    for (const int32_t seq : present) {
+      if (seq != next) {
+        gaps += fmt::format("\n  map {}: keyframes {} to {}", ToString(map), next, seq - 1);
+      }
+      next = seq + 1;
+    }
+  }
+  if (!gaps.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: keyframes are missing, and a replay without them would not be the same:{}\n"
+        "The server's journal (journal.lcm beside a session.lcm) has every keyframe: replay that.",
+        log.string(), gaps));
+  }
+}
+
+}  // namespace
+
+std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
+  lcm::LogFile file(log.string(), "r");
+  if (!file.good()) {
+    throw std::runtime_error(fmt::format("{}: cannot be read as an LCM log", log.string()));
+  }
+  std::vector<LoggedKeyframe> keyframes;
+  std::map<MapId, std::set<int32_t>> seqs;
+  while (const lcm::LogEvent* event = file.readNextEvent()) {
+    if (!event->channel.starts_with("KEYFRAME_")) {
+      continue;
+    }
+    const auto* bytes = static_cast<const uint8_t*>(event->data);
+    LoggedKeyframe keyframe;
+    keyframe.channel = event->channel;
+    keyframe.data.assign(bytes, bytes + event->datalen);
+    keyframe_t message;
+    const bool decoded = DecodeMessage(keyframe.data, &message);
+    const auto id = decoded ? Parse(message.id) : Parsed<KeyframeId>{};
+    if (!id.value) {
+      throw std::runtime_error(fmt::format("{}: event {} on {} is not a keyframe of this version",
+                                           log.string(), event->eventnum, event->channel));
+    }
+    keyframe.id = *id.value;
+    keyframe.utime = message.utime;
+    if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
+      keyframes.push_back(std::move(keyframe));
+    }
+  }
+  if (keyframes.empty()) {
+    throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
+  }
+  CheckGaps(log, seqs);
+  return keyframes;
+}
+
+std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs) {
+  std::vector<LoggedKeyframe> merged;
+  std::vector<size_t> next(logs.size(), 0);
+  while (true) {
+    size_t best = logs.size();
+    int64_t best_elapsed = 0;
+    for (size_t i = 0; i < logs.size(); ++i) {
+      if (next[i] < logs[i].size()) {
+        const int64_t elapsed = logs[i][next[i]].utime - logs[i].front().utime;
+        if (best == logs.size() || elapsed < best_elapsed) {
+          best = i;
+          best_elapsed = elapsed;
+        }
+      }
+    }
+    if (best == logs.size()) {
+      return merged;
+    }
+    // A copy: the log's first keyframe is its clock to the end.
+    merged.push_back(logs[best][next[best]++]);
+  }
+}
+
+}  // namespace pangea::session

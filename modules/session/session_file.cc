@@ -1,0 +1,99 @@
+#include "session/session_file.h"
+
+#include <fmt/format.h>
+
+#include <set>
+#include <stdexcept>
+
+#include "common/yaml_options.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A recording is a folder with mav0 in it, or mav0 itself.
+bool IsRecording(const fs::path& folder) {
+  return fs::is_directory(folder / "mav0") || fs::is_directory(folder / "cam0");
+}
+
+// The folder itself, or the only folder whose name continues it (MH_01 -> MH_01_easy).
+std::optional<fs::path> FindRecording(const fs::path& wanted) {
+  if (IsRecording(wanted)) {
+    return wanted;
+  }
+  std::optional<fs::path> found;
+  const std::string prefix = wanted.filename().string() + "_";
+  if (fs::is_directory(wanted.parent_path())) {
+    for (const auto& entry : fs::directory_iterator(wanted.parent_path())) {
+      if (entry.path().filename().string().starts_with(prefix) && IsRecording(entry.path())) {
+        if (found) {
+          return std::nullopt;
+        }
+        found = entry.path();
+      }
+    }
+  }
+  return found;
+}
+
+void CheckAgents(const SessionScript& script, const std::string& file) {
+  if (script.agents.empty()) {
+    throw std::runtime_error(fmt::format("{}: 'agents' is empty: list at least one agent", file));
+  }
+  std::set<int32_t> ids;
+  for (const AgentScript& agent : script.agents) {
+    if (agent.id < 1 || agent.id > 65535) {
+      throw std::runtime_error(
+          fmt::format("{}: agent id {}: use a number from 1 to 65535", file, agent.id));
+    }
+    if (!ids.insert(agent.id).second) {
+      throw std::runtime_error(
+          fmt::format("{}: agent id {} is given twice: every agent needs its own", file, agent.id));
+    }
+    if (agent.delay_s < 0 || agent.start_s < 0 || agent.duration_s < 0) {
+      throw std::runtime_error(fmt::format(
+          "{}: agent {}: delay, start and duration must not be negative", file, agent.id));
+    }
+  }
+}
+
+}  // namespace
+
+SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path>& recordings) {
+  SessionScript script;
+  YamlOptions yaml;
+  yaml.AddList("agents", &script.agents, [](YamlOptions& item, AgentScript& agent) {
+    item.Add("id", &agent.id);
+    item.Require("id");
+    item.Add("recording", &agent.recording);
+    item.Require("recording");
+    item.Add("delay", &agent.delay_s);
+    item.Add("start", &agent.start_s);
+    item.Add("duration", &agent.duration_s);
+  });
+  yaml.Require("agents");
+  yaml.ReadFile(file.string());
+  CheckAgents(script, file.string());
+
+  const fs::path base = recordings.value_or(fs::absolute(file).parent_path());
+  std::string missing;
+  for (AgentScript& agent : script.agents) {
+    const auto found = FindRecording((base / agent.recording).lexically_normal());
+    if (found) {
+      agent.resolved = *found;
+    } else {
+      missing += fmt::format("\n  agent {}: {}", agent.id,
+                             (base / agent.recording).lexically_normal().string());
+    }
+  }
+  if (!missing.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no EuRoC recording (a folder with mav0/cam0 and mav0/imu0) at:{}\n"
+                    "Put them there, or name the folder that holds them with --recordings DIR.",
+                    file.string(), missing));
+  }
+  return script;
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,321 @@
+#include "session/session_runner.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <stdexcept>
+
+#include "common/bus/process.h"
+#include "session/buses.h"
+#include "session/child_process.h"
+#include "session/session_monitor.h"
+#include "session/session_progress.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxRestarts = 20;         // of one process; then the session gives it up
+constexpr double kStartTimeout_s = 20;   // for the server processes to report
+constexpr double kDrainTimeout_s = 300;  // for the server to work off what has come
+constexpr double kQuiet_s = 2.5;         // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStopGrace_s = 5;
+
+double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
+
+// A process the session keeps alive.
+struct Kept {
+  std::vector<std::string> argv;
+  ChildProcess child;
+  int restarts = 0;
+};
+
+// One agent's vio: ends by itself when its recording is over.
+struct Player {
+  AgentScript script;
+  std::optional<ChildProcess> child;
+  double started = 0;
+  double ended = 0;
+  double played_before_s = 0;  // seconds of recording played by earlier runs of a restarted vio
+  int restarts = 0;
+
+  bool done() const { return ended > 0; }
+};
+
+class Runner {
+ public:
+  Runner(const SessionScript& script, const RunOptions& options)
+      : options_(options),
+        buses_(ChooseBuses(Ids(script), options.first_port)),
+        monitor_(buses_),
+        progress_(isatty(STDOUT_FILENO) != 0) {
+    for (const AgentScript& agent : script.agents) {
+      players_.push_back({.script = agent});
+    }
+  }
+
+  RunSummary Run() {
+    begin_ = Now();
+    fs::create_directories(options_.out / "logs");
+    // The processes are one-threaded by design; BLAS must not start threads behind their back.
+    setenv("OMP_NUM_THREADS", "1", 1);
+    setenv("OPENBLAS_NUM_THREADS", "1", 1);
+    StartServer();
+    StartLinks();
+    Play();
+    Drain();
+    StopAll();
+    summary_.wall_s = Now() - begin_;
+    summary_.status = monitor_.statuses();
+    for (const Player& player : players_) {
+      summary_.vio_wall_s[player.script.id] = player.ended - player.started;
+    }
+    return summary_;
+  }
+
+ private:
+  static std::vector<int32_t> Ids(const SessionScript& script) {
+    std::vector<int32_t> ids;
+    for (const AgentScript& agent : script.agents) {
+      ids.push_back(agent.id);
+    }
+    return ids;
+  }
+
+  static std::string Program(const std::string& name) {
+    const fs::path path = ProgramDirectory() / name;
+    if (!fs::exists(path)) {
+      throw std::runtime_error(
+          fmt::format("{} is missing: build it (scripts/build)", path.string()));
+    }
+    return path.string();
+  }
+
+  void Keep(const std::string& name, std::vector<std::string> argv) {
+    ChildProcess child(name, argv, options_.out / "logs" / (name + ".txt"));
+    kept_.push_back({std::move(argv), std::move(child)});
+  }
+
+  // lcm-logger refuses an existing file, and a restarted one must go on in it: append.
+  void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
+    const auto logger = FindOnPath("lcm-logger");
+    if (!logger) {
+      throw std::runtime_error("lcm-logger is not on PATH: install liblcm-bin");
+    }
+    Keep(name, {logger->string(), "--append", "--lcm-url=" + url, file.string()});
+  }
+
+  void StartServer() {
+    KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
+    Keep("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link, "--server",
+                           buses_.server, "--journal", (options_.out / "journal.lcm").string()});
+    for (const auto& [name, program] :
+         {std::pair{"place_recognition", "pangea-place-recognition"},
+          std::pair{"inter_map_ba", "pangea-inter-map-ba"}, std::pair{"fusion", "pangea-fusion"},
+          std::pair{"posegraph", "pangea-posegraph"}}) {
+      Keep(name, {Program(program), "--bus", buses_.server});
+      server_names_.emplace_back(name);
+    }
+    server_names_.emplace_back("agent_handler");
+    const double deadline = Now() + kStartTimeout_s;
+    while (!monitor_.Idle(server_names_, 0) && !StopRequested()) {
+      if (Now() > deadline) {
+        throw std::runtime_error(
+            fmt::format("the server processes did not come up within {} s; their output is in {}",
+                        kStartTimeout_s, (options_.out / "logs").string()));
+      }
+      monitor_.Handle(50);
+      Revive();
+    }
+  }
+
+  void StartLinks() {
+    for (const Player& player : players_) {
+      const int32_t id = player.script.id;
+      const std::string bus = buses_.agents.at(id);
+      KeepLogger(fmt::format("logger_agent_{}", id), bus,
+                 options_.out / fmt::format("agent_{}.lcm", id));
+      Keep(fmt::format("uplink_{}", id), {Program("pangea-uplink"), "--agent", std::to_string(id),
+                                          "--bus", bus, "--link", buses_.link});
+    }
+  }
+
+  void StartPlayer(Player& player) {
+    const int32_t id = player.script.id;
+    std::vector<std::string> argv = {
+        Program("pangea-vio"),
+        "--agent",
+        std::to_string(id),
+        "--bus",
+        buses_.agents.at(id),
+        "--recording",
+        player.script.resolved.string(),
+        "--rate",
+        options_.rate,
+        "--start",
+        fmt::format("{}", player.script.start_s + player.played_before_s)};
+    if (player.script.duration_s > 0) {
+      argv.insert(argv.end(), {"--duration", fmt::format("{}", player.script.duration_s -
+                                                                   player.played_before_s)});
+    }
+    const std::string name = fmt::format("vio_{}", id);
+    player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
+    if (player.started == 0) {
+      player.started = Now();
+    }
+  }
+
+  // Seconds of session time: wall time scaled by the rate; at rate max, how far the furthest agent
+  // is.
+  double SessionTime() const {
+    if (options_.rate != "max") {
+      return (Now() - play_begin_) * std::stod(options_.rate);
+    }
+    double furthest = 0;
+    bool any_playing = false;
+    for (const Player& player : players_) {
+      if (player.child) {
+        furthest = std::max(furthest,
+                            player.script.delay_s + monitor_.agent(player.script.id).recorded_s());
+        any_playing = any_playing || !player.done();
+      }
+    }
+    // With nobody playing, session time would stand still: the next agent starts at once.
+    return any_playing ? furthest : 1e18;
+  }
+
+  void Play() {
+    play_begin_ = Now();
+    const auto done = [](const Player& player) { return player.done(); };
+    while (!std::all_of(players_.begin(), players_.end(), done) && !StopRequested()) {
+      for (Player& player : players_) {
+        const bool due = player.script.delay_s <= 0 || SessionTime() >= player.script.delay_s;
+        if (!player.child && due) {
+          StartPlayer(player);
+        }
+        WatchPlayer(player);
+      }
+      Step();
+    }
+    for (Player& player : players_) {
+      if (player.child && !player.done()) {
+        player.child->Stop(kStopGrace_s);
+        player.ended = Now();
+      }
+    }
+    summary_.interrupted = StopRequested();
+  }
+
+  void WatchPlayer(Player& player) {
+    const auto exit = player.child ? player.child->Poll() : std::nullopt;
+    if (!exit || player.done()) {
+      return;
+    }
+    if (exit->code == 0 || StopRequested()) {
+      player.ended = Now();
+    } else if (exit->signal != 0 && player.restarts < kMaxRestarts) {
+      // Killed: the same agent goes on where it was, in a new map.
+      ++player.restarts;
+      summary_.restarted.push_back(player.child->name());
+      player.played_before_s = monitor_.agent(player.script.id).recorded_s();
+      StartPlayer(player);
+    } else {
+      player.ended = Now();
+      summary_.failures.push_back(
+          fmt::format("agent {}: {}", player.script.id, player.child->LastLine()));
+      progress_.Say(summary_.failures.back());
+    }
+  }
+
+  void Revive() {
+    for (Kept& kept : kept_) {
+      const auto exit = kept.child.Poll();
+      if (!exit || kept.restarts >= kMaxRestarts) {
+        continue;
+      }
+      const std::string name = kept.child.name();
+      progress_.Say(fmt::format("{} ended ({}): {}; starting it again", name,
+                                exit->signal != 0 ? fmt::format("signal {}", exit->signal)
+                                                  : fmt::format("exit code {}", exit->code),
+                                kept.child.LastLine()));
+      summary_.restarted.push_back(name);
+      const int restarts = kept.restarts + 1;
+      std::vector<std::string> argv = kept.argv;
+      std::destroy_at(&kept);
+      std::construct_at(
+          &kept,
+          Kept{argv, ChildProcess(name, argv, options_.out / "logs" / (name + ".txt")), restarts});
+      if (restarts == kMaxRestarts) {
+        summary_.failures.push_back(
+            fmt::format("{} ended {} times and was given up", name, restarts));
+      }
+    }
+  }
+
+  void Step() {
+    monitor_.Handle(100);
+    Revive();
+    std::vector<AgentLine> lines;
+    for (const Player& player : players_) {
+      lines.push_back({player.script.id, player.child.has_value(), player.done()});
+    }
+    progress_.Update(lines, monitor_, Now() - begin_);
+  }
+
+  // Until every process has worked off what has come.
+  void Drain() {
+    std::vector<std::string> names = server_names_;
+    for (const Player& player : players_) {
+      names.push_back(fmt::format("uplink_{}", player.script.id));
+    }
+    const double deadline = Now() + (summary_.interrupted ? 2 * kQuiet_s : kDrainTimeout_s);
+    while (!monitor_.Idle(names, kQuiet_s)) {
+      if (Now() > deadline) {
+        if (!summary_.interrupted) {
+          summary_.failures.push_back(
+              fmt::format("the server did not come to rest within {} s", kDrainTimeout_s));
+        }
+        return;
+      }
+      Step();
+    }
+  }
+
+  // Sources first, loggers last, so that nothing said is missed.
+  void StopAll() {
+    progress_.Finish();
+    for (const bool loggers : {false, true}) {
+      for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) {
+        if (kept->child.name().starts_with("logger") == loggers) {
+          kept->child.Stop(kStopGrace_s);
+        }
+      }
+    }
+  }
+
+  RunOptions options_;
+  Buses buses_;
+  SessionMonitor monitor_;
+  SessionProgress progress_;
+  std::vector<Kept> kept_;
+  std::vector<Player> players_;
+  std::vector<std::string> server_names_;
+  RunSummary summary_;
+  double begin_ = 0;
+  double play_begin_ = 0;
+};
+
+}  // namespace
+
+RunSummary RunSession(const SessionScript& script, const RunOptions& options) {
+  InstallSignalHandlers();
+  return Runner(script, options).Run();
+}
+
+}  // namespace pangea::session
