@@ -56,7 +56,7 @@ class Runner {
         monitor_(buses_),
         progress_(isatty(STDOUT_FILENO) != 0) {
     for (const AgentScript& agent : script.agents) {
-      players_.push_back({.script = agent});
+      players_.emplace_back().script = agent;
     }
   }
 
