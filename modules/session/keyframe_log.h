@@ -18,12 +18,13 @@ struct LoggedKeyframe {
   std::vector<uint8_t> data;  // the encoded keyframe_t
 };
 
-// All distinct keyframes of one log in log order. Throws std::runtime_error naming the log when it cannot be read, a
-// keyframe does not decode, there is none, or a map's keyframes have gaps or are out of order (named).
+// All distinct keyframes of one log in log order. Throws std::runtime_error naming the log when it
+// cannot be read, a keyframe does not decode, there is none, or a map's keyframes have gaps or are
+// out of order (named).
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log);
 
-// Several logs as if they had started together: ordered by the time since each log's first keyframe, ties by the
-// order of the logs; each log keeps its own order.
+// Several logs as if they had started together: ordered by the time since each log's first
+// keyframe, ties by the order of the logs; each log keeps its own order.
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs);
 
 }  // namespace pangea::session
