@@ -75,6 +75,7 @@ class Runner {
     summary_.status = monitor_.statuses();
     for (const Player& player : players_) {
       summary_.vio_wall_s[player.script.id] = player.ended - player.started;
+      summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
     }
     return summary_;
   }

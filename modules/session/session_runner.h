@@ -28,6 +28,7 @@ struct RunSummary {
   std::vector<std::string> failures;       // one line each: what could not be done
   std::map<std::string, status_t> status;  // newest status of each process
   std::map<int32_t, double> vio_wall_s;    // how long each agent's vio ran
+  std::map<int32_t, double> played_s;      // how much of its recording it played
 };
 
 // Blocks until every recording is played and the server has worked everything off, or Ctrl-C.

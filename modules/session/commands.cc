@@ -1,0 +1,152 @@
+#include "session/commands.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include "session/replay.h"
+#include "session/session_file.h"
+#include "session/session_report.h"
+#include "session/session_runner.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// An earlier session in the folder is moved aside: nothing is lost.
+void PrepareOut(const fs::path& out) {
+  if (fs::exists(out) && !fs::is_directory(out)) {
+    throw std::runtime_error(fmt::format("--out {}: is a file, not a folder", out.string()));
+  }
+  if (fs::exists(out / "session.lcm")) {
+    for (int n = 1;; ++n) {
+      const fs::path aside = out.string() + fmt::format(".{}", n);
+      if (!fs::exists(aside)) {
+        fs::rename(out, aside);
+        std::cout << fmt::format("moved the earlier session in {} to {}\n", out.string(),
+                                 aside.string());
+        break;
+      }
+    }
+  }
+  fs::create_directories(out);
+}
+
+struct RunArguments {
+  std::string file;
+  std::string out;
+  std::string recordings;
+  std::string rate = "1";
+  int first_port = 0;
+};
+
+int Run(const RunArguments& arguments) {
+  const SessionScript script =
+      ReadSessionFile(arguments.file, arguments.recordings.empty()
+                                          ? std::nullopt
+                                          : std::make_optional<fs::path>(arguments.recordings));
+  RunOptions options;
+  options.out = fs::path(arguments.out);
+  options.rate = arguments.rate;
+  if (arguments.first_port != 0) {
+    options.first_port = static_cast<uint16_t>(arguments.first_port);
+  }
+  PrepareOut(options.out);
+  WriteRecordings(script, options.out);
+  const RunSummary summary = RunSession(script, options);
+  std::cout << ReportRun(script, summary, options.out) << std::flush;
+  for (const std::string& failure : summary.failures) {
+    std::cerr << fmt::format("pangea-session: {}\n", failure);
+  }
+  return summary.failures.empty() ? 0 : 1;
+}
+
+struct ReplayArguments {
+  std::vector<std::string> logs;
+  std::string out;
+  std::vector<std::string> recordings;  // ID=DIR
+};
+
+// "2=folder" given on the command line goes before what the capture remembers.
+std::vector<AgentRun> RecordingsOf(const ReplayArguments& arguments) {
+  std::vector<AgentRun> runs = ReadRecordings({arguments.logs.begin(), arguments.logs.end()});
+  for (const std::string& given : arguments.recordings) {
+    const size_t equals = given.find('=');
+    AgentRun run;
+    try {
+      run.id = std::stoi(given.substr(0, equals));
+    } catch (const std::logic_error&) {
+      run.id = 0;
+    }
+    if (equals == std::string::npos || run.id < 1) {
+      throw std::runtime_error(fmt::format(
+          "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", given));
+    }
+    run.recording = given.substr(equals + 1);
+    std::erase_if(runs, [&](const AgentRun& known) { return known.id == run.id; });
+    runs.push_back(run);
+  }
+  return runs;
+}
+
+int RunReplay(const ReplayArguments& arguments) {
+  const fs::path out(arguments.out);
+  for (const std::string& log : arguments.logs) {
+    if (fs::exists(out) && fs::equivalent(fs::absolute(log).parent_path(), out)) {
+      throw std::runtime_error(fmt::format(
+          "--out {}: holds the log that is to be replayed; give another folder", arguments.out));
+    }
+  }
+  const std::vector<AgentRun> recordings = RecordingsOf(arguments);
+  PrepareOut(out);
+  const ReplaySummary summary =
+      Replay({arguments.logs.begin(), arguments.logs.end()}, out / "session.lcm");
+  std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
+                           summary.agent_ids.size());
+  std::cout << ReportReplay(recordings, out) << std::flush;
+  return 0;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, int* exit_code) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App* run = app.add_subcommand("run", "Play a session file through real processes");
+  run->add_option("file", arguments->file, "Session file (YAML)")->required();
+  run->add_option("--out", arguments->out, "Folder for everything the session leaves")->required();
+  run->add_option("--recordings", arguments->recordings,
+                  "Folder the recordings are relative to (default: the session file's)");
+  run->add_option("--rate", arguments->rate,
+                  "1 = as recorded, 2 = twice as fast, ..., max = as fast as everybody keeps up")
+      ->check(CLI::PositiveNumber | CLI::IsMember({"max"}))
+      ->capture_default_str();
+  run->add_option("--port", arguments->first_port,
+                  "First UDP port of the session's buses (default: free ones are chosen)")
+      ->check(CLI::Range(1024, 65000));
+  run->callback([arguments, exit_code] { *exit_code = Run(*arguments); });
+}
+
+void AddReplayCommand(CLI::App& app, int* exit_code) {
+  auto arguments = std::make_shared<ReplayArguments>();
+  CLI::App* replay = app.add_subcommand(
+      "replay", "Run the server over the keyframes of captured logs, deterministically");
+  replay
+      ->add_option("logs", arguments->logs,
+                   "session.lcm or journal.lcm of a session, or logs of pangea-vio "
+                   "--out-keyframes; several are "
+                   "interleaved as if they had started together")
+      ->required()
+      ->check(CLI::ExistingFile);
+  replay->add_option("--out", arguments->out, "Folder for the results")->required();
+  replay->add_option(
+      "--recording", arguments->recordings,
+      "ID=FOLDER: an agent's recording, for its ground truth (default: as the session "
+      "remembers it beside its log)");
+  replay->callback([arguments, exit_code] { *exit_code = RunReplay(*arguments); });
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,14 @@
+#pragma once
+
+// The command line of pangea-session.
+
+#include <CLI/CLI.hpp>
+
+namespace pangea::session {
+
+// Adds `run` and `replay` to the app; whichever is given runs when the app has parsed. `exit_code`
+// is set by it.
+void AddRunCommand(CLI::App& app, int* exit_code);
+void AddReplayCommand(CLI::App& app, int* exit_code);
+
+}  // namespace pangea::session

@@ -1,0 +1,119 @@
+#include "session/session_report.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::optional<int64_t> Counter(const RunSummary& summary, const std::string& process,
+                               const std::string& name) {
+  const auto status = summary.status.find(process);
+  if (status != summary.status.end()) {
+    for (const counter_t& counter : status->second.counters) {
+      if (counter.name == name) {
+        return counter.count;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+AgentRun RunOf(const AgentScript& script) {
+  AgentRun run;
+  run.id = script.id;
+  run.recording = script.resolved.string();
+  run.start_s = script.start_s;
+  if (script.duration_s > 0) {
+    run.duration_s = script.duration_s;
+  }
+  return run;
+}
+
+}  // namespace
+
+std::string ReportRun(const SessionScript& script, const RunSummary& summary, const fs::path& out) {
+  ReportInput input;
+  input.server_log = (out / "session.lcm").string();
+  double recorded_s = 0;
+  for (const AgentScript& agent : script.agents) {
+    AgentRun run = RunOf(agent);
+    run.bus_log = (out / fmt::format("agent_{}.lcm", agent.id)).string();
+    const std::string uplink = fmt::format("uplink_{}", agent.id);
+    run.bytes_up = Counter(summary, uplink, "bytes_up");
+    run.bytes_down = Counter(summary, uplink, "bytes_down");
+    const auto played = summary.played_s.find(agent.id);
+    const auto wall = summary.vio_wall_s.find(agent.id);
+    if (played != summary.played_s.end() && wall != summary.vio_wall_s.end() && wall->second > 0) {
+      run.realtime_factor = played->second / wall->second;
+      recorded_s = std::max(recorded_s, played->second);
+    }
+    input.agents.push_back(std::move(run));
+  }
+  // What a process could do at most: seconds of session per second of its own CPU time.
+  for (const auto& [name, status] : summary.status) {
+    if (status.cpu_s > 0 && recorded_s > 0) {
+      input.realtime_factors[name] = recorded_s / static_cast<double>(status.cpu_s);
+    }
+  }
+  for (const std::string& name : summary.restarted) {
+    ++input.restarts[name];
+  }
+  input.notes = summary.failures;
+  if (summary.interrupted) {
+    input.notes.emplace_back("interrupted: the recordings were not played to their end");
+  }
+  return WriteReport(input, out.string());
+}
+
+std::string ReportReplay(const std::vector<AgentRun>& agents, const fs::path& out) {
+  ReportInput input;
+  input.server_log = (out / "session.lcm").string();
+  input.agents = agents;
+  return WriteReport(input, out.string());
+}
+
+void WriteRecordings(const SessionScript& script, const fs::path& out) {
+  json agents = json::array();
+  for (const AgentScript& agent : script.agents) {
+    agents.push_back({{"id", agent.id},
+                      {"recording", fs::absolute(agent.resolved).string()},
+                      {"start", agent.start_s},
+                      {"duration", agent.duration_s}});
+  }
+  std::ofstream(out / "recordings.json") << json{{"agents", agents}}.dump(2) << "\n";
+}
+
+std::vector<AgentRun> ReadRecordings(const std::vector<fs::path>& logs) {
+  std::vector<AgentRun> runs;
+  std::set<fs::path> seen;
+  for (const fs::path& log : logs) {
+    const fs::path file = fs::absolute(log).parent_path() / "recordings.json";
+    if (!fs::exists(file) || !seen.insert(file).second) {
+      continue;
+    }
+    try {
+      std::ifstream stream(file);
+      for (const json& agent : json::parse(stream).at("agents")) {
+        AgentScript script;
+        script.id = agent.at("id").get<int32_t>();
+        script.resolved = agent.at("recording").get<std::string>();
+        script.start_s = agent.at("start").get<double>();
+        script.duration_s = agent.at("duration").get<double>();
+        runs.push_back(RunOf(script));
+      }
+    } catch (const json::exception& error) {
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+    }
+  }
+  return runs;
+}
+
+}  // namespace pangea::session
