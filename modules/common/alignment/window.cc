@@ -41,8 +41,10 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
     window.landmark_of_corner.emplace_back(keyframe.corners.size(), -1);
   }
 
-  // The most certain depth of each landmark; points without a landmark stand alone.
-  std::map<int32_t, Estimate> best;
+  // The newest depth of each landmark: it rests on most observations. (Not the one that claims to
+  // be the most certain: sigma over inverse depth favours depths whose error makes them near.)
+  // Points without a landmark stand alone.
+  std::map<int32_t, Estimate> newest;
   std::vector<Estimate> alone;
   for (int f = 0; f <= window.newest(); ++f) {
     for (const MapPoint& point : window.keyframe(f).points) {
@@ -58,10 +60,7 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
         alone.push_back(estimate);
         continue;
       }
-      const auto [it, added] = best.emplace(id, estimate);
-      if (!added && estimate.relative() < it->second.relative()) {
-        it->second = estimate;
-      }
+      newest[id] = estimate;
     }
   }
 
@@ -84,7 +83,7 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
     }
     window.landmarks.push_back(std::move(landmark));
   };
-  for (const auto& [id, estimate] : best) {
+  for (const auto& [id, estimate] : newest) {
     add(id, estimate);
   }
   for (const Estimate& estimate : alone) {
