@@ -6,7 +6,9 @@
 #include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
-#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
 
 #include "common/preintegration.h"
 #include "vio/initial_solution.h"
@@ -106,24 +108,31 @@ struct YawCost {
   }
 };
 
+// Views of the unknowns, which all live in one array: Ceres orders blocks by their address, and
+// only inside one array is that the same in every run.
 struct Pose {
-  Quaterniond q;
-  Vector3d p, v;
+  Eigen::Map<Quaterniond> q;
+  Eigen::Map<Vector3d> p, v;
 };
 
 class StartProblem {
  public:
   StartProblem(std::span<const StartFrame> frames, const Rigid3& T_body_cam, const ImuNoise& noise,
                const Vector3d& gyro_bias, const LinearStart& start, double ray_sigma)
-      : frames_(frames), T_body_cam_(T_body_cam), gyro_bias_(gyro_bias), ray_sigma_(ray_sigma) {
+      : frames_(frames), T_body_cam_(T_body_cam), ray_sigma_(ray_sigma) {
+    blocks_.reserve(2 + 3 * frames.size() + start.p_first.size());
+    new (&gyro_bias_) Eigen::Map<Vector3d>(NewBlock(gyro_bias));
+    new (&accel_bias_) Eigen::Map<Vector3d>(NewBlock(Vector3d::Zero()));
     const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
     for (size_t k = 0; k < frames.size(); ++k) {
-      poses_.push_back({q_odom_first * start.T_first_body[k].q,
-                        q_odom_first * start.T_first_body[k].t,
-                        q_odom_first * start.v_first_body[k]});
+      double* q = NewBlock((q_odom_first * start.T_first_body[k].q).coeffs());
+      double* p = NewBlock(q_odom_first * start.T_first_body[k].t);
+      double* v = NewBlock(q_odom_first * start.v_first_body[k]);
+      poses_.push_back(
+          {Eigen::Map<Quaterniond>(q), Eigen::Map<Vector3d>(p), Eigen::Map<Vector3d>(v)});
     }
     for (const auto& [id, p] : start.p_first) {
-      points_[id] = q_odom_first * p;
+      points_.emplace(id, Eigen::Map<Vector3d>(NewBlock(q_odom_first * p)));
     }
     AddImu(noise);
     AddRays();
@@ -142,6 +151,7 @@ class StartProblem {
   std::optional<RefinedStart> Solve() {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = Ordering();
     options.max_num_iterations = 20;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
@@ -163,6 +173,29 @@ class StartProblem {
   }
 
  private:
+  template <typename Vector>
+  double* NewBlock(const Vector& value) {
+    blocks_.emplace_back(Eigen::Vector4d::Zero());
+    blocks_.back().head(value.size()) = value;
+    return blocks_.back().data();
+  }
+
+  // Points are eliminated first.
+  std::shared_ptr<ceres::ParameterBlockOrdering> Ordering() const {
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    std::vector<double*> all;
+    problem_.GetParameterBlocks(&all);
+    for (double* block : all) {
+      ordering->AddElementToGroup(block, 1);
+    }
+    for (const auto& [id, point] : points_) {
+      if (problem_.HasParameterBlock(point.data())) {
+        ordering->AddElementToGroup(const_cast<double*>(point.data()), 0);
+      }
+    }
+    return ordering;
+  }
+
   void AddImu(const ImuNoise& noise) {
     for (size_t k = 1; k < frames_.size(); ++k) {
       Preintegrator integrator(noise, gyro_bias_, Vector3d::Zero());
@@ -248,11 +281,12 @@ class StartProblem {
 
   std::span<const StartFrame> frames_;
   Rigid3 T_body_cam_;
-  Vector3d gyro_bias_;
-  Vector3d accel_bias_ = Vector3d::Zero();
   double ray_sigma_;
-  std::deque<Pose> poses_;
-  std::map<int32_t, Vector3d> points_;
+  std::vector<Eigen::Vector4d> blocks_;
+  Eigen::Map<Vector3d> gyro_bias_{nullptr};
+  Eigen::Map<Vector3d> accel_bias_{nullptr};
+  std::vector<Pose> poses_;
+  std::map<int32_t, Eigen::Map<Vector3d>> points_;
   ceres::Problem problem_;
 };
 

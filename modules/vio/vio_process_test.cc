@@ -180,6 +180,24 @@ TEST_F(VioProcessTest, PublishesPosesAndCompleteKeyframes) {
   EXPECT_GE(ReadTum(options_.out_tum, &warnings).size(), 100u);
 }
 
+TEST_F(VioProcessTest, TheSameRecordingGivesTheSameBytes) {
+  std::vector<std::vector<uint8_t>> runs[2];
+  for (auto& run : runs) {
+    LocalBus bus;
+    bus.Subscribe("KEYFRAME_7", [&run](const std::string&, Bytes data) {
+      run.emplace_back(data.begin(), data.end());
+    });
+    VioProcess process(bus, options_, 0);
+    process.Open(world_.camera(), ImuNoise{});
+    next_imu_ = 0;
+    Play(process, 0, 5);
+    process.Flush();
+    bus.Drain();
+  }
+  ASSERT_FALSE(runs[0].empty());
+  EXPECT_EQ(runs[0], runs[1]);
+}
+
 TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});
