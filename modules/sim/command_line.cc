@@ -69,8 +69,8 @@ void CommandLine::AddPath(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->group(group);
   app.add_option("--knot-spacing", knot_spacing_s_,
-                 "seconds between the spline's knots on positions (half of it on rotations); "
-                 "default 0.1, with --imu 0.05")
+                 "seconds between the spline's knots on positions (half of it: on rotations); "
+                 "default 0.1 and 0.05, with --imu 0.05 and 0.02")
       ->check(CLI::Range(0.01, 1.0))
       ->group(group);
 }
@@ -145,11 +145,11 @@ void CommandLine::Apply() {
   if (shrink_ > 1) {
     options_.camera = Shrunk(options_.camera, shrink_);
   }
-  const double spacing = knot_spacing_s_ > 0         ? knot_spacing_s_
-                         : options_.imu_file.empty() ? 0.1
-                                                     : 0.05;
-  options_.spline.position_spacing_s = spacing;
-  options_.spline.rotation_spacing_s = 0.5 * spacing;
+  // A recorded IMU must fit the images: the turns it felt are followed to some 25 Hz.
+  options_.spline = options_.imu_file.empty() ? SplinePathOptions{} : SplinePathOptions{0.05, 0.02};
+  if (knot_spacing_s_ > 0) {
+    options_.spline = {knot_spacing_s_, 0.5 * knot_spacing_s_};
+  }
   options_.sensor.exposure_s = 1e-3 * exposure_ms_;
   if (no_cache_) {
     options_.cache_dir.clear();

@@ -105,9 +105,7 @@ void EurocWriter::WriteImuCalibration(const ImuNoise& noise) const {
 }
 
 void EurocWriter::WriteImu(const SimulatedImu& imu) const {
-  std::string text =
-      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
-      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  std::string text = kImuHeader;
   for (size_t i = 0; i < imu.samples.size(); ++i) {
     const Eigen::Vector3d& w = imu.samples[i].gyro;
     const Eigen::Vector3d& a = imu.samples[i].accel;

@@ -15,6 +15,10 @@ namespace pangea::sim {
 
 class EurocWriter {
  public:
+  static constexpr const char* kImuHeader =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+
   // Creates `folder`/mav0 and its folders. Refuses one that holds a recording already.
   explicit EurocWriter(const std::string& folder);
   // Writes on into one that was created before.

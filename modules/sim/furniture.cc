@@ -198,9 +198,11 @@ std::vector<Part> Placed(const Piece& piece, const Eigen::Vector3d& at, double y
 int SceneClad::AddSheet(const std::string& paint, double width_m, double height_m, double texel_m) {
   Rng rng(seed_, paint + " style");
   SheetStyle style;
-  style.tone = rng.Uniform(60, 160);
-  style.panel_m = rng.Uniform(0.4, 1.6);
-  style.shapes_per_m2 = rng.Uniform(2, 9);
+  // From bare sheets to crowded ones.
+  const double crowd = rng.Uniform();
+  style.tone = rng.Uniform(40, 180);
+  style.panel_m = rng.Uniform(0.6, 2.5);
+  style.shapes_per_m2 = 0.5 + 6 * crowd * crowd;
   orders_.push_back({paint, width_m, height_m, coarseness_ * texel_m, style});
   return static_cast<int>(orders_.size()) - 1;
 }
@@ -248,7 +250,7 @@ void SceneClad::Paint(int detail_size, Scene* scene) {
                   static_cast<float>(order.texel_m), false);
       surface.detail_u = static_cast<float>(rng.Uniform(0, detail_m));
       surface.detail_v = static_cast<float>(rng.Uniform(0, detail_m));
-      surface.detail_gain = static_cast<float>(rng.Uniform(0.3, 0.9));
+      surface.detail_gain = static_cast<float>(rng.Uniform(0.15, 0.6));
     }
   };
   std::thread helper(work);

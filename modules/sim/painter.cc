@@ -13,6 +13,7 @@ namespace {
 struct Sheet {
   cv::Mat image;  // 8-bit
   double texel_m;
+  double tone;
   Rng* rng;
 
   int Texels(double metres) const {
@@ -23,6 +24,11 @@ struct Sheet {
   int Count(double per_m2) const { return static_cast<int>(per_m2 * Area() + rng->Uniform()); }
   cv::Point RandomPoint() const { return {rng->Index(image.cols), rng->Index(image.rows)}; }
   int Grey(double low, double high) const { return static_cast<int>(rng->Uniform(low, high)); }
+  // The grey of a mark: now and then far from the sheet's tone, mostly near it.
+  int Mark() const {
+    const double grey = rng->Chance(0.3) ? rng->Uniform(5, 250) : tone + 32 * rng->Normal();
+    return static_cast<int>(std::clamp(grey, 0.0, 255.0));
+  }
 };
 
 // Smooth noise with cells of `cell` texels, values about -1 .. 1.
@@ -42,13 +48,13 @@ cv::Mat SmoothNoise(cv::Size size, double cell, Rng* rng) {
 
 cv::Mat BaseCoat(cv::Size size, const SheetStyle& style, double texel_m, Rng* rng) {
   cv::Mat coat(size, CV_32F, cv::Scalar(style.tone));
-  double amplitude = 26;
+  double amplitude = 24;
   for (double cell_m = 2.5; cell_m > 1.5 * texel_m; cell_m *= 0.4) {
     coat += amplitude * SmoothNoise(size, cell_m / texel_m, rng);
-    amplitude *= 0.86;
+    amplitude *= 0.68;
   }
-  cv::Mat stain =
-      SmoothNoise(size, 0.7 / texel_m, rng) + 0.6 * SmoothNoise(size, 0.2 / texel_m, rng);
+  cv::Mat stain = SmoothNoise(size, 0.7 / texel_m, rng);
+  stain += 0.6 * SmoothNoise(size, 0.2 / texel_m, rng);
   cv::max(stain - 0.45, 0.0, stain);
   coat -= 70 * stain;
   cv::Mat image;
@@ -91,10 +97,10 @@ void PaintPanels(Sheet* sheet, const cv::Rect& panel, double panel_m) {
     return;
   }
   cv::Mat area = sheet->image(panel);
-  const double tone = 34 * sheet->rng->Normal();
-  area.convertTo(area, CV_8U, sheet->rng->Uniform(0.75, 1.2), tone);
+  const double tone = 22 * sheet->rng->Normal();
+  area.convertTo(area, CV_8U, sheet->rng->Uniform(0.8, 1.2), tone);
   const int seam = std::max(1, sheet->Texels(sheet->rng->Uniform(0.004, 0.02)));
-  cv::rectangle(sheet->image, panel, sheet->Grey(5, 60), seam);
+  cv::rectangle(sheet->image, panel, sheet->Mark(), seam);
   if (sheet->rng->Chance(0.4)) {
     PaintRivets(sheet, panel);
   }
@@ -111,7 +117,7 @@ void PaintPolygon(Sheet* sheet, double size_m) {
     points.emplace_back(centre.x + static_cast<int>(radius * std::cos(angle)),
                         centre.y + static_cast<int>(radius * std::sin(angle)));
   }
-  const int grey = sheet->Grey(5, 250);
+  const int grey = sheet->Mark();
   if (sheet->rng->Chance(0.6)) {
     cv::fillPoly(sheet->image, std::vector<std::vector<cv::Point>>{points}, grey);
   } else {
@@ -161,15 +167,17 @@ void PaintScratch(Sheet* sheet, double length_m) {
   const double length = length_m / sheet->texel_m;
   const cv::Point to(from.x + static_cast<int>(length * std::cos(angle)),
                      from.y + static_cast<int>(length * std::sin(angle)));
-  cv::line(sheet->image, from, to, sheet->Grey(5, 250), 1 + sheet->rng->Index(2));
+  const int grey = sheet->Mark();
+  cv::line(sheet->image, from, to, grey, 1 + sheet->rng->Index(2));
 }
 
 void PaintSpot(Sheet* sheet, double radius_m) {
-  const cv::Size axes(sheet->Texels(radius_m),
-                      sheet->Texels(radius_m * sheet->rng->Uniform(0.4, 1)));
+  const double flat = sheet->rng->Uniform(0.4, 1);
+  const cv::Size axes(sheet->Texels(radius_m), sheet->Texels(radius_m * flat));
   const int thickness = sheet->rng->Chance(0.6) ? cv::FILLED : sheet->Texels(0.2 * radius_m);
-  cv::ellipse(sheet->image, sheet->RandomPoint(), axes, sheet->rng->Uniform(0, 180), 0, 360,
-              sheet->Grey(5, 250), thickness);
+  const cv::Point centre = sheet->RandomPoint();
+  const double turn = sheet->rng->Uniform(0, 180);
+  cv::ellipse(sheet->image, centre, axes, turn, 0, 360, sheet->Mark(), thickness);
 }
 
 }  // namespace
@@ -178,11 +186,11 @@ cv::Mat PaintSheet(double width_m, double height_m, double texel_m, const SheetS
                    Rng* rng) {
   const cv::Size size(std::max(4, static_cast<int>(std::ceil(width_m / texel_m))),
                       std::max(4, static_cast<int>(std::ceil(height_m / texel_m))));
-  Sheet sheet{BaseCoat(size, style, texel_m, rng), texel_m, rng};
+  Sheet sheet{BaseCoat(size, style, texel_m, rng), texel_m, style.tone, rng};
   PaintPanels(&sheet, cv::Rect(cv::Point(0, 0), size), style.panel_m);
   // From large to small; numbers grow with the inverse area, a little slower.
   for (double scale = 0.5; scale > 3 * texel_m; scale *= 0.45) {
-    const double density = style.shapes_per_m2 * std::pow(0.5 / scale, 1.7) * 0.2;
+    const double density = style.shapes_per_m2 * std::pow(0.5 / scale, 1.4) * 0.2;
     for (int i = sheet.Count(density); i > 0; --i) {
       const double size_m = scale * rng->Uniform(0.6, 1.4);
       const double kind = rng->Uniform();
@@ -204,15 +212,15 @@ cv::Mat PaintSheet(double width_m, double height_m, double texel_m, const SheetS
 
 cv::Mat PaintDetail(int size, Rng* rng) {
   cv::Mat noise(size, size, CV_32F, cv::Scalar(128));
-  double amplitude = 30;
+  double amplitude = 24;
   for (int cell = 2; cell <= 32; cell *= 2) {
     noise += amplitude * SmoothNoise(noise.size(), cell, rng);
-    amplitude *= 0.8;
+    amplitude *= 0.75;
   }
   cv::Mat image;
   noise.convertTo(image, CV_8U);
-  Sheet sheet{image, 1.0, rng};
-  const int marks = size * size / 500;
+  Sheet sheet{image, 1.0, 128, rng};
+  const int marks = size * size / 3000;
   for (int i = 0; i < marks; ++i) {
     const double scale = 2.0 * std::pow(10.0, rng->Uniform());
     if (rng->Chance(0.6)) {

@@ -116,35 +116,36 @@ Eigen::Quaterniond Lean(const Vector3d& acceleration) {
 
 Trajectory GeneratePath(const GeneratedPathOptions& options) {
   constexpr double kPeriod = 0.02;
+  // Accelerations are second differences over this many samples to either side: the lean of a body
+  // with inertia. So many are made, and dropped again, before and behind the path.
+  constexpr int kReach = 5;
   const int count = static_cast<int>(options.duration_s / kPeriod) + 1;
   Traveller traveller(options);
   std::vector<Vector3d> positions;
   std::vector<Vector3d> angles;
-  traveller.Step(1e-6, 1.0);
-  for (int i = 0; i < count; ++i) {
-    positions.push_back(traveller.Position());
-    angles.push_back(traveller.YawPitchRoll());
+  for (int i = -kReach; i < count + kReach; ++i) {
     constexpr double kTakeOff = 2.0;
     const double x = options.static_start_s > 0
                          ? std::clamp((i * kPeriod - options.static_start_s) / kTakeOff, 0.0, 1.0)
                          : 1.0;
     traveller.Step(kPeriod, x * x * (3 - 2 * x));
+    positions.push_back(traveller.Position());
+    angles.push_back(traveller.YawPitchRoll());
   }
   Trajectory trajectory;
   constexpr int64_t kOriginUtime = 1700000000000000;
   for (int i = 0; i < count; ++i) {
-    // Central second difference over 0.2 s: the lean of a body with inertia.
-    const int reach = std::min({5, i, count - 1 - i});
+    const auto at = static_cast<size_t>(i + kReach);
     Eigen::Quaterniond lean = Eigen::Quaterniond::Identity();
-    if (options.motion == Motion::kFlight && reach == 5) {
-      const auto at = [&](int j) { return positions[static_cast<size_t>(j)]; };
-      lean = Lean((at(i + 5) - 2 * at(i) + at(i - 5)) / (25 * kPeriod * kPeriod));
+    if (options.motion == Motion::kFlight) {
+      const double interval = kReach * kPeriod;
+      lean = Lean((positions[at + kReach] - 2 * positions[at] + positions[at - kReach]) /
+                  (interval * interval));
     }
-    const Eigen::Quaterniond q_ref_cam =
-        lean * Attitude(angles[static_cast<size_t>(i)]) * LevelCamera();
-    trajectory.push_back({kOriginUtime + std::llround(1e6 * kPeriod * i),
-                          Rigid3((q_ref_cam * options.q_body_cam.conjugate()).normalized(),
-                                 positions[static_cast<size_t>(i)])});
+    const Eigen::Quaterniond q_ref_cam = lean * Attitude(angles[at]) * LevelCamera();
+    trajectory.push_back(
+        {kOriginUtime + std::llround(1e6 * kPeriod * i),
+         Rigid3((q_ref_cam * options.q_body_cam.conjugate()).normalized(), positions[at])});
   }
   return trajectory;
 }

@@ -6,18 +6,17 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
-#include <fstream>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <thread>
 
-#include "common/csv.h"
 #include "sim/euroc_writer.h"
 #include "sim/frame_cache.h"
 #include "sim/imu_simulator.h"
 #include "sim/random.h"
 #include "sim/renderer.h"
+#include "sim/schedule.h"
 #include "sim/tracks.h"
 
 namespace pangea::sim {
@@ -64,21 +63,10 @@ uint64_t FrameKey(const SceneOptions& scene, const SplinePath& path, const Camer
   return hash;
 }
 
-// A stretch of time to record: image stamps, and the IMU's span around them.
-struct Schedule {
-  std::vector<int64_t> images_ns;
-  int64_t imu_begin_ns = 0;
-  int64_t imu_end_ns = 0;
-};
-
 // Exposure and read-out reach this far beyond a stamp.
 constexpr int64_t kMarginNs = 100'000'000;
 
 int64_t Nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
-
-struct Span {
-  int64_t begin_ns, end_ns;
-};
 
 Span SpanOf(const SplinePath& path, const RecordingOptions& options) {
   Span span{path.begin_ns() + kMarginNs, path.end_ns() - kMarginNs};
@@ -92,75 +80,6 @@ Span SpanOf(const SplinePath& path, const RecordingOptions& options) {
         1e-9 * static_cast<double>(path.end_ns() - path.begin_ns()), options.start_s));
   }
   return span;
-}
-
-// Every stamp is also an IMU sample's, as in EuRoC.
-Schedule MakeSchedule(const Span& span, const RecordingOptions& options) {
-  Schedule schedule;
-  schedule.imu_begin_ns = span.begin_ns;
-  schedule.imu_end_ns = span.end_ns;
-  const int64_t imu_period = Nanoseconds(1.0 / options.imu.rate_hz);
-  const auto every =
-      std::max<int64_t>(1, std::llround(options.imu.rate_hz / options.image_rate_hz));
-  for (int64_t t = span.begin_ns + imu_period; t + imu_period <= span.end_ns;
-       t += every * imu_period) {
-    schedule.images_ns.push_back(t);
-  }
-  return schedule;
-}
-
-// Rows of a recorded IMU as they stand in the file.
-struct RecordedImu {
-  std::vector<int64_t> stamps_ns;
-  std::vector<std::string> lines;
-};
-
-RecordedImu ReadRecordedImu(const std::string& path) {
-  RecordedImu imu;
-  for (const CsvRow& row : ReadCsv(path)) {
-    int64_t ns = 0;
-    if (row.fields.size() != 7 || !ParseNumber(row.fields[0], &ns)) {
-      throw std::runtime_error(
-          fmt::format("{}:{}: not 'nanoseconds, gyro x y z, accel x y z'", path, row.line));
-    }
-    imu.stamps_ns.push_back(ns);
-    imu.lines.push_back(fmt::format("{}\n", fmt::join(row.fields, ",")));
-  }
-  if (!std::ranges::is_sorted(imu.stamps_ns) || imu.stamps_ns.empty()) {
-    throw std::runtime_error(fmt::format("{}: must hold rows in order of time", path));
-  }
-  return imu;
-}
-
-std::vector<int64_t> ReadStamps(const std::string& path) {
-  std::vector<int64_t> stamps;
-  for (const CsvRow& row : ReadCsv(path)) {
-    int64_t ns = 0;
-    if (!ParseNumber(row.fields[0], &ns)) {
-      throw std::runtime_error(fmt::format("{}:{}: not a stamp in nanoseconds", path, row.line));
-    }
-    stamps.push_back(ns);
-  }
-  std::ranges::sort(stamps);
-  return stamps;
-}
-
-Schedule HybridSchedule(const Span& span, const RecordedImu& imu, const std::string& stamps_file) {
-  Schedule schedule;
-  for (const int64_t stamp : ReadStamps(stamps_file)) {
-    if (stamp >= std::max(span.begin_ns, imu.stamps_ns.front()) &&
-        stamp <= std::min(span.end_ns, imu.stamps_ns.back())) {
-      schedule.images_ns.push_back(stamp);
-    }
-  }
-  if (schedule.images_ns.empty()) {
-    throw std::runtime_error(
-        fmt::format("{}: no stamp lies within both the path's and the IMU's time", stamps_file));
-  }
-  constexpr int64_t kAround = 10'000'000;
-  schedule.imu_begin_ns = schedule.images_ns.front() - kAround;
-  schedule.imu_end_ns = schedule.images_ns.back() + kAround;
-  return schedule;
 }
 
 // Runs one recording's parts in order.
@@ -235,10 +154,10 @@ Recorder::Recorder(const RecordingOptions& options)
   }
   const Span span = SpanOf(*path_, options);
   if (options.imu_file.empty()) {
-    schedule_ = MakeSchedule(span, options);
+    schedule_ = MakeSchedule(span, options.imu.rate_hz, options.image_rate_hz);
   } else {
     recorded_imu_ = ReadRecordedImu(options.imu_file);
-    schedule_ = HybridSchedule(span, *recorded_imu_, options.stamps_file);
+    schedule_ = ReadSchedule(options.stamps_file, span, *recorded_imu_);
   }
   sensor_.emplace(options_.camera, sensor_options_);
   cache_.emplace(options.cache_dir,
@@ -342,25 +261,14 @@ void Recorder::WriteInertial() {
   writer.WriteImuCalibration(options_.imu);
   writer.WriteImageList(schedule_.images_ns);
   if (!recorded_imu_) {
-    const SimulatedImu imu = SimulateImu(*path_, schedule_.imu_begin_ns, schedule_.imu_end_ns,
+    const SimulatedImu imu = SimulateImu(*path_, schedule_.imu.begin_ns, schedule_.imu.end_ns,
                                          options_.imu, options_.perfect, options_.seed);
     writer.WriteImu(imu);
     writer.WriteGroundTruth(*path_, imu.stamps_ns, &imu);
     return;
   }
-  std::string text =
-      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
-      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
-  std::vector<int64_t> stamps;
-  for (size_t i = 0; i < recorded_imu_->lines.size(); ++i) {
-    const int64_t stamp = recorded_imu_->stamps_ns[i];
-    if (stamp >= schedule_.imu_begin_ns && stamp <= schedule_.imu_end_ns) {
-      text += recorded_imu_->lines[i];
-      stamps.push_back(stamp);
-    }
-  }
-  writer.WriteText("imu0/data.csv", text);
-  writer.WriteGroundTruth(*path_, stamps, nullptr);
+  writer.WriteText("imu0/data.csv", recorded_imu_->Text(schedule_.imu));
+  writer.WriteGroundTruth(*path_, recorded_imu_->Stamps(schedule_.imu), nullptr);
 }
 
 void Recorder::WriteTracks() const {
@@ -368,7 +276,7 @@ void Recorder::WriteTracks() const {
   TrackMaker tracks(scene_, options_.camera, kPoints, options_.scene.seed);
   std::string text = "#timestamp [ns],landmark_id,u [px],v [px]\n";
   for (const int64_t stamp : schedule_.images_ns) {
-    for (const TrackedPoint& point : tracks.Next(CameraPose(stamp, 0))) {
+    for (const TrackedPoint& point : tracks.Next(RowPoses(stamp))) {
       text += fmt::format("{},{},{:.4f},{:.4f}\n", stamp, point.landmark_id, point.pixel.x(),
                           point.pixel.y());
     }
@@ -385,9 +293,9 @@ RecordingSummary Recorder::Run(const Progress& progress) {
   WriteImages(progress);
   summary_.images = schedule_.images_ns.size();
   summary_.rendered = rendered_;
-  Eigen::Vector3d previous = path_->At(schedule_.imu_begin_ns).T_ref_body.t;
+  Eigen::Vector3d previous = path_->At(schedule_.imu.begin_ns).T_ref_body.t;
   constexpr int64_t kStep = 5'000'000;
-  for (int64_t t = schedule_.imu_begin_ns; t <= schedule_.imu_end_ns; t += kStep) {
+  for (int64_t t = schedule_.imu.begin_ns; t <= schedule_.imu.end_ns; t += kStep) {
     const PathState state = path_->At(t);
     summary_.path_m += (state.T_ref_body.t - previous).norm();
     previous = state.T_ref_body.t;
@@ -398,53 +306,6 @@ RecordingSummary Recorder::Run(const Progress& progress) {
 }
 
 }  // namespace
-
-CameraModel EurocCamera() {
-  CameraModel camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = 458.654;
-  camera.fy = 457.296;
-  camera.cx = 367.215;
-  camera.cy = 248.375;
-  camera.distortion << -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05;
-  Eigen::Matrix3d R_body_cam;
-  R_body_cam << 0.0148655429818, -0.999880929698, 0.00414029679422, 0.999557249008, 0.0149672133247,
-      0.025715529948, -0.0257744366974, 0.00375618835797, 0.999660727178;
-  camera.T_body_cam = Rigid3(Eigen::Quaterniond(R_body_cam).normalized(),
-                             {-0.0216401454975, -0.064676986768, 0.00981073058949});
-  return camera;
-}
-
-CameraModel PhoneCamera() {
-  CameraModel camera;
-  camera.kind = CameraModel::Kind::kEquidistant;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = 445.2;
-  camera.fy = 445.9;
-  camera.cx = 318.4;
-  camera.cy = 243.1;
-  camera.distortion << 0.021, -0.012, 0.004, -0.001;
-  camera.readout_s = 0.012;
-  // Held upright in landscape, looking ahead: the body's z points out of the screen.
-  Eigen::Matrix3d R_body_cam;
-  R_body_cam << 0, 1, 0, 1, 0, 0, 0, 0, -1;
-  camera.T_body_cam = Rigid3(Eigen::Quaterniond(R_body_cam).normalized(), {0.04, 0.01, -0.005});
-  return camera;
-}
-
-CameraModel Shrunk(const CameraModel& camera, double factor) {
-  CameraModel shrunk = camera;
-  shrunk.width = static_cast<int>(camera.width / factor);
-  shrunk.height = static_cast<int>(camera.height / factor);
-  shrunk.fx /= factor;
-  shrunk.fy /= factor;
-  // Pixel centres are at whole numbers, so edges are at -0.5.
-  shrunk.cx = (camera.cx + 0.5) / factor - 0.5;
-  shrunk.cy = (camera.cy + 0.5) / factor - 0.5;
-  return shrunk;
-}
 
 RecordingSummary RenderRecording(const RecordingOptions& options, const Progress& progress) {
   return Recorder(options).Run(progress);

@@ -16,6 +16,7 @@
 
 #include "common/camera_model.h"
 #include "common/imu.h"
+#include "sim/cameras.h"
 #include "sim/path_generator.h"
 #include "sim/path_steps.h"
 #include "sim/scene_builder.h"
@@ -23,12 +24,6 @@
 #include "sim/spline_path.h"
 
 namespace pangea::sim {
-
-// EuRoC's cam0, and a phone's wide camera (equidistant lens, rolling shutter, late stamps).
-CameraModel EurocCamera();
-CameraModel PhoneCamera();
-// The same camera with its image (and all that is in pixels) shrunk by a factor.
-CameraModel Shrunk(const CameraModel& camera, double factor);
 
 struct RecordingOptions {
   std::string out;  // folder that will hold mav0

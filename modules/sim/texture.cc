@@ -47,10 +47,6 @@ Texture::Texture(const cv::Mat& image, float texel_m, bool repeat)
   }
 }
 
-float Texture::coarsest_m() const {
-  return static_cast<float>(1 << (levels_.size() - 1)) / texels_per_m_;
-}
-
 inline float Texture::Bilinear(const Level& level, float x, float y) const {
   const int ix = FloorInt(x);
   const int iy = FloorInt(y);
@@ -79,12 +75,15 @@ inline float Texture::Bilinear(const Level& level, float x, float y) const {
 
 float Texture::Sample(const Footprint& f) const {
   constexpr int kMaxTaps = 4;
-  const int taps = std::clamp(static_cast<int>(f.major / f.minor + 0.5f), 1, kMaxTaps);
+  // Taps stand up to one and a half pixels apart.
+  const int taps = std::clamp(static_cast<int>(0.67f * f.major / f.minor + 0.5f), 1, kMaxTaps);
   const float size = std::max(f.minor, f.major / static_cast<float>(taps));
   const float lod = std::clamp(FastLog2(std::max(size * texels_per_m_, 1.0f)), 0.0f,
                                static_cast<float>(levels_.size() - 1));
   const int fine = static_cast<int>(lod);
-  const float blend = lod - static_cast<float>(fine);
+  // Blended only near the middle between two levels: most look-ups need one level alone.
+  const float fraction = lod - static_cast<float>(fine);
+  const float blend = std::clamp(2.5f * (fraction - 0.3f), 0.0f, 1.0f);
   const Level& a = levels_[static_cast<size_t>(fine)];
   const Level& b = levels_[std::min(static_cast<size_t>(fine) + 1, levels_.size() - 1)];
   const float scale = texels_per_m_ / static_cast<float>(1 << fine);
@@ -94,11 +93,12 @@ float Texture::Sample(const Footprint& f) const {
     const float s = (static_cast<float>(i) + 0.5f - 0.5f * static_cast<float>(taps)) * step;
     const float x = (f.u + s * f.major_u) * scale;
     const float y = (f.v + s * f.major_v) * scale;
-    float value = Bilinear(a, x - 0.5f, y - 0.5f);
-    if (blend > 0) {
-      value += blend * (Bilinear(b, 0.5f * x - 0.5f, 0.5f * y - 0.5f) - value);
+    if (blend < 1) {
+      sum += (1 - blend) * Bilinear(a, x - 0.5f, y - 0.5f);
     }
-    sum += value;
+    if (blend > 0) {
+      sum += blend * Bilinear(b, 0.5f * x - 0.5f, 0.5f * y - 0.5f);
+    }
   }
   return sum / static_cast<float>(taps);
 }

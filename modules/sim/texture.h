@@ -24,8 +24,6 @@ class Texture {
 
   // Mean grey over the footprint, 0 .. 255.
   float Sample(const Footprint& footprint) const;
-  // A footprint as long as this sees the top level alone.
-  float coarsest_m() const;
 
  private:
   struct Level {

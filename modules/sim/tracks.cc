@@ -34,45 +34,51 @@ std::vector<Eigen::Vector3d> ScatterLandmarks(const Scene& scene, uint64_t seed)
 TrackMaker::TrackMaker(const Scene& scene, const CameraModel& camera, int count, uint64_t seed)
     : scene_(scene), camera_(camera), count_(count), landmarks_(ScatterLandmarks(scene, seed)) {}
 
-bool TrackMaker::Visible(const Rigid3& T_ref_cam, const Eigen::Vector3d& landmark,
-                         Eigen::Vector2d* pixel) const {
+std::optional<Eigen::Vector2d> TrackMaker::PixelOf(const std::vector<Rigid3>& T_ref_cam,
+                                                   const Eigen::Vector3d& landmark,
+                                                   Rigid3* pose) const {
+  *pose = T_ref_cam[T_ref_cam.size() / 2];
   constexpr double kNearest = 0.2;
-  const Eigen::Vector3d p_cam = T_ref_cam.Inverse() * landmark;
-  const double range = p_cam.norm();
-  if (p_cam.z() < kNearest) {
-    return false;
+  constexpr int kRowIterations = 3;
+  for (int i = 0;; ++i) {
+    const Eigen::Vector3d p_cam = pose->Inverse() * landmark;
+    const auto pixel = p_cam.z() < kNearest ? std::nullopt : camera_.Project(p_cam);
+    if (!pixel || !camera_.Contains(*pixel, 1)) {
+      return std::nullopt;
+    }
+    if (T_ref_cam.size() == 1 || i == kRowIterations) {
+      return pixel;
+    }
+    *pose = T_ref_cam[static_cast<size_t>(std::lround(pixel->y()))];
   }
-  const auto projected = camera_.Project(p_cam);
-  if (!projected || !camera_.Contains(*projected, 1)) {
-    return false;
-  }
-  const Eigen::Vector3d direction = (landmark - T_ref_cam.t) / range;
-  const auto hit = scene_.Cast(T_ref_cam.t.cast<float>(), direction.cast<float>());
-  constexpr double kTolerance = 2e-3;
-  if (!hit || hit->range < range * (1 - kTolerance)) {
-    return false;
-  }
-  *pixel = *projected;
-  return true;
 }
 
-std::vector<TrackedPoint> TrackMaker::Next(const Rigid3& T_ref_cam) {
+bool TrackMaker::Hidden(const Eigen::Vector3d& eye, const Eigen::Vector3d& landmark) const {
+  const double range = (landmark - eye).norm();
+  const Eigen::Vector3d direction = (landmark - eye) / range;
+  const auto hit = scene_.Cast(eye.cast<float>(), direction.cast<float>());
+  constexpr double kTolerance = 2e-3;
+  return !hit || hit->range < range * (1 - kTolerance);
+}
+
+std::vector<TrackedPoint> TrackMaker::Next(const std::vector<Rigid3>& T_ref_cam) {
   std::vector<TrackedPoint> points;
   const int across = std::max(1, static_cast<int>(std::sqrt(1.5 * count_)));
   const int down = (count_ + across - 1) / across;
   std::vector<int> taken(static_cast<size_t>(across * down), 0);
-  const auto cell = [&](const Eigen::Vector2d& pixel) {
-    const int x = std::clamp(static_cast<int>(pixel.x() * across / camera_.width), 0, across - 1);
-    const int y = std::clamp(static_cast<int>(pixel.y() * down / camera_.height), 0, down - 1);
-    return static_cast<size_t>(y * across + x);
-  };
   const auto add = [&](int32_t id, int most_in_cell) {
-    Eigen::Vector2d pixel;
     const Eigen::Vector3d& landmark = landmarks_[static_cast<size_t>(id)];
-    if (static_cast<int>(points.size()) < count_ && Visible(T_ref_cam, landmark, &pixel) &&
-        taken[cell(pixel)] < most_in_cell) {
-      ++taken[cell(pixel)];
-      points.push_back({id, pixel});
+    Rigid3 pose;
+    const auto pixel = PixelOf(T_ref_cam, landmark, &pose);
+    if (!pixel || static_cast<int>(points.size()) >= count_) {
+      return;
+    }
+    const int x = std::clamp(static_cast<int>(pixel->x() * across / camera_.width), 0, across - 1);
+    const int y = std::clamp(static_cast<int>(pixel->y() * down / camera_.height), 0, down - 1);
+    int& in_cell = taken[static_cast<size_t>(y * across + x)];
+    if (in_cell < most_in_cell && !Hidden(pose.t, landmark)) {
+      ++in_cell;
+      points.push_back({id, *pixel});
     }
   };
   constexpr int kCrowded = 4;
@@ -80,9 +86,6 @@ std::vector<TrackedPoint> TrackMaker::Next(const Rigid3& T_ref_cam) {
     add(id, kCrowded);
   }
   for (int32_t id = 0; id < static_cast<int32_t>(landmarks_.size()); ++id) {
-    if (static_cast<int>(points.size()) >= count_) {
-      break;
-    }
     if (std::ranges::find(followed_, id) == followed_.end()) {
       add(id, 1);
     }

@@ -4,6 +4,7 @@
 // A point once seen is followed for as long as it is visible; new ones fill the empty cells.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/camera_model.h"
@@ -22,12 +23,14 @@ class TrackMaker {
   TrackMaker(const Scene& scene, const CameraModel& camera, int count, uint64_t seed);
 
   const std::vector<Eigen::Vector3d>& landmarks() const { return landmarks_; }
-  // Call in order of time. T_ref_cam of the first row; a rolling shutter is not modelled.
-  std::vector<TrackedPoint> Next(const Rigid3& T_ref_cam);
+  // Call in order of time. T_ref_cam: one pose for all rows, or one a row, as in Renderer::Render.
+  std::vector<TrackedPoint> Next(const std::vector<Rigid3>& T_ref_cam);
 
  private:
-  bool Visible(const Rigid3& T_ref_cam, const Eigen::Vector3d& landmark,
-               Eigen::Vector2d* pixel) const;
+  // Where a landmark falls into the image, and the pose of the row it falls on.
+  std::optional<Eigen::Vector2d> PixelOf(const std::vector<Rigid3>& T_ref_cam,
+                                         const Eigen::Vector3d& landmark, Rigid3* pose) const;
+  bool Hidden(const Eigen::Vector3d& eye, const Eigen::Vector3d& landmark) const;
 
   const Scene& scene_;
   const CameraModel& camera_;

@@ -1,0 +1,16 @@
+#pragma once
+
+// The cameras recordings are made with.
+
+#include "common/camera_model.h"
+
+namespace pangea::sim {
+
+// EuRoC's cam0.
+CameraModel EurocCamera();
+// A phone's wide camera: equidistant lens, rolling shutter.
+CameraModel PhoneCamera();
+// The same camera with its image, and all that is in pixels, shrunk by a factor.
+CameraModel Shrunk(const CameraModel& camera, double factor);
+
+}  // namespace pangea::sim
