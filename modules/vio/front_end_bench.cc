@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 #include <iostream>
 #include <map>
 
@@ -127,11 +127,9 @@ void Run(const Options& options) {
     const Eigen::Quaterniond q = last == 0 ? Eigen::Quaterniond::Identity()
                                            : CameraRotation(recording, last, entry.utime, bias);
     last = entry.utime;
-    const auto begin = std::chrono::steady_clock::now();
+    const std::clock_t begin = std::clock();
     const TrackedFrame& frame = tracker.Track(entry.utime, image, q);
-    milliseconds.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-            .count());
+    milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     counts.push_back(static_cast<double>(frame.observations.size()));
     const Tracker::Statistics& s = tracker.statistics();
     sum.tracked += s.tracked;
