@@ -21,6 +21,7 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   search.Add("max_scale", &options.search.max_scale);
   YamlOptions& ba = yaml.Section("ba");
   ba.Add("pixel_sigma", &options.ba.pixel_sigma);
+  ba.Add("systematic_px", &options.ba.systematic_px);
   ba.Add("scale_sigma", &options.ba.scale_sigma);
   ba.Add("max_chi2", &options.ba.max_chi2);
   ba.Add("max_depth_chi2", &options.ba.max_depth_chi2);

@@ -301,6 +301,21 @@ class JointProblem {
   std::optional<ceres::Problem> problem_;
 };
 
+// Median distance of the inliers' points from the newest keyframe of their window.
+double MedianDistance(const Window& window_m, const Window& window_c,
+                      const std::vector<PointMatch>& matches, const std::vector<bool>& inlier) {
+  std::vector<double> distances;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (inlier[i]) {
+      const Window& holder = HolderSide(matches[i]) == kSideM ? window_m : window_c;
+      distances.push_back(holder.landmarks[matches[i].landmark].p_w.norm());
+    }
+  }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
 }  // namespace
 
 std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& window_c,
@@ -341,6 +356,11 @@ std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& 
   turn.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
   // Never smaller than the residuals say.
   result.covariance = std::max(1.0, variance) * turn * *covariance * turn.transpose();
+  const double turn_floor =
+      options.systematic_px * window_c.keyframe(window_c.newest()).camera.PixelAngle();
+  const double step_floor = turn_floor * MedianDistance(window_m, window_c, matches, result.inlier);
+  result.covariance.diagonal().head<3>().array() += step_floor * step_floor;
+  result.covariance.diagonal().tail<3>().array() += turn_floor * turn_floor;
   return result;
 }
 
