@@ -142,12 +142,16 @@ double PairEvidence::SceneExtent(const std::vector<int>& candidates) const {
   return std::min(extent_a, extent_b);
 }
 
-bool PairEvidence::Enough(const std::vector<int>& looks) const {
+bool PairEvidence::Enough(const std::vector<int>& looks, int rival_looks) const {
   const auto strong = std::ranges::count_if(
       looks, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
-  return (static_cast<int>(looks.size()) >= options_.min_looks ||
-          strong >= options_.min_strong_looks) &&
-         SceneExtent(looks) >= options_.min_scene_extent_m;
+  const int count = static_cast<int>(looks.size());
+  if (SceneExtent(looks) < options_.min_scene_extent_m) {
+    return count >= options_.min_looks_at_one_spot &&
+           rival_looks <= options_.max_rival_share_at_one_spot * count;
+  }
+  return (count >= options_.min_looks || strong >= options_.min_strong_looks) &&
+         rival_looks <= options_.max_rival_share * count;
 }
 
 int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
@@ -214,8 +218,7 @@ void PairEvidence::Judge() {
   verdict_ = {};
   verdict_.looks = static_cast<int>(looks.size());
   verdict_.rival_looks = static_cast<int>(Looks(LargestAgreeing(all)).size());
-  verdict_.merge =
-      Enough(looks) && verdict_.rival_looks <= options_.max_rival_share * verdict_.looks;
+  verdict_.merge = Enough(looks, verdict_.rival_looks);
   for (const int k : agreeing_) {
     verdict_.agreeing.push_back(candidates_[k].id);
   }

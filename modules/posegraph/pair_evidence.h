@@ -27,8 +27,12 @@ struct MergeOptions {
   // A keyframe is elsewhere by this distance or this turn of the view.
   double look_distance_m = 0.25;
   double look_angle = 0.15;
-  // What the agreeing looks see must not be one spot: an object has a look-alike somewhere.
+  // What the agreeing looks see must not be one spot: an object has a look-alike somewhere. Agents
+  // that only ever looked at one spot need this many looks, and next to no rival: look-alikes
+  // standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
+  int min_looks_at_one_spot = 6;
+  double max_rival_share_at_one_spot = 0.25;
   // The largest rival may have this share of the looks.
   double max_rival_share = 0.5;
   double agree_chi2 = 18.47;  // chi-squared(4): 0.999
@@ -87,7 +91,7 @@ class PairEvidence {
   std::vector<int> LargestAgreeing(std::vector<int> among) const;
   std::vector<int> Looks(const std::vector<int>& candidates) const;
   double SceneExtent(const std::vector<int>& candidates) const;
-  bool Enough(const std::vector<int>& looks) const;
+  bool Enough(const std::vector<int>& looks, int rival_looks) const;
   bool DifferentLook(const Candidate& k, const Candidate& l) const;
   int BestMember(const std::vector<int>& agreeing) const;
   void Judge();

@@ -20,6 +20,8 @@ inline void Bind(YamlOptions& yaml, PoseGraphOptions& options) {
   merge.Add("look_distance_m", &options.merge.look_distance_m);
   merge.Add("look_angle", &options.merge.look_angle);
   merge.Add("min_scene_extent_m", &options.merge.min_scene_extent_m);
+  merge.Add("min_looks_at_one_spot", &options.merge.min_looks_at_one_spot);
+  merge.Add("max_rival_share_at_one_spot", &options.merge.max_rival_share_at_one_spot);
   merge.Add("max_rival_share", &options.merge.max_rival_share);
   merge.Add("agree_chi2", &options.merge.agree_chi2);
   merge.Add("min_drift_per_m", &options.merge.min_drift_per_m);

@@ -1,0 +1,47 @@
+// Every type's fingerprint, pinned: a type that a committed log contains is frozen, and a change
+// here must be meant. A changed type is a new file; only a type that never shipped may have its
+// number replaced.
+
+#include <gtest/gtest.h>
+
+#include "pangea/again_t.hpp"
+#include "pangea/camera_t.hpp"
+#include "pangea/constraint_t.hpp"
+#include "pangea/correction_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/image_t.hpp"
+#include "pangea/imu_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/link_ack_t.hpp"
+#include "pangea/link_hello_t.hpp"
+#include "pangea/link_packet_t.hpp"
+#include "pangea/map_state_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "pangea/resend_request_t.hpp"
+#include "pangea/status_t.hpp"
+
+namespace pangea {
+namespace {
+
+TEST(Fingerprints, ArePinned) {
+  EXPECT_EQ(static_cast<uint64_t>(again_t::getHash()), 0x6f768b67d21c1586u);
+  EXPECT_EQ(static_cast<uint64_t>(camera_t::getHash()), 0xe1fe7ec25d6f1ac5u);
+  EXPECT_EQ(static_cast<uint64_t>(constraint_t::getHash()), 0x2730b9abbbf2e325u);
+  EXPECT_EQ(static_cast<uint64_t>(correction_t::getHash()), 0xfb0f44cb33451099u);
+  EXPECT_EQ(static_cast<uint64_t>(have_t::getHash()), 0x9f58b67f2b9e7c17u);
+  EXPECT_EQ(static_cast<uint64_t>(image_t::getHash()), 0xcf3cd5c496fbbc4fu);
+  EXPECT_EQ(static_cast<uint64_t>(imu_t::getHash()), 0x831ef36c48e5cf62u);
+  EXPECT_EQ(static_cast<uint64_t>(keyframe_t::getHash()), 0x59b338437f11086du);
+  EXPECT_EQ(static_cast<uint64_t>(link_ack_t::getHash()), 0x70a3cb32136e68d2u);
+  EXPECT_EQ(static_cast<uint64_t>(link_hello_t::getHash()), 0x1924bf0086a589u);
+  EXPECT_EQ(static_cast<uint64_t>(link_packet_t::getHash()), 0x5e7620d79fc3b390u);
+  EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
+  EXPECT_EQ(static_cast<uint64_t>(place_match_t::getHash()), 0x5be9f82364c3b435u);
+  EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);
+  EXPECT_EQ(static_cast<uint64_t>(resend_request_t::getHash()), 0x3f967c69b75046f2u);
+  EXPECT_EQ(static_cast<uint64_t>(status_t::getHash()), 0xc86ad2441b54de87u);
+}
+
+}  // namespace
+}  // namespace pangea

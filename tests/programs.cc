@@ -1,0 +1,66 @@
+#include "programs.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+namespace pangea::tests {
+
+namespace fs = std::filesystem;
+
+Outcome RunCommand(const std::string& command) {
+  const std::string line =
+      "PATH=" PANGEA_BINARY_DIR "/bin:$PATH; { " + command + "; } </dev/null 2>&1";
+  Outcome outcome;
+  FILE* pipe = popen(line.c_str(), "r");
+  if (pipe == nullptr) {
+    ADD_FAILURE() << "cannot start a shell";
+    return outcome;
+  }
+  char buffer[4096];
+  for (size_t n = 0; (n = fread(buffer, 1, sizeof(buffer), pipe)) > 0;) {
+    outcome.output.append(buffer, n);
+  }
+  const int status = pclose(pipe);
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+fs::path FreshFolder(const std::string& name) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("pangea_tests_" + name);
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  return folder;
+}
+
+std::string ReadFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+nlohmann::json ReadJson(const fs::path& path) {
+  return nlohmann::json::parse(ReadFile(path), nullptr, false);
+}
+
+void RenderWalk(const fs::path& out, const std::string& arguments) {
+  const Outcome rendered =
+      RunCommand("pangea-sim --no-cache --shrink 2 --out " + out.string() + " " + arguments);
+  ASSERT_EQ(rendered.exit_code, 0) << rendered.output;
+}
+
+fs::path WriteSession(const fs::path& folder, const std::vector<std::string>& agents) {
+  const fs::path file = folder / "session.yaml";
+  std::ofstream stream(file);
+  stream << "agents:\n";
+  for (const std::string& agent : agents) {
+    stream << "  - {" << agent << "}\n";
+  }
+  return file;
+}
+
+}  // namespace pangea::tests

@@ -1,0 +1,31 @@
+#pragma once
+
+// Runs the built programs as a user would, and looks at what they leave.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace pangea::tests {
+
+struct Outcome {
+  int exit_code = 0;
+  std::string output;  // stdout and stderr
+};
+
+// A shell command with the build's bin folder first on PATH.
+Outcome RunCommand(const std::string& command);
+
+// An empty folder for one test.
+std::filesystem::path FreshFolder(const std::string& name);
+std::string ReadFile(const std::filesystem::path& path);
+nlohmann::json ReadJson(const std::filesystem::path& path);
+
+// Renders a short walk at half size: pangea-sim with these further arguments.
+void RenderWalk(const std::filesystem::path& out, const std::string& arguments);
+
+// A session of agents 1, 2, ... with these recordings; returns the file.
+std::filesystem::path WriteSession(const std::filesystem::path& folder,
+                                   const std::vector<std::string>& agents);
+
+}  // namespace pangea::tests

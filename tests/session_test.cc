@@ -1,0 +1,110 @@
+// The main job with real processes on real buses: two recordings of one hall go in, one map comes
+// out; its capture replays to the same map; and what users get wrong gets an answer.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// Rendered and played once for all tests of this file.
+class SessionTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new fs::path(FreshFolder("session"));
+    RenderWalk(*folder_ / "walk_1", "--generate walk --path-seed 1 --seed 1 --duration 14");
+    RenderWalk(*folder_ / "walk_2", "--generate walk --path-seed 2 --seed 2 --duration 14");
+    const fs::path file =
+        WriteSession(*folder_, {"id: 1, recording: walk_1", "id: 2, recording: walk_2, delay: 2"});
+    run_ = new Outcome(RunCommand("pangea-session run " + file.string() + " --out " +
+                                  (*folder_ / "out").string() + " --rate max"));
+  }
+  static void TearDownTestSuite() {
+    fs::remove_all(*folder_);
+    delete folder_;
+    delete run_;
+  }
+  static fs::path Out(const std::string& name) { return *folder_ / "out" / name; }
+
+  static fs::path* folder_;
+  static Outcome* run_;
+};
+fs::path* SessionTest::folder_ = nullptr;
+Outcome* SessionTest::run_ = nullptr;
+
+TEST_F(SessionTest, TwoAgentsBecomeOneMap) {
+  ASSERT_EQ(run_->exit_code, 0) << run_->output;
+  const auto report = ReadJson(Out("report.json"));
+  ASSERT_FALSE(report.is_discarded());
+  ASSERT_EQ(report["groups"].size(), 1u) << run_->output;
+  EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
+  EXPECT_LT(report["ate_joint_m"].get<double>(), 0.25);
+  for (const auto& agent : report["agents"]) {
+    EXPECT_EQ(agent["map_ids"].size(), 1u);
+    EXPECT_GT(agent["keyframes"].get<int>(), 10);
+    EXPECT_LT(agent["initialised_s"].get<double>(), 4.0);
+    EXPECT_GT(agent["coverage"].get<double>(), 0.95);
+    EXPECT_LT(agent["ate_vio_m"].get<double>(), 0.25);
+  }
+}
+
+TEST_F(SessionTest, LeavesEveryFile) {
+  for (const char* name :
+       {"session.lcm", "agent_1.lcm", "agent_2.lcm", "agent_1.vio.tum", "agent_1.tum",
+        "agent_2.tum", "map.ply", "report.json", "report.md", "trajectory.png", "error.png"}) {
+    EXPECT_TRUE(fs::exists(Out(name)) && fs::file_size(Out(name)) > 0) << name;
+  }
+}
+
+TEST_F(SessionTest, ReplayGivesTheSameBytesTwiceAndTheSameMap) {
+  for (const char* name : {"replay_1", "replay_2"}) {
+    const Outcome replay = RunCommand("pangea-session replay " + Out("session.lcm").string() +
+                                      " --out " + (*folder_ / name).string());
+    ASSERT_EQ(replay.exit_code, 0) << replay.output;
+  }
+  for (const auto& entry : fs::directory_iterator(*folder_ / "replay_1")) {
+    const std::string name = entry.path().filename().string();
+    EXPECT_TRUE(ReadFile(entry.path()) == ReadFile(*folder_ / "replay_2" / name)) << name;
+  }
+  const auto live = ReadJson(Out("report.json"));
+  const auto replayed = ReadJson(*folder_ / "replay_1" / "report.json");
+  EXPECT_EQ(live["groups"][0]["agents"], replayed["groups"][0]["agents"]);
+  EXPECT_NEAR(live["ate_joint_m"].get<double>(), replayed["ate_joint_m"].get<double>(), 0.005);
+}
+
+TEST_F(SessionTest, AnEarlierSessionIsMovedAside) {
+  const fs::path out = *folder_ / "again";
+  fs::create_directories(out);
+  fs::copy(Out("session.lcm"), out / "session.lcm");
+  const Outcome replay =
+      RunCommand("pangea-session replay " + Out("session.lcm").string() + " --out " + out.string());
+  EXPECT_EQ(replay.exit_code, 0) << replay.output;
+  EXPECT_TRUE(fs::exists(out.string() + ".1/session.lcm"));
+}
+
+TEST(SessionMistakes, GetAnAnswer) {
+  const fs::path folder = FreshFolder("mistakes");
+  const fs::path missing = WriteSession(folder, {"id: 1, recording: nowhere"});
+  Outcome outcome =
+      RunCommand("pangea-session run " + missing.string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("nowhere"), HasSubstr("--recordings")));
+
+  const fs::path unknown = WriteSession(folder, {"id: 1, recordin: nowhere"});
+  outcome =
+      RunCommand("pangea-session run " + unknown.string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("recordin"), HasSubstr("recording")));
+
+  outcome = RunCommand("pangea-session replay " + (folder / "no.lcm").string() + " --out x");
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, HasSubstr("no.lcm"));
+}
+
+}  // namespace
+}  // namespace pangea::tests
