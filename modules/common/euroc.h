@@ -5,9 +5,9 @@
 // Times become microseconds, rounded down; file names keep their nanoseconds. `body` is the IMU.
 // Images are read when asked for.
 //
-// What is wrong with a recording either makes it unusable (the constructor throws, naming file, line
-// or field, and the mend) or is mended and named in warnings(): docs/recordings.md has the table, and
-// the optional keys of sensor.yaml.
+// What is wrong with a recording either makes it unusable (the constructor throws, naming file,
+// line or field, and the mend) or is mended and named in warnings(): docs/recordings.md has the
+// table, and the optional keys of sensor.yaml.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

@@ -38,8 +38,8 @@ struct MergeOptions {
   double agree_chi2 = 18.47;  // chi-squared(4): 0.999
   // Odometry that claims less drift than this is not believed while maps are compared (it is no
   // weight of the solve): standard deviations per metre of path.
-  double min_drift_per_m = 0.005;
-  double min_yaw_drift_per_m = 0.0003;
+  double min_drift_per_m = 0.02;
+  double min_yaw_drift_per_m = 0.001;
 };
 
 // Covariance of the odometry between two nodes of a map, at a point, with the options' least drift

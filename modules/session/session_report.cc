@@ -101,7 +101,8 @@ std::vector<AgentRun> ReadRecordings(const std::vector<fs::path>& logs) {
     }
     try {
       std::ifstream stream(file);
-      for (const json& agent : json::parse(stream).at("agents")) {
+      const json recordings = json::parse(stream);
+      for (const json& agent : recordings.at("agents")) {
         AgentScript script;
         script.id = agent.at("id").get<int32_t>();
         script.resolved = agent.at("recording").get<std::string>();

@@ -26,7 +26,7 @@ namespace pangea::vio {
 struct EstimatorOptions {
   int window = 11;           // camera poses in the filter's window
   int max_landmarks = 50;    // landmarks kept in the filter's state
-  double pixel_sigma = 1.0;  // of an observation with sigma_px 1, pixels
+  double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels
   // A keyframe is taken when the image has moved this far (rotation taken out) since the last one,
   // ...
   double keyframe_parallax_px = 20;

@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 
 constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
 constexpr double kMinSpan_s = 1.0;        // shortest start-up window, and
-constexpr double kMaxSpan_s = 2.2;        // the longest: older images are forgotten
+constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgotten
 constexpr size_t kMinTracks = 20;
 
 // At rest: the image stands, the accelerometer and the gyro are quiet.
@@ -28,7 +28,7 @@ constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
 constexpr double kRestGyro = 0.03;   // rad/s
 
 // A moving start must be at least this certain and explain this much.
-constexpr double kMaxVelocitySigma = 0.12;  // m/s
+constexpr double kMaxVelocitySigma = 0.05;  // m/s
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMinInlierShare = 0.8;
 constexpr double kMaxRmsSigmas = 1.8;
