@@ -16,7 +16,7 @@ using testing::HasSubstr;
 // A log of keyframes of one map: (seq, utime).
 std::filesystem::path WriteLog(const std::string& name, int32_t agent,
                                const std::vector<std::pair<int32_t, int64_t>>& keyframes) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
+  std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
   std::filesystem::remove(path);
   lcm::LogFile file(path.string(), "w");
   for (const auto& [seq, utime] : keyframes) {

@@ -23,7 +23,7 @@ class SessionFileTest : public ::testing::Test {
     fs::create_directories(folder_ / "sessions");
   }
   fs::path Write(const std::string& text) {
-    const fs::path file = folder_ / "sessions" / "two.yaml";
+    fs::path file = folder_ / "sessions" / "two.yaml";
     std::ofstream(file) << text;
     return file;
   }
