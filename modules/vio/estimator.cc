@@ -73,6 +73,10 @@ struct Estimator::Impl {
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void RemoveClone(int index);
   FinishedKeyframe Finish(int index);
+  Matrix6d CloneCovariance(int index) const {
+    const int at = filter->state().CloneOffset(index);
+    return filter->state().covariance.block<6, 6>(at, at);
+  }
   Preintegration IntegrateBetween(int64_t from_utime, int64_t to_utime, const ImuState& at) const;
   std::optional<std::string> Implausible() const;
   int64_t ImuTime(int64_t frame_utime) const {
@@ -89,10 +93,11 @@ struct Estimator::Impl {
   std::optional<WindowFilter> filter;
   TrackHistory history;
   FeatureUpdates updates;
-  std::deque<ImuSample> imu_samples;         // since the last finished keyframe
-  int64_t filter_utime = 0;                  // IMU time of the filter's state
-  int64_t last_keyframe_utime = 0;           // newest clone that is a keyframe
-  std::optional<FinishedKeyframe> previous;  // the last finished keyframe
+  std::deque<ImuSample> imu_samples;                // since the last finished keyframe
+  int64_t filter_utime = 0;                         // IMU time of the filter's state
+  int64_t last_keyframe_utime = 0;                  // newest clone that is a keyframe
+  std::optional<FinishedKeyframe> previous;         // the last finished keyframe
+  Matrix6d previous_covariance = Matrix6d::Zero();  // of its clone, when it was finished
   Vector3d omega_body = Vector3d::Zero();
   bool still = false;
   int still_frames = 0;
@@ -242,6 +247,9 @@ FinishedKeyframe Estimator::Impl::Finish(int index) {
   if (previous && edge_end >= 0) {
     keyframe.edge = FinishedKeyframe::Edge{previous->T_odom_body.Inverse() * keyframe.T_odom_body,
                                            RelativeCovariance(state, edge_end, index)};
+    keyframe.edge->covariance +=
+        CorrectionCovariance(previous_covariance - CloneCovariance(edge_end), previous->T_odom_body,
+                             keyframe.T_odom_body);
     ImuState at;
     at.gyro_bias = previous->gyro_bias;
     at.accel_bias = previous->accel_bias;
@@ -252,6 +260,7 @@ FinishedKeyframe Estimator::Impl::Finish(int index) {
     }
   }
   previous = keyframe;
+  previous_covariance = CloneCovariance(index);
   while (imu_samples.size() > 2 && imu_samples[1].utime < ImuTime(keyframe.utime) - 100'000) {
     imu_samples.pop_front();
   }

@@ -15,6 +15,11 @@ namespace pangea::vio {
 // Covariance of T_i_j = T_odom_i^-1 T_odom_j, (translation, rotation) in i's body frame.
 Matrix6d RelativeCovariance(const WindowState& state, int i, int j);
 
+// An edge starts at pose i as it was published; by the time of j the filter has corrected it. A
+// correction is independent of the error that is left, so its covariance is what i's, in the
+// window's coordinates, has lost since: `lost`. This is what that adds to the edge.
+Matrix6d CorrectionCovariance(const Matrix6d& lost, const Rigid3& T_odom_i, const Rigid3& T_odom_j);
+
 // Pose, velocity, biases, tilt covariance and depths of clone `index`. No edge and no
 // preintegration yet.
 FinishedKeyframe FinishKeyframe(const WindowState& state, const TrackHistory& history, int index);

@@ -1,0 +1,320 @@
+#include "vio/estimator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <map>
+
+#include "common/preintegration.h"
+#include "vio/vio_test_world.h"
+#include "vio/window_test_state.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+EstimatorOptions Options() {
+  EstimatorOptions options;
+  options.pixel_sigma = VioTestWorldOptions{}.pixel_noise;
+  return options;
+}
+
+// A ride's results beside the truth.
+struct Ride {
+  struct Frame {
+    int64_t utime;
+    FrameResult result;
+    ImuState truth;
+  };
+  VioTestWorld world;
+  Estimator estimator;
+  std::vector<Frame> tracked;
+  std::vector<FinishedKeyframe> finished;
+  FrameResult last;
+  int frames = 0;
+  double started_s = -1;
+
+  explicit Ride(const VioTestWorldOptions& options)
+      : world(options), estimator(Options(), world.camera(), ImuNoise{}) {}
+
+  void Feed(const VioTestWorld::Input& input) {
+    ++frames;
+    last = estimator.AddFrame(input.frame, input.imu);
+    world.Drop(last.outlier_landmarks);
+    finished.insert(finished.end(), last.finished.begin(), last.finished.end());
+    if (last.state == EstimatorState::kTracking) {
+      tracked.push_back({input.frame.utime, last, world.TruthAt(input.frame.utime)});
+      started_s =
+          started_s < 0 ? 1e-6 * static_cast<double>(input.frame.utime - 1'000'000) : started_s;
+    }
+  }
+  void Advance(int count) {
+    for (int i = 0; i < count; ++i) {
+      Feed(world.Next());
+    }
+  }
+  void Flush() {
+    const auto rest = estimator.Flush();
+    finished.insert(finished.end(), rest.begin(), rest.end());
+  }
+  // The truth in the estimate's odom frame: both share gravity, the yaw and origin of the start.
+  Rigid3 T_odom_truth() const {
+    const Frame& first = tracked.front();
+    const Rigid3 T = first.result.T_odom_body * first.truth.T_odom_body.Inverse();
+    const Eigen::Quaterniond q = YawRotation(YawOf(T.q));
+    return {q, first.result.T_odom_body.t - q * first.truth.T_odom_body.t};
+  }
+};
+
+// Root mean square position error after the best alignment in position and yaw.
+double Ate(const Ride& ride) {
+  Vector3d mean_e = Vector3d::Zero(), mean_t = Vector3d::Zero();
+  const double n = static_cast<double>(ride.tracked.size());
+  for (const Ride::Frame& frame : ride.tracked) {
+    mean_e += frame.result.T_odom_body.t / n;
+    mean_t += frame.truth.T_odom_body.t / n;
+  }
+  double sine = 0, cosine = 0;
+  for (const Ride::Frame& frame : ride.tracked) {
+    const Vector3d e = frame.result.T_odom_body.t - mean_e, t = frame.truth.T_odom_body.t - mean_t;
+    cosine += t.x() * e.x() + t.y() * e.y();
+    sine += t.x() * e.y() - t.y() * e.x();
+  }
+  const Eigen::Quaterniond q = YawRotation(std::atan2(sine, cosine));
+  double sum = 0;
+  for (const Ride::Frame& frame : ride.tracked) {
+    sum += (frame.result.T_odom_body.t - mean_e - q * (frame.truth.T_odom_body.t - mean_t))
+               .squaredNorm();
+  }
+  return std::sqrt(sum / n);
+}
+
+double TiltError(const ImuState& truth, const FrameResult& result) {
+  const Vector3d up_true = truth.T_odom_body.q.conjugate() * Vector3d::UnitZ();
+  const Vector3d up = result.T_odom_body.q.conjugate() * Vector3d::UnitZ();
+  return std::acos(std::min(1.0, up.dot(up_true)));
+}
+
+TEST(Estimator, StartsMoving) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    Ride ride(options);
+    ride.Advance(45);
+    ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+    EXPECT_LE(ride.started_s, 3.0);
+    const Ride::Frame& first = ride.tracked.front();
+    EXPECT_LT(TiltError(first.truth, first.result), 0.035);
+    EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 0.01);
+    EXPECT_LT((first.result.accel_bias - first.truth.accel_bias).norm(), 0.35);
+    EXPECT_NEAR(first.result.v_odom_body.norm(), first.truth.v_odom_body.norm(), 0.15);
+    // Scale: how far it went since.
+    const Ride::Frame& last = ride.tracked.back();
+    const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
+    const double length = (last.result.T_odom_body.t - first.result.T_odom_body.t).norm();
+    EXPECT_NEAR(length / true_length, 1, 0.05) << "seed " << seed;
+  }
+}
+
+TEST(Estimator, StartsAtRest) {
+  VioTestWorldOptions options;
+  options.pixel_noise = 0.2;  // a standing image is tracked better than a moving one
+  options.rest_begin_s = -1;
+  options.rest_end_s = 4;
+  Ride ride(options);
+  ride.Advance(80);
+  ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+  EXPECT_LE(ride.started_s, 1.5);
+  const Ride::Frame& first = ride.tracked.front();
+  EXPECT_LT(first.result.v_odom_body.norm(), 0.02);
+  EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 2e-3);
+  EXPECT_LT(TiltError(first.truth, first.result), 0.03);
+  const Ride::Frame& last = ride.tracked.back();  // 4 s on the move
+  EXPECT_LT(TiltError(last.truth, last.result), 0.01);
+  const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
+  EXPECT_NEAR((last.result.T_odom_body.t - first.result.T_odom_body.t).norm() / true_length, 1,
+              0.05);
+}
+
+TEST(Estimator, FollowsThePathForHalfAMinute) {
+  VioTestWorldOptions options;
+  options.seed = 3;
+  // The calibration is as good as the estimator supposes.
+  options.extrinsics_rotation_sigma = 0.003;
+  options.extrinsics_position_sigma = 0.003;
+  options.time_offset_sigma = 0.002;
+  Ride ride(options);
+  ride.Advance(300);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+  const double ate = Ate(ride);
+  std::cout << "ATE over 30 s: " << ate << " m\n";
+  EXPECT_LT(ate, 0.12);
+  EXPECT_LT(TiltError(ride.tracked.back().truth, ride.tracked.back().result), 0.01);
+  // The calibration got better, not worse.
+  const CameraModel camera = ride.estimator.camera();
+  EXPECT_NEAR(camera.time_offset_s, ride.world.true_time_offset_s(), 0.001);
+  EXPECT_LT(LogSo3(camera.T_body_cam.q * ride.world.true_T_body_cam().q.conjugate()).norm(), 0.004);
+}
+
+TEST(Estimator, StandsStillWithoutDrift) {
+  VioTestWorldOptions options;
+  options.seed = 4;
+  options.rest_begin_s = 5;
+  options.rest_end_s = 17;
+  Ride ride(options);
+  ride.Advance(60);  // t = 6.9: at rest for 1.4 s
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+  const Rigid3 before = ride.last.T_odom_body;
+  ride.Advance(100);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+  EXPECT_LT((ride.last.T_odom_body.t - before.t).norm(), 0.02);
+  EXPECT_LT(LogSo3(ride.last.T_odom_body.q * before.q.conjugate()).norm(), 0.005);
+  EXPECT_LT(ride.last.v_odom_body.norm(), 0.01);
+  // ... and walks on as if nothing had been.
+  ride.Advance(50);
+  EXPECT_LT(Ate(ride), 0.1);
+}
+
+TEST(Estimator, AGapInTheImagesIsALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
+  VioTestWorld::Input gap;
+  for (int i = 0; i < 15; ++i) {  // 1.5 s of images never come, their samples do
+    const VioTestWorld::Input next = ride.world.Next();
+    gap.frame = next.frame;
+    gap.imu.insert(gap.imu.end(), next.imu.begin(), next.imu.end());
+  }
+  ride.Feed(gap);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("no images"));
+  ride.Advance(1);  // and stays one
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+}
+
+TEST(Estimator, AGapInTheInertialSamplesIsALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
+  for (int i = 0; i < 5; ++i) {
+    ride.world.Next();
+  }
+  VioTestWorld::Input late = ride.world.Next();
+  ride.Feed(late);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("inertial samples have a gap"));
+}
+
+TEST(Estimator, NoInertialSamplesAreALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  VioTestWorld::Input none = ride.world.Next();
+  none.imu.clear();
+  ride.Feed(none);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("no inertial samples"));
+}
+
+TEST(Estimator, TheSameInputGivesTheSameOutput) {
+  Ride a({}), b({});
+  a.Advance(60);
+  b.Advance(60);
+  EXPECT_EQ(a.last.T_odom_body.t, b.last.T_odom_body.t);
+  EXPECT_EQ(a.last.T_odom_body.q.coeffs(), b.last.T_odom_body.q.coeffs());
+  EXPECT_EQ(a.finished.size(), b.finished.size());
+}
+
+// Mean of normalised squares.
+struct Mean {
+  double sum = 0;
+  int count = 0;
+  void Add(double value) {
+    sum += value;
+    ++count;
+  }
+  double value() const { return sum / count; }
+};
+
+TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
+  Mean edge, edge_position, edge_rotation, tilt, depth, preintegrated;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.extrinsics_rotation_sigma = 0.002;
+    options.extrinsics_position_sigma = 0.002;
+    Ride ride(options);
+    ride.Advance(80);
+    ride.Flush();
+    ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
+
+    // Every announced keyframe comes, in order, once.
+    std::vector<int64_t> announced, came;
+    for (const Ride::Frame& frame : ride.tracked) {
+      if (frame.result.is_keyframe) {
+        announced.push_back(frame.utime);
+      }
+    }
+    for (const FinishedKeyframe& keyframe : ride.finished) {
+      came.push_back(keyframe.utime);
+    }
+    EXPECT_EQ(came, announced) << "seed " << seed;
+    ASSERT_GT(ride.finished.size(), 5u);
+
+    const Rigid3 T_odom_truth = ride.T_odom_truth();
+    for (size_t k = 0; k < ride.finished.size(); ++k) {
+      const FinishedKeyframe& keyframe = ride.finished[k];
+      const ImuState truth = ride.world.TruthAt(keyframe.utime);
+      const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
+      const Vector3d turn = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
+      tilt.Add(turn.head<2>().dot(keyframe.roll_pitch_covariance.inverse() * turn.head<2>()) / 2);
+      for (const LandmarkDepth& landmark : keyframe.landmarks) {
+        if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
+          const double e = landmark.inverse_depth - 1 / *z;
+          depth.Add(e * e / landmark.inverse_depth_var);
+        }
+      }
+      ASSERT_EQ(keyframe.edge.has_value(), k > 0);
+      ASSERT_EQ(keyframe.preintegration.has_value(), k > 0);
+      if (k == 0) {
+        continue;
+      }
+      // Edges chain to the published poses.
+      const FinishedKeyframe& previous = ride.finished[k - 1];
+      const Vector6d gap =
+          (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);
+      EXPECT_LT(gap.norm(), 1e-9);
+      const Rigid3 T_true_edge =
+          ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
+      const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
+      const Matrix6d& C = keyframe.edge->covariance;
+      edge.Add(e.dot(C.llt().solve(e)) / 6);
+      edge_position.Add(
+          e.head<3>().dot(Matrix3d(C.topLeftCorner<3, 3>()).llt().solve(e.head<3>())) / 3);
+      edge_rotation.Add(
+          e.tail<3>().dot(Matrix3d(C.bottomRightCorner<3, 3>()).llt().solve(e.tail<3>())) / 3);
+      // The inertial measurement of the same span, corrected for the true biases.
+      const ImuState before = ride.world.TruthAt(previous.utime);
+      const CorrectedDelta delta =
+          CorrectForBias(*keyframe.preintegration, before.gyro_bias, before.accel_bias);
+      const Eigen::Quaterniond dq = before.T_odom_body.q.conjugate() * truth.T_odom_body.q;
+      preintegrated.Add(LogSo3(delta.q.conjugate() * dq).norm());
+    }
+  }
+  std::cout << "normalised squares: edges " << edge.value() << " (position "
+            << edge_position.value() << ", rotation " << edge_rotation.value() << ", " << edge.count
+            << "), tilt " << tilt.value() << ", depths " << depth.value() << " (" << depth.count
+            << "); preintegrated rotation " << preintegrated.value() << " rad\n";
+  for (const Mean* mean : {&edge, &edge_position, &edge_rotation, &tilt, &depth}) {
+    EXPECT_GT(mean->value(), 0.3);
+    EXPECT_LT(mean->value(), 3.0);
+  }
+  EXPECT_LT(preintegrated.value(), 2e-3);
+}
+
+}  // namespace
+}  // namespace pangea::vio
