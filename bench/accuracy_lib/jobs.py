@@ -62,13 +62,18 @@ class Job:
         return self.record().get("digest", "") if self.main_product else self.key()
 
     def program(self):
-        return file_digest(self.commands[0].argv[0])
+        try:
+            return file_digest(self.commands[0].argv[0])
+        except OSError:
+            return None
 
     def fresh(self):
         return self.record().get("key") == self.key()
 
     def stale(self):
-        return self.record().get("program") not in (None, self.program())
+        """Made by another build of the program than the one at hand."""
+        made_by, at_hand = self.record().get("program"), self.program()
+        return None not in (made_by, at_hand) and made_by != at_hand
 
     def finish(self, part, seconds):
         made = {"key": self.key(), "program": self.program(), "seconds": round(seconds, 1)}
@@ -96,8 +101,11 @@ class Running:
         log.parent.mkdir(parents=True, exist_ok=True)
         self.output = log.open("w")
         self.left = list(job.commands)
-        self.child = None
-        self._next()
+        try:
+            self._next()
+        except OSError:
+            self.output.close()
+            raise
 
     def _next(self):
         self.command = self.left.pop(0)
