@@ -4,8 +4,10 @@ import argparse
 import contextlib
 import io
 import json
+import os
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -14,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from accuracy_lib import anchors  # noqa: E402
 from accuracy_lib.figures import Measured, Sample, Series  # noqa: E402
 from accuracy_lib.jobs import OUT, Command, Job, Runner  # noqa: E402
-from accuracy_lib.plan import Plan  # noqa: E402
+from accuracy_lib.plan import Plan, RenderJob  # noqa: E402
 
 
 def shell(text):
@@ -72,6 +74,43 @@ class RunnerTest(unittest.TestCase):
 
     def test_a_missing_product_fails_the_job(self):
         self.assertEqual(self.run_jobs(self.chain(first="true")), ["failed", "skipped"])
+
+
+class RenderTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.work = Path(folder.name)
+        self.images = self.work / "recording/mav0/cam0/data"
+        self.images.mkdir(parents=True)
+        (self.images.parent / "data.csv").write_text("#stamp,file\n1,1.png\n2,2.png\n")
+        for name in ("1.png", "2.png"):
+            (self.images / name).write_text("pixels")
+            os.utime(self.images / name, times=(time.time() - 60,) * 2)
+
+    def render(self):
+        render = RenderJob("render", "x", self.work / "recording", [shell("render")])
+        render.users.append(Job("vio", "x", self.work / "vio", [shell("vio")], needs=[render]))
+        return render
+
+    def test_a_whole_recording_rendered_by_hand_is_taken(self):
+        self.assertTrue(self.render().fresh())
+
+    def test_half_a_recording_is_not(self):
+        (self.images / "2.png").unlink()
+        self.assertFalse(self.render().fresh())
+
+    def test_dropped_images_are_rendered_again_only_when_needed(self):
+        render = self.render()
+        self.assertTrue(render.fresh())
+        render.drop_images()
+        self.assertFalse(render.fresh())
+        vio = render.users[0]
+        vio.folder.mkdir()
+        (vio.folder / "job.json").write_text(json.dumps({"key": vio.key()}))
+        self.assertTrue(render.fresh())
+        render.redo = ["vio"]
+        self.assertFalse(render.fresh())
 
 
 class SeriesTest(unittest.TestCase):

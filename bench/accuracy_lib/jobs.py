@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 OUT = "{out}"  # in a command: the folder that is being made
+GOING = ("waiting", "wanted", "running")
 
 
 @functools.cache
@@ -39,7 +40,7 @@ class Job:
     files: dict = field(default_factory=dict)  # name -> text, written before the commands run
     outside: list = field(default_factory=list)  # files read that no job made
     alone: bool = False  # uses all processors itself
-    state: str = "waiting"  # then running, and done, kept, failed or skipped
+    state: str = "waiting"  # then wanted, running, and done, kept, failed or skipped
 
     @property
     def ended_well(self):
@@ -148,7 +149,7 @@ class Runner:
 
     def run(self):
         try:
-            while any(job.state in ("waiting", "running") for job in self.jobs):
+            while any(job.state in GOING for job in self.jobs):
                 self._start_ready()
                 time.sleep(0.1)
                 self._collect()
@@ -161,22 +162,26 @@ class Runner:
 
     def _say(self, text):
         seconds = int(time.monotonic() - self.begin)
-        over = sum(job.state not in ("waiting", "running") for job in self.jobs)
+        over = sum(job.state not in GOING for job in self.jobs)
         print(f"[{seconds // 60:4d}:{seconds % 60:02d}] {over}/{len(self.jobs)} {text}", flush=True)
 
     def _start_ready(self):
         for job in self.jobs:
-            if job.state != "waiting":
-                continue
-            if any(need.state in ("failed", "skipped") for need in job.needs):
-                job.state = "skipped"
-                self._say(f"{job.kind} {job.name}: skipped, what it needs is missing")
-            elif all(need.ended_well for need in job.needs):
-                if job.kind not in self.redo and job.fresh():
-                    job.state = "kept"
-                    self.after(job)
-                elif self._room_for(job):
-                    self._start(job)
+            if job.state == "waiting":
+                self._decide(job)
+            if job.state == "wanted" and self._room_for(job):
+                self._start(job)
+
+    def _decide(self, job):
+        if any(need.state in ("failed", "skipped") for need in job.needs):
+            job.state = "skipped"
+            self._say(f"{job.kind} {job.name}: skipped, what it needs is missing")
+        elif all(need.ended_well for need in job.needs):
+            if job.kind not in self.redo and job.fresh():
+                job.state = "kept"
+                self.after(job)
+            else:
+                job.state = "wanted"
 
     def _room_for(self, job):
         if any(running.job.alone for running in self.running):
