@@ -156,7 +156,7 @@ class Tables:
             links = [self.measured.links(f"seed{seed}", name) for seed in self.seeds]
             fused_passes.append(fused == len(self.seeds))
             ate_passes.append(joint.at_most(bar))
-            rows.append([name, f"{fused} of {len(self.seeds)}", f"{min(links)}–{max(links)}", joint.text(), str(bar),
+            rows.append([name, f"{fused} of {len(self.seeds)}", "–".join(map(str, sorted({min(links), max(links)}))), joint.text(), str(bar),
                          _passed(fused_passes[-1] and ate_passes[-1]), series[name]["joint_sim3"].text(), second.text(),
                          alone.text(), *map(_metres, paper)])
             self._goal(f"{name}: second agent better than the paper's best, {min(paper)} m", second.at_most(min(paper)))
