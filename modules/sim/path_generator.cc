@@ -135,7 +135,7 @@ Trajectory GeneratePath(const GeneratedPathOptions& options) {
   Trajectory trajectory;
   constexpr int64_t kOriginUtime = 1700000000000000;
   for (int i = 0; i < count; ++i) {
-    const auto at = static_cast<size_t>(i + kReach);
+    const auto at = static_cast<size_t>(i) + kReach;
     Eigen::Quaterniond lean = Eigen::Quaterniond::Identity();
     if (options.motion == Motion::kFlight) {
       const double interval = kReach * kPeriod;

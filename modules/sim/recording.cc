@@ -138,8 +138,8 @@ Recorder::Recorder(const RecordingOptions& options)
       sets.emplace_back(HashBytes(points.data(), points.size() * sizeof(points[0])), points);
     }
     std::ranges::sort(sets, {}, &decltype(sets)::value_type::first);
-    const auto repeated = std::ranges::unique(sets, {}, &decltype(sets)::value_type::first);
-    sets.erase(repeated.begin(), repeated.end());
+    const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
+    sets.erase(std::unique(sets.begin(), sets.end(), same), sets.end());
     for (const auto& [hash, points] : sets) {
       scene_options_.keep_clear.insert(scene_options_.keep_clear.end(), points.begin(),
                                        points.end());

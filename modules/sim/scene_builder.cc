@@ -91,7 +91,7 @@ std::vector<Vector3d> Thinned(const std::vector<Vector3d>& points) {
   }
   std::ranges::stable_sort(order, [&](size_t a, size_t b) { return cells[a] < cells[b]; });
   const auto same = [&](size_t a, size_t b) { return cells[a] == cells[b]; };
-  order.erase(std::ranges::unique(order, same).begin(), order.end());
+  order.erase(std::unique(order.begin(), order.end(), same), order.end());
   std::vector<Vector3d> thinned;
   for (const size_t i : order) {
     thinned.push_back(points[i]);

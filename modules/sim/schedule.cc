@@ -76,8 +76,8 @@ Schedule ReadSchedule(const std::string& stamps_file, const Span& span, const Re
         fmt::format("{}: no stamp lies within both the path's and the IMU's time", stamps_file));
   }
   std::ranges::sort(schedule.images_ns);
-  const auto repeated = std::ranges::unique(schedule.images_ns);
-  schedule.images_ns.erase(repeated.begin(), repeated.end());
+  schedule.images_ns.erase(std::unique(schedule.images_ns.begin(), schedule.images_ns.end()),
+                           schedule.images_ns.end());
   constexpr int64_t kAround = 10'000'000;
   schedule.imu = {schedule.images_ns.front() - kAround, schedule.images_ns.back() + kAround};
   return schedule;

@@ -39,7 +39,7 @@ double ExposureGain(double variation, uint64_t seed, double time_s) {
 }  // namespace
 
 Sensor::Sensor(const CameraModel& camera, const SensorOptions& options)
-    : camera_(camera), options_(options), vignette_(camera.height, camera.width, CV_32F) {
+    : options_(options), vignette_(camera.height, camera.width, CV_32F) {
   const Eigen::Vector2d centre(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {

@@ -31,7 +31,6 @@ struct CameraRates {
 
 class Sensor {
  public:
-  // `camera` must outlive it.
   Sensor(const CameraModel& camera, const SensorOptions& options);
 
   // 8-bit, of the view as the camera moves.
@@ -42,7 +41,6 @@ class Sensor {
  private:
   cv::Mat Blurred(const RenderedView& view, const CameraRates& rates) const;
 
-  const CameraModel& camera_;
   SensorOptions options_;
   cv::Mat vignette_;                  // CV_32F, at most 1
   std::vector<Eigen::Vector3f> ray_;  // unit

@@ -74,9 +74,10 @@ inline float Texture::Bilinear(const Level& level, float x, float y) const {
 }
 
 float Texture::Sample(const Footprint& f) const {
-  constexpr int kMaxTaps = 4;
+  constexpr float kMaxTaps = 4;
   // Taps stand up to one and a half pixels apart.
-  const int taps = std::clamp(static_cast<int>(0.67f * f.major / f.minor + 0.5f), 1, kMaxTaps);
+  const float wanted = std::clamp(0.67f * f.major / f.minor + 0.5f, 1.0f, kMaxTaps);
+  const int taps = static_cast<int>(wanted);
   const float size = std::max(f.minor, f.major / static_cast<float>(taps));
   const float lod = std::clamp(FastLog2(std::max(size * texels_per_m_, 1.0f)), 0.0f,
                                static_cast<float>(levels_.size() - 1));
