@@ -42,7 +42,7 @@ std::optional<Eigen::Vector2d> TrackMaker::PixelOf(const std::vector<Rigid3>& T_
   constexpr int kRowIterations = 3;
   for (int i = 0;; ++i) {
     const Eigen::Vector3d p_cam = pose->Inverse() * landmark;
-    const auto pixel = p_cam.z() < kNearest ? std::nullopt : camera_.Project(p_cam);
+    auto pixel = p_cam.z() < kNearest ? std::nullopt : camera_.Project(p_cam);
     if (!pixel || !camera_.Contains(*pixel, 1)) {
       return std::nullopt;
     }
@@ -75,7 +75,8 @@ std::vector<TrackedPoint> TrackMaker::Next(const std::vector<Rigid3>& T_ref_cam)
     }
     const int x = std::clamp(static_cast<int>(pixel->x() * across / camera_.width), 0, across - 1);
     const int y = std::clamp(static_cast<int>(pixel->y() * down / camera_.height), 0, down - 1);
-    int& in_cell = taken[static_cast<size_t>(y * across + x)];
+    const int cell = y * across + x;
+    int& in_cell = taken[static_cast<size_t>(cell)];
     if (in_cell < most_in_cell && !Hidden(pose.t, landmark)) {
       ++in_cell;
       points.push_back({id, *pixel});
