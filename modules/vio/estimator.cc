@@ -6,15 +6,16 @@
 #include <cmath>
 #include <deque>
 
-#include "vio/feature_updates.h"
 #include "vio/initialiser.h"
 #include "vio/keyframe_finisher.h"
+#include "vio/landmark_store.h"
 #include "vio/track_history.h"
-#include "vio/window_filter.h"
+#include "vio/window_problem.h"
 
 namespace pangea::vio {
 namespace {
 
+using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
 constexpr int64_t kMaxImuGap_us = 300'000;
@@ -25,16 +26,19 @@ constexpr double kMaxSpeed = 50;     // m/s
 constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
-// The image stands still when it moves less than this between images; then a new image replaces the
-// one before.
-constexpr double kStillPixels = 0.4;
-constexpr size_t kStillTracks = 15;
-// ... and the body is at rest when it has stood still this long with a quiet gyro and
-// accelerometer.
-constexpr int kRestFrames = 6;
-constexpr double kRestVelocitySigma = 0.02;  // m/s
-constexpr double kRestGyro = 0.05;           // rad/s, mean rate less bias
-constexpr double kRestAccel = 0.3;           // m/s^2, standard deviation
+constexpr int kMaxIterations = 4;
+// A landmark is an outlier when its newest ray is this far off, or all of them together.
+constexpr double kMaxRayError = 5.0;     // sigmas
+constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
+
+// The body rests when the image has moved by no more than its noise for this long (the
+// median shift in sigmas: noise alone gives 1.7), with a quiet gyro and accelerometer.
+constexpr double kRestSpan_s = 0.5;
+constexpr double kStillSigmas = 2.2;
+constexpr double kRestGyro = 0.05;  // rad/s, mean rate less bias
+constexpr double kRestAccel = 0.3;  // m/s^2, standard deviation
+constexpr size_t kRestSamples = 50;
+constexpr int64_t kImuMargin_us = 50'000;  // for changes of the time offset
 
 // Prior uncertainty of the given calibration.
 constexpr double kExtrinsicsRotationSigma = 0.005;  // rad
@@ -42,6 +46,13 @@ constexpr double kExtrinsicsPositionSigma = 0.005;  // m
 constexpr double kTimeOffsetSigma = 0.003;          // s
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
+
+// 95 % quantile of chi-square (Wilson & Hilferty, 1931).
+double ChiSquare95(int degrees_of_freedom) {
+  const double k = degrees_of_freedom;
+  const double c = 1 - 2 / (9 * k) + 1.6449 * std::sqrt(2 / (9 * k));
+  return k * c * c * c;
+}
 
 // From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
 Eigen::Matrix<double, 15, 15> ToInvariant(const ImuState& imu,
@@ -60,252 +71,362 @@ struct Estimator::Impl {
         camera(c),
         noise(n),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
-        initialiser(c, n, o.pixel_sigma),
-        updates(o.window, o.max_landmarks) {}
+        initialiser(c, n, o.pixel_sigma) {
+    problem.state.T_body_cam = c.T_body_cam;
+    problem.state.time_offset_s = c.time_offset_s;
+  }
 
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
   std::vector<FinishedKeyframe> Flush();
 
-  void Start(const InitialState& initial);
-  std::optional<std::string> Propagate(int64_t utime);
-  void UpdateAtRest(int64_t previous_utime);
-  void ChooseKeyframe(const TrackedFrame& frame);
+  void Start(const InitialState& initial, const TrackedFrame& frame);
+  std::optional<std::string> AddToWindow(const TrackedFrame& frame);
+  void DropPassing();
+  std::optional<std::string> ImuGap(int64_t from_utime, int64_t to_utime) const;
+  Preintegration Integrate(int64_t from_imu_utime, int64_t to_imu_utime, const ImuState& at) const;
+  bool AtRest(const TrackedFrame& frame);
+  std::vector<int32_t> Solve();
+  bool HasMoved(int64_t since_utime, double parallax_px, double track_share) const;
+  void ChooseRole();
+  void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
-  void RemoveClone(int index);
-  FinishedKeyframe Finish(int index);
-  Matrix6d CloneCovariance(int index) const {
-    const int at = filter->state().CloneOffset(index);
-    return filter->state().covariance.block<6, 6>(at, at);
-  }
-  Preintegration IntegrateBetween(int64_t from_utime, int64_t to_utime, const ImuState& at) const;
+  void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
+  FinishedKeyframe Publish(int index, const MatrixXd& P);
   std::optional<std::string> Implausible() const;
   int64_t ImuTime(int64_t frame_utime) const {
-    const double offset = filter ? filter->state().time_offset_s : camera.time_offset_s;
-    return frame_utime + static_cast<int64_t>(std::llround(1e6 * offset));
+    return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
   }
-  int NewestClone() const { return static_cast<int>(filter->state().clones.size()) - 1; }
+  WindowFrame& Newest() { return problem.state.frames.back(); }
+  const WindowFrame& LastStaying() const {
+    const auto& frames = problem.state.frames;
+    return frames.back().stays ? frames.back() : frames[frames.size() - 2];
+  }
 
   EstimatorOptions options;
   CameraModel camera;
   ImuNoise noise;
   double ray_sigma;
   Initialiser initialiser;
-  std::optional<WindowFilter> filter;
+  bool started = false;
+  WindowProblem problem;
   TrackHistory history;
-  FeatureUpdates updates;
-  std::deque<ImuSample> imu_samples;                // since the last finished keyframe
-  int64_t filter_utime = 0;                         // IMU time of the filter's state
-  int64_t last_keyframe_utime = 0;                  // newest clone that is a keyframe
-  std::optional<FinishedKeyframe> previous;         // the last finished keyframe
-  Matrix6d previous_covariance = Matrix6d::Zero();  // of its clone, when it was finished
-  Vector3d omega_body = Vector3d::Zero();
-  bool still = false;
-  int still_frames = 0;
+  LandmarkStore landmarks;
+  std::deque<ImuSample> imu_samples;                // since the last published keyframe
+  int64_t last_keyframe_utime = 0;                  // newest frame that is a keyframe
+  std::optional<FinishedKeyframe> previous;         // the last published keyframe
+  Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
+  TrackHistory recent;                              // the last half a second, to tell a rest
+  std::deque<int64_t> recent_utimes;
+  bool still = false;  // the images stand
   int blind_frames = 0;
   bool lost = false;
 };
 
-void Estimator::Impl::Start(const InitialState& initial) {
-  WindowState state;
-  state.imu = initial.imu;
-  state.T_body_cam = camera.T_body_cam;
-  state.time_offset_s = camera.time_offset_s;
-  state.covariance = Eigen::MatrixXd::Zero(kFixedSize, kFixedSize);
-  state.covariance.topLeftCorner<15, 15>() = ToInvariant(initial.imu, initial.covariance);
-  Eigen::Matrix<double, 7, 1> sigma;
+void Estimator::Impl::Start(const InitialState& initial, const TrackedFrame& frame) {
+  WindowFrame first;
+  first.utime = frame.utime;
+  first.imu_utime = ImuTime(frame.utime);
+  first.time_offset_s = problem.state.time_offset_s;
+  first.imu = initial.imu;
+  first.stays = true;
+  problem.state.frames = {first};
+  problem.links.resize(1);
+  history.AddFrame(frame, camera, ray_sigma);
+
+  const int n = kCalibrationSize + kFrameSize;
+  MatrixXd P = MatrixXd::Zero(n, n);
+  Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
       Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma;
-  state.covariance.bottomRightCorner<7, 7>() = sigma.cwiseAbs2().asDiagonal();
-  filter.emplace(noise, std::move(state));
-  filter_utime = ImuTime(initial.utime);
+  P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
+  P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(initial.imu, initial.covariance);
+  // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
+  // invertible.
+  P.diagonal().segment<kPoseSize>(kCalibrationSize).array() += 1e-8;
+  problem.prior.at = problem.state;
+  problem.prior.H = P.llt().solve(MatrixXd::Identity(n, n));
+  problem.prior.g.setZero(n);
+  started = true;
 }
 
-// Nothing when it worked, else what is wrong.
-std::optional<std::string> Estimator::Impl::Propagate(int64_t utime) {
-  const int64_t target = ImuTime(utime);
-  if (target <= filter_utime) {
-    return std::nullopt;
-  }
-  std::vector<ImuSample> span;
+std::optional<std::string> Estimator::Impl::ImuGap(int64_t from_utime, int64_t to_utime) const {
+  bool any = false;
   for (size_t i = 0; i + 1 < imu_samples.size(); ++i) {
     const ImuSample& a = imu_samples[i];
     const ImuSample& b = imu_samples[i + 1];
-    if (b.utime <= filter_utime || a.utime >= target) {
+    if (b.utime <= from_utime || a.utime >= to_utime) {
       continue;
     }
+    any = true;
     if (b.utime - a.utime > kMaxImuGap_us) {
       return fmt::format("the inertial samples have a gap of {:.2f} s", Seconds(b.utime - a.utime));
     }
-    if (span.empty()) {
-      span.push_back(a.utime < filter_utime ? InterpolateImu(a, b, filter_utime) : a);
-    }
-    span.push_back(b.utime > target ? InterpolateImu(a, b, target) : b);
   }
-  if (span.size() < 2) {
+  if (!any || imu_samples.back().utime < to_utime - kImuMargin_us) {
     return "no inertial samples up to the image's time";
   }
-  // The time offset may want a little more than has come: the last sample holds.
-  if (span.back().utime < target) {
-    ImuSample held = span.back();
-    held.utime = target;
-    span.push_back(held);
-  }
-  filter->Propagate(span);
-  filter_utime = target;
-  omega_body = span.back().gyro - filter->state().imu.gyro_bias;
   return std::nullopt;
 }
 
-void Estimator::Impl::UpdateAtRest(int64_t previous_utime) {
-  const WindowState& state = filter->state();
-  const int n = static_cast<int>(state.clones.size());
-  const Clone& newest = state.clones[n - 1];
-  still = false;
-  if (n >= 2) {
-    const TrackHistory::Shift shift =
-        history.ShiftBetween(previous_utime, newest.utime, Eigen::Quaterniond::Identity());
-    still = shift.shared >= kStillTracks && shift.median < kStillPixels * camera.PixelAngle();
-  }
-  still_frames = still ? still_frames + 1 : 0;
-  if (still_frames < kRestFrames) {
-    return;
-  }
-  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
-  std::vector<ImuSample> recent;
-  for (auto it = imu_samples.rbegin(); it != imu_samples.rend() && recent.size() < 50; ++it) {
-    recent.push_back(*it);
-    mean_gyro += it->gyro;
-    mean_accel += it->accel;
-  }
-  mean_gyro /= static_cast<double>(recent.size());
-  mean_accel /= static_cast<double>(recent.size());
-  double var_accel = 0;
-  for (const ImuSample& sample : recent) {
-    var_accel += (sample.accel - mean_accel).squaredNorm() / static_cast<double>(recent.size());
-  }
-  if ((mean_gyro - state.imu.gyro_bias).norm() > kRestGyro || var_accel > kRestAccel * kRestAccel) {
-    return;
-  }
-  Measurement m;
-  m.H = Eigen::MatrixXd::Zero(3, state.size());
-  m.H.block<3, 3>(0, kTheta) = -Hat(state.imu.v_odom_body);
-  m.H.block<3, 3>(0, kVelocity).setIdentity();
-  m.r = -state.imu.v_odom_body;
-  filter->Update(m, kRestVelocitySigma);
-}
-
-void Estimator::Impl::ChooseKeyframe(const TrackedFrame& frame) {
-  WindowState& state = filter->mutable_state();
-  Clone& newest = state.clones.back();
-  const int last = state.CloneIndex(last_keyframe_utime);
-  const double elapsed = Seconds(frame.utime - last_keyframe_utime);
-  bool wanted = last_keyframe_utime == 0 || elapsed >= options.keyframe_interval_s;
-  if (!wanted && elapsed >= options.keyframe_min_interval_s) {
-    // Without the last keyframe in the window there is nothing left in common to measure.
-    wanted = last < 0 || state.clones[last].is_edge_end;
-    if (!wanted) {
-      const Eigen::Quaterniond q_newest_last =
-          (newest.T_odom_body.q * state.T_body_cam.q).conjugate() *
-          (state.clones[last].T_odom_body.q * state.T_body_cam.q);
-      const TrackHistory::Shift shift =
-          history.ShiftBetween(last_keyframe_utime, frame.utime, q_newest_last);
-      const double share = static_cast<double>(shift.shared) /
-                           std::max<double>(1.0, history.Frame(last_keyframe_utime).size());
-      wanted = shift.median > options.keyframe_parallax_px * camera.PixelAngle() ||
-               share < options.keyframe_track_share;
-    }
-  }
-  if (wanted) {
-    newest.is_keyframe = true;
-    last_keyframe_utime = frame.utime;
-  }
-}
-
-Preintegration Estimator::Impl::IntegrateBetween(int64_t from_utime, int64_t to_utime,
-                                                 const ImuState& at) const {
+Preintegration Estimator::Impl::Integrate(int64_t from_imu_utime, int64_t to_imu_utime,
+                                          const ImuState& at) const {
   Preintegrator integrator(noise, at.gyro_bias, at.accel_bias);
-  const int64_t from = ImuTime(from_utime), to = ImuTime(to_utime);
-  for (size_t i = 0; i + 1 < imu_samples.size(); ++i) {
-    ImuSample a = imu_samples[i], b = imu_samples[i + 1];
-    if (b.utime <= from || a.utime >= to) {
-      continue;
+  const auto first = std::partition_point(
+      imu_samples.begin(), imu_samples.end(),
+      [from_imu_utime](const ImuSample& sample) { return sample.utime <= from_imu_utime; });
+  auto b = first;
+  for (; b != imu_samples.begin() && b != imu_samples.end(); ++b) {
+    const ImuSample& a = *std::prev(b);
+    if (a.utime >= to_imu_utime) {
+      break;
     }
-    const ImuSample begin = a.utime < from ? InterpolateImu(a, b, from) : a;
-    const ImuSample end = b.utime > to ? InterpolateImu(a, b, to) : b;
-    integrator.Add(begin, end);
+    integrator.Add(a.utime < from_imu_utime ? InterpolateImu(a, *b, from_imu_utime) : a,
+                   b->utime > to_imu_utime ? InterpolateImu(a, *b, to_imu_utime) : *b);
+  }
+  // The time offset may want a little more than has come: the last sample holds.
+  if (!imu_samples.empty() && imu_samples.back().utime < to_imu_utime) {
+    ImuSample held = imu_samples.back();
+    held.utime = to_imu_utime;
+    integrator.Add(imu_samples.back(), held);
   }
   return integrator.result();
 }
 
-FinishedKeyframe Estimator::Impl::Finish(int index) {
-  WindowState& state = filter->mutable_state();
-  FinishedKeyframe keyframe = FinishKeyframe(state, history, index);
-  int edge_end = -1;
-  for (int i = 0; i < static_cast<int>(state.clones.size()); ++i) {
-    edge_end = state.clones[i].is_edge_end ? i : edge_end;
+// A frame that does not stay makes room for the next one: its rays go, its inertial samples are
+// measured again as part of the longer span.
+void Estimator::Impl::DropPassing() {
+  if (!Newest().stays) {
+    history.RemoveFrame(Newest().utime);
+    problem.state.frames.pop_back();
+    problem.links.pop_back();
   }
-  if (previous && edge_end >= 0) {
+}
+
+// Nothing when it worked, else what is wrong.
+std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
+  const int64_t imu_utime = ImuTime(frame.utime);
+  if (const auto wrong = ImuGap(Newest().imu_utime, imu_utime)) {
+    return wrong;
+  }
+  history.AddFrame(frame, camera, ray_sigma);
+  const bool at_rest = AtRest(frame);
+  DropPassing();
+  const WindowFrame& last = Newest();
+  InertialLink link;
+  link.measured = Integrate(last.imu_utime, imu_utime, last.imu);
+  link.information = InertialInformation(link.measured, noise);
+  WindowFrame added;
+  added.utime = frame.utime;
+  added.imu_utime = imu_utime;
+  added.time_offset_s = problem.state.time_offset_s;
+  added.imu = Predict(link.measured, last.imu);
+  const auto sample =
+      std::partition_point(imu_samples.begin(), imu_samples.end(),
+                           [imu_utime](const ImuSample& one) { return one.utime < imu_utime; });
+  added.omega_body =
+      (sample == imu_samples.end() ? imu_samples.back() : *sample).gyro - last.imu.gyro_bias;
+  added.at_rest = at_rest;
+  problem.state.frames.push_back(added);
+  problem.links.emplace_back(std::move(link));
+  return std::nullopt;
+}
+
+// Whether the body rests: the image has not moved by more than its noise, since the rest began or
+// for a while, and the IMU is quiet.
+bool Estimator::Impl::AtRest(const TrackedFrame& frame) {
+  recent.AddFrame(frame, camera, ray_sigma);
+  recent_utimes.push_back(frame.utime);
+  while (recent_utimes.size() > 2 && Seconds(frame.utime - recent_utimes[1]) >= kRestSpan_s) {
+    recent.RemoveFrame(recent_utimes.front());
+    recent_utimes.pop_front();
+  }
+  const WindowFrame& last = LastStaying();
+  if (last.at_rest) {
+    still = history.MedianShiftSigmas(last.utime, frame.utime) < kStillSigmas;
+  } else {
+    still = Seconds(frame.utime - recent_utimes.front()) >= kRestSpan_s &&
+            recent.MedianShiftSigmas(recent_utimes.front(), frame.utime) < kStillSigmas;
+  }
+  if (!still) {
+    return false;
+  }
+  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
+  const size_t count = std::min<size_t>(imu_samples.size(), kRestSamples);
+  const auto first = imu_samples.end() - static_cast<std::ptrdiff_t>(count);
+  for (auto it = first; it != imu_samples.end(); ++it) {
+    mean_gyro += it->gyro / static_cast<double>(count);
+    mean_accel += it->accel / static_cast<double>(count);
+  }
+  double var_accel = 0;
+  for (auto it = first; it != imu_samples.end(); ++it) {
+    var_accel += (it->accel - mean_accel).squaredNorm() / static_cast<double>(count);
+  }
+  return (mean_gyro - Newest().imu.gyro_bias).norm() < kRestGyro &&
+         var_accel < kRestAccel * kRestAccel;
+}
+
+// Optimises the window; the tracks that turned out to be outliers.
+std::vector<int32_t> Estimator::Impl::Solve() {
+  problem.landmarks = landmarks.Gather(problem.state, history);
+  Optimise(problem, kMaxIterations);
+  std::vector<int32_t> outliers;
+  size_t seen_now = 0;
+  const int newest = problem.state.Newest();
+  std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
+    double sum = 0, worst = 0;
+    bool is_seen = false;
+    for (const FrameRay& ray : landmark.rays) {
+      const double e = RayError(problem.state, landmark.point, ray);
+      sum += e * e;
+      worst = std::max(worst, e);
+      is_seen = is_seen || ray.frame == newest;
+    }
+    const double rms = std::sqrt(sum / (2.0 * static_cast<double>(landmark.rays.size())));
+    if (rms < kMaxLandmarkRms && worst < kMaxRayError) {
+      seen_now += is_seen ? 1 : 0;
+      return false;
+    }
+    history.RemoveLandmark(landmark.id);
+    if (is_seen) {
+      outliers.push_back(landmark.id);
+    }
+    return true;
+  });
+  landmarks.Keep(problem);
+  const size_t tracked = history.Frame(Newest().utime).size();
+  const bool seeing = seen_now >= kMinUsed || still || tracked > 3 * kMinUsed;
+  blind_frames = seeing ? 0 : blind_frames + 1;
+  return outliers;
+}
+
+// Whether the image has changed enough since another frame of the window.
+bool Estimator::Impl::HasMoved(int64_t since_utime, double parallax_px, double track_share) const {
+  const WindowState& state = problem.state;
+  const auto since = state.Find(since_utime);
+  if (!since || state.frames[*since].pose_only) {
+    return true;  // nothing is left in common to measure
+  }
+  const WindowFrame& newest = state.frames.back();
+  const Eigen::Quaterniond q_newest_since =
+      (newest.imu.T_odom_body.q * state.T_body_cam.q).conjugate() *
+      (state.frames[*since].imu.T_odom_body.q * state.T_body_cam.q);
+  const TrackHistory::Shift shift = history.ShiftBetween(since_utime, newest.utime, q_newest_since);
+  const double share =
+      static_cast<double>(shift.shared) /
+      std::max<double>(1.0, static_cast<double>(history.Frame(since_utime).size()));
+  return shift.median > parallax_px * camera.PixelAngle() || share < track_share;
+}
+
+// Whether the newest frame stays in the window, and whether it is to be published.
+void Estimator::Impl::ChooseRole() {
+  WindowFrame& newest = Newest();
+  const double elapsed = Seconds(newest.utime - last_keyframe_utime);
+  newest.is_keyframe =
+      last_keyframe_utime == 0 || elapsed >= options.keyframe_interval_s ||
+      (elapsed >= options.keyframe_min_interval_s && !newest.at_rest &&
+       HasMoved(last_keyframe_utime, options.keyframe_parallax_px, options.keyframe_track_share));
+  if (newest.is_keyframe) {
+    last_keyframe_utime = newest.utime;
+  }
+  const int before = problem.state.Newest() - 1;
+  const bool rest_begins = newest.at_rest && before >= 0 && !problem.state.frames[before].at_rest;
+  newest.stays =
+      newest.is_keyframe || before < 0 || rest_begins ||
+      (!newest.at_rest && HasMoved(problem.state.frames[before].utime, options.window_parallax_px,
+                                   options.window_track_share));
+}
+
+FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
+  WindowState& state = problem.state;
+  FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
+  const int at = state.Offset(index);
+  const auto from = previous ? state.Find(previous->utime) : std::nullopt;
+  if (from) {
+    const int at_from = state.Offset(*from);
     keyframe.edge = FinishedKeyframe::Edge{previous->T_odom_body.Inverse() * keyframe.T_odom_body,
-                                           RelativeCovariance(state, edge_end, index)};
+                                           RelativeCovariance(state, P, *from, index)};
     keyframe.edge->covariance +=
-        CorrectionCovariance(previous_covariance - CloneCovariance(edge_end), previous->T_odom_body,
-                             keyframe.T_odom_body);
-    ImuState at;
-    at.gyro_bias = previous->gyro_bias;
-    at.accel_bias = previous->accel_bias;
-    Preintegration span = IntegrateBetween(previous->utime, keyframe.utime, at);
+        CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
+                             previous->T_odom_body, keyframe.T_odom_body);
+    ImuState biases;
+    biases.gyro_bias = previous->gyro_bias;
+    biases.accel_bias = previous->accel_bias;
+    Preintegration span = Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime), biases);
     if (span.duration_s > 0) {
       span.covariance.diagonal().array() += 1e-14;
       keyframe.preintegration = span;
     }
   }
+  state.frames[index].is_published = true;
   previous = keyframe;
-  previous_covariance = CloneCovariance(index);
-  while (imu_samples.size() > 2 && imu_samples[1].utime < ImuTime(keyframe.utime) - 100'000) {
-    imu_samples.pop_front();
-  }
+  previous_covariance = P.block<6, 6>(at, at);
   return keyframe;
 }
 
-void Estimator::Impl::RemoveClone(int index) {
-  updates.MoveAnchors(*filter, index);
-  history.RemoveFrame(filter->state().clones[index].utime);
-  filter->RemoveClone(index);
+// Publishes the keyframes up to frame `newest` that have not been.
+void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished) {
+  MatrixXd P;
+  for (int i = 0; i <= newest; ++i) {
+    const WindowFrame& frame = problem.state.frames[i];
+    if (frame.is_keyframe && !frame.is_published) {
+      if (P.size() == 0) {
+        P = WindowCovariance(problem);
+      }
+      finished->push_back(Publish(i, P));
+    }
+  }
 }
 
 void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
-  const auto first_of_window = [&] {
-    return !filter->state().clones.empty() && filter->state().clones.front().is_edge_end ? 1 : 0;
-  };
-  while (NewestClone() + 1 - first_of_window() > options.window) {
-    const std::vector<Clone>& clones = filter->state().clones;
-    const int second_newest = NewestClone() - 1;
-    const int oldest = first_of_window();
-    const bool oldest_is_due =
-        Seconds(clones.back().utime - clones[oldest].utime) > options.keyframe_interval_s;
-    if (still && !clones[second_newest].is_keyframe && !oldest_is_due) {
-      RemoveClone(second_newest);
-      continue;
-    }
-    if (clones[oldest].is_keyframe) {
-      finished->push_back(Finish(oldest));
-      if (oldest > 0) {
-        RemoveClone(0);
-      }
-      // It stays until the next keyframe's edge is known, but what it saw has been used.
-      updates.MoveAnchors(*filter, 0);
-      history.RemoveFrame(filter->state().clones[0].utime);
-      filter->mutable_state().clones[0].is_edge_end = true;
-    } else {
-      RemoveClone(oldest);
-    }
+  WindowState& state = problem.state;
+  int due = -1;  // keyframes up to here have waited long enough
+  for (int i = 0; i <= state.Newest(); ++i) {
+    due = Seconds(Newest().utime - state.frames[i].utime) > options.keyframe_interval_s ? i : due;
   }
-  updates.Forget(history, filter->state());
+  PublishUpTo(due, finished);
+  while (Newest().stays) {
+    const int oldest = state.frames.front().pose_only ? 1 : 0;
+    if (state.Newest() + 1 - oldest <= options.window) {
+      break;
+    }
+    PublishUpTo(oldest, finished);
+    const int64_t published = previous ? previous->utime : 0;
+    Marginalisation what;
+    what.keep_pose = state.frames[oldest].utime == published;
+    what.drop_kept_pose = state.frames.front().utime != published;
+    FoldLandmarks(oldest);
+    history.RemoveFrame(state.frames[oldest].utime);
+    MarginaliseOldest(problem, what);
+  }
+  landmarks.Forget(history);
+  const int64_t needed = std::min(state.frames.front().imu_utime,
+                                  previous ? ImuTime(previous->utime) : Newest().imu_utime);
+  while (imu_samples.size() > kRestSamples && imu_samples[1].utime < needed - kImuMargin_us) {
+    imu_samples.pop_front();
+  }
+}
+
+// The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
+// that do not fit go without a word.
+void Estimator::Impl::FoldLandmarks(int frame) {
+  std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
+    if (landmark.point.anchor != frame) {
+      return false;
+    }
+    landmarks.StartAnew(landmark.id, Newest().utime);
+    double sum = 0;
+    for (const FrameRay& ray : landmark.rays) {
+      const double e = RayError(problem.state, landmark.point, ray);
+      sum += e * e;
+    }
+    return sum > ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
+  });
 }
 
 std::optional<std::string> Estimator::Impl::Implausible() const {
-  const ImuState& imu = filter->state().imu;
-  if (!filter->state().covariance.allFinite() || !imu.T_odom_body.t.allFinite()) {
+  const ImuState& imu = problem.state.frames.back().imu;
+  if (!imu.T_odom_body.t.allFinite() || !imu.v_odom_body.allFinite() ||
+      !imu.T_odom_body.q.coeffs().allFinite()) {
     return "the estimate is not finite";
   }
   if (imu.v_odom_body.norm() > kMaxSpeed) {
@@ -332,7 +453,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   if (lost) {
     return fail("lost before");
   }
-  if (!filter) {
+  if (!started) {
     while (imu_samples.size() > 2 && Seconds(frame.utime - imu_samples[1].utime) > 1.0) {
       imu_samples.pop_front();
     }
@@ -343,66 +464,34 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
       result.reason = initial.reason;
       return result;
     }
-    InitialState state = *initial.state;
-    state.utime = frame.utime;
-    Start(state);
-    result.is_keyframe = false;
+    Start(*initial.state, frame);
   } else {
-    const WindowState& state = filter->state();
-    if (!state.clones.empty() &&
-        Seconds(frame.utime - state.clones.back().utime) > kMaxFrameGap_s) {
-      return fail(
-          fmt::format("no images for {:.1f} s", Seconds(frame.utime - state.clones.back().utime)));
+    const double gap_s = Seconds(frame.utime - Newest().utime);
+    if (gap_s > kMaxFrameGap_s) {
+      return fail(fmt::format("no images for {:.1f} s", gap_s));
     }
-    if (const auto wrong = Propagate(frame.utime)) {
+    if (const auto wrong = AddToWindow(frame)) {
       return fail(*wrong);
     }
+    result.outlier_landmarks = Solve();
   }
-  const int64_t previous_utime =
-      filter->state().clones.empty() ? 0 : filter->state().clones.back().utime;
-  filter->AddClone(frame.utime, omega_body);
-  history.AddFrame(frame, ray_sigma);
-  UpdateAtRest(previous_utime);
-  const FeatureUpdates::Outcome outcome = updates.Apply(*filter, history);
-  const bool seeing = outcome.used >= kMinUsed || still ||
-                      frame.observations.size() > 3 * static_cast<size_t>(kMinUsed);
-  blind_frames = seeing ? 0 : blind_frames + 1;
-  ChooseKeyframe(frame);
-  ShrinkWindow(&result.finished);
   if (const auto wrong = Implausible()) {
     return fail(*wrong);
   }
-  const WindowState& state = filter->state();
+  ChooseRole();
+  ShrinkWindow(&result.finished);
   result.state = EstimatorState::kTracking;
-  result.T_odom_body = state.imu.T_odom_body;
-  result.v_odom_body = state.imu.v_odom_body;
-  result.gyro_bias = state.imu.gyro_bias;
-  result.accel_bias = state.imu.accel_bias;
-  result.is_keyframe = state.clones.back().is_keyframe;
-  result.outlier_landmarks = outcome.outliers;
+  result.T_odom_body = Newest().imu.T_odom_body;
+  result.v_odom_body = Newest().imu.v_odom_body;
+  result.gyro_bias = Newest().imu.gyro_bias;
+  result.accel_bias = Newest().imu.accel_bias;
+  result.is_keyframe = Newest().is_keyframe;
   return result;
 }
 
 std::vector<FinishedKeyframe> Estimator::Impl::Flush() {
   std::vector<FinishedKeyframe> finished;
-  if (!filter) {
-    return finished;
-  }
-  for (bool any = true; any;) {
-    any = false;
-    for (int i = 0; i <= NewestClone(); ++i) {
-      if (filter->state().clones[i].is_keyframe && !filter->state().clones[i].is_edge_end) {
-        finished.push_back(Finish(i));
-        for (Clone& clone : filter->mutable_state().clones) {
-          clone.is_edge_end = false;
-          clone.is_keyframe = clone.is_keyframe && clone.utime > finished.back().utime;
-        }
-        filter->mutable_state().clones[i].is_edge_end = true;
-        any = true;
-        break;
-      }
-    }
-  }
+  PublishUpTo(problem.state.Newest(), &finished);
   return finished;
 }
 
@@ -421,10 +510,8 @@ std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
 
 CameraModel Estimator::camera() const {
   CameraModel camera = impl_->camera;
-  if (impl_->filter) {
-    camera.T_body_cam = impl_->filter->state().T_body_cam;
-    camera.time_offset_s = impl_->filter->state().time_offset_s;
-  }
+  camera.T_body_cam = impl_->problem.state.T_body_cam;
+  camera.time_offset_s = impl_->problem.state.time_offset_s;
   return camera;
 }
 

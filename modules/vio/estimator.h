@@ -3,9 +3,10 @@
 // Visual-inertial odometry of one map: tracked features and inertial samples in, poses and finished
 // keyframes out.
 //
-// Starts by itself, at rest or moving (initialiser.h), then filters over a sliding window of camera
-// poses (window_filter.h). Frames: odom is gravity-aligned (z up), its origin and yaw are those of
-// the first pose. No threads, no clock, no files: the same input gives the same output.
+// Starts by itself, at rest or moving (initialiser.h), then optimises over a sliding window of
+// frames; what leaves it stays behind as a prior (window_problem.h). Frames: odom is
+// gravity-aligned (z up), its origin and yaw are those of the first pose. No threads, no clock, no
+// files: the same input gives the same output.
 
 #include <cstdint>
 #include <memory>
@@ -24,8 +25,11 @@
 namespace pangea::vio {
 
 struct EstimatorOptions {
-  int window = 11;           // camera poses in the filter's window
-  int max_landmarks = 50;    // landmarks kept in the filter's state
+  int window = 12;  // frames that stay in the window
+  // A frame stays when the image has moved this far (rotation taken out) since the last one that
+  // stayed, or when this share of that one's tracks is left.
+  double window_parallax_px = 10;
+  double window_track_share = 0.7;
   double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels
   // A keyframe is taken when the image has moved this far (rotation taken out) since the last one,
   // ...
@@ -52,6 +56,8 @@ struct FinishedKeyframe {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y
+  // Of all of it, in the window's coordinates (window_state.h).
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   // From the keyframe finished before; none in the first of the map.
   struct Edge {
     Rigid3 T_previous_this;

@@ -8,8 +8,8 @@
 #include <map>
 
 #include "common/preintegration.h"
+#include "vio/test_random.h"
 #include "vio/vio_test_world.h"
-#include "vio/window_test_state.h"
 
 namespace pangea::vio {
 namespace {

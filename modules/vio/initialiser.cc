@@ -23,7 +23,7 @@ constexpr size_t kMinTracks = 20;
 
 // At rest: the image stands, the accelerometer and the gyro are quiet.
 constexpr double kRestSpan_s = 1.0;
-constexpr double kRestPixels = 0.7;
+constexpr double kRestSigmas = 2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
 constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
 constexpr double kRestGyro = 0.03;   // rad/s
 
@@ -109,7 +109,7 @@ std::optional<InitialState> Initialiser::TryAtRest() const {
   }
   size_t shared = 0;
   const double moved = MedianDisplacement(*oldest, frames_.back().frame, &shared);
-  if (samples.size() < 20 || shared < kMinTracks || moved > kRestPixels) {
+  if (samples.size() < 20 || shared < kMinTracks || moved > kRestSigmas * pixel_sigma_) {
     return std::nullopt;
   }
   Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();

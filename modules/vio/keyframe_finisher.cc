@@ -16,37 +16,27 @@ using Eigen::Vector3d;
 // A depth is worth sending when it is known to this share of itself.
 constexpr double kMaxRelativeSigma = 0.3;
 constexpr size_t kMinRays = 4;
+constexpr double kMaxRms = 2.0;  // sigmas
 
 // A floor on what is never better known than this, whatever the window's rays say: poses are not
 // exact.
 constexpr double kMinRelativeSigma = 0.005;
 
 std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state,
-                                     const TrackHistory& history, int clone) {
-  double rho = 0, variance = 0;
-  const int landmark = state.LandmarkIndex(id);
-  if (landmark >= 0) {
-    const auto here = Reanchor(state, landmark, clone);
-    if (!here) {
-      return std::nullopt;
-    }
-    rho = here->point.ray_rho.z();
-    // The poses' common error cancels in J P J'.
-    variance = (here->J.row(2) * state.covariance * here->J.row(2).transpose()).value();
-  } else {
-    const std::vector<ClonedRay> rays = history.RaysOf(id, state, 0);
-    if (rays.size() < kMinRays) {
-      return std::nullopt;
-    }
-    const auto point = Triangulate(state, rays, clone);
-    if (!point || point->rms > 2.0) {
-      return std::nullopt;
-    }
-    rho = point->point.ray_rho.z();
-    variance = point->covariance(2, 2);
+                                     const TrackHistory& history, int frame) {
+  const std::vector<FrameRay> rays = history.RaysOf(id, state, 0);
+  const auto own = std::find_if(rays.begin(), rays.end(),
+                                [frame](const FrameRay& ray) { return ray.frame == frame; });
+  if (rays.size() < kMinRays || own == rays.end()) {
+    return std::nullopt;
   }
+  const auto point = Triangulate(state, rays, static_cast<size_t>(own - rays.begin()));
+  if (!point || point->rms > kMaxRms) {
+    return std::nullopt;
+  }
+  const double rho = point->point.ray_rho.z();
   const double floor = kMinRelativeSigma * rho;
-  variance = std::max(variance, floor * floor);
+  const double variance = std::max(point->covariance(2, 2), floor * floor);
   if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
     return std::nullopt;
   }
@@ -55,10 +45,10 @@ std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state,
 
 }  // namespace
 
-Matrix6d RelativeCovariance(const WindowState& state, int i, int j) {
+Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, int i, int j) {
   // p_ij = R_i^T (p_j - p_i), with p = Exp(dtheta) p^ + xi for both.
-  const Rigid3& T_i = state.clones[i].T_odom_body;
-  const Rigid3& T_j = state.clones[j].T_odom_body;
+  const Rigid3& T_i = state.frames[i].imu.T_odom_body;
+  const Rigid3& T_j = state.frames[j].imu.T_odom_body;
   const Matrix3d R = T_i.R().transpose();
   MatrixXd J = MatrixXd::Zero(6, 12);  // (dtheta_i, xi_i, dtheta_j, xi_j)
   J.block<3, 3>(0, 0) = R * Hat(T_j.t);
@@ -67,10 +57,10 @@ Matrix6d RelativeCovariance(const WindowState& state, int i, int j) {
   J.block<3, 3>(0, 9) = R;
   J.block<3, 3>(3, 0) = -R;
   J.block<3, 3>(3, 6) = R;
-  const int at_i = state.CloneOffset(i), at_j = state.CloneOffset(j);
+  const int at_i = state.Offset(i), at_j = state.Offset(j);
   MatrixXd P(12, 12);
-  P << state.covariance.block<6, 6>(at_i, at_i), state.covariance.block<6, 6>(at_i, at_j),
-      state.covariance.block<6, 6>(at_j, at_i), state.covariance.block<6, 6>(at_j, at_j);
+  P << P_window.block<6, 6>(at_i, at_i), P_window.block<6, 6>(at_i, at_j),
+      P_window.block<6, 6>(at_j, at_i), P_window.block<6, 6>(at_j, at_j);
   Matrix6d covariance = J * P * J.transpose();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   // At rest two poses are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
@@ -94,18 +84,19 @@ Matrix6d CorrectionCovariance(const Matrix6d& lost, const Rigid3& T_odom_i,
          eigen.eigenvectors().transpose();
 }
 
-FinishedKeyframe FinishKeyframe(const WindowState& state, const TrackHistory& history, int index) {
-  const Clone& clone = state.clones[index];
+FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
+                                const TrackHistory& history, int index) {
+  const WindowFrame& frame = state.frames[index];
   FinishedKeyframe keyframe;
-  keyframe.utime = clone.utime;
-  keyframe.T_odom_body = clone.T_odom_body;
-  keyframe.v_odom_body = clone.v_odom_body;
-  keyframe.gyro_bias = clone.gyro_bias;
-  keyframe.accel_bias = clone.accel_bias;
-  const int at = state.CloneOffset(index);
-  keyframe.roll_pitch_covariance =
-      state.covariance.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
-  for (const auto& [id, ray] : history.Frame(clone.utime)) {
+  keyframe.utime = frame.utime;
+  keyframe.T_odom_body = frame.imu.T_odom_body;
+  keyframe.v_odom_body = frame.imu.v_odom_body;
+  keyframe.gyro_bias = frame.imu.gyro_bias;
+  keyframe.accel_bias = frame.imu.accel_bias;
+  const int at = state.Offset(index);
+  keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
+  keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
+  for (const auto& [id, ray] : history.Frame(frame.utime)) {
     if (const auto depth = DepthOf(id, state, history, index)) {
       keyframe.landmarks.push_back(*depth);
     }

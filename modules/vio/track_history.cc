@@ -1,28 +1,55 @@
 #include "vio/track_history.h"
 
 #include <algorithm>
+#include <limits>
+#include <set>
 
 namespace pangea::vio {
+namespace {
 
-void TrackHistory::AddFrame(const TrackedFrame& frame, double ray_sigma) {
+constexpr size_t kMinShared = 15;  // landmarks that tell whether an image stands still
+
+}  // namespace
+
+void TrackHistory::AddFrame(const TrackedFrame& frame, const CameraModel& camera,
+                            double ray_sigma) {
   auto& seen = frames_[frame.utime];
+  const double row_s = camera.height > 1 ? camera.readout_s / (camera.height - 1) : 0;
   for (const Observation& observation : frame.observations) {
-    seen[observation.landmark_id] = {-1, observation.ray, ray_sigma * observation.sigma_px};
+    seen[observation.landmark_id] = {-1, observation.ray, ray_sigma * observation.sigma_px,
+                                     row_s * static_cast<double>(observation.pixel.y())};
   }
 }
 
-std::vector<ClonedRay> TrackHistory::RaysOf(int32_t landmark_id, const WindowState& state,
-                                            int64_t from_utime) const {
-  std::vector<ClonedRay> rays;
-  for (int i = 0; i < static_cast<int>(state.clones.size()); ++i) {
-    const Clone& clone = state.clones[i];
-    const auto frame = frames_.find(clone.utime);
-    if (clone.is_edge_end || clone.utime < from_utime || frame == frames_.end()) {
+void TrackHistory::RemoveLandmark(int32_t landmark_id) {
+  for (auto& [utime, seen] : frames_) {
+    seen.erase(landmark_id);
+  }
+}
+
+std::vector<int32_t> TrackHistory::Landmarks() const {
+  std::set<int32_t> ids;
+  for (const auto& [utime, seen] : frames_) {
+    for (const auto& [id, ray] : seen) {
+      ids.insert(id);
+    }
+  }
+  return {ids.begin(), ids.end()};
+}
+
+std::vector<FrameRay> TrackHistory::RaysOf(int32_t landmark_id, const WindowState& state,
+                                           int64_t from_utime) const {
+  std::vector<FrameRay> rays;
+  for (int i = 0; i <= state.Newest(); ++i) {
+    const WindowFrame& in_window = state.frames[i];
+    const auto frame = frames_.find(in_window.utime);
+    if (in_window.pose_only || in_window.utime < from_utime || frame == frames_.end()) {
       continue;
     }
     const auto seen = frame->second.find(landmark_id);
     if (seen != frame->second.end()) {
-      rays.push_back({i, seen->second.ray, seen->second.sigma});
+      rays.push_back(seen->second);
+      rays.back().frame = i;
     }
   }
   return rays;
@@ -33,8 +60,8 @@ bool TrackHistory::Sees(int64_t utime, int32_t landmark_id) const {
   return frame != frames_.end() && frame->second.contains(landmark_id);
 }
 
-const std::map<int32_t, ClonedRay>& TrackHistory::Frame(int64_t utime) const {
-  static const std::map<int32_t, ClonedRay> kNothing;
+const std::map<int32_t, FrameRay>& TrackHistory::Frame(int64_t utime) const {
+  static const std::map<int32_t, FrameRay> kNothing;
   const auto frame = frames_.find(utime);
   return frame == frames_.end() ? kNothing : frame->second;
 }
@@ -57,6 +84,23 @@ TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_ut
   }
   std::nth_element(shifts.begin(), shifts.begin() + shifts.size() / 2, shifts.end());
   return {shifts[shifts.size() / 2], shifts.size()};
+}
+
+double TrackHistory::MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const {
+  std::vector<double> shifts;
+  const auto& to = Frame(to_utime);
+  for (const auto& [id, ray] : Frame(from_utime)) {
+    const auto other = to.find(id);
+    if (other != to.end()) {
+      shifts.push_back((ray.ray - other->second.ray).norm() / ray.sigma);
+    }
+  }
+  if (shifts.size() < kMinShared) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
+  std::nth_element(shifts.begin(), middle, shifts.end());
+  return *middle;
 }
 
 }  // namespace pangea::vio

@@ -1,12 +1,13 @@
 #pragma once
 
-// What each clone of the window saw, by landmark.
+// What each frame of the window saw, by landmark.
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <vector>
 
+#include "common/camera_model.h"
 #include "vio/point_geometry.h"
 #include "vio/tracks.h"
 #include "vio/window_state.h"
@@ -15,15 +16,18 @@ namespace pangea::vio {
 
 class TrackHistory {
  public:
-  // The observations of the newest clone. `ray_sigma` is that of an observation with sigma_px 1.
-  void AddFrame(const TrackedFrame& frame, double ray_sigma);
+  // The observations of the newest frame. `ray_sigma` is that of an observation with sigma_px 1.
+  void AddFrame(const TrackedFrame& frame, const CameraModel& camera, double ray_sigma);
   void RemoveFrame(int64_t utime) { frames_.erase(utime); }
+  void RemoveLandmark(int32_t landmark_id);
 
-  // All of one landmark's rays in the window's clones from `from_utime` on, oldest first.
-  std::vector<ClonedRay> RaysOf(int32_t landmark_id, const WindowState& state,
-                                int64_t from_utime) const;
+  // All of one landmark's rays in the window's full frames from `from_utime` on, oldest first.
+  std::vector<FrameRay> RaysOf(int32_t landmark_id, const WindowState& state,
+                               int64_t from_utime) const;
   bool Sees(int64_t utime, int32_t landmark_id) const;
-  const std::map<int32_t, ClonedRay>& Frame(int64_t utime) const;  // ClonedRay::clone is not set
+  const std::map<int32_t, FrameRay>& Frame(int64_t utime) const;  // FrameRay::frame is not set
+  // Every landmark some frame saw, in order.
+  std::vector<int32_t> Landmarks() const;
 
   // Median shift between two frames' shared landmarks, rotation taken out, in rays; and how many
   // they share.
@@ -34,8 +38,12 @@ class TrackHistory {
   Shift ShiftBetween(int64_t from_utime, int64_t to_utime,
                      const Eigen::Quaterniond& q_to_from) const;
 
+  // Median shift between two frames' shared landmarks as it is, in sigmas of a ray: 1.7 when
+  // nothing moves. Infinite with too few to tell.
+  double MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const;
+
  private:
-  std::map<int64_t, std::map<int32_t, ClonedRay>> frames_;
+  std::map<int64_t, std::map<int32_t, FrameRay>> frames_;
 };
 
 }  // namespace pangea::vio

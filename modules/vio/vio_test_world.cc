@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vio/window_test_state.h"
+#include "vio/test_random.h"
 
 namespace pangea::vio {
 namespace {

@@ -34,7 +34,8 @@ void BindDescriber(YamlOptions& yaml, DescriberOptions& o) {
 
 void BindEstimator(YamlOptions& yaml, EstimatorOptions& o) {
   yaml.Add("window", &o.window);
-  yaml.Add("max_landmarks", &o.max_landmarks);
+  yaml.Add("window_parallax_px", &o.window_parallax_px);
+  yaml.Add("window_track_share", &o.window_track_share);
   yaml.Add("pixel_sigma", &o.pixel_sigma);
   yaml.Add("keyframe_parallax_px", &o.keyframe_parallax_px);
   yaml.Add("keyframe_track_share", &o.keyframe_track_share);

@@ -1,53 +1,72 @@
 #include "vio/window_state.h"
 
 namespace pangea::vio {
-namespace {
 
-// R = Exp(dtheta) R^, p = Exp(dtheta) p^ + xi.
-Rigid3 RetractInvariant(const Rigid3& T, const Eigen::Vector3d& dtheta, const Eigen::Vector3d& xi) {
-  const Eigen::Quaterniond turn = ExpSo3(dtheta);
-  return {(turn * T.q).normalized(), turn * T.t + xi};
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+int WindowState::Offset(int frame) const {
+  int offset = kCalibrationSize;
+  for (int i = 0; i < frame; ++i) {
+    offset += frames[i].size();
+  }
+  return offset;
 }
 
-}  // namespace
-
-int WindowState::CloneIndex(int64_t utime) const {
-  for (size_t i = 0; i < clones.size(); ++i) {
-    if (clones[i].utime == utime) {
-      return static_cast<int>(i);
+std::optional<int> WindowState::Find(int64_t utime) const {
+  for (int i = 0; i <= Newest(); ++i) {
+    if (frames[i].utime == utime) {
+      return i;
     }
   }
-  return -1;
+  return std::nullopt;
 }
 
-int WindowState::LandmarkIndex(int32_t landmark_id) const {
-  for (size_t i = 0; i < landmarks.size(); ++i) {
-    if (landmarks[i].first == landmark_id) {
-      return static_cast<int>(i);
-    }
-  }
-  return -1;
+Rigid3 WindowState::PoseAhead(int frame, double ahead_s) const {
+  const WindowFrame& f = frames[frame];
+  return {f.imu.T_odom_body.q * ExpSo3(ahead_s * f.omega_body),
+          f.imu.T_odom_body.t + ahead_s * f.imu.v_odom_body};
 }
 
-void WindowState::Retract(const Eigen::VectorXd& error) {
-  const Eigen::Vector3d dtheta = error.segment<3>(kTheta);
-  imu.T_odom_body = RetractInvariant(imu.T_odom_body, dtheta, error.segment<3>(kPosition));
-  imu.v_odom_body = ExpSo3(dtheta) * imu.v_odom_body + error.segment<3>(kVelocity);
-  imu.gyro_bias += error.segment<3>(kGyroBias);
-  imu.accel_bias += error.segment<3>(kAccelBias);
+void WindowState::Retract(const VectorXd& error) {
   T_body_cam.q = (ExpSo3(error.segment<3>(kExtrinsics)) * T_body_cam.q).normalized();
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
-  for (size_t i = 0; i < clones.size(); ++i) {
-    const int at = CloneOffset(static_cast<int>(i));
-    clones[i].T_odom_body =
-        RetractInvariant(clones[i].T_odom_body, error.segment<3>(at), error.segment<3>(at + 3));
-    // Carried along, so that a keyframe leaves with a velocity of its own attitude.
-    clones[i].v_odom_body = ExpSo3(error.segment<3>(at)) * clones[i].v_odom_body;
+  int at = kCalibrationSize;
+  for (WindowFrame& frame : frames) {
+    const Quaterniond turn = ExpSo3(error.segment<3>(at + kTheta));
+    Rigid3& T = frame.imu.T_odom_body;
+    T = {(turn * T.q).normalized(), turn * T.t + error.segment<3>(at + kPosition)};
+    if (!frame.pose_only) {
+      frame.imu.v_odom_body = turn * frame.imu.v_odom_body + error.segment<3>(at + kVelocity);
+      frame.imu.gyro_bias += error.segment<3>(at + kGyroBias);
+      frame.imu.accel_bias += error.segment<3>(at + kAccelBias);
+    }
+    at += frame.size();
   }
-  for (size_t i = 0; i < landmarks.size(); ++i) {
-    landmarks[i].second.ray_rho += error.segment<3>(LandmarkOffset(static_cast<int>(i)));
+}
+
+VectorXd Difference(const WindowState& a, const WindowState& b) {
+  VectorXd e(b.size());
+  e.segment<3>(kExtrinsics) = LogSo3(a.T_body_cam.q * b.T_body_cam.q.conjugate());
+  e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
+  e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
+  int at = kCalibrationSize;
+  for (size_t i = 0; i < b.frames.size(); ++i) {
+    const ImuState& x = a.frames[i].imu;
+    const ImuState& y = b.frames[i].imu;
+    const Quaterniond turn = x.T_odom_body.q * y.T_odom_body.q.conjugate();
+    e.segment<3>(at + kTheta) = LogSo3(turn);
+    e.segment<3>(at + kPosition) = x.T_odom_body.t - turn * y.T_odom_body.t;
+    if (!b.frames[i].pose_only) {
+      e.segment<3>(at + kVelocity) = x.v_odom_body - turn * y.v_odom_body;
+      e.segment<3>(at + kGyroBias) = x.gyro_bias - y.gyro_bias;
+      e.segment<3>(at + kAccelBias) = x.accel_bias - y.accel_bias;
+    }
+    at += b.frames[i].size();
   }
+  return e;
 }
 
 }  // namespace pangea::vio

@@ -1,17 +1,17 @@
 #pragma once
 
-// The state of the window filter, and how an error of it looks.
+// The variables of the sliding window, and how an error of them looks.
 //
 // Errors are right-invariant: a rotation error dtheta is on the LEFT (R = Exp(dtheta) R^) and every
 // vector that lives in odom is carried along by it (p = Exp(dtheta) p^ + xi). In these coordinates
 // the four directions that camera and IMU cannot observe, the global position and yaw, are the same
-// wherever the state is linearised, so updates gain no information about them (Barrau & Bonnabel,
-// "The invariant extended Kalman filter as a stable observer", 2017; Zhang et al., RA-L 2017).
-// Landmarks are anchored in a camera of the window and need no such care.
+// wherever a factor is linearised, so a prior linearised long ago gains no information about them
+// (Barrau & Bonnabel, "The invariant extended Kalman filter as a stable observer", 2017; Zhang et
+// al., RA-L 2017). Landmarks are anchored in a camera of the window and need no such care.
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <vector>
 
 #include "common/preintegration.h"
@@ -19,14 +19,13 @@
 
 namespace pangea::vio {
 
-// Layout of the error state.
+// Layout of one frame's error.
 inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
-inline constexpr int kExtrinsics = 15;  // rotation (left), translation of T_body_cam
-inline constexpr int kTimeOffset = 21;
-inline constexpr int kFixedSize = 22;
-inline constexpr int kCloneSize = 6;  // (dtheta, xi_p)
-inline constexpr int kLandmarkSize =
-    3;  // (alpha, beta, rho): ray and inverse depth in the anchor's camera
+inline constexpr int kFrameSize = 15;
+inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
+// The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset.
+inline constexpr int kExtrinsics = 0, kTimeOffset = 6;
+inline constexpr int kCalibrationSize = 7;
 
 struct ImuState {
   Rigid3 T_odom_body;
@@ -35,45 +34,44 @@ struct ImuState {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
 };
 
-// A camera pose of the window.
-struct Clone {
-  int64_t utime = 0;  // of its frame
-  Rigid3 T_odom_body;
-  Eigen::Vector3d v_odom_body =
-      Eigen::Vector3d::Zero();  // when it was made; not part of the error state
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-  bool is_keyframe = false;
-  bool is_edge_end = false;  // a finished keyframe, kept only until the next one's edge is known
-};
+// A frame of the window: the body at the image's time as the time offset stood when it came.
+struct WindowFrame {
+  int64_t utime = 0;         // of its TrackedFrame
+  int64_t imu_utime = 0;     // utime + time_offset_s
+  double time_offset_s = 0;  // when it came
+  ImuState imu;
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate there, rad/s
+  bool stays = false;        // it holds its place; else the next frame replaces it
+  bool is_keyframe = false;  // it is, or will be, published
+  bool is_published = false;
+  bool pose_only = false;  // only its pose is left: the end of the next odometry edge
+  bool at_rest = false;
 
-// A point by its ray (alpha, beta, 1) and inverse depth rho in the anchor clone's camera.
-struct AnchoredPoint {
-  int64_t anchor_utime = 0;
-  Eigen::Vector3d ray_rho = Eigen::Vector3d::Zero();
-  Eigen::Vector3d InCamera() const {
-    return {ray_rho.x() / ray_rho.z(), ray_rho.y() / ray_rho.z(), 1 / ray_rho.z()};
-  }
+  int size() const { return pose_only ? kPoseSize : kFrameSize; }
 };
 
 struct WindowState {
-  ImuState imu;
   Rigid3 T_body_cam;
-  double time_offset_s = 0;                                  // t_imu = t_image + time_offset_s
-  std::vector<Clone> clones;                                 // oldest first
-  std::vector<std::pair<int32_t, AnchoredPoint>> landmarks;  // by landmark id, in order of entry
-  Eigen::MatrixXd covariance;
+  double time_offset_s = 0;         // t_imu = t_image + time_offset_s
+  std::vector<WindowFrame> frames;  // oldest first
 
-  int CloneOffset(int index) const { return kFixedSize + kCloneSize * index; }
-  int LandmarkOffset(int index) const {
-    return kFixedSize + kCloneSize * static_cast<int>(clones.size()) + kLandmarkSize * index;
+  int Offset(int frame) const;
+  int size() const { return Offset(static_cast<int>(frames.size())); }
+  int Newest() const { return static_cast<int>(frames.size()) - 1; }
+  std::optional<int> Find(int64_t utime) const;
+
+  // The body when a row of a frame's image was exposed, that much after the image's time: the
+  // frame's pose, moved on at its velocity and turn rate.
+  double Ahead(int frame, double row_s) const {
+    return time_offset_s - frames[frame].time_offset_s + row_s;
   }
-  int size() const { return LandmarkOffset(static_cast<int>(landmarks.size())); }
-  int CloneIndex(int64_t utime) const;           // -1 if it is not there
-  int LandmarkIndex(int32_t landmark_id) const;  // -1 if it is not there
+  Rigid3 PoseAhead(int frame, double ahead_s) const;
 
   // state (+) error, in the coordinates above.
   void Retract(const Eigen::VectorXd& error);
 };
+
+// a (-) b: b.Retract(Difference(a, b)) is a. Both have the same frames.
+Eigen::VectorXd Difference(const WindowState& a, const WindowState& b);
 
 }  // namespace pangea::vio
