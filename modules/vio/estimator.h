@@ -53,6 +53,7 @@ struct FinishedKeyframe {
   int64_t utime = 0;  // of its TrackedFrame
   Rigid3 T_odom_body;
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y

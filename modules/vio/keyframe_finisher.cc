@@ -91,6 +91,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   keyframe.utime = frame.utime;
   keyframe.T_odom_body = frame.imu.T_odom_body;
   keyframe.v_odom_body = frame.imu.v_odom_body;
+  keyframe.omega_body = frame.omega_body;
   keyframe.gyro_bias = frame.imu.gyro_bias;
   keyframe.accel_bias = frame.imu.accel_bias;
   const int at = state.Offset(index);

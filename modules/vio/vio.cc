@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/rigid3.h"
+#include "vio/rolling_shutter.h"
 
 namespace pangea::vio {
 
@@ -123,6 +124,8 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
     keyframe.corners = std::move(node.mapped());
   }
   keyframe.points = Points(finished, keyframe.corners);
+  TakeOutReadout({finished.omega_body, finished.T_odom_body.q.conjugate() * finished.v_odom_body},
+                 keyframe);
   keyframe.group_revision = group_revision_;
   return keyframe;
 }
