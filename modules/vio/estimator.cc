@@ -4,21 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
+#include "vio/imu_buffer.h"
 #include "vio/initialiser.h"
 #include "vio/keyframe_finisher.h"
 #include "vio/landmark_store.h"
+#include "vio/rest_detector.h"
 #include "vio/track_history.h"
 #include "vio/window_problem.h"
+#include "vio/window_start.h"
 
 namespace pangea::vio {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::Vector3d;
 
-constexpr int64_t kMaxImuGap_us = 300'000;
 constexpr double kMaxFrameGap_s = 1.0;
 constexpr int kMaxBlindFrames = 20;  // images in a row with next to nothing to go by: lost
 constexpr int kMinUsed = 4;
@@ -31,20 +31,6 @@ constexpr int kMaxIterations = 4;
 constexpr double kMaxRayError = 5.0;     // sigmas
 constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
 
-// The body rests when the image has moved by no more than its noise for this long (the
-// median shift in sigmas: noise alone gives 1.7), with a quiet gyro and accelerometer.
-constexpr double kRestSpan_s = 0.5;
-constexpr double kStillSigmas = 2.2;
-constexpr double kRestGyro = 0.05;  // rad/s, mean rate less bias
-constexpr double kRestAccel = 0.3;  // m/s^2, standard deviation
-constexpr size_t kRestSamples = 50;
-constexpr int64_t kImuMargin_us = 50'000;  // for changes of the time offset
-
-// Prior uncertainty of the given calibration.
-constexpr double kExtrinsicsRotationSigma = 0.005;  // rad
-constexpr double kExtrinsicsPositionSigma = 0.005;  // m
-constexpr double kTimeOffsetSigma = 0.003;          // s
-
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 // 95 % quantile of chi-square (Wilson & Hilferty, 1931).
@@ -52,15 +38,6 @@ double ChiSquare95(int degrees_of_freedom) {
   const double k = degrees_of_freedom;
   const double c = 1 - 2 / (9 * k) + 1.6449 * std::sqrt(2 / (9 * k));
   return k * c * c * c;
-}
-
-// From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
-Eigen::Matrix<double, 15, 15> ToInvariant(const ImuState& imu,
-                                          const Eigen::Matrix<double, 15, 15>& covariance) {
-  Eigen::Matrix<double, 15, 15> J = Eigen::Matrix<double, 15, 15>::Identity();
-  J.block<3, 3>(kPosition, kTheta) = Hat(imu.T_odom_body.t);
-  J.block<3, 3>(kVelocity, kTheta) = Hat(imu.v_odom_body);
-  return J * covariance * J.transpose();
 }
 
 }  // namespace
@@ -71,7 +48,9 @@ struct Estimator::Impl {
         camera(c),
         noise(n),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
-        initialiser(c, n, o.pixel_sigma) {
+        initialiser(c, n, o.pixel_sigma),
+        imu_samples(n),
+        rest(c, ray_sigma) {
     problem.state.T_body_cam = c.T_body_cam;
     problem.state.time_offset_s = c.time_offset_s;
   }
@@ -82,9 +61,6 @@ struct Estimator::Impl {
   void Start(const InitialState& initial, const TrackedFrame& frame);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
-  std::optional<std::string> ImuGap(int64_t from_utime, int64_t to_utime) const;
-  Preintegration Integrate(int64_t from_imu_utime, int64_t to_imu_utime, const ImuState& at) const;
-  bool AtRest(const TrackedFrame& frame);
   std::vector<int32_t> Solve();
   bool HasMoved(int64_t since_utime, double parallax_px, double track_share) const;
   void ChooseRole();
@@ -111,13 +87,11 @@ struct Estimator::Impl {
   WindowProblem problem;
   TrackHistory history;
   LandmarkStore landmarks;
-  std::deque<ImuSample> imu_samples;                // since the last published keyframe
+  ImuBuffer imu_samples;  // since the last published keyframe
+  RestDetector rest;
   int64_t last_keyframe_utime = 0;                  // newest frame that is a keyframe
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
-  TrackHistory recent;                              // the last half a second, to tell a rest
-  std::deque<int64_t> recent_utimes;
-  bool still = false;  // the images stand
   int blind_frames = 0;
   bool lost = false;
 };
@@ -132,64 +106,8 @@ void Estimator::Impl::Start(const InitialState& initial, const TrackedFrame& fra
   problem.state.frames = {first};
   problem.links.resize(1);
   history.AddFrame(frame, camera, ray_sigma);
-
-  const int n = kCalibrationSize + kFrameSize;
-  MatrixXd P = MatrixXd::Zero(n, n);
-  Eigen::Matrix<double, kCalibrationSize, 1> sigma;
-  sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
-      Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma;
-  P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
-  P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(initial.imu, initial.covariance);
-  // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
-  // invertible.
-  P.diagonal().segment<kPoseSize>(kCalibrationSize).array() += 1e-8;
-  problem.prior.at = problem.state;
-  problem.prior.H = P.llt().solve(MatrixXd::Identity(n, n));
-  problem.prior.g.setZero(n);
+  problem.prior = StartPrior(problem.state, initial.covariance);
   started = true;
-}
-
-std::optional<std::string> Estimator::Impl::ImuGap(int64_t from_utime, int64_t to_utime) const {
-  bool any = false;
-  for (size_t i = 0; i + 1 < imu_samples.size(); ++i) {
-    const ImuSample& a = imu_samples[i];
-    const ImuSample& b = imu_samples[i + 1];
-    if (b.utime <= from_utime || a.utime >= to_utime) {
-      continue;
-    }
-    any = true;
-    if (b.utime - a.utime > kMaxImuGap_us) {
-      return fmt::format("the inertial samples have a gap of {:.2f} s", Seconds(b.utime - a.utime));
-    }
-  }
-  if (!any || imu_samples.back().utime < to_utime - kImuMargin_us) {
-    return "no inertial samples up to the image's time";
-  }
-  return std::nullopt;
-}
-
-Preintegration Estimator::Impl::Integrate(int64_t from_imu_utime, int64_t to_imu_utime,
-                                          const ImuState& at) const {
-  Preintegrator integrator(noise, at.gyro_bias, at.accel_bias);
-  const auto first = std::partition_point(
-      imu_samples.begin(), imu_samples.end(),
-      [from_imu_utime](const ImuSample& sample) { return sample.utime <= from_imu_utime; });
-  auto b = first;
-  for (; b != imu_samples.begin() && b != imu_samples.end(); ++b) {
-    const ImuSample& a = *std::prev(b);
-    if (a.utime >= to_imu_utime) {
-      break;
-    }
-    integrator.Add(a.utime < from_imu_utime ? InterpolateImu(a, *b, from_imu_utime) : a,
-                   b->utime > to_imu_utime ? InterpolateImu(a, *b, to_imu_utime) : *b);
-  }
-  // The time offset may want a little more than has come: the last sample holds.
-  if (!imu_samples.empty() && imu_samples.back().utime < to_imu_utime) {
-    ImuSample held = imu_samples.back();
-    held.utime = to_imu_utime;
-    integrator.Add(imu_samples.back(), held);
-  }
-  return integrator.result();
 }
 
 // A frame that does not stay makes room for the next one: its rays go, its inertial samples are
@@ -205,64 +123,31 @@ void Estimator::Impl::DropPassing() {
 // Nothing when it worked, else what is wrong.
 std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
   const int64_t imu_utime = ImuTime(frame.utime);
-  if (const auto wrong = ImuGap(Newest().imu_utime, imu_utime)) {
+  if (const auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
     return wrong;
   }
   history.AddFrame(frame, camera, ray_sigma);
-  const bool at_rest = AtRest(frame);
+  const std::optional<double> shift =
+      LastStaying().at_rest
+          ? std::optional(history.MedianShiftSigmas(LastStaying().utime, frame.utime))
+          : std::nullopt;
+  const bool at_rest = rest.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
   DropPassing();
   const WindowFrame& last = Newest();
   InertialLink link;
-  link.measured = Integrate(last.imu_utime, imu_utime, last.imu);
+  link.measured =
+      imu_samples.Integrate(last.imu_utime, imu_utime, last.imu.gyro_bias, last.imu.accel_bias);
   link.information = InertialInformation(link.measured, noise);
   WindowFrame added;
   added.utime = frame.utime;
   added.imu_utime = imu_utime;
   added.time_offset_s = problem.state.time_offset_s;
   added.imu = Predict(link.measured, last.imu);
-  const auto sample =
-      std::partition_point(imu_samples.begin(), imu_samples.end(),
-                           [imu_utime](const ImuSample& one) { return one.utime < imu_utime; });
-  added.omega_body =
-      (sample == imu_samples.end() ? imu_samples.back() : *sample).gyro - last.imu.gyro_bias;
+  added.omega_body = imu_samples.At(imu_utime).gyro - last.imu.gyro_bias;
   added.at_rest = at_rest;
   problem.state.frames.push_back(added);
   problem.links.emplace_back(std::move(link));
   return std::nullopt;
-}
-
-// Whether the body rests: the image has not moved by more than its noise, since the rest began or
-// for a while, and the IMU is quiet.
-bool Estimator::Impl::AtRest(const TrackedFrame& frame) {
-  recent.AddFrame(frame, camera, ray_sigma);
-  recent_utimes.push_back(frame.utime);
-  while (recent_utimes.size() > 2 && Seconds(frame.utime - recent_utimes[1]) >= kRestSpan_s) {
-    recent.RemoveFrame(recent_utimes.front());
-    recent_utimes.pop_front();
-  }
-  const WindowFrame& last = LastStaying();
-  if (last.at_rest) {
-    still = history.MedianShiftSigmas(last.utime, frame.utime) < kStillSigmas;
-  } else {
-    still = Seconds(frame.utime - recent_utimes.front()) >= kRestSpan_s &&
-            recent.MedianShiftSigmas(recent_utimes.front(), frame.utime) < kStillSigmas;
-  }
-  if (!still) {
-    return false;
-  }
-  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
-  const size_t count = std::min<size_t>(imu_samples.size(), kRestSamples);
-  const auto first = imu_samples.end() - static_cast<std::ptrdiff_t>(count);
-  for (auto it = first; it != imu_samples.end(); ++it) {
-    mean_gyro += it->gyro / static_cast<double>(count);
-    mean_accel += it->accel / static_cast<double>(count);
-  }
-  double var_accel = 0;
-  for (auto it = first; it != imu_samples.end(); ++it) {
-    var_accel += (it->accel - mean_accel).squaredNorm() / static_cast<double>(count);
-  }
-  return (mean_gyro - Newest().imu.gyro_bias).norm() < kRestGyro &&
-         var_accel < kRestAccel * kRestAccel;
 }
 
 // Optimises the window; the tracks that turned out to be outliers.
@@ -294,7 +179,7 @@ std::vector<int32_t> Estimator::Impl::Solve() {
   });
   landmarks.Keep(problem);
   const size_t tracked = history.Frame(Newest().utime).size();
-  const bool seeing = seen_now >= kMinUsed || still || tracked > 3 * kMinUsed;
+  const bool seeing = seen_now >= kMinUsed || rest.images_stand() || tracked > 3 * kMinUsed;
   blind_frames = seeing ? 0 : blind_frames + 1;
   return outliers;
 }
@@ -348,10 +233,8 @@ FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
     keyframe.edge->covariance +=
         CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
                              previous->T_odom_body, keyframe.T_odom_body);
-    ImuState biases;
-    biases.gyro_bias = previous->gyro_bias;
-    biases.accel_bias = previous->accel_bias;
-    Preintegration span = Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime), biases);
+    Preintegration span = imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime),
+                                                previous->gyro_bias, previous->accel_bias);
     if (span.duration_s > 0) {
       span.covariance.diagonal().array() += 1e-14;
       keyframe.preintegration = span;
@@ -401,9 +284,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   landmarks.Forget(history);
   const int64_t needed = std::min(state.frames.front().imu_utime,
                                   previous ? ImuTime(previous->utime) : Newest().imu_utime);
-  while (imu_samples.size() > kRestSamples && imu_samples[1].utime < needed - kImuMargin_us) {
-    imu_samples.pop_front();
-  }
+  imu_samples.Forget(needed);
 }
 
 // The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
@@ -443,7 +324,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
 
 FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   FrameResult result;
-  imu_samples.insert(imu_samples.end(), imu.begin(), imu.end());
+  imu_samples.Add(imu);
   const auto fail = [&](const std::string& reason) {
     lost = true;
     result.state = EstimatorState::kLost;
@@ -454,9 +335,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
     return fail("lost before");
   }
   if (!started) {
-    while (imu_samples.size() > 2 && Seconds(frame.utime - imu_samples[1].utime) > 1.0) {
-      imu_samples.pop_front();
-    }
+    imu_samples.Forget(frame.utime);
     TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
     shifted.utime = ImuTime(frame.utime);
     const InitialResult initial = initialiser.AddFrame(shifted, imu);

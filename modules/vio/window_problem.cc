@@ -3,248 +3,21 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "vio/window_factors.h"
 
 namespace pangea::vio {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// A ray this many sigmas off is pulled at with constant force (Huber, 1964).
-constexpr double kHuber = 2.0;
-// A rest: what may pass for one within the noise of a hundred tracks together.
-constexpr double kRestVelocitySigma = 0.02;    // m/s
-constexpr double kRestPositionSigma = 0.002;   // m, between two frames of one rest
-constexpr double kRestRotationSigma = 0.0003;  // rad
-constexpr double kMinInverseDepth = 1e-4;      // 1/m
+constexpr double kMinInverseDepth = 1e-4;  // 1/m
 // An iteration that promises less than this of the cost (a half is one sigma of one direction) is
 // the last.
 constexpr double kEnough = 0.02;
 constexpr int kMaxRetries = 6;
-
-double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
-double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
-
-VectorXd PriorError(const WindowProblem& problem) {
-  WindowState state = problem.state;
-  state.frames.resize(problem.prior.at.frames.size());
-  return Difference(state, problem.prior.at);
-}
-
-// One landmark's part of the normal equations, before it is eliminated. Columns as in
-// NormalEquations::Elimination.
-struct LandmarkSystem {
-  double cost = 0;
-  MatrixXd H;
-  VectorXd g;
-  Matrix3d V = Matrix3d::Zero();
-  Eigen::Matrix<double, 3, Eigen::Dynamic> W;
-  Vector3d g_point = Vector3d::Zero();
-};
-
-void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int at_anchor,
-            int at_frame, LandmarkSystem* out) {
-  const Eigen::Matrix<double, 2, 3> J_point = scale * predicted.J_point;
-  out->V += J_point.transpose() * J_point;
-  out->g_point += J_point.transpose() * r;
-  if (at_anchor == at_frame) {
-    return;  // in its own anchor a point is where its ray is, wherever the frames are
-  }
-  const Eigen::Matrix<double, 2, kCalibrationSize> J_c = scale * predicted.J_calibration;
-  const Eigen::Matrix<double, 2, kPoseSize> J_a =
-      scale * predicted.J_anchor;  // the frame's is -J_a
-  const Eigen::Matrix<double, kPoseSize, kPoseSize> A = J_a.transpose() * J_a;
-  const Eigen::Matrix<double, kCalibrationSize, kPoseSize> C = J_c.transpose() * J_a;
-  const Eigen::Matrix<double, 3, kPoseSize> W_a = J_point.transpose() * J_a;
-  const Eigen::Matrix<double, kPoseSize, 1> g_a = J_a.transpose() * r;
-  MatrixXd& H = out->H;
-  H.topLeftCorner<kCalibrationSize, kCalibrationSize>() += J_c.transpose() * J_c;
-  H.block<kCalibrationSize, kPoseSize>(0, at_anchor) += C;
-  H.block<kPoseSize, kCalibrationSize>(at_anchor, 0) += C.transpose();
-  H.block<kCalibrationSize, kPoseSize>(0, at_frame) -= C;
-  H.block<kPoseSize, kCalibrationSize>(at_frame, 0) -= C.transpose();
-  H.block<kPoseSize, kPoseSize>(at_anchor, at_anchor) += A;
-  H.block<kPoseSize, kPoseSize>(at_anchor, at_frame) -= A;
-  H.block<kPoseSize, kPoseSize>(at_frame, at_anchor) -= A;
-  H.block<kPoseSize, kPoseSize>(at_frame, at_frame) += A;
-  out->W.leftCols<kCalibrationSize>() += J_point.transpose() * J_c;
-  out->W.middleCols<kPoseSize>(at_anchor) += W_a;
-  out->W.middleCols<kPoseSize>(at_frame) -= W_a;
-  out->g.head<kCalibrationSize>() += J_c.transpose() * r;
-  out->g.segment<kPoseSize>(at_anchor) += g_a;
-  out->g.segment<kPoseSize>(at_frame) -= g_a;
-}
-
-LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landmark) {
-  const int m = static_cast<int>(landmark.rays.size());
-  const int n = kCalibrationSize + kPoseSize * m;
-  LandmarkSystem out;
-  out.H.setZero(n, n);
-  out.g.setZero(n);
-  out.W.setZero(3, n);
-  int at_anchor = -1;
-  for (int j = 0; j < m; ++j) {
-    at_anchor = landmark.rays[j].frame == landmark.point.anchor ? kCalibrationSize + kPoseSize * j
-                                                                : at_anchor;
-  }
-  for (int j = 0; j < m; ++j) {
-    const FrameRay& seen = landmark.rays[j];
-    const auto predicted = PredictRay(state, landmark.point, seen);
-    if (!predicted) {
-      continue;  // behind that camera: says nothing this time, and costs what a gross error costs
-    }
-    const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
-    const double e = r.norm();
-    const double root = std::sqrt(HuberWeight(e));
-    out.cost += HuberCost(e);
-    AddRay(*predicted, root * r, root / seen.sigma, at_anchor, kCalibrationSize + kPoseSize * j,
-           &out);
-  }
-  return out;
-}
-
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* equations) {
-  LandmarkSystem part = LineariseLandmark(state, landmark);
-  Matrix3d V = part.V;
-  V.diagonal() *= 1 + damping;
-  V.diagonal().array() += 1e-9;
-  const Matrix3d V_inverse = V.inverse();
-  NormalEquations::Elimination elimination;
-  elimination.offset = -V_inverse * part.g_point;
-  elimination.gain = -V_inverse * part.W;
-  part.H.noalias() += part.W.transpose() * elimination.gain;
-  part.g.noalias() += part.W.transpose() * elimination.offset;
-  equations->cost += part.cost;
-
-  // Scatter: calibration and each ray's frame.
-  std::vector<int> to;
-  for (const FrameRay& seen : landmark.rays) {
-    to.push_back(state.Offset(seen.frame));
-  }
-  constexpr int kC = kCalibrationSize, kP = kPoseSize;
-  equations->H.topLeftCorner<kC, kC>() += part.H.topLeftCorner<kC, kC>();
-  equations->g.head<kC>() += part.g.head<kC>();
-  for (int j = 0; j < static_cast<int>(to.size()); ++j) {
-    const int from_j = kC + kP * j;
-    equations->g.segment<kP>(to[j]) += part.g.segment<kP>(from_j);
-    equations->H.block<kC, kP>(0, to[j]) += part.H.block<kC, kP>(0, from_j);
-    equations->H.block<kP, kC>(to[j], 0) += part.H.block<kP, kC>(from_j, 0);
-    for (int i = 0; i < static_cast<int>(to.size()); ++i) {
-      equations->H.block<kP, kP>(to[i], to[j]) += part.H.block<kP, kP>(kC + kP * i, from_j);
-    }
-  }
-  equations->eliminations.push_back(std::move(elimination));
-}
-
-void AddLink(const WindowState& state, const InertialLink& link, int to, NormalEquations* out) {
-  const InertialResidual residual =
-      ComputeInertialResidual(link.measured, state.frames[to - 1].imu, state.frames[to].imu);
-  Eigen::Matrix<double, 15, 30> J;
-  J << residual.J_from, residual.J_to;
-  const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * link.information;
-  const int at = state.Offset(to - 1);  // the two frames are neighbours
-  out->H.block<30, 30>(at, at) += JtL * J;
-  out->g.segment<30>(at) += JtL * residual.r;
-  out->cost += 0.5 * residual.r.dot(link.information * residual.r);
-}
-
-// The velocity of a resting frame is zero.
-void AddRest(const WindowState& state, int frame, NormalEquations* out) {
-  const Vector3d& v = state.frames[frame].imu.v_odom_body;
-  const double information = 1 / (kRestVelocitySigma * kRestVelocitySigma);
-  Eigen::Matrix<double, 3, kFrameSize> J = Eigen::Matrix<double, 3, kFrameSize>::Zero();
-  J.block<3, 3>(0, kVelocity).setIdentity();
-  J.block<3, 3>(0, kTheta) = -Hat(v);
-  const int at = state.Offset(frame);
-  out->H.block<kFrameSize, kFrameSize>(at, at) += information * J.transpose() * J;
-  out->g.segment<kFrameSize>(at) += information * J.transpose() * v;
-  out->cost += 0.5 * information * v.squaredNorm();
-}
-
-// Two neighbours that both rest have one pose: r = (Log(R_i^T R_j), R_i^T (p_j - p_i)).
-bool RestTogether(const WindowProblem& problem, int to) {
-  return problem.links[to] && problem.state.frames[to - 1].at_rest &&
-         problem.state.frames[to].at_rest;
-}
-
-Vector6d RestResidual(const WindowState& state, int to) {
-  const Rigid3 T =
-      state.frames[to - 1].imu.T_odom_body.Inverse() * state.frames[to].imu.T_odom_body;
-  Vector6d r;
-  r << LogSo3(T.q) / kRestRotationSigma, T.t / kRestPositionSigma;
-  return r;
-}
-
-void AddRestTogether(const WindowState& state, int to, NormalEquations* out) {
-  const Rigid3& T_i = state.frames[to - 1].imu.T_odom_body;
-  const Rigid3& T_j = state.frames[to].imu.T_odom_body;
-  const Vector6d r = RestResidual(state, to);
-  const Matrix3d R_i = T_i.R().transpose();
-  const Matrix3d turn = RightJacobianInverse(kRestRotationSigma * r.head<3>()) *
-                        T_j.R().transpose() / kRestRotationSigma;
-  Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();  // (pose i, pose j)
-  J.block<3, 3>(0, 0) = -turn;
-  J.block<3, 3>(0, 6) = turn;
-  J.block<3, 3>(3, 0) = R_i * Hat(T_j.t) / kRestPositionSigma;
-  J.block<3, 3>(3, 3) = -R_i / kRestPositionSigma;
-  J.block<3, 3>(3, 6) = -R_i * Hat(T_j.t) / kRestPositionSigma;
-  J.block<3, 3>(3, 9) = R_i / kRestPositionSigma;
-  const Eigen::Matrix<double, 12, 12> A = J.transpose() * J;
-  const Eigen::Matrix<double, 12, 1> b = J.transpose() * r;
-  const int at_i = state.Offset(to - 1), at_j = state.Offset(to);
-  out->H.block<6, 6>(at_i, at_i) += A.topLeftCorner<6, 6>();
-  out->H.block<6, 6>(at_i, at_j) += A.topRightCorner<6, 6>();
-  out->H.block<6, 6>(at_j, at_i) += A.bottomLeftCorner<6, 6>();
-  out->H.block<6, 6>(at_j, at_j) += A.bottomRightCorner<6, 6>();
-  out->g.segment<6>(at_i) += b.head<6>();
-  out->g.segment<6>(at_j) += b.tail<6>();
-  out->cost += 0.5 * r.squaredNorm();
-}
-
-void AddPrior(const WindowProblem& problem, NormalEquations* out) {
-  const WindowPrior& prior = problem.prior;
-  const VectorXd e = PriorError(problem);
-  const VectorXd He = prior.H * e;
-  // The prior's derivatives stay those of its own linearisation: the unobservable directions are
-  // the same here and there.
-  out->H.topLeftCorner(prior.H.rows(), prior.H.cols()) += prior.H;
-  out->g.head(prior.g.size()) += prior.g + He;
-  out->cost += prior.g.dot(e) + 0.5 * e.dot(He);
-}
-
-double Cost(const WindowProblem& problem) {
-  const WindowState& state = problem.state;
-  const VectorXd e = PriorError(problem);
-  double cost = problem.prior.g.dot(e) + 0.5 * e.dot(problem.prior.H * e);
-  for (int i = 1; i <= state.Newest(); ++i) {
-    if (problem.links[i]) {
-      const InertialLink& link = *problem.links[i];
-      const auto residual =
-          ComputeInertialResidual(link.measured, state.frames[i - 1].imu, state.frames[i].imu);
-      cost += 0.5 * residual.r.dot(link.information * residual.r);
-    }
-    if (RestTogether(problem, i)) {
-      cost += 0.5 * RestResidual(state, i).squaredNorm();
-    }
-  }
-  for (const WindowFrame& frame : state.frames) {
-    if (frame.at_rest) {
-      cost += 0.5 * frame.imu.v_odom_body.squaredNorm() / (kRestVelocitySigma * kRestVelocitySigma);
-    }
-  }
-  for (const Landmark& landmark : problem.landmarks) {
-    for (const FrameRay& seen : landmark.rays) {
-      const double error = RayError(state, landmark.point, seen);
-      cost += std::isfinite(error) ? HuberCost(error) : 0;
-    }
-  }
-  return cost;
-}
 
 void Step(WindowProblem& problem, const NormalEquations& equations, const VectorXd& step) {
   for (size_t l = 0; l < problem.landmarks.size(); ++l) {
@@ -272,12 +45,43 @@ MatrixXd SolveScaled(const MatrixXd& H, const Rhs& b) {
   return scale.asDiagonal() * y;
 }
 
-}  // namespace
-
-double RayError(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen) {
-  const auto ray = PredictRayOnly(state, point, seen);
-  return ray ? (*ray - seen.ray).norm() / seen.sigma : std::numeric_limits<double>::infinity();
+// All that is said of the oldest full frame.
+NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
+  const WindowState& state = problem.state;
+  NormalEquations out;
+  out.H.setZero(state.size(), state.size());
+  out.g.setZero(state.size());
+  AddPrior(problem, &out);
+  if (problem.links[oldest + 1]) {
+    AddLink(state, *problem.links[oldest + 1], oldest + 1, &out);
+  }
+  if (RestTogether(problem, oldest + 1)) {
+    AddRestTogether(state, oldest + 1, &out);
+  }
+  if (state.frames[oldest].at_rest) {
+    AddRest(state, oldest, &out);
+  }
+  for (const Landmark& landmark : problem.landmarks) {
+    if (landmark.point.anchor == oldest) {
+      AddLandmark(state, landmark, 0, &out);
+    }
+  }
+  return out;
 }
+
+void EraseFrame(WindowProblem& problem, int index) {
+  problem.state.frames.erase(problem.state.frames.begin() + index);
+  problem.links.erase(problem.links.begin() + index);
+  for (Landmark& landmark : problem.landmarks) {
+    landmark.point.anchor -= landmark.point.anchor > index ? 1 : 0;
+    std::erase_if(landmark.rays, [index](const FrameRay& ray) { return ray.frame == index; });
+    for (FrameRay& ray : landmark.rays) {
+      ray.frame -= ray.frame > index ? 1 : 0;
+    }
+  }
+}
+
+}  // namespace
 
 NormalEquations Linearise(const WindowProblem& problem, double damping) {
   const int n = problem.state.size();
@@ -345,24 +149,7 @@ MatrixXd WindowCovariance(const WindowProblem& problem) {
 void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
   WindowState& state = problem.state;
   const int oldest = state.frames.front().pose_only ? 1 : 0;
-  NormalEquations equations;
-  equations.H.setZero(state.size(), state.size());
-  equations.g.setZero(state.size());
-  AddPrior(problem, &equations);
-  if (problem.links[oldest + 1]) {
-    AddLink(state, *problem.links[oldest + 1], oldest + 1, &equations);
-  }
-  if (RestTogether(problem, oldest + 1)) {
-    AddRestTogether(state, oldest + 1, &equations);
-  }
-  if (state.frames[oldest].at_rest) {
-    AddRest(state, oldest, &equations);
-  }
-  for (const Landmark& landmark : problem.landmarks) {
-    if (landmark.point.anchor == oldest) {
-      AddLandmark(state, landmark, 0, &equations);
-    }
-  }
+  const NormalEquations equations = LineariseOldest(problem, oldest);
   std::erase_if(problem.landmarks,
                 [oldest](const Landmark& landmark) { return landmark.point.anchor == oldest; });
 
@@ -385,17 +172,6 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
   prior.H = 0.5 * (prior.H + prior.H.transpose()).eval();
   prior.g = equations.g(stay) - gain.transpose() * g_go;
 
-  const auto erase_frame = [&](int index) {
-    state.frames.erase(state.frames.begin() + index);
-    problem.links.erase(problem.links.begin() + index);
-    for (Landmark& landmark : problem.landmarks) {
-      landmark.point.anchor -= landmark.point.anchor > index ? 1 : 0;
-      std::erase_if(landmark.rays, [index](const FrameRay& ray) { return ray.frame == index; });
-      for (FrameRay& ray : landmark.rays) {
-        ray.frame -= ray.frame > index ? 1 : 0;
-      }
-    }
-  };
   problem.links[oldest + 1].reset();
   if (what.keep_pose) {
     WindowFrame& kept = state.frames[oldest];
@@ -403,10 +179,10 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
     kept.at_rest = false;
     problem.links[oldest].reset();
   } else {
-    erase_frame(oldest);
+    EraseFrame(problem, oldest);
   }
   if (drops_kept) {
-    erase_frame(0);
+    EraseFrame(problem, 0);
   }
   prior.at = state;
 }

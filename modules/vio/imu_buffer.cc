@@ -1,0 +1,82 @@
+#include "vio/imu_buffer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace pangea::vio {
+namespace {
+
+constexpr int64_t kMaxGap_us = 300'000;
+constexpr int64_t kMargin_us = 50'000;  // for changes of the time offset
+constexpr size_t kMinKept = 50;         // to tell a rest by
+
+}  // namespace
+
+void ImuBuffer::Add(std::span<const ImuSample> samples) {
+  samples_.insert(samples_.end(), samples.begin(), samples.end());
+}
+
+void ImuBuffer::Forget(int64_t before_utime) {
+  while (samples_.size() > kMinKept && samples_[1].utime < before_utime - kMargin_us) {
+    samples_.pop_front();
+  }
+}
+
+std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) const {
+  bool any = false;
+  for (size_t i = 0; i + 1 < samples_.size(); ++i) {
+    const ImuSample& a = samples_[i];
+    const ImuSample& b = samples_[i + 1];
+    if (b.utime <= from_utime || a.utime >= to_utime) {
+      continue;
+    }
+    any = true;
+    if (b.utime - a.utime > kMaxGap_us) {
+      return fmt::format("the inertial samples have a gap of {:.2f} s",
+                         1e-6 * static_cast<double>(b.utime - a.utime));
+    }
+  }
+  if (!any || samples_.back().utime < to_utime - kMargin_us) {
+    return "no inertial samples up to the image's time";
+  }
+  return std::nullopt;
+}
+
+Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
+                                    const Eigen::Vector3d& gyro_bias,
+                                    const Eigen::Vector3d& accel_bias) const {
+  Preintegrator integrator(noise_, gyro_bias, accel_bias);
+  auto b = std::partition_point(
+      samples_.begin(), samples_.end(),
+      [from_utime](const ImuSample& sample) { return sample.utime <= from_utime; });
+  for (; b != samples_.begin() && b != samples_.end(); ++b) {
+    const ImuSample& a = *std::prev(b);
+    if (a.utime >= to_utime) {
+      break;
+    }
+    integrator.Add(a.utime < from_utime ? InterpolateImu(a, *b, from_utime) : a,
+                   b->utime > to_utime ? InterpolateImu(a, *b, to_utime) : *b);
+  }
+  // The time offset may want a little more than has come: the last sample holds.
+  if (!samples_.empty() && samples_.back().utime < to_utime) {
+    ImuSample held = samples_.back();
+    held.utime = to_utime;
+    integrator.Add(samples_.back(), held);
+  }
+  return integrator.result();
+}
+
+const ImuSample& ImuBuffer::At(int64_t utime) const {
+  const auto sample =
+      std::partition_point(samples_.begin(), samples_.end(),
+                           [utime](const ImuSample& one) { return one.utime < utime; });
+  return sample == samples_.end() ? samples_.back() : *sample;
+}
+
+std::vector<ImuSample> ImuBuffer::Latest(size_t count) const {
+  const size_t kept = std::min(count, samples_.size());
+  return {samples_.end() - static_cast<std::ptrdiff_t>(kept), samples_.end()};
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,15 @@
+#pragma once
+
+// What is known of the window when it starts: the initialiser's state and the given calibration.
+
+#include <Eigen/Core>
+
+#include "vio/window_problem.h"
+
+namespace pangea::vio {
+
+// `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
+// the left, all differences plain (InitialState).
+WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance);
+
+}  // namespace pangea::vio
