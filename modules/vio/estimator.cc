@@ -20,7 +20,8 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr double kMaxFrameGap_s = 1.0;
-constexpr int kMaxBlindFrames = 20;  // images in a row with next to nothing to go by: lost
+constexpr int64_t kStartSpan_us = 4'000'000;  // samples a start may ask for
+constexpr int kMaxBlindFrames = 20;           // images in a row with next to nothing to go by: lost
 constexpr int kMinUsed = 4;
 constexpr double kMaxSpeed = 50;     // m/s
 constexpr double kMaxGyroBias = 1;   // rad/s
@@ -58,7 +59,9 @@ struct Estimator::Impl {
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
   std::vector<FinishedKeyframe> Flush();
 
-  void Start(const InitialState& initial, const TrackedFrame& frame);
+  void Start(const InitialState& initial);
+  InertialLink Link(const WindowFrame& from, int64_t to_imu_utime) const;
+  void Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
   std::vector<int32_t> Solve();
@@ -96,18 +99,45 @@ struct Estimator::Impl {
   bool lost = false;
 };
 
-void Estimator::Impl::Start(const InitialState& initial, const TrackedFrame& frame) {
-  WindowFrame first;
-  first.utime = frame.utime;
-  first.imu_utime = ImuTime(frame.utime);
-  first.time_offset_s = problem.state.time_offset_s;
-  first.imu = initial.imu;
-  first.stays = true;
-  problem.state.frames = {first};
-  problem.links.resize(1);
-  history.AddFrame(frame, camera, ray_sigma);
-  problem.prior = StartPrior(problem.state, initial.covariance);
+// The window takes over the frames the start was found from: they go on being refined.
+void Estimator::Impl::Start(const InitialState& initial) {
+  const int64_t offset_us = ImuTime(0);
+  for (const InitialState::Frame& from : initial.frames) {
+    TrackedFrame tracked = from.tracked;
+    tracked.utime -= offset_us;
+    history.AddFrame(tracked, camera, ray_sigma);
+    if (problem.state.frames.empty()) {
+      Append(tracked.utime, from.imu, std::nullopt);
+      Newest().stays = true;
+      problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance)
+                                      : MovingStartPrior(problem.state);
+      continue;
+    }
+    DropPassing();
+    Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
+    Newest().stays = HasMoved(problem.state.frames[problem.state.Newest() - 1].utime,
+                              options.window_parallax_px, options.window_track_share);
+  }
   started = true;
+}
+
+InertialLink Estimator::Impl::Link(const WindowFrame& from, int64_t to_imu_utime) const {
+  InertialLink link;
+  link.measured =
+      imu_samples.Integrate(from.imu_utime, to_imu_utime, from.imu.gyro_bias, from.imu.accel_bias);
+  link.information = InertialInformation(link.measured, noise);
+  return link;
+}
+
+void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link) {
+  WindowFrame frame;
+  frame.utime = utime;
+  frame.imu_utime = ImuTime(utime);
+  frame.time_offset_s = problem.state.time_offset_s;
+  frame.imu = imu;
+  frame.omega_body = imu_samples.At(frame.imu_utime).gyro - imu.gyro_bias;
+  problem.state.frames.push_back(frame);
+  problem.links.push_back(std::move(link));
 }
 
 // A frame that does not stay makes room for the next one: its rays go, its inertial samples are
@@ -133,20 +163,9 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
           : std::nullopt;
   const bool at_rest = rest.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
   DropPassing();
-  const WindowFrame& last = Newest();
-  InertialLink link;
-  link.measured =
-      imu_samples.Integrate(last.imu_utime, imu_utime, last.imu.gyro_bias, last.imu.accel_bias);
-  link.information = InertialInformation(link.measured, noise);
-  WindowFrame added;
-  added.utime = frame.utime;
-  added.imu_utime = imu_utime;
-  added.time_offset_s = problem.state.time_offset_s;
-  added.imu = Predict(link.measured, last.imu);
-  added.omega_body = imu_samples.At(imu_utime).gyro - last.imu.gyro_bias;
-  added.at_rest = at_rest;
-  problem.state.frames.push_back(added);
-  problem.links.emplace_back(std::move(link));
+  const InertialLink link = Link(Newest(), imu_utime);
+  Append(frame.utime, Predict(link.measured, Newest().imu), link);
+  Newest().at_rest = at_rest;
   return std::nullopt;
 }
 
@@ -335,7 +354,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
     return fail("lost before");
   }
   if (!started) {
-    imu_samples.Forget(frame.utime);
+    imu_samples.Forget(frame.utime - kStartSpan_us);
     TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
     shifted.utime = ImuTime(frame.utime);
     const InitialResult initial = initialiser.AddFrame(shifted, imu);
@@ -343,7 +362,8 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
       result.reason = initial.reason;
       return result;
     }
-    Start(*initial.state, frame);
+    Start(*initial.state);
+    Solve();
   } else {
     const double gap_s = Seconds(frame.utime - Newest().utime);
     if (gap_s > kMaxFrameGap_s) {

@@ -165,10 +165,12 @@ class StartProblem {
     if (!Covariance(&out)) {
       return std::nullopt;
     }
-    out.last.T_odom_body = {poses_.back().q.normalized(), Vector3d::Zero()};
-    out.last.v_odom_body = poses_.back().v;
-    out.last.gyro_bias = gyro_bias_;
-    out.last.accel_bias = accel_bias_;
+    for (const Pose& pose : poses_) {
+      out.states.push_back({{pose.q.normalized(), pose.p - poses_.back().p},
+                            Vector3d(pose.v),
+                            Vector3d(gyro_bias_),
+                            Vector3d(accel_bias_)});
+    }
     return out;
   }
 

@@ -40,9 +40,10 @@ std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const
 // Refined by bundle adjustment; poses are in a gravity-aligned frame with its origin in the last
 // body.
 struct RefinedStart {
-  ImuState last;
-  Eigen::Matrix<double, 15, 15> covariance;  // (dtheta left, dp, dv, gyro bias, accel bias)
-  double rms_sigma = 0;                      // reprojection residual of the inliers, in sigmas
+  std::vector<ImuState> states;  // of every frame, with one pair of biases
+  // Of the last: (dtheta left, dp, dv, gyro bias, accel bias).
+  Eigen::Matrix<double, 15, 15> covariance;
+  double rms_sigma = 0;  // reprojection residual of the inliers, in sigmas
   double inlier_share = 0;
 };
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,

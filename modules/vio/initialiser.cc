@@ -126,10 +126,11 @@ std::optional<InitialState> Initialiser::TryAtRest() const {
     return std::nullopt;
   }
   InitialState state;
-  state.utime = now;
   state.at_rest = true;
-  state.imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(mean_accel, Vector3d::UnitZ());
-  state.imu.gyro_bias = mean_gyro;
+  ImuState imu;
+  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(mean_accel, Vector3d::UnitZ());
+  imu.gyro_bias = mean_gyro;
+  state.frames.push_back({frames_.back().frame, imu});
   // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
   Eigen::Matrix<double, 15, 1> sigma;
   constexpr double kAccelBiasSigma = 0.1;
@@ -180,12 +181,13 @@ InitialResult Initialiser::TryMoving() const {
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
                     velocity_sigma, tilt_sigma * 57.3)};
   }
-  if (refined->last.accel_bias.norm() > kMaxAccelBias) {
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias) {
     return {std::nullopt, "the start needs an implausible accelerometer bias"};
   }
   InitialState state;
-  state.utime = frames_.back().frame.utime;
-  state.imu = refined->last;
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    state.frames.push_back({frames_[i].frame, refined->states[i]});
+  }
   state.covariance = refined->covariance;
   return {state, ""};
 }

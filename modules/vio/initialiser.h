@@ -22,10 +22,15 @@
 
 namespace pangea::vio {
 
+// odom: z up, origin at the body now, yaw free.
 struct InitialState {
-  int64_t utime = 0;  // of the newest frame
-  ImuState imu;       // odom: z up, origin at the body now, yaw free
-  // Of (dtheta left, dp, dv, gyro bias, accel bias), in odom.
+  // The frames the start was found from, oldest first, the newest last; one if it was at rest.
+  struct Frame {
+    TrackedFrame tracked;  // its utime is the IMU's
+    ImuState imu;
+  };
+  std::vector<Frame> frames;
+  // Of the newest: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   bool at_rest = false;
 };

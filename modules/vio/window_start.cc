@@ -14,6 +14,12 @@ constexpr double kExtrinsicsRotationSigma = 0.005;  // rad
 constexpr double kExtrinsicsPositionSigma = 0.005;  // m
 constexpr double kTimeOffsetSigma = 0.003;          // s
 
+// Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
+constexpr double kTiltSigma = 0.5;        // rad
+constexpr double kVelocitySigma = 5;      // m/s
+constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
+constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
+
 // From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
 Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
   Matrix15d J = Matrix15d::Identity();
@@ -39,6 +45,16 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance) {
   prior.at = start;
   prior.H = P.llt().solve(MatrixXd::Identity(n, n));
   prior.g.setZero(n);
+  return prior;
+}
+
+WindowPrior MovingStartPrior(const WindowState& start) {
+  Eigen::Matrix<double, 15, 1> sigma;
+  sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
+      Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
+      Vector3d::Constant(kAccelBiasSigma);
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal());
+  prior.at.frames[0].imu.accel_bias.setZero();
   return prior;
 }
 
