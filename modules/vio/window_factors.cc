@@ -162,14 +162,13 @@ void AddLink(const WindowState& state, const InertialLink& link, int to, NormalE
 }
 
 void AddRest(const WindowState& state, int frame, NormalEquations* out) {
+  // r = R^T v, so that a turn of all the frames leaves it as it is also when v is not yet zero; its
+  // derivative by xi_v is R^T.
   const Vector3d& v = state.frames[frame].imu.v_odom_body;
   const double information = 1 / (kRestVelocitySigma * kRestVelocitySigma);
-  Eigen::Matrix<double, 3, kFrameSize> J = Eigen::Matrix<double, 3, kFrameSize>::Zero();
-  J.block<3, 3>(0, kVelocity).setIdentity();
-  J.block<3, 3>(0, kTheta) = -Hat(v);
-  const int at = state.Offset(frame);
-  out->H.block<kFrameSize, kFrameSize>(at, at) += information * J.transpose() * J;
-  out->g.segment<kFrameSize>(at) += information * J.transpose() * v;
+  const int at = state.Offset(frame) + kVelocity;
+  out->H.diagonal().segment<3>(at).array() += information;
+  out->g.segment<3>(at) += information * v;
   out->cost += 0.5 * information * v.squaredNorm();
 }
 
