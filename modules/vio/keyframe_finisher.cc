@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vio/point_geometry.h"
+#include "vio/window_factors.h"
 
 namespace pangea::vio {
 namespace {
@@ -18,11 +19,28 @@ constexpr double kMaxRelativeSigma = 0.3;
 constexpr size_t kMinRays = 4;
 constexpr double kMaxRms = 2.0;  // sigmas
 
-// A floor on what is never better known than this, whatever the window's rays say: poses are not
-// exact.
+// Nothing is better known than this, whatever the window's rays say.
 constexpr double kMinRelativeSigma = 0.005;
 
-std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state,
+// Variance of the inverse depth: that of the rays, and what the errors of calibration and frames
+// (covariance P) do to it.
+double DepthVariance(const WindowState& state, const MatrixXd& P, const Triangulated& point,
+                     const std::vector<FrameRay>& rays) {
+  NormalEquations unused;
+  unused.H.setZero(state.size(), state.size());
+  unused.g.setZero(state.size());
+  AddLandmark(state, {0, point.point, rays}, 0, &unused);
+  const auto& gain = unused.eliminations.front().gain;
+  Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
+  J.head<kCalibrationSize>() = gain.row(2).head<kCalibrationSize>();
+  for (int i = 0; i < static_cast<int>(rays.size()); ++i) {
+    J.segment<kPoseSize>(state.Offset(rays[i].frame)) =
+        gain.row(2).segment<kPoseSize>(kCalibrationSize + kPoseSize * i);
+  }
+  return point.covariance(2, 2) + J.dot(J * P);
+}
+
+std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const MatrixXd& P,
                                      const TrackHistory& history, int frame) {
   const std::vector<FrameRay> rays = history.RaysOf(id, state, 0);
   const auto own = std::find_if(rays.begin(), rays.end(),
@@ -36,7 +54,7 @@ std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state,
   }
   const double rho = point->point.ray_rho.z();
   const double floor = kMinRelativeSigma * rho;
-  const double variance = std::max(point->covariance(2, 2), floor * floor);
+  const double variance = std::max(DepthVariance(state, P, *point, rays), floor * floor);
   if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
     return std::nullopt;
   }
@@ -98,7 +116,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
   keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
   for (const auto& [id, ray] : history.Frame(frame.utime)) {
-    if (const auto depth = DepthOf(id, state, history, index)) {
+    if (const auto depth = DepthOf(id, state, P, history, index)) {
       keyframe.landmarks.push_back(*depth);
     }
   }
