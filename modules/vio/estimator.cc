@@ -28,6 +28,8 @@ constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
 constexpr int kMaxIterations = 4;
+constexpr double kRestTrackShare = 0.5;
+constexpr double kAnyParallax = 1e9;  // pixels
 // A landmark is an outlier when its newest ray is this far off, or all of them together.
 constexpr double kMaxRayError = 5.0;     // sigmas
 constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
@@ -101,7 +103,8 @@ struct Estimator::Impl {
 
 // The window takes over the frames the start was found from: they go on being refined.
 void Estimator::Impl::Start(const InitialState& initial) {
-  const int64_t offset_us = ImuTime(0);
+  const int64_t offset_us = ImuTime(0);  // as it was when the initialiser got the frames
+  problem.state.time_offset_s += initial.time_offset_change_s;
   for (const InitialState::Frame& from : initial.frames) {
     TrackedFrame tracked = from.tracked;
     tracked.utime -= offset_us;
@@ -233,11 +236,15 @@ void Estimator::Impl::ChooseRole() {
     last_keyframe_utime = newest.utime;
   }
   const int before = problem.state.Newest() - 1;
-  const bool rest_begins = newest.at_rest && before >= 0 && !problem.state.frames[before].at_rest;
-  newest.stays =
-      newest.is_keyframe || before < 0 || rest_begins ||
-      (!newest.at_rest && HasMoved(problem.state.frames[before].utime, options.window_parallax_px,
-                                   options.window_track_share));
+  if (newest.is_keyframe || before < 0) {
+    newest.stays = true;
+    return;
+  }
+  const WindowFrame& last = problem.state.frames[before];
+  // A rest is held by the frame it began with, and handed on before its tracks run out.
+  newest.stays = newest.at_rest
+                     ? !last.at_rest || HasMoved(last.utime, kAnyParallax, kRestTrackShare)
+                     : HasMoved(last.utime, options.window_parallax_px, options.window_track_share);
 }
 
 FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {

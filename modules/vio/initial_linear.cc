@@ -16,6 +16,10 @@ using Eigen::Quaterniond;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr size_t kMinPairs = 4;
+constexpr double kMaxTimeOffset_s = 0.06;  // searched to either side
+// A time offset must explain the rotations this much better than none.
+constexpr double kClearlyBetter = 0.8;
 constexpr size_t kMinShared = 20;  // landmarks two images must share to speak about their rotation
 
 Vector3d Bearing(const Vector2d& ray) { return Vector3d(ray.x(), ray.y(), 1).normalized(); }
@@ -34,6 +38,7 @@ Preintegration IntegrateBetween(std::span<const StartFrame> frames, size_t from,
 // Two images, their shared bearings (in body orientation), and how their rotation follows the gyro
 // bias.
 struct RotationPair {
+  int64_t from_utime = 0, to_utime = 0;
   std::vector<std::pair<Vector3d, Vector3d>> bearings;
   Quaterniond delta_q;
   Matrix3d J_bias;
@@ -60,6 +65,8 @@ std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Ri
     const StartFrame& a = frames[i];
     const StartFrame& b = frames[i + kSpan];
     RotationPair pair;
+    pair.from_utime = a.utime;
+    pair.to_utime = b.utime;
     for (const auto& [id, ray] : a.rays) {
       const auto other = b.rays.find(id);
       if (other != b.rays.end()) {
@@ -75,6 +82,53 @@ std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Ri
     }
   }
   return pairs;
+}
+
+// The gyro's rotation over a span of time that the samples cover; no bias taken off.
+Quaterniond Turn(std::span<const ImuSample> samples, int64_t from_utime, int64_t to_utime) {
+  Quaterniond q = Quaterniond::Identity();
+  for (size_t i = 0; i + 1 < samples.size(); ++i) {
+    const int64_t begin = std::max(samples[i].utime, from_utime);
+    const int64_t end = std::min(samples[i + 1].utime, to_utime);
+    if (end > begin) {
+      const Vector3d gyro = 0.5 * (samples[i].gyro + samples[i + 1].gyro);
+      q = q * ExpSo3(1e-6 * static_cast<double>(end - begin) * gyro);
+    }
+  }
+  return q.normalized();
+}
+
+struct FoundBias {
+  Vector3d bias = Vector3d::Zero();
+  double cost = 0;
+};
+
+FoundBias FindBias(const std::vector<RotationPair>& pairs, const Vector3d& start,
+                   double first_step) {
+  const auto cost = [&](const Vector3d& bias) {
+    double sum = 0;
+    for (const RotationPair& pair : pairs) {
+      // The square root keeps one pair with bad tracks from ruling the sum.
+      sum += std::sqrt(EpipolarCost(pair, bias) + 1e-10);
+    }
+    return sum;
+  };
+  FoundBias found{start, cost(start)};
+  // Pattern search with shrinking steps: three unknowns, a cheap cost, no derivatives at its kink.
+  for (double step = first_step; step > 2e-5; step *= 0.5) {
+    for (bool improved = true; improved;) {
+      improved = false;
+      for (int k = 0; k < 6; ++k) {
+        const Vector3d tried = found.bias + (k % 2 == 0 ? step : -step) * Vector3d::Unit(k / 2);
+        const double value = cost(tried);
+        if (value < found.cost && tried.norm() < 0.5) {
+          found = {tried, value};
+          improved = true;
+        }
+      }
+    }
+  }
+  return found;
 }
 
 // min y' A y - 2 b' y with |y.tail(3)| = kGravity: the head is eliminated, the rest is a secular
@@ -114,35 +168,44 @@ std::optional<Eigen::Matrix<double, 6, 1>> SolveWithGravityNorm(
 std::optional<Vector3d> SolveGyroBias(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                       const ImuNoise& noise) {
   const std::vector<RotationPair> pairs = MakePairs(frames, T_body_cam, noise);
-  if (pairs.size() < 4) {
+  if (pairs.size() < kMinPairs) {
     return std::nullopt;
   }
-  const auto cost = [&](const Vector3d& bias) {
-    double sum = 0;
-    for (const RotationPair& pair : pairs) {
-      // The square root keeps one pair with bad tracks from ruling the sum.
-      sum += std::sqrt(EpipolarCost(pair, bias) + 1e-10);
-    }
-    return sum;
-  };
-  Vector3d bias = Vector3d::Zero();
-  // Pattern search with shrinking steps: three unknowns, a cheap cost, no derivatives at its kink.
-  double best = cost(bias);
-  for (double step = 0.05; step > 2e-5; step *= 0.5) {
-    for (bool improved = true; improved;) {
-      improved = false;
-      for (int k = 0; k < 6; ++k) {
-        const Vector3d tried = bias + (k % 2 == 0 ? step : -step) * Vector3d::Unit(k / 2);
-        const double value = cost(tried);
-        if (value < best && tried.norm() < 0.5) {
-          best = value;
-          bias = tried;
-          improved = true;
-        }
-      }
-    }
+  return FindBias(pairs, Vector3d::Zero(), 0.05).bias;
+}
+
+std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                                      std::span<const ImuSample> samples, const ImuNoise& noise) {
+  const auto max_us = static_cast<int64_t>(1e6 * kMaxTimeOffset_s);
+  std::vector<RotationPair> pairs = MakePairs(frames, T_body_cam, noise);
+  std::erase_if(pairs, [&](const RotationPair& pair) {
+    return samples.empty() || pair.from_utime - max_us < samples.front().utime ||
+           pair.to_utime + max_us > samples.back().utime;
+  });
+  if (pairs.size() < kMinPairs) {
+    return std::nullopt;
   }
-  return bias;
+  constexpr int kSteps = 10;  // to either side
+  std::vector<double> costs;
+  Vector3d bias = FindBias(pairs, Vector3d::Zero(), 0.05).bias;
+  for (int k = -kSteps; k <= kSteps; ++k) {
+    const int64_t shift = max_us * k / kSteps;
+    for (RotationPair& pair : pairs) {
+      pair.delta_q = Turn(samples, pair.from_utime + shift, pair.to_utime + shift);
+    }
+    const FoundBias found = FindBias(pairs, bias, 0.01);
+    bias = found.bias;
+    costs.push_back(found.cost);
+  }
+  const auto best = std::min_element(costs.begin(), costs.end());
+  if (best == costs.begin() || best + 1 == costs.end() || *best > kClearlyBetter * costs[kSteps]) {
+    return std::nullopt;
+  }
+  // Between the steps: the parabola through the best and its neighbours.
+  const double before = *(best - 1), after = *(best + 1);
+  const double fraction = 0.5 * (before - after) / (before + after - 2 * *best);
+  const double step = kMaxTimeOffset_s / kSteps;
+  return step * (static_cast<double>(best - costs.begin()) - kSteps + fraction);
 }
 
 std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const Rigid3& T_body_cam,

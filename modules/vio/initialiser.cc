@@ -19,6 +19,7 @@ using Eigen::Vector3d;
 constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
 constexpr double kMinSpan_s = 1.0;        // shortest start-up window, and
 constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgotten
+constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
 constexpr size_t kMinTracks = 20;
 
 // At rest: the image stands, the accelerometer and the gyro are quiet.
@@ -56,35 +57,49 @@ double SpanSeconds(int64_t from_utime, int64_t to_utime) {
   return 1e-6 * static_cast<double>(to_utime - from_utime);
 }
 
+// The samples of a span of time, its ends interpolated; the last one holds when they end too early.
+std::vector<ImuSample> SamplesBetween(const std::vector<ImuSample>& samples, int64_t from_utime,
+                                      int64_t to_utime) {
+  std::vector<ImuSample> between;
+  for (size_t i = 0; i + 1 < samples.size(); ++i) {
+    const ImuSample& a = samples[i];
+    const ImuSample& b = samples[i + 1];
+    if (b.utime <= from_utime || a.utime >= to_utime) {
+      continue;
+    }
+    if (between.empty()) {
+      between.push_back(a.utime < from_utime ? InterpolateImu(a, b, from_utime) : a);
+    }
+    between.push_back(b.utime > to_utime ? InterpolateImu(a, b, to_utime) : b);
+  }
+  if (!between.empty() && between.back().utime < to_utime) {
+    between.push_back(between.back());
+    between.back().utime = to_utime;
+  }
+  return between;
+}
+
 }  // namespace
 
 Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)
     : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma) {}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
-  pending_.insert(pending_.end(), imu.begin(), imu.end());
-  const auto after = std::find_if(pending_.begin(), pending_.end(), [&](const ImuSample& sample) {
-    return sample.utime >= frame.utime;
-  });
-  if (after == pending_.end()) {
+  samples_.insert(samples_.end(), imu.begin(), imu.end());
+  if (samples_.empty() || samples_.back().utime < frame.utime) {
     return {std::nullopt, "no inertial samples up to the image's time"};
   }
-  const bool spaced =
-      frames_.empty() || SpanSeconds(frames_.back().frame.utime, frame.utime) >= kFrameSpacing_s;
-  if (!spaced) {
+  if (!frames_.empty() && SpanSeconds(frames_.back().utime, frame.utime) < kFrameSpacing_s) {
     return {std::nullopt, "collecting images"};
   }
-  BufferedFrame buffered{frame, {pending_.begin(), after}};
-  const ImuSample end =
-      after == pending_.begin() ? *after : InterpolateImu(*(after - 1), *after, frame.utime);
-  buffered.imu.push_back(end);
-  pending_.erase(pending_.begin(), after);
-  pending_.insert(pending_.begin(), end);
-  frames_.push_back(std::move(buffered));
-  while (SpanSeconds(frames_.front().frame.utime, frame.utime) > kMaxSpan_s) {
+  frames_.push_back(frame);
+  while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
     frames_.erase(frames_.begin());
   }
-  const double span = SpanSeconds(frames_.front().frame.utime, frame.utime);
+  std::erase_if(samples_, [&](const ImuSample& sample) {
+    return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
+  });
+  const double span = SpanSeconds(frames_.front().utime, frame.utime);
   if (span < kMinSpan_s) {
     return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
   }
@@ -95,20 +110,13 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
 }
 
 std::optional<InitialState> Initialiser::TryAtRest() const {
-  const int64_t now = frames_.back().frame.utime;
-  std::vector<ImuSample> samples;
-  const TrackedFrame* oldest = nullptr;
-  for (const BufferedFrame& buffered : frames_) {
-    if (SpanSeconds(buffered.frame.utime, now) <= kRestSpan_s + kFrameSpacing_s) {
-      if (oldest == nullptr) {
-        oldest = &buffered.frame;
-      } else {
-        samples.insert(samples.end(), buffered.imu.begin(), buffered.imu.end());
-      }
-    }
-  }
+  const int64_t now = frames_.back().utime;
+  const auto oldest = std::find_if(frames_.begin(), frames_.end(), [now](const TrackedFrame& one) {
+    return SpanSeconds(one.utime, now) <= kRestSpan_s + kFrameSpacing_s;
+  });
+  const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
   size_t shared = 0;
-  const double moved = MedianDisplacement(*oldest, frames_.back().frame, &shared);
+  const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);
   if (samples.size() < 20 || shared < kMinTracks || moved > kRestSigmas * pixel_sigma_) {
     return std::nullopt;
   }
@@ -130,7 +138,7 @@ std::optional<InitialState> Initialiser::TryAtRest() const {
   ImuState imu;
   imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(mean_accel, Vector3d::UnitZ());
   imu.gyro_bias = mean_gyro;
-  state.frames.push_back({frames_.back().frame, imu});
+  state.frames.push_back({frames_.back(), imu});
   // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
   Eigen::Matrix<double, 15, 1> sigma;
   constexpr double kAccelBiasSigma = 0.1;
@@ -141,16 +149,39 @@ std::optional<InitialState> Initialiser::TryAtRest() const {
   return state;
 }
 
-InitialResult Initialiser::TryMoving() const {
+std::vector<StartFrame> Initialiser::StartFrames() const {
+  const int64_t shift = std::llround(1e6 * time_offset_change_s_);
   std::vector<StartFrame> frames;
-  for (const BufferedFrame& buffered : frames_) {
-    StartFrame start{buffered.frame.utime, {}, buffered.imu};
-    for (const Observation& observation : buffered.frame.observations) {
+  for (const TrackedFrame& frame : frames_) {
+    StartFrame start;
+    start.utime = frame.utime + shift;
+    if (!frames.empty()) {
+      start.imu = SamplesBetween(samples_, frames.back().utime, start.utime);
+    }
+    for (const Observation& observation : frame.observations) {
       start.rays[observation.landmark_id] = observation.ray;
     }
     frames.push_back(std::move(start));
   }
-  frames.front().imu.clear();
+  return frames;
+}
+
+InitialResult Initialiser::TryMoving() {
+  const std::vector<StartFrame> frames = StartFrames();
+  InitialResult result = TryMoving(frames);
+  if (result.state || !result.contradicts) {
+    return result;
+  }
+  // The clocks may be further apart than the calibration says.
+  const auto offset = SolveTimeOffset(frames, camera_.T_body_cam, samples_, noise_);
+  if (!offset) {
+    return result;
+  }
+  time_offset_change_s_ += *offset;
+  return TryMoving(StartFrames());
+}
+
+InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) const {
   const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
   if (!gyro_bias) {
     return {std::nullopt, "too few features are tracked from image to image"};
@@ -167,7 +198,8 @@ InitialResult Initialiser::TryMoving() const {
   if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
     return {std::nullopt,
             fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
-                        100 * refined->inlier_share, refined->rms_sigma)};
+                        100 * refined->inlier_share, refined->rms_sigma),
+            true};
   }
   const double velocity_sigma =
       std::sqrt(Eigen::SelfAdjointEigenSolver<Matrix3d>(
@@ -185,8 +217,9 @@ InitialResult Initialiser::TryMoving() const {
     return {std::nullopt, "the start needs an implausible accelerometer bias"};
   }
   InitialState state;
+  state.time_offset_change_s = time_offset_change_s_;
   for (size_t i = 0; i < frames_.size(); ++i) {
-    state.frames.push_back({frames_[i].frame, refined->states[i]});
+    state.frames.push_back({frames_[i], refined->states[i]});
   }
   state.covariance = refined->covariance;
   return {state, ""};

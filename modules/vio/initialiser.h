@@ -17,6 +17,7 @@
 
 #include "common/camera_model.h"
 #include "common/imu.h"
+#include "vio/initial_solution.h"
 #include "vio/tracks.h"
 #include "vio/window_state.h"
 
@@ -33,11 +34,13 @@ struct InitialState {
   // Of the newest: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   bool at_rest = false;
+  double time_offset_change_s = 0;  // the images were taken this much later than their utime says
 };
 
 struct InitialResult {
   std::optional<InitialState> state;
-  std::string reason;  // why there is none yet
+  std::string reason;        // why there is none yet
+  bool contradicts = false;  // because images and inertial samples do not fit
 };
 
 class Initialiser {
@@ -49,18 +52,17 @@ class Initialiser {
   InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
 
  private:
-  struct BufferedFrame {
-    TrackedFrame frame;
-    std::vector<ImuSample> imu;  // from the previous frame's time to this one's, ends interpolated
-  };
   std::optional<InitialState> TryAtRest() const;
-  InitialResult TryMoving() const;
+  InitialResult TryMoving();
+  InitialResult TryMoving(const std::vector<StartFrame>& frames) const;
+  std::vector<StartFrame> StartFrames() const;
 
   CameraModel camera_;
   ImuNoise noise_;
   double pixel_sigma_;
-  std::vector<BufferedFrame> frames_;
-  std::vector<ImuSample> pending_;  // samples from the newest frame's time on
+  std::vector<TrackedFrame> frames_;
+  std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
+  double time_offset_change_s_ = 0;
 };
 
 }  // namespace pangea::vio

@@ -35,7 +35,9 @@ void Vio::OpenNewMap() {
 }
 
 int64_t Vio::ImuTimeOf(int64_t image_utime) const {
-  return image_utime + std::llround(1e6 * camera_.time_offset_s);
+  // Never less than the calibration says, so that samples come in order while the estimate moves.
+  const double offset_s = std::max(camera_.time_offset_s, estimator_->camera().time_offset_s);
+  return image_utime + std::llround(1e6 * offset_s);
 }
 
 // The gyroscope's rotation between the last image and this one, as a turn of the camera.

@@ -15,6 +15,9 @@ using Eigen::VectorXd;
 
 // A ray this many sigmas off is pulled at with constant force (Huber, 1964).
 constexpr double kHuber = 2.0;
+// What a point behind a camera that saw it costs, as a ray this many sigmas off: nothing is gained
+// by throwing it there.
+constexpr double kBehind = 100;
 // A rest: what may pass for one within the noise of a hundred tracks together.
 constexpr double kRestVelocitySigma = 0.02;    // m/s
 constexpr double kRestPositionSigma = 0.002;   // m, between two frames of one rest
@@ -89,7 +92,8 @@ LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landm
     const FrameRay& seen = landmark.rays[j];
     const auto predicted = PredictRay(state, landmark.point, seen);
     if (!predicted) {
-      continue;  // behind that camera: says nothing this time
+      out.cost += HuberCost(kBehind);  // and no derivative: it says nothing of where to go
+      continue;
     }
     const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
     const double e = r.norm();
@@ -237,7 +241,7 @@ double Cost(const WindowProblem& problem) {
   for (const Landmark& landmark : problem.landmarks) {
     for (const FrameRay& seen : landmark.rays) {
       const double error = RayError(state, landmark.point, seen);
-      cost += std::isfinite(error) ? HuberCost(error) : 0;
+      cost += HuberCost(std::isfinite(error) ? error : kBehind);
     }
   }
   return cost;

@@ -12,7 +12,7 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 // Prior uncertainty of the given calibration.
 constexpr double kExtrinsicsRotationSigma = 0.005;  // rad
 constexpr double kExtrinsicsPositionSigma = 0.005;  // m
-constexpr double kTimeOffsetSigma = 0.003;          // s
+constexpr double kTimeOffsetSigma = 0.005;          // s
 
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
 constexpr double kTiltSigma = 0.5;        // rad
