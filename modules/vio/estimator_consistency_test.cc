@@ -1,0 +1,116 @@
+// Whether finished keyframes are as good as their covariance says.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <iostream>
+
+#include "vio/estimator.h"
+#include "vio/vio_test_world.h"
+#include "vio/window_state.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// Normalised squares by their dimension: 1 is honest.
+struct Mean {
+  double sum = 0;
+  int count = 0;
+  void Add(const VectorXd& e, const Eigen::MatrixXd& covariance) {
+    sum += e.dot(covariance.llt().solve(e)) / static_cast<double>(e.size());
+    ++count;
+  }
+  double value() const { return sum / count; }
+};
+
+struct Outcome {
+  std::vector<FinishedKeyframe> keyframes;
+  std::vector<ImuState> truth;  // in the estimate's odom: that of the first keyframe's yaw, origin
+};
+
+Outcome RideOnce(uint64_t seed) {
+  VioTestWorldOptions world_options;
+  world_options.seed = seed;
+  world_options.extrinsics_rotation_sigma = 0.002;
+  world_options.extrinsics_position_sigma = 0.002;
+  VioTestWorld world(world_options);
+  EstimatorOptions options;
+  options.pixel_sigma = world_options.pixel_noise;
+  Estimator estimator(options, world.camera(), ImuNoise{});
+  Outcome run;
+  for (int i = 0; i < 150; ++i) {
+    const VioTestWorld::Input input = world.Next();
+    const FrameResult result = estimator.AddFrame(input.frame, input.imu);
+    world.Drop(result.outlier_landmarks);
+    run.keyframes.insert(run.keyframes.end(), result.finished.begin(), result.finished.end());
+  }
+  if (run.keyframes.empty()) {
+    return run;
+  }
+  const FinishedKeyframe& first = run.keyframes.front();
+  const Rigid3 T_first = world.TruthAt(first.utime).T_odom_body;
+  const Eigen::Quaterniond turn = YawRotation(YawOf(first.T_odom_body.q * T_first.q.conjugate()));
+  for (const FinishedKeyframe& keyframe : run.keyframes) {
+    ImuState truth = world.TruthAt(keyframe.utime);
+    truth.T_odom_body = {turn * truth.T_odom_body.q,
+                         turn * (truth.T_odom_body.t - T_first.t) + first.T_odom_body.t};
+    truth.v_odom_body = turn * truth.v_odom_body;
+    run.truth.push_back(truth);
+  }
+  return run;
+}
+
+// The window's coordinates (window_state.h).
+Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const ImuState& truth) {
+  const Eigen::Quaterniond turn = truth.T_odom_body.q * keyframe.T_odom_body.q.conjugate();
+  Eigen::Matrix<double, 15, 1> e;
+  e << LogSo3(turn), truth.T_odom_body.t - turn * keyframe.T_odom_body.t,
+      truth.v_odom_body - turn * keyframe.v_odom_body, truth.gyro_bias - keyframe.gyro_bias,
+      truth.accel_bias - keyframe.accel_bias;
+  return e;
+}
+
+// What is known of a shift along odom's axes and of a turn about its z axis. Not the variances of
+// position and yaw: the start's position depends on velocity and tilt, of which more is learnt.
+Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& covariance) {
+  Eigen::Matrix<double, 15, 4> N = Eigen::Matrix<double, 15, 4>::Zero();
+  N.block<3, 3>(kPosition, 0).setIdentity();
+  N(kTheta + 2, 3) = 1;
+  return N.transpose() * covariance.llt().solve(N);
+}
+
+TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
+  Mean tilt, velocity, gyro_bias, accel_bias;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const Outcome run = RideOnce(seed);
+    ASSERT_GT(run.keyframes.size(), 10u) << "seed " << seed;
+    // The first keyframe is the start itself.
+    const Eigen::Matrix4d at_start = UnobservableInformation(run.keyframes.front().covariance);
+    for (size_t k = 0; k < run.keyframes.size(); ++k) {
+      const auto& P = run.keyframes[k].covariance;
+      const auto e = ErrorOf(run.keyframes[k], run.truth[k]);
+      tilt.Add(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+      velocity.Add(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+      gyro_bias.Add(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
+      accel_bias.Add(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
+      // Position and yaw cannot be observed: nobody ever knows more of them than the start did.
+      const Eigen::Matrix4d gained = UnobservableInformation(P) - at_start;
+      EXPECT_LT(gained.eigenvalues().real().maxCoeff(), 1e-3 * at_start.diagonal().minCoeff())
+          << "seed " << seed << ", keyframe " << k;
+    }
+  }
+  std::cout << "normalised squares of " << tilt.count << " keyframes: tilt " << tilt.value()
+            << ", velocity " << velocity.value() << ", gyro bias " << gyro_bias.value()
+            << ", accelerometer bias " << accel_bias.value() << "\n";
+  for (const Mean* mean : {&tilt, &velocity, &gyro_bias, &accel_bias}) {
+    EXPECT_GT(mean->value(), 0.3);
+    EXPECT_LT(mean->value(), 3.0);
+  }
+}
+
+}  // namespace
+}  // namespace pangea::vio
