@@ -58,6 +58,19 @@ void ReadGroundTruth(const AgentRun& run, AgentFigures* agent, std::vector<std::
   }
 }
 
+std::map<MapId, int64_t> FusedRevisions(const CapturedSession& session) {
+  std::map<MapId, int64_t> revisions;
+  for (const GroupChange& change : session.changes) {
+    for (const MapId& map : change.maps) {
+      if (change.maps.size() > 1) {
+        const auto known = revisions.try_emplace(map, change.revision).first;
+        known->second = std::min(known->second, change.revision);
+      }
+    }
+  }
+  return revisions;
+}
+
 void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentFigures* agent,
                   std::vector<std::string>* notes) {
   PoseTrack track;
@@ -65,6 +78,7 @@ void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentFigu
     track = ReadPoses(run.bus_log, run.id);
   }
   agent->odometry = std::move(track.odometry);
+  agent->live = LiveFiguresOf(track.live, FusedRevisions(session), agent->ground_truth);
   agent->odometry_at_camera_rate = !agent->odometry.empty();
   std::optional<int64_t> first_pose = track.first_tracking_utime;
   if (!agent->odometry_at_camera_rate) {
@@ -156,6 +170,22 @@ void AddJoint(const std::vector<AgentFigures>& agents, GroupFigures* figures) {
   figures->joint = JointAbsoluteError(pairs, AlignmentKind::kSe3);
 }
 
+void AddConstraints(const CapturedSession& session, ReportFigures* figures) {
+  std::map<int32_t, Trajectory> ground_truth;
+  for (const AgentFigures& agent : figures->agents) {
+    ground_truth[agent.id] = agent.ground_truth;
+  }
+  const auto all = ConstraintsWithTruth(session, ground_truth);
+  std::vector<ConstraintWithTruth> inter;
+  std::vector<ConstraintWithTruth> intra;
+  for (const ConstraintWithTruth& known : all) {
+    (known.constraint.from.map == known.constraint.to.map ? intra : inter).push_back(known);
+  }
+  figures->all_constraints = CheckConstraints(all);
+  figures->inter_constraints = CheckConstraints(inter);
+  figures->intra_constraints = CheckConstraints(intra);
+}
+
 }  // namespace
 
 bool AgentFigures::AteCounts() const {
@@ -185,6 +215,7 @@ ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& se
   for (GroupFigures& group : figures.groups) {
     AddJoint(figures.agents, &group);
   }
+  AddConstraints(session, &figures);
   return figures;
 }
 

@@ -9,7 +9,9 @@
 #include "eval/metrics.h"
 #include "session/report.h"
 #include "session/report_groups.h"
+#include "session/report_live.h"
 #include "session/report_log.h"
+#include "session/report_truth.h"
 
 namespace pangea::session {
 
@@ -27,6 +29,7 @@ struct AgentFigures {
   std::optional<Ate> vio;               // odometry of the main map, SE(3)
   std::optional<Ate> server;            // its keyframes in the main group, SE(3)
   std::optional<double> coverage;
+  LiveFigures live;  // of what it showed while the session ran
   AgentRun run;
 
   // Only then does an error say something (coverage >= 0.95 and one map).
@@ -42,6 +45,9 @@ struct GroupFigures {
 struct ReportFigures {
   std::vector<AgentFigures> agents;  // ascending id
   std::vector<GroupFigures> groups;  // as FinalGroups orders them
+  ConstraintsTruth all_constraints;
+  ConstraintsTruth inter_constraints;
+  ConstraintsTruth intra_constraints;
   std::vector<std::string> notes;
 };
 

@@ -8,6 +8,7 @@
 #include "common/channels.h"
 #include "common/keyframe.h"
 #include "common/messages.h"
+#include "pangea/correction_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "session/log_reader.h"
 
@@ -79,7 +80,7 @@ class States {
       }
     }
     if (newest && (fused || split)) {
-      GroupChange change{fused, session_s, state->maps, {}};
+      GroupChange change{fused, session_s, state->revision, state->maps, {}};
       for (const KeyframePose& pose : state->keyframes) {
         auto& utime = change.newest_utime[pose.id.map.agent_id];
         utime = std::max(utime, pose.utime);
@@ -124,11 +125,38 @@ void AddPose(Bytes data, PoseTrack* track) {
   auto& first = track->first_tracking_utime;
   first = std::min(first.value_or(message.utime), message.utime);
   track->odometry[*map.value].push_back({message.utime, *T_odom_body.value});
+  if (const auto T_map_body = Parse(message.T_map_body); T_map_body.value) {
+    track->live.push_back({message.utime, *map.value, *map.value, message.group_revision,
+                           *T_odom_body.value, *T_map_body.value});
+  }
 }
 
-void Finish(PoseTrack* track) {
+// The frame each map is shown in from a revision on.
+using Frames = std::map<MapId, std::map<int64_t, MapId>>;
+
+void AddFrame(Bytes data, Frames* frames) {
+  correction_t message{};
+  if (DecodeMessage(data, &message)) {
+    if (const auto correction = Parse(message); correction.value) {
+      (*frames)[correction.value->map][correction.value->revision] = correction.value->group;
+    }
+  }
+}
+
+// A pose and the correction in it come in any order, so frames are told at the end.
+void Finish(const Frames& frames, PoseTrack* track) {
   for (auto& [map, odometry] : track->odometry) {
     SortByTime(&odometry);
+  }
+  std::ranges::stable_sort(track->live, {}, &LivePose::utime);
+  const auto repeated = std::ranges::unique(track->live, {}, &LivePose::utime);
+  track->live.erase(repeated.begin(), repeated.end());
+  for (LivePose& pose : track->live) {
+    const auto of_map = frames.find(pose.map);
+    if (of_map != frames.end()) {
+      const auto after = of_map->second.upper_bound(pose.revision);
+      pose.frame = after == of_map->second.begin() ? pose.map : std::prev(after)->second;
+    }
   }
 }
 
@@ -206,13 +234,17 @@ CapturedSession ReadServerLog(const std::string& path) {
 
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
   PoseTrack track;
-  const std::string channel = channels::Pose(agent_id);
+  Frames frames;
+  const std::string poses = channels::Pose(agent_id);
+  const std::string corrections = channels::Correction(agent_id);
   ReadLog(path, [&](const LogEvent& event) {
-    if (event.channel == channel) {
+    if (event.channel == poses) {
       AddPose(event.data, &track);
+    } else if (event.channel == corrections) {
+      AddFrame(event.data, &frames);
     }
   });
-  Finish(&track);
+  Finish(frames, &track);
   return track;
 }
 

@@ -28,17 +28,29 @@ struct CapturedKeyframe {
   std::vector<CapturedPoint> points;
 };
 
-// POSE_k of one agent.
+// What an agent showed at one image.
+struct LivePose {
+  int64_t utime = 0;
+  MapId map;    // its odom frame
+  MapId frame;  // the map whose odom frame T_map_body is in
+  int64_t revision = 0;
+  Rigid3 T_odom_body;
+  Rigid3 T_map_body;
+};
+
+// POSE_k and CORRECTION_k of one agent.
 struct PoseTrack {
   std::optional<int64_t> first_utime;  // first pose message, whatever its state
   std::optional<int64_t> first_tracking_utime;
   std::map<MapId, Trajectory> odometry;  // T_odom_body while tracking
+  std::vector<LivePose> live;            // while tracking, ascending in time
 };
 
 // A change of groups, in the order of the log.
 struct GroupChange {
   bool fused = true;                        // false: maps were taken apart
   double session_s = 0;                     // since the log's first event
+  int64_t revision = 0;                     // of the state that made it
   std::vector<MapId> maps;                  // the group after it
   std::map<int32_t, int64_t> newest_utime;  // of each agent's keyframes in the group
 };
@@ -57,7 +69,7 @@ struct CapturedSession {
 
 // Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_* of a server bus' log.
 CapturedSession ReadServerLog(const std::string& path);
-// Reads POSE_<agent_id> of an agent bus' log.
+// Reads POSE_<agent_id> and CORRECTION_<agent_id> of an agent bus' log.
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id);
 
 }  // namespace pangea::session

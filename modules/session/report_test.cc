@@ -73,8 +73,9 @@ int64_t Utime(double s) { return kStart + std::llround(1e6 * s); }
 
 class ReportTest : public ::testing::Test {
  protected:
-  static constexpr double kDuration = 30;  // seconds of recording
-  static constexpr double kInit = 2;       // first pose
+  static constexpr double kDuration = 30;       // seconds of recording
+  static constexpr double kInit = 2;            // first pose
+  static constexpr double kCorrected = 12.025;  // what an agent shows, from here on exact
   static constexpr double kKeyframePeriod = 0.5;
 
   void SetUp() override {
@@ -128,8 +129,17 @@ class ReportTest : public ::testing::Test {
       pose.map = ToMessage(Map(agent));
       pose.T_odom_body = ToMessage(Odometry(agent, s));
       pose.T_map_body = pose.T_odom_body;
+      if (s >= kCorrected) {
+        pose.T_map_body = ToMessage(OdomFromTruth(1) * Truth(agent, s));
+        pose.group_revision = 1;
+      }
       log.Write(channels::Pose(agent), pose);
     }
+    Correction correction;
+    correction.map = Map(agent);
+    correction.group = Map(1);
+    correction.revision = 1;
+    log.Write(channels::Correction(agent), ToMessage(correction));
   }
 
   static int NumKeyframes() { return static_cast<int>((kDuration - kInit) / kKeyframePeriod) + 1; }
@@ -194,6 +204,7 @@ class ReportTest : public ::testing::Test {
     constraint.to = {Map(2), seq};
     constraint.accepted = accepted;
     constraint.reason = reason;
+    constraint.T_from_to = Truth(1, Seconds(seq)).Inverse() * Truth(2, Seconds(seq));
     log_->Write("CONSTRAINT", ToMessage(constraint));
   }
 
@@ -248,6 +259,10 @@ TEST_F(ReportTest, TwoAgentsFused) {
   EXPECT_EQ(agent["bytes_down"], 2'000);
   EXPECT_NEAR(agent["kb_per_s_up"].get<double>(), 600.0 / 30, 0.1);
   EXPECT_EQ(agent["realtime_factor"], 1.0);
+  EXPECT_LT(agent["ate_live_m"].get<double>(), 1e-5);
+  EXPECT_GT(agent["ate_live_raw_m"].get<double>(), 0.02);
+  EXPECT_LT(agent["live_jump_max_m"].get<double>(), 0.03) << "the odometry's 2 % of a step";
+  EXPECT_GT(agent["live_jump_max_m"].get<double>(), 0);
   const Trajectory vio = Tum("agent_2.vio.tum");
   EXPECT_NEAR(agent["path_m"].get<double>(), PathLength(vio), 1e-4);
   EXPECT_NEAR(static_cast<double>(vio.size()), 28 * 20, 2);
@@ -264,6 +279,14 @@ TEST_F(ReportTest, TwoAgentsFused) {
   EXPECT_EQ(report["constraints"]["refused"], 2);
   EXPECT_EQ(report["constraints"]["refused_by_reason"]["yaw of # deg is above the gate of # deg"],
             2);
+  const json& truth = report["constraints_truth"];
+  EXPECT_EQ(truth["checked"], 1);
+  EXPECT_EQ(truth["wrong"], 0);
+  EXPECT_EQ(truth["precision"], 1.0);
+  EXPECT_LT(truth["nees_per_dim"]["mean"].get<double>(), 1e-6);
+  EXPECT_EQ(truth["inter"]["checked"], 1);
+  EXPECT_TRUE(truth["intra"]["precision"].is_null());
+  EXPECT_TRUE(truth["intra"]["nees_yaw"].is_null());
   ASSERT_EQ(report["fused_at"].size(), 1U) << "the second state changes no group";
   EXPECT_EQ(report["fused_at"][0]["agents"], json::array({1, 2}));
   EXPECT_NEAR(report["fused_at"][0]["recording_s"]["2"].get<double>(), Seconds(19), 0.051);
@@ -324,6 +347,7 @@ TEST_F(ReportTest, WithoutGroundTruthTheErrorsAreNullAndTheFilesStillCome) {
     EXPECT_NEAR(agent["initialised_s"].get<double>(), kInit, 0.051);
   }
   EXPECT_TRUE(report["ate_joint_m"].is_null());
+  EXPECT_EQ(report["constraints_truth"]["checked"], 0);
   EXPECT_THAT(markdown_, HasSubstr("has no ground truth, so no error"));
   for (const std::string file : {"agent_1.tum", "agent_1.vio.tum", "agent_2.tum", "map.ply",
                                  "trajectory.png", "error.png"}) {
@@ -338,6 +362,8 @@ TEST_F(ReportTest, TheLogAloneIsEnough) {
   const json report = Report();
   ASSERT_EQ(report["agents"].size(), 2U);
   EXPECT_TRUE(report["agents"][0]["bytes_up"].is_null());
+  EXPECT_TRUE(report["agents"][0]["ate_live_m"].is_null());
+  EXPECT_TRUE(report["agents"][0]["live_jump_max_m"].is_null());
   EXPECT_TRUE(report["agents"][0]["initialised_s"].is_null());
   EXPECT_EQ(Tum("agent_1.vio.tum").size(), static_cast<size_t>(NumKeyframes()));
   EXPECT_THAT(markdown_, HasSubstr("odometry is that of its keyframes"));

@@ -99,6 +99,28 @@ ConstraintCounts CountConstraints(const CapturedSession& session) {
   return counts;
 }
 
+ordered_json NormalisedJson(const NormalisedError& error, bool any) {
+  if (!any) {
+    return {};
+  }
+  return {{"mean", Number(error.mean)},
+          {"median", Number(error.median)},
+          {"share_above_99", Number(error.share_above_99)}};
+}
+
+ordered_json TruthJson(const ConstraintsTruth& truth) {
+  const bool any = truth.checked > 0;
+  const auto metres = [any](double value) { return any ? Number(value) : ordered_json(); };
+  return {{"checked", truth.checked},
+          {"wrong", truth.wrong},
+          {"precision", Number(truth.Precision())},
+          {"nees_per_dim", NormalisedJson(truth.pose, any)},
+          {"nees_per_dim_position", NormalisedJson(truth.position, any)},
+          {"nees_yaw", NormalisedJson(truth.yaw, any)},
+          {"translation_median_m", metres(truth.translation_median_m)},
+          {"translation_p95_m", metres(truth.translation_p95_m)}};
+}
+
 ordered_json MapIds(const std::vector<MapId>& maps) {
   ordered_json ids = ordered_json::array();
   for (const MapId& map : maps) {
@@ -117,6 +139,9 @@ ordered_json AgentJson(const AgentFigures& agent) {
           {"ate_vio_m", Rmse(agent.vio)},
           {"ate_server_m", Rmse(agent.server)},
           {"coverage", Number(agent.coverage)},
+          {"ate_live_m", Number(agent.live.ate_m)},
+          {"ate_live_raw_m", Number(agent.live.ate_raw_m)},
+          {"live_jump_max_m", Number(agent.live.jump_max_m)},
           {"bytes_up", run.bytes_up ? ordered_json(*run.bytes_up) : ordered_json()},
           {"bytes_down", run.bytes_down ? ordered_json(*run.bytes_down) : ordered_json()},
           {"kb_per_s_up", Number(KilobytesPerSecondUp(agent))},
@@ -225,7 +250,7 @@ std::string ChangesText(const CapturedSession& session, const ReportFigures& fig
 
 std::string ConstraintsText(const CapturedSession& session) {
   const ConstraintCounts counts = CountConstraints(session);
-  std::string text = fmt::format("{} accepted ({} between maps, {} within one), {} refused.\n",
+  std::string text = fmt::format("{} accepted ({} by fusion, {} by inter_map_ba), {} refused.\n",
                                  counts.accepted_inter + counts.accepted_intra,
                                  counts.accepted_inter, counts.accepted_intra, counts.num_refused);
   if (!counts.refused.empty()) {
@@ -236,6 +261,47 @@ std::string ConstraintsText(const CapturedSession& session) {
     text += fmt::format("\n{}", table.Text());
   }
   return text;
+}
+
+// Empty when no constraint has ground truth.
+std::string TruthText(const ReportFigures& figures) {
+  if (figures.all_constraints.checked == 0) {
+    return {};
+  }
+  Table table({"against ground truth", "checked", "wrong", "NEES / dim", "median", "> 99 %",
+               "position", "yaw", "error median m", "p95 m"});
+  const auto add = [&table](const char* name, const ConstraintsTruth& truth) {
+    if (truth.checked > 0) {
+      table.Add({name, fmt::format("{}", truth.checked), fmt::format("{}", truth.wrong),
+                 fmt::format("{:.2f}", truth.pose.mean), fmt::format("{:.2f}", truth.pose.median),
+                 fmt::format("{:.1f} %", 100 * truth.pose.share_above_99),
+                 fmt::format("{:.2f}", truth.position.mean), fmt::format("{:.2f}", truth.yaw.mean),
+                 fmt::format("{:.3f}", truth.translation_median_m),
+                 fmt::format("{:.3f}", truth.translation_p95_m)});
+    }
+  };
+  add("all", figures.all_constraints);
+  add("between maps", figures.inter_constraints);
+  add("within one", figures.intra_constraints);
+  return fmt::format(
+      "\n{}\nNEES: squared error / covariance, per dimension; 1 when the covariance is honest.\n",
+      table.Text());
+}
+
+// Empty when no agent's poses were captured.
+std::string LiveText(const ReportFigures& figures) {
+  Table table({"agent", "live ATE m", "raw ATE m", "largest jump m"});
+  bool any = false;
+  for (const AgentFigures& agent : figures.agents) {
+    any |= agent.live.jump_max_m.has_value();
+    table.Add({fmt::format("{}", agent.id), Cell(agent.live.ate_m, 3),
+               Cell(agent.live.ate_raw_m, 3), Cell(agent.live.jump_max_m, 3)});
+  }
+  return any ? fmt::format(
+                   "\nWhat each agent showed while the session ran, from its first fusion "
+                   "on:\n\n{}",
+                   table.Text())
+             : std::string();
 }
 
 std::string ProcessTable(const ReportInput& input, const CapturedSession& session) {
@@ -275,7 +341,6 @@ std::string ReportJson(const ReportInput& input, const CapturedSession& session,
                               {"map_ids", MapIds(group.group.maps)},
                               {"keyframes", group.group.keyframes.size()},
                               {"constraints_switched_off", group.group.num_switched_off},
-                              {"constraints_switched_off", group.group.num_switched_off},
                               {"ate_joint_m", JointJson(group)}});
   }
   // The first group has most agents.
@@ -286,6 +351,9 @@ std::string ReportJson(const ReportInput& input, const CapturedSession& session,
                          {"accepted_intra", counts.accepted_intra},
                          {"refused", counts.num_refused},
                          {"refused_by_reason", counts.refused}};
+  json["constraints_truth"] = TruthJson(figures.all_constraints);
+  json["constraints_truth"]["inter"] = TruthJson(figures.inter_constraints);
+  json["constraints_truth"]["intra"] = TruthJson(figures.intra_constraints);
   json["fused_at"] = ordered_json::array();
   for (const GroupChange& change : session.changes) {
     json["fused_at"].push_back(ChangeJson(change, figures));
@@ -302,10 +370,12 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
       "counts "
       "with coverage of at least 0.95 and one map.\n",
       AgentTable(figures));
+  text += LiveText(figures);
   text +=
       fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n{}",
                   GroupTable(figures), ChangesText(session, figures));
   text += fmt::format("\n## Constraints\n\n{}", ConstraintsText(session));
+  text += TruthText(figures);
   if (!session.statuses.empty() || !input.realtime_factors.empty() || !input.restarts.empty()) {
     text += fmt::format("\n## Processes\n\n{}", ProcessTable(input, session));
   }

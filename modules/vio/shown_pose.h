@@ -3,7 +3,8 @@
 // The pose an agent shows in the fused map: its odometry under the server's newest correction.
 //
 // A new correction of the same map frame is blended in, so that what is shown never jumps: the
-// correction moves the shown position at most at kMaxSpeed and its heading at most at kMaxYawRate.
+// correction moves the shown position at most at kMaxSpeed and turns it at most at kMaxYawRate: at
+// 20 Hz, 15 mm from one image to the next. It turns about the body, wherever the odom origin is.
 // When the group's frame itself changes (the map was fused into another), coordinates before and
 // after have nothing to do with each other, and the correction holds at once.
 
@@ -17,8 +18,8 @@ namespace pangea::vio {
 
 class ShownPose {
  public:
-  static constexpr double kMaxSpeed = 0.5;    // m/s, on top of the agent's own motion
-  static constexpr double kMaxYawRate = 0.2;  // rad/s
+  static constexpr double kMaxSpeed = 0.3;    // m/s, on top of the agent's own motion
+  static constexpr double kMaxYawRate = 0.1;  // rad/s
 
   // A new map: its own odom frame until the server says otherwise.
   void Reset(const MapId& map);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace pangea::vio {
 namespace {
 
@@ -39,6 +41,44 @@ TEST(ShownPose, BlendsACorrectionAtABoundedRateAndArrives) {
     last = now;
   }
   EXPECT_LT(last.Minus(drift * kFar).norm(), 1e-9);
+}
+
+// A walk 800 m from the odom origin, 20 images a second, corrected after the first; the largest
+// step, metres, that is not the odometry's own, as a person who carries the phone sees it.
+double LargestJump(const Rigid3& T_map_odom, Rigid3* last_error) {
+  ShownPose shown;
+  shown.Reset(kMap);
+  const auto odometry = [](int image) {
+    return Rigid3{YawRotation(0.02 * image), {640 + 0.06 * image, 480, 1}};
+  };
+  Rigid3 last = shown.Show(0, odometry(0));
+  EXPECT_TRUE(shown.Correct(MakeCorrection(1, kMap, T_map_odom)));
+  double largest = 0;
+  for (int image = 1; image <= 400; ++image) {
+    const Rigid3 now = shown.Show(image * 50'000, odometry(image));
+    const Rigid3 own = odometry(image - 1).Inverse() * odometry(image);
+    largest = std::max(largest, ((last.Inverse() * now).t - own.t).norm());
+    last = now;
+  }
+  *last_error = last * (T_map_odom * odometry(400)).Inverse();
+  return largest;
+}
+
+TEST(ShownPose, AYawCorrectionFarFromTheOriginMovesThePositionAtTheBoundedSpeed) {
+  Rigid3 error;
+  // About the origin: 4 m sideways where the body is.
+  EXPECT_LE(LargestJump({YawRotation(0.005), {0, 0, 0}}, &error),
+            ShownPose::kMaxSpeed * 0.05 + 1e-9);
+  EXPECT_LT(error.Minus(Rigid3{}).norm(), 1e-6);
+}
+
+TEST(ShownPose, ATurnAboutTheBodyDoesNotMoveIt) {
+  const Rigid3 to_body{Eigen::Quaterniond::Identity(), {640, 480, 1}};
+  const Rigid3 turn = to_body * Rigid3{YawRotation(0.1), {0, 0, 0}} * to_body.Inverse();
+  Rigid3 error;
+  // While it turns, for a second, the body walks on: 0.1 rad across 6 cm an image.
+  EXPECT_LE(LargestJump(turn, &error), 0.1 * 0.06 + 1e-9);
+  EXPECT_LT(error.Minus(Rigid3{}).norm(), 1e-6);
 }
 
 TEST(ShownPose, ANewFrameHoldsAtOnce) {
