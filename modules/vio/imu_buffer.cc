@@ -4,12 +4,15 @@
 
 #include <algorithm>
 
+#include "vio/imu_noise.h"
+
 namespace pangea::vio {
 namespace {
 
 constexpr int64_t kMaxGap_us = 300'000;
 constexpr int64_t kMargin_us = 50'000;  // for changes of the time offset
-constexpr size_t kMinKept = 50;         // to tell a rest by
+constexpr size_t kMinKept = 100;        // to tell a rest, or the noise, by
+constexpr std::ptrdiff_t kNoiseSamples = 100;
 
 }  // namespace
 
@@ -46,7 +49,7 @@ std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) 
 Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
                                     const Eigen::Vector3d& gyro_bias,
                                     const Eigen::Vector3d& accel_bias) const {
-  Preintegrator integrator(noise_, gyro_bias, accel_bias);
+  Preintegrator integrator(NoiseAround(from_utime, to_utime), gyro_bias, accel_bias);
   auto b = std::partition_point(
       samples_.begin(), samples_.end(),
       [from_utime](const ImuSample& sample) { return sample.utime <= from_utime; });
@@ -65,6 +68,18 @@ Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
     integrator.Add(samples_.back(), held);
   }
   return integrator.result();
+}
+
+// Measured on the span, or on as much before its end as tells the noise.
+ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
+  const auto before = [](int64_t utime) {
+    return [utime](const ImuSample& sample) { return sample.utime <= utime; };
+  };
+  const auto begin = std::partition_point(samples_.begin(), samples_.end(), before(from_utime));
+  const auto end = std::partition_point(samples_.begin(), samples_.end(), before(to_utime));
+  const auto enough = end - std::min<std::ptrdiff_t>(kNoiseSamples, end - samples_.begin());
+  const std::vector<ImuSample> around(std::min(begin, enough), end);
+  return MeasuredNoise(noise_, around);
 }
 
 const ImuSample& ImuBuffer::At(int64_t utime) const {

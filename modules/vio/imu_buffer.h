@@ -24,6 +24,7 @@ class ImuBuffer {
 
   // What is missing for a span of time, in words; nothing when it is covered.
   std::optional<std::string> Gap(int64_t from_utime, int64_t to_utime) const;
+  // With the noise that the samples show, not less than the data sheet's (imu_noise.h).
   Preintegration Integrate(int64_t from_utime, int64_t to_utime, const Eigen::Vector3d& gyro_bias,
                            const Eigen::Vector3d& accel_bias) const;
   // The first at or after this time, else the last of all. There must be one.
@@ -32,6 +33,8 @@ class ImuBuffer {
   std::vector<ImuSample> Latest(size_t count) const;
 
  private:
+  ImuNoise NoiseAround(int64_t from_utime, int64_t to_utime) const;
+
   ImuNoise noise_;
   std::deque<ImuSample> samples_;
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/preintegration.h"
+#include "vio/imu_noise.h"
 #include "vio/initial_solution.h"
 
 namespace pangea::vio {
@@ -190,7 +191,8 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   if (!linear) {
     return {std::nullopt, "the motion does not determine velocity and gravity yet"};
   }
-  const auto refined = Refine(frames, camera_.T_body_cam, noise_, *gyro_bias, *linear,
+  const ImuNoise noise = MeasuredNoise(noise_, samples_);
+  const auto refined = Refine(frames, camera_.T_body_cam, noise, *gyro_bias, *linear,
                               pixel_sigma_ * camera_.PixelAngle());
   if (!refined) {
     return {std::nullopt, "the start-up bundle adjustment did not converge"};
