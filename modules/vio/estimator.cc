@@ -156,7 +156,7 @@ void Estimator::Impl::DropPassing() {
 // Nothing when it worked, else what is wrong.
 std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
   const int64_t imu_utime = ImuTime(frame.utime);
-  if (const auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
+  if (auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
     return wrong;
   }
   history.AddFrame(frame, camera, ray_sigma);
