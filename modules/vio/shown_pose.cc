@@ -34,7 +34,7 @@ Rigid3 ShownPose::Show(int64_t utime, const Rigid3& T_odom_body) {
   const Eigen::Vector3d move = wanted.t - now.t;
   const double turn_share = std::min(1.0, kMaxYawRate * dt / std::max(turn.norm(), 1e-12));
   const double move_share = std::min(1.0, kMaxSpeed * dt / std::max(move.norm(), 1e-12));
-  const Rigid3 shown{(ExpSo3(turn_share * turn) * now.q).normalized(), now.t + move_share * move};
+  Rigid3 shown{(ExpSo3(turn_share * turn) * now.q).normalized(), now.t + move_share * move};
   shown_ = shown * T_odom_body.Inverse();
   return shown;
 }
