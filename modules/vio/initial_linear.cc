@@ -143,7 +143,7 @@ std::optional<Eigen::Matrix<double, 6, 1>> SolveWithGravityNorm(
   if (eigen.info() != Eigen::Success || !M.allFinite()) {
     return std::nullopt;
   }
-  const Vector3d w = eigen.eigenvalues();
+  const Vector3d& w = eigen.eigenvalues();
   const Vector3d e = eigen.eigenvectors().transpose() * d;
   // |(M + mu I)^-1 d| falls with mu on (-w_min, inf): bisect for the length of gravity.
   const auto length = [&](double mu) { return (e.array() / (w.array() + mu)).matrix().norm(); };
