@@ -30,7 +30,7 @@ Outcome RunCommand(const std::string& command) {
 }
 
 fs::path FreshFolder(const std::string& name) {
-  const fs::path folder = fs::path(testing::TempDir()) / ("pangea_tests_" + name);
+  fs::path folder = fs::path(testing::TempDir()) / ("pangea_tests_" + name);
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
@@ -54,7 +54,7 @@ void RenderWalk(const fs::path& out, const std::string& arguments) {
 }
 
 fs::path WriteSession(const fs::path& folder, const std::vector<std::string>& agents) {
-  const fs::path file = folder / "session.yaml";
+  fs::path file = folder / "session.yaml";
   std::ofstream stream(file);
   stream << "agents:\n";
   for (const std::string& agent : agents) {

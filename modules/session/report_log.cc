@@ -149,8 +149,9 @@ void Finish(const Frames& frames, PoseTrack* track) {
     SortByTime(&odometry);
   }
   std::ranges::stable_sort(track->live, {}, &LivePose::utime);
-  const auto repeated = std::ranges::unique(track->live, {}, &LivePose::utime);
-  track->live.erase(repeated.begin(), repeated.end());
+  const auto same_time = [](const LivePose& a, const LivePose& b) { return a.utime == b.utime; };
+  track->live.erase(std::unique(track->live.begin(), track->live.end(), same_time),
+                    track->live.end());
   for (LivePose& pose : track->live) {
     const auto of_map = frames.find(pose.map);
     if (of_map != frames.end()) {
