@@ -18,10 +18,6 @@ constexpr size_t kMaxJournalledBytes = 65'000;
 constexpr size_t kMaxCorrections = 1000;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
-// What a keyframe's match and verdicts may take before they are asked for; then ever more rarely.
-constexpr int64_t kFirstAsk_us = 3 * kSecond_us;
-constexpr int64_t kMaxAsk_us = 60 * kSecond_us;
-constexpr int32_t kMaxAsked = 100;
 constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
 constexpr size_t kMaxHaveGaps = 1000;
 
@@ -74,20 +70,19 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
   node_.Set("journal_bytes_cut", journal_->cut_bytes());
   link_bus.Subscribe("LINK_UP_[0-9]+",
                      [this](const std::string& channel, Bytes data) { OnLinkUp(channel, data); });
-  server_bus.Subscribe(std::string(channels::kPlaceMatch),
-                       [this](const std::string&, Bytes data) { OnPlaceMatch(data); });
-  server_bus.Subscribe(std::string(channels::kConstraint),
-                       [this](const std::string&, Bytes data) { OnConstraint(data); });
+  server_bus.Subscribe(
+      std::string(channels::kPlaceMatch),
+      [this](const std::string& channel, Bytes data) { OnAnswer<place_match_t>(channel, data); });
+  server_bus.Subscribe(
+      std::string(channels::kConstraint),
+      [this](const std::string& channel, Bytes data) { OnAnswer<constraint_t>(channel, data); });
   node_.Subscribe<correction_t>(std::string(channels::kAllCorrections),
                                 [this](const std::string&, const correction_t& message) {
                                   const auto correction = Parse(message);
                                   if (!correction.value) {
                                     return node_.Refuse(correction.refused);
                                   }
-                                  const auto agent = agents_.find(correction.value->map.agent_id);
-                                  if (agent != agents_.end()) {
-                                    agent->second.handler.OnCorrection(*correction.value);
-                                  }
+                                  OnCorrection(*correction.value);
                                 });
   node_.Subscribe<resend_request_t>(std::string(channels::kResendRequest),
                                     [this](const std::string&, const resend_request_t& request) {
@@ -102,9 +97,9 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
   node_.Subscribe<again_t>(channels::Again(node_.name()),
                            [this](const std::string&, const again_t& again) {
                              if (again.channel == channels::kPlaceMatch) {
-                               OnPlaceMatch(again.data);
+                               OnAnswer<place_match_t>(again.channel, again.data);
                              } else if (again.channel == channels::kConstraint) {
-                               OnConstraint(again.data);
+                               OnAnswer<constraint_t>(again.channel, again.data);
                              }
                            });
 }
@@ -122,24 +117,20 @@ bool AgentHandlerProcess::LoadEvent(const std::string& channel, Bytes data,
     return !IsDamaged<keyframe_t>(data);
   }
   if (channel == channels::kPlaceMatch) {
-    if (const auto match = DecodeAndParse<place_match_t>(data); match.value) {
-      if (index_.Look(*match.value) == JournalIndex::Added::kNew) {
-        index_.Add(*match.value, place);
-      }
-      return true;
-    }
-    node_.Count("journal_events_unreadable");
-    return !IsDamaged<place_match_t>(data);
+    return LoadAnswer<place_match_t>(data, place);
   }
-  if (channel == channels::kConstraint) {
-    if (const auto constraint = DecodeAndParse<constraint_t>(data); constraint.value) {
-      if (index_.Look(*constraint.value) == JournalIndex::Added::kNew) {
-        index_.Add(*constraint.value, place);
-      }
-      return true;
-    }
+  return channel != channels::kConstraint || LoadAnswer<constraint_t>(data, place);
+}
+
+template <typename Message>
+bool AgentHandlerProcess::LoadAnswer(Bytes data, const JournalPlace& place) {
+  const auto answer = DecodeAndParse<Message>(data);
+  if (!answer.value) {
     node_.Count("journal_events_unreadable");
-    return !IsDamaged<constraint_t>(data);
+    return !IsDamaged<Message>(data);
+  }
+  if (index_.Look(*answer.value) == JournalIndex::Added::kNew) {
+    index_.Add(*answer.value, place);
   }
   return true;
 }
@@ -239,31 +230,21 @@ void AgentHandlerProcess::SyncJournal() {
   unsynced_.clear();
 }
 
-void AgentHandlerProcess::OnPlaceMatch(Bytes data) {
-  const auto match = DecodeAndParse<place_match_t>(data);
-  if (!match.value || data.size() > kMaxJournalledBytes) {
-    return node_.Refuse(match.value ? "place_match_t is too large" : match.refused);
+template <typename Message>
+void AgentHandlerProcess::OnAnswer(const std::string& channel, Bytes data) {
+  const auto answer = DecodeAndParse<Message>(data);
+  if (!answer.value) {
+    return node_.Refuse(answer.refused);
   }
-  if (index_.Look(*match.value) == JournalIndex::Added::kUnknownKeyframe) {
-    return node_.Refuse("match of a keyframe that is not journalled");
+  if (data.size() > kMaxJournalledBytes) {
+    return node_.Refuse(channel + " is too large");
   }
-  if (index_.Look(*match.value) == JournalIndex::Added::kNew && !journal_->Full()) {
-    index_.Add(*match.value,
-               journal_->Append(now_utime_, std::string(channels::kPlaceMatch), data));
+  const JournalIndex::Added added = index_.Look(*answer.value);
+  if (added == JournalIndex::Added::kUnknownKeyframe) {
+    return node_.Refuse(channel + " of a keyframe that is not journalled");
   }
-}
-
-void AgentHandlerProcess::OnConstraint(Bytes data) {
-  const auto constraint = DecodeAndParse<constraint_t>(data);
-  if (!constraint.value || data.size() > kMaxJournalledBytes) {
-    return node_.Refuse(constraint.value ? "constraint_t is too large" : constraint.refused);
-  }
-  if (index_.Look(*constraint.value) == JournalIndex::Added::kUnknownKeyframe) {
-    return node_.Refuse("verdict on a keyframe that is not journalled");
-  }
-  if (index_.Look(*constraint.value) == JournalIndex::Added::kNew && !journal_->Full()) {
-    index_.Add(*constraint.value,
-               journal_->Append(now_utime_, std::string(channels::kConstraint), data));
+  if (added == JournalIndex::Added::kNew && !journal_->Full()) {
+    index_.Add(*answer.value, journal_->Append(now_utime_, channel, data));
   }
 }
 
@@ -334,39 +315,17 @@ void AgentHandlerProcess::PublishHave() {
   } while (it != have_.end());
 }
 
-void AgentHandlerProcess::Ask(const SeqGap& gap, std::string_view channel) {
-  resend_request_t request{};
-  request.requester = node_.name();
-  request.channel = channel;
-  request.map = ToMessage(gap.map);
-  request.from_seq = gap.from_seq;
-  request.to_seq = std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1);
-  node_.Publish(std::string(channels::kResendRequest), request);
-  node_.NoteResendAsked();
-}
-
-// Exactly one match per keyframe and one verdict per candidate are owed; the other processes may
-// only be slow, so it is asked seldom, and more seldom while nothing comes.
 void AgentHandlerProcess::AskForOwed(int64_t now_utime) {
-  const auto ask = [&](Owed* owed, const MapId& map, std::string_view channel, auto missing) {
-    if (now_utime < owed->next_ask_utime) {
-      return;
-    }
-    const std::optional<SeqGap> gap = missing(owed->seen_before);
-    const bool stuck = gap && gap->from_seq == owed->asked_from;
-    owed->wait_us = stuck ? std::min(2 * owed->wait_us, kMaxAsk_us) : kFirstAsk_us;
-    owed->next_ask_utime = now_utime + owed->wait_us;
-    owed->asked_from = gap ? gap->from_seq : -1;
-    owed->seen_before = index_.Highest(map);
-    if (gap) {
-      Ask(*gap, channel);
-    }
-  };
-  for (const MapId& map : index_.Maps()) {
-    ask(&owed_matches_[map], map, channels::kPlaceMatch,
-        [&](int32_t up_to) { return index_.MissingMatches(map, up_to); });
-    ask(&owed_verdicts_[map], map, channels::kConstraint,
-        [&](int32_t up_to) { return index_.MissingVerdicts(map, up_to); });
+  for (const auto& [channel, gap] : owed_.Due(index_, now_utime)) {
+    resend_request_t request{};
+    request.requester = node_.name();
+    request.channel =
+        channel == JournalChannel::kPlaceMatch ? channels::kPlaceMatch : channels::kConstraint;
+    request.map = ToMessage(gap.map);
+    request.from_seq = gap.from_seq;
+    request.to_seq = gap.to_seq;
+    node_.Publish(std::string(channels::kResendRequest), request);
+    node_.NoteResendAsked();
   }
 }
 

@@ -14,6 +14,7 @@
 
 #include "agent_handler/agent_handler.h"
 #include "agent_handler/journal.h"
+#include "agent_handler/owed_questions.h"
 #include "agent_handler/resend_queue.h"
 #include "common/bus/node.h"
 #include "common/link/pacer.h"
@@ -53,27 +54,22 @@ class AgentHandlerProcess : public PolledProcess {
     std::vector<uint8_t> bytes;
     JournalPlace place;
   };
-  // The questions for what the other processes owe a map.
-  struct Owed {
-    int32_t seen_before = -1;  // keyframes there were at the last round
-    int32_t asked_from = -1;
-    int64_t next_ask_utime = 0;
-    int64_t wait_us = 0;
-  };
 
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   void OnLinkUp(const std::string& channel, Bytes data);
   Agent* FindOrCreate(const LinkPacket& packet);
   void OnCorrection(const Correction& correction);
-  void OnPlaceMatch(Bytes data);
-  void OnConstraint(Bytes data);
+  // Answers are place matches and constraints: of a journal that is read, and new ones.
+  template <typename Message>
+  bool LoadAnswer(Bytes data, const JournalPlace& place);
+  template <typename Message>
+  void OnAnswer(const std::string& channel, Bytes data);
   void JournalReady();
   void SyncJournal();
   void SendAcks();
   void AnswerResendRequests();
   void PublishHave();
   void AskForOwed(int64_t now_utime);
-  void Ask(const SeqGap& gap, std::string_view channel);
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;
@@ -86,8 +82,7 @@ class AgentHandlerProcess : public PolledProcess {
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;
   std::map<MapId, int32_t> have_;  // highest seq on the disk
-  std::map<MapId, Owed> owed_matches_;
-  std::map<MapId, Owed> owed_verdicts_;
+  OwedQuestions owed_;
   std::map<MapId, Correction> corrections_;  // the newest of each map, at most 1000
   ResendQueue resend_queue_;
   Pacer resend_pacer_;

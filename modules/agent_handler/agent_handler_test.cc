@@ -1,10 +1,10 @@
 #include "agent_handler/agent_handler.h"
 
 #include <fmt/format.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "agent_handler/owed_questions.h"
 #include "agent_handler/resend_queue.h"
 #include "agent_handler/test_keyframes.h"
 
@@ -139,6 +139,47 @@ TEST(JournalIndex, KnowsWhatIsOwed) {
   index.Add(verdict, {201, 1});
   EXPECT_FALSE(index.MissingVerdicts(kMap, 5));
   EXPECT_EQ(index.Find(JournalChannel::kConstraint, {kMap, 1}).size(), 2u);
+}
+
+// Nothing is asked on the first round (it may be on its way), then seldom, and ever more rarely
+// while the same is missing.
+TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
+  JournalIndex index;
+  for (int seq = 0; seq < 150; ++seq) {
+    index.AddKeyframe({kMap, seq}, {seq, 1});
+  }
+  index.Add(MatchOf(140, 1), {1000, 1});
+  OwedQuestions owed;
+  EXPECT_TRUE(owed.Due(index, kSecond).empty());
+  index.AddKeyframe({kMap, 150}, {150, 1});
+  std::vector<int64_t> asked_at;
+  for (int64_t s = 2; s <= 200; ++s) {
+    for (const auto& [channel, gap] : owed.Due(index, s * kSecond)) {
+      if (channel == JournalChannel::kConstraint) {
+        EXPECT_EQ(gap.from_seq, 140);
+        EXPECT_EQ(gap.to_seq, 140);
+        continue;
+      }
+      EXPECT_EQ(gap.map, kMap);
+      EXPECT_EQ(gap.from_seq, 0);
+      EXPECT_EQ(gap.to_seq, 99) << "no more than so many at once";
+      asked_at.push_back(s);
+    }
+  }
+  EXPECT_THAT(asked_at, testing::ElementsAre(4, 7, 13, 25, 49, 97, 157));
+  for (int seq = 0; seq < 140; ++seq) {
+    index.Add(MatchOf(seq, 0), {2000 + seq, 1});
+  }
+  std::vector<int32_t> from;
+  for (int64_t s = 201; s <= 230; ++s) {
+    for (const auto& [channel, gap] : owed.Due(index, s * kSecond)) {
+      if (channel == JournalChannel::kPlaceMatch) {
+        from.push_back(gap.from_seq);
+      }
+    }
+  }
+  EXPECT_THAT(from, testing::Each(141)) << "as soon as something came, it is asked anew";
+  EXPECT_GE(from.size(), 2u);
 }
 
 // A verdict that was journalled before its match is not owed any more.

@@ -1,0 +1,136 @@
+#include "agent_handler/link_test_world.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "agent_handler/test_keyframes.h"
+#include "common/channels.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+
+namespace pangea {
+
+void LossyBus::Publish(const std::string& channel, Bytes data) {
+  if (std::uniform_real_distribution<double>(0, 1)(rng_) >= loss) {
+    inner.Publish(channel, data);
+  }
+}
+
+void SwitchedBus::Publish(const std::string& channel, Bytes data) {
+  if (*on_) {
+    bus_.Publish(channel, data);
+  }
+}
+
+void SwitchedBus::Subscribe(const std::string& channel_regex, Handler handler) {
+  bus_.Subscribe(channel_regex, [on = on_, handler](const std::string& channel, Bytes data) {
+    if (*on) {
+      handler(channel, data);
+    }
+  });
+}
+
+void LinkWorld::SetUp() {
+  journal_path = testing::TempDir() + "pangea_link_" + std::to_string(getpid()) + ".lcm";
+  std::filesystem::remove(journal_path);
+  // The odometry keeps its keyframes and answers requests.
+  agent_bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
+    resend_request_t request{};
+    ASSERT_TRUE(DecodeMessage(data, &request));
+    for (int32_t seq = std::max(request.from_seq, oldest_kept);
+         seq <= request.to_seq && seq < published; ++seq) {
+      again_t again{};
+      again.channel = request.channel;
+      again.data = EncodeTestKeyframe({kMap, seq});
+      again.num_bytes = static_cast<int32_t>(again.data.size());
+      PublishMessage(agent_bus, channels::Again(request.requester), again);
+    }
+  });
+  agent_bus.Subscribe("HAVE", [this](const std::string&, Bytes data) {
+    have_t have{};
+    ASSERT_TRUE(DecodeMessage(data, &have));
+    acknowledged = have.num_maps > 0 ? have.highest_seq[0] : -1;
+  });
+  server_bus.Subscribe("KEYFRAME_1", [this](const std::string&, Bytes data) {
+    delivered.emplace_back(data.begin(), data.end());
+  });
+  StartUplink();
+  StartHandler();
+}
+
+void LinkWorld::TearDown() {
+  handler.reset();
+  std::filesystem::remove(journal_path);
+}
+
+void LinkWorld::StartUplink() {
+  uplink_agent_side = std::make_unique<SwitchedBus>(agent_bus);
+  uplink_link_side = std::make_unique<SwitchedBus>(link_bus);
+  uplink =
+      std::make_unique<UplinkProcess>(*uplink_agent_side, *uplink_link_side, 1, ++run, options);
+}
+
+void LinkWorld::KillUplink() {
+  uplink_agent_side->Off();
+  uplink_link_side->Off();
+  dead_uplinks.push_back(std::move(uplink));
+  dead_buses.push_back(std::move(uplink_agent_side));
+  dead_buses.push_back(std::move(uplink_link_side));
+}
+
+void LinkWorld::StartHandler() {
+  handler_link_side = std::make_unique<SwitchedBus>(link_bus);
+  handler_server_side = std::make_unique<SwitchedBus>(server_bus);
+  handler = std::make_unique<AgentHandlerProcess>(*handler_link_side, *handler_server_side,
+                                                  journal_path, ++run, AgentHandlerOptions{});
+}
+
+void LinkWorld::KillHandler() {
+  handler_link_side->Off();
+  handler_server_side->Off();
+  handler.reset();
+  dead_buses.push_back(std::move(handler_link_side));
+  dead_buses.push_back(std::move(handler_server_side));
+}
+
+void LinkWorld::PublishKeyframes(int count) {
+  for (int i = 0; i < count; ++i) {
+    agent_bus.Publish("KEYFRAME_1", EncodeTestKeyframe({kMap, published++}));
+  }
+}
+
+void LinkWorld::Run(double seconds) {
+  const int64_t end = now + static_cast<int64_t>(seconds * 1e6);
+  for (; now < end; now += 5'000) {
+    agent_bus.Drain();
+    if (uplink) {
+      uplink->Poll(now);
+    }
+    link_bus.inner.Drain();
+    if (handler) {
+      handler->Poll(now);
+    }
+    if (now % 100'000 == 0) {
+      if (uplink) {
+        uplink->Tick(kWall + now);
+      }
+      if (handler) {
+        handler->Tick(kWall + now);
+      }
+    }
+    link_bus.inner.Drain();
+    server_bus.Drain();
+    agent_bus.Drain();
+  }
+}
+
+void LinkWorld::ExpectDelivered(int count) const {
+  ASSERT_EQ(delivered.size(), static_cast<size_t>(count));
+  for (int seq = 0; seq < count; ++seq) {
+    EXPECT_EQ(delivered[static_cast<size_t>(seq)], EncodeTestKeyframe({kMap, seq})) << seq;
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,81 @@
+#pragma once
+
+// Uplink and agent_handler together on in-process buses, with an odometry and a lossy link between.
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "agent_handler/agent_handler_process.h"
+#include "common/bus/bus.h"
+#include "uplink/uplink_process.h"
+
+namespace pangea {
+
+inline constexpr int64_t kSecond = 1'000'000;
+inline const MapId kMap{1, 1000};
+
+class LossyBus : public Bus {
+ public:
+  void Publish(const std::string& channel, Bytes data) override;
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    inner.Subscribe(channel_regex, std::move(handler));
+  }
+  LocalBus inner;
+  double loss = 0;
+
+ private:
+  std::mt19937_64 rng_{3};
+};
+
+// Fresh buses at each restart of a process would be the true thing; here a bus lets go of a process
+// that dies.
+class SwitchedBus : public Bus {
+ public:
+  explicit SwitchedBus(Bus& bus) : bus_(bus) {}
+  void Publish(const std::string& channel, Bytes data) override;
+  void Subscribe(const std::string& channel_regex, Handler handler) override;
+  void Off() { *on_ = false; }
+
+ private:
+  Bus& bus_;
+  std::shared_ptr<bool> on_ = std::make_shared<bool>(true);
+};
+
+class LinkWorld : public testing::Test {
+ protected:
+  void SetUp() override;
+  void TearDown() override;
+
+  void StartUplink();
+  void KillUplink();
+  void StartHandler();
+  void KillHandler();
+  void PublishKeyframes(int count);
+  void Run(double seconds);
+  // Keyframes 0 to count - 1, in order, byte for byte.
+  void ExpectDelivered(int count) const;
+
+  static constexpr int64_t kWall = 1'700'000'000 * kSecond;
+  LocalBus agent_bus, server_bus;
+  LossyBus link_bus;
+  UplinkOptions options;
+  std::string journal_path;
+  std::vector<std::unique_ptr<SwitchedBus>> dead_buses;
+  std::vector<std::unique_ptr<UplinkProcess>> dead_uplinks;
+  std::unique_ptr<SwitchedBus> uplink_agent_side, uplink_link_side;
+  std::unique_ptr<SwitchedBus> handler_link_side, handler_server_side;
+  std::unique_ptr<UplinkProcess> uplink;
+  std::unique_ptr<AgentHandlerProcess> handler;
+  std::vector<std::vector<uint8_t>> delivered;
+  int64_t now = kSecond;
+  int64_t run = 100;
+  int32_t published = 0;
+  int32_t oldest_kept = 0;
+  int32_t acknowledged = -1;
+};
+
+}  // namespace pangea
