@@ -4,7 +4,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <chrono>
 #include <random>
 
 #include "common/testing/synthetic_world.h"
@@ -38,6 +37,11 @@ std::vector<Constraint> MakeConstraints(const SyntheticWorld& world, int count, 
   return constraints;
 }
 
+std::vector<Constraint> BetweenMaps(std::vector<Constraint> constraints) {
+  std::erase_if(constraints, [](const Constraint& one) { return one.kind != PlaceKind::kInter; });
+  return constraints;
+}
+
 void AddKeyframes(const SyntheticWorld& world, PoseGraph* graph) {
   for (size_t k = 0; k < world.agents[0].keyframes.size(); ++k) {
     for (const SyntheticAgent& agent : world.agents) {
@@ -50,6 +54,13 @@ void AddConstraints(const std::vector<Constraint>& constraints, PoseGraph* graph
   for (const Constraint& constraint : constraints) {
     graph->AddConstraint(constraint);
   }
+}
+
+PoseGraphUpdate Solve(const SyntheticWorld& world, const std::vector<Constraint>& constraints,
+                      PoseGraph* graph) {
+  AddKeyframes(world, graph);
+  AddConstraints(constraints, graph);
+  return graph->Finish();
 }
 
 // RMSE of positions after the best turn about z and shift: the joint ATE of a group.
@@ -110,9 +121,7 @@ TEST(PoseGraph, LoopsInALoneMapTakeItsDriftAway) {
   options.edge_sigma_yaw = 0.003;
   const SyntheticWorld world = MakeSyntheticWorld(options);
   PoseGraph graph({});
-  AddKeyframes(world, &graph);
-  AddConstraints(MakeConstraints(world, 60, 0), &graph);
-  const PoseGraphUpdate update = graph.Finish();
+  const PoseGraphUpdate update = Solve(world, MakeConstraints(world, 60, 0), &graph);
   ASSERT_EQ(update.states.size(), 1u);
   EXPECT_EQ(update.states[0].num_switched_off, 0);
   EXPECT_LT(JointAte(world, update.states[0]), 0.3 * OdometryAte(world, 0));
@@ -122,12 +131,7 @@ TEST(PoseGraph, OneMatchDoesNotMergeThreeLooksDo) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
   PoseGraph graph({});
   AddKeyframes(world, &graph);
-  std::vector<Constraint> constraints;
-  for (const Constraint& constraint : MakeConstraints(world, 12, 0)) {
-    if (constraint.kind == PlaceKind::kInter) {
-      constraints.push_back(constraint);
-    }
-  }
+  const std::vector<Constraint> constraints = BetweenMaps(MakeConstraints(world, 12, 0));
   ASSERT_GE(constraints.size(), 6u);
   EXPECT_TRUE(graph.AddConstraint(constraints[0]).states.empty());
   EXPECT_EQ(graph.counters().groups, 2);
@@ -157,12 +161,9 @@ TEST(PoseGraph, SwitchesOffAThirdOfWrongConstraints) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 120, seed));
     PoseGraph graph({});
-    AddKeyframes(world, &graph);
     const std::vector<Constraint> constraints = MakeConstraints(world, 150, 0.3, seed);
-    AddConstraints(constraints, &graph);
-    const PoseGraphUpdate update = graph.Finish();
+    const PoseGraphUpdate update = Solve(world, constraints, &graph);
     ASSERT_EQ(update.states.size(), 1u) << seed;
-    Random random(0);
     int num_false = 0;
     for (const Constraint& constraint : constraints) {
       const Rigid3 truth =
@@ -179,11 +180,9 @@ TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
   PoseGraph graph({});
   AddKeyframes(world, &graph);
-  for (const Constraint& constraint : MakeConstraints(world, 200, 1.0)) {
-    if (constraint.kind == PlaceKind::kInter) {
-      graph.AddConstraint(constraint);
-      EXPECT_EQ(graph.counters().groups, 2);
-    }
+  for (const Constraint& constraint : BetweenMaps(MakeConstraints(world, 200, 1.0))) {
+    graph.AddConstraint(constraint);
+    EXPECT_EQ(graph.counters().groups, 2);
   }
 }
 
@@ -235,9 +234,7 @@ TEST(PoseGraph, OptimisedRelativePosesAreAsGoodAsTheirCovariance) {
     options.edge_sigma_yaw = 0.002;
     const SyntheticWorld world = MakeSyntheticWorld(options);
     PoseGraph graph({});
-    AddKeyframes(world, &graph);
-    AddConstraints(MakeConstraints(world, 40, 0, trial), &graph);
-    const PoseGraphUpdate update = graph.Finish();
+    const PoseGraphUpdate update = Solve(world, MakeConstraints(world, 40, 0, trial), &graph);
     ASSERT_EQ(update.states.size(), 1u);
     const Correction& correction = update.corrections[1];
     ASSERT_EQ(correction.map, world.agents[1].map);
@@ -280,9 +277,7 @@ TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
   options.claimed_sigma_scale = 0.1;
   const SyntheticWorld world = MakeSyntheticWorld(options);
   PoseGraph graph({});
-  AddKeyframes(world, &graph);
-  AddConstraints(MakeConstraints(world, 60, 0.1), &graph);
-  const PoseGraphUpdate update = graph.Finish();
+  const PoseGraphUpdate update = Solve(world, MakeConstraints(world, 60, 0.1), &graph);
   EXPECT_GT(graph.counters().odometry_scale, 3);
   EXPECT_LT(graph.counters().odometry_scale, 30);
   EXPECT_LE(update.states[0].num_switched_off, 10);
@@ -327,9 +322,8 @@ TEST(PoseGraph, TheSameCallsGiveTheSameBytes) {
   std::vector<double> results[2];
   for (std::vector<double>& result : results) {
     PoseGraph graph({});
-    AddKeyframes(world, &graph);
-    AddConstraints(constraints, &graph);
-    for (const KeyframePose& pose : graph.Finish().states.at(0).keyframes) {
+    const PoseGraphUpdate update = Solve(world, constraints, &graph);
+    for (const KeyframePose& pose : update.states.at(0).keyframes) {
       result.push_back(pose.T_map_body.t.x());
       result.push_back(pose.T_map_body.q.z());
     }
@@ -379,11 +373,9 @@ TEST(PoseGraph, ScopeOfThePaper) {
   PoseGraph graph(paper);
   AddKeyframes(world, &graph);
   int first_overlap = 1000;
-  for (const Constraint& constraint : MakeConstraints(world, 60, 0)) {
-    if (constraint.kind == PlaceKind::kInter) {
-      graph.AddConstraint(constraint);
-      first_overlap = std::min(first_overlap, constraint.from.seq);
-    }
+  for (const Constraint& constraint : BetweenMaps(MakeConstraints(world, 60, 0))) {
+    graph.AddConstraint(constraint);
+    first_overlap = std::min(first_overlap, constraint.from.seq);
   }
   const PoseGraphUpdate update = graph.Finish();
   ASSERT_EQ(update.states.size(), 1u);
