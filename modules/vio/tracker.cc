@@ -14,6 +14,8 @@ constexpr double kMergeShare = 0.4;
 
 Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
+Eigen::Vector2f ToEigenF(const cv::Point2f& p) { return {p.x, p.y}; }
+
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
@@ -41,12 +43,14 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
   statistics_ = {};
   Prepare(image);
   if (!features_.empty()) {
-    const std::vector<Feature> before = features_;
+    const std::vector<Bearing> before = Bearings();
     TrackFeatures(q_cam_lastcam);
+    AlignWithPatches(image);
     RejectOutliers(q_cam_lastcam, before);
   }
   statistics_.tracked = static_cast<int>(features_.size());
   AddFeatures();
+  TakePatches(image);
   FillFrame(utime);
   return frame_;
 }
@@ -68,18 +72,26 @@ bool Tracker::Inside(const cv::Point2f& pixel) const {
   return camera_.Contains(ToEigen(pixel), options_.border_px);
 }
 
+std::vector<Tracker::Bearing> Tracker::Bearings() const {
+  std::vector<Bearing> bearings;
+  for (const Feature& feature : features_) {
+    bearings.push_back({feature.id, feature.ray});
+  }
+  return bearings;
+}
+
 void Tracker::TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam) {
   std::vector<Feature> predicted;
   std::vector<cv::Point2f> from, to;
-  for (const Feature& feature : features_) {
+  for (Feature& feature : features_) {
     const auto pixel = camera_.Project(q_cam_lastcam * feature.ray.homogeneous());
     if (!pixel || !camera_.Contains(*pixel)) {
       ++statistics_.lost_klt;
       continue;
     }
-    predicted.push_back(feature);
     from.push_back(feature.pixel);
     to.emplace_back(static_cast<float>(pixel->x()), static_cast<float>(pixel->y()));
+    predicted.push_back(std::move(feature));
   }
   features_.clear();
   if (predicted.empty()) {
@@ -102,17 +114,44 @@ void Tracker::TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam) {
     } else if (!backward_ok[i] || cv::norm(back[i] - from[i]) > options_.max_forward_backward_px) {
       ++statistics_.lost_backward;
     } else {
-      Feature feature = predicted[i];
+      Feature& feature = predicted[i];
       feature.pixel = to[i];
       feature.ray = *ray;
-      ++feature.age;
-      features_.push_back(feature);
+      features_.push_back(std::move(feature));
+    }
+  }
+}
+
+// Image-to-image tracking has brought each feature to within a pixel or so.
+void Tracker::AlignWithPatches(const cv::Mat& image) {
+  for (Feature& feature : features_) {
+    if (!feature.patch) {
+      continue;
+    }
+    const auto found = feature.patch->Find(image, ToEigenF(feature.pixel));
+    const auto ray = found ? camera_.Unproject(found->cast<double>()) : std::nullopt;
+    if (ray) {
+      feature.pixel = {found->x(), found->y()};
+      feature.ray = *ray;
+    }
+    if (!ray || feature.patch->IsWornOut()) {
+      feature.patch.reset();
+    }
+  }
+}
+
+void Tracker::TakePatches(const cv::Mat& image) {
+  for (Feature& feature : features_) {
+    if (!feature.patch) {
+      if (const auto patch = ReferencePatch::Take(image, ToEigenF(feature.pixel))) {
+        feature.patch = std::make_unique<ReferencePatch>(*patch);
+      }
     }
   }
 }
 
 void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
-                             const std::vector<Feature>& before) {
+                             const std::vector<Bearing>& before) {
   std::vector<Eigen::Vector2d> rays_before, rays_now;
   size_t at = 0;
   for (const Feature& feature : features_) {
@@ -132,7 +171,7 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
       return cv::norm(other.pixel - features_[i].pixel) < merge_px;
     });
     if (check.inlier[i] && !merged) {
-      kept.push_back(features_[i]);
+      kept.push_back(std::move(features_[i]));
     } else {
       ++statistics_.lost_two_view;
     }
@@ -208,7 +247,7 @@ void Tracker::AddFeatures() {
     if (near || !ray || !Inside(pixel)) {
       continue;
     }
-    features_.push_back({next_id_++, 0, pixel, *ray});
+    features_.push_back({next_id_++, pixel, *ray, nullptr});
     ++statistics_.added;
   }
 }

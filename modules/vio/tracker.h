@@ -1,19 +1,23 @@
 #pragma once
 
 // Feature tracks through an image stream: Shi-Tomasi corners on a grid, pyramidal KLT with the
-// gyro's rotation as the first guess, forward-backward check, two-view outlier rejection on
-// undistorted rays (the paper, section III-A, and VINS-Mono's front end, which it builds on).
+// gyro's rotation as the first guess, forward-backward check, alignment with how the feature looked
+// at first (reference_patch.h), two-view outlier rejection on undistorted rays (the paper, section
+// III-A, and VINS-Mono's front end, which it builds on).
 //
 // In: grey images and the rotation of the camera since the last one. Out: the tracked frame.
 // Landmark ids count up from 0 and are never used twice until Reset. One thread; deterministic.
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "common/camera_model.h"
+#include "vio/reference_patch.h"
 #include "vio/tracks.h"
 #include "vio/two_view_check.h"
 
@@ -34,7 +38,7 @@ struct TrackerOptions {
   double min_eigenvalue = 1e-4;
   bool equalize = true;  // contrast-limited histogram equalisation before everything
   double equalize_clip = 3.0;
-  double sigma_px = 0.7;  // of an observation
+  double sigma_px = 0.5;  // of an observation
   TwoViewOptions two_view;
 };
 
@@ -63,14 +67,21 @@ class Tracker {
  private:
   struct Feature {
     int32_t id = 0;
-    int age = 0;  // images since it was found
     cv::Point2f pixel;
     Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+    std::unique_ptr<ReferencePatch> patch;  // null: to be taken anew
+  };
+  struct Bearing {
+    int32_t id;
+    Eigen::Vector2d ray;
   };
 
   void Prepare(const cv::Mat& image);
+  std::vector<Bearing> Bearings() const;
   void TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam);
-  void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Feature>& before);
+  void AlignWithPatches(const cv::Mat& image);
+  void TakePatches(const cv::Mat& image);
+  void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
   void AddFeatures();
   std::vector<std::pair<float, cv::Point>> FindCorners(const cv::Rect& cell) const;
   bool Inside(const cv::Point2f& pixel) const;

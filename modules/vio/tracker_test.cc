@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
+#include <vector>
 
 #include "common/rigid3.h"
 #include "vio/test_images.h"
@@ -95,6 +97,39 @@ TEST(Tracker, SurvivesAChangeOfExposure) {
   const Outcome outcome = TrackOnce(image, darker, q, q);
   EXPECT_GE(outcome.tracked, 100);
   EXPECT_LT(outcome.rms_px, 0.25);
+}
+
+// Errors from image to image would add up to several tenths of a pixel over this ride.
+TEST(Tracker, DoesNotDriftAlongATrack) {
+  const cv::Mat image = RandomTexture(752, 480, 9);
+  Tracker tracker(PlainCamera(), {});
+  const auto first = ById(tracker.Track(0, image, Eigen::Quaterniond::Identity()));
+  Eigen::Quaterniond q_now_first = Eigen::Quaterniond::Identity();
+  std::map<int32_t, Observation> last;
+  for (int i = 1; i <= 60; ++i) {
+    // Slow turns to and fro, with roll: the patches turn by up to 8 degrees.
+    const double phase = 0.2 * i;
+    const Eigen::Quaterniond q =
+        ExpSo3({0.006 * std::sin(phase), 0.008 * std::sin(0.7 * phase), 0.015 * std::cos(phase)});
+    q_now_first = q * q_now_first;
+    cv::Mat view = TurnedView(image, PlainCamera(), q_now_first);
+    cv::Mat noise(view.size(), CV_16S);
+    cv::theRNG().state = static_cast<uint64_t>(i);
+    cv::randn(noise, 0, 3);
+    cv::add(view, noise, view, cv::noArray(), CV_8U);
+    last = ById(tracker.Track(50'000 * i, view, q));
+  }
+  std::vector<double> errors;
+  for (const auto& [id, observation] : last) {
+    if (const auto found = first.find(id); found != first.end()) {
+      const Eigen::Vector2d expected =
+          *PlainCamera().Project(q_now_first * found->second.ray.homogeneous());
+      errors.push_back((observation.pixel.cast<double>() - expected).norm());
+    }
+  }
+  ASSERT_GE(errors.size(), 60u);
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
 TEST(Tracker, RejectsAnUnrelatedImage) {
