@@ -217,6 +217,21 @@ void YamlOptions::AddSequence(const std::string& key,
   };
 }
 
+void YamlOptions::AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
+                                     std::function<std::optional<YamlOptions>()> current) {
+  Entry& entry = NewEntry(key);
+  entry.read = [start = std::move(start)](const YAML::Node& node, const std::string& file,
+                                          const std::string& path) {
+    if (!node.IsNull()) {
+      start().Read(node, file, path + ".");
+    }
+  };
+  entry.print = [current = std::move(current)](int indent) {
+    const std::optional<YamlOptions> section = current();
+    return section ? fmt::format("\n{}", section->PrintIndented(indent + 2)) : std::string(" ~\n");
+  };
+}
+
 void YamlOptions::Require(const std::string& key) {
   for (const auto& entry : entries_) {
     if (entry->key == key) {

@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -81,6 +82,25 @@ class YamlOptions {
         [items, bind] { return BindAll(items, bind); });
   }
 
+  // A struct that need not be there: a section bound by `bind(yaml, value)`, or no value.
+  template <typename T, typename BindValue>
+  void AddOptional(const std::string& key, std::optional<T>* value, BindValue bind) {
+    AddOptionalSection(
+        key,
+        [value, bind] {
+          YamlOptions section;
+          bind(section, value->emplace());
+          return section;
+        },
+        [value, bind] {
+          std::optional<YamlOptions> section;
+          if (value->has_value()) {
+            bind(section.emplace(), **value);
+          }
+          return section;
+        });
+  }
+
   // This key must be in the file.
   void Require(const std::string& key);
 
@@ -107,6 +127,8 @@ class YamlOptions {
                 const std::function<void(size_t)>& set, const std::function<size_t()>& get);
   void AddSequence(const std::string& key, std::function<std::vector<YamlOptions>(size_t)> resize,
                    std::function<std::vector<YamlOptions>()> current);
+  void AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
+                          std::function<std::optional<YamlOptions>()> current);
   template <typename T>
   void AddScalar(const std::string& key, const std::string& type, T* value);
   template <typename T>

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <stdexcept>
 
 namespace pangea {
@@ -33,6 +34,7 @@ struct Options {
     int keyframes = 10;
   } window;
   std::vector<Item> items;
+  std::optional<Item> extra;
 };
 
 void Bind(YamlOptions& yaml, Options& o) {
@@ -50,6 +52,10 @@ void Bind(YamlOptions& yaml, Options& o) {
     y.Add("id", &item.id);
     y.Add("name", &item.name);
     y.Require("id");
+  });
+  yaml.AddOptional("extra", &o.extra, [](YamlOptions& y, Item& item) {
+    y.Add("id", &item.id);
+    y.Add("name", &item.name);
   });
 }
 
@@ -93,6 +99,20 @@ TEST(YamlOptions, ReadsEveryTypeAndKeepsDefaults) {
 TEST(YamlOptions, EmptyTextKeepsAllDefaults) {
   EXPECT_EQ(Read("").count, 3);
   EXPECT_EQ(Read("# nothing\n").count, 3);
+}
+
+TEST(YamlOptions, AnOptionalSectionIsThereOnlyWhenGiven) {
+  EXPECT_FALSE(Read("count: 4").extra);
+  EXPECT_FALSE(Read("extra: ~").extra);
+  EXPECT_EQ(Read("extra: {}").extra.value().name, "none");
+  EXPECT_EQ(Read("extra: {id: 5}").extra.value().id, 5);
+  EXPECT_THAT(Complaint("extra: {nam: x}"), HasSubstr("'extra.name'"));
+  for (const char* text : {"count: 4", "extra: {id: 5}"}) {
+    Options options = Read(text);
+    YamlOptions yaml;
+    Bind(yaml, options);
+    EXPECT_EQ(Read(yaml.Print()).extra.has_value(), options.extra.has_value()) << yaml.Print();
+  }
 }
 
 TEST(YamlOptions, UnknownKeyNamesFileLineAndNearest) {

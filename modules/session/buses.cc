@@ -34,7 +34,8 @@ std::string Url(uint16_t port) {
 
 }  // namespace
 
-Buses ChooseBuses(const std::vector<int32_t>& agent_ids, std::optional<uint16_t> first_port) {
+Buses ChooseBuses(const std::vector<int32_t>& agent_ids, const std::vector<int32_t>& with_own_link,
+                  std::optional<uint16_t> first_port) {
   std::random_device random;
   uint16_t port = first_port.value_or(static_cast<uint16_t>(20000 + random() % 30000));
   const auto next_url = [&] {
@@ -52,6 +53,9 @@ Buses ChooseBuses(const std::vector<int32_t>& agent_ids, std::optional<uint16_t>
   buses.link = next_url();
   for (const int32_t id : agent_ids) {
     buses.agents[id] = next_url();
+  }
+  for (const int32_t id : with_own_link) {
+    buses.agent_links[id] = next_url();
   }
   return buses;
 }

@@ -12,12 +12,20 @@ namespace pangea::session {
 
 struct Buses {
   std::string server;
-  std::string link;
-  std::map<int32_t, std::string> agents;  // by agent id
+  std::string link;                            // the server's end
+  std::map<int32_t, std::string> agents;       // by agent id
+  std::map<int32_t, std::string> agent_links;  // of agents that have a link bus of their own
+
+  const std::string& LinkOf(int32_t agent_id) const {
+    const auto own = agent_links.find(agent_id);
+    return own == agent_links.end() ? link : own->second;
+  }
 };
 
 // Picks free UDP ports; from `first_port` upwards when it is given, and then a port in use is an
-// error that names it. Throws std::runtime_error.
-Buses ChooseBuses(const std::vector<int32_t>& agent_ids, std::optional<uint16_t> first_port);
+// error that names it. `with_own_link`: agents between whose link and the server's something
+// stands. Throws std::runtime_error.
+Buses ChooseBuses(const std::vector<int32_t>& agent_ids, const std::vector<int32_t>& with_own_link,
+                  std::optional<uint16_t> first_port);
 
 }  // namespace pangea::session

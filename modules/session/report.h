@@ -24,6 +24,13 @@
 
 namespace pangea::session {
 
+// A bad link between an agent and the server, as the session made it.
+struct LinkRun {
+  std::string conditions;                     // for people: "loss 5 %, delay 50 ms"
+  std::map<std::string, int64_t> packets_up;  // by what became of them: "taken", "delivered", ...
+  std::map<std::string, int64_t> packets_down;
+};
+
 struct AgentRun {
   int32_t id = 0;
   // EuRoC folder, for ground truth; empty, or without ground truth: no ATE
@@ -37,6 +44,7 @@ struct AgentRun {
   // payload on the link bus, both directions; none when it was not measured (a replay)
   std::optional<int64_t> bytes_up;
   std::optional<int64_t> bytes_down;
+  std::optional<LinkRun> link;
   // recording time played / wall time it took
   std::optional<double> realtime_factor;
 };

@@ -48,6 +48,10 @@ TEST_F(ReportTest, TwoAgentsFused) {
   EXPECT_EQ(agent["bytes_down"], 2'000);
   EXPECT_NEAR(agent["kb_per_s_up"].get<double>(), 600.0 / 30, 0.1);
   EXPECT_EQ(agent["realtime_factor"], 1.0);
+  EXPECT_TRUE(report["agents"][0]["link"].is_null());
+  EXPECT_EQ(agent["link"]["conditions"], "loss 10 %");
+  EXPECT_EQ(agent["link"]["packets_up"]["delivered"], 91);
+  EXPECT_EQ(agent["link"]["packets_down"]["taken"], 7);
   EXPECT_LT(agent["ate_live_m"].get<double>(), 1e-5);
   EXPECT_GT(agent["ate_live_raw_m"].get<double>(), 0.02);
   EXPECT_LT(agent["live_jump_max_m"].get<double>(), 0.03) << "the odometry's 2 % of a step";

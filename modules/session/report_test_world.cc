@@ -55,6 +55,9 @@ void ReportWorld::SetUp() {
     run.bytes_up = 300'000 * agent;
     run.bytes_down = 2'000;
     run.realtime_factor = 1.0;
+    if (agent == 2) {
+      run.link = LinkRun{"loss 10 %", {{"taken", 100}, {"delivered", 91}}, {{"taken", 7}}};
+    }
     input_.agents.push_back(run);
   }
   input_.server_log = folder_ + "/session.lcm";

@@ -129,6 +129,15 @@ ordered_json MapIds(const std::vector<MapId>& maps) {
   return ids;
 }
 
+ordered_json LinkJson(const AgentRun& run) {
+  if (!run.link) {
+    return {};
+  }
+  return {{"conditions", run.link->conditions},
+          {"packets_up", run.link->packets_up},
+          {"packets_down", run.link->packets_down}};
+}
+
 ordered_json AgentJson(const AgentFigures& agent) {
   const AgentRun& run = agent.run;
   return {{"id", agent.id},
@@ -145,6 +154,7 @@ ordered_json AgentJson(const AgentFigures& agent) {
           {"bytes_up", run.bytes_up ? ordered_json(*run.bytes_up) : ordered_json()},
           {"bytes_down", run.bytes_down ? ordered_json(*run.bytes_down) : ordered_json()},
           {"kb_per_s_up", Number(KilobytesPerSecondUp(agent))},
+          {"link", LinkJson(run)},
           {"realtime_factor", Number(run.realtime_factor)}};
 }
 
@@ -288,6 +298,26 @@ std::string TruthText(const ReportFigures& figures) {
       table.Text());
 }
 
+// Empty when the session made no link bad.
+std::string LinksText(const ReportFigures& figures) {
+  Table table({"agent", "link", "packets up", "delivered", "packets down", "delivered"});
+  bool any = false;
+  for (const AgentFigures& agent : figures.agents) {
+    if (const auto& link = agent.run.link) {
+      any = true;
+      const auto cell = [](const std::map<std::string, int64_t>& packets, const char* name) {
+        const auto count = packets.find(name);
+        return count == packets.end() ? std::string("-") : fmt::format("{}", count->second);
+      };
+      table.Add({fmt::format("{}", agent.id), link->conditions, cell(link->packets_up, "taken"),
+                 cell(link->packets_up, "delivered"), cell(link->packets_down, "taken"),
+                 cell(link->packets_down, "delivered")});
+    }
+  }
+  return any ? fmt::format("\n{}\nDelivered counts doubled packets twice.\n", table.Text())
+             : std::string();
+}
+
 // Empty when no agent's poses were captured.
 std::string LiveText(const ReportFigures& figures) {
   Table table({"agent", "live ATE m", "raw ATE m", "largest jump m"});
@@ -370,6 +400,7 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
       "counts "
       "with coverage of at least 0.95 and one map.\n",
       AgentTable(figures));
+  text += LinksText(figures);
   text += LiveText(figures);
   text +=
       fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n{}",

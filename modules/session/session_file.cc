@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "common/yaml_options.h"
+#include "link_emulator/link_conditions_yaml.h"
 
 namespace pangea::session {
 namespace {
@@ -55,6 +56,29 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: delay, start and duration must not be negative", file, agent.id));
     }
+    if (!agent.keyframes.empty() && agent.start_s > 0) {
+      throw std::runtime_error(fmt::format(
+          "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
+          file, agent.id));
+    }
+    if (const auto invalid = agent.link ? agent.link->Invalid() : std::nullopt) {
+      throw std::runtime_error(fmt::format("{}: agent {}: link: {}", file, agent.id, *invalid));
+    }
+  }
+}
+
+void FindKeyframes(const fs::path& file, SessionScript* script) {
+  for (AgentScript& agent : script->agents) {
+    if (agent.keyframes.empty()) {
+      continue;
+    }
+    agent.resolved_keyframes =
+        (fs::absolute(file).parent_path() / agent.keyframes).lexically_normal();
+    if (!fs::is_regular_file(agent.resolved_keyframes)) {
+      throw std::runtime_error(
+          fmt::format("{}: agent {}: no keyframe log at {}: pangea-vio --out-keyframes writes one",
+                      file.string(), agent.id, agent.resolved_keyframes.string()));
+    }
   }
 }
 
@@ -71,10 +95,14 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
     item.Add("delay", &agent.delay_s);
     item.Add("start", &agent.start_s);
     item.Add("duration", &agent.duration_s);
+    item.Add("keyframes", &agent.keyframes);
+    item.AddOptional("link", &agent.link,
+                     [](YamlOptions& link, LinkConditions& conditions) { Bind(link, conditions); });
   });
   yaml.Require("agents");
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());
+  FindKeyframes(file, &script);
 
   const fs::path base = recordings.value_or(fs::absolute(file).parent_path());
   std::string missing;

@@ -5,6 +5,8 @@
 //   agents:
 //     - {id: 1, recording: ../recordings/MH_01}
 //     - {id: 2, recording: ../recordings/MH_02, delay: 5, start: 10, duration: 60}
+//     - {id: 3, recording: ../recordings/MH_03, keyframes: MH_03/keyframes.lcm,
+//        link: {loss: 0.05, delay_ms: 50, partitions: [{at: 30, seconds: 60}]}}
 
 #include <cstdint>
 #include <filesystem>
@@ -12,15 +14,22 @@
 #include <string>
 #include <vector>
 
+#include "link_emulator/link_conditions.h"
+
 namespace pangea::session {
 
 struct AgentScript {
-  int32_t id = 0;                  // 1 .. 65535, unique in the session
-  std::string recording;           // folder, relative to the session file or to --recordings
-  double delay_s = 0;              // session time at which the agent starts
-  double start_s = 0;              // where in the recording it starts
-  double duration_s = 0;           // how much of it is played; 0 = to the end
-  std::filesystem::path resolved;  // the folder, found
+  int32_t id = 0;         // 1 .. 65535, unique in the session
+  std::string recording;  // folder, relative to the session file or to --recordings
+  double delay_s = 0;     // session time at which the agent starts
+  double start_s = 0;     // where in the recording it starts
+  double duration_s = 0;  // how much of it is played; 0 = to the end
+  // An LCM log with the agent's keyframes, which are played instead of running the odometry;
+  // the recording is then only its ground truth. Relative to the session file; empty for none.
+  std::string keyframes;
+  std::optional<LinkConditions> link;  // a bad link of its own to the server
+  std::filesystem::path resolved;      // the recording's folder, found
+  std::filesystem::path resolved_keyframes;
 };
 
 struct SessionScript {
@@ -29,7 +38,7 @@ struct SessionScript {
 
 // Reads and checks a session file and finds its recordings: relative to `recordings` if that is
 // given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Throws
-// std::runtime_error that names file, key and mend, and every recording that is missing.
+// std::runtime_error that names file, key and mend, and every recording or log that is missing.
 SessionScript ReadSessionFile(const std::filesystem::path& file,
                               const std::optional<std::filesystem::path>& recordings);
 

@@ -52,6 +52,22 @@ TEST_F(SessionFileTest, ReadsAgentsAndFindsRecordings) {
   EXPECT_EQ(script.agents[1].duration_s, 60);
 }
 
+TEST_F(SessionFileTest, ReadsLinkAndKeyframes) {
+  std::ofstream(folder_ / "sessions" / "one.lcm") << "log";
+  const SessionScript script =
+      ReadSessionFile(Write("agents:\n"
+                            "  - {id: 1, recording: ../recordings/MH_01, keyframes: one.lcm,\n"
+                            "     link: {loss: 0.1, partitions: [{at: 30, seconds: 60}]}}\n"
+                            "  - {id: 2, recording: ../recordings/MH_02}\n"),
+                      std::nullopt);
+  EXPECT_EQ(script.agents[0].resolved_keyframes, folder_ / "sessions" / "one.lcm");
+  ASSERT_TRUE(script.agents[0].link);
+  EXPECT_EQ(script.agents[0].link->loss, 0.1);
+  EXPECT_EQ(script.agents[0].link->partitions.at(0).seconds, 60);
+  EXPECT_FALSE(script.agents[1].link);
+  EXPECT_TRUE(script.agents[1].resolved_keyframes.empty());
+}
+
 TEST_F(SessionFileTest, RecordingsFolderOnTheCommandLine) {
   const SessionScript script =
       ReadSessionFile(Write("agents: [{id: 7, recording: MH_02}]\n"), folder_ / "recordings");
@@ -69,6 +85,12 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
   EXPECT_THAT(ErrorOf("agents: []\n"), HasSubstr("empty"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, start: -3}]\n"),
               HasSubstr("negative"));
+  EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, link: {los: 0.1}}]\n"),
+              HasSubstr("'agents[0].link.loss'"));
+  EXPECT_THAT(ErrorOf("agents: [{id: 4, recording: ../recordings/MH_02, link: {loss: 5}}]\n"),
+              testing::AllOf(HasSubstr("agent 4: link: loss 5"), HasSubstr("0 to 1")));
+  EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, keyframes: no.lcm}]\n"),
+              testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "common/bus/process.h"
 #include "common/channels.h"
 #include "common/messages.h"
+#include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 
 namespace pangea::session {
@@ -22,6 +23,13 @@ int64_t CounterOf(const status_t& status, const std::string& name) {
     }
   }
   return 0;
+}
+
+void NoteTime(int64_t utime, AgentProgress* progress) {
+  if (progress->first_utime == 0) {
+    progress->first_utime = utime;
+  }
+  progress->newest_utime = std::max(progress->newest_utime, utime);
 }
 
 }  // namespace
@@ -65,6 +73,8 @@ void SessionMonitor::WatchServer(Bus& bus) {
 void SessionMonitor::WatchAgent(int32_t id, Bus& bus) {
   bus.Subscribe(channels::Pose(id),
                 [this, id](const std::string&, Bytes data) { OnPose(id, data); });
+  bus.Subscribe(channels::Keyframe(id),
+                [this, id](const std::string&, Bytes data) { OnKeyframe(id, data); });
   bus.Subscribe(channels::Correction(id),
                 [this, id](const std::string&, Bytes data) { OnCorrection(id, data); });
   bus.Subscribe(std::string(channels::kAllStatus),
@@ -133,13 +143,25 @@ void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
     return;
   }
   AgentProgress& progress = agents_[agent_id];
-  if (progress.first_utime == 0) {
-    progress.first_utime = message.utime;
-  }
-  progress.newest_utime = std::max(progress.newest_utime, message.utime);
+  with_odometry_.insert(agent_id);
+  NoteTime(message.utime, &progress);
   progress.tracking = message.state == pose_t::STATE_TRACKING;
   progress.reason = message.reason;
   if (const auto T = Parse(message.T_odom_body); progress.tracking && T.value) {
+    T_odom_body_[agent_id] = *T.value;
+  }
+}
+
+// Stored keyframes come without poses between them.
+void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
+  keyframe_t message;
+  if (with_odometry_.contains(agent_id) || !DecodeMessage(data, &message)) {
+    return;
+  }
+  AgentProgress& progress = agents_[agent_id];
+  NoteTime(message.utime, &progress);
+  progress.tracking = true;
+  if (const auto T = Parse(message.T_odom_body); T.value) {
     T_odom_body_[agent_id] = *T.value;
   }
 }
@@ -150,7 +172,8 @@ void SessionMonitor::OnStatus(Bytes data) {
     return;
   }
   for (auto& [id, progress] : agents_) {
-    if (message.process == "vio_" + std::to_string(id)) {
+    if (message.process == "vio_" + std::to_string(id) ||
+        message.process == "keyframes_" + std::to_string(id)) {
       progress.keyframes = CounterOf(message, "keyframes");
     }
   }

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,10 @@
 namespace pangea::session {
 
 struct AgentProgress {
-  int64_t first_utime = 0;   // of its first image, sensor clock; 0 while there is none
-  int64_t newest_utime = 0;  // of its newest image
+  // Of its first image, sensor clock; 0 while there is none. Where stored keyframes are played: of
+  // the first of these.
+  int64_t first_utime = 0;
+  int64_t newest_utime = 0;  // of its newest
   bool tracking = false;
   std::string reason;  // why it is not tracking
   int64_t keyframes = 0;
@@ -58,6 +61,7 @@ class SessionMonitor {
   void OnMapState(Bytes data);
   void OnCorrection(int32_t agent_id, Bytes data);
   void OnPose(int32_t agent_id, Bytes data);
+  void OnKeyframe(int32_t agent_id, Bytes data);
   void OnStatus(Bytes data);
 
   struct Drift {
@@ -69,6 +73,7 @@ class SessionMonitor {
   std::vector<std::unique_ptr<LcmBus>> buses_;
   std::map<int32_t, AgentProgress> agents_;
   std::map<int32_t, Rigid3> T_odom_body_;  // newest pose of each agent
+  std::set<int32_t> with_odometry_;        // agents that publish poses
   std::map<MapId, Drift> drifts_;
   std::map<MapId, std::pair<int64_t, std::vector<MapId>>>
       groups_;  // revision and maps, by each map

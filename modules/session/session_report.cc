@@ -26,6 +26,23 @@ std::optional<int64_t> Counter(const RunSummary& summary, const std::string& pro
   return std::nullopt;
 }
 
+// The counters "up_taken", "up_delivered", ... of the agent's link emulator.
+LinkRun LinkRunOf(const AgentScript& agent, const RunSummary& summary) {
+  LinkRun link;
+  link.conditions = Describe(*agent.link);
+  const auto status = summary.status.find(fmt::format("link_emulator_{}", agent.id));
+  if (status != summary.status.end()) {
+    for (const counter_t& counter : status->second.counters) {
+      if (counter.name.starts_with("up_")) {
+        link.packets_up[counter.name.substr(3)] = counter.count;
+      } else if (counter.name.starts_with("down_")) {
+        link.packets_down[counter.name.substr(5)] = counter.count;
+      }
+    }
+  }
+  return link;
+}
+
 AgentRun RunOf(const AgentScript& script) {
   AgentRun run;
   run.id = script.id;
@@ -49,6 +66,9 @@ std::string ReportRun(const SessionScript& script, const RunSummary& summary, co
     const std::string uplink = fmt::format("uplink_{}", agent.id);
     run.bytes_up = Counter(summary, uplink, "bytes_up");
     run.bytes_down = Counter(summary, uplink, "bytes_down");
+    if (agent.link) {
+      run.link = LinkRunOf(agent, summary);
+    }
     const auto played = summary.played_s.find(agent.id);
     const auto wall = summary.vio_wall_s.find(agent.id);
     if (played != summary.played_s.end() && wall != summary.vio_wall_s.end() && wall->second > 0) {

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <iostream>
 #include <stdexcept>
 
 #include "common/bus/process.h"
+#include "link_emulator/link_conditions_yaml.h"
 #include "session/buses.h"
 #include "session/child_process.h"
 #include "session/session_monitor.h"
@@ -36,7 +38,8 @@ struct Kept {
   int restarts = 0;
 };
 
-// One agent's vio: ends by itself when its recording is over.
+// One agent's vio, or the player of its stored keyframes: ends by itself when its recording is
+// over.
 struct Player {
   AgentScript script;
   std::optional<ChildProcess> child;
@@ -52,7 +55,7 @@ class Runner {
  public:
   Runner(const SessionScript& script, const RunOptions& options)
       : options_(options),
-        buses_(ChooseBuses(Ids(script), options.first_port)),
+        buses_(ChooseBuses(Ids(script, false), Ids(script, true), options.first_port)),
         monitor_(buses_),
         progress_(isatty(STDOUT_FILENO) != 0) {
     for (const AgentScript& agent : script.agents) {
@@ -81,10 +84,12 @@ class Runner {
   }
 
  private:
-  static std::vector<int32_t> Ids(const SessionScript& script) {
+  static std::vector<int32_t> Ids(const SessionScript& script, bool only_with_bad_link) {
     std::vector<int32_t> ids;
     for (const AgentScript& agent : script.agents) {
-      ids.push_back(agent.id);
+      if (agent.link || !only_with_bad_link) {
+        ids.push_back(agent.id);
+      }
     }
     return ids;
   }
@@ -142,30 +147,48 @@ class Runner {
       const std::string bus = buses_.agents.at(id);
       KeepLogger(fmt::format("logger_agent_{}", id), bus,
                  options_.out / fmt::format("agent_{}.lcm", id));
+      if (player.script.link) {
+        StartLinkEmulator(id, *player.script.link);
+      }
       Keep(fmt::format("uplink_{}", id), {Program("pangea-uplink"), "--agent", std::to_string(id),
-                                          "--bus", bus, "--link", buses_.link});
+                                          "--bus", bus, "--link", buses_.LinkOf(id)});
     }
   }
 
+  void StartLinkEmulator(int32_t id, LinkConditions conditions) {
+    const std::string name = fmt::format("link_emulator_{}", id);
+    const fs::path file = options_.out / "logs" / (name + ".yaml");
+    YamlOptions yaml;
+    Bind(yaml, conditions);
+    std::ofstream(file) << yaml.Print();
+    Keep(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id), "--agent-link",
+                buses_.LinkOf(id), "--server-link", buses_.link, "--bus", buses_.agents.at(id),
+                "--options", file.string()});
+  }
+
+  // A killed player of stored keyframes begins again: what the uplink has is a repeat.
   void StartPlayer(Player& player) {
     const int32_t id = player.script.id;
-    std::vector<std::string> argv = {
-        Program("pangea-vio"),
-        "--agent",
-        std::to_string(id),
-        "--bus",
-        buses_.agents.at(id),
-        "--recording",
-        player.script.resolved.string(),
-        "--rate",
-        options_.rate,
-        "--start",
-        fmt::format("{}", player.script.start_s + player.played_before_s)};
-    if (player.script.duration_s > 0) {
-      argv.insert(argv.end(), {"--duration", fmt::format("{}", player.script.duration_s -
-                                                                   player.played_before_s)});
+    const bool stored = !player.script.keyframes.empty();
+    std::vector<std::string> argv = {Program(stored ? "pangea-keyframe-player" : "pangea-vio"),
+                                     "--agent",
+                                     std::to_string(id),
+                                     "--bus",
+                                     buses_.agents.at(id),
+                                     "--rate",
+                                     options_.rate};
+    const double before_s = stored ? 0 : player.played_before_s;
+    if (stored) {
+      argv.insert(argv.end(), {"--keyframes", player.script.resolved_keyframes.string()});
+    } else {
+      argv.insert(argv.end(), {"--recording", player.script.resolved.string(), "--start",
+                               fmt::format("{}", player.script.start_s + before_s)});
     }
-    const std::string name = fmt::format("vio_{}", id);
+    if (player.script.duration_s > 0) {
+      argv.insert(argv.end(),
+                  {"--duration", fmt::format("{}", player.script.duration_s - before_s)});
+    }
+    const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
     if (player.started == 0) {
       player.started = Now();

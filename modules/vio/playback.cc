@@ -4,22 +4,17 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <fstream>
 #include <iostream>
 #include <sstream>
 #include <stdexcept>
-#include <thread>
 
 #include "common/csv.h"
 
 namespace pangea::vio {
 namespace {
 
-constexpr int64_t kTickInterval_us = 100'000;
 constexpr int64_t kImuBeforeStart_us = 500'000;
-constexpr int64_t kLastWait_us = 20'000'000;
-constexpr int64_t kLastWaitAlone_us = 1'000'000;
 
 int64_t ToUs(double seconds) { return static_cast<int64_t>(1e6 * seconds); }
 
@@ -61,7 +56,10 @@ std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraM
 
 Playback::Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
                    const PlaybackOptions& options)
-    : bus_(bus), process_(process), recording_(recording), options_(options) {
+    : process_(process),
+      pace_(bus, process, process.outlet()),
+      recording_(recording),
+      options_(options) {
   if (!options_.tracks_csv.empty()) {
     tracks_ = ReadTracks(options_.tracks_csv, recording.camera());
   }
@@ -85,23 +83,24 @@ void Playback::Run() {
          recording_.imu()[next_imu_].utime < images[index].utime - kImuBeforeStart_us) {
     ++next_imu_;
   }
-  WaitUntil(WallUtime() + ToUs(options_.delay_s));
+  pace_.WaitUntil(WallUtime() + ToUs(options_.delay_s));
   const int64_t begin_wall = WallUtime();
   const int64_t begin = images[index].utime;
   for (; index < images.size() && images[index].utime <= last && !StopRequested(); ++index) {
     const int64_t played = images[index].utime - begin;
     if (options_.rate > 0) {
-      WaitUntil(begin_wall + static_cast<int64_t>(static_cast<double>(played) / options_.rate));
+      pace_.WaitUntil(begin_wall +
+                      static_cast<int64_t>(static_cast<double>(played) / options_.rate));
     } else {
-      WaitForAcknowledgements();
+      pace_.WaitForAcknowledgements();
     }
     PlayImage(index);
     const int64_t spent = std::max<int64_t>(1, WallUtime() - begin_wall);
     process_.node().Set("realtime_factor_permille", 1000 * played / spent);
-    Serve(0);
+    pace_.Serve(0);
   }
   process_.Flush();
-  WaitAtTheEnd();
+  pace_.WaitAtTheEnd();
   process_.PublishFinished(WallUtime());
 }
 
@@ -136,50 +135,6 @@ void Playback::PlayImage(size_t index) {
   const auto tracks = tracks_.find(entry.utime);
   process_.AddTracks(tracks == tracks_.end() ? TrackedFrame{entry.utime, {}} : tracks->second,
                      image, imu);
-}
-
-// Handles what has arrived, waiting for the first message at most `timeout_ms`.
-void Playback::Serve(int timeout_ms) {
-  if (bus_ != nullptr) {
-    while (bus_->Handle(timeout_ms)) {
-      timeout_ms = 0;
-    }
-  } else if (timeout_ms > 0) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(timeout_ms));
-  }
-  const int64_t now = WallUtime();
-  if (now >= next_tick_utime_) {
-    process_.Tick(now);
-    next_tick_utime_ = now + kTickInterval_us;
-  }
-}
-
-void Playback::WaitUntil(int64_t wall_utime) {
-  for (int64_t now = WallUtime(); now < wall_utime && !StopRequested(); now = WallUtime()) {
-    Serve(static_cast<int>(std::clamp<int64_t>((wall_utime - now) / 1000, 1, 50)));
-  }
-}
-
-void Playback::WaitForAcknowledgements() {
-  int64_t unacknowledged = process_.Unacknowledged();
-  int64_t progress_utime = WallUtime();
-  while (bus_ != nullptr && !StopRequested() && process_.Unacknowledged() > kMaxAhead &&
-         WallUtime() - process_.uplink_heard_utime() < kUplinkSilence_us &&
-         WallUtime() - progress_utime < kNoProgress_us) {
-    Serve(50);
-    if (process_.Unacknowledged() < unacknowledged) {
-      unacknowledged = process_.Unacknowledged();
-      progress_utime = WallUtime();
-    }
-  }
-}
-
-void Playback::WaitAtTheEnd() {
-  const int64_t begin = WallUtime();
-  while (bus_ != nullptr && process_.Unacknowledged() > 0 && !StopRequested() &&
-         WallUtime() - begin < (process_.uplink_ever_heard() ? kLastWait_us : kLastWaitAlone_us)) {
-    Serve(50);
-  }
 }
 
 }  // namespace pangea::vio

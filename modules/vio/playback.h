@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
+#include "common/bus/playback_pace.h"
 #include "common/euroc.h"
 #include "vio/tracks.h"
 #include "vio/vio_process.h"
@@ -22,8 +22,8 @@ struct PlaybackOptions {
   double start_s = 0;                // after the recording's first image
   std::optional<double> duration_s;  // to the end without it
   double delay_s = 0;                // wall clock, before the first image
-  // Recording seconds per second; 0 = as fast as possible, but never with more than kMaxAhead
-  // keyframes unacknowledged while there is an uplink to acknowledge them.
+  // Recording seconds per second; 0 = as fast as possible, but no faster than the server keeps up
+  // (playback_pace.h).
   double rate = 1;
   std::string tracks_csv;  // exact tracks instead of the tracker's; empty for none
 };
@@ -34,12 +34,6 @@ std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraM
 
 class Playback {
  public:
-  static constexpr int64_t kMaxAhead = 30;
-  static constexpr int64_t kUplinkSilence_us = 5'000'000;
-  // An uplink that is there but makes no progress for this long has no server behind it, and an
-  // agent does not wait for a server.
-  static constexpr int64_t kNoProgress_us = 20'000'000;
-
   // `bus` may be null: nothing to listen to.
   Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
            const PlaybackOptions& options);
@@ -51,18 +45,13 @@ class Playback {
  private:
   void PlayImage(size_t index);
   std::span<const ImuSample> ImuUntil(int64_t utime);
-  void WaitUntil(int64_t wall_utime);
-  void WaitForAcknowledgements();
-  void WaitAtTheEnd();
-  void Serve(int timeout_ms);
 
-  LcmBus* bus_;
   VioProcess& process_;
+  PlaybackPace pace_;
   const EurocRecording& recording_;
   PlaybackOptions options_;
   std::map<int64_t, TrackedFrame> tracks_;
   size_t next_imu_ = 0;
-  int64_t next_tick_utime_ = 0;
 };
 
 }  // namespace pangea::vio

@@ -2,21 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
 #include "common/channels.h"
 #include "common/messages.h"
 #include "common/trajectory.h"
-#include "pangea/again_t.hpp"
 #include "pangea/keyframe_t.hpp"
 
 namespace pangea::vio {
 namespace {
 
 constexpr int64_t kStatusInterval_us = 1'000'000;
-constexpr size_t kMaxRequesterLength = 40;
 
 int8_t ToMessage(EstimatorState state) {
   switch (state) {
@@ -37,26 +34,15 @@ std::vector<uint8_t> Encode(const Message& message) {
   return bytes;
 }
 
-bool IsProcessName(const std::string& name) {
-  return !name.empty() && name.size() <= kMaxRequesterLength &&
-         std::all_of(name.begin(), name.end(),
-                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
-}
-
 }  // namespace
 
 VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime)
     : options_(options),
       node_(bus, fmt::format("vio_{}", options.agent_id)),
-      uplink_heard_utime_(now_utime) {
+      outlet_(node_, options.agent_id, kKeptKeyframes, now_utime) {
   node_.Subscribe<correction_t>(
       channels::Correction(options_.agent_id),
       [this](const std::string&, const correction_t& message) { OnCorrection(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
-  node_.Subscribe<resend_request_t>(
-      std::string(channels::kResendRequest),
-      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
   if (!options_.out_keyframes.empty()) {
     keyframe_log_ = std::make_unique<lcm::LogFile>(options_.out_keyframes, "w");
     if (!keyframe_log_->good()) {
@@ -138,24 +124,16 @@ void VioProcess::PublishPose(const VioOutput& output) {
 }
 
 void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
-  const std::string channel = channels::Keyframe(options_.agent_id);
   std::vector<uint8_t> bytes = Encode(pangea::ToMessage(keyframe));
-  node_.bus().Publish(channel, bytes);
-  node_.Count("keyframes");
-  node_.Count("keyframe_bytes", static_cast<int64_t>(bytes.size()));
-  published_[keyframe.id.map] = keyframe.id.seq + 1;
   if (keyframe_log_) {
     lcm::LogEvent event{};
     event.timestamp = keyframe.utime;
-    event.channel = channel;
+    event.channel = channels::Keyframe(options_.agent_id);
     event.datalen = static_cast<int32_t>(bytes.size());
     event.data = bytes.data();
     keyframe_log_->writeEvent(&event);
   }
-  kept_.push_back({keyframe.id, std::move(bytes)});
-  if (kept_.size() > kKeptKeyframes) {
-    kept_.pop_front();
-  }
+  outlet_.Publish(keyframe.id, std::move(bytes));
 }
 
 void VioProcess::WriteTum(const VioOutput& output) {
@@ -184,31 +162,19 @@ void VioProcess::Flush() {
 
 void VioProcess::PublishFinished(int64_t now_utime) {
   node_.Set("finished", 1);
-  node_.PublishStatus(now_utime, Unacknowledged(), "finished");
+  node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "finished");
 }
 
 void VioProcess::Tick(int64_t now_utime) {
-  if (uplink_heard_) {
-    uplink_heard_utime_ = now_utime;
-    uplink_heard_ = false;
-  }
+  outlet_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
-    node_.PublishStatus(now_utime, Unacknowledged(), Summary());
+    node_.PublishStatus(now_utime, outlet_.Unacknowledged(), Summary());
   }
 }
 
 std::string VioProcess::Summary() const {
   return fmt::format("agent {}: {}", options_.agent_id, state_text_);
-}
-
-int64_t VioProcess::Unacknowledged() const {
-  int64_t count = 0;
-  for (const auto& [map, published] : published_) {
-    const auto it = acknowledged_.find(map);
-    count += std::max(0, published - (it == acknowledged_.end() ? 0 : it->second));
-  }
-  return count;
 }
 
 void VioProcess::OnCorrection(const correction_t& message) {
@@ -220,45 +186,6 @@ void VioProcess::OnCorrection(const correction_t& message) {
   if (shown_.Correct(*correction.value)) {
     node_.Count("corrections");
     vio_->set_group_revision(shown_.revision());
-  }
-}
-
-void VioProcess::OnHave(const have_t& message) {
-  uplink_heard_ = true;
-  uplink_ever_heard_ = true;
-  for (int i = 0; i < message.num_maps; ++i) {
-    const Parsed<MapId> map = Parse(message.maps[static_cast<size_t>(i)]);
-    if (map.value && map.value->agent_id == options_.agent_id) {
-      int32_t& acknowledged = acknowledged_[*map.value];
-      acknowledged = std::max(acknowledged, message.highest_seq[static_cast<size_t>(i)] + 1);
-    }
-  }
-}
-
-void VioProcess::OnResendRequest(const resend_request_t& message) {
-  if (message.channel != channels::Keyframe(options_.agent_id)) {
-    return;
-  }
-  const Parsed<MapId> map = Parse(message.map);
-  if (!map.value || !IsProcessName(message.requester)) {
-    node_.Refuse("resend request: map or requester is malformed");
-    return;
-  }
-  int answers = 0;
-  for (const KeptKeyframe& keyframe : kept_) {
-    if (keyframe.id.map != *map.value || keyframe.id.seq < message.from_seq ||
-        keyframe.id.seq > message.to_seq) {
-      continue;
-    }
-    if (++answers > kMaxAnswers) {
-      break;
-    }
-    again_t again{};
-    again.channel = message.channel;
-    again.data = keyframe.bytes;
-    again.num_bytes = static_cast<int32_t>(again.data.size());
-    node_.Publish(channels::Again(message.requester), again);
-    node_.Count("resent");
   }
 }
 

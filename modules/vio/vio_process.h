@@ -4,26 +4,23 @@
 // (live_input.h); this class knows only "an image and its inertial samples".
 //
 //   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz out;
-//   CORRECTION_k, HAVE (what the server has acknowledged), RESEND_REQUEST in, answered on
-//   AGAIN_<requester> from the newest kKeptKeyframes; older ones are gone and not answered.
+//   CORRECTION_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in keyframe_outlet.h, for
+//   the newest kKeptKeyframes.
 
 #include <cstdint>
-#include <deque>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/bus/keyframe_outlet.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/euroc.h"
 #include "pangea/correction_t.hpp"
-#include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
-#include "pangea/resend_request_t.hpp"
 #include "vio/shown_pose.h"
 #include "vio/vio.h"
 
@@ -47,7 +44,6 @@ struct VioProcessOptions {
 class VioProcess : public Process {
  public:
   static constexpr size_t kKeptKeyframes = 200;
-  static constexpr int kMaxAnswers = 30;  // keyframes per request: the asker asks again
 
   // Throws std::runtime_error when an output file cannot be written.
   VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime);
@@ -68,22 +64,11 @@ class VioProcess : public Process {
   void Tick(int64_t now_utime) override;
 
   int64_t ImuTimeOf(int64_t image_utime) const { return vio_->ImuTimeOf(image_utime); }
-  // Keyframes published and not yet acknowledged, as far as HAVE says.
-  int64_t Unacknowledged() const;
-  // When the uplink last spoke, wall clock; the process' start before it ever did.
-  int64_t uplink_heard_utime() const { return uplink_heard_utime_; }
-  bool uplink_ever_heard() const { return uplink_ever_heard_; }
+  const KeyframeOutlet& outlet() const { return outlet_; }
   Node& node() { return node_; }
 
  private:
-  struct KeptKeyframe {
-    KeyframeId id;
-    std::vector<uint8_t> bytes;
-  };
-
   void OnCorrection(const correction_t& message);
-  void OnHave(const have_t& message);
-  void OnResendRequest(const resend_request_t& message);
   void Handle(const VioOutput& output);
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
@@ -92,15 +77,10 @@ class VioProcess : public Process {
 
   VioProcessOptions options_;
   Node node_;
+  KeyframeOutlet outlet_;
   std::optional<Vio> vio_;
   ShownPose shown_;
   MapId shown_map_;
-  std::deque<KeptKeyframe> kept_;
-  std::map<MapId, int32_t> published_;     // keyframes of each map
-  std::map<MapId, int32_t> acknowledged_;  // of each map, how many
-  int64_t uplink_heard_utime_ = 0;
-  bool uplink_ever_heard_ = false;
-  bool uplink_heard_ = false;  // since the last tick
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";

@@ -205,8 +205,8 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   process.Flush();
   bus_.Drain();
   ASSERT_GE(keyframes_.size(), 4u);
-  EXPECT_EQ(process.Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
-  EXPECT_FALSE(process.uplink_ever_heard());
+  EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
+  EXPECT_FALSE(process.outlet().uplink_ever_heard());
   have_t have{};
   have.num_maps = 1;
   have.maps.push_back(ToMessage(keyframes_[0].id.map));
@@ -222,8 +222,8 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   request.requester = "no such/name";
   PublishMessage(bus_, "RESEND_REQUEST", request);
   bus_.Drain();
-  EXPECT_EQ(process.Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
-  EXPECT_TRUE(process.uplink_ever_heard());
+  EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
+  EXPECT_TRUE(process.outlet().uplink_ever_heard());
   ASSERT_EQ(again_.size(), 2u);
   keyframe_t keyframe{};
   ASSERT_TRUE(DecodeMessage(again_[0].data, &keyframe));

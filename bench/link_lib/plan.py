@@ -1,0 +1,53 @@
+"""Which sessions are run: one for each row of the table, the same but for the link."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from accuracy_lib.jobs import OUT, Command, Job
+
+# One factor at a time; both directions of every agent's link. The first one is what the others are compared with.
+ROWS = {
+    "perfect": "",
+    "loss_1": "loss: 0.01",
+    "loss_5": "loss: 0.05",
+    "loss_10": "loss: 0.1",
+    "loss_20": "loss: 0.2",
+    "delay_50": "delay_ms: 50",
+    "delay_500": "delay_ms: 500",
+    "delay_2000": "delay_ms: 2000",
+    "jitter_50": "delay_ms: 50, jitter_ms: 50",
+    "reorder_5": "reorder: 0.05",
+    "duplicate_5": "duplicate: 0.05",
+    "partition_60": "partitions: [{at: 30, seconds: 60}]",
+}
+SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
+
+
+@dataclass
+class Agent:
+    id: int
+    keyframes: Path
+    recording: Path
+
+
+def session_yaml(options, conditions):
+    lines = ["agents:"]
+    for index, agent in enumerate(options.agents):
+        seed = f"seed: {agent.id}"
+        keys = [f"id: {agent.id}", f"recording: {agent.recording.resolve()}", f"keyframes: {agent.keyframes.resolve()}",
+                f"delay: {SECOND_STARTS_AFTER_S * index}"]
+        keys += [f"duration: {options.seconds:g}"] if options.seconds else []
+        keys.append(f"link: {{{', '.join(filter(None, [conditions, seed]))}}}")
+        lines.append(f"  - {{{', '.join(keys)}}}")
+    return "\n".join(lines) + "\n"
+
+
+def jobs_of(options, work):
+    program = Path(options.bin).resolve() / "pangea-session"
+    outside = [agent.keyframes.resolve() for agent in options.agents]
+    jobs = []
+    for name in options.rows:
+        run = Command([str(program), "run", f"{OUT}/session.yaml", "--out", f"{OUT}/session"])
+        jobs.append(Job("link", name, work / name, [run], outside=outside,
+                        files={"session.yaml": session_yaml(options, ROWS[name])}))
+    return jobs

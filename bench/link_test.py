@@ -1,0 +1,74 @@
+"""What a row of the link's table says of its session's logs and report."""
+
+import json
+import struct
+import sys
+import tempfile
+import unittest
+from argparse import Namespace
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from link_lib.figures import LCM_SYNC, Row, keyframes, table  # noqa: E402
+from link_lib.plan import ROWS, Agent, jobs_of, session_yaml  # noqa: E402
+
+
+def write_log(path, agent, seqs, late_us=0):
+    with open(path, "wb") as file:
+        for number, seq in enumerate(seqs):
+            channel = f"KEYFRAME_{agent}".encode()
+            data = struct.pack(">qiqiq", 1, agent, 1000, seq, 500_000 * seq) + bytes(100)
+            header = struct.pack(">IqqII", LCM_SYNC, number, 500_000 * seq + late_us, len(channel), len(data))
+            file.write(header + channel + data)
+
+
+class LinkTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.work = Path(folder.name)
+        write_log(self.work / "stored.lcm", 1, range(10))
+        self.options = Namespace(agents=[Agent(1, self.work / "stored.lcm", self.work)], seconds=None, bin=".",
+                                 rows=list(ROWS))
+
+    def row(self, name, journalled, ate):
+        job = next(job for job in jobs_of(self.options, self.work) if job.name == name)
+        session = job.folder / "session"
+        session.mkdir(parents=True)
+        write_log(session / "agent_1.lcm", 1, range(10))
+        write_log(session / "session.lcm", 1, range(10), late_us=30_000)
+        write_log(session / "journal.lcm", 1, journalled)
+        report = {"groups": [{"agents": [1]}], "ate_joint_m": ate, "agents": [{"bytes_up": 2000, "bytes_down": 100}],
+                  "fused_at": [{"change": "fused", "session_s": 7.53}]}
+        (session / "report.json").write_text(json.dumps(report))
+        return Row(job, self.options)
+
+    def test_reads_keyframes_and_stops_at_a_torn_tail(self):
+        log = self.work / "stored.lcm"
+        log.write_bytes(log.read_bytes()[:-1])
+        self.assertEqual([seq for _, _, seq in keyframes(log)], list(range(9)))
+
+    def test_figures_of_a_session(self):
+        figures = self.row("perfect", range(10), 0.01).figures
+        self.assertEqual((figures["keyframes_sent"], figures["keyframes_journalled"]), (10, 10))
+        self.assertEqual((figures["late_median_s"], figures["fused_s"]), (0.03, 7.6))
+        self.assertAlmostEqual(figures["bytes_up_over_keyframes"], 2000 / (10 * 132), places=3)
+
+    def test_passes_only_whole_and_the_same(self):
+        perfect = self.row("perfect", range(10), 0.010)
+        good, wrong = self.row("loss_5", range(10), 0.014), self.row("loss_10", range(10), 0.016)
+        torn = self.row("loss_20", range(9), 0.010)
+        rows = [perfect, good, wrong, torn]
+        self.assertEqual([row.passes(rows) for row in rows], [True, True, False, False])
+        self.assertEqual(len(table(rows).splitlines()), 6)
+
+    def test_a_session_for_a_row(self):
+        self.options.seconds = 60
+        text = session_yaml(self.options, ROWS["loss_10"])
+        self.assertIn("link: {loss: 0.1, seed: 1}", text)
+        self.assertIn("duration: 60", text)
+
+
+if __name__ == "__main__":
+    unittest.main()

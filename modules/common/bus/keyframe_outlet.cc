@@ -1,0 +1,99 @@
+#include "common/bus/keyframe_outlet.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/again_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr size_t kMaxRequesterLength = 40;
+
+bool IsProcessName(const std::string& name) {
+  return !name.empty() && name.size() <= kMaxRequesterLength &&
+         std::all_of(name.begin(), name.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+}
+
+}  // namespace
+
+KeyframeOutlet::KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime)
+    : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_heard_utime_(now_utime) {
+  node_.Subscribe<have_t>(std::string(channels::kHave),
+                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Subscribe<resend_request_t>(
+      std::string(channels::kResendRequest),
+      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+}
+
+void KeyframeOutlet::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
+  node_.bus().Publish(channels::Keyframe(agent_id_), bytes);
+  node_.Count("keyframes");
+  node_.Count("keyframe_bytes", static_cast<int64_t>(bytes.size()));
+  published_[id.map] = id.seq + 1;
+  kept_.push_back({id, std::move(bytes)});
+  if (kept_.size() > max_kept_) {
+    kept_.pop_front();
+  }
+}
+
+void KeyframeOutlet::Tick(int64_t now_utime) {
+  if (uplink_heard_) {
+    uplink_heard_utime_ = now_utime;
+    uplink_heard_ = false;
+  }
+}
+
+int64_t KeyframeOutlet::Unacknowledged() const {
+  int64_t count = 0;
+  for (const auto& [map, published] : published_) {
+    const auto it = acknowledged_.find(map);
+    count += std::max(0, published - (it == acknowledged_.end() ? 0 : it->second));
+  }
+  return count;
+}
+
+void KeyframeOutlet::OnHave(const have_t& message) {
+  uplink_heard_ = true;
+  uplink_ever_heard_ = true;
+  for (int i = 0; i < message.num_maps; ++i) {
+    const Parsed<MapId> map = Parse(message.maps[static_cast<size_t>(i)]);
+    if (map.value && map.value->agent_id == agent_id_) {
+      int32_t& acknowledged = acknowledged_[*map.value];
+      acknowledged = std::max(acknowledged, message.highest_seq[static_cast<size_t>(i)] + 1);
+    }
+  }
+}
+
+void KeyframeOutlet::OnResendRequest(const resend_request_t& message) {
+  if (message.channel != channels::Keyframe(agent_id_)) {
+    return;
+  }
+  const Parsed<MapId> map = Parse(message.map);
+  if (!map.value || !IsProcessName(message.requester)) {
+    node_.Refuse("resend request: map or requester is malformed");
+    return;
+  }
+  int answers = 0;
+  for (const KeptKeyframe& keyframe : kept_) {
+    if (keyframe.id.map != *map.value || keyframe.id.seq < message.from_seq ||
+        keyframe.id.seq > message.to_seq) {
+      continue;
+    }
+    if (++answers > kMaxAnswers) {
+      break;
+    }
+    again_t again{};
+    again.channel = message.channel;
+    again.data = keyframe.bytes;
+    again.num_bytes = static_cast<int32_t>(again.data.size());
+    node_.Publish(channels::Again(message.requester), again);
+    node_.Count("resent");
+  }
+}
+
+}  // namespace pangea

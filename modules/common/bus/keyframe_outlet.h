@@ -1,0 +1,58 @@
+#pragma once
+
+// Where an agent's keyframes come onto its bus: each is published once, and those of the newest
+// that somebody missed again.
+//   KEYFRAME_k out; HAVE (what the server has acknowledged) in; RESEND_REQUEST in, answered on
+//   AGAIN_<requester> from the newest `kept` keyframes; older ones are gone and not answered.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "common/bus/node.h"
+#include "common/ids.h"
+#include "pangea/have_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+
+class KeyframeOutlet {
+ public:
+  static constexpr int kMaxAnswers = 30;  // keyframes per request: the asker asks again
+
+  // `now_utime`: wall clock.
+  KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime);
+
+  // An encoded keyframe_t of this agent.
+  void Publish(const KeyframeId& id, std::vector<uint8_t> bytes);
+  // At about 10 Hz.
+  void Tick(int64_t now_utime);
+
+  // Keyframes published and not yet acknowledged, as far as HAVE says.
+  int64_t Unacknowledged() const;
+  // When the uplink last spoke, wall clock; the start before it ever did.
+  int64_t uplink_heard_utime() const { return uplink_heard_utime_; }
+  bool uplink_ever_heard() const { return uplink_ever_heard_; }
+
+ private:
+  struct KeptKeyframe {
+    KeyframeId id;
+    std::vector<uint8_t> bytes;
+  };
+
+  void OnHave(const have_t& message);
+  void OnResendRequest(const resend_request_t& message);
+
+  Node& node_;
+  const int32_t agent_id_;
+  const size_t max_kept_;
+  std::deque<KeptKeyframe> kept_;
+  std::map<MapId, int32_t> published_;     // keyframes of each map
+  std::map<MapId, int32_t> acknowledged_;  // of each map, how many
+  int64_t uplink_heard_utime_ = 0;
+  bool uplink_ever_heard_ = false;
+  bool uplink_heard_ = false;  // since the last tick
+};
+
+}  // namespace pangea

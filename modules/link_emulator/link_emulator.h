@@ -1,0 +1,90 @@
+#pragma once
+
+// One direction of a bad link: (time, packet) in, (deliver time, packet) out.
+//
+// What happens to a packet follows from the seed, the direction and how many packets came before
+// it, never from the clock: the same packets meet the same fate in every run. Only partitions are a
+// matter of time: what comes in while one lasts is lost; what is under way arrives.
+//
+// A packet chosen for reordering is held back until 1 .. kMaxOvertakers later packets have gone
+// first, or for kLongestHold_us when nobody follows.
+//
+// Bounded: at most kMaxQueuedBytes are under way; a packet that does not fit is dropped, as a
+// router drops the tail.
+//
+// A state machine: time goes in (microseconds since the link came up, never backwards); no clock,
+// no bus, one thread.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "common/bus/bus.h"
+#include "link_emulator/link_conditions.h"
+
+namespace pangea {
+
+enum class LinkDirection : uint8_t { kUp = 0, kDown = 1 };
+
+class LinkEmulator {
+ public:
+  static constexpr int64_t kMaxQueuedBytes = 32 << 20;  // 4 MB/s for 8 s
+  static constexpr int kMaxOvertakers = 8;
+  static constexpr int64_t kLongestHold_us = 250'000;
+
+  struct Delivery {
+    int64_t at_us = 0;
+    std::vector<uint8_t> packet;
+  };
+
+  // Packets since the start: taken = lost + cut + overflowed + (delivered or under way) - doubled.
+  struct Counts {
+    int64_t taken = 0;
+    int64_t delivered = 0;
+    int64_t lost = 0;        // by chance
+    int64_t cut = 0;         // by a partition
+    int64_t overflowed = 0;  // more under way than the bound; copies that did not fit not counted
+    int64_t doubled = 0;
+    int64_t reordered = 0;
+  };
+
+  LinkEmulator(LinkConditions conditions, LinkDirection direction);
+
+  void Add(int64_t now_us, Bytes packet);
+  // What has to be delivered by now, in order of delivery.
+  std::vector<Delivery> TakeDue(int64_t now_us);
+  std::optional<int64_t> next_due_us() const;
+
+  const Counts& counts() const { return counts_; }
+  size_t under_way() const { return queue_.size(); }
+
+ private:
+  // Delivery time, then order of arrival.
+  using Place = std::pair<int64_t, int64_t>;
+  enum class Draw : uint8_t { kLoss, kDuplicate, kReorder, kOvertakers, kJitter, kCopyJitter };
+  struct Held {
+    Place place;
+    int overtakers = 0;
+  };
+
+  // Uniform in [0, 1): the newest packet's.
+  double Uniform(Draw draw) const;
+  bool Partitioned(int64_t now_us) const;
+  int64_t Delay_us(Draw jitter) const;
+  bool Fits(Bytes packet) const;
+  Place Enqueue(int64_t at_us, Bytes packet);
+  // Packets held back see one go past, at this time.
+  void Overtake(int64_t at_us);
+
+  const LinkConditions conditions_;
+  const LinkDirection direction_;
+  Counts counts_;
+  std::map<Place, std::vector<uint8_t>> queue_;
+  std::vector<Held> held_;
+  int64_t queued_bytes_ = 0;
+  int64_t next_order_ = 0;
+};
+
+}  // namespace pangea
