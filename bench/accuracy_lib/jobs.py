@@ -19,8 +19,14 @@ GOING = ("waiting", "wanted", "running")
 
 
 @functools.cache
-def file_digest(path):
+def _digest_of_version(path, size, mtime_ns):
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
+
+
+def file_digest(path):
+    """Read again only when the file has changed."""
+    stat = Path(path).stat()
+    return _digest_of_version(path, stat.st_size, stat.st_mtime_ns)
 
 
 @dataclass
@@ -55,8 +61,8 @@ class Job:
     def key(self):
         """Of what would be made now; the products needed must be there. Independent of where the programs are."""
         commands = [[Path(c.argv[0]).name, *c.argv[1:]] for c in self.commands]
-        stamps = [[str(p), Path(p).stat().st_mtime_ns] for p in self.outside]
-        text = json.dumps([commands, stamps, sorted(self.files.items()), [n.digest() for n in self.needs]])
+        outside = [[str(p), file_digest(p)] for p in self.outside]
+        text = json.dumps([commands, outside, sorted(self.files.items()), [n.digest() for n in self.needs]])
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def digest(self):
