@@ -12,8 +12,9 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   add_compile_options(-march=x86-64-v2 -ffp-contract=off)
 endif()
 if(PANGEA_SANITIZE)
+  # Lines are enough to find a place (-g1), and twice as fast to build as all of -g.
   # GCC 12 sees uninitialised values in instrumented std::function and std::regex that are none.
-  add_compile_options(-fsanitize=${PANGEA_SANITIZE} -fno-omit-frame-pointer -O1
+  add_compile_options(-fsanitize=${PANGEA_SANITIZE} -fno-omit-frame-pointer -O1 -g1
     -Wno-maybe-uninitialized)
   add_link_options(-fsanitize=${PANGEA_SANITIZE})
 endif()
