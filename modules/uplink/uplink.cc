@@ -121,7 +121,7 @@ bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-LinkPacket Uplink::Hello() {
+LinkPacket Uplink::Hello(int64_t now_us) {
   LinkHello hello;
   hello.software = software_;
   const auto announce = [&](const MapId& id, const Map& map) {
@@ -135,7 +135,7 @@ LinkPacket Uplink::Hello() {
   if (!maps_.empty() && (hello.maps.empty() || hello.maps.back().map != maps_.rbegin()->first)) {
     announce(maps_.rbegin()->first, maps_.rbegin()->second);
   }
-  return sender_.Wrap(LinkPacket::Kind::kHello, EncodeMessage(ToMessage(hello)));
+  return sender_.Wrap(LinkPacket::Kind::kHello, EncodeMessage(ToMessage(hello)), now_us);
 }
 
 bool Uplink::HelloIsUrgent(int64_t now_us) const {
@@ -150,7 +150,7 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   std::vector<LinkPacket> packets;
   const int64_t since_hello = last_hello_us_ ? now_us - *last_hello_us_ : kHelloInterval_us;
   if (since_hello >= (HelloIsUrgent(now_us) ? kHelloUrgent_us : kHelloInterval_us)) {
-    packets.push_back(Hello());
+    packets.push_back(Hello(now_us));
     last_hello_us_ = now_us;
     hello_due_ = false;
   }
@@ -160,7 +160,7 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   const auto pose_interval_us =
       options_.pose_hz > 0 ? static_cast<int64_t>(1e6 / options_.pose_hz) : 0;
   if (!pose_.empty() && pose_interval_us > 0 && now_us - last_pose_us_ >= pose_interval_us) {
-    packets.push_back(sender_.Wrap(LinkPacket::Kind::kPose, std::move(pose_)));
+    packets.push_back(sender_.Wrap(LinkPacket::Kind::kPose, std::move(pose_), now_us));
     pose_.clear();
     last_pose_us_ = now_us;
   }

@@ -74,7 +74,7 @@ class Uplink {
   void NoteHandler(int64_t run);
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
-  LinkPacket Hello();
+  LinkPacket Hello(int64_t now_us);
 
   const int32_t agent_id_;
   const int64_t run_;

@@ -193,7 +193,7 @@ void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us,
     if (!pacer_.Ready() || in_flight_bytes_ + size > options_.max_in_flight_bytes) {
       return;
     }
-    LinkPacket packet = Wrap(LinkPacket::Kind::kKeyframe, {data.begin(), data.end()});
+    LinkPacket packet = Wrap(LinkPacket::Kind::kKeyframe, {data.begin(), data.end()}, now_us);
     packet.keyframe = id;
     packet.index = i;
     packet.count = count;
@@ -201,17 +201,13 @@ void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us,
     packet.crc32 = item->crc32;
     resent_ += piece.tries > 0 ? 1 : 0;
     piece = {packet.number, now_us, piece.tries + 1, true, false};
-    recent_.push_back({packet.number, now_us});
-    if (recent_.size() > kRecent) {
-      recent_.pop_front();
-    }
     pacer_.Take(size);
     in_flight_bytes_ += size;
     out->push_back(std::move(packet));
   }
 }
 
-LinkPacket Sender::Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data) {
+LinkPacket Sender::Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data, int64_t now_us) {
   LinkPacket packet;
   packet.agent_id = agent_id_;
   packet.run = run_;
@@ -219,6 +215,10 @@ LinkPacket Sender::Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data) {
   packet.kind = kind;
   packet.total_bytes = static_cast<int>(data.size());
   packet.data = std::move(data);
+  recent_.push_back({packet.number, now_us});
+  if (recent_.size() > kRecent) {
+    recent_.pop_front();
+  }
   return packet;
 }
 

@@ -28,7 +28,9 @@ namespace pangea {
 struct SenderOptions {
   int payload_bytes = 1200;  // data per packet; 1200 fits one Ethernet frame, the paper has 4096
   double rate_bytes_per_s = 4e6;
-  int max_in_flight_bytes = 64'000;     // sent, neither arrived nor given up
+  // Sent, neither arrived nor given up: what the receiver's cache takes (paper, IV.A). A smaller
+  // window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take 200 kB.
+  int max_in_flight_bytes = 210 * 1024;
   int64_t max_spool_bytes = 256 << 20;  // about 9,000 keyframes, an hour's walk
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;
@@ -52,8 +54,9 @@ class Sender {
   void OnAck(const LinkAck& ack, int64_t now_us);
   // The keyframe packets due now. Call it every few milliseconds while there is something to send.
   std::vector<LinkPacket> Poll(int64_t now_us);
-  // A packet of its own, neither kept nor repeated.
-  LinkPacket Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data);
+  // A packet of its own, neither kept nor repeated. Its acknowledgement measures the round trip
+  // too, so that the first keyframes already wait as long as they have to.
+  LinkPacket Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data, int64_t now_us);
 
   size_t spooled() const { return spool_.size(); }
   int64_t spooled_bytes() const { return spooled_bytes_; }
