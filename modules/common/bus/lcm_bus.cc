@@ -25,11 +25,14 @@ struct LcmBus::Impl {
   struct Subscription {
     Impl* owner;
     Handler handler;
-    void OnMessage(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+    // LCM's C interface: GCC 12 miscompiles the C++ wrapper's call of a member function under
+    // -fsanitize=address,undefined.
+    static void OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* subscription) {
+      auto* self = static_cast<Subscription*>(subscription);
       try {
-        handler(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
+        self->handler(channel, {static_cast<const uint8_t*>(buffer->data), buffer->data_size});
       } catch (...) {  // must not cross LCM's C frames; Handle() rethrows it
-        owner->failure = std::current_exception();
+        self->owner->failure = std::current_exception();
       }
     }
   };
@@ -55,9 +58,10 @@ void LcmBus::Publish(const std::string& channel, Bytes data) {
 
 void LcmBus::Subscribe(const std::string& channel_regex, Handler handler) {
   impl_->subscriptions.push_back({impl_.get(), std::move(handler)});
-  lcm::Subscription* subscription = impl_->lcm.subscribe(
-      channel_regex, &Impl::Subscription::OnMessage, &impl_->subscriptions.back());
-  subscription->setQueueCapacity(kQueueCapacity);
+  lcm_subscription_t* subscription =
+      lcm_subscribe(impl_->lcm.getUnderlyingLCM(), channel_regex.c_str(),
+                    &Impl::Subscription::OnMessage, &impl_->subscriptions.back());
+  lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
 }
 
 int LcmBus::fd() { return impl_->lcm.getFileno(); }
