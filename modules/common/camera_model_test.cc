@@ -4,23 +4,14 @@
 
 #include <random>
 
+#include "common/testing/numeric_jacobian.h"
+#include "common/testing/test_cameras.h"
+
 namespace pangea {
 namespace {
 
-CameraModel EurocCamera() {
-  CameraModel camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = 458.654;
-  camera.fy = 457.296;
-  camera.cx = 367.215;
-  camera.cy = 248.375;
-  camera.distortion << -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05;
-  return camera;
-}
-
 CameraModel FisheyeCamera() {
-  CameraModel camera = EurocCamera();
+  CameraModel camera = EurocTestCamera();
   camera.kind = CameraModel::Kind::kEquidistant;
   camera.fx = camera.fy = 310;
   camera.distortion << -0.0034, 0.0007, -0.0020, 0.0002;
@@ -49,12 +40,10 @@ TEST_P(CameraModelTest, JacobianMatchesCentralDifferences) {
   for (int i = 0; i < 200; ++i) {
     const auto ray = camera.Unproject({u(rng), v(rng)});
     const Eigen::Vector3d p = Eigen::Vector3d(ray->x(), ray->y(), 1) * depth(rng);
-    Eigen::Matrix<double, 2, 3> J, numeric;
+    Eigen::Matrix<double, 2, 3> J;
     ASSERT_TRUE(camera.Project(p, &J).has_value());
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d d = 1e-6 * Eigen::Vector3d::Unit(k);
-      numeric.col(k) = (*camera.Project(p + d) - *camera.Project(p - d)) / 2e-6;
-    }
+    const Eigen::MatrixXd numeric = NumericJacobian(
+        3, 1e-6, [&](const Eigen::Vector3d& d) { return camera.Project(p + d).value(); });
     EXPECT_LT((J - numeric).norm(), 1e-5 * (1 + J.norm()));
   }
 }
@@ -65,17 +54,17 @@ TEST_P(CameraModelTest, NothingBehindTheCamera) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, CameraModelTest,
-                         ::testing::Values(EurocCamera(), FisheyeCamera()));
+                         ::testing::Values(EurocTestCamera(), FisheyeCamera()));
 
 // Radtan's polynomial turns back far outside the image; such points must not appear inside it.
 TEST(CameraModel, FoldedDistortionIsRefused) {
-  CameraModel camera = EurocCamera();
+  CameraModel camera = EurocTestCamera();
   camera.distortion << -0.3, 0, 0, 0;  // turns back at r = 1.05
   EXPECT_FALSE(camera.Project({3.0, 0.0, 1.0}).has_value());
 }
 
 TEST(CameraModel, SaysWhatIsWrong) {
-  CameraModel camera = EurocCamera();
+  CameraModel camera = EurocTestCamera();
   EXPECT_FALSE(camera.Invalid().has_value());
   camera.fx = std::nan("");
   EXPECT_TRUE(camera.Invalid().has_value());

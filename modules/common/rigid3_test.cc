@@ -5,6 +5,8 @@
 #include <numbers>
 #include <random>
 
+#include "common/testing/numeric_jacobian.h"
+
 namespace pangea {
 namespace {
 
@@ -51,14 +53,9 @@ TEST_F(Rigid3Test, ExpAndLogInvertEachOtherAtEveryScale) {
 TEST_F(Rigid3Test, RightJacobianMatchesCentralDifferences) {
   for (int i = 0; i < 50; ++i) {
     const Eigen::Vector3d w = RandomVector(i < 10 ? 1e-5 : 0.8);
-    Eigen::Matrix3d numeric;
-    constexpr double kStep = 1e-6;
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d d = kStep * Eigen::Vector3d::Unit(k);
-      numeric.col(k) = (LogSo3(ExpSo3(w).conjugate() * ExpSo3(w + d)) -
-                        LogSo3(ExpSo3(w).conjugate() * ExpSo3(w - d))) /
-                       (2 * kStep);
-    }
+    const Eigen::Matrix3d numeric = NumericJacobian(3, 1e-6, [&](const Eigen::Vector3d& d) {
+      return LogSo3(ExpSo3(w).conjugate() * ExpSo3(w + d));
+    });
     EXPECT_LT((RightJacobian(w) - numeric).norm(), 1e-8);
     EXPECT_LT((RightJacobian(w) * RightJacobianInverse(w) - Eigen::Matrix3d::Identity()).norm(),
               1e-9);
@@ -79,14 +76,13 @@ TEST_F(Rigid3Test, CovarianceOfProductAndInverse) {
     const Rigid3 B = RandomRigid3();
     const Matrix6d cov_A = RandomCovariance();
     const Matrix6d cov_B = RandomCovariance();
-    Matrix6d J_A, J_B, J_inv;
-    constexpr double kStep = 1e-6;
-    for (int k = 0; k < 6; ++k) {
-      const Vector6d d = kStep * Vector6d::Unit(k);
-      J_A.col(k) = (A.Plus(d) * B).Minus(A.Plus(-d) * B) / (2 * kStep);
-      J_B.col(k) = (A * B.Plus(d)).Minus(A * B.Plus(-d)) / (2 * kStep);
-      J_inv.col(k) = A.Plus(d).Inverse().Minus(A.Plus(-d).Inverse()) / (2 * kStep);
-    }
+    const auto numeric = [](const auto& f) -> Matrix6d {
+      return NumericJacobian(6, 1e-6,
+                             [&](const Vector6d& d) { return f(d).Minus(f(Vector6d::Zero())); });
+    };
+    const Matrix6d J_A = numeric([&](const Vector6d& d) { return A.Plus(d) * B; });
+    const Matrix6d J_B = numeric([&](const Vector6d& d) { return A * B.Plus(d); });
+    const Matrix6d J_inv = numeric([&](const Vector6d& d) { return A.Plus(d).Inverse(); });
     const Matrix6d product = J_A * cov_A * J_A.transpose() + J_B * cov_B * J_B.transpose();
     EXPECT_LT((ComposeCovariance(A, cov_A, B, cov_B) - product).norm(), 1e-6 * product.norm());
     const Matrix6d inverse = J_inv * cov_A * J_inv.transpose();

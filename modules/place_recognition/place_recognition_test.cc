@@ -183,7 +183,7 @@ TEST(PlaceRecognition, AKeyframeWithoutCornersIsAnsweredToo) {
   PlaceRecognition recognition({});
   Keyframe keyframe;
   keyframe.id = {kMapA, 0};
-  keyframe.camera = test::TestWorld::Camera();
+  keyframe.camera = EurocTestCamera();
   EXPECT_TRUE(recognition.Add(keyframe).candidates.empty());
   keyframe.id = {kMapA, 30};
   EXPECT_TRUE(recognition.Add(keyframe).candidates.empty());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/keyframe.h"
+#include "common/testing/test_cameras.h"
 
 namespace pangea::test {
 
@@ -43,7 +44,7 @@ class TestWorld {
     Keyframe keyframe;
     keyframe.id = id;
     keyframe.utime = int64_t{id.seq} * 250'000;
-    keyframe.camera = Camera();
+    keyframe.camera = EurocTestCamera();
     const Rigid3 T_world_body(YawRotation(yaw) * ExpSo3(Eigen::Vector3d(0, pitch, 0)), p_world);
     keyframe.T_odom_body = T_odom_world * T_world_body;
     const Rigid3 T_cam_world = (T_world_body * keyframe.camera.T_body_cam).Inverse();
@@ -67,20 +68,6 @@ class TestWorld {
     }
     AddClutter(&keyframe);
     return keyframe;
-  }
-
-  static CameraModel Camera() {
-    CameraModel camera;
-    camera.width = 752;
-    camera.height = 480;
-    camera.fx = camera.fy = 458;
-    camera.cx = 367;
-    camera.cy = 248;
-    camera.distortion << -0.28, 0.074, 0, 0;
-    Eigen::Matrix3d R_body_cam;  // z forward = body x, x right = -y, y down = -z
-    R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    camera.T_body_cam = {Eigen::Quaterniond(R_body_cam), Eigen::Vector3d(0.05, 0, 0)};
-    return camera;
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "common/testing/test_cameras.h"
 #include "sim/cameras.h"
 #include "sim/random.h"
 #include "sim/renderer.h"
@@ -23,9 +24,7 @@ using Eigen::Vector3d;
 
 // Looks along +x of the reference, turned by a small rotation of the camera.
 Rigid3 LookAlongX(const Vector3d& turn, const Vector3d& at) {
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(R) * ExpSo3(turn), at};
+  return {LookingAhead() * ExpSo3(turn), at};
 }
 
 // The window around a pixel, less its background (the grey at its corner).

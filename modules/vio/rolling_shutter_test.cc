@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "common/testing/test_cameras.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -11,12 +13,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 CameraModel Phone(double readout_s) {
-  CameraModel camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 450;
-  camera.cx = 319.5;
-  camera.cy = 239.5;
+  CameraModel camera = PinholeTestCamera(640, 480, 450);
   camera.distortion << -0.05, 0.01, 0, 0;
   camera.T_body_cam = {ExpSo3({0.3, -1.2, 0.4}), {0.05, -0.02, 0.01}};
   camera.readout_s = readout_s;

@@ -2,6 +2,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "common/testing/test_cameras.h"
+
 namespace pangea::vio {
 
 cv::Mat RandomTexture(int width, int height, uint64_t seed) {
@@ -19,15 +21,7 @@ cv::Mat RandomTexture(int width, int height, uint64_t seed) {
   return image;
 }
 
-CameraModel PlainCamera() {
-  CameraModel camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = camera.fy = 460;
-  camera.cx = 375.5;
-  camera.cy = 239.5;
-  return camera;
-}
+CameraModel PlainCamera() { return PinholeTestCamera(752, 480, 460); }
 
 cv::Mat TurnedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q) {
   cv::Mat map_x(image.size(), CV_32F), map_y(image.size(), CV_32F), turned;

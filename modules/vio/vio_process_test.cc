@@ -9,6 +9,7 @@
 
 #include "common/channels.h"
 #include "common/messages.h"
+#include "common/testing/test_cameras.h"
 #include "pangea/again_t.hpp"
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
@@ -27,8 +28,7 @@ constexpr int64_t kImageStep_us = 50'000;
 class World {
  public:
   explicit World(uint64_t seed) : camera_(PlainCamera()) {
-    camera_.T_body_cam.q = Eigen::Quaterniond(
-        (Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished());  // looks along body x
+    camera_.T_body_cam.q = LookingAhead();
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(-1, 1);
     for (int i = 0; i < 1500; ++i) {

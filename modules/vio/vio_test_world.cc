@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/testing/test_cameras.h"
 #include "vio/test_random.h"
 
 namespace pangea::vio {
@@ -38,14 +39,8 @@ double PathTime(double t, double begin, double end) {
 
 VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
     : options_(options), rng_(options.seed) {
-  camera_.width = 640;
-  camera_.height = 480;
-  camera_.fx = camera_.fy = 400;
-  camera_.cx = 319.5;
-  camera_.cy = 239.5;
-  Eigen::Matrix3d R_body_cam;
-  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera_.T_body_cam = {Eigen::Quaterniond(R_body_cam) * ExpSo3(RandomVector(rng_, 0.05)),
+  camera_ = PinholeTestCamera(640, 480, 400);
+  camera_.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng_, 0.05)),
                         RandomVector(rng_, 0.05)};
   true_T_body_cam_.q =
       ExpSo3(RandomVector(rng_, options.extrinsics_rotation_sigma)) * camera_.T_body_cam.q;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/testing/numeric_jacobian.h"
 #include "vio/window_factors.h"
 #include "vio/window_start.h"
 #include "vio/window_test_world.h"
@@ -312,22 +313,16 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   const MatrixXd P = prior.H.inverse();
   // Errors drawn as the initialiser means them, seen as the window does: p + dp = Exp(dtheta) p +
   // xi.
-  const MatrixXd J = [&] {
-    MatrixXd out(15, 15);
-    constexpr double kStep = 1e-6;
-    for (int k = 0; k < 15; ++k) {
-      const VectorXd d = kStep * VectorXd::Unit(15, k);
-      WindowState moved = start;
-      ImuState& imu = moved.frames[0].imu;
-      imu.T_odom_body.q = ExpSo3(d.head<3>()) * imu.T_odom_body.q;
-      imu.T_odom_body.t += d.segment<3>(kPosition);
-      imu.v_odom_body += d.segment<3>(kVelocity);
-      imu.gyro_bias += d.segment<3>(kGyroBias);
-      imu.accel_bias += d.segment<3>(kAccelBias);
-      out.col(k) = Difference(moved, start).tail(kFrameSize) / kStep;
-    }
-    return out;
-  }();
+  const MatrixXd J = pangea::NumericJacobian(15, 1e-6, [&](const VectorXd& d) -> VectorXd {
+    WindowState moved = start;
+    ImuState& imu = moved.frames[0].imu;
+    imu.T_odom_body.q = ExpSo3(d.head<3>()) * imu.T_odom_body.q;
+    imu.T_odom_body.t += d.segment<3>(kPosition);
+    imu.v_odom_body += d.segment<3>(kVelocity);
+    imu.gyro_bias += d.segment<3>(kGyroBias);
+    imu.accel_bias += d.segment<3>(kAccelBias);
+    return Difference(moved, start).tail(kFrameSize);
+  });
   const MatrixXd expected = J * plain * J.transpose();
   EXPECT_LT((P.bottomRightCorner(15, 15) - expected).cwiseAbs().maxCoeff(), 1e-5);
   EXPECT_NEAR(std::sqrt(P(kTimeOffset, kTimeOffset)), 0.005, 1e-9);

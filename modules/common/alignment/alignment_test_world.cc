@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "common/matching.h"
+#include "common/testing/test_cameras.h"
 
 namespace pangea {
 namespace {
@@ -55,22 +56,6 @@ Eigen::Vector3d RandomSurfacePoint(Random& random) {
   }
 }
 
-CameraModel TestCamera() {
-  CameraModel camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = 458.654;
-  camera.fy = 457.296;
-  camera.cx = 367.215;
-  camera.cy = 248.375;
-  camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
-  // Camera z forward along body x.
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_body_cam = {Eigen::Quaterniond(R), {0.05, 0.02, 0.01}};
-  return camera;
-}
-
 Rigid3 PoseAt(const TestAgentOptions& options, int k, Random& random) {
   const double angle = options.start_angle + k * options.step_angle;
   const double sign = options.step_angle < 0 ? -1 : 1;
@@ -100,7 +85,7 @@ class AgentWalk {
       Keyframe keyframe;
       keyframe.id = {options_.map, k};
       keyframe.utime = 1'000'000 + 250'000ll * k;
-      keyframe.camera = TestCamera();
+      keyframe.camera = EurocTestCamera();
       keyframe.roll_pitch_covariance = Eigen::Matrix2d::Identity() * 1e-5;
       if (k == 0) {
         const Rigid3 T_odom_room(

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/testing/test_cameras.h"
+
 namespace pangea {
 namespace {
 
@@ -74,20 +76,6 @@ std::vector<SyntheticPoint> MakePoints(const SyntheticWorldOptions& options, Ran
   return points;
 }
 
-CameraModel SyntheticCamera() {
-  CameraModel camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = camera.fy = 458;
-  camera.cx = 367;
-  camera.cy = 248;
-  camera.distortion = {-0.283, 0.074, 0.0002, 0};
-  Eigen::Matrix3d R_body_cam;  // the camera looks along body x
-  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_body_cam = {Eigen::Quaterniond(R_body_cam), {0.05, 0.02, 0.01}};
-  return camera;
-}
-
 class AgentWalk {
  public:
   AgentWalk(const SyntheticWorldOptions& options, const std::vector<SyntheticPoint>& points,
@@ -109,7 +97,7 @@ class AgentWalk {
       Keyframe keyframe;
       keyframe.id = {agent_.map, k};
       keyframe.utime = 1'000'000 + 400'000ll * k;
-      keyframe.camera = SyntheticCamera();
+      keyframe.camera = EurocTestCamera();
       keyframe.roll_pitch_covariance =
           Eigen::Matrix2d::Identity() * std::pow(options_.tilt_sigma, 2);
       Odometry(k, &keyframe);
