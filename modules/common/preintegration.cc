@@ -1,5 +1,7 @@
 #include "common/preintegration.h"
 
+#include <algorithm>
+
 #include "common/rigid3.h"
 
 namespace pangea {
@@ -57,6 +59,12 @@ void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   p.duration_s += dt;
 }
 
+void Preintegrator::Add(std::span<const ImuSample> samples) {
+  for (size_t i = 0; i + 1 < samples.size(); ++i) {
+    Add(samples[i], samples[i + 1]);
+  }
+}
+
 CorrectedDelta CorrectForBias(const Preintegration& p, const Eigen::Vector3d& gyro_bias,
                               const Eigen::Vector3d& accel_bias) {
   Eigen::Matrix<double, 6, 1> db;
@@ -71,6 +79,30 @@ ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime) 
                                                static_cast<double>(b.utime - a.utime)
                                          : 0.0;
   return {utime, a.gyro + share * (b.gyro - a.gyro), a.accel + share * (b.accel - a.accel)};
+}
+
+std::vector<ImuSample> SamplesBetween(std::span<const ImuSample> samples, int64_t from_utime,
+                                      int64_t to_utime) {
+  const auto after = std::partition_point(
+      samples.begin(), samples.end(),
+      [from_utime](const ImuSample& sample) { return sample.utime <= from_utime; });
+  std::vector<ImuSample> between;
+  for (size_t i = std::max<size_t>(1, after - samples.begin()); i < samples.size(); ++i) {
+    const ImuSample& a = samples[i - 1];
+    const ImuSample& b = samples[i];
+    if (a.utime >= to_utime) {
+      break;
+    }
+    if (between.empty()) {
+      between.push_back(a.utime < from_utime ? InterpolateImu(a, b, from_utime) : a);
+    }
+    between.push_back(b.utime > to_utime ? InterpolateImu(a, b, to_utime) : b);
+  }
+  if (!between.empty() && between.back().utime < to_utime) {
+    between.push_back(between.back());
+    between.back().utime = to_utime;
+  }
+  return between;
 }
 
 }  // namespace pangea

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <span>
+#include <vector>
 
 #include "common/imu.h"
 
@@ -30,6 +32,8 @@ class Preintegrator {
                 const Eigen::Vector3d& accel_bias);
   // Motion from `a` to `b`: the mean of the two samples holds in between. Samples must be in order.
   void Add(const ImuSample& a, const ImuSample& b);
+  // Motion from the first of them to the last.
+  void Add(std::span<const ImuSample> samples);
   const Preintegration& result() const { return result_; }
 
  private:
@@ -48,5 +52,10 @@ CorrectedDelta CorrectForBias(const Preintegration& preintegration,
 
 // The sample at `utime` between two others, linear.
 ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime);
+
+// The samples of a span of time, its ends interpolated. The last one holds when they end too early;
+// when they begin too late, so does the span.
+std::vector<ImuSample> SamplesBetween(std::span<const ImuSample> samples, int64_t from_utime,
+                                      int64_t to_utime);
 
 }  // namespace pangea

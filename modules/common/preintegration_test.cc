@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/rigid3.h"
+#include "common/testing/numeric_jacobian.h"
 
 namespace pangea {
 namespace {
@@ -46,14 +47,12 @@ TEST(Preintegration, ConvergesWithTheRate) {
 TEST(Preintegration, BiasJacobianMatchesDifferences) {
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   const Preintegration base = Integrate(200, zero, zero);
+  const Eigen::MatrixXd numeric = NumericJacobian(6, 1e-5, [&](const Eigen::VectorXd& biases) {
+    return Difference(Integrate(200, biases.head<3>(), biases.tail<3>()), base);
+  });
   for (int k = 0; k < 6; ++k) {
-    constexpr double kStep = 1e-5;
-    const Eigen::Vector3d d = kStep * Eigen::Vector3d::Unit(k % 3);
-    const auto plus = k < 3 ? Integrate(200, d, zero) : Integrate(200, zero, d);
-    const auto minus = k < 3 ? Integrate(200, -d, zero) : Integrate(200, zero, -d);
-    const Eigen::Matrix<double, 9, 1> numeric =
-        (Difference(plus, base) - Difference(minus, base)) / (2 * kStep);
-    EXPECT_LT((numeric - base.bias_jacobian.col(k)).norm(), 1e-4 * (1 + numeric.norm())) << k;
+    EXPECT_LT((numeric - base.bias_jacobian).col(k).norm(), 1e-4 * (1 + numeric.col(k).norm()))
+        << k;
   }
 }
 
@@ -96,6 +95,34 @@ TEST(Preintegration, CovarianceIsHonest) {
     sum += error.dot(integrator.result().covariance.llt().solve(error));
   }
   EXPECT_NEAR(sum / kRuns, 9.0, 1.0);  // standard error 0.25
+}
+
+std::vector<int64_t> Times(const std::vector<ImuSample>& samples) {
+  std::vector<int64_t> times;
+  for (const ImuSample& sample : samples) {
+    times.push_back(sample.utime);
+    EXPECT_NEAR(sample.gyro.x(), 1e-3 * static_cast<double>(sample.utime), 1e-12);
+  }
+  return times;
+}
+
+TEST(SamplesBetween, EndsAreInterpolatedAndTheLastSampleHolds) {
+  std::vector<ImuSample> samples;
+  for (int64_t utime = 1000; utime <= 5000; utime += 1000) {
+    samples.push_back({utime, {1e-3 * static_cast<double>(utime), 0, 0}, {}});
+  }
+  using Expected = std::vector<int64_t>;
+  EXPECT_EQ(Times(SamplesBetween(samples, 2000, 4000)), (Expected{2000, 3000, 4000}));
+  EXPECT_EQ(Times(SamplesBetween(samples, 2300, 4100)), (Expected{2300, 3000, 4000, 4100}));
+  EXPECT_EQ(Times(SamplesBetween(samples, 2300, 2400)), (Expected{2300, 2400}));
+  EXPECT_EQ(Times(SamplesBetween(samples, 0, 1500)), (Expected{1000, 1500}));
+  const std::vector<ImuSample> held = SamplesBetween(samples, 4500, 5200);
+  ASSERT_EQ(held.size(), 3u);
+  EXPECT_EQ(held[2].utime, 5200);
+  EXPECT_EQ(held[2].gyro, samples[4].gyro);
+  EXPECT_TRUE(SamplesBetween(samples, 0, 900).empty());
+  EXPECT_TRUE(SamplesBetween(samples, 6000, 7000).empty());
+  EXPECT_TRUE(SamplesBetween({}, 0, 1000).empty());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vio/frame_choice.h"
 #include "vio/imu_buffer.h"
 #include "vio/initialiser.h"
 #include "vio/keyframe_finisher.h"
@@ -28,8 +29,6 @@ constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
 constexpr int kMaxIterations = 4;
-constexpr double kRestTrackShare = 0.5;
-constexpr double kAnyParallax = 1e9;  // pixels
 // A landmark is an outlier when its newest ray is this far off, or all of them together.
 constexpr double kMaxRayError = 5.0;     // sigmas
 constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
@@ -43,6 +42,25 @@ double ChiSquare95(int degrees_of_freedom) {
   return k * c * c * c;
 }
 
+struct LandmarkError {
+  double sum = 0;    // of squares, sigmas
+  double worst = 0;  // ray, sigmas
+};
+LandmarkError ErrorOf(const WindowState& state, const Landmark& landmark) {
+  LandmarkError error;
+  for (const FrameRay& ray : landmark.rays) {
+    const double e = RayError(state, landmark.point, ray);
+    error.sum += e * e;
+    error.worst = std::max(error.worst, e);
+  }
+  return error;
+}
+
+bool IsSeenIn(int frame, const Landmark& landmark) {
+  return std::any_of(landmark.rays.begin(), landmark.rays.end(),
+                     [frame](const FrameRay& ray) { return ray.frame == frame; });
+}
+
 }  // namespace
 
 struct Estimator::Impl {
@@ -53,7 +71,8 @@ struct Estimator::Impl {
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
         initialiser(c, n, o.pixel_sigma),
         imu_samples(n),
-        rest(c, ray_sigma) {
+        rest(c, ray_sigma),
+        choice(o, c) {
     problem.state.T_body_cam = c.T_body_cam;
     problem.state.time_offset_s = c.time_offset_s;
   }
@@ -67,8 +86,6 @@ struct Estimator::Impl {
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
   std::vector<int32_t> Solve();
-  bool HasMoved(int64_t since_utime, double parallax_px, double track_share) const;
-  void ChooseRole();
   void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
@@ -94,7 +111,7 @@ struct Estimator::Impl {
   LandmarkStore landmarks;
   ImuBuffer imu_samples;  // since the last published keyframe
   RestDetector rest;
-  int64_t last_keyframe_utime = 0;                  // newest frame that is a keyframe
+  FrameChoice choice;
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
   int blind_frames = 0;
@@ -118,8 +135,7 @@ void Estimator::Impl::Start(const InitialState& initial) {
     }
     DropPassing();
     Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
-    Newest().stays = HasMoved(problem.state.frames[problem.state.Newest() - 1].utime,
-                              options.window_parallax_px, options.window_track_share);
+    Newest().stays = choice.IsWorthAPlace(problem.state, history);
   }
   started = true;
 }
@@ -180,14 +196,8 @@ std::vector<int32_t> Estimator::Impl::Solve() {
   size_t seen_now = 0;
   const int newest = problem.state.Newest();
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
-    double sum = 0, worst = 0;
-    bool is_seen = false;
-    for (const FrameRay& ray : landmark.rays) {
-      const double e = RayError(problem.state, landmark.point, ray);
-      sum += e * e;
-      worst = std::max(worst, e);
-      is_seen = is_seen || ray.frame == newest;
-    }
+    const bool is_seen = IsSeenIn(newest, landmark);
+    const auto [sum, worst] = ErrorOf(problem.state, landmark);
     const double rms = std::sqrt(sum / (2.0 * static_cast<double>(landmark.rays.size())));
     if (rms < kMaxLandmarkRms && worst < kMaxRayError) {
       seen_now += is_seen ? 1 : 0;
@@ -204,47 +214,6 @@ std::vector<int32_t> Estimator::Impl::Solve() {
   const bool seeing = seen_now >= kMinUsed || rest.images_stand() || tracked > 3 * kMinUsed;
   blind_frames = seeing ? 0 : blind_frames + 1;
   return outliers;
-}
-
-// Whether the image has changed enough since another frame of the window.
-bool Estimator::Impl::HasMoved(int64_t since_utime, double parallax_px, double track_share) const {
-  const WindowState& state = problem.state;
-  const auto since = state.Find(since_utime);
-  if (!since || state.frames[*since].pose_only) {
-    return true;  // nothing is left in common to measure
-  }
-  const WindowFrame& newest = state.frames.back();
-  const Eigen::Quaterniond q_newest_since =
-      (newest.imu.T_odom_body.q * state.T_body_cam.q).conjugate() *
-      (state.frames[*since].imu.T_odom_body.q * state.T_body_cam.q);
-  const TrackHistory::Shift shift = history.ShiftBetween(since_utime, newest.utime, q_newest_since);
-  const double share =
-      static_cast<double>(shift.shared) /
-      std::max<double>(1.0, static_cast<double>(history.Frame(since_utime).size()));
-  return shift.median > parallax_px * camera.PixelAngle() || share < track_share;
-}
-
-// Whether the newest frame stays in the window, and whether it is to be published.
-void Estimator::Impl::ChooseRole() {
-  WindowFrame& newest = Newest();
-  const double elapsed = Seconds(newest.utime - last_keyframe_utime);
-  newest.is_keyframe =
-      last_keyframe_utime == 0 || elapsed >= options.keyframe_interval_s ||
-      (elapsed >= options.keyframe_min_interval_s && !newest.at_rest &&
-       HasMoved(last_keyframe_utime, options.keyframe_parallax_px, options.keyframe_track_share));
-  if (newest.is_keyframe) {
-    last_keyframe_utime = newest.utime;
-  }
-  const int before = problem.state.Newest() - 1;
-  if (newest.is_keyframe || before < 0) {
-    newest.stays = true;
-    return;
-  }
-  const WindowFrame& last = problem.state.frames[before];
-  // A rest is held by the frame it began with, and handed on before its tracks run out.
-  newest.stays = newest.at_rest
-                     ? !last.at_rest || HasMoved(last.utime, kAnyParallax, kRestTrackShare)
-                     : HasMoved(last.utime, options.window_parallax_px, options.window_track_share);
 }
 
 FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
@@ -321,12 +290,8 @@ void Estimator::Impl::FoldLandmarks(int frame) {
       return false;
     }
     landmarks.StartAnew(landmark.id, Newest().utime);
-    double sum = 0;
-    for (const FrameRay& ray : landmark.rays) {
-      const double e = RayError(problem.state, landmark.point, ray);
-      sum += e * e;
-    }
-    return sum > ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
+    return ErrorOf(problem.state, landmark).sum >
+           ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
   });
 }
 
@@ -384,7 +349,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   if (const auto wrong = Implausible()) {
     return fail(*wrong);
   }
-  ChooseRole();
+  choice.Choose(history, &problem.state);
   ShrinkWindow(&result.finished);
   result.state = EstimatorState::kTracking;
   result.T_odom_body = Newest().imu.T_odom_body;

@@ -21,9 +21,11 @@ void ImuBuffer::Add(std::span<const ImuSample> samples) {
 }
 
 void ImuBuffer::Forget(int64_t before_utime) {
-  while (samples_.size() > kMinKept && samples_[1].utime < before_utime - kMargin_us) {
-    samples_.pop_front();
+  size_t old = 0;
+  while (samples_.size() - old > kMinKept && samples_[old + 1].utime < before_utime - kMargin_us) {
+    ++old;
   }
+  samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(old));
 }
 
 std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) const {
@@ -50,23 +52,8 @@ Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
                                     const Eigen::Vector3d& gyro_bias,
                                     const Eigen::Vector3d& accel_bias) const {
   Preintegrator integrator(NoiseAround(from_utime, to_utime), gyro_bias, accel_bias);
-  auto b = std::partition_point(
-      samples_.begin(), samples_.end(),
-      [from_utime](const ImuSample& sample) { return sample.utime <= from_utime; });
-  for (; b != samples_.begin() && b != samples_.end(); ++b) {
-    const ImuSample& a = *std::prev(b);
-    if (a.utime >= to_utime) {
-      break;
-    }
-    integrator.Add(a.utime < from_utime ? InterpolateImu(a, *b, from_utime) : a,
-                   b->utime > to_utime ? InterpolateImu(a, *b, to_utime) : *b);
-  }
   // The time offset may want a little more than has come: the last sample holds.
-  if (!samples_.empty() && samples_.back().utime < to_utime) {
-    ImuSample held = samples_.back();
-    held.utime = to_utime;
-    integrator.Add(samples_.back(), held);
-  }
+  integrator.Add(SamplesBetween(samples_, from_utime, to_utime));
   return integrator.result();
 }
 

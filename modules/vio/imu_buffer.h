@@ -3,7 +3,6 @@
 // The inertial samples that frames of the window or an edge may still ask for. Times are the IMU's.
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <span>
 #include <string>
@@ -36,7 +35,7 @@ class ImuBuffer {
   ImuNoise NoiseAround(int64_t from_utime, int64_t to_utime) const;
 
   ImuNoise noise_;
-  std::deque<ImuSample> samples_;
+  std::vector<ImuSample> samples_;
 };
 
 }  // namespace pangea::vio

@@ -28,9 +28,7 @@ Preintegration IntegrateBetween(std::span<const StartFrame> frames, size_t from,
                                 const ImuNoise& noise, const Vector3d& gyro_bias) {
   Preintegrator integrator(noise, gyro_bias, Vector3d::Zero());
   for (size_t k = from + 1; k <= to; ++k) {
-    for (size_t i = 0; i + 1 < frames[k].imu.size(); ++i) {
-      integrator.Add(frames[k].imu[i], frames[k].imu[i + 1]);
-    }
+    integrator.Add(frames[k].imu);
   }
   return integrator.result();
 }

@@ -201,9 +201,7 @@ class StartProblem {
   void AddImu(const ImuNoise& noise) {
     for (size_t k = 1; k < frames_.size(); ++k) {
       Preintegrator integrator(noise, gyro_bias_, Vector3d::Zero());
-      for (size_t i = 0; i + 1 < frames_[k].imu.size(); ++i) {
-        integrator.Add(frames_[k].imu[i], frames_[k].imu[i + 1]);
-      }
+      integrator.Add(frames_[k].imu);
       Preintegration p = integrator.result();
       // Keeps a span of a single sample invertible: positions to 1 micrometre.
       p.covariance.diagonal().array() += 1e-12;

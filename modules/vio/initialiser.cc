@@ -58,28 +58,6 @@ double SpanSeconds(int64_t from_utime, int64_t to_utime) {
   return 1e-6 * static_cast<double>(to_utime - from_utime);
 }
 
-// The samples of a span of time, its ends interpolated; the last one holds when they end too early.
-std::vector<ImuSample> SamplesBetween(const std::vector<ImuSample>& samples, int64_t from_utime,
-                                      int64_t to_utime) {
-  std::vector<ImuSample> between;
-  for (size_t i = 0; i + 1 < samples.size(); ++i) {
-    const ImuSample& a = samples[i];
-    const ImuSample& b = samples[i + 1];
-    if (b.utime <= from_utime || a.utime >= to_utime) {
-      continue;
-    }
-    if (between.empty()) {
-      between.push_back(a.utime < from_utime ? InterpolateImu(a, b, from_utime) : a);
-    }
-    between.push_back(b.utime > to_utime ? InterpolateImu(a, b, to_utime) : b);
-  }
-  if (!between.empty() && between.back().utime < to_utime) {
-    between.push_back(between.back());
-    between.back().utime = to_utime;
-  }
-  return between;
-}
-
 }  // namespace
 
 Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)

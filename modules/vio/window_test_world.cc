@@ -1,5 +1,7 @@
 #include "vio/window_test_world.h"
 
+#include "common/testing/numeric_jacobian.h"
+#include "common/testing/test_cameras.h"
 #include "vio/test_random.h"
 
 namespace pangea::vio {
@@ -67,9 +69,7 @@ std::vector<ImuSample> TestSamples(int count, int64_t first_utime, uint64_t seed
 Preintegration Integrate(std::span<const ImuSample> samples, const ImuNoise& noise,
                          const Vector3d& gyro_bias, const Vector3d& accel_bias) {
   Preintegrator integrator(noise, gyro_bias, accel_bias);
-  for (size_t i = 0; i + 1 < samples.size(); ++i) {
-    integrator.Add(samples[i], samples[i + 1]);
-  }
+  integrator.Add(samples);
   return integrator.result();
 }
 
@@ -77,10 +77,8 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   std::mt19937_64 rng(options.seed);
   WindowProblem problem;
   WindowState& state = problem.state;
-  Eigen::Matrix3d R_body_cam;  // the camera looks along the body's x axis, a little askew
-  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  state.T_body_cam = {Eigen::Quaterniond(R_body_cam) * ExpSo3(RandomVector(rng, 0.1)),
-                      RandomVector(rng, 0.1)};
+  // A little askew.
+  state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
   state.frames = {FirstFrame(0.002, rng)};
   problem.links.resize(1);
@@ -137,15 +135,11 @@ MatrixXd UnobservableDirections(const WindowState& state) {
 
 MatrixXd NumericJacobian(const WindowState& state,
                          const std::function<VectorXd(const WindowState&)>& f) {
-  constexpr double kStep = 1e-5;
-  MatrixXd J(f(state).size(), state.size());
-  for (int k = 0; k < state.size(); ++k) {
-    WindowState plus = state, minus = state;
-    plus.Retract(kStep * VectorXd::Unit(state.size(), k));
-    minus.Retract(-kStep * VectorXd::Unit(state.size(), k));
-    J.col(k) = (f(plus) - f(minus)) / (2 * kStep);
-  }
-  return J;
+  return pangea::NumericJacobian(state.size(), 1e-5, [&](const VectorXd& error) {
+    WindowState moved = state;
+    moved.Retract(error);
+    return f(moved);
+  });
 }
 
 }  // namespace pangea::vio
