@@ -9,6 +9,7 @@
 
 #include "common/csv.h"
 #include "common/euroc_calibration.h"
+#include "common/median.h"
 
 namespace pangea {
 namespace {
@@ -72,9 +73,7 @@ void NameGaps(const std::vector<T>& items, double factor, const std::string& pat
   for (size_t i = 1; i < items.size(); ++i) {
     periods.push_back(items[i].utime - items[i - 1].utime);
   }
-  std::vector<int64_t> sorted = periods;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double limit_us = factor * static_cast<double>(sorted[sorted.size() / 2]);
+  const double limit_us = factor * static_cast<double>(Median(periods));
   constexpr int kNamed = 5;
   int gaps = 0;
   for (size_t i = 0; i < periods.size(); ++i) {

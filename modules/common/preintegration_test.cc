@@ -109,7 +109,7 @@ std::vector<int64_t> Times(const std::vector<ImuSample>& samples) {
 TEST(SamplesBetween, EndsAreInterpolatedAndTheLastSampleHolds) {
   std::vector<ImuSample> samples;
   for (int64_t utime = 1000; utime <= 5000; utime += 1000) {
-    samples.push_back({utime, {1e-3 * static_cast<double>(utime), 0, 0}, {}});
+    samples.push_back({utime, {1e-3 * static_cast<double>(utime), 0, 0}, Eigen::Vector3d::Zero()});
   }
   using Expected = std::vector<int64_t>;
   EXPECT_EQ(Times(SamplesBetween(samples, 2000, 4000)), (Expected{2000, 3000, 4000}));

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "common/median.h"
 
 namespace pangea {
 namespace {
@@ -16,9 +19,7 @@ Eigen::Vector3d MiddleOfScene(const Keyframe& keyframe) {
     for (const MapPoint& point : keyframe.points) {
       inverse_depths.push_back(point.inverse_depth);
     }
-    const auto middle = inverse_depths.begin() + static_cast<int>(inverse_depths.size() / 2);
-    std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
-    depth = 1.0 / std::max(*middle, 1e-3f);
+    depth = 1.0 / std::max(Median(std::move(inverse_depths)), 1e-3f);
   }
   return keyframe.T_odom_cam() * Eigen::Vector3d(0, 0, depth);
 }

@@ -4,7 +4,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "common/median.h"
 #include "posegraph/posegraph.h"
 
 namespace pangea {
@@ -22,9 +24,7 @@ double MedianDistance(const std::vector<PairEvidence::Innovation>& innovations, 
     const Matrix4d covariance = measurement + factor * odometry;
     distances.push_back(error.dot(covariance.ldlt().solve(error)));
   }
-  const auto middle = distances.begin() + static_cast<int>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return Median(std::move(distances));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/median.h"
+
 namespace pangea::sim {
 namespace {
 
@@ -27,9 +29,7 @@ Eigen::Vector3d MedianVelocity(const Trajectory& t, size_t i, int half_window) {
     for (size_t j = begin; j < end; ++j) {
       values[j - begin] = Velocity(t, j)[axis];
     }
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
+    median[axis] = Median(values);
   }
   return median;
 }

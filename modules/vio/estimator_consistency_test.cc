@@ -14,18 +14,6 @@ namespace pangea::vio {
 namespace {
 
 using Eigen::Vector3d;
-using Eigen::VectorXd;
-
-// Normalised squares by their dimension: 1 is honest.
-struct Mean {
-  double sum = 0;
-  int count = 0;
-  void Add(const VectorXd& e, const Eigen::MatrixXd& covariance) {
-    sum += e.dot(covariance.llt().solve(e)) / static_cast<double>(e.size());
-    ++count;
-  }
-  double value() const { return sum / count; }
-};
 
 struct Outcome {
   std::vector<FinishedKeyframe> keyframes;
@@ -64,7 +52,7 @@ Outcome RideOnce(uint64_t seed) {
   return run;
 }
 
-// The window's coordinates (window_state.h).
+// In the window's coordinates (window_state.h).
 Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const ImuState& truth) {
   const Eigen::Quaterniond turn = truth.T_odom_body.q * keyframe.T_odom_body.q.conjugate();
   Eigen::Matrix<double, 15, 1> e;
@@ -93,10 +81,10 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
     for (size_t k = 0; k < run.keyframes.size(); ++k) {
       const auto& P = run.keyframes[k].covariance;
       const auto e = ErrorOf(run.keyframes[k], run.truth[k]);
-      tilt.Add(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
-      velocity.Add(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
-      gyro_bias.Add(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
-      accel_bias.Add(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
+      tilt.AddSquare(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+      velocity.AddSquare(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+      gyro_bias.AddSquare(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
+      accel_bias.AddSquare(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
       // Position and yaw cannot be observed: nobody ever knows more of them than the start did.
       const Eigen::Matrix4d gained = UnobservableInformation(P) - at_start;
       EXPECT_LT(gained.eigenvalues().real().maxCoeff(), 1e-3 * at_start.diagonal().minCoeff())

@@ -14,7 +14,6 @@
 namespace pangea::vio {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
 
@@ -243,17 +242,6 @@ TEST(Estimator, TheSameInputGivesTheSameOutput) {
   EXPECT_EQ(a.finished.size(), b.finished.size());
 }
 
-// Mean of normalised squares.
-struct Mean {
-  double sum = 0;
-  int count = 0;
-  void Add(double value) {
-    sum += value;
-    ++count;
-  }
-  double value() const { return sum / count; }
-};
-
 TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
   Mean edge, edge_position, edge_rotation, tilt, depth, preintegrated;
   for (uint64_t seed = 1; seed <= 10; ++seed) {
@@ -285,7 +273,7 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
       const ImuState truth = ride.world.TruthAt(keyframe.utime);
       const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
       const Vector3d turn = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
-      tilt.Add(turn.head<2>().dot(keyframe.roll_pitch_covariance.inverse() * turn.head<2>()) / 2);
+      tilt.AddSquare(turn.head<2>(), keyframe.roll_pitch_covariance);
       for (const LandmarkDepth& landmark : keyframe.landmarks) {
         if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
           const double e = landmark.inverse_depth - 1 / *z;
@@ -306,11 +294,9 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
           ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
       const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
       const Matrix6d& C = keyframe.edge->covariance;
-      edge.Add(e.dot(C.llt().solve(e)) / 6);
-      edge_position.Add(
-          e.head<3>().dot(Matrix3d(C.topLeftCorner<3, 3>()).llt().solve(e.head<3>())) / 3);
-      edge_rotation.Add(
-          e.tail<3>().dot(Matrix3d(C.bottomRightCorner<3, 3>()).llt().solve(e.tail<3>())) / 3);
+      edge.AddSquare(e, C);
+      edge_position.AddSquare(e.head<3>(), C.topLeftCorner<3, 3>());
+      edge_rotation.AddSquare(e.tail<3>(), C.bottomRightCorner<3, 3>());
       // The inertial measurement of the same span, corrected for the true biases.
       const ImuState before = ride.world.TruthAt(previous.utime);
       const CorrectedDelta delta =

@@ -32,4 +32,18 @@ ImuNoise MeasuredNoise(const ImuNoise& least, std::span<const ImuSample> samples
   return noise;
 }
 
+SampleMoments MomentsOf(std::span<const ImuSample> samples) {
+  const auto count = static_cast<double>(samples.size());
+  SampleMoments moments;
+  for (const ImuSample& sample : samples) {
+    moments.gyro_mean += sample.gyro / count;
+    moments.accel_mean += sample.accel / count;
+  }
+  for (const ImuSample& sample : samples) {
+    moments.gyro_variance += (sample.gyro - moments.gyro_mean).squaredNorm() / count;
+    moments.accel_variance += (sample.accel - moments.accel_mean).squaredNorm() / count;
+  }
+  return moments;
+}
+
 }  // namespace pangea::vio

@@ -46,5 +46,14 @@ TEST(MeasuredNoise, IsNeverBelowTheDataSheet) {
   EXPECT_EQ(MeasuredNoise(ImuNoise{}, {}).accel_noise_density, ImuNoise{}.accel_noise_density);
 }
 
+TEST(MomentsOf, AreThoseOfTheSamples) {
+  const std::vector<ImuSample> samples = {{0, {1, 0, 2}, {3, 0, 9}}, {1, {3, 0, 2}, {3, 4, 9}}};
+  const SampleMoments moments = MomentsOf(samples);
+  EXPECT_EQ(moments.gyro_mean, Eigen::Vector3d(2, 0, 2));
+  EXPECT_EQ(moments.accel_mean, Eigen::Vector3d(3, 2, 9));
+  EXPECT_EQ(moments.gyro_variance, 1);
+  EXPECT_EQ(moments.accel_variance, 4);
+}
+
 }  // namespace
 }  // namespace pangea::vio

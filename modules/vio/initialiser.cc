@@ -5,7 +5,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "common/median.h"
 #include "common/preintegration.h"
 #include "vio/imu_noise.h"
 #include "vio/initial_solution.h"
@@ -49,9 +51,7 @@ double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* 
   if (displacement.empty()) {
     return 1e9;
   }
-  std::nth_element(displacement.begin(), displacement.begin() + displacement.size() / 2,
-                   displacement.end());
-  return displacement[displacement.size() / 2];
+  return Median(std::move(displacement));
 }
 
 double SpanSeconds(int64_t from_utime, int64_t to_utime) {
@@ -99,24 +99,16 @@ std::optional<InitialState> Initialiser::TryAtRest() const {
   if (samples.size() < 20 || shared < kMinTracks || moved > kRestSigmas * pixel_sigma_) {
     return std::nullopt;
   }
-  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
-  for (const ImuSample& sample : samples) {
-    mean_gyro += sample.gyro / static_cast<double>(samples.size());
-    mean_accel += sample.accel / static_cast<double>(samples.size());
-  }
-  double var_gyro = 0, var_accel = 0;
-  for (const ImuSample& sample : samples) {
-    var_gyro += (sample.gyro - mean_gyro).squaredNorm() / static_cast<double>(samples.size());
-    var_accel += (sample.accel - mean_accel).squaredNorm() / static_cast<double>(samples.size());
-  }
-  if (var_accel > kRestAccel * kRestAccel || var_gyro > kRestGyro * kRestGyro) {
+  const SampleMoments moments = MomentsOf(samples);
+  if (moments.accel_variance > kRestAccel * kRestAccel ||
+      moments.gyro_variance > kRestGyro * kRestGyro) {
     return std::nullopt;
   }
   InitialState state;
   state.at_rest = true;
   ImuState imu;
-  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(mean_accel, Vector3d::UnitZ());
-  imu.gyro_bias = mean_gyro;
+  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
+  imu.gyro_bias = moments.gyro_mean;
   state.frames.push_back({frames_.back(), imu});
   // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
   Eigen::Matrix<double, 15, 1> sigma;

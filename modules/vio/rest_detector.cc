@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "vio/imu_noise.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -16,17 +18,9 @@ constexpr size_t kSamples = 50;
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 bool IsQuiet(const std::vector<ImuSample>& samples, const Vector3d& gyro_bias) {
-  const double count = static_cast<double>(samples.size());
-  Vector3d mean_gyro = Vector3d::Zero(), mean_accel = Vector3d::Zero();
-  for (const ImuSample& sample : samples) {
-    mean_gyro += sample.gyro / count;
-    mean_accel += sample.accel / count;
-  }
-  double var_accel = 0;
-  for (const ImuSample& sample : samples) {
-    var_accel += (sample.accel - mean_accel).squaredNorm() / count;
-  }
-  return (mean_gyro - gyro_bias).norm() < kMaxGyro && var_accel < kMaxAccelSigma * kMaxAccelSigma;
+  const SampleMoments moments = MomentsOf(samples);
+  return (moments.gyro_mean - gyro_bias).norm() < kMaxGyro &&
+         moments.accel_variance < kMaxAccelSigma * kMaxAccelSigma;
 }
 
 }  // namespace

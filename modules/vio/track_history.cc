@@ -1,8 +1,10 @@
 #include "vio/track_history.h"
 
-#include <algorithm>
 #include <limits>
 #include <set>
+#include <utility>
+
+#include "common/median.h"
 
 namespace pangea::vio {
 namespace {
@@ -82,8 +84,7 @@ TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_ut
   if (shifts.empty()) {
     return {};
   }
-  std::nth_element(shifts.begin(), shifts.begin() + shifts.size() / 2, shifts.end());
-  return {shifts[shifts.size() / 2], shifts.size()};
+  return {Median(shifts), shifts.size()};
 }
 
 double TrackHistory::MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const {
@@ -98,9 +99,7 @@ double TrackHistory::MedianShiftSigmas(int64_t from_utime, int64_t to_utime) con
   if (shifts.size() < kMinShared) {
     return std::numeric_limits<double>::infinity();
   }
-  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
-  std::nth_element(shifts.begin(), middle, shifts.end());
-  return *middle;
+  return Median(std::move(shifts));
 }
 
 }  // namespace pangea::vio

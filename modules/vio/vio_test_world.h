@@ -3,6 +3,7 @@
 // A hand-held camera with an IMU in a hall with points on its walls: what an ideal tracker and the
 // sensors would hand to the estimator, and the truth.
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
@@ -17,6 +18,20 @@
 #include "vio/window_state.h"
 
 namespace pangea::vio {
+
+// A mean, of normalised squares by their dimension for instance: then 1 is honest.
+struct Mean {
+  double sum = 0;
+  int count = 0;
+  void Add(double value) {
+    sum += value;
+    ++count;
+  }
+  void AddSquare(const Eigen::VectorXd& e, const Eigen::MatrixXd& covariance) {
+    Add(e.dot(covariance.llt().solve(e)) / static_cast<double>(e.size()));
+  }
+  double value() const { return sum / count; }
+};
 
 struct VioTestWorldOptions {
   uint64_t seed = 1;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/alignment/ba_factors.h"
+#include "common/median.h"
 
 namespace pangea {
 namespace {
@@ -311,9 +312,7 @@ double MedianDistance(const Window& window_m, const Window& window_c,
       distances.push_back(holder.landmarks[matches[i].landmark].p_w.norm());
     }
   }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return Median(std::move(distances));
 }
 
 }  // namespace
