@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/testing/test_cameras.h"
 
 namespace pangea::vio {

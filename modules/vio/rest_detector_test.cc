@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "common/testing/test_cameras.h"
@@ -37,7 +38,7 @@ struct Said {
 ImuSample SampleAt(const Ride& ride, int i, std::mt19937_64& rng) {
   const double t = i / kRate_hz;
   const Vector3d gravity = ExpSo3(t * ride.omega).conjugate() * Vector3d(0, 0, kGravity);
-  return {static_cast<int64_t>(1e6 * t), ride.omega + ride.seen_omega + RandomVector(rng, 2e-3),
+  return {std::llround(1e6 * t), ride.omega + ride.seen_omega + RandomVector(rng, 2e-3),
           gravity + RandomVector(rng, ride.accel_sigma)};
 }
 
@@ -46,7 +47,7 @@ TrackedFrame FrameAt(const Ride& ride, const CameraModel& camera, double t,
   const Rigid3 T_start_cam =
       Rigid3(ExpSo3(t * ride.omega), t * ride.v) * Rigid3(LookingAhead(), Vector3d::Zero());
   TrackedFrame frame;
-  frame.utime = static_cast<int64_t>(1e6 * t);
+  frame.utime = std::llround(1e6 * t);
   for (int id = 0; id < ride.landmarks; ++id) {
     const Eigen::Vector2d pixel = camera.Project(T_start_cam.Inverse() * points[id]).value() +
                                   RandomVector(rng, ride.sigma_px * ride.pixel_noise).head<2>();
