@@ -71,6 +71,20 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
   return keyframes;
 }
 
+std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id) {
+  std::vector<LoggedKeyframe> keyframes = ReadKeyframeLog(log);
+  std::erase_if(keyframes, [agent_id](const LoggedKeyframe& keyframe) {
+    return keyframe.id.map.agent_id != agent_id;
+  });
+  if (keyframes.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no keyframes of agent {} in this log; an agent has "
+                    "the id its keyframes were made with",
+                    log.string(), agent_id));
+  }
+  return keyframes;
+}
+
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs) {
   std::vector<LoggedKeyframe> merged;
   std::vector<size_t> next(logs.size(), 0);

@@ -23,6 +23,9 @@ struct LoggedKeyframe {
 // out of order (named).
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log);
 
+// Those of one agent. Throws std::runtime_error naming the log when it has none.
+std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id);
+
 // Several logs as if they had started together: ordered by the time since each log's first
 // keyframe, ties by the order of the logs; each log keeps its own order.
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs);

@@ -54,6 +54,12 @@ TEST(KeyframeLog, RepeatsCountOnce) {
   EXPECT_EQ(keyframes[2].utime, 30);
 }
 
+TEST(KeyframeLog, OfOneAgent) {
+  const auto log = WriteLog("one_agent.lcm", 3, {{0, 10}, {1, 20}});
+  EXPECT_EQ(ReadKeyframeLogOf(log, 3).size(), 2u);
+  EXPECT_THROW(ReadKeyframeLogOf(log, 4), std::runtime_error);
+}
+
 TEST(KeyframeLog, NamesGaps) {
   EXPECT_THAT(ErrorOf(WriteLog("gap.lcm", 3, {{0, 10}, {4, 20}})),
               testing::AllOf(HasSubstr("gap.lcm"), HasSubstr("3/100"), HasSubstr("1 to 3")));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <stdexcept>
 
 #include "common/bus/playback_pace.h"
 
@@ -19,15 +18,7 @@ KeyframePlayer::KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
     : options_(options),
       keyframes_(std::move(keyframes)),
       node_(bus, fmt::format("keyframes_{}", options.agent_id)),
-      outlet_(node_, options.agent_id, keyframes_.size(), now_utime) {
-  for (const LoggedKeyframe& keyframe : keyframes_) {
-    const int32_t agent_id = keyframe.id.map.agent_id;
-    if (agent_id != options_.agent_id) {
-      throw std::runtime_error(fmt::format("the stored keyframes are agent {}'s, not agent {}'s",
-                                           agent_id, options_.agent_id));
-    }
-  }
-}
+      outlet_(node_, options.agent_id, keyframes_.size(), now_utime) {}
 
 std::optional<int64_t> KeyframePlayer::next_us() const {
   if (next_ == keyframes_.size()) {

@@ -23,7 +23,7 @@ struct KeyframePlayerOptions {
 
 class KeyframePlayer : public Process {
  public:
-  // Throws std::runtime_error when there are keyframes of another agent.
+  // `keyframes`: this agent's.
   KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
                  std::vector<LoggedKeyframe> keyframes, int64_t now_utime);
 

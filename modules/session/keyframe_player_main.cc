@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
   app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
       ->required()
       ->check(CLI::Range(1, 65535));
-  app.add_option("--keyframes", log, "LCM log with KEYFRAME_k: pangea-vio --out-keyframes")
+  app.add_option("--keyframes", log,
+                 "LCM log with KEYFRAME_k: of pangea-vio --out-keyframes, or of an earlier session")
       ->required()
       ->check(CLI::ExistingFile);
   app.add_option("--bus", bus_url, "LCM URL of the agent's bus")->capture_default_str();
@@ -30,7 +31,8 @@ int main(int argc, char** argv) {
     options.rate = rate == "max" ? 0 : std::stod(rate);
     pangea::InstallSignalHandlers();
     pangea::LcmBus bus(bus_url);
-    pangea::session::PlayKeyframes(bus, options, pangea::session::ReadKeyframeLog(log));
+    pangea::session::PlayKeyframes(bus, options,
+                                   pangea::session::ReadKeyframeLogOf(log, options.agent_id));
     return 0;
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-keyframe-player: {}\n", error.what());

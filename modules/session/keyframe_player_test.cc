@@ -85,9 +85,5 @@ TEST_F(KeyframePlayerTest, AnswersForWhatItHasPlayed) {
   EXPECT_EQ(player.outlet().Unacknowledged(), 1);
 }
 
-TEST_F(KeyframePlayerTest, RefusesAnotherAgentsKeyframes) {
-  EXPECT_THROW(KeyframePlayer(bus_, {5, 1, std::nullopt}, Keyframes(1), 0), std::runtime_error);
-}
-
 }  // namespace
 }  // namespace pangea::session

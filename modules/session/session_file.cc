@@ -56,6 +56,10 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: delay, start and duration must not be negative", file, agent.id));
     }
+    if (agent.recording.empty() && agent.keyframes.empty()) {
+      throw std::runtime_error(
+          fmt::format("{}: agent {}: give it a 'recording', or 'keyframes'", file, agent.id));
+    }
     if (!agent.keyframes.empty() && agent.start_s > 0) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
@@ -91,7 +95,6 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
     item.Add("id", &agent.id);
     item.Require("id");
     item.Add("recording", &agent.recording);
-    item.Require("recording");
     item.Add("delay", &agent.delay_s);
     item.Add("start", &agent.start_s);
     item.Add("duration", &agent.duration_s);
@@ -107,6 +110,9 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
   const fs::path base = recordings.value_or(fs::absolute(file).parent_path());
   std::string missing;
   for (AgentScript& agent : script.agents) {
+    if (agent.recording.empty()) {
+      continue;
+    }
     const auto found = FindRecording((base / agent.recording).lexically_normal());
     if (found) {
       agent.resolved = *found;

@@ -19,16 +19,19 @@
 namespace pangea::session {
 
 struct AgentScript {
-  int32_t id = 0;         // 1 .. 65535, unique in the session
-  std::string recording;  // folder, relative to the session file or to --recordings
+  int32_t id = 0;  // 1 .. 65535, unique in the session
+  // Folder, relative to the session file or to --recordings; may be absent where there are
+  // keyframes.
+  std::string recording;
   double delay_s = 0;     // session time at which the agent starts
   double start_s = 0;     // where in the recording it starts
   double duration_s = 0;  // how much of it is played; 0 = to the end
-  // An LCM log with the agent's keyframes, which are played instead of running the odometry;
-  // the recording is then only its ground truth. Relative to the session file; empty for none.
+  // An LCM log with the agent's keyframes (and perhaps others'), which are played instead of
+  // running the odometry; the recording is then only its ground truth. Relative to the session
+  // file; empty for none.
   std::string keyframes;
   std::optional<LinkConditions> link;  // a bad link of its own to the server
-  std::filesystem::path resolved;      // the recording's folder, found
+  std::filesystem::path resolved;      // the recording's folder, found; empty without a recording
   std::filesystem::path resolved_keyframes;
 };
 

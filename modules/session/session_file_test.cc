@@ -58,8 +58,10 @@ TEST_F(SessionFileTest, ReadsLinkAndKeyframes) {
       ReadSessionFile(Write("agents:\n"
                             "  - {id: 1, recording: ../recordings/MH_01, keyframes: one.lcm,\n"
                             "     link: {loss: 0.1, partitions: [{at: 30, seconds: 60}]}}\n"
-                            "  - {id: 2, recording: ../recordings/MH_02}\n"),
+                            "  - {id: 2, recording: ../recordings/MH_02}\n"
+                            "  - {id: 3, keyframes: one.lcm}\n"),
                       std::nullopt);
+  EXPECT_TRUE(script.agents[2].resolved.empty());
   EXPECT_EQ(script.agents[0].resolved_keyframes, folder_ / "sessions" / "one.lcm");
   ASSERT_TRUE(script.agents[0].link);
   EXPECT_EQ(script.agents[0].link->loss, 0.1);
@@ -83,6 +85,8 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
                       "  - {id: 1, recording: ../recordings/MH_02}\n"),
               HasSubstr("twice"));
   EXPECT_THAT(ErrorOf("agents: []\n"), HasSubstr("empty"));
+  EXPECT_THAT(ErrorOf("agents: [{id: 6}]\n"),
+              testing::AllOf(HasSubstr("agent 6"), HasSubstr("'recording'")));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, start: -3}]\n"),
               HasSubstr("negative"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, link: {los: 0.1}}]\n"),

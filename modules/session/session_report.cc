@@ -104,7 +104,8 @@ void WriteRecordings(const SessionScript& script, const fs::path& out) {
   json agents = json::array();
   for (const AgentScript& agent : script.agents) {
     agents.push_back({{"id", agent.id},
-                      {"recording", fs::absolute(agent.resolved).string()},
+                      {"recording", agent.resolved.empty() ? std::string()
+                                                           : fs::absolute(agent.resolved).string()},
                       {"start", agent.start_s},
                       {"duration", agent.duration_s}});
   }

@@ -1,0 +1,64 @@
+// Captured keyframes through real processes over bad links: nothing is lost, and the map is the one
+// the capture replays to.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/trajectory.h"
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// The agents' keyframes meet in another order than in the capture.
+constexpr double kTolerance_m = 0.01;
+
+fs::path Sample() { return fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks"; }
+
+// Root mean square of the distances between the same agent's keyframes, both in the map's frame.
+double Distance(const fs::path& out, const std::string& name) {
+  const Trajectory got = ReadTum((out / name).string(), nullptr);
+  const Trajectory expected = ReadTum((Sample() / "expected" / name).string(), nullptr);
+  EXPECT_EQ(got.size(), expected.size()) << name;
+  double sum = 0;
+  for (size_t i = 0; i < std::min(got.size(), expected.size()); ++i) {
+    EXPECT_EQ(got[i].utime, expected[i].utime);
+    sum += (got[i].T.t - expected[i].T.t).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(expected.size()));
+}
+
+TEST(BadLink, ChangesNothing) {
+  const fs::path folder = FreshFolder("bad_link");
+  const std::string rest =
+      "keyframes: " + (Sample() / "session.lcm").string() +
+      ", link: {loss: 0.1, delay_ms: 300, jitter_ms: 20, reorder: 0.02, duplicate: 0.02";
+  const fs::path file =
+      WriteSession(folder, {"id: 1, " + rest + "}", "id: 2, delay: 2, " + rest + ", seed: 2}"});
+  const fs::path out = folder / "out";
+  const Outcome run =
+      RunCommand("pangea-session run " + file.string() + " --out " + out.string() + " --rate max");
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const auto report = ReadJson(out / "report.json");
+  ASSERT_EQ(report["groups"].size(), 1u) << run.output;
+  EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
+  EXPECT_LT(Distance(out, "agent_1.tum"), kTolerance_m);
+  EXPECT_LT(Distance(out, "agent_2.tum"), kTolerance_m);
+  for (const auto& agent : report["agents"]) {
+    const auto& up = agent["link"]["packets_up"];
+    EXPECT_GT(up["lost"].get<int>(), 20);
+    EXPECT_GT(up["doubled"].get<int>(), 2);
+    EXPECT_GT(up["reordered"].get<int>(), 2);
+  }
+  EXPECT_THAT(run.output, HasSubstr("loss 10 %"));
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace pangea::tests
