@@ -27,10 +27,20 @@ int PoseGraph::MapNumber(const MapId& id) {
 }
 
 PoseGraphUpdate PoseGraph::AddKeyframe(const Keyframe& keyframe) {
+  Take(keyframe);
+  return Settle();
+}
+
+PoseGraphUpdate PoseGraph::AddConstraint(const Constraint& constraint) {
+  Take(constraint);
+  return Settle();
+}
+
+void PoseGraph::Take(const Keyframe& keyframe) {
   const int number = MapNumber(keyframe.id.map);
   Map& map = maps_[number];
   if (!map.chain.Add(keyframe)) {
-    return {};
+    return;
   }
   map.poses.push_back(map.T_map_odom * Pose4{keyframe.T_odom_body.t, 0});
   Group& group = GroupOf(number);
@@ -48,22 +58,18 @@ PoseGraphUpdate PoseGraph::AddKeyframe(const Keyframe& keyframe) {
   std::erase_if(parked_, [&](const Constraint& constraint) {
     return (constraint.from == keyframe.id || constraint.to == keyframe.id) && TryAdd(constraint);
   });
-  return Settle(false);
 }
 
-PoseGraphUpdate PoseGraph::AddConstraint(const Constraint& constraint) {
+void PoseGraph::Take(const Constraint& constraint) {
   if (!constraint.accepted || seen_.contains(constraint.Id())) {
-    return {};
+    return;
   }
   if (TryAdd(constraint)) {
     seen_.insert(constraint.Id());
-    return Settle(false);
-  }
-  if (parked_.size() < kMaxParked) {
+  } else if (parked_.size() < kMaxParked) {
     seen_.insert(constraint.Id());
     parked_.push_back(constraint);
   }
-  return {};
 }
 
 bool PoseGraph::TryAdd(const Constraint& constraint) {

@@ -16,7 +16,7 @@
 // estimation, robustly). Never below one.
 //
 // Deterministic: the same calls in the same order give the same bytes. When it solves depends on
-// counts of messages alone. One thread.
+// counts of messages, and on when it is told to settle, alone. One thread.
 
 #include <cstdint>
 #include <deque>
@@ -73,9 +73,14 @@ class PoseGraph {
   explicit PoseGraph(const PoseGraphOptions& options, int64_t first_revision = 1);
 
   // A repeat, or one older than the newest of its map, changes nothing.
-  PoseGraphUpdate AddKeyframe(const Keyframe& keyframe);
+  void Take(const Keyframe& keyframe);
   // A repeat or a refusal changes nothing; one about an unknown keyframe waits for it (bounded:
   // beyond kMaxParked it is forgotten and may come again).
+  void Take(const Constraint& constraint);
+  // Solves what is due after all that was taken, once.
+  PoseGraphUpdate Settle() { return Settle(false); }
+  // Take and Settle.
+  PoseGraphUpdate AddKeyframe(const Keyframe& keyframe);
   PoseGraphUpdate AddConstraint(const Constraint& constraint);
   // Solves every group from the beginning, as if all had come at once, and publishes what is new.
   PoseGraphUpdate Finish();

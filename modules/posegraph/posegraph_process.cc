@@ -59,13 +59,15 @@ void PoseGraphProcess::OnKeyframe(const keyframe_t& message) {
     Enqueue(id.map, seq, std::nullopt);
   }
   Enqueue(id.map, id.seq, std::move(parsed.value));
+  SettleUnlessMoreWaits();
 }
 
 void PoseGraphProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
   for (const Item& ready : keyframes_.Add(map, seq, std::move(item))) {
     if (ready) {
       ++num_arrived_;
-      Publish(graph_.AddKeyframe(*ready));
+      graph_.Take(*ready);
+      ++num_unsettled_;
     } else {
       node_.NoteDropped();
     }
@@ -85,7 +87,9 @@ void PoseGraphProcess::OnConstraint(const constraint_t& message) {
   } else {
     node_.Count("verdicts_repeated");
   }
-  Publish(graph_.AddConstraint(*parsed.value));
+  graph_.Take(*parsed.value);
+  ++num_unsettled_;
+  SettleUnlessMoreWaits();
 }
 
 void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
@@ -105,6 +109,7 @@ void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
       due_.try_emplace(promised.Id(), Due{query, now_utime_});
     }
   }
+  SettleUnlessMoreWaits();
 }
 
 void PoseGraphProcess::OnHave(const have_t& message) {
@@ -142,6 +147,13 @@ void PoseGraphProcess::OnAgain(const again_t& message) {
   }
 }
 
+void PoseGraphProcess::SettleUnlessMoreWaits() {
+  if (num_unsettled_ > 0 && (num_unsettled_ >= kMaxUnsettled || !node_.bus().MoreWaits())) {
+    num_unsettled_ = 0;
+    Publish(graph_.Settle());
+  }
+}
+
 void PoseGraphProcess::Publish(const PoseGraphUpdate& update) {
   for (const Correction& correction : update.corrections) {
     node_.Publish(channels::Correction(correction.map.agent_id), ToMessage(correction));
@@ -153,10 +165,14 @@ void PoseGraphProcess::Publish(const PoseGraphUpdate& update) {
   }
 }
 
-void PoseGraphProcess::Finish() { Publish(graph_.Finish()); }
+void PoseGraphProcess::Finish() {
+  num_unsettled_ = 0;
+  Publish(graph_.Finish());
+}
 
 void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
+  SettleUnlessMoreWaits();
   AskForKeyframes(now_utime);
   AskForMatches(now_utime);
   AskForVerdicts(now_utime);

@@ -35,6 +35,12 @@ std::vector<Constraint> MakeConstraints(const SyntheticWorld& world) {
   return constraints;
 }
 
+// Says that more waits when a test says so.
+struct TestBus : LocalBus {
+  bool MoreWaits() override { return more_waits; }
+  bool more_waits = false;
+};
+
 // A server bus with the process on it, and all that it says.
 struct Server {
   explicit Server(int64_t first_revision = 1) : process(bus, {}, first_revision) {
@@ -81,7 +87,7 @@ struct Server {
     bus.Drain();
   }
 
-  LocalBus bus;
+  TestBus bus;
   PoseGraphProcess process;
   std::vector<map_state_t> states;
   std::vector<correction_t> corrections;
@@ -124,6 +130,34 @@ TEST(PoseGraphProcess, TellsEachAgentItsDriftAndTheMap) {
   const size_t said = server.said.size();
   server.Finish();
   EXPECT_EQ(server.said.size(), said);
+}
+
+TEST(PoseGraphProcess, TakesWhatWaitsBeforeItSolves) {
+  const SyntheticWorld world = MakeWorld(20);
+  const std::vector<Constraint> constraints = MakeConstraints(world);
+  ASSERT_GT(constraints.size(), 10u);  // more than a merge needs
+  Server server;
+  server.bus.more_waits = true;
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      server.Send(keyframe);
+    }
+  }
+  for (size_t i = 0; i + 1 < constraints.size(); ++i) {
+    server.Send(constraints[i]);
+  }
+  EXPECT_EQ(server.process.graph().counters().solves, 0);
+  EXPECT_TRUE(server.corrections.empty());
+  server.bus.more_waits = false;
+  server.Tick(1);
+  EXPECT_EQ(server.process.graph().counters().solves, 1);
+  EXPECT_EQ(server.corrections.size(), 2u);
+  // Messages without an end hold nothing up for ever.
+  server.bus.more_waits = true;
+  for (int i = 0; i < 100; ++i) {
+    server.Send(constraints.back());
+  }
+  EXPECT_EQ(server.process.graph().counters().solves, 2);
 }
 
 TEST(PoseGraphProcess, TheSameMessagesGiveTheSameBytes) {

@@ -23,6 +23,9 @@ class Bus {
   virtual void Publish(const std::string& channel, Bytes data) = 0;
   // `channel_regex` is anchored at both ends (LCM's rule). Lasts as long as the bus.
   virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
+  // Whether more messages wait already, so that work which they share may wait for them. A bus that
+  // has each message handled to completion says no.
+  virtual bool MoreWaits() { return false; }
 };
 
 // Publish queues; Drain delivers, including what the handlers publish, until nothing is left.
@@ -51,6 +54,7 @@ class LcmBus : public Bus {
   // Delivers what is waiting, at most for `timeout_ms`; returns whether anything came.
   // An exception from a handler is rethrown here, not through LCM's C frames.
   bool Handle(int timeout_ms);
+  bool MoreWaits() override;
   // File descriptor to poll on; -1 when the connection is gone.
   int fd();
 

@@ -34,6 +34,19 @@ TEST(LocalBus, DeliversInOrderIncludingWhatHandlersPublish) {
   EXPECT_THAT(seen, testing::ElementsAre("A", "any A", "any B"));
 }
 
+TEST(LcmBus, KnowsWhetherMoreWaits) {
+  LcmBus bus("memq://");
+  std::vector<bool> more;
+  bus.Subscribe("A", [&](const std::string&, Bytes) { more.push_back(bus.MoreWaits()); });
+  bus.Subscribe("B", [](const std::string&, Bytes) {});
+  bus.Publish("A", {});
+  bus.Publish("B", {});
+  bus.Publish("A", {});
+  while (bus.Handle(0)) {
+  }
+  EXPECT_THAT(more, testing::ElementsAre(true, false));
+}
+
 TEST(Node, CountsWhatDoesNotDecode) {
   LocalBus bus;
   Node node(bus, "test");

@@ -66,6 +66,11 @@ void LcmBus::Subscribe(const std::string& channel_regex, Handler handler) {
 
 int LcmBus::fd() { return impl_->lcm.getFileno(); }
 
+bool LcmBus::MoreWaits() {
+  pollfd poll_fd{fd(), POLLIN, 0};
+  return poll(&poll_fd, 1, 0) > 0 && (poll_fd.revents & POLLIN) != 0;
+}
+
 bool LcmBus::Handle(int timeout_ms) {
   // A tcpq connection that broke has fd -1, and handling it would abort.
   if (fd() < 0) {
