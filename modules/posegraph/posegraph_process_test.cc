@@ -133,7 +133,7 @@ TEST(PoseGraphProcess, TellsEachAgentItsDriftAndTheMap) {
 }
 
 TEST(PoseGraphProcess, TakesWhatWaitsBeforeItSolves) {
-  const SyntheticWorld world = MakeWorld(20);
+  const SyntheticWorld world = MakeWorld(30);
   const std::vector<Constraint> constraints = MakeConstraints(world);
   ASSERT_GT(constraints.size(), 10u);  // more than a merge needs
   Server server;
