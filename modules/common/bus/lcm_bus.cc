@@ -25,8 +25,8 @@ struct LcmBus::Impl {
   struct Subscription {
     Impl* owner;
     Handler handler;
-    // LCM's C interface: GCC 12 miscompiles the C++ wrapper's call of a member function under
-    // -fsanitize=address,undefined.
+    // LCM's C interface: built by GCC 12 with -fsanitize=address,undefined, the C++ wrapper called
+    // its member function on the wrong object.
     static void OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* subscription) {
       auto* self = static_cast<Subscription*>(subscription);
       try {
