@@ -3,9 +3,14 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <sstream>
+
+#include "common/trajectory.h"
 
 namespace pangea::tests {
 
@@ -45,6 +50,25 @@ std::string ReadFile(const fs::path& path) {
 
 nlohmann::json ReadJson(const fs::path& path) {
   return nlohmann::json::parse(ReadFile(path), nullptr, false);
+}
+
+double Distance_m(const fs::path& got_file, const fs::path& expected_file) {
+  if (!fs::exists(got_file)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const Trajectory got = ReadTum(got_file.string(), nullptr);
+  const Trajectory expected = ReadTum(expected_file.string(), nullptr);
+  const auto same_time = [](const StampedPose& a, const StampedPose& b) {
+    return a.utime == b.utime;
+  };
+  if (!std::equal(got.begin(), got.end(), expected.begin(), expected.end(), same_time)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  double sum = 0;
+  for (size_t i = 0; i < got.size(); ++i) {
+    sum += (got[i].T.t - expected[i].T.t).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(expected.size()));
 }
 
 void RenderWalk(const fs::path& out, const std::string& arguments) {

@@ -21,6 +21,10 @@ std::filesystem::path FreshFolder(const std::string& name);
 std::string ReadFile(const std::filesystem::path& path);
 nlohmann::json ReadJson(const std::filesystem::path& path);
 
+// Root mean square of the distances between the keyframes of two TUM files in one frame; infinite
+// when the first does not exist or they are not the same keyframes.
+double Distance_m(const std::filesystem::path& got, const std::filesystem::path& expected);
+
 // Renders a short walk at half size: pangea-sim with these further arguments.
 void RenderWalk(const std::filesystem::path& out, const std::string& arguments);
 

@@ -65,14 +65,15 @@ int Run(const RunArguments& arguments) {
   return summary.failures.empty() ? 0 : 1;
 }
 
-struct ReplayArguments {
+// Of replay and report; the latter has one log.
+struct LogArguments {
   std::vector<std::string> logs;
   std::string out;
   std::vector<std::string> recordings;  // ID=DIR
 };
 
 // "2=folder" given on the command line goes before what the capture remembers.
-std::vector<AgentRun> RecordingsOf(const ReplayArguments& arguments) {
+std::vector<AgentRun> RecordingsOf(const LogArguments& arguments) {
   std::vector<AgentRun> runs = ReadRecordings({arguments.logs.begin(), arguments.logs.end()});
   for (const std::string& given : arguments.recordings) {
     const size_t equals = given.find('=');
@@ -93,7 +94,7 @@ std::vector<AgentRun> RecordingsOf(const ReplayArguments& arguments) {
   return runs;
 }
 
-int RunReplay(const ReplayArguments& arguments) {
+int RunReplay(const LogArguments& arguments) {
   const fs::path out(arguments.out);
   for (const std::string& log : arguments.logs) {
     if (fs::exists(out) && fs::equivalent(fs::absolute(log).parent_path(), out)) {
@@ -107,8 +108,27 @@ int RunReplay(const ReplayArguments& arguments) {
       Replay({arguments.logs.begin(), arguments.logs.end()}, out / "session.lcm");
   std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                            summary.agent_ids.size());
-  std::cout << ReportReplay(recordings, out) << std::flush;
+  std::cout << ReportLog(out / "session.lcm", recordings, out) << std::flush;
   return 0;
+}
+
+int RunReport(const LogArguments& arguments) {
+  if (fs::exists(fs::path(arguments.out) / "session.lcm")) {
+    throw std::runtime_error(fmt::format(
+        "--out {}: holds a session and its own report; give another folder", arguments.out));
+  }
+  fs::create_directories(arguments.out);
+  std::cout << ReportLog(arguments.logs.front(), RecordingsOf(arguments), arguments.out)
+            << std::flush;
+  return 0;
+}
+
+void AddResultOptions(CLI::App& command, LogArguments* arguments) {
+  command.add_option("--out", arguments->out, "Folder for the results")->required();
+  command.add_option(
+      "--recording", arguments->recordings,
+      "ID=FOLDER: an agent's recording, for its ground truth (default: as the session "
+      "remembers it beside its log)");
 }
 
 }  // namespace
@@ -131,7 +151,7 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
 }
 
 void AddReplayCommand(CLI::App& app, int* exit_code) {
-  auto arguments = std::make_shared<ReplayArguments>();
+  auto arguments = std::make_shared<LogArguments>();
   CLI::App* replay = app.add_subcommand(
       "replay", "Run the server over the keyframes of captured logs, deterministically");
   replay
@@ -141,12 +161,20 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
                    "interleaved as if they had started together")
       ->required()
       ->check(CLI::ExistingFile);
-  replay->add_option("--out", arguments->out, "Folder for the results")->required();
-  replay->add_option(
-      "--recording", arguments->recordings,
-      "ID=FOLDER: an agent's recording, for its ground truth (default: as the session "
-      "remembers it beside its log)");
+  AddResultOptions(*replay, arguments.get());
   replay->callback([arguments, exit_code] { *exit_code = RunReplay(*arguments); });
+}
+
+void AddReportCommand(CLI::App& app, int* exit_code) {
+  auto arguments = std::make_shared<LogArguments>();
+  CLI::App* report = app.add_subcommand(
+      "report", "What a captured server bus amounts to, whoever captured it: nothing is run again");
+  report->add_option("log", arguments->logs, "Log of a server bus, e.g. an lcm-logger's")
+      ->required()
+      ->expected(1)
+      ->check(CLI::ExistingFile);
+  AddResultOptions(*report, arguments.get());
+  report->callback([arguments, exit_code] { *exit_code = RunReport(*arguments); });
 }
 
 }  // namespace pangea::session

@@ -1,4 +1,4 @@
-// pangea-session: scripted multi-agent sessions, and their deterministic replay.
+// pangea-session: scripted multi-agent sessions, their deterministic replay, and reports.
 
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   pangea::session::AddRunCommand(app, &exit_code);
   pangea::session::AddReplayCommand(app, &exit_code);
+  pangea::session::AddReportCommand(app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

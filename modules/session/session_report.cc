@@ -93,9 +93,10 @@ std::string ReportRun(const SessionScript& script, const RunSummary& summary, co
   return WriteReport(input, out.string());
 }
 
-std::string ReportReplay(const std::vector<AgentRun>& agents, const fs::path& out) {
+std::string ReportLog(const fs::path& log, const std::vector<AgentRun>& agents,
+                      const fs::path& out) {
   ReportInput input;
-  input.server_log = (out / "session.lcm").string();
+  input.server_log = log.string();
   input.agents = agents;
   return WriteReport(input, out.string());
 }

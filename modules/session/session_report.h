@@ -19,8 +19,9 @@ namespace pangea::session {
 std::string ReportRun(const SessionScript& script, const RunSummary& summary,
                       const std::filesystem::path& out);
 
-// The same for a replay whose log is out/session.lcm. `agents` may lack agents of the log.
-std::string ReportReplay(const std::vector<AgentRun>& agents, const std::filesystem::path& out);
+// The same for any log of a server bus. `agents` may lack agents of the log.
+std::string ReportLog(const std::filesystem::path& log, const std::vector<AgentRun>& agents,
+                      const std::filesystem::path& out);
 
 // recordings.json in a session's folder: what each agent played.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);

@@ -1,0 +1,79 @@
+// A capture's inputs, played by lcm-logplayer into server processes started by hand, give the map
+// that the capture replays to.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kTolerance_m = 0.005;
+constexpr int kTries = 60;  // one a second, until the processes have worked everything off
+
+std::string LoopbackUrl() {
+  return "udpm://239.255.76.67:" + std::to_string(30000 + getpid() % 20000) +
+         "?ttl=0&recv_buf_size=4194304";
+}
+
+// The four server functions and a logger, until the object goes.
+class ServerByHand {
+ public:
+  ServerByHand(const std::string& url, const fs::path& folder) : pids_(folder / "pids") {
+    std::string command;
+    for (const char* name : {"place-recognition", "inter-map-ba", "fusion", "posegraph"}) {
+      command += std::string("pangea-") + name + " --bus '" + url + "' >" +
+                 (folder / name).string() + " 2>&1 & echo $! >>" + pids_.string() + "; ";
+    }
+    command += "lcm-logger --quiet --lcm-url='" + url + "' " + (folder / "bus.lcm").string() +
+               " >/dev/null 2>&1 & echo $! >>" + pids_.string() + "; sleep 1";
+    RunCommand(command);
+  }
+  ~ServerByHand() { RunCommand("kill $(cat " + pids_.string() + ")"); }
+  ServerByHand(const ServerByHand&) = delete;
+  ServerByHand& operator=(const ServerByHand&) = delete;
+
+ private:
+  fs::path pids_;
+};
+
+TEST(LogPlayer, FeedsLiveProcesses) {
+  const fs::path sample = fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks";
+  const fs::path folder = FreshFolder("logplayer");
+  const std::string url = LoopbackUrl();
+  const ServerByHand server(url, folder);
+  const Outcome played =
+      RunCommand("lcm-logplayer --speed=5 --lcm-url='" + url + "' --regexp='KEYFRAME_.*' " +
+                 (sample / "session.lcm").string());
+  ASSERT_EQ(played.exit_code, 0) << played.output;
+
+  double distance_1 = 0;
+  double distance_2 = 0;
+  std::string said;
+  for (int i = 0; i < kTries; ++i) {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    said = RunCommand("pangea-session report " + (folder / "bus.lcm").string() + " --out " +
+                      (folder / "report").string())
+               .output;
+    distance_1 = Distance_m(folder / "report/agent_1.tum", sample / "expected/agent_1.tum");
+    distance_2 = Distance_m(folder / "report/agent_2.tum", sample / "expected/agent_2.tum");
+    if (distance_1 < kTolerance_m && distance_2 < kTolerance_m) {
+      break;
+    }
+  }
+  EXPECT_LT(distance_1, kTolerance_m) << said;
+  EXPECT_LT(distance_2, kTolerance_m) << said;
+  const auto report = ReadJson(folder / "report/report.json");
+  ASSERT_EQ(report["groups"].size(), 1u) << said;
+  EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace pangea::tests
