@@ -27,6 +27,8 @@ function(pangea_library name)
   target_link_libraries(${name} PUBLIC ${ARG_DEPENDS})
 endfunction()
 
+add_custom_target(programs)
+
 # pangea_program(name SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
 function(pangea_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
@@ -34,6 +36,7 @@ function(pangea_program name)
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+  add_dependencies(programs ${name})
   add_test(NAME ${name}.help COMMAND ${name} --help)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
 endfunction()
