@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -25,22 +26,25 @@ std::string LoopbackUrl() {
 // The four server functions and a logger, until the object goes.
 class ServerByHand {
  public:
-  ServerByHand(const std::string& url, const fs::path& folder) : pids_(folder / "pids") {
+  ServerByHand(const std::string& url, const fs::path& folder) {
+    const fs::path pids = folder / "pids";
     std::string command;
     for (const char* name : {"place-recognition", "inter-map-ba", "fusion", "posegraph"}) {
       command += std::string("pangea-") + name + " --bus '" + url + "' >" +
-                 (folder / name).string() + " 2>&1 & echo $! >>" + pids_.string() + "; ";
+                 (folder / name).string() + " 2>&1 & echo $! >>" + pids.string() + "; ";
     }
     command += "lcm-logger --quiet --lcm-url='" + url + "' " + (folder / "bus.lcm").string() +
-               " >/dev/null 2>&1 & echo $! >>" + pids_.string() + "; sleep 1";
+               " >/dev/null 2>&1 & echo $! >>" + pids.string() + "; sleep 1";
     RunCommand(command);
+    pids_ = ReadFile(pids);
+    std::replace(pids_.begin(), pids_.end(), '\n', ' ');
   }
-  ~ServerByHand() { RunCommand("kill $(cat " + pids_.string() + ")"); }
+  ~ServerByHand() { RunCommand("kill " + pids_); }
   ServerByHand(const ServerByHand&) = delete;
   ServerByHand& operator=(const ServerByHand&) = delete;
 
  private:
-  fs::path pids_;
+  std::string pids_;
 };
 
 TEST(LogPlayer, FeedsLiveProcesses) {
