@@ -62,6 +62,18 @@ Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const Imu
   return e;
 }
 
+// Of the position itself, p - p^ = xi_p + theta x p^, not of what is left of it after the turn.
+struct PositionError {
+  Eigen::Vector3d error;
+  Eigen::Matrix3d covariance;
+};
+PositionError PositionErrorOf(const FinishedKeyframe& keyframe, const ImuState& truth) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << -Hat(keyframe.T_odom_body.t), Eigen::Matrix3d::Identity();
+  return {truth.T_odom_body.t - keyframe.T_odom_body.t,
+          J * keyframe.covariance.topLeftCorner<6, 6>() * J.transpose()};
+}
+
 // What is known of a shift along odom's axes and of a turn about its z axis. Not the variances of
 // position and yaw: the start's position depends on velocity and tilt, of which more is learnt.
 Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& covariance) {
@@ -72,7 +84,7 @@ Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& cov
 }
 
 TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
-  Mean tilt, velocity, gyro_bias, accel_bias;
+  Mean position, yaw, tilt, velocity, gyro_bias, accel_bias;
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     const Outcome run = RideOnce(seed);
     ASSERT_GT(run.keyframes.size(), 10u) << "seed " << seed;
@@ -81,6 +93,12 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
     for (size_t k = 0; k < run.keyframes.size(); ++k) {
       const auto& P = run.keyframes[k].covariance;
       const auto e = ErrorOf(run.keyframes[k], run.truth[k]);
+      // The gauge: the start's prior holds origin and yaw there, and the truth is laid onto them.
+      if (k > 0) {
+        const PositionError p = PositionErrorOf(run.keyframes[k], run.truth[k]);
+        position.AddSquare(p.error, p.covariance);
+        yaw.AddSquare(e.segment<1>(kTheta + 2), P.block<1, 1>(kTheta + 2, kTheta + 2));
+      }
       tilt.AddSquare(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
       velocity.AddSquare(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
       gyro_bias.AddSquare(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
@@ -91,10 +109,11 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
           << "seed " << seed << ", keyframe " << k;
     }
   }
-  std::cout << "normalised squares of " << tilt.count << " keyframes: tilt " << tilt.value()
-            << ", velocity " << velocity.value() << ", gyro bias " << gyro_bias.value()
-            << ", accelerometer bias " << accel_bias.value() << "\n";
-  for (const Mean* mean : {&tilt, &velocity, &gyro_bias, &accel_bias}) {
+  std::cout << "normalised squares of " << tilt.count << " keyframes: position " << position.value()
+            << ", yaw " << yaw.value() << ", tilt " << tilt.value() << ", velocity "
+            << velocity.value() << ", gyro bias " << gyro_bias.value() << ", accelerometer bias "
+            << accel_bias.value() << "\n";
+  for (const Mean* mean : {&position, &yaw, &tilt, &velocity, &gyro_bias, &accel_bias}) {
     EXPECT_GT(mean->value(), 0.3);
     EXPECT_LT(mean->value(), 3.0);
   }

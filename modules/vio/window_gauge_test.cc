@@ -1,0 +1,152 @@
+// Whether a prior that was linearised again and again still knows nothing of position and yaw.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <iostream>
+#include <map>
+
+#include "vio/vio_test_world.h"
+#include "vio/window_problem.h"
+#include "vio/window_test_world.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kMarginalisations = 40;
+constexpr int kViews = 8;            // images a landmark is seen in, at most
+constexpr double kSpread = 0.01;     // of every error of the window, each time it is linearised
+constexpr double kRaySigma = 0.002;  // 0.8 px
+
+// A ride as one long window at its true state: inertial samples between its images, rays with
+// noise, and a prior that says nothing.
+WindowProblem Ride(uint64_t seed) {
+  VioTestWorldOptions options;
+  options.seed = seed;
+  options.outlier_share = 0;
+  VioTestWorld world(options);
+  WindowProblem problem;
+  problem.state.T_body_cam = world.camera().T_body_cam;
+  std::map<int32_t, Landmark> open;  // still to be seen again
+  ImuSample last_sample;
+  for (int i = 0; i < kMarginalisations + kViews; ++i) {
+    VioTestWorld::Input input = world.Next();
+    WindowFrame frame;
+    frame.utime = frame.imu_utime = input.frame.utime;
+    frame.imu = world.TruthAt(frame.utime);
+    frame.omega_body = input.imu.back().gyro - frame.imu.gyro_bias;
+    std::optional<InertialLink> link;
+    if (i > 0) {
+      const ImuState& from = problem.state.frames.back().imu;
+      input.imu.insert(input.imu.begin(), last_sample);
+      link.emplace();
+      link->measured = Integrate(input.imu, ImuNoise{}, from.gyro_bias, from.accel_bias);
+      link->information = InertialInformation(link->measured, ImuNoise{});
+    }
+    last_sample = input.imu.back();
+    problem.state.frames.push_back(frame);
+    problem.links.push_back(link);
+    for (const Observation& seen : input.frame.observations) {
+      Landmark& landmark = open[seen.landmark_id];
+      if (landmark.rays.size() == kViews) {
+        problem.landmarks.push_back(landmark);
+        landmark = {};
+      }
+      if (landmark.rays.empty()) {
+        const double depth = *world.TrueDepth(seen.landmark_id, frame.utime);
+        landmark = {seen.landmark_id, {i, 0, {seen.ray.x(), seen.ray.y(), 1 / depth}}, {}};
+      }
+      landmark.rays.push_back({i, seen.ray, kRaySigma, 0});
+    }
+  }
+  for (const auto& [id, landmark] : open) {
+    if (landmark.rays.size() > 2) {
+      problem.landmarks.push_back(landmark);
+    }
+  }
+  problem.prior.at = problem.state;
+  problem.prior.H.setZero(problem.state.size(), problem.state.size());
+  problem.prior.g.setZero(problem.state.size());
+  return problem;
+}
+
+// Plain errors (dtheta, dp, dv) to the window's: xi = d + value x dtheta; or back, with sign -1.
+MatrixXd FromPlain(const WindowState& state, double sign) {
+  MatrixXd T = MatrixXd::Identity(state.size(), state.size());
+  for (int i = 0; i <= state.Newest(); ++i) {
+    const int at = state.Offset(i);
+    const ImuState& imu = state.frames[i].imu;
+    T.block<3, 3>(at + kPosition, at + kTheta) = sign * Hat(imu.T_odom_body.t);
+    T.block<3, 3>(at + kVelocity, at + kTheta) = sign * Hat(imu.v_odom_body);
+  }
+  return T;
+}
+
+// What a prior in plain errors, unchanged since it was made, says in the window's at a new state.
+MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
+  const MatrixXd then_by_now = FromPlain(prior.at, 1) * FromPlain(now, -1);
+  return then_by_now.transpose() * prior.H * then_by_now;
+}
+
+// The prior after all marginalisations, each with every frame linearised anew around the truth.
+WindowPrior Marginalised(WindowProblem problem, bool plain_errors) {
+  WindowState truth = problem.state;
+  for (int round = 0; round < kMarginalisations; ++round) {
+    problem.state = truth;
+    problem.state.Retract(RandomError(truth, kSpread, 100 + round));
+    if (plain_errors) {
+      problem.prior.H = KeptInPlainErrors(problem.prior, problem.state);
+      problem.prior.at = problem.state;
+    }
+    MarginaliseOldest(problem, {});
+    truth.frames.erase(truth.frames.begin());
+  }
+  return problem.prior;
+}
+
+// Information, each row in units of what it alone would know: the most about a shift or a turn
+// about the vertical, and the least about any direction across these.
+struct Knowledge {
+  double of_gauge = 0;
+  double of_the_rest = 0;
+};
+Knowledge Known(const WindowPrior& prior) {
+  std::vector<int> rows;  // that the prior speaks of
+  for (int i = 0; i < prior.H.rows(); ++i) {
+    if (prior.H(i, i) > 0) {
+      rows.push_back(i);
+    }
+  }
+  const MatrixXd H = prior.H(rows, rows);
+  const VectorXd scale = H.diagonal().cwiseSqrt();
+  const MatrixXd S = scale.cwiseInverse().asDiagonal() * H * scale.cwiseInverse().asDiagonal();
+  const MatrixXd N_all = UnobservableDirections(prior.at);
+  const MatrixXd N = scale.asDiagonal() * MatrixXd(N_all(rows, Eigen::all));
+  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(N).householderQ();
+  const MatrixXd gauge = Q.leftCols(4), rest = Q.rightCols(Q.cols() - 4);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> of_gauge(gauge.transpose() * S * gauge);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> of_the_rest(rest.transpose() * S * rest);
+  return {of_gauge.eigenvalues().cwiseAbs().maxCoeff(), of_the_rest.eigenvalues().minCoeff()};
+}
+
+TEST(WindowGauge, FortyMarginalisationsLearnNothingOfPositionAndYaw) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const WindowProblem ride = Ride(seed);
+    const Knowledge invariant = Known(Marginalised(ride, false));
+    const Knowledge plain = Known(Marginalised(ride, true));
+    std::cout << "ride " << seed << ": position and yaw " << invariant.of_gauge
+              << ", the least known of the rest " << invariant.of_the_rest << "; with plain errors "
+              << plain.of_gauge << ", " << plain.of_the_rest << "\n";
+    EXPECT_LT(invariant.of_gauge, 1e-3 * invariant.of_the_rest) << "seed " << seed;
+    // The same ride with errors that are not invariant does learn: the measure would show it.
+    EXPECT_GT(plain.of_gauge, 1e3 * invariant.of_gauge) << "seed " << seed;
+    EXPECT_GT(plain.of_gauge, invariant.of_the_rest) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace pangea::vio
