@@ -21,9 +21,10 @@ class InterMapBa : public PairJudge {
   explicit InterMapBa(const InterMapBaOptions& options)
       : PairJudge(options.alignment, options.drift) {}
 
-  Constraint Judge(const KeyframeId& query, const PlaceCandidate& candidate) override {
+  Constraint Judge(const KeyframeId& query, const PlaceCandidate& candidate,
+                   AlignmentReport* report = nullptr) override {
     return query.map == candidate.match.map
-               ? PairJudge::Judge(query, candidate)
+               ? PairJudge::Judge(query, candidate, report)
                : RefusedConstraint(query, candidate, "intra, but of two maps");
   }
 };

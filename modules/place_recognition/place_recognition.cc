@@ -43,7 +43,7 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 
 PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options) : options_(options) {}
 
-PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe) {
+PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceReport>* report) {
   Stored query = MakeStored(keyframe);
   PlaceMatch match;
   match.query = query.id;
@@ -61,15 +61,16 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe) {
       own.push_back({i, scores[i]});
     }
   }
-  Search(query, own, options_.own, &match);
-  Search(query, others, options_.others, &match);
+  Search(query, own, options_.own, &match, report);
+  Search(query, others, options_.others, &match, report);
   RememberPlaces(match);
   Store(std::move(query));
   return match;
 }
 
 void PlaceRecognition::Search(const Stored& query, const std::vector<Place>& hits,
-                              const PlaceRecognitionOptions::Search& options, PlaceMatch* match) {
+                              const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
+                              std::vector<PlaceReport>* report) {
   std::vector<Place> places = Spread(Places(hits), options.places);
   for (const Place& place : Continued(query.id, hits, options.continued_places)) {
     if (std::none_of(places.begin(), places.end(),
@@ -80,8 +81,12 @@ void PlaceRecognition::Search(const Stored& query, const std::vector<Place>& hit
   counters_.places += static_cast<int64_t>(places.size());
   std::vector<PlaceCandidate> verified;
   for (const Place& place : places) {
-    if (auto candidate = Verify(query, place, match)) {
+    PlaceReport seen;
+    if (auto candidate = Verify(query, place, match, &seen)) {
       verified.push_back(std::move(*candidate));
+    }
+    if (report != nullptr) {
+      report->push_back(seen);
     }
   }
   Publish(std::move(verified), options.candidates, match);
@@ -264,6 +269,8 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const Stored& query, cons
   const EpipolarResult epipolar =
       CheckEpipolar(RayPairs(query.rays, other.rays, matches),
                     StableHash(query.id, other.id, kSeedSalt), options_.epipolar);
+  report->inliers = static_cast<int>(epipolar.inliers.size());
+  report->verified = epipolar.accepted;
   if (!epipolar.accepted) {
     ++counters_.rejected_epipolar;
     match->rejected.push_back(fmt::format("{}: {} of {} matches agree on a pose",

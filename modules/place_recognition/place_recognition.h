@@ -47,6 +47,14 @@ struct PlaceRecognitionOptions {
   EpipolarOptions epipolar;
 };
 
+// A place that was looked at and how far it came, for whoever measures this module.
+struct PlaceReport {
+  KeyframeId match;
+  float score = 0;        // of the retrieval, 0 .. 1
+  int inliers = 0;        // matched corners that agree on one pose; 0: too few were matched
+  bool verified = false;  // more agree than chance explains
+};
+
 class PlaceRecognition {
  public:
   struct Counters {
@@ -61,8 +69,8 @@ class PlaceRecognition {
 
   explicit PlaceRecognition(const PlaceRecognitionOptions& options);
 
-  // Recognises, then remembers.
-  PlaceMatch Add(const Keyframe& keyframe);
+  // Recognises, then remembers. `report` gets every place that was looked at.
+  PlaceMatch Add(const Keyframe& keyframe, std::vector<PlaceReport>* report = nullptr);
   // Remembers only: for keyframes whose match is known from an earlier run.
   void Remember(const Keyframe& keyframe, const PlaceMatch& known);
 
@@ -101,8 +109,10 @@ class PlaceRecognition {
                                int limit) const;
   // One of the two searches: from keyframes that share descriptors to published candidates.
   void Search(const Stored& query, const std::vector<Place>& hits,
-              const PlaceRecognitionOptions::Search& options, PlaceMatch* match);
-  std::optional<PlaceCandidate> Verify(const Stored& query, const Place& place, PlaceMatch* match);
+              const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
+              std::vector<PlaceReport>* report);
+  std::optional<PlaceCandidate> Verify(const Stored& query, const Place& place, PlaceMatch* match,
+                                       PlaceReport* report);
   void Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match);
   PlaceKind Kind(const MapId& a, const MapId& b) const;
   void RememberPlaces(const PlaceMatch& match);

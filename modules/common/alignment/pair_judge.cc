@@ -20,7 +20,8 @@ bool PairJudge::Ready(const KeyframeId& query, const PlaceCandidate& candidate) 
   return query.map != candidate.match.map || store_.ChainIsComplete(candidate.match, query);
 }
 
-Constraint PairJudge::Judge(const KeyframeId& query, const PlaceCandidate& candidate) {
+Constraint PairJudge::Judge(const KeyframeId& query, const PlaceCandidate& candidate,
+                            AlignmentReport* report) {
   const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
   const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
   if (frames_c.empty() || frames_m.empty()) {
@@ -43,7 +44,7 @@ Constraint PairJudge::Judge(const KeyframeId& query, const PlaceCandidate& candi
     }
     gate = MakeDriftGate(drift_, *path_m, frames_c.back()->keyframe().T_odom_body.t);
   }
-  return aligner_.Align(frames_m, frames_c, candidate, gate);
+  return aligner_.Align(frames_m, frames_c, candidate, gate, report);
 }
 
 }  // namespace pangea

@@ -26,7 +26,8 @@ class PairJudge {
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
   // Only when ready. Keyframes of one map pass the drift gate too; two maps' odom frames lie
   // anyhow to each other.
-  virtual Constraint Judge(const KeyframeId& query, const PlaceCandidate& candidate);
+  virtual Constraint Judge(const KeyframeId& query, const PlaceCandidate& candidate,
+                           AlignmentReport* report = nullptr);
 
  private:
   DriftGateOptions drift_;

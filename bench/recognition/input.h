@@ -1,0 +1,28 @@
+#pragma once
+
+// Keyframe logs with their ground truth.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "common/trajectory.h"
+
+namespace pangea::bench {
+
+struct AgentInput {
+  int32_t id = 0;
+  std::string keyframes;  // an LCM log; other agents' keyframes in it are passed over
+  std::string reference;  // a TUM or EuRoC ground-truth file, or a recording's folder
+};
+
+struct Input {
+  std::vector<Keyframe> keyframes;      // as if all agents had started together
+  std::map<int32_t, Trajectory> truth;  // by agent
+};
+
+// Throws std::runtime_error with one line for the user.
+Input ReadInput(const std::vector<AgentInput>& agents);
+
+}  // namespace pangea::bench

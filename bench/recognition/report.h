@@ -1,0 +1,19 @@
+#pragma once
+
+// What pangea-recognition-bench writes: a table, the curves, and a row for every place looked at.
+
+#include <filesystem>
+#include <string>
+
+#include "bench/recognition/stages.h"
+
+namespace pangea::bench {
+
+// Markdown.
+std::string Table(const Run& run);
+// own_map.png and other_maps.png: precision over recall, a dot where the system decides; no picture
+// of a search that has nothing to find. Throws std::runtime_error when gnuplot fails.
+void WriteCurves(const Run& run, const std::filesystem::path& folder);
+std::string Csv(const Run& run);
+
+}  // namespace pangea::bench
