@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from accuracy_lib import anchors
-from accuracy_lib.jobs import OUT, Command, Job
+from accuracy_lib.jobs import OUT, Command, Job, Runner
 
 MAP_UTIME = "1000000"  # maps are told apart by their agent
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -84,9 +84,6 @@ class Plan:
                 self._hybrid(seed)
         for folder in self.options.real:
             self._real(Path(folder).resolve())
-        for job in self.jobs:
-            if isinstance(job, RenderJob):
-                job.redo = self.options.redo
         return self.jobs
 
     def pairs(self):
@@ -128,7 +125,7 @@ class Plan:
         where = f"hybrid_seed{seed}"
         folder = Path(self.options.imu).resolve()
         for sequence in self.hybrid_sequences():
-            imu, stamps = _only(folder, f"{sequence}*.csv"), _only(folder, f"{sequence}*stamps*.txt")
+            imu, stamps = only(folder, f"{sequence}*.csv"), only(folder, f"{sequence}*stamps*.txt")
             render = self._render(where, sequence, seed, ["--imu", str(imu), "--stamps", str(stamps)])
             self._server(where, sequence, [self._vio(where, sequence, int(sequence[-1]), render, render.folder)])
         for group in self.together(anchors.HYBRID_TOGETHER):
@@ -148,7 +145,7 @@ class Plan:
 
     def _render(self, where, sequence, seed, extra):
         folder = Path(self.options.groundtruth).resolve()
-        paths = [str(_only(folder, f"{s}*.csv")) for s in anchors.SEQUENCES]
+        paths = [str(only(folder, f"{s}*.csv")) for s in anchors.SEQUENCES]
         path = paths[anchors.SEQUENCES.index(sequence)]
         argv = [str(self.bin / "pangea-sim"), "--path", path, "--keep-clear", *paths, "--out", OUT, "--seed", str(seed)]
         argv += anchors.DARK_OPTIONS if sequence in anchors.DARK else []
@@ -193,11 +190,29 @@ class Plan:
         return Command(argv, optional=True)  # without ground truth, or with too few poses, there is no figure
 
 
+def run(jobs, options, logs):
+    """Makes what is missing, and drops images that all have seen if that is wanted; with --tables-only it only looks."""
+    if options.tables_only:
+        for job in jobs:
+            job.state = "kept" if job.kind == "render" or job.record() else "missing"
+        return
+    renders = [job for job in jobs if job.kind == "render"]
+    for render in renders:
+        render.redo = options.redo
+
+    def after(job):
+        for render in renders if options.drop_images else []:
+            if job in render.users and all(user.ended_well for user in render.users):
+                render.drop_images()
+
+    Runner(jobs, max(1, options.jobs), logs, options.redo, after).run()
+
+
 def _mav0(recording):
     return recording if recording.name == "mav0" else recording / "mav0"
 
 
-def _only(folder, pattern):
+def only(folder, pattern):
     found = sorted(folder.glob(pattern))
     if len(found) != 1:
         raise SystemExit(f"accuracy: {folder}/{pattern}: {len(found)} files, where one is needed")

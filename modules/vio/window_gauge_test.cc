@@ -74,22 +74,29 @@ WindowProblem Ride(uint64_t seed) {
   return problem;
 }
 
-// Plain errors (dtheta, dp, dv) to the window's: xi = d + value x dtheta; or back, with sign -1.
-MatrixXd FromPlain(const WindowState& state, double sign) {
-  MatrixXd T = MatrixXd::Identity(state.size(), state.size());
-  for (int i = 0; i <= state.Newest(); ++i) {
-    const int at = state.Offset(i);
-    const ImuState& imu = state.frames[i].imu;
-    T.block<3, 3>(at + kPosition, at + kTheta) = sign * Hat(imu.T_odom_body.t);
-    T.block<3, 3>(at + kVelocity, at + kTheta) = sign * Hat(imu.v_odom_body);
-  }
-  return T;
-}
-
-// What a prior in plain errors, unchanged since it was made, says in the window's at a new state.
+// What a prior that is kept in plain errors (dtheta, dp, dv), as most odometries do, says in the
+// window's at a new state. With xi = d + value x dtheta, the same plain error is there
+// xi_then = xi_now + (value_then - value_now) x dtheta.
 MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
-  const MatrixXd then_by_now = FromPlain(prior.at, 1) * FromPlain(now, -1);
-  return then_by_now.transpose() * prior.H * then_by_now;
+  MatrixXd H = prior.H;
+  const auto add_moves = [&](bool rows) {
+    for (int i = 0; i <= now.Newest(); ++i) {
+      const ImuState &a = prior.at.frames[i].imu, &b = now.frames[i].imu;
+      const int at = now.Offset(i);
+      const Eigen::Matrix3d p = Hat(a.T_odom_body.t - b.T_odom_body.t);
+      const Eigen::Matrix3d v = Hat(a.v_odom_body - b.v_odom_body);
+      if (rows) {
+        H.middleRows<3>(at + kTheta) += p.transpose() * H.middleRows<3>(at + kPosition) +
+                                        v.transpose() * H.middleRows<3>(at + kVelocity);
+      } else {
+        H.middleCols<3>(at + kTheta) +=
+            H.middleCols<3>(at + kPosition) * p + H.middleCols<3>(at + kVelocity) * v;
+      }
+    }
+  };
+  add_moves(false);
+  add_moves(true);
+  return H;
 }
 
 // The prior after all marginalisations, each with every frame linearised anew around the truth.
