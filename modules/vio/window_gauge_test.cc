@@ -79,23 +79,16 @@ WindowProblem Ride(uint64_t seed) {
 // xi_then = xi_now + (value_then - value_now) x dtheta.
 MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
   MatrixXd H = prior.H;
-  const auto add_moves = [&](bool rows) {
+  for (int side = 0; side < 2; ++side) {
     for (int i = 0; i <= now.Newest(); ++i) {
-      const ImuState &a = prior.at.frames[i].imu, &b = now.frames[i].imu;
+      const ImuState &then_i = prior.at.frames[i].imu, &now_i = now.frames[i].imu;
       const int at = now.Offset(i);
-      const Eigen::Matrix3d p = Hat(a.T_odom_body.t - b.T_odom_body.t);
-      const Eigen::Matrix3d v = Hat(a.v_odom_body - b.v_odom_body);
-      if (rows) {
-        H.middleRows<3>(at + kTheta) += p.transpose() * H.middleRows<3>(at + kPosition) +
-                                        v.transpose() * H.middleRows<3>(at + kVelocity);
-      } else {
-        H.middleCols<3>(at + kTheta) +=
-            H.middleCols<3>(at + kPosition) * p + H.middleCols<3>(at + kVelocity) * v;
-      }
+      H.middleCols<3>(at + kTheta) +=
+          H.middleCols<3>(at + kPosition) * Hat(then_i.T_odom_body.t - now_i.T_odom_body.t) +
+          H.middleCols<3>(at + kVelocity) * Hat(then_i.v_odom_body - now_i.v_odom_body);
     }
-  };
-  add_moves(false);
-  add_moves(true);
+    H.transposeInPlace();
+  }
   return H;
 }
 
