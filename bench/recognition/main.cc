@@ -24,11 +24,11 @@ void Write(const std::filesystem::path& path, const std::string& text) {
 void Measure(const std::vector<AgentInput>& agents, const std::filesystem::path& out) {
   std::filesystem::create_directories(out);
   const Input input = ReadInput(agents);
-  const Run run = RunStages(input.keyframes, input.truth);
-  const std::string table = Table(run);
+  const Outcome outcome = RunStages(input.keyframes, input.truth);
+  const std::string table = Table(outcome);
   Write(out / "recognition.md", table);
-  Write(out / "places.csv", Csv(run));
-  WriteCurves(run, out);
+  Write(out / "places.csv", Csv(outcome));
+  WriteCurves(outcome, out);
   fmt::print("{}", table);
 }
 

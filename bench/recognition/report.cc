@@ -7,14 +7,14 @@
 namespace pangea::bench {
 namespace {
 
-const std::vector<KeyframeId>& WithOverlap(const Run& run, Search search) {
+const std::vector<KeyframeId>& WithOverlap(const Outcome& outcome, Search search) {
   static const std::vector<KeyframeId> kNone;
-  const auto found = run.with_overlap.find(search);
-  return found == run.with_overlap.end() ? kNone : found->second;
+  const auto found = outcome.with_overlap.find(search);
+  return found == outcome.with_overlap.end() ? kNone : found->second;
 }
 
-Plot CurvesOf(const Run& run, Search search) {
-  const std::vector<KeyframeId>& with_overlap = WithOverlap(run, search);
+Plot CurvesOf(const Outcome& outcome, Search search) {
+  const std::vector<KeyframeId>& with_overlap = WithOverlap(outcome, search);
   Plot plot;
   plot.title =
       fmt::format("Places in {}: {} keyframes have one", ToString(search), with_overlap.size());
@@ -22,7 +22,7 @@ Plot CurvesOf(const Run& run, Search search) {
   plot.y_label = "precision";
   plot.y_from_zero = true;
   for (size_t stage = 0; stage < kStages.size(); ++stage) {
-    const std::vector<Judged> judged = AtStage(run, search, stage);
+    const std::vector<Judged> judged = AtStage(outcome, search, stage);
     PlotLine line{.label = kStages[stage], .colour = AgentColour(stage)};
     for (const PrecisionRecall& point : OverThresholds(judged, with_overlap)) {
       line.points.emplace_back(point.recall, point.precision);
@@ -38,15 +38,15 @@ Plot CurvesOf(const Run& run, Search search) {
 
 }  // namespace
 
-std::string Table(const Run& run) {
+std::string Table(const Outcome& outcome) {
   std::string text = fmt::format(
       "{} keyframes.\n\n| places in | keyframes that have one | stage | pass | right | found | "
       "precision | recall |\n|---|---|---|---|---|---|---|---|\n",
-      run.keyframes);
+      outcome.keyframes);
   for (const Search search : kSearches) {
-    const std::vector<KeyframeId>& with_overlap = WithOverlap(run, search);
+    const std::vector<KeyframeId>& with_overlap = WithOverlap(outcome, search);
     for (size_t stage = 0; stage < kStages.size(); ++stage) {
-      const PrecisionRecall figures = AsDecided(AtStage(run, search, stage), with_overlap);
+      const PrecisionRecall figures = AsDecided(AtStage(outcome, search, stage), with_overlap);
       text += fmt::format("| {} | {} | {} | {} | {} | {} | {:.3f} | {:.3f} |\n", ToString(search),
                           with_overlap.size(), kStages[stage], figures.passed, figures.right,
                           figures.found, figures.precision, figures.recall);
@@ -55,23 +55,24 @@ std::string Table(const Run& run) {
   return text;
 }
 
-void WriteCurves(const Run& run, const std::filesystem::path& folder) {
+void WriteCurves(const Outcome& outcome, const std::filesystem::path& folder) {
   for (const Search search : kSearches) {
-    if (!WithOverlap(run, search).empty()) {
+    if (!WithOverlap(outcome, search).empty()) {
       const char* name = search == Search::kOwnMap ? "own_map.png" : "other_maps.png";
-      WritePng(CurvesOf(run, search), (folder / name).string());
+      WritePng(CurvesOf(outcome, search), (folder / name).string());
     }
   }
 }
 
-std::string Csv(const Run& run) {
+std::string Csv(const Outcome& outcome) {
   std::string text =
       "query,match,overlap,score,epipolar_inliers,verified,published,pnp_inliers,landmarks,"
-      "accepted,right_pose\n";
-  for (const Looked& l : run.looked) {
-    text += fmt::format("{},{},{:.3f},{:.4f},{},{:d},{:d},{},{},{:d},{:d}\n", ToString(l.query),
-                        ToString(l.match), l.overlap, l.score, l.epipolar_inliers, l.verified,
-                        l.published, l.pnp_inliers, l.landmarks, l.accepted, l.right_pose);
+      "accepted,error_m,error_rad\n";
+  for (const Looked& l : outcome.looked) {
+    text += fmt::format("{},{},{:.3f},{:.4f},{},{:d},{:d},{},{},{:d},{:.3f},{:.4f}\n",
+                        ToString(l.query), ToString(l.match), l.overlap, l.score,
+                        l.epipolar_inliers, l.verified, l.published, l.pnp_inliers, l.landmarks,
+                        l.accepted, l.error_m, l.error_rad);
   }
   return text;
 }

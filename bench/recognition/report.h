@@ -10,10 +10,10 @@
 namespace pangea::bench {
 
 // Markdown.
-std::string Table(const Run& run);
+std::string Table(const Outcome& outcome);
 // own_map.png and other_maps.png: precision over recall, a dot where the system decides; no picture
 // of a search that has nothing to find. Throws std::runtime_error when gnuplot fails.
-void WriteCurves(const Run& run, const std::filesystem::path& folder);
-std::string Csv(const Run& run);
+void WriteCurves(const Outcome& outcome, const std::filesystem::path& folder);
+std::string Csv(const Outcome& outcome);
 
 }  // namespace pangea::bench

@@ -34,17 +34,17 @@ class Stages {
     if (!query) {
       return;
     }
-    ++run_.keyframes;
+    ++outcome_.keyframes;
     NoteTrueOverlaps(*query);
     for (const PlaceReport& place : places) {
       if (const auto other = known_.find(place.match); other != known_.end()) {
-        run_.looked.push_back(Follow(*query, other->second, place, match));
+        outcome_.looked.push_back(Follow(*query, other->second, place, match));
       }
     }
     known_.emplace(query->id, *query);
   }
 
-  Run Take() { return std::move(run_); }
+  Outcome Take() { return std::move(outcome_); }
 
  private:
   std::optional<Known> Know(const Keyframe& keyframe) const {
@@ -78,7 +78,7 @@ class Stages {
       if (!found.contains(search) && !(search == Search::kOwnMap && IsRecent(query, other)) &&
           Overlap(query.view, other.view) >= kRightOverlap) {
         found.insert(search);
-        run_.with_overlap[search].push_back(query.id);
+        outcome_.with_overlap[search].push_back(query.id);
       }
     }
   }
@@ -104,10 +104,12 @@ class Stages {
     looked.pnp_inliers = report.pnp_inliers;
     looked.landmarks = report.landmarks;
     looked.accepted = constraint.accepted;
-    const Vector6d error =
-        constraint.T_from_to.Minus(other.T_reference_body.Inverse() * query.T_reference_body);
-    looked.right_pose = error.head<3>().norm() <= session::kWrongTranslation_m &&
-                        error.tail<3>().norm() <= session::kWrongRotation_rad;
+    if (looked.landmarks > 0) {
+      const Vector6d error =
+          constraint.T_from_to.Minus(other.T_reference_body.Inverse() * query.T_reference_body);
+      looked.error_m = error.head<3>().norm();
+      looked.error_rad = error.tail<3>().norm();
+    }
     return looked;
   }
 
@@ -117,7 +119,7 @@ class Stages {
   InterMapBa intra_{InterMapBaOptions{}};
   Fusion inter_{FusionOptions{}};
   std::map<KeyframeId, Known> known_;
-  Run run_;
+  Outcome outcome_;
 };
 
 // Nothing for what did not come to the stage.
@@ -138,16 +140,22 @@ std::optional<Judged> JudgedAt(const Looked& looked, size_t stage) {
     default:
       return looked.published && placed
                  ? std::optional(Judged{looked.query, static_cast<double>(looked.landmarks),
-                                        looked.right_pose, looked.accepted})
+                                        looked.right_pose(), looked.accepted})
                  : std::nullopt;
   }
 }
 
 }  // namespace
 
+bool Looked::right_pose() const {
+  return landmarks > 0 && error_m <= session::kWrongTranslation_m &&
+         error_rad <= session::kWrongRotation_rad;
+}
+
 std::string ToString(Search search) { return search == Search::kOwnMap ? "own map" : "other maps"; }
 
-Run RunStages(const std::vector<Keyframe>& keyframes, const std::map<int32_t, Trajectory>& truth) {
+Outcome RunStages(const std::vector<Keyframe>& keyframes,
+                  const std::map<int32_t, Trajectory>& truth) {
   Stages stages(truth);
   for (const Keyframe& keyframe : keyframes) {
     stages.Add(keyframe);
@@ -155,9 +163,9 @@ Run RunStages(const std::vector<Keyframe>& keyframes, const std::map<int32_t, Tr
   return stages.Take();
 }
 
-std::vector<Judged> AtStage(const Run& run, Search search, size_t stage) {
+std::vector<Judged> AtStage(const Outcome& outcome, Search search, size_t stage) {
   std::vector<Judged> judged;
-  for (const Looked& looked : run.looked) {
+  for (const Looked& looked : outcome.looked) {
     if ((looked.query.map == looked.match.map) == (search == Search::kOwnMap)) {
       if (const auto one = JudgedAt(looked, stage)) {
         judged.push_back(*one);

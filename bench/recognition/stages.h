@@ -30,10 +30,13 @@ struct Looked {
   int pnp_inliers = 0;
   int landmarks = 0;  // inliers of the window BA
   bool accepted = false;
-  bool right_pose = false;  // the constraint, to 0.5 m and 5 degrees
+  double error_m = 0;  // of the pose that the window BA found, if it has landmarks
+  double error_rad = 0;
+
+  bool right_pose() const;  // to 0.5 m and 5 degrees
 };
 
-struct Run {
+struct Outcome {
   size_t keyframes = 0;  // with ground truth
   // Keyframes of which an earlier one truly shows the same, recent ones of their own map left out.
   std::map<Search, std::vector<KeyframeId>> with_overlap;
@@ -42,10 +45,11 @@ struct Run {
 
 // `truth` is by agent, all of it in one frame; keyframes without a true pose are recognised but not
 // counted.
-Run RunStages(const std::vector<Keyframe>& keyframes, const std::map<int32_t, Trajectory>& truth);
+Outcome RunStages(const std::vector<Keyframe>& keyframes,
+                  const std::map<int32_t, Trajectory>& truth);
 
 // What a stage says of those that came to it; `score`: retrieval score, or its inliers.
 inline constexpr std::array kStages = {"retrieval", "epipolar", "PnP", "window BA"};
-std::vector<Judged> AtStage(const Run& run, Search search, size_t stage);
+std::vector<Judged> AtStage(const Outcome& outcome, Search search, size_t stage);
 
 }  // namespace pangea::bench

@@ -254,8 +254,10 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(const KeyframeI
 }
 
 std::optional<PlaceCandidate> PlaceRecognition::Verify(const Stored& query, const Place& place,
-                                                       PlaceMatch* match) {
+                                                       PlaceMatch* match, PlaceReport* report) {
   const Stored& other = stored_[place.keyframe];
+  report->match = other.id;
+  report->score = place.score;
   std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, options_.matching);
   std::erase_if(matches, [&](const CornerMatch& m) {
     return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;

@@ -141,10 +141,9 @@ TEST(WindowGauge, FortyMarginalisationsLearnNothingOfPositionAndYaw) {
     std::cout << "ride " << seed << ": position and yaw " << invariant.of_gauge
               << ", the least known of the rest " << invariant.of_the_rest << "; with plain errors "
               << plain.of_gauge << ", " << plain.of_the_rest << "\n";
-    EXPECT_LT(invariant.of_gauge, 1e-3 * invariant.of_the_rest) << "seed " << seed;
-    // The same ride with errors that are not invariant does learn: the measure would show it.
-    EXPECT_GT(plain.of_gauge, 1e3 * invariant.of_gauge) << "seed " << seed;
-    EXPECT_GT(plain.of_gauge, invariant.of_the_rest) << "seed " << seed;
+    EXPECT_LT(invariant.of_gauge, 1e-5 * invariant.of_the_rest) << "seed " << seed;
+    // Errors that are not invariant learn on the same ride: this measure would show it.
+    EXPECT_GT(plain.of_gauge, 0.1 * invariant.of_the_rest) << "seed " << seed;
   }
 }
 
