@@ -21,7 +21,7 @@ class Scene:
 
 
 # MH_01 stands on the floor from 10 to 40 s, so more of it.
-SCENES = [Scene("MH_01", 75, "MH_01"), Scene("MH_03", 60, "MH_03"), Scene("walk", 60, None)]
+SCENES = [Scene("MH_01", 75, "MH_01"), Scene("MH_03", 45, "MH_03"), Scene("walk", 45, None)]
 
 
 class Plan:

@@ -1,7 +1,7 @@
 """What the odometry is given: everything exact, then one thing after the other as a real sensor gives it.
 
-A rung of the ladder keeps what the rungs above it took away. Beside the ladder stand those things that do not need the
-tracker, each alone taken away from the exact start.
+A rung of the ladder keeps what the rungs above it took away. Beside the ladder stand IMU and calibration, which show without
+the tracker: each of their errors alone, all else exact.
 """
 
 from dataclasses import dataclass, replace
@@ -14,17 +14,11 @@ class Given:
     imu_noise: bool = False
     imu_bias: bool = False
     imu_recorded: bool = False  # EuRoC's own, and images rendered at its camera's stamps
-    extrinsics: bool = False
-    time_offset: bool = False
-    intrinsics: bool = False
+    calibration: tuple = ()  # what is wrong of CALIBRATION
 
     @property
     def seeded(self):
         return self != replace(Given(), tracks=self.tracks)
-
-    @property
-    def calibration(self):
-        return [name for name in ("extrinsics", "time_offset", "intrinsics") if getattr(self, name)]
 
 
 @dataclass(frozen=True)
@@ -34,16 +28,16 @@ class Rung:
     given: Given
 
 
+CALIBRATION = ("extrinsics", "time_offset", "intrinsics")
+_IMU = [("imu_noise", "IMU noise", {"imu_noise": True}), ("imu_bias", "IMU biases", {"imu_bias": True})]
 _STEPS = [
     ("tracker", "features followed in the images", {"tracks": "followed"}),
     ("pixel_noise", "exposure changes, pixel noise", {"images": "noisy"}),
     ("blur", "motion blur", {"images": "full"}),
-    ("imu_noise", "IMU noise", {"imu_noise": True}),
-    ("imu_bias", "IMU biases", {"imu_bias": True}),
-    ("extrinsics", "extrinsics off", {"extrinsics": True}),
-    ("time_offset", "time offset off", {"time_offset": True}),
-    ("intrinsics", "intrinsics off", {"intrinsics": True}),
+    *_IMU,
+    ("calibration", "calibration off", {"calibration": CALIBRATION}),
 ]
+_OFF = [(what, what.replace("_", " ") + " off", {"calibration": (what,)}) for what in CALIBRATION]
 
 
 def _ladder():
@@ -55,6 +49,6 @@ def _ladder():
 
 
 LADDER = list(_ladder())
-ALONE = [Rung("only_" + name, title, replace(Given(), **change)) for name, title, change in _STEPS if "images" not in change]
+ALONE = [Rung("only_" + name, title, replace(Given(), **change)) for name, title, change in _IMU + _OFF]
 # The real thing: a recorded IMU beside images with noise and blur, calibration exact.
 RECORDED = Rung("imu_recorded", "recorded IMU, exact calibration", Given(tracks="followed", images="full", imu_recorded=True))
