@@ -63,10 +63,11 @@ class Plan:
         argv += ["--seed", str(seed)]
         name = f"{scene.name} {rung.name} {seed}"
         folder = self.work / "recordings" / scene.name / f"{rung.name}_{seed}"
-        recording = Job("recording", name, folder, [Command(argv)], needs=list({exact, images}), outside=[ASSEMBLE])
+        renders = [exact] if images is exact else [exact, images]
+        recording = Job("recording", name, folder, [Command(argv)], needs=renders, outside=[ASSEMBLE])
         self.jobs.append(recording)
         tracks = exact.folder / "mav0/cam0/tracks.csv" if rung.given.tracks == "exact" else None
-        return self._vio(scene, rung, seed, folder, [recording], [exact, images], tracks)
+        return self._vio(scene, rung, seed, folder, [recording], renders, tracks)
 
     def _vio(self, scene, rung, seed, recording, needs, renders, tracks):
         argv = [str(self.bin / "pangea-vio"), "--agent", "1", "--bus", "none", "--recording", str(recording)]
@@ -79,7 +80,7 @@ class Plan:
                              f"{OUT}/rpe.json"], optional=True)]
         folder = self.work / "vio" / scene.name / f"{rung.name}_{seed}"
         job = Job("vio", f"{scene.name} {rung.name} {seed}", folder, commands, needs=needs, main_product="vio.tum")
-        for render in set(renders):
+        for render in renders:
             render.users.append(job)
         self.jobs.append(job)
         return job
