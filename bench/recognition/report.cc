@@ -20,7 +20,6 @@ Plot CurvesOf(const Outcome& outcome, Search search) {
       fmt::format("Places in {}: {} keyframes have one", ToString(search), with_overlap.size());
   plot.x_label = "recall";
   plot.y_label = "precision";
-  plot.y_from_zero = true;
   for (size_t stage = 0; stage < kStages.size(); ++stage) {
     const std::vector<Judged> judged = AtStage(outcome, search, stage);
     PlotLine line{.label = kStages[stage], .colour = AgentColour(stage)};
