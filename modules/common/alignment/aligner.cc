@@ -1,7 +1,9 @@
 #include "common/alignment/aligner.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -10,6 +12,7 @@
 #include <utility>
 
 #include "common/alignment/epipolar_filter.h"
+#include "common/median.h"
 
 namespace pangea {
 namespace {
@@ -17,6 +20,12 @@ namespace {
 KeyframeWindow Last(const KeyframeWindow& frames, int count) {
   const auto n = std::min(frames.size(), static_cast<size_t>(count));
   return {frames.end() - static_cast<std::ptrdiff_t>(n), frames.end()};
+}
+
+// Standard deviation in the worst direction.
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  return std::sqrt(solver.eigenvalues().maxCoeff());
 }
 
 // One candidate on its way through the steps; each returns why it is refused, or an empty string.
@@ -189,16 +198,41 @@ class Alignment {
     if (report_.cells < options_.min_occupied_cells) {
       return "inliers too close together";
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> translation(
-        ba_->covariance.topLeftCorner<3, 3>());
-    const Eigen::Matrix3d R_w_Km = window_m_.T_w_body.back().R();
-    const double yaw_var =
-        (R_w_Km * ba_->covariance.bottomRightCorner<3, 3>() * R_w_Km.transpose())(2, 2);
-    if (translation.eigenvalues().maxCoeff() > options_.max_sigma_m * options_.max_sigma_m ||
-        yaw_var > options_.max_sigma_yaw * options_.max_sigma_yaw) {
+    if (LargestSigma(ba_->covariance.topLeftCorner<3, 3>()) > options_.max_sigma_m ||
+        LargestSigma(ba_->covariance.bottomRightCorner<3, 3>()) > options_.max_sigma_rad) {
       return "too uncertain";
     }
     return "";
+  }
+
+  // The left and the right half of what both see, each solved alone. A turn of the view and a step
+  // to the side look alike over a narrow field; matches that are a little off then give a pose far
+  // off, which gravity does not contradict and the residuals do not show. But it differs from half
+  // to half. What both halves take from the odometries counts twice: the test lets pass too much
+  // rather than too little.
+  std::string CheckHalves() {
+    std::vector<double> sides;
+    std::vector<PointMatch> inliers;
+    for (size_t i = 0; i < matches_.size(); ++i) {
+      if (ba_->inlier[i]) {
+        inliers.push_back(matches_[i]);
+        sides.push_back(Side(matches_[i]));
+      }
+    }
+    const double middle = Median(sides);
+    std::array<std::vector<PointMatch>, 2> halves;
+    for (size_t i = 0; i < inliers.size(); ++i) {
+      halves[sides[i] < middle ? 0 : 1].push_back(inliers[i]);
+    }
+    const auto left = SolveJointBa(window_m_, window_c_, halves[0], ba_->T_m_c, options_.ba);
+    const auto right = SolveJointBa(window_m_, window_c_, halves[1], ba_->T_m_c, options_.ba);
+    if (!left || !right) {
+      return "half of the view gives no pose";
+    }
+    const Vector6d difference = left->T_Km_Kc.Minus(right->T_Km_Kc);
+    const Matrix6d covariance = left->covariance + right->covariance;
+    report_.halves_chi2 = difference.dot(covariance.ldlt().solve(difference));
+    return report_.halves_chi2 > options_.max_halves_chi2 ? "the halves of the view disagree" : "";
   }
 
   // T_odom_m_odom_c of the present guess.
@@ -226,6 +260,16 @@ class Alignment {
  private:
   double InlierRatio() const {
     return static_cast<double>(ba_->num_inlier_observations) / static_cast<double>(matches_.size());
+  }
+
+  // Where the match's point is in the newest view of m, across the line of sight and level.
+  double Side(const PointMatch& match) const {
+    const bool forward = match.direction == Direction::kForward;
+    const Eigen::Vector3d& p_w = (forward ? window_m_ : window_c_).landmarks[match.landmark].p_w;
+    const Rigid3& T_w_cam = window_m_.T_w_cam.back();
+    const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(ba_->T_m_c * p_w)) - T_w_cam.t;
+    const Eigen::Vector3d sight = T_w_cam.q * Eigen::Vector3d::UnitZ();
+    return ray.dot(sight.cross(Eigen::Vector3d::UnitZ())) / ray.dot(sight);
   }
 
   // The candidate's matched corners that have a depth, in either keyframe or by their landmark in
@@ -363,6 +407,7 @@ Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& 
   step([&] { return gate(alignment.OdomAlignment()); });
   step([&] { return alignment.Accept(); });
   step([&] { return alignment.CheckWiderSurroundings(); });
+  step([&] { return alignment.CheckHalves(); });
   constraint.accepted = constraint.reason.empty();
   if (report != nullptr) {
     *report = alignment.report();

@@ -10,7 +10,7 @@
 //   candidate's corners + nearest descriptors -> upright PnP RANSAC -> views and gravity gates
 //   -> projection search in the two keyframes -> surroundings gate
 //   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance
-//   -> projection search along the way
+//   -> projection search along the way -> the two halves of the view
 //
 // The cheap steps come first: a bad candidate dies in the first two.
 
@@ -64,8 +64,12 @@ struct AlignmentOptions {
   int min_inliers = 16;           // distinct landmarks
   double min_inlier_ratio = 0.5;  // of the matches the BA used
   int min_occupied_cells = 6;     // of 6 x 4, in one of the two keyframes
-  double max_sigma_m = 0.25;      // standard deviation of the translation, its worst direction
-  double max_sigma_yaw = 0.03;    // radians
+  // Accepted means: nearer to the truth than 0.5 m and 5 degrees. Five standard deviations of the
+  // worst direction, as images with few points err more often than a normal distribution says.
+  double max_sigma_m = 0.1;
+  double max_sigma_rad = 0.0175;
+  // Between the poses of the view's two halves: 99 % of 6 degrees of freedom.
+  double max_halves_chi2 = 16.8;
 };
 
 // What the steps saw, beside the verdict: for tests and for choosing the options.
@@ -78,6 +82,7 @@ struct AlignmentReport {
   int landmarks = 0;  // distinct inliers of the BA
   int cells = 0;      // image cells these occupy in one of the keyframes
   double tilt = 0;    // radians
+  double halves_chi2 = 0;
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the

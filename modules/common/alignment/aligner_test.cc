@@ -196,6 +196,46 @@ TEST(AlignerTest, RefusesTooFewPoints) {
   EXPECT_FALSE(constraint.reason.empty());
 }
 
+// Accepted is a promise of half a metre and five degrees. A narrow piece of a far wall in view:
+// with few points a turn and a step to the side cannot be told apart well enough to keep it, with
+// many they can.
+TEST(AlignerTest, RefusesWhatIsTooUncertain) {
+  for (const int num_points : {60, 250}) {
+    std::mt19937_64 random(9);
+    std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
+    std::vector<TestPoint> wall;
+    for (int i = 0; i < num_points; ++i) {
+      const Eigen::Vector3d p(ahead(random), across(random), 1.7 + up(random));
+      wall.push_back({YawRotation(1.75) * p, {random(), random(), random(), random()}});
+    }
+    TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
+    walk_m.radius = 0.6;
+    walk_c.radius = 0.8;
+    const TestAgent m = RunTestAgent(wall, walk_m), c = RunTestAgent(wall, walk_c);
+    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    EXPECT_GT(constraint.num_inliers, 100);
+    EXPECT_EQ(constraint.reason, num_points == 60 ? "too uncertain" : "");
+  }
+}
+
+// Corners a little off, one half of the image up and the other down: each is an inlier, and
+// together they give a pose.
+TEST(AlignerTest, RefusesHalvesThatDisagree) {
+  const auto room = MakeTestRoom({.seed = 9});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  const TestAgent c = RunTestAgent(room, SecondAgent(0));
+  TestAgent off = c;
+  for (Keyframe& keyframe : off.keyframes) {
+    for (Corner& corner : keyframe.corners) {
+      const bool left = corner.pixel.x() < 0.5F * static_cast<float>(keyframe.camera.width);
+      corner.pixel.y() += left ? 3.0F : -3.0F;
+    }
+  }
+  const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 0);
+  EXPECT_EQ(Align(c, 9, m, 10, candidate).reason, "");
+  EXPECT_EQ(Align(off, 9, m, 10, candidate).reason, "the halves of the view disagree");
+}
+
 TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   const auto room = MakeTestRoom({.seed = 8});
   TestAgentOptions walk = FirstAgent(0);

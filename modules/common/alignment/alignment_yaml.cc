@@ -45,7 +45,8 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   yaml.Add("min_inlier_ratio", &options.min_inlier_ratio);
   yaml.Add("min_occupied_cells", &options.min_occupied_cells);
   yaml.Add("max_sigma_m", &options.max_sigma_m);
-  yaml.Add("max_sigma_yaw", &options.max_sigma_yaw);
+  yaml.Add("max_sigma_rad", &options.max_sigma_rad);
+  yaml.Add("max_halves_chi2", &options.max_halves_chi2);
 }
 
 void Bind(YamlOptions& yaml, DriftGateOptions& options) {
