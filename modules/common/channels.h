@@ -14,6 +14,7 @@ namespace pangea::channels {
 inline constexpr std::string_view kPlaceMatch = "PLACE_MATCH";
 inline constexpr std::string_view kConstraint = "CONSTRAINT";
 inline constexpr std::string_view kMapState = "MAP_STATE";
+inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 

@@ -74,6 +74,28 @@ CorrectedDelta CorrectForBias(const Preintegration& p, const Eigen::Vector3d& gy
           p.delta_p + d.tail<3>()};
 }
 
+Preintegration Compose(const Preintegration& first, const Preintegration& second) {
+  const CorrectedDelta next = CorrectForBias(second, first.gyro_bias, first.accel_bias);
+  const Eigen::Matrix3d R = first.delta_q.toRotationMatrix();
+  Preintegration both = first;
+  both.duration_s += second.duration_s;
+  both.delta_q = (first.delta_q * next.q).normalized();
+  both.delta_v += R * next.v;
+  both.delta_p += second.duration_s * first.delta_v + R * next.p;
+  // What the errors of each do to those of both, order (rotation, velocity, position).
+  Eigen::Matrix<double, 9, 9> of_first = Eigen::Matrix<double, 9, 9>::Identity();
+  of_first.block<3, 3>(0, 0) = next.q.toRotationMatrix().transpose();
+  of_first.block<3, 3>(3, 0) = -R * Hat(next.v);
+  of_first.block<3, 3>(6, 0) = -R * Hat(next.p);
+  of_first.block<3, 3>(6, 3) = second.duration_s * Eigen::Matrix3d::Identity();
+  Eigen::Matrix<double, 9, 9> of_second = Eigen::Matrix<double, 9, 9>::Identity();
+  of_second.block<3, 3>(3, 3) = of_second.block<3, 3>(6, 6) = R;
+  both.covariance = of_first * first.covariance * of_first.transpose() +
+                    of_second * second.covariance * of_second.transpose();
+  both.bias_jacobian = of_first * first.bias_jacobian + of_second * second.bias_jacobian;
+  return both;
+}
+
 ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime) {
   const double share = b.utime > a.utime ? static_cast<double>(utime - a.utime) /
                                                static_cast<double>(b.utime - a.utime)

@@ -50,6 +50,9 @@ struct CorrectedDelta {
 CorrectedDelta CorrectForBias(const Preintegration& preintegration,
                               const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias);
 
+// The motion of `first` and then of `second`, linearised at the biases of `first`.
+Preintegration Compose(const Preintegration& first, const Preintegration& second);
+
 // The sample at `utime` between two others, linear.
 ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime);
 

@@ -56,6 +56,32 @@ TEST(Preintegration, BiasJacobianMatchesDifferences) {
   }
 }
 
+TEST(Preintegration, TwoSpansComposeToOne) {
+  const Eigen::Vector3d gyro_bias(0.01, -0.02, 0.015), accel_bias(0.1, 0.05, -0.1);
+  Preintegrator whole(ImuNoise{}, gyro_bias, accel_bias), first = whole, second = whole;
+  for (int i = 0; i < 150; ++i) {
+    const ImuSample a = SampleAt(0.005 * i), b = SampleAt(0.005 * (i + 1));
+    whole.Add(a, b);
+    (i < 60 ? first : second).Add(a, b);
+  }
+  const Preintegration both = Compose(first.result(), second.result());
+  EXPECT_NEAR(both.duration_s, whole.result().duration_s, 1e-12);
+  EXPECT_LT(Difference(both, whole.result()).norm(), 1e-9);
+  EXPECT_LT((both.covariance - whole.result().covariance).norm(),
+            1e-9 * whole.result().covariance.norm());
+  EXPECT_LT((both.bias_jacobian - whole.result().bias_jacobian).norm(), 1e-9);
+}
+
+// The second span knew other biases: to first order that does not matter.
+TEST(Preintegration, ComposesSpansOfDifferentBiases) {
+  const Eigen::Vector3d bias(1e-3, -1e-3, 2e-3), zero = Eigen::Vector3d::Zero();
+  const Preintegration a = Integrate(200, zero, zero);
+  const Preintegration same = Compose(a, Integrate(200, zero, zero));
+  const Preintegration other = Compose(a, Integrate(200, bias, 10 * bias));
+  EXPECT_EQ(other.gyro_bias, zero);
+  EXPECT_LT(Difference(same, other).norm(), 2e-6);
+}
+
 TEST(Preintegration, FirstOrderCorrectionFollowsTheBias) {
   const Eigen::Vector3d bg(0.01, -0.02, 0.015), ba(0.1, 0.05, -0.1);
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();

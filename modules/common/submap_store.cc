@@ -50,7 +50,9 @@ void SubmapStore::Add(Keyframe keyframe) {
   if (keyframes_.contains(id)) {
     return;
   }
-  keyframe.preintegration.reset();  // nothing that matches places needs it
+  if (!options_.keep_preintegration) {
+    keyframe.preintegration.reset();
+  }
   keyframes_.emplace(id, std::make_shared<const Keyframe>(std::move(keyframe)));
   arrival_.push_back(id);
   if (arrival_.size() > static_cast<size_t>(options_.max_keyframes)) {

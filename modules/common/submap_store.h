@@ -61,6 +61,7 @@ struct SubmapStoreOptions {
   // A keyframe of 700 corners takes about 40 kB, its view about 25 kB more.
   int max_keyframes = 20000;
   int max_views = 256;
+  bool keep_preintegration = false;  // nothing that matches places needs it
 };
 
 class SubmapStore {

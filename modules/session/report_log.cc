@@ -8,6 +8,7 @@
 #include "common/channels.h"
 #include "common/keyframe.h"
 #include "common/messages.h"
+#include "common/state_chunks.h"
 #include "pangea/correction_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "session/log_reader.h"
@@ -34,22 +35,14 @@ class States {
   explicit States(CapturedSession* session) : session_(session) {}
 
   void AddChunk(const map_state_t& message, MapState chunk, double session_s) {
-    // Revisions increase over all groups, so one names a state; its chunks come in any order.
-    auto& chunks = pending_[{chunk.revision, chunk.group}];
-    chunks.emplace(message.chunk, std::move(chunk));
-    if (chunks.size() < static_cast<size_t>(message.num_chunks)) {
-      return;
+    auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(chunk));
+    if (whole) {
+      std::ranges::sort(whole->maps);
+      Add(std::make_shared<const MapState>(std::move(*whole)), session_s);
     }
-    MapState whole = std::move(chunks.begin()->second);
-    for (auto it = std::next(chunks.begin()); it != chunks.end(); ++it) {
-      std::ranges::move(it->second.keyframes, std::back_inserter(whole.keyframes));
-    }
-    pending_.erase({whole.revision, whole.group});
-    std::ranges::sort(whole.maps);
-    Add(std::make_shared<const MapState>(std::move(whole)), session_s);
   }
 
-  int pending() const { return static_cast<int>(pending_.size()); }
+  int pending() const { return static_cast<int>(chunks_.pending()); }
 
  private:
   std::set<MapId> Together(const MapId& map) const {
@@ -90,7 +83,7 @@ class States {
   }
 
   CapturedSession* session_;
-  std::map<std::pair<int64_t, MapId>, std::map<int, MapState>> pending_;
+  StateChunks chunks_;
 };
 
 // POSE_<id>, by its digits; 0 for any other channel.

@@ -1,4 +1,4 @@
-#include "vio/inertial_factor.h"
+#include "common/inertial_factor.h"
 
 #include <gtest/gtest.h>
 

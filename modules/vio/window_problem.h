@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "vio/inertial_factor.h"
+#include "common/inertial_factor.h"
 #include "vio/point_geometry.h"
 #include "vio/window_state.h"
 

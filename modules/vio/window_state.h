@@ -14,25 +14,17 @@
 #include <optional>
 #include <vector>
 
+#include "common/inertial_factor.h"
 #include "common/preintegration.h"
 #include "common/rigid3.h"
 
 namespace pangea::vio {
 
-// Layout of one frame's error.
-inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
-inline constexpr int kFrameSize = 15;
+// One frame's error is laid out as in common/inertial_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset.
 inline constexpr int kExtrinsics = 0, kTimeOffset = 6;
 inline constexpr int kCalibrationSize = 7;
-
-struct ImuState {
-  Rigid3 T_odom_body;
-  Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-};
 
 // A frame of the window: the body at the image's time as the time offset stood when it came.
 struct WindowFrame {

@@ -1,9 +1,9 @@
-#include "vio/inertial_factor.h"
+#include "common/inertial_factor.h"
 
 #include <Eigen/Cholesky>
 #include <cmath>
 
-namespace pangea::vio {
+namespace pangea {
 namespace {
 
 using Eigen::Matrix3d;
@@ -105,4 +105,4 @@ ImuState Predict(const Preintegration& measured, const ImuState& from) {
   return to;
 }
 
-}  // namespace pangea::vio
+}  // namespace pangea
