@@ -4,7 +4,7 @@
 #include "posegraph/posegraph_process.h"
 #include "posegraph/posegraph_yaml.h"
 
-// KEYFRAME_*, CONSTRAINT, PLACE_MATCH --> PoseGraphProcess --> CORRECTION_*, MAP_STATE
+// KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT --> PoseGraphProcess --> CORRECTION_*, MAP_STATE
 int main(int argc, char** argv) {
   pangea::PoseGraphOptions options;
   pangea::YamlOptions yaml;

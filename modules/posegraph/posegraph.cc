@@ -220,7 +220,56 @@ PoseGraphUpdate PoseGraph::Finish() {
   return Settle(true);
 }
 
+void PoseGraph::TakeRefined(const MapState& refined) {
+  const Refinement refinement(refined);
+  const auto known = [this](const MapId& map) { return numbers_.contains(map); };
+  const auto shares = [&](const Refinement& held) { return held.SharesMapWith(refinement); };
+  const auto as_new = [&](const Refinement& held) {
+    return shares(held) && held.revision() >= refinement.revision();
+  };
+  if (!std::ranges::all_of(refinement.maps(), known) || std::ranges::any_of(refinements_, as_new)) {
+    return;
+  }
+  std::erase_if(refinements_, shares);
+  refinements_.push_back(refinement);
+  for (const MapId& map : refinement.maps()) {
+    Group& group = GroupOf(numbers_.at(map));
+    group.unpublished = group.publish_now = true;
+  }
+}
+
+std::map<int, RefinedMap> PoseGraph::RefinedMaps(const Group& group) const {
+  std::map<int, RefinedMap> maps;
+  for (const int number : group.maps) {
+    maps.try_emplace(number, maps_[number].chain, maps_[number].poses);
+  }
+  for (const Refinement& refinement : refinements_) {
+    const auto here = [&](const MapId& map) { return maps.contains(numbers_.at(map)); };
+    if (!std::ranges::all_of(refinement.maps(), here)) {
+      continue;
+    }
+    std::vector<std::pair<NodeRef, Rigid3>> nodes;
+    std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> positions;
+    for (const auto& [id, pose] : refinement.poses()) {
+      const int number = numbers_.at(id.map);
+      if (const std::optional<int> node = maps_[number].chain.Find(id.seq)) {
+        nodes.emplace_back(NodeRef{number, *node}, pose);
+        positions.emplace_back(maps_[number].poses[*node].p, pose.t);
+      }
+    }
+    if (nodes.empty()) {
+      continue;
+    }
+    const Rigid3 T_map_refined = AlignUpright(positions).ToRigid3();
+    for (const auto& [node, pose] : nodes) {
+      maps.at(node.map).Add(node.node, T_map_refined * pose);
+    }
+  }
+  return maps;
+}
+
 MapState PoseGraph::StateOf(const Group& group) const {
+  const std::map<int, RefinedMap> told = RefinedMaps(group);
   MapState state;
   state.group = maps_[group.maps.front()].id;
   state.revision = next_revision_;
@@ -229,8 +278,8 @@ MapState PoseGraph::StateOf(const Group& group) const {
     state.maps.push_back(map.id);
     for (size_t i = 0; i < map.chain.size(); ++i) {
       const OdometryChain::Node& node = map.chain[i];
-      const Eigen::Quaterniond q = YawRotation(map.poses[i].yaw) * node.T_odom_body.q;
-      state.keyframes.push_back({{map.id, node.seq}, node.utime, {q.normalized(), map.poses[i].p}});
+      state.keyframes.push_back(
+          {{map.id, node.seq}, node.utime, told.at(number).T_map_body(static_cast<int>(i))});
     }
   }
   for (const Loop& loop : loops_) {
@@ -250,6 +299,7 @@ void PoseGraph::Publish(Group* group, PoseGraphUpdate* update) {
     return;
   }
   ++next_revision_;
+  const std::map<int, RefinedMap> told = RefinedMaps(*group);
   for (const int number : group->maps) {
     Map& map = maps_[number];
     // Alone and never corrected, a map is where its odometry says.
@@ -259,11 +309,12 @@ void PoseGraph::Publish(Group* group, PoseGraphUpdate* update) {
     map.corrected = true;
     Correction correction;
     correction.map = map.id;
-    const OdometryChain::Node& node = map.chain[std::max(map.newest_solved, 0)];
+    const int newest = std::max(map.newest_solved, 0);
+    const OdometryChain::Node& node = map.chain[newest];
     correction.seq = node.seq;
     correction.group = state.group;
     correction.revision = state.revision;
-    correction.T_map_odom = map.T_map_odom.ToRigid3();
+    correction.T_map_odom = (told.at(number).Shift(newest) * map.T_map_odom).ToRigid3();
     constexpr double kLeastVariance = 1e-12;
     correction.covariance = kLeastVariance * Matrix6d::Identity();
     correction.covariance.topLeftCorner<3, 3>() += map.covariance.topLeftCorner<3, 3>();

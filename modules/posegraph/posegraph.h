@@ -31,6 +31,7 @@
 #include "posegraph/loop.h"
 #include "posegraph/odometry_chain.h"
 #include "posegraph/pair_evidence.h"
+#include "posegraph/refinement.h"
 
 namespace pangea {
 
@@ -77,6 +78,9 @@ class PoseGraph {
   // A repeat or a refusal changes nothing; one about an unknown keyframe waits for it (bounded:
   // beyond kMaxParked it is forgotten and may come again).
   void Take(const Constraint& constraint);
+  // A group's state after bundle adjustment (refinement.h). A repeat, an older one and one about
+  // an unknown map change nothing.
+  void TakeRefined(const MapState& refined);
   // Solves what is due after all that was taken, once.
   PoseGraphUpdate Settle() { return Settle(false); }
   // Take and Settle.
@@ -140,6 +144,8 @@ class PoseGraph {
   void Apply(const GroupSolver& solver, const std::map<int, Pair>& scope,
              const std::map<int, int>& offset);
 
+  // Each of the group's maps as it is told.
+  std::map<int, RefinedMap> RefinedMaps(const Group& group) const;
   MapState StateOf(const Group& group) const;
   void Publish(Group* group, PoseGraphUpdate* update);
 
@@ -153,7 +159,8 @@ class PoseGraph {
   std::map<int, Group> groups_;  // by their oldest map
   std::vector<int> group_of_;    // of each map
   std::vector<Constraint> parked_;
-  std::set<int64_t> seen_;  // accepted constraints
+  std::set<int64_t> seen_;               // accepted constraints
+  std::vector<Refinement> refinements_;  // no two share a map
   int64_t num_solves_ = 0;
 };
 

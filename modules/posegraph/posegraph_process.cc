@@ -36,6 +36,9 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
   node_.Subscribe<place_match_t>(
       std::string(channels::kPlaceMatch),
       [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
+  node_.Subscribe<map_state_t>(
+      std::string(channels::kRefinement),
+      [this](const std::string&, const map_state_t& message) { OnRefinement(message); });
   node_.Subscribe<have_t>(std::string(channels::kHave),
                           [this](const std::string&, const have_t& message) { OnHave(message); });
   node_.Subscribe<again_t>(
@@ -110,6 +113,21 @@ void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
     }
   }
   SettleUnlessMoreWaits();
+}
+
+void PoseGraphProcess::OnRefinement(const map_state_t& message) {
+  Parsed<MapState> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  const auto whole = refinements_.Add(message.chunk, message.num_chunks, std::move(*parsed.value));
+  if (whole) {
+    node_.Count("refinements");
+    graph_.TakeRefined(*whole);
+    ++num_unsettled_;
+    SettleUnlessMoreWaits();
+  }
 }
 
 void PoseGraphProcess::OnHave(const have_t& message) {

@@ -1,6 +1,7 @@
 #pragma once
 
-// KEYFRAME_*, CONSTRAINT, PLACE_MATCH in; CORRECTION_k, MAP_STATE, STATUS_posegraph out.
+// KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT in; CORRECTION_k, MAP_STATE, STATUS_posegraph
+// out.
 //
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
 // (RESEND_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of, verdicts that a
@@ -24,10 +25,12 @@
 #include "common/bus/in_order.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
+#include "common/state_chunks.h"
 #include "pangea/again_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_t.hpp"
+#include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "posegraph/posegraph.h"
 
@@ -63,6 +66,7 @@ class PoseGraphProcess : public Process {
   void OnKeyframe(const keyframe_t& message);
   void OnConstraint(const constraint_t& message);
   void OnPlaceMatch(const place_match_t& message);
+  void OnRefinement(const map_state_t& message);
   void OnHave(const have_t& message);
   void OnAgain(const again_t& message);
 
@@ -79,6 +83,7 @@ class PoseGraphProcess : public Process {
   PoseGraph graph_;
   InOrder<Item> keyframes_;
   InOrder<std::monostate> matches_;
+  StateChunks refinements_;
   std::map<MapId, Asked> keyframes_asked_;
   std::map<MapId, Asked> matches_asked_;
   std::map<int64_t, Due> due_;      // promised verdicts, by constraint id
