@@ -23,13 +23,14 @@ std::string LoopbackUrl() {
          "?ttl=0&recv_buf_size=4194304";
 }
 
-// The four server functions and a logger, until the object goes.
+// The server functions and a logger, until the object goes.
 class ServerByHand {
  public:
   ServerByHand(const std::string& url, const fs::path& folder) {
     const fs::path pids = folder / "pids";
     std::string command;
-    for (const char* name : {"place-recognition", "inter-map-ba", "fusion", "posegraph"}) {
+    for (const char* name :
+         {"place-recognition", "inter-map-ba", "fusion", "posegraph", "global-ba"}) {
       command += std::string("pangea-") + name + " --bus '" + url + "' >" +
                  (folder / name).string() + " 2>&1 & echo $! >>" + pids.string() + "; ";
     }

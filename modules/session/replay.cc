@@ -9,6 +9,7 @@
 
 #include "common/bus/bus.h"
 #include "fusion/fusion_process.h"
+#include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"
@@ -62,6 +63,7 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
   InterMapBaProcess inter_map_ba(bus, InterMapBaOptions{});
   FusionProcess fusion(bus, FusionOptions{});
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
+  GlobalBaProcess global_ba(bus, GlobalBaOptions{});
 
   ReplaySummary summary;
   for (const LoggedKeyframe& keyframe : Interleave(std::move(keyframes))) {
@@ -76,6 +78,8 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
     }
   }
   posegraph.Finish();
+  bus.Drain();
+  global_ba.Finish();
   bus.Drain();
   return summary;
 }

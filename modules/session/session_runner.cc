@@ -124,7 +124,7 @@ class Runner {
     for (const auto& [name, program] :
          {std::pair{"place_recognition", "pangea-place-recognition"},
           std::pair{"inter_map_ba", "pangea-inter-map-ba"}, std::pair{"fusion", "pangea-fusion"},
-          std::pair{"posegraph", "pangea-posegraph"}}) {
+          std::pair{"posegraph", "pangea-posegraph"}, std::pair{"global_ba", "pangea-global-ba"}}) {
       Keep(name, {Program(program), "--bus", buses_.server});
       server_names_.emplace_back(name);
     }

@@ -1,0 +1,144 @@
+#include "global_ba/ba_factors.h"
+
+#include <Eigen/Cholesky>
+
+#include "common/alignment/ba_factors.h"
+
+namespace pangea {
+namespace {
+
+constexpr double kMinDepth_m = 0.05;
+constexpr double kBehind = 20;  // sigmas
+
+template <int kRows, int kColumns>
+using RowMajor = Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>;
+
+template <int kRows, int kColumns>
+Eigen::Map<RowMajor<kRows, kColumns>> AsMatrix(double* jacobian) {
+  return Eigen::Map<RowMajor<kRows, kColumns>>(jacobian);
+}
+
+// From the errors of a state's blocks to those of the inertial residual (right-invariant): a turn
+// carries position and velocity along, e_p = dp + p x dtheta.
+RowMajor<15, 7> PoseJacobian(const Eigen::Matrix<double, 15, 15>& J, const ImuState& state) {
+  RowMajor<15, 7> J_pose;
+  J_pose.leftCols<3>() = J.middleCols<3>(kPosition);
+  J_pose.middleCols<3>(3) = J.middleCols<3>(kTheta) +
+                            J.middleCols<3>(kPosition) * Hat(state.T_odom_body.t) +
+                            J.middleCols<3>(kVelocity) * Hat(state.v_odom_body);
+  J_pose.col(6).setZero();
+  return J_pose;
+}
+
+}  // namespace
+
+ImuState StateFromBlocks(const double* pose, const double* motion) {
+  return {PoseFromBlock(pose), Eigen::Vector3d::Map(motion), Eigen::Vector3d::Map(motion + 3),
+          Eigen::Vector3d::Map(motion + 6)};
+}
+
+bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals,
+                              double** jacobians) const {
+  const Rigid3 T_map_body = PoseFromBlock(parameters[0]);
+  const Rigid3 T_body_cam = PoseFromBlock(parameters[2]);
+  const Eigen::Vector3d arm_map = Eigen::Vector3d::Map(parameters[1]) - T_map_body.t;
+  const Eigen::Matrix3d R_body_map = T_map_body.R().transpose();
+  const Eigen::Matrix3d R_cam_body = T_body_cam.R().transpose();
+  const Eigen::Vector3d arm_body = R_body_map * arm_map - T_body_cam.t;
+  const Eigen::Vector3d p_cam = R_cam_body * arm_body;
+  Eigen::Map<Eigen::Vector2d> r(residuals);
+  const bool in_front = p_cam.z() > kMinDepth_m;
+  const double inverse_z = in_front ? 1 / p_cam.z() : 0;
+  const Eigen::Vector2d seen = p_cam.head<2>() * inverse_z;
+  if (in_front) {
+    r = sqrt_info_ * (seen - ray_);
+  } else {
+    r.setConstant(kBehind);
+  }
+  if (jacobians == nullptr) {
+    return true;
+  }
+  Eigen::Matrix<double, 2, 3> J_project;
+  J_project << inverse_z, 0, -seen.x() * inverse_z, 0, inverse_z, -seen.y() * inverse_z;
+  const Eigen::Matrix<double, 2, 3> J_body = sqrt_info_ * J_project * R_cam_body;
+  const Eigen::Matrix<double, 2, 3> J_map = J_body * R_body_map;
+  if (jacobians[0] != nullptr) {
+    AsMatrix<2, 7>(jacobians[0]) << -J_map, J_map * Hat(arm_map), Eigen::Vector2d::Zero();
+  }
+  if (jacobians[1] != nullptr) {
+    AsMatrix<2, 3>(jacobians[1]) = J_map;
+  }
+  if (jacobians[2] != nullptr) {
+    AsMatrix<2, 7>(jacobians[2]) << -J_body, J_body * Hat(arm_body), Eigen::Vector2d::Zero();
+  }
+  return true;
+}
+
+InertialFactor::InertialFactor(const Preintegration& measured, const ImuNoise& noise)
+    : measured_(measured), sqrt_info_(InertialInformation(measured, noise).llt().matrixU()) {}
+
+bool InertialFactor::Evaluate(double const* const* parameters, double* residuals,
+                              double** jacobians) const {
+  const ImuState from = StateFromBlocks(parameters[0], parameters[1]);
+  const ImuState to = StateFromBlocks(parameters[2], parameters[3]);
+  const InertialResidual residual = ComputeInertialResidual(measured_, from, to);
+  Eigen::Map<Eigen::Matrix<double, 15, 1>> r(residuals);
+  r = sqrt_info_ * residual.r;
+  if (jacobians == nullptr) {
+    return true;
+  }
+  if (jacobians[0] != nullptr) {
+    AsMatrix<15, 7>(jacobians[0]) = sqrt_info_ * PoseJacobian(residual.J_from, from);
+  }
+  if (jacobians[1] != nullptr) {
+    AsMatrix<15, 9>(jacobians[1]) = sqrt_info_ * residual.J_from.rightCols<9>();
+  }
+  if (jacobians[2] != nullptr) {
+    AsMatrix<15, 7>(jacobians[2]) = sqrt_info_ * PoseJacobian(residual.J_to, to);
+  }
+  if (jacobians[3] != nullptr) {
+    AsMatrix<15, 9>(jacobians[3]) = sqrt_info_ * residual.J_to.rightCols<9>();
+  }
+  return true;
+}
+
+BiasPriorFactor::BiasPriorFactor(double gyro_sigma, double accel_sigma) {
+  inverse_sigma_ << Eigen::Vector3d::Constant(1 / gyro_sigma),
+      Eigen::Vector3d::Constant(1 / accel_sigma);
+}
+
+bool BiasPriorFactor::Evaluate(double const* const* parameters, double* residuals,
+                               double** jacobians) const {
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> bias(parameters[0] + 3);
+  Eigen::Map<Eigen::Matrix<double, 6, 1>> r(residuals);
+  r = inverse_sigma_.cwiseProduct(bias);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    Eigen::Map<RowMajor<6, 9>> J = AsMatrix<6, 9>(jacobians[0]);
+    J.setZero();
+    J.rightCols<6>() = inverse_sigma_.asDiagonal();
+  }
+  return true;
+}
+
+CameraPriorFactor::CameraPriorFactor(const Rigid3& T_body_cam, double position_sigma,
+                                     double rotation_sigma)
+    : prior_(T_body_cam) {
+  inverse_sigma_ << Eigen::Vector3d::Constant(1 / position_sigma),
+      Eigen::Vector3d::Constant(1 / rotation_sigma);
+}
+
+bool CameraPriorFactor::Evaluate(double const* const* parameters, double* residuals,
+                                 double** jacobians) const {
+  const Vector6d error = PoseFromBlock(parameters[0]).Minus(prior_);
+  Eigen::Map<Vector6d> r(residuals);
+  r = inverse_sigma_.cwiseProduct(error);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    // Log(Exp(d) Exp(e)) ~ e + Jl^-1(e) d, and Jl^-1(e) = Jr^-1(-e).
+    Matrix6d J = Matrix6d::Identity();
+    J.bottomRightCorner<3, 3>() = RightJacobianInverse(-error.tail<3>());
+    AsMatrix<6, 7>(jacobians[0]) << inverse_sigma_.asDiagonal() * J, Vector6d::Zero();
+  }
+  return true;
+}
+
+}  // namespace pangea

@@ -1,0 +1,160 @@
+#include "global_ba/ba_factors.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/alignment/ba_factors.h"
+#include "common/testing/numeric_jacobian.h"
+#include "global_ba/ba_test_world.h"
+
+namespace pangea {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// Pose and motion in one piece, moved by an offset in their tangents.
+struct Blocks {
+  Rigid3 pose;
+  MotionBlock motion;
+
+  explicit Blocks(const ImuState& imu) : pose(imu.T_odom_body) {
+    motion << imu.v_odom_body, imu.gyro_bias, imu.accel_bias;
+  }
+  void Write(const VectorXd& offset, double* pose_block, double* motion_block) const {
+    PoseToBlock(pose.Plus(offset.head<6>()), pose_block);
+    Eigen::Map<MotionBlock> moved(motion_block);
+    moved = motion + offset.tail<9>();
+  }
+};
+
+Rigid3 RandomPose(std::mt19937_64& rng) {
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&] { return Vector3d(normal(rng), normal(rng), normal(rng)); };
+  return {ExpSo3(vector()), 3 * vector()};
+}
+
+TEST(LandmarkFactor, DerivativesMatchDifferences) {
+  std::mt19937_64 rng(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Rigid3 T_map_body = RandomPose(rng), T_body_cam = RandomPose(rng);
+    const Vector3d p_cam(0.4, -0.3, 2.5 + 0.1 * trial);
+    const Vector3d point = T_map_body * (T_body_cam * p_cam);
+    Eigen::Matrix2d sqrt_info;
+    sqrt_info << 100, 20, -5, 80;
+    const LandmarkFactor factor({0.1, 0.1}, sqrt_info);
+    double pose[7], landmark[3], camera[7];
+    const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
+      PoseToBlock(T_map_body.Plus(offset.head<6>()), pose);
+      Vector3d::Map(landmark) = point + offset.segment<3>(6);
+      PoseToBlock(T_body_cam.Plus(offset.tail<6>()), camera);
+      const double* const blocks[] = {pose, landmark, camera};
+      VectorXd r(2);
+      EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+      return r;
+    };
+    Eigen::Matrix<double, 2, 7, Eigen::RowMajor> J_pose, J_camera;
+    Eigen::Matrix<double, 2, 3, Eigen::RowMajor> J_landmark;
+    double* jacobians[] = {J_pose.data(), J_landmark.data(), J_camera.data()};
+    const VectorXd r = evaluate(VectorXd::Zero(15), jacobians);
+    EXPECT_LT((r - sqrt_info * (p_cam.hnormalized() - Eigen::Vector2d(0.1, 0.1))).norm(), 1e-9);
+    MatrixXd J(2, 15);
+    J << J_pose.leftCols<6>(), J_landmark, J_camera.leftCols<6>();
+    const MatrixXd numeric = NumericJacobian(
+        15, 1e-6, [&](const VectorXd& offset) -> VectorXd { return evaluate(offset, nullptr); });
+    EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-6 * numeric.cwiseAbs().maxCoeff());
+  }
+}
+
+TEST(LandmarkFactor, BehindTheCameraItIsAnOutlierWithoutSlope) {
+  const LandmarkFactor factor({0, 0}, Eigen::Matrix2d::Identity());
+  const double pose[] = {0, 0, 0, 1, 0, 0, 0}, landmark[] = {0.1, 0.2, -1};
+  const double* const blocks[] = {pose, landmark, pose};
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 7, Eigen::RowMajor> J_pose, J_camera;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> J_landmark;
+  double* jacobians[] = {J_pose.data(), J_landmark.data(), J_camera.data()};
+  EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+  EXPECT_GT(r.squaredNorm(), BaOptions{}.max_chi2);
+  EXPECT_EQ(J_pose.norm() + J_landmark.norm() + J_camera.norm(), 0);
+}
+
+TEST(CameraPriorFactor, DerivativesMatchDifferences) {
+  std::mt19937_64 rng(2);
+  const Rigid3 prior = RandomPose(rng);
+  Vector6d off;
+  off << 0.1, -0.2, 0.3, 0.4, -0.3, 0.2;
+  const Rigid3 at = prior.Plus(off);
+  const CameraPriorFactor factor(prior, 0.1, 0.2);
+  double block[7];
+  const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
+    PoseToBlock(at.Plus(offset), block);
+    const double* const blocks[] = {block};
+    VectorXd r(6);
+    EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+    return r;
+  };
+  Eigen::Matrix<double, 6, 7, Eigen::RowMajor> J;
+  double* jacobians[] = {J.data()};
+  const VectorXd r = evaluate(VectorXd::Zero(6), jacobians);
+  EXPECT_LT((r.head<3>() - off.head<3>() / 0.1).norm(), 1e-9);
+  EXPECT_LT((r.tail<3>() - off.tail<3>() / 0.2).norm(), 1e-9);
+  const MatrixXd numeric = NumericJacobian(
+      6, 1e-6, [&](const VectorXd& offset) -> VectorXd { return evaluate(offset, nullptr); });
+  EXPECT_LT((J.leftCols<6>() - numeric).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(InertialFactor, DerivativesMatchDifferencesInEveryBlock) {
+  const BaTestWorld world = MakeBaTestWorld({.agents = 1, .keyframes = 8, .landmarks = 1});
+  for (size_t i = 1; i < world.start.keyframes.size(); ++i) {
+    const BaKeyframe& to = world.start.keyframes[i];
+    const Blocks first(world.start.keyframes[i - 1].imu), second(to.imu);
+    const InertialFactor factor(*to.preintegration, ImuNoise{});
+    double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
+    const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
+      first.Write(offset.head<15>(), pose_a, motion_a);
+      second.Write(offset.tail<15>(), pose_b, motion_b);
+      const double* const blocks[] = {pose_a, motion_a, pose_b, motion_b};
+      VectorXd r(15);
+      EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+      return r;
+    };
+    Eigen::Matrix<double, 15, 7, Eigen::RowMajor> J_pose_a, J_pose_b;
+    Eigen::Matrix<double, 15, 9, Eigen::RowMajor> J_motion_a, J_motion_b;
+    double* jacobians[] = {J_pose_a.data(), J_motion_a.data(), J_pose_b.data(), J_motion_b.data()};
+    evaluate(VectorXd::Zero(30), jacobians);
+    MatrixXd J(15, 30);
+    J << J_pose_a.leftCols<6>(), J_motion_a, J_pose_b.leftCols<6>(), J_motion_b;
+    const MatrixXd numeric = NumericJacobian(
+        30, 1e-5, [&](const VectorXd& offset) -> VectorXd { return evaluate(offset, nullptr); });
+    for (int column = 0; column < 30; ++column) {
+      EXPECT_LT((J.col(column) - numeric.col(column)).cwiseAbs().maxCoeff(),
+                1e-6 * numeric.cwiseAbs().maxCoeff())
+          << "keyframe " << i << ", column " << column;
+    }
+  }
+}
+
+TEST(BiasPriorFactor, IsOneAtOneSigmaAndItsDerivativeMatches) {
+  const BiasPriorFactor factor(0.05, 0.15);
+  const auto evaluate = [&](const VectorXd& motion, double** jacobians) {
+    const double* const blocks[] = {motion.data()};
+    VectorXd r(6);
+    EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+    return r;
+  };
+  VectorXd at(9);
+  at << 1, 2, 3, 0.05, 0.05, 0.05, 0.15, 0.15, 0.15;
+  Eigen::Matrix<double, 6, 9, Eigen::RowMajor> J;
+  double* jacobians[] = {J.data()};
+  EXPECT_LT((evaluate(at, jacobians) - VectorXd::Ones(6)).norm(), 1e-12);
+  const MatrixXd numeric = NumericJacobian(9, 1e-6, [&](const VectorXd& offset) -> VectorXd {
+    return evaluate(VectorXd(at + offset), nullptr);
+  });
+  EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,103 @@
+#pragma once
+
+// The visual-inertial bundle adjustment of one group:
+//
+//   min  sum_seen rho(|r_landmark|^2) + sum_keyframes |r_inertial|^2
+//        + sum_maps |r_bias|^2 + |r_camera|^2
+//
+// over every keyframe's pose, velocity and biases, every landmark, and where each map's camera sits
+// on its IMU (ba_factors.h): an odometry finds that on its way, so early keyframes were made with a
+// poorer estimate than late ones. Landmarks are
+// eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with Cauchy's loss what
+// does not fit shows and is dropped, with Huber's the rest is estimated. Position and yaw of the
+// whole are free: damping leaves them where they began.
+//
+// In pieces of a few iterations, so that whoever runs it may look up in between and drop it. One
+// thread, no clock: the same world gives the same bytes.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/ids.h"
+#include "common/inertial_factor.h"
+
+namespace pangea {
+
+struct BaKeyframe {
+  KeyframeId id;
+  int64_t utime = 0;
+  int camera = 0;  // of the world's
+  ImuState imu;    // odom is the group's map frame here
+  // The IMU since keyframe `previous` of the world; none where a map or a piece of it begins.
+  int previous = -1;
+  std::optional<Preintegration> preintegration;
+};
+
+struct BaObservation {
+  int keyframe = 0;
+  int landmark = 0;
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // on the camera's plane z = 1
+  Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();
+};
+
+// Indices are into its own vectors. A keyframe comes after its `previous`.
+struct BaWorld {
+  std::vector<Rigid3> T_body_cam;  // of each camera
+  std::vector<BaKeyframe> keyframes;
+  std::vector<Eigen::Vector3d> landmarks;  // map frame
+  std::vector<BaObservation> observations;
+};
+
+// Takes out landmarks that fewer than two keyframes see, and what is seen of them.
+void DropLonelyLandmarks(BaWorld* world);
+
+struct BaOptions {
+  // How biases wander; white noise comes with each preintegration.
+  ImuNoise imu;
+  // Of a map's first keyframe, about zero.
+  double gyro_bias_sigma = 0.05;   // rad/s
+  double accel_bias_sigma = 0.15;  // m/s^2
+  // Of T_body_cam about the odometry's last estimate.
+  double camera_position_sigma = 0.005;  // m
+  double camera_rotation_sigma = 0.005;  // rad
+  double loss_scale = 2.0;               // sigmas
+  double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
+  int iterations_a_piece = 2;
+  int max_iterations = 10;  // of each of the two rounds
+  double function_tolerance = 5e-4;
+};
+
+class BaProblem {
+ public:
+  BaProblem(BaWorld world, const BaOptions& options);
+  ~BaProblem();
+  BaProblem(const BaProblem&) = delete;
+  BaProblem& operator=(const BaProblem&) = delete;
+
+  // The next piece of work; false when there is none left.
+  bool Advance();
+
+  // As it stands.
+  const BaWorld& world() const { return world_; }
+  // The last solve's, over all residuals; zero before.
+  double cost() const { return cost_; }
+  int iterations() const { return iterations_; }
+
+ private:
+  enum class Round { kFindOutliers, kEstimate, kDone };
+  struct Solver;
+
+  void Begin();
+  void DropOutliers();
+  void ReadBack();
+
+  BaOptions options_;
+  BaWorld world_;
+  Round round_ = Round::kFindOutliers;
+  std::unique_ptr<Solver> solver_;
+  double cost_ = 0;
+  int iterations_ = 0;  // of this round
+};
+
+}  // namespace pangea

@@ -1,0 +1,102 @@
+#include "global_ba/ba_problem.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "global_ba/ba_test_world.h"
+
+namespace pangea {
+namespace {
+
+BaWorld Solved(const BaWorld& start, const BaOptions& options = {}) {
+  BaProblem problem(start, options);
+  while (problem.Advance()) {
+  }
+  return problem.world();
+}
+
+double PathLength(const BaWorld& world) {
+  double length = 0;
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    if (keyframe.previous >= 0) {
+      length += (keyframe.imu.T_odom_body.t - world.keyframes[keyframe.previous].imu.T_odom_body.t)
+                    .norm();
+    }
+  }
+  return length;
+}
+
+TEST(BaProblem, FindsExactTruth) {
+  const BaTestWorld world = MakeBaTestWorld({.noise = 0});
+  ASSERT_GT(WorstError(world.start, world.truth), 0.05);
+  EXPECT_LT(WorstError(Solved(world.start), world.truth), 5e-4);  // what integration itself errs
+}
+
+TEST(BaProblem, FindsTheScaleThatTheStartHasWrong) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const BaTestWorld world = MakeBaTestWorld({.seed = seed, .start_sigma_m = 0});
+    const double true_length = PathLength(world.truth);
+    ASSERT_NEAR(PathLength(world.start) / true_length, 1.02, 1e-6);
+    BaOptions to_the_end;
+    to_the_end.function_tolerance = 1e-7;
+    to_the_end.max_iterations = 40;
+    EXPECT_NEAR(PathLength(Solved(world.start, to_the_end)) / true_length, 1, 2e-3);
+  }
+}
+
+TEST(BaProblem, OutliersDoNotMoveIt) {
+  const BaTestWorld clean = MakeBaTestWorld({});
+  const BaTestWorld dirty = MakeBaTestWorld({.outlier_share = 0.1});
+  const BaWorld solved = Solved(dirty.start);
+  EXPECT_LT(solved.observations.size(),
+            0.95 * static_cast<double>(dirty.start.observations.size()));
+  EXPECT_GT(solved.observations.size(), 0.8 * static_cast<double>(dirty.start.observations.size()));
+  EXPECT_LT(WorstError(solved, dirty.truth), 2 * WorstError(Solved(clean.start), clean.truth));
+}
+
+// Twice the cost at the minimum is chi-squared with as many degrees of freedom as there are
+// residuals beyond parameters, when the noise is what the residuals claim.
+TEST(BaProblem, ResidualsAreWhatTheyClaim) {
+  double sum = 0, degrees = 0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const BaTestWorld world = MakeBaTestWorld({.seed = seed, .landmarks = 60});
+    BaOptions options;
+    options.loss_scale = 1e3;  // no loss: each residual counts in full
+    options.max_chi2 = 1e6;
+    options.function_tolerance = 1e-9;
+    BaProblem problem(world.start, options);
+    while (problem.Advance()) {
+    }
+    const size_t keyframes = world.start.keyframes.size();
+    sum += 2 * problem.cost();
+    degrees += 2.0 * static_cast<double>(world.start.observations.size()) +
+               15.0 * static_cast<double>(keyframes - 2) + 2 * 6 -
+               15.0 * static_cast<double>(keyframes) -
+               3.0 * static_cast<double>(world.start.landmarks.size()) + 4;
+  }
+  EXPECT_NEAR(sum / degrees, 1, 0.05);
+}
+
+TEST(BaProblem, TheSameStartGivesTheSameBytes) {
+  const BaTestWorld world = MakeBaTestWorld({});
+  const BaWorld a = Solved(world.start), b = Solved(world.start);
+  for (size_t i = 0; i < a.keyframes.size(); ++i) {
+    EXPECT_EQ(a.keyframes[i].imu.T_odom_body.t, b.keyframes[i].imu.T_odom_body.t);
+  }
+}
+
+// Dropping the work in the middle leaves a world that is no worse than the start.
+TEST(BaProblem, CanBeLeftAfterAnyPiece) {
+  const BaTestWorld world = MakeBaTestWorld({});
+  BaProblem problem(world.start, BaOptions{});
+  double cost = 1e300;
+  while (problem.Advance() && problem.iterations() <= 4) {
+    EXPECT_LE(problem.cost(), cost);
+    cost = problem.cost();
+  }
+  EXPECT_LT(WorstError(problem.world(), world.truth), WorstError(world.start, world.truth));
+}
+
+}  // namespace
+}  // namespace pangea

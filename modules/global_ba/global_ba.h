@@ -1,0 +1,91 @@
+#pragma once
+
+// Global visual-inertial bundle adjustment of fused groups (ORB-SLAM3's and COVINS' last step:
+// Campos et al., TRO 2021; Schmuck et al., ISMAR 2021).
+//
+// In: keyframes, place matches, verdicts, group states, in any order. Out: the refined state of a
+// group: every keyframe's pose from all rays and all inertial measurements of all its agents at
+// once. The pose graph's edges and loops carry each odometry's own scale; here one adjustment finds
+// it from the whole flight, and landmarks that several agents see make it theirs together.
+//
+// A group is due when its loops or keyframes are not those of its last refinement. Work goes in
+// pieces, and is dropped when news of its maps is taken. Map frame: the state's. One thread, no
+// clock: the same calls in the same order give the same bytes.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/server_messages.h"
+#include "common/submap_store.h"
+#include "global_ba/ba_problem.h"
+#include "global_ba/group_world.h"
+
+namespace pangea {
+
+struct GlobalBaOptions {
+  GroupWorldOptions world;
+  BaOptions ba;
+  int min_keyframes = 10;  // of a group
+};
+
+class GlobalBa {
+ public:
+  struct Counters {
+    int64_t begun = 0;
+    int64_t dropped = 0;  // because of news
+    int64_t finished = 0;
+  };
+
+  explicit GlobalBa(const GlobalBaOptions& options) : options_(options) {}
+
+  // Repeats change nothing.
+  void Take(Keyframe keyframe);
+  void Take(const PlaceMatch& match);
+  void Take(const Constraint& constraint);
+  // Whole; the highest revision wins, map by map.
+  void Take(MapState state);
+
+  // Whether a group is due or in work.
+  bool HasWork() const { return problem_ != nullptr || NextDue() != nullptr; }
+  // One piece of work, if there is any. The refined state when that was the last.
+  std::optional<MapState> Advance();
+
+  const Counters& counters() const { return counters_; }
+  size_t num_keyframes() const { return store_.size(); }
+
+ private:
+  using Pair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
+  using Corners = std::vector<std::pair<int, int>>;
+  using StatePointer = std::shared_ptr<const MapState>;
+
+  // What a refinement rests on.
+  struct Basis {
+    std::vector<MapId> maps;
+    size_t keyframes = 0;
+    int constraints = 0, switched_off = 0;
+    bool operator==(const Basis&) const = default;
+  };
+  static Basis BasisOf(const MapState& state);
+
+  StatePointer NextDue() const;
+  void Begin(StatePointer state);
+  void DropIfAbout(const MapId& map);
+  MapState Refined() const;
+
+  GlobalBaOptions options_;
+  SubmapStore store_{{.keep_preintegration = true}};
+  std::map<Pair, Corners> matched_;  // by place recognition
+  std::set<Pair> accepted_;
+  std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
+  std::map<MapId, Basis> refined_;        // by group
+  StatePointer in_work_;
+  std::unique_ptr<BaProblem> problem_;
+  Counters counters_;
+};
+
+}  // namespace pangea

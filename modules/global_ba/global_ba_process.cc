@@ -1,0 +1,195 @@
+#include "global_ba/global_ba_process.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+// Longer than the pose graph waits before it solves all from the beginning.
+constexpr int64_t kQuiet_us = 3 * kSecond;
+constexpr int64_t kAskAgainAfter_us = 2 * kSecond;
+// One request's answers must fit the receive buffer: a keyframe is about 28 kB.
+constexpr int32_t kMaxAsked = 50;
+constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
+// A gap that nobody fills after so many requests is gone over.
+constexpr int kMaxTimesAsked = 15;
+
+}  // namespace
+
+GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options)
+    : node_(bus, "global_ba"), global_ba_(options) {
+  node_.Subscribe<keyframe_t>(
+      std::string(channels::kAllKeyframes),
+      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
+  node_.Subscribe<place_match_t>(
+      std::string(channels::kPlaceMatch),
+      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
+  node_.Subscribe<constraint_t>(
+      std::string(channels::kConstraint),
+      [this](const std::string&, const constraint_t& message) { OnConstraint(message); });
+  node_.Subscribe<map_state_t>(
+      std::string(channels::kMapState),
+      [this](const std::string&, const map_state_t& message) { OnMapState(message); });
+  node_.Subscribe<have_t>(std::string(channels::kHave),
+                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Subscribe<again_t>(
+      channels::Again(node_.name()),
+      [this](const std::string&, const again_t& message) { OnAgain(message); });
+}
+
+void GlobalBaProcess::OnKeyframe(const keyframe_t& message) {
+  Parsed<Keyframe> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  ++num_news_;
+  keyframes_.Add(parsed.value->id.map, parsed.value->id.seq, {});
+  global_ba_.Take(std::move(*parsed.value));
+}
+
+void GlobalBaProcess::OnPlaceMatch(const place_match_t& message) {
+  const Parsed<PlaceMatch> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  ++num_news_;
+  matches_.Add(parsed.value->query.map, parsed.value->query.seq, {});
+  global_ba_.Take(*parsed.value);
+}
+
+void GlobalBaProcess::OnConstraint(const constraint_t& message) {
+  const Parsed<Constraint> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  ++num_news_;
+  global_ba_.Take(*parsed.value);
+}
+
+void GlobalBaProcess::OnMapState(const map_state_t& message) {
+  Parsed<MapState> parsed = Parse(message);
+  if (!parsed.value) {
+    node_.Refuse(parsed.refused);
+    return;
+  }
+  if (auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+    global_ba_.Take(std::move(*whole));
+  }
+}
+
+void GlobalBaProcess::OnHave(const have_t& message) {
+  for (int i = 0; i < message.num_maps; ++i) {
+    const Parsed<MapId> map = Parse(message.maps[i]);
+    if (!map.value || message.highest_seq[i] < 0) {
+      node_.Refuse("have: invalid map or seq");
+      continue;
+    }
+    keyframes_.Announce(*map.value, message.highest_seq[i]);
+    matches_.Announce(*map.value, message.highest_seq[i]);
+    // What was judged before this process started.
+    if (verdicts_asked_.insert(*map.value).second) {
+      for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
+        Ask(std::string(channels::kConstraint), *map.value, seq, seq + kMaxVerdictsAsked - 1);
+      }
+    }
+  }
+}
+
+void GlobalBaProcess::OnAgain(const again_t& message) {
+  const Bytes data(message.data.data(), message.data.size());
+  keyframe_t keyframe{};
+  constraint_t constraint{};
+  place_match_t match{};
+  if (message.channel == channels::kConstraint && DecodeMessage(data, &constraint)) {
+    OnConstraint(constraint);
+  } else if (message.channel == channels::kPlaceMatch && DecodeMessage(data, &match)) {
+    OnPlaceMatch(match);
+  } else if (DecodeMessage(data, &keyframe)) {
+    OnKeyframe(keyframe);
+  } else {
+    node_.Refuse("again: not what was asked for");
+  }
+}
+
+void GlobalBaProcess::Advance() {
+  if (const auto refined = global_ba_.Advance()) {
+    for (const map_state_t& chunk : ToMessages(*refined)) {
+      node_.Publish(std::string(channels::kRefinement), chunk);
+    }
+  }
+}
+
+void GlobalBaProcess::Finish() {
+  while (global_ba_.HasWork()) {
+    Advance();
+  }
+}
+
+void GlobalBaProcess::Tick(int64_t now_utime) {
+  AskFor(&keyframes_, &keyframes_asked_, true, now_utime);
+  AskFor(&matches_, &matches_asked_, false, now_utime);
+  if (num_news_ != num_news_at_change_) {
+    num_news_at_change_ = num_news_;
+    last_news_utime_ = now_utime;
+  }
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond;
+    PublishStatus(now_utime);
+  }
+  if (now_utime >= last_news_utime_ + kQuiet_us && !node_.bus().MoreWaits() &&
+      global_ba_.HasWork()) {
+    Advance();
+  }
+}
+
+void GlobalBaProcess::AskFor(Stream* stream, std::map<MapId, Asked>* asked, bool keyframes,
+                             int64_t now_utime) {
+  for (const SeqGap& gap : stream->Gaps()) {
+    Asked& last = (*asked)[gap.map];
+    if (last.from_seq != gap.from_seq) {
+      last = {gap.from_seq, now_utime + kAskAgainAfter_us, 0};
+    } else if (now_utime >= last.next_utime && last.times >= kMaxTimesAsked) {
+      stream->Skip({gap.map, gap.from_seq, gap.from_seq});
+    } else if (now_utime >= last.next_utime) {
+      last.next_utime = now_utime + kAskAgainAfter_us;
+      ++last.times;
+      Ask(keyframes ? channels::Keyframe(gap.map.agent_id) : std::string(channels::kPlaceMatch),
+          gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1));
+    }
+  }
+}
+
+void GlobalBaProcess::Ask(const std::string& channel, const MapId& map, int32_t from_seq,
+                          int32_t to_seq) {
+  resend_request_t request{};
+  request.requester = node_.name();
+  request.channel = channel;
+  request.map = ToMessage(map);
+  request.from_seq = from_seq;
+  request.to_seq = to_seq;
+  node_.Publish(std::string(channels::kResendRequest), request);
+  node_.NoteResendAsked();
+}
+
+void GlobalBaProcess::PublishStatus(int64_t now_utime) {
+  const GlobalBa::Counters& counters = global_ba_.counters();
+  node_.Set("adjustments_begun", counters.begun);
+  node_.Set("adjustments_dropped", counters.dropped);
+  node_.Set("adjustments_finished", counters.finished);
+  node_.PublishStatus(now_utime, global_ba_.HasWork() ? 1 : 0,
+                      fmt::format("{} keyframes, {} groups adjusted, {} adjustments dropped",
+                                  global_ba_.num_keyframes(), counters.finished, counters.dropped));
+}
+
+}  // namespace pangea

@@ -1,0 +1,127 @@
+#include "global_ba/global_ba.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "global_ba/ba_test_world.h"
+
+namespace pangea {
+namespace {
+
+struct Server {
+  explicit Server(const BaTestMessages& messages) : ba(GlobalBaOptions{}) {
+    for (const Keyframe& keyframe : messages.keyframes) {
+      ba.Take(keyframe);
+    }
+    for (const PlaceMatch& match : messages.matches) {
+      ba.Take(match);
+    }
+    for (const Constraint& constraint : messages.constraints) {
+      ba.Take(constraint);
+    }
+    ba.Take(messages.state);
+  }
+
+  std::optional<MapState> Finish() {
+    while (ba.HasWork()) {
+      if (auto refined = ba.Advance()) {
+        return refined;
+      }
+    }
+    return std::nullopt;
+  }
+
+  GlobalBa ba;
+};
+
+BaWorld Moved(BaWorld world, const MapState& refined) {
+  for (size_t i = 0; i < world.keyframes.size(); ++i) {
+    EXPECT_EQ(world.keyframes[i].id, refined.keyframes[i].id);
+    world.keyframes[i].imu.T_odom_body = refined.keyframes[i].T_map_body;
+  }
+  return world;
+}
+
+TEST(GlobalBa, RefinesAGroup) {
+  const BaTestWorld world = MakeBaTestWorld({});
+  const auto refined = Server(MessagesOf(world)).Finish();
+  ASSERT_TRUE(refined.has_value());
+  EXPECT_EQ(refined->revision, 1);
+  const double before = WorstError(world.start, world.truth);
+  EXPECT_GT(before, 0.1);
+  EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth), 0.2 * before);
+}
+
+TEST(GlobalBa, TheOrderOfNewsDoesNotMatter) {
+  BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  const auto in_order = Server(messages).Finish();
+  std::mt19937_64 rng(1);
+  std::ranges::shuffle(messages.keyframes, rng);
+  std::ranges::shuffle(messages.matches, rng);
+  std::ranges::shuffle(messages.constraints, rng);
+  const auto shuffled = Server(messages).Finish();
+  ASSERT_TRUE(in_order && shuffled);
+  for (size_t i = 0; i < in_order->keyframes.size(); ++i) {
+    EXPECT_EQ(in_order->keyframes[i].T_map_body.t, shuffled->keyframes[i].T_map_body.t);
+  }
+}
+
+TEST(GlobalBa, NewsOfTheGroupDropsTheWorkAndOtherNewsDoesNot) {
+  const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  Server server(messages);
+  server.ba.Advance();
+  server.ba.Advance();
+  Keyframe elsewhere = messages.keyframes.front();
+  elsewhere.id.map = {9, 9};
+  server.ba.Take(elsewhere);
+  server.ba.Take(messages.keyframes.front());    // a repeat
+  server.ba.Take(messages.constraints.front());  // another
+  EXPECT_EQ(server.ba.counters().dropped, 0);
+  Keyframe next = messages.keyframes.back();
+  ++next.id.seq;
+  server.ba.Take(next);
+  EXPECT_EQ(server.ba.counters().dropped, 1);
+  EXPECT_TRUE(server.Finish().has_value());
+  EXPECT_EQ(server.ba.counters().begun, 2);
+}
+
+TEST(GlobalBa, AGroupIsDueAgainWhenItsLoopsOrKeyframesChange) {
+  const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  Server server(messages);
+  ASSERT_TRUE(server.Finish().has_value());
+  MapState state = messages.state;
+  ++state.revision;  // as the pose graph tells it after the refinement
+  server.ba.Take(state);
+  EXPECT_FALSE(server.ba.HasWork());
+  ++state.revision;
+  ++state.num_constraints;
+  server.ba.Take(state);
+  EXPECT_TRUE(server.ba.HasWork());
+}
+
+TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
+  BaTestMessages messages = MessagesOf(MakeBaTestWorld({.agents = 1}));
+  EXPECT_EQ(messages.state.num_constraints, 0);
+  EXPECT_FALSE(Server(messages).ba.HasWork());
+}
+
+// Maps that were taken apart since: the state of both is old news.
+TEST(GlobalBa, AGroupThatIsNoMoreIsNotDue) {
+  const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  Server server(messages);
+  for (const MapId& map : messages.state.maps) {
+    MapState alone = messages.state;
+    alone.group = map;
+    alone.maps = {map};
+    alone.revision += 1 + map.agent_id;
+    alone.num_constraints = 0;
+    std::erase_if(alone.keyframes, [&](const KeyframePose& pose) { return pose.id.map != map; });
+    server.ba.Take(alone);
+  }
+  EXPECT_FALSE(server.ba.HasWork());
+}
+
+}  // namespace
+}  // namespace pangea

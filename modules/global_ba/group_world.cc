@@ -1,0 +1,68 @@
+#include "global_ba/group_world.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+namespace pangea {
+namespace {
+
+BaKeyframe Start(const Keyframe& keyframe, const Rigid3& T_map_body) {
+  BaKeyframe start;
+  start.id = keyframe.id;
+  start.utime = keyframe.utime;
+  const Eigen::Quaterniond q_map_odom = T_map_body.q * keyframe.T_odom_body.q.conjugate();
+  start.imu = {T_map_body, q_map_odom * keyframe.v_odom_body, keyframe.gyro_bias,
+               keyframe.accel_bias};
+  return start;
+}
+
+}  // namespace
+
+BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& places,
+                       const GroupWorldOptions& options, SubmapStore* store) {
+  std::map<KeyframeId, Rigid3> poses;
+  for (const KeyframePose& pose : state.keyframes) {
+    poses[pose.id] = pose.T_map_body;
+  }
+  BaWorld world;
+  std::map<KeyframeId, int> index;
+  std::vector<std::shared_ptr<const KeyframeView>> views;
+  for (const auto& [id, T_map_body] : poses) {
+    const auto view = store->Find(id);
+    if (view == nullptr) {
+      continue;
+    }
+    const Keyframe& keyframe = view->keyframe();
+    BaKeyframe start = Start(keyframe, T_map_body);
+    // A camera for each map, as the last keyframe has it.
+    const bool same_map = !world.keyframes.empty() && world.keyframes.back().id.map == id.map;
+    world.T_body_cam.resize(world.T_body_cam.size() + (same_map ? 0 : 1));
+    world.T_body_cam.back() = keyframe.camera.T_body_cam;
+    start.camera = static_cast<int>(world.T_body_cam.size()) - 1;
+    if (keyframe.edge && keyframe.preintegration) {
+      const auto previous = index.find({id.map, keyframe.edge->from_seq});
+      if (previous != index.end()) {
+        start.previous = previous->second;
+        start.preintegration = keyframe.preintegration;
+      }
+    }
+    index[id] = static_cast<int>(views.size());
+    views.push_back(view);
+    world.keyframes.push_back(std::move(start));
+  }
+  std::vector<MatchedKeyframes> matches;
+  std::vector<bool> needed(views.size(), false);
+  for (const MatchedPlaces& place : places) {
+    const auto query = index.find(place.query);
+    const auto match = index.find(place.match);
+    if (query != index.end() && match != index.end()) {
+      matches.push_back({query->second, match->second, place.corners});
+      needed[query->second] = needed[match->second] = true;
+    }
+  }
+  AddLandmarks(views, matches, options.landmarks, &world);
+  return WithoutRedundant(world, needed, options.redundancy);
+}
+
+}  // namespace pangea

@@ -1,0 +1,164 @@
+#include "global_ba/landmarks.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "common/alignment/point_observation.h"
+
+namespace pangea {
+namespace {
+
+using TrackId = std::pair<MapId, int32_t>;
+
+struct Track {
+  std::vector<BaObservation> own;
+  std::vector<BaObservation> matched;
+};
+
+class Builder {
+ public:
+  Builder(const std::vector<std::shared_ptr<const KeyframeView>>& views,
+          const LandmarkOptions& options, BaWorld* world)
+      : views_(views), options_(options), world_(world) {
+    for (const BaKeyframe& keyframe : world->keyframes) {
+      T_map_cam_.push_back(keyframe.imu.T_odom_body * world->T_body_cam[keyframe.camera]);
+    }
+  }
+
+  void AddTracks() {
+    for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
+      const Keyframe& keyframe = views_[i]->keyframe();
+      int32_t last = kNoLandmark;  // of several corners of one landmark the first
+      for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
+        const int32_t id = keyframe.corners[corner].landmark_id;
+        if (id != kNoLandmark && id != last && views_[i]->has_ray(corner)) {
+          tracks_[{keyframe.id.map, id}].own.push_back(Observe(i, corner, options_.track_sigma_px));
+        }
+        last = id;
+      }
+    }
+  }
+
+  void AddMatches(const MatchedKeyframes& match) {
+    for (const auto& [corner_a, corner_b] : match.corners) {
+      if (corner_a >= NumCorners(match.a) || corner_b >= NumCorners(match.b) ||
+          !views_[match.a]->has_ray(corner_a) || !views_[match.b]->has_ray(corner_b)) {
+        continue;
+      }
+      const TrackId a = TrackOf(match.a, corner_a);
+      const TrackId b = TrackOf(match.b, corner_b);
+      const bool both = a.second != kNoLandmark && b.second != kNoLandmark;
+      // However many keyframes see two tracks meet, it is one place that they share or miss.
+      if (both && (a == b || !met_.insert(std::minmax(a, b)).second)) {
+        continue;
+      }
+      // Each seen at the other's corner is the same measurement twice.
+      const double share = both ? std::sqrt(0.5) : 1;
+      AddMatch(a, match.b, corner_b, share);
+      AddMatch(b, match.a, corner_a, share);
+    }
+  }
+
+  void Finish() {
+    for (const auto& [id, track] : tracks_) {
+      const auto landmark = Triangulate(track.own);
+      if (!landmark) {
+        continue;
+      }
+      const int index = static_cast<int>(world_->landmarks.size());
+      world_->landmarks.push_back(*landmark);
+      for (const auto* observations : {&track.own, &track.matched}) {
+        for (BaObservation seen : *observations) {
+          if (Fits(seen, *landmark)) {
+            seen.landmark = index;
+            world_->observations.push_back(seen);
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  int NumCorners(int keyframe) const {
+    return static_cast<int>(views_[keyframe]->keyframe().corners.size());
+  }
+  const Corner& CornerAt(int keyframe, int corner) const {
+    return views_[keyframe]->keyframe().corners[corner];
+  }
+  TrackId TrackOf(int keyframe, int corner) const {
+    return {views_[keyframe]->keyframe().id.map, CornerAt(keyframe, corner).landmark_id};
+  }
+
+  BaObservation Observe(int keyframe, int corner, double sigma) const {
+    return {keyframe, -1, views_[keyframe]->ray(corner),
+            views_[keyframe]->pixel_jacobian(corner) / sigma};
+  }
+
+  void AddMatch(const TrackId& track, int keyframe, int corner, double share) {
+    const auto known = tracks_.find(track);
+    if (track.second != kNoLandmark && known != tracks_.end()) {
+      const double sigma = CornerSigma(CornerAt(keyframe, corner), options_.match_sigma_px);
+      known->second.matched.push_back(Observe(keyframe, corner, sigma / share));
+    }
+  }
+
+  // The point nearest to all rays; nothing when they are too parallel or it does not fit the track.
+  std::optional<Eigen::Vector3d> Triangulate(const std::vector<BaObservation>& seen) const {
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    double least_cosine = 1;
+    for (size_t i = 0; i < seen.size(); ++i) {
+      const Rigid3& T_map_cam = T_map_cam_[seen[i].keyframe];
+      const Eigen::Vector3d direction = T_map_cam.q * seen[i].ray.homogeneous().normalized();
+      const Eigen::Matrix3d across =
+          Eigen::Matrix3d::Identity() - direction * direction.transpose();
+      A += across;
+      b += across * T_map_cam.t;
+      if (i == 0) {
+        first = direction;
+      }
+      least_cosine = std::min(least_cosine, first.dot(direction));
+    }
+    if (least_cosine > std::cos(options_.min_parallax)) {
+      return std::nullopt;
+    }
+    const Eigen::Vector3d point = A.ldlt().solve(b);
+    const bool fits = std::all_of(seen.begin(), seen.end(),
+                                  [&](const BaObservation& s) { return Fits(s, point); });
+    return fits ? std::make_optional(point) : std::nullopt;
+  }
+
+  bool Fits(const BaObservation& seen, const Eigen::Vector3d& point) const {
+    constexpr double kMinDepth_m = 0.1;
+    const Eigen::Vector3d p_cam = T_map_cam_[seen.keyframe].Inverse() * point;
+    return p_cam.z() > kMinDepth_m &&
+           (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < options_.max_start_sigmas;
+  }
+
+  const std::vector<std::shared_ptr<const KeyframeView>>& views_;
+  const LandmarkOptions& options_;
+  BaWorld* world_;
+  std::vector<Rigid3> T_map_cam_;
+  std::map<TrackId, Track> tracks_;
+  std::set<std::pair<TrackId, TrackId>> met_;
+};
+
+}  // namespace
+
+void AddLandmarks(const std::vector<std::shared_ptr<const KeyframeView>>& views,
+                  const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
+                  BaWorld* world) {
+  Builder builder(views, options, world);
+  builder.AddTracks();
+  for (const MatchedKeyframes& match : matches) {
+    builder.AddMatches(match);
+  }
+  builder.Finish();
+}
+
+}  // namespace pangea

@@ -1,0 +1,165 @@
+#include "global_ba/landmarks.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "global_ba/ba_test_world.h"
+#include "global_ba/group_world.h"
+
+namespace pangea {
+namespace {
+
+constexpr int kKeyframes = 6;
+
+// Two agents, exact rays, exact poses.
+struct Group {
+  Group()
+      : truth(MakeBaTestWorld({.keyframes = kKeyframes,
+                               .landmarks = 40,
+                               .noise = 0,
+                               .scale_error = 0,
+                               .start_sigma_m = 0})),
+        messages(MessagesOf(truth)) {
+    for (const PlaceMatch& match : messages.matches) {
+      for (const PlaceCandidate& candidate : match.candidates) {
+        places.push_back({match.query, candidate.match, candidate.corner_matches});
+      }
+    }
+  }
+  BaWorld World() const {
+    SubmapStore store({.keep_preintegration = true});
+    for (const Keyframe& keyframe : messages.keyframes) {
+      store.Add(keyframe);
+    }
+    return MakeGroupWorld(messages.state, places, GroupWorldOptions{}, &store);
+  }
+
+  BaTestWorld truth;
+  BaTestMessages messages;
+  std::vector<MatchedPlaces> places;
+};
+
+// Landmarks that keyframes of both agents see.
+int CountShared(const BaWorld& world) {
+  std::map<int, std::array<bool, 2>> seen_by;
+  for (const BaObservation& seen : world.observations) {
+    seen_by[seen.landmark][seen.keyframe / kKeyframes] = true;
+  }
+  int shared = 0;
+  for (const auto& [landmark, agents] : seen_by) {
+    shared += agents[0] && agents[1] ? 1 : 0;
+  }
+  return shared;
+}
+
+TEST(Landmarks, AreWhereTheirRaysMeet) {
+  const BaWorld world = Group().World();
+  ASSERT_GE(world.landmarks.size(), 60u);  // of 40 points two tracks each
+  const BaWorld truth = Group().truth.truth;
+  for (const Eigen::Vector3d& landmark : world.landmarks) {
+    double nearest = 1e3;
+    for (const Eigen::Vector3d& point : truth.landmarks) {
+      nearest = std::min(nearest, (landmark - point).norm());
+    }
+    EXPECT_LT(nearest, 1e-4);
+  }
+}
+
+TEST(Landmarks, MatchesTieTwoMapsOnceForEachPairOfTracks) {
+  Group group;
+  const BaWorld all = group.World();
+  EXPECT_GT(CountShared(all), 0.9 * static_cast<double>(all.landmarks.size()));
+  group.places.resize(1);
+  const BaWorld one = group.World();
+  EXPECT_GT(CountShared(one), 0);
+  const size_t with_one = one.observations.size();
+  group.places.push_back(group.places.front());
+  EXPECT_EQ(group.World().observations.size(), with_one);
+  group.places.clear();
+  EXPECT_EQ(CountShared(group.World()), 0);
+}
+
+TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
+  Group group;
+  for (Keyframe& keyframe : group.messages.keyframes) {
+    for (Corner& corner : keyframe.corners) {
+      corner.octave = 2;
+      // Agent 2 tracks nothing: each match is seen once, at the full weight of a corner.
+      corner.landmark_id = keyframe.id.map.agent_id == 1 ? corner.landmark_id : kNoLandmark;
+    }
+  }
+  const BaWorld world = group.World();
+  const LandmarkOptions options;
+  int matched = 0;
+  double track = 0;
+  for (const BaObservation& seen : world.observations) {
+    const bool own = seen.keyframe < kKeyframes;
+    track = own ? std::max(track, seen.sqrt_info.norm()) : track;
+    matched += own ? 0 : 1;
+  }
+  ASSERT_GT(matched, 0);
+  const double ratio = options.track_sigma_px / (options.match_sigma_px * 1.44);
+  for (const BaObservation& seen : world.observations) {
+    if (seen.keyframe >= kKeyframes) {
+      EXPECT_NEAR(seen.sqrt_info.norm() / (track * ratio), 1,
+                  0.35);  // the lens varies over the image
+    }
+  }
+}
+
+TEST(Landmarks, AWrongMatchIsLeftOut) {
+  Group group;
+  const size_t right = group.World().observations.size();
+  for (MatchedPlaces& place : group.places) {
+    for (size_t i = 0; i + 1 < place.corners.size(); i += 2) {
+      std::swap(place.corners[i].second, place.corners[i + 1].second);
+    }
+  }
+  const BaWorld world = group.World();
+  EXPECT_LT(world.observations.size(), right);
+  for (const BaObservation& seen : world.observations) {
+    const BaKeyframe& keyframe = world.keyframes[seen.keyframe];
+    const Eigen::Vector3d p_cam =
+        (keyframe.imu.T_odom_body * world.T_body_cam[keyframe.camera]).Inverse() *
+        world.landmarks[seen.landmark];
+    EXPECT_LT((seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm(),
+              LandmarkOptions{}.max_start_sigmas);
+  }
+}
+
+TEST(Landmarks, ParallelRaysMakeNone) {
+  Group group;
+  group.places.clear();
+  group.messages.state.keyframes.resize(1);
+  EXPECT_TRUE(group.World().landmarks.empty());
+}
+
+TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
+  Group group;
+  const Rigid3 turned(YawRotation(0.5), {1, 2, 3});
+  for (KeyframePose& pose : group.messages.state.keyframes) {
+    pose.T_map_body = turned * pose.T_map_body;
+  }
+  const BaWorld world = group.World();
+  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes);
+  for (size_t i = 0; i < world.keyframes.size(); ++i) {
+    const ImuState& got = world.keyframes[i].imu;
+    const ImuState& odometry = group.truth.start.keyframes[i].imu;
+    EXPECT_LT((got.v_odom_body - turned.q * odometry.v_odom_body).norm(), 1e-9);
+    EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframes != 0);
+  }
+}
+
+// A keyframe that never came: the inertial chain begins anew after it.
+TEST(GroupWorld, AMissingKeyframeBreaksTheChain) {
+  Group group;
+  group.messages.keyframes.erase(group.messages.keyframes.begin() + 2);
+  const BaWorld world = group.World();
+  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes - 1);
+  EXPECT_EQ(world.keyframes[2].previous, -1);
+  EXPECT_EQ(world.keyframes[3].previous, 2);
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,105 @@
+#include "global_ba/redundancy.h"
+
+#include <algorithm>
+
+namespace pangea {
+namespace {
+
+class Culling {
+ public:
+  Culling(const BaWorld& world, const RedundancyOptions& options)
+      : options_(options),
+        world_(world),
+        next_(world.keyframes.size(), -1),
+        seen_(world.keyframes.size()),
+        observers_(world.landmarks.size(), 0),
+        gone_(world.keyframes.size(), false) {
+    for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
+      if (world.keyframes[i].previous >= 0) {
+        next_[world.keyframes[i].previous] = i;
+      }
+    }
+    for (const BaObservation& seen : world.observations) {
+      seen_[seen.keyframe].push_back(seen.landmark);
+      ++observers_[seen.landmark];
+    }
+  }
+
+  void Run(const std::vector<bool>& needed) {
+    for (int i = 0; i < static_cast<int>(needed.size()); ++i) {
+      if (!needed[i] && MayLeave(i) && IsSeenByOthers(i)) {
+        Remove(i);
+      }
+    }
+  }
+
+  BaWorld Result() const {
+    BaWorld result;
+    result.T_body_cam = world_.T_body_cam;
+    std::vector<int> new_index(gone_.size(), -1);
+    for (size_t i = 0; i < gone_.size(); ++i) {
+      if (!gone_[i]) {
+        new_index[i] = static_cast<int>(result.keyframes.size());
+        BaKeyframe keyframe = world_.keyframes[i];
+        keyframe.previous = keyframe.previous < 0 ? -1 : new_index[keyframe.previous];
+        result.keyframes.push_back(std::move(keyframe));
+      }
+    }
+    result.landmarks = world_.landmarks;
+    for (BaObservation seen : world_.observations) {
+      if (!gone_[seen.keyframe]) {
+        seen.keyframe = new_index[seen.keyframe];
+        result.observations.push_back(seen);
+      }
+    }
+    DropLonelyLandmarks(&result);
+    return result;
+  }
+
+ private:
+  bool MayLeave(int i) const {
+    const BaKeyframe& keyframe = world_.keyframes[i];
+    if (keyframe.previous < 0 || next_[i] < 0) {
+      return false;
+    }
+    const double gap_s =
+        keyframe.preintegration->duration_s + world_.keyframes[next_[i]].preintegration->duration_s;
+    return gap_s <= options_.max_gap_s;
+  }
+
+  bool IsSeenByOthers(int i) const {
+    const auto enough = std::ranges::count_if(
+        seen_[i], [this](int landmark) { return observers_[landmark] > options_.observers; });
+    return static_cast<double>(enough) >= options_.share * static_cast<double>(seen_[i].size());
+  }
+
+  void Remove(int i) {
+    gone_[i] = true;
+    for (const int landmark : seen_[i]) {
+      --observers_[landmark];
+    }
+    const BaKeyframe& keyframe = world_.keyframes[i];
+    BaKeyframe& next = world_.keyframes[next_[i]];
+    next.preintegration = Compose(*keyframe.preintegration, *next.preintegration);
+    next.previous = keyframe.previous;
+    next_[keyframe.previous] = next_[i];
+  }
+
+  const RedundancyOptions& options_;
+  BaWorld world_;
+  std::vector<int> next_;               // of each keyframe, in its map; -1 for none
+  std::vector<std::vector<int>> seen_;  // landmarks of each keyframe
+  std::vector<int> observers_;          // of each landmark
+  std::vector<bool> gone_;
+};
+
+}  // namespace
+
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<bool>& needed,
+                         const RedundancyOptions& options) {
+  Culling culling(world, options);
+  culling.Run(needed);
+  return culling.Result();
+}
+
+}  // namespace pangea

@@ -1,0 +1,87 @@
+#include "global_ba/redundancy.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "global_ba/ba_test_world.h"
+
+namespace pangea {
+namespace {
+
+// Keyframes every 0.2 s that all see nearly the same.
+BaWorld Dense() { return MakeBaTestWorld({.keyframes = 20, .step_s = 0.2, .landmarks = 60}).truth; }
+
+std::vector<bool> None(const BaWorld& world) {
+  return std::vector<bool>(world.keyframes.size(), false);
+}
+
+TEST(Redundancy, CullsWhatOthersSee) {
+  const BaWorld world = Dense();
+  const BaWorld culled = WithoutRedundant(world, None(world), {});
+  EXPECT_LT(culled.keyframes.size(), 0.5 * static_cast<double>(world.keyframes.size()));
+  EXPECT_GT(culled.landmarks.size(), 0.9 * static_cast<double>(world.landmarks.size()));
+}
+
+TEST(Redundancy, WhatIsLeftIsOneChainWithoutLongGaps) {
+  const BaWorld world = Dense();
+  const RedundancyOptions options;
+  const BaWorld culled = WithoutRedundant(world, None(world), options);
+  int beginnings = 0;
+  for (int i = 0; i < static_cast<int>(culled.keyframes.size()); ++i) {
+    const BaKeyframe& keyframe = culled.keyframes[i];
+    if (keyframe.previous < 0) {
+      ++beginnings;
+      EXPECT_EQ(keyframe.id.seq, 0);
+      continue;
+    }
+    const BaKeyframe& before = culled.keyframes[keyframe.previous];
+    EXPECT_EQ(before.id.map, keyframe.id.map);
+    const double gap_s = 1e-6 * static_cast<double>(keyframe.utime - before.utime);
+    EXPECT_LE(gap_s, options.max_gap_s + 1e-9);
+    EXPECT_NEAR(keyframe.preintegration->duration_s, gap_s, 1e-6);
+  }
+  EXPECT_EQ(beginnings, 2);
+  EXPECT_EQ(culled.keyframes.back().id.seq, 19);
+  for (const BaObservation& seen : culled.observations) {
+    EXPECT_LT(seen.keyframe, static_cast<int>(culled.keyframes.size()));
+    EXPECT_LT(seen.landmark, static_cast<int>(culled.landmarks.size()));
+  }
+}
+
+TEST(Redundancy, NeverWhatIsNeeded) {
+  const BaWorld world = Dense();
+  std::vector<bool> needed = None(world);
+  for (size_t i = 0; i < needed.size(); i += 3) {
+    needed[i] = true;
+  }
+  const BaWorld culled = WithoutRedundant(world, needed, {});
+  EXPECT_LT(culled.keyframes.size(), world.keyframes.size());
+  std::set<KeyframeId> left;
+  for (const BaKeyframe& keyframe : culled.keyframes) {
+    left.insert(keyframe.id);
+  }
+  for (size_t i = 0; i < needed.size(); i += 3) {
+    EXPECT_TRUE(left.contains(world.keyframes[i].id));
+  }
+}
+
+TEST(Redundancy, NotWhatOnlyFewSee) {
+  const BaWorld world = Dense();
+  RedundancyOptions options;
+  options.observers = 1000;
+  EXPECT_EQ(WithoutRedundant(world, None(world), options).keyframes.size(), world.keyframes.size());
+}
+
+TEST(Redundancy, TheRestIsAsGoodAnEstimate) {
+  const BaTestWorld world = MakeBaTestWorld({.keyframes = 30, .step_s = 0.2, .landmarks = 60});
+  BaWorld truth = WithoutRedundant(world.truth, None(world.truth), {});
+  BaProblem problem(WithoutRedundant(world.start, None(world.start), {}), BaOptions{});
+  while (problem.Advance()) {
+  }
+  ASSERT_EQ(problem.world().keyframes.size(), truth.keyframes.size());
+  EXPECT_LT(WorstError(problem.world(), truth), 0.02);
+}
+
+}  // namespace
+}  // namespace pangea
