@@ -130,12 +130,12 @@ class PlanTest(unittest.TestCase):
             job.state = "done"
             job.folder.mkdir(parents=True)
             (job.folder / "vio.tum").touch()
-            own = {"ate_m": {"rmse": ate}, "coverage": 1.0 if seed == 1 else 0.5}
+            own = {"ate_m": {"rmse": ate, "median": 0.008}, "coverage": 1.0 if seed == 1 else 0.5}
             (job.folder / "ate.json").write_text(json.dumps({"SE(3)": {"trajectories": [own]}}))
             row = {"position_m": {"rmse": 0.002}, "rotation_deg": {"rmse": 0.05}}
             (job.folder / "rpe.json").write_text(json.dumps({"over_distance": [row]}))
         line = next(line for line in Tables(self.plan).text().splitlines() if line.startswith("| + motion blur"))
-        self.assertEqual(line, "| + motion blur | – | – | 20.0 (10.0–30.0)\\* | 2.0 (2.0–2.0), 0.050 (0.050–0.050) |")
+        self.assertEqual(line, "| + motion blur | – | – | 20.0 (10.0–30.0)\\*, 8.0 (8.0–8.0) | 2.0 (2.0–2.0), 0.050 (0.050–0.050) |")
 
 
 if __name__ == "__main__":

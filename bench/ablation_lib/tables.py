@@ -17,6 +17,7 @@ class Figures:
     """Of one run; None where there is none."""
 
     ate_m: float
+    median_m: float  # of the same errors: not moved by the first seconds, when a start has yet to settle
     rpe_m: float
     rpe_deg: float
     counts: bool  # one map over the whole recording
@@ -32,7 +33,7 @@ def figures_of(job):
         return None
     coverage = own["coverage"] or 0
     one_map = len(list(job.folder.glob("vio.tum*"))) == 1
-    return Figures(own["ate_m"]["rmse"], row["position_m"]["rmse"], row["rotation_deg"]["rmse"],
+    return Figures(own["ate_m"]["rmse"], own["ate_m"]["median"], row["position_m"]["rmse"], row["rotation_deg"]["rmse"],
                    coverage >= MIN_COVERAGE and one_map)
 
 
@@ -53,7 +54,7 @@ class Tables:
                  f"{', '.join(map(str, self.plan.options.seeds))} (smallest–largest); \\*: lost, or less than "
                  f"{MIN_COVERAGE:.0%} of the recording.", ""]
         names = [scene.name for scene in scenes]
-        lines += ["| given | " + " | ".join(f"{n} ATE mm | {n} RPE mm, deg" for n in names) + " |",
+        lines += ["| given | " + " | ".join(f"{n} ATE: rmse, median mm | {n} RPE mm, deg" for n in names) + " |",
                   "|---|" + "---|---|" * len(names)]
         for title, rungs in (("", LADDER), ("", [RECORDED]), ("all exact but ", ALONE)):
             for rung in rungs:
@@ -69,7 +70,7 @@ class Tables:
         if not known:
             return "–", "–"
         mark = "" if len(known) == len(runs) and all(run.counts for run in known) else "\\*"
-        return (_spread([run.ate_m for run in known], 1e3, 1) + mark,
+        return (_spread([run.ate_m for run in known], 1e3, 1) + mark + ", " + _spread([run.median_m for run in known], 1e3, 1),
                 _spread([run.rpe_m for run in known], 1e3, 1) + ", " + _spread([run.rpe_deg for run in known], 1, 3))
 
     def json(self):
@@ -81,7 +82,7 @@ class Tables:
         rungs = LADDER + [RECORDED]
         script = ["set terminal pngcairo noenhanced size 1400,800 font 'sans,14' background '#ffffff'", f"set output '{path}'",
                   "set ylabel 'ATE, mm'", "set logscale y", "set yrange [*:*]", "set grid ytics linecolor '#dddddd'",
-                  "set border 3 linecolor '#555555'", "set tics nomirror", "set key tmargin center horizontal",
+                  "set rmargin 4", "set border 3 linecolor '#555555'", "set tics nomirror", "set key tmargin center horizontal",
                   f"set xrange [-0.5:{len(rungs) - 0.5}]", "set xtics rotate by 30 right",
                   "set xtics (" + ", ".join(f"'{rung.title}' {i}" for i, rung in enumerate(rungs)) + ")"]
         plots = []
