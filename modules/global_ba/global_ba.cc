@@ -1,8 +1,32 @@
 #include "global_ba/global_ba.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace pangea {
+namespace {
+
+// Whether a state has the shape of a refinement: the same steps from keyframe to keyframe.
+bool HasShape(const MapState& state, const std::vector<KeyframePose>& refined) {
+  constexpr double kSame_m = 1e-4;
+  std::map<KeyframeId, Eigen::Vector3d> positions;
+  for (const KeyframePose& pose : state.keyframes) {
+    positions[pose.id] = pose.T_map_body.t;
+  }
+  for (size_t i = 1; i < refined.size(); ++i) {
+    const auto from = positions.find(refined[i - 1].id), to = positions.find(refined[i].id);
+    if (from == positions.end() || to == positions.end()) {
+      return false;
+    }
+    const double step = (refined[i].T_map_body.t - refined[i - 1].T_map_body.t).norm();
+    if (std::abs((to->second - from->second).norm() - step) > kSame_m) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
 
 void GlobalBa::Take(Keyframe keyframe) {
   if (!store_.Contains(keyframe.id)) {
@@ -13,7 +37,9 @@ void GlobalBa::Take(Keyframe keyframe) {
 
 void GlobalBa::Take(const PlaceMatch& match) {
   for (const PlaceCandidate& candidate : match.candidates) {
-    matched_.try_emplace({match.query, candidate.match}, candidate.corner_matches);
+    if (matched_.size() < kMaxMatched) {
+      matched_.try_emplace({match.query, candidate.match}, candidate.corner_matches);
+    }
   }
 }
 
@@ -34,6 +60,11 @@ void GlobalBa::Take(MapState state) {
     if (current == nullptr || current->revision < shared->revision) {
       current = shared;
     }
+  }
+  const auto refined = refined_.find(shared->group);
+  if (refined != refined_.end() && refined->second.first == BasisOf(*shared) &&
+      !HasShape(*shared, refined->second.second)) {
+    refined_.erase(refined);
   }
   if (in_work_ != nullptr && BasisOf(*states_[in_work_->group]) != BasisOf(*in_work_)) {
     DropIfAbout(in_work_->group);
@@ -59,7 +90,7 @@ GlobalBa::StatePointer GlobalBa::NextDue() const {
     if (map == state->group && state->num_constraints > 0 &&
         static_cast<int>(state->keyframes.size()) >= options_.min_keyframes &&
         std::ranges::all_of(state->maps, is_current) &&
-        (known == refined_.end() || known->second != BasisOf(*state))) {
+        (known == refined_.end() || known->second.first != BasisOf(*state))) {
       return state;
     }
   }
@@ -77,7 +108,7 @@ std::optional<MapState> GlobalBa::Advance() {
     return std::nullopt;
   }
   MapState refined = Refined();
-  refined_[in_work_->group] = BasisOf(*in_work_);
+  refined_[in_work_->group] = {BasisOf(*in_work_), refined.keyframes};
   problem_.reset();
   in_work_.reset();
   ++counters_.finished;

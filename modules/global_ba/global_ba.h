@@ -8,7 +8,8 @@
 // once. The pose graph's edges and loops carry each odometry's own scale; here one adjustment finds
 // it from the whole flight, and landmarks that several agents see make it theirs together.
 //
-// A group is due when its loops or keyframes are not those of its last refinement. Work goes in
+// A group is due when its loops or keyframes are not those of its last refinement, or when the pose
+// graph has forgotten that one (it was started again). Work goes in
 // pieces, and is dropped when news of its maps is taken. Map frame: the state's. One thread, no
 // clock: the same calls in the same order give the same bytes.
 
@@ -71,6 +72,7 @@ class GlobalBa {
     bool operator==(const Basis&) const = default;
   };
   static Basis BasisOf(const MapState& state);
+  static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond ties nothing
 
   StatePointer NextDue() const;
   void Begin(StatePointer state);
@@ -82,7 +84,8 @@ class GlobalBa {
   std::map<Pair, Corners> matched_;  // by place recognition
   std::set<Pair> accepted_;
   std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
-  std::map<MapId, Basis> refined_;        // by group
+  // By group.
+  std::map<MapId, std::pair<Basis, std::vector<KeyframePose>>> refined_;
   StatePointer in_work_;
   std::unique_ptr<BaProblem> problem_;
   Counters counters_;

@@ -90,15 +90,29 @@ TEST(GlobalBa, NewsOfTheGroupDropsTheWorkAndOtherNewsDoesNot) {
 TEST(GlobalBa, AGroupIsDueAgainWhenItsLoopsOrKeyframesChange) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   Server server(messages);
-  ASSERT_TRUE(server.Finish().has_value());
-  MapState state = messages.state;
-  ++state.revision;  // as the pose graph tells it after the refinement
+  const auto refined = server.Finish();
+  ASSERT_TRUE(refined.has_value());
+  MapState state = *refined;
+  ++state.revision;  // as the pose graph tells it after the refinement, in a frame of its own
+  for (KeyframePose& pose : state.keyframes) {
+    pose.T_map_body = Rigid3(YawRotation(1), {1, 2, 3}) * pose.T_map_body;
+  }
   server.ba.Take(state);
   EXPECT_FALSE(server.ba.HasWork());
   ++state.revision;
   ++state.num_constraints;
   server.ba.Take(state);
   EXPECT_TRUE(server.ba.HasWork());
+}
+
+TEST(GlobalBa, AGroupIsDueAgainWhenThePoseGraphHasForgotten) {
+  const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  Server server(messages);
+  ASSERT_TRUE(server.Finish().has_value());
+  MapState state = messages.state;
+  ++state.revision;
+  server.ba.Take(state);
+  EXPECT_TRUE(server.Finish().has_value());
 }
 
 TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
