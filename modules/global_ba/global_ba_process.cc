@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "common/channels.h"
 #include "common/messages.h"
-#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 namespace {
@@ -15,12 +13,7 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 // Longer than the pose graph waits before it solves all from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;
-constexpr int64_t kAskAgainAfter_us = 2 * kSecond;
-// One request's answers must fit the receive buffer: a keyframe is about 28 kB.
-constexpr int32_t kMaxAsked = 50;
 constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
-// A gap that nobody fills after so many requests is gone over.
-constexpr int kMaxTimesAsked = 15;
 
 }  // namespace
 
@@ -52,7 +45,7 @@ void GlobalBaProcess::OnKeyframe(const keyframe_t& message) {
     return;
   }
   ++num_news_;
-  keyframes_.Add(parsed.value->id.map, parsed.value->id.seq, {});
+  keyframes_.Note(parsed.value->id.map, parsed.value->id.seq);
   global_ba_.Take(std::move(*parsed.value));
 }
 
@@ -63,7 +56,7 @@ void GlobalBaProcess::OnPlaceMatch(const place_match_t& message) {
     return;
   }
   ++num_news_;
-  matches_.Add(parsed.value->query.map, parsed.value->query.seq, {});
+  matches_.Note(parsed.value->query.map, parsed.value->query.seq);
   global_ba_.Take(*parsed.value);
 }
 
@@ -100,9 +93,19 @@ void GlobalBaProcess::OnHave(const have_t& message) {
     // What was judged before this process started.
     if (verdicts_asked_.insert(*map.value).second) {
       for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
-        Ask(std::string(channels::kConstraint), *map.value, seq, seq + kMaxVerdictsAsked - 1);
+        AskAgain(node_, std::string(channels::kConstraint),
+                 {*map.value, seq, seq + kMaxVerdictsAsked - 1});
       }
     }
+  }
+  for (const seq_gap_t& gap : message.gaps) {
+    const Parsed<MapId> map = Parse(gap.map);
+    if (!map.value || gap.from_seq < 0 || gap.to_seq < gap.from_seq) {
+      node_.Refuse("have: invalid gap");
+      continue;
+    }
+    keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq});
+    matches_.Skip({*map.value, gap.from_seq, gap.to_seq});
   }
 }
 
@@ -137,8 +140,12 @@ void GlobalBaProcess::Finish() {
 }
 
 void GlobalBaProcess::Tick(int64_t now_utime) {
-  AskFor(&keyframes_, &keyframes_asked_, true, now_utime);
-  AskFor(&matches_, &matches_asked_, false, now_utime);
+  for (const SeqGap& gap : keyframes_.Due(now_utime)) {
+    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
+  }
+  for (const SeqGap& gap : matches_.Due(now_utime)) {
+    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  }
   if (num_news_ != num_news_at_change_) {
     num_news_at_change_ = num_news_;
     last_news_utime_ = now_utime;
@@ -151,35 +158,6 @@ void GlobalBaProcess::Tick(int64_t now_utime) {
       global_ba_.HasWork()) {
     Advance();
   }
-}
-
-void GlobalBaProcess::AskFor(Stream* stream, std::map<MapId, Asked>* asked, bool keyframes,
-                             int64_t now_utime) {
-  for (const SeqGap& gap : stream->Gaps()) {
-    Asked& last = (*asked)[gap.map];
-    if (last.from_seq != gap.from_seq) {
-      last = {gap.from_seq, now_utime + kAskAgainAfter_us, 0};
-    } else if (now_utime >= last.next_utime && last.times >= kMaxTimesAsked) {
-      stream->Skip({gap.map, gap.from_seq, gap.from_seq});
-    } else if (now_utime >= last.next_utime) {
-      last.next_utime = now_utime + kAskAgainAfter_us;
-      ++last.times;
-      Ask(keyframes ? channels::Keyframe(gap.map.agent_id) : std::string(channels::kPlaceMatch),
-          gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1));
-    }
-  }
-}
-
-void GlobalBaProcess::Ask(const std::string& channel, const MapId& map, int32_t from_seq,
-                          int32_t to_seq) {
-  resend_request_t request{};
-  request.requester = node_.name();
-  request.channel = channel;
-  request.map = ToMessage(map);
-  request.from_seq = from_seq;
-  request.to_seq = to_seq;
-  node_.Publish(std::string(channels::kResendRequest), request);
-  node_.NoteResendAsked();
 }
 
 void GlobalBaProcess::PublishStatus(int64_t now_utime) {

@@ -10,12 +10,9 @@
 // matches that a gap or HAVE tells of, and once per map the verdicts of a former run. A verdict
 // that is lost later costs its matches, nothing else.
 
-#include <map>
 #include <set>
-#include <string>
-#include <variant>
 
-#include "common/bus/in_order.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/state_chunks.h"
@@ -38,13 +35,6 @@ class GlobalBaProcess : public Process {
   void Finish();
 
  private:
-  using Stream = InOrder<std::monostate>;
-  struct Asked {
-    int32_t from_seq = -1;
-    int64_t next_utime = 0;
-    int times = 0;
-  };
-
   void OnKeyframe(const keyframe_t& message);
   void OnPlaceMatch(const place_match_t& message);
   void OnConstraint(const constraint_t& message);
@@ -53,17 +43,13 @@ class GlobalBaProcess : public Process {
   void OnAgain(const again_t& message);
 
   void Advance();
-  void AskFor(Stream* stream, std::map<MapId, Asked>* asked, bool keyframes, int64_t now_utime);
-  void Ask(const std::string& channel, const MapId& map, int32_t from_seq, int32_t to_seq);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   GlobalBa global_ba_;
   StateChunks chunks_;
-  Stream keyframes_;
-  Stream matches_;
-  std::map<MapId, Asked> keyframes_asked_;
-  std::map<MapId, Asked> matches_asked_;
+  MissingMessages keyframes_;
+  MissingMessages matches_;
   std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
   int64_t num_news_ = 0;
   int64_t num_news_at_change_ = 0;

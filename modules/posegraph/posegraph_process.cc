@@ -8,7 +8,6 @@
 
 #include "common/channels.h"
 #include "common/messages.h"
-#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 namespace {
@@ -102,7 +101,7 @@ void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
     return;
   }
   const KeyframeId& query = parsed.value->query;
-  matches_.Add(query.map, query.seq, {});
+  matches_.Note(query.map, query.seq);
   for (const PlaceCandidate& candidate : parsed.value->candidates) {
     Constraint promised;
     promised.from = candidate.match;
@@ -141,7 +140,8 @@ void PoseGraphProcess::OnHave(const have_t& message) {
     // What was judged before this process started.
     if (verdicts_asked_.insert(*map.value).second) {
       for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
-        Ask(std::string(channels::kConstraint), *map.value, seq, seq + kMaxVerdictsAsked - 1);
+        AskAgain(node_, std::string(channels::kConstraint),
+                 {*map.value, seq, seq + kMaxVerdictsAsked - 1});
       }
     }
     keyframes_.Announce(*map.value, message.highest_seq[i]);
@@ -192,7 +192,9 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
   SettleUnlessMoreWaits();
   AskForKeyframes(now_utime);
-  AskForMatches(now_utime);
+  for (const SeqGap& gap : matches_.Due(now_utime)) {
+    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  }
   AskForVerdicts(now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
@@ -217,21 +219,9 @@ void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
     } else if (now_utime >= asked.next_utime) {
       asked.next_utime = now_utime + kAskAgainAfter_us;
       ++asked.times;
-      Ask(channels::Keyframe(gap.map.agent_id), gap.map, gap.from_seq,
-          std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1));
-    }
-  }
-}
-
-void PoseGraphProcess::AskForMatches(int64_t now_utime) {
-  for (const SeqGap& gap : matches_.Gaps()) {
-    Asked& asked = matches_asked_[gap.map];
-    if (asked.from_seq != gap.from_seq) {
-      asked = {gap.from_seq, now_utime + kVerdictAfter_us, 0};
-    } else if (now_utime >= asked.next_utime) {
-      asked.next_utime = now_utime + kVerdictAfter_us;
-      Ask(std::string(channels::kPlaceMatch), gap.map, gap.from_seq,
-          std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1));
+      AskAgain(
+          node_, channels::Keyframe(gap.map.agent_id),
+          {gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1)});
     }
   }
 }
@@ -248,21 +238,9 @@ void PoseGraphProcess::AskForVerdicts(int64_t now_utime) {
     }
   }
   for (const auto& [map, range] : overdue) {
-    Ask(std::string(channels::kConstraint), map, range.first,
-        std::min(range.second, range.first + kMaxVerdictsAsked - 1));
+    AskAgain(node_, std::string(channels::kConstraint),
+             {map, range.first, std::min(range.second, range.first + kMaxVerdictsAsked - 1)});
   }
-}
-
-void PoseGraphProcess::Ask(const std::string& channel, const MapId& map, int32_t from_seq,
-                           int32_t to_seq) {
-  resend_request_t request{};
-  request.requester = node_.name();
-  request.channel = channel;
-  request.map = ToMessage(map);
-  request.from_seq = from_seq;
-  request.to_seq = to_seq;
-  node_.Publish(std::string(channels::kResendRequest), request);
-  node_.NoteResendAsked();
 }
 
 void PoseGraphProcess::PublishStatus(int64_t now_utime) {

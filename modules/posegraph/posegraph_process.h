@@ -20,9 +20,9 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <variant>
 
 #include "common/bus/in_order.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/state_chunks.h"
@@ -74,18 +74,15 @@ class PoseGraphProcess : public Process {
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
   void AskForKeyframes(int64_t now_utime);
-  void AskForMatches(int64_t now_utime);
   void AskForVerdicts(int64_t now_utime);
-  void Ask(const std::string& channel, const MapId& map, int32_t from_seq, int32_t to_seq);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   PoseGraph graph_;
   InOrder<Item> keyframes_;
-  InOrder<std::monostate> matches_;
+  MissingMessages matches_;
   StateChunks refinements_;
   std::map<MapId, Asked> keyframes_asked_;
-  std::map<MapId, Asked> matches_asked_;
   std::map<int64_t, Due> due_;      // promised verdicts, by constraint id
   std::set<int64_t> verdicts_;      // that came
   std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for

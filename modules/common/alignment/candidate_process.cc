@@ -2,35 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "common/channels.h"
 #include "common/messages.h"
-#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
-// One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
-constexpr int32_t kMaxAsked = 50;
-
 }  // namespace
-
-std::vector<SeqGap> CandidateProcess::Tracker::Due(int64_t now_utime) {
-  std::vector<SeqGap> due;
-  for (const SeqGap& gap : stream_.Gaps()) {
-    const auto [it, is_new] = asked_.try_emplace(gap.map, Asked{-1, 0});
-    Asked& asked = it->second;
-    if (asked.from_seq != gap.from_seq) {
-      asked = {gap.from_seq, now_utime + kSecond};
-    } else if (now_utime >= asked.next_utime) {
-      asked.next_utime = now_utime + 2 * kSecond;
-      due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
-    }
-  }
-  return due;
-}
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                                    std::unique_ptr<PairJudge> judge)
@@ -91,7 +70,7 @@ void CandidateProcess::OnHave(const have_t& message) {
     }
     // Verdicts of a former run: no need to repeat them.
     if (verdicts_asked_.insert(*map.value).second) {
-      Ask(std::string(channels::kConstraint), {*map.value, 0, message.highest_seq[i]});
+      AskAgain(node_, std::string(channels::kConstraint), {*map.value, 0, message.highest_seq[i]});
     }
     keyframes_.Announce(*map.value, message.highest_seq[i]);
     matches_.Announce(*map.value, message.highest_seq[i]);
@@ -148,23 +127,12 @@ void CandidateProcess::JudgeReady() {
   }
 }
 
-void CandidateProcess::Ask(const std::string& channel, const SeqGap& gap) {
-  resend_request_t request{};
-  request.requester = node_.name();
-  request.channel = channel;
-  request.map = ToMessage(gap.map);
-  request.from_seq = gap.from_seq;
-  request.to_seq = gap.to_seq;
-  node_.Publish(std::string(channels::kResendRequest), request);
-  node_.NoteResendAsked();
-}
-
 void CandidateProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    Ask(channels::Keyframe(gap.map.agent_id), gap);
+    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
   for (const SeqGap& gap : matches_.Due(now_utime)) {
-    Ask(std::string(channels::kPlaceMatch), gap);
+    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;

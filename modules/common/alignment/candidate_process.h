@@ -15,11 +15,10 @@
 #include <set>
 #include <string>
 #include <utility>
-#include <variant>
 
 #include "common/alignment/pair_judge.h"
 #include "common/bus/bus.h"
-#include "common/bus/in_order.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "pangea/again_t.hpp"
@@ -38,36 +37,17 @@ class CandidateProcess : public Process {
  private:
   static constexpr size_t kMaxWaiting = 2000;
 
-  // Which messages of each map are missing; asks for a gap that stays.
-  class Tracker {
-   public:
-    void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
-    void Announce(const MapId& map, int32_t highest_seq) { stream_.Announce(map, highest_seq); }
-    void Skip(const SeqGap& gap) { stream_.Skip(gap); }
-    // The gaps that have stayed for a second, each at most every two.
-    std::vector<SeqGap> Due(int64_t now_utime);
-
-   private:
-    struct Asked {
-      int32_t from_seq = 0;
-      int64_t next_utime = 0;
-    };
-    InOrder<std::monostate> stream_;
-    std::map<MapId, Asked> asked_;
-  };
-
   void OnKeyframe(const keyframe_t& message);
   void OnPlaceMatch(const place_match_t& message);
   void OnHave(const have_t& message);
   void OnAgain(const again_t& message);
   void JudgeReady();
-  void Ask(const std::string& channel, const SeqGap& gap);
 
   Node node_;
   PlaceKind kind_;
   std::unique_ptr<PairJudge> judge_;
-  Tracker keyframes_;
-  Tracker matches_;
+  MissingMessages keyframes_;
+  MissingMessages matches_;
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;  // by (query, match)
   std::set<int64_t> judged_;                                             // constraint ids
   std::set<MapId> verdicts_asked_;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/bus/in_order.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "pangea/have_t.hpp"
 
@@ -96,6 +97,25 @@ TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {
   ASSERT_EQ(stream.Gaps().size(), 1u);
   EXPECT_EQ(stream.Gaps()[0].from_seq, 4);
   EXPECT_EQ(stream.Gaps()[0].to_seq, 9);
+}
+
+TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
+  constexpr int64_t kSecond = 1'000'000;
+  const MapId map{1, 100};
+  MissingMessages missing;
+  missing.Note(map, 0);
+  missing.Announce(map, 99);
+  EXPECT_TRUE(missing.Due(0).empty());  // it may be under way
+  const auto due = missing.Due(kSecond);
+  ASSERT_EQ(due.size(), 1u);
+  EXPECT_EQ(due[0].from_seq, 1);
+  EXPECT_EQ(due[0].to_seq, 50);  // not all at once
+  EXPECT_TRUE(missing.Due(2 * kSecond).empty());
+  EXPECT_EQ(missing.Due(3 * kSecond).size(), 1u);
+  missing.Skip({map, 1, 98});
+  missing.Note(map, 99);
+  missing.Due(4 * kSecond);
+  EXPECT_TRUE(missing.Due(9 * kSecond).empty());
 }
 
 TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {

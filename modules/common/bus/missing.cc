@@ -1,0 +1,43 @@
+#include "common/bus/missing.h"
+
+#include <algorithm>
+
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+// One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
+constexpr int32_t kMaxAsked = 50;
+
+}  // namespace
+
+void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
+  resend_request_t request{};
+  request.requester = node.name();
+  request.channel = channel;
+  request.map = ToMessage(gap.map);
+  request.from_seq = gap.from_seq;
+  request.to_seq = gap.to_seq;
+  node.Publish(std::string(channels::kResendRequest), request);
+  node.NoteResendAsked();
+}
+
+std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {
+  std::vector<SeqGap> due;
+  for (const SeqGap& gap : stream_.Gaps()) {
+    Asked& asked = asked_[gap.map];
+    if (asked.from_seq != gap.from_seq) {
+      asked = {gap.from_seq, now_utime + kSecond};
+    } else if (now_utime >= asked.next_utime) {
+      asked.next_utime = now_utime + 2 * kSecond;
+      due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
+    }
+  }
+  return due;
+}
+
+}  // namespace pangea

@@ -1,0 +1,40 @@
+#pragma once
+
+// What a process does about messages that did not come: it asks for them again.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/bus/in_order.h"
+#include "common/bus/node.h"
+
+namespace pangea {
+
+// RESEND_REQUEST for the gap's messages of a channel; the answers come on AGAIN_<node's name>.
+void AskAgain(Node& node, const std::string& channel, const SeqGap& gap);
+
+// Which messages of each map are missing, of a stream whose order does not matter.
+class MissingMessages {
+ public:
+  void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
+  // Somebody says this much exists (HAVE).
+  void Announce(const MapId& map, int32_t highest_seq) { stream_.Announce(map, highest_seq); }
+  // Nobody has these any more (the gaps in HAVE).
+  void Skip(const SeqGap& gap) { stream_.Skip(gap); }
+  // The gaps that have stayed for a second, each at most every two, as much of each as may be asked
+  // for at once.
+  std::vector<SeqGap> Due(int64_t now_utime);
+
+ private:
+  struct Asked {
+    int32_t from_seq = -1;
+    int64_t next_utime = 0;
+  };
+  InOrder<std::monostate> stream_;
+  std::map<MapId, Asked> asked_;
+};
+
+}  // namespace pangea
