@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/alignment/epipolar_filter.h"
+#include "common/alignment/match_sets.h"
 #include "common/median.h"
 
 namespace pangea {
@@ -48,7 +49,7 @@ class Alignment {
   }
 
   std::string FirstGuess(const PlaceCandidate& candidate, uint64_t seed) {
-    std::vector<PointMatch> matches = CandidateMatches(candidate);
+    std::vector<PointMatch> matches = CandidateMatches(window_m_, window_c_, candidate);
     for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
       const std::vector<PointMatch> nearest = MatchByDescriptor(
           window_m_, window_c_, direction, options_.first_max_hamming, options_.first_max_ratio);
@@ -129,8 +130,8 @@ class Alignment {
     }
     constexpr double kMaxEpipolarError_px = 4;
     constexpr int kMinEpipolarPairs = 16;
-    matches_ = FilterByFundamental(window_m_, window_c_, Agreeing(matches_), kMaxEpipolarError_px,
-                                   kMinEpipolarPairs);
+    matches_ = FilterByFundamental(window_m_, window_c_, Agreeing(window_m_, window_c_, matches_),
+                                   kMaxEpipolarError_px, kMinEpipolarPairs);
     if (static_cast<int>(matches_.size()) < options_.min_inliers) {
       return "too few points found by projection";
     }
@@ -202,7 +203,7 @@ class Alignment {
         LargestSigma(ba_->covariance.bottomRightCorner<3, 3>()) > options_.max_sigma_rad) {
       return "too uncertain";
     }
-    return "";
+    return SaysMostAlone() ? "hangs on one landmark" : "";
   }
 
   // The left and the right half of what both see, each solved alone. A turn of the view and a step
@@ -258,6 +259,15 @@ class Alignment {
   }
 
  private:
+  // Where the rest of the view leaves a direction open, one near point decides it, right or wrong:
+  // it was looked for where the guess had it, and whatever was found there fits. So of what is
+  // known in the worst direction no landmark may say more than all others together.
+  bool SaysMostAlone() const {
+    const double sigma_m = LargestSigma(ba_->covariance.topLeftCorner<3, 3>());
+    const double without_m = LargestSigma(ba_->covariance_without_one.topLeftCorner<3, 3>());
+    return without_m * without_m > 2 * sigma_m * sigma_m;
+  }
+
   double InlierRatio() const {
     return static_cast<double>(ba_->num_inlier_observations) / static_cast<double>(matches_.size());
   }
@@ -270,25 +280,6 @@ class Alignment {
     const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(ba_->T_m_c * p_w)) - T_w_cam.t;
     const Eigen::Vector3d sight = T_w_cam.q * Eigen::Vector3d::UnitZ();
     return ray.dot(sight.cross(Eigen::Vector3d::UnitZ())) / ray.dot(sight);
-  }
-
-  // The candidate's matched corners that have a depth, in either keyframe or by their landmark in
-  // a neighbour.
-  std::vector<PointMatch> CandidateMatches(const PlaceCandidate& candidate) const {
-    std::vector<PointMatch> matches;
-    const int m = window_m_.newest(), c = window_c_.newest();
-    for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
-      if (!window_c_.frames[c]->has_ray(corner_c) || !window_m_.frames[m]->has_ray(corner_m)) {
-        continue;
-      }
-      if (const int landmark = window_m_.landmark_of_corner[m][corner_m]; landmark >= 0) {
-        matches.push_back({Direction::kForward, landmark, {c, corner_c}, 0});
-      }
-      if (const int landmark = window_c_.landmark_of_corner[c][corner_c]; landmark >= 0) {
-        matches.push_back({Direction::kReverse, landmark, {m, corner_m}, 0});
-      }
-    }
-    return matches;
   }
 
   std::vector<RayPair> RayPairs(const PlaceCandidate& candidate) const {
@@ -314,47 +305,6 @@ class Alignment {
                        unit(window_c_.T_w_cam.back(), c.ray(corner_c)), sigma});
     }
     return pairs;
-  }
-
-  static std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches) {
-    std::set<std::tuple<Direction, int, int>> seen;
-    std::vector<PointMatch> distinct;
-    for (const PointMatch& match : matches) {
-      if (seen.emplace(match.direction, match.landmark, match.observed.corner).second) {
-        distinct.push_back(match);
-      }
-    }
-    return distinct;
-  }
-
-  // Of the keyframes' votes on which landmark of the other window this landmark is, the majority
-  // stays; corners that are no landmark vote for nothing and stay.
-  std::vector<PointMatch> Agreeing(const std::vector<PointMatch>& matches) const {
-    std::map<std::pair<Direction, int>, std::map<int, int>> votes;
-    const auto other_of = [this](const PointMatch& match) {
-      const Window& observer = match.direction == Direction::kForward ? window_c_ : window_m_;
-      return observer.landmark_of_corner[match.observed.frame][match.observed.corner];
-    };
-    for (const PointMatch& match : matches) {
-      if (const int other = other_of(match); other >= 0) {
-        ++votes[{match.direction, match.landmark}][other];
-      }
-    }
-    std::vector<PointMatch> agreeing;
-    for (const PointMatch& match : matches) {
-      const int other = other_of(match);
-      if (other >= 0) {
-        const auto& ballot = votes.at({match.direction, match.landmark});
-        const auto most =
-            std::max_element(ballot.begin(), ballot.end(),
-                             [](const auto& a, const auto& b) { return a.second < b.second; });
-        if (most->first != other) {
-          continue;
-        }
-      }
-      agreeing.push_back(match);
-    }
-    return agreeing;
   }
 
   std::vector<PointObservation> Observations(const std::vector<PointMatch>& matches) const {

@@ -9,8 +9,9 @@
 //
 //   candidate's corners + nearest descriptors -> upright PnP RANSAC -> views and gravity gates
 //   -> projection search in the two keyframes -> surroundings gate
-//   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance
-//   -> projection search along the way -> the two halves of the view
+//   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance (inliers,
+//   covariance, no landmark that decides alone) -> projection search along the way
+//   -> the two halves of the view
 //
 // The cheap steps come first: a bad candidate dies in the first two.
 

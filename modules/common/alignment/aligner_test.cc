@@ -218,6 +218,34 @@ TEST(AlignerTest, RefusesWhatIsTooUncertain) {
   }
 }
 
+// The same wall with near points before it: one alone would decide the pose, right or wrong.
+TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
+  const auto point_at = [&](double x, double y, double z) {
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
+                     {random(), random(), random(), random()}};
+  };
+  std::vector<TestPoint> wall;
+  for (int i = 0; i < 60; ++i) {
+    wall.push_back(point_at(ahead(random), across(random), 1.7 + up(random)));
+  }
+  for (const auto& [num_near, reason] :
+       std::map<int, std::string>{{0, "too uncertain"}, {1, "hangs on one landmark"}, {16, ""}}) {
+    std::vector<TestPoint> points = wall;
+    for (int i = 0; i < num_near; ++i) {
+      points.insert(points.begin(), point_at(4 + 0.1 * i, -0.8 + 0.1 * i, 1.5 + 0.1 * (i % 5)));
+    }
+    TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
+    walk_m.relative_depth_sigma = walk_c.relative_depth_sigma = 0.005;
+    walk_m.radius = 0.6;
+    walk_c.radius = 0.8;
+    const TestAgent m = RunTestAgent(points, walk_m), c = RunTestAgent(points, walk_c);
+    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    EXPECT_EQ(constraint.reason, reason) << num_near;
+  }
+}
+
 // Corners a little off, one half of the image up and the other down: each is an inlier, and
 // together they give a pose.
 TEST(AlignerTest, RefusesHalvesThatDisagree) {

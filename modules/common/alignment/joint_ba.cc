@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "common/alignment/ba_factors.h"
+#include "common/alignment/frame_information.h"
 #include "common/median.h"
 
 namespace pangea {
@@ -128,56 +128,38 @@ class JointProblem {
 
   Rigid3 NewestPose(int side) { return PoseFromBlock(Newest(side)); }
 
-  // Marginal covariance of the newest c keyframe's pose, in window m's frame: the inverse of the
-  // Schur complement of the points in J^T J.
-  std::optional<Matrix6d> MarginalOfNewestC() {
-    ceres::Problem::EvaluateOptions evaluate;
-    evaluate.apply_loss_function = false;
-    evaluate.num_threads = 1;
-    const std::vector<double*> frames = FrameBlocks();
-    evaluate.parameter_blocks = frames;
-    const int num_frame_columns = 6 * (static_cast<int>(frames.size()) - 2) + 2;
-    for (const PointKey& key : used_points_) {
-      evaluate.parameter_blocks.push_back(Point(key));
-    }
-    ceres::CRSMatrix jacobian;
-    if (!problem_->Evaluate(evaluate, nullptr, nullptr, nullptr, &jacobian)) {
+  // Marginal covariances of the newest c keyframe's pose, in window m's frame: the inverse of the
+  // Schur complement of the points in J^T J, of all and without the landmark that says most.
+  struct Marginals {
+    Matrix6d all, without_one;
+  };
+  std::optional<Marginals> MarginalsOfNewestC(const std::vector<PointMatch>& matches,
+                                              const std::vector<bool>& use) {
+    const auto information = Information();
+    const auto all = information ? CovarianceOfFirst(information->total) : std::nullopt;
+    if (!all) {
       return std::nullopt;
     }
-    const int num_points = static_cast<int>(used_points_.size());
-    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(num_frame_columns, num_frame_columns);
-    std::vector<Eigen::Matrix3d> V(num_points, Eigen::Matrix3d::Zero());
-    std::vector<Eigen::MatrixXd> W(num_points, Eigen::MatrixXd::Zero(num_frame_columns, 3));
-    for (int row = 0; row < jacobian.num_rows; ++row) {
-      for (int a = jacobian.rows[row]; a < jacobian.rows[row + 1]; ++a) {
-        const int i = jacobian.cols[a];
-        for (int b = jacobian.rows[row]; b < jacobian.rows[row + 1]; ++b) {
-          const int j = jacobian.cols[b];
-          const double product = jacobian.values[a] * jacobian.values[b];
-          if (i < num_frame_columns && j < num_frame_columns) {
-            H(i, j) += product;
-          } else if (j >= num_frame_columns) {
-            const int point = (j - num_frame_columns) / 3;
-            const int column = (j - num_frame_columns) % 3;
-            if (i < num_frame_columns) {
-              W[point](i, column) += product;
-            } else {
-              V[point]((i - num_frame_columns) % 3, column) += product;
-            }
-          }
-        }
+    std::map<PointKey, size_t> index;
+    for (const PointKey& key : used_points_) {
+      index.emplace(key, index.size());
+    }
+    Marginals marginals{*all, *all};
+    for (const std::vector<PointKey>& landmark : Landmarks(matches, use)) {
+      Eigen::MatrixXd rest = information->total;
+      for (const PointKey& key : landmark) {
+        rest -= information->of_point[index.at(key)];
+      }
+      const std::optional<Matrix6d> without = CovarianceOfFirst(rest);
+      if (!without) {
+        return std::nullopt;
+      }
+      if (without->topLeftCorner<3, 3>().trace() >
+          marginals.without_one.topLeftCorner<3, 3>().trace()) {
+        marginals.without_one = *without;
       }
     }
-    for (int point = 0; point < num_points; ++point) {
-      H.noalias() -= W[point] * V[point].inverse() * W[point].transpose();
-    }
-    const Eigen::LLT<Eigen::MatrixXd> llt(H);
-    if (llt.info() != Eigen::Success) {
-      return std::nullopt;
-    }
-    const Eigen::MatrixXd columns = llt.solve(Eigen::MatrixXd::Identity(num_frame_columns, 6));
-    const Matrix6d covariance = columns.topRows<6>();
-    return covariance.allFinite() ? std::make_optional(covariance) : std::nullopt;
+    return marginals;
   }
 
   ~JointProblem() = default;
@@ -193,6 +175,56 @@ class JointProblem {
     double share = 1;
     size_t match = 0;
   };
+
+  std::optional<FrameInformation> Information() {
+    ceres::Problem::EvaluateOptions evaluate;
+    evaluate.apply_loss_function = false;
+    evaluate.num_threads = 1;
+    evaluate.parameter_blocks = FrameBlocks();
+    const int num_frame_columns = 6 * (static_cast<int>(evaluate.parameter_blocks.size()) - 2) + 2;
+    for (const PointKey& key : used_points_) {
+      evaluate.parameter_blocks.push_back(Point(key));
+    }
+    ceres::CRSMatrix jacobian;
+    if (!problem_->Evaluate(evaluate, nullptr, nullptr, nullptr, &jacobian)) {
+      return std::nullopt;
+    }
+    return EliminatePoints(jacobian, num_frame_columns);
+  }
+
+  // The points in use, those that matches join into one landmark of both windows together.
+  std::vector<std::vector<PointKey>> Landmarks(const std::vector<PointMatch>& matches,
+                                               const std::vector<bool>& use) const {
+    std::map<PointKey, PointKey> leader;
+    for (const PointKey& key : used_points_) {
+      leader.emplace(key, key);
+    }
+    for (size_t i = 0; i < matches.size(); ++i) {
+      const int side = HolderSide(matches[i]);
+      const PointKey own{side, matches[i].landmark}, other{1 - side, Other(matches[i])};
+      if (use[i] && leader.contains(own) && leader.contains(other)) {
+        const PointKey from = leader.at(other), to = leader.at(own);
+        for (auto& [key, value] : leader) {
+          value = value == from ? to : value;
+        }
+      }
+    }
+    std::map<PointKey, std::vector<PointKey>> landmarks;
+    for (const auto& [key, value] : leader) {
+      landmarks[value].push_back(key);
+    }
+    std::vector<std::vector<PointKey>> groups;
+    for (auto& [key, group] : landmarks) {
+      groups.push_back(std::move(group));
+    }
+    return groups;
+  }
+
+  // The other window's landmark that the match's corner is, or -1.
+  int Other(const PointMatch& match) const {
+    return windows_[1 - HolderSide(match)]
+        ->landmark_of_corner[match.observed.frame][match.observed.corner];
+  }
 
   const WindowLandmark& Landmark(const PointMatch& match) const {
     return windows_[HolderSide(match)]->landmarks[match.landmark];
@@ -243,9 +275,7 @@ class JointProblem {
                                  const std::vector<bool>& use) const {
     std::set<std::array<int, 3>> pairs;  // (holder's side, its landmark, the other's landmark)
     const auto pair_of = [this](const PointMatch& match) {
-      const int other = windows_[1 - HolderSide(match)]
-                            ->landmark_of_corner[match.observed.frame][match.observed.corner];
-      return std::array<int, 3>{HolderSide(match), match.landmark, other};
+      return std::array<int, 3>{HolderSide(match), match.landmark, Other(match)};
     };
     for (size_t i = 0; i < matches.size(); ++i) {
       if (use[i]) {
@@ -337,8 +367,8 @@ std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& 
   for (const bool inlier : result.inlier) {
     result.num_inlier_observations += inlier ? 1 : 0;
   }
-  const auto covariance = problem.MarginalOfNewestC();
-  if (!covariance || result.num_inlier_observations == 0) {
+  const auto marginals = problem.MarginalsOfNewestC(matches, result.inlier);
+  if (!marginals || result.num_inlier_observations == 0) {
     return std::nullopt;
   }
   // chi2 is in sigmas of each corner's own octave; two dimensions an observation.
@@ -353,13 +383,19 @@ std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& 
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
   turn.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
-  // Never smaller than the residuals say.
-  result.covariance = std::max(1.0, variance) * turn * *covariance * turn.transpose();
   const double turn_floor =
       options.systematic_px * window_c.keyframe(window_c.newest()).camera.PixelAngle();
   const double step_floor = turn_floor * MedianDistance(window_m, window_c, matches, result.inlier);
-  result.covariance.diagonal().head<3>().array() += step_floor * step_floor;
-  result.covariance.diagonal().tail<3>().array() += turn_floor * turn_floor;
+  Vector6d floor;
+  floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(turn_floor);
+  const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {
+    // Never smaller than the residuals say.
+    Matrix6d turned = std::max(1.0, variance) * turn * covariance * turn.transpose();
+    turned.diagonal() += floor.cwiseAbs2();
+    return turned;
+  };
+  result.covariance = in_Km(marginals->all);
+  result.covariance_without_one = in_Km(marginals->without_one);
   return result;
 }
 

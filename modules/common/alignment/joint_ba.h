@@ -34,7 +34,9 @@ struct JointBaResult {
   Rigid3 T_m_c;                                // windows
   Rigid3 T_Km_Kc;                              // bodies of the newest keyframes
   Matrix6d covariance = Matrix6d::Identity();  // of T_Km_Kc, in Km's body frame
-  std::vector<bool> inlier;                    // by match
+  // The same if the landmark that says most were not there.
+  Matrix6d covariance_without_one = Matrix6d::Identity();
+  std::vector<bool> inlier;  // by match
   int num_inlier_observations = 0;
   double rms_px = 0;  // of the inliers, in pixels of octave 0
 };
