@@ -1,0 +1,24 @@
+#pragma once
+
+// LCM logs cut and put together. The logs made are ordinary ones; events keep their capture time.
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace pangea::session {
+
+struct LogCut {
+  double from_s = 0;  // since the log's first event, capture time
+  double to_s = std::numeric_limits<double>::infinity();
+  std::string channels = ".*";  // regular expression for the whole name
+};
+
+// Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
+// read, an output that exists or cannot be written, and an expression that is none.
+int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out);
+// All events of the logs in the order of capture; of equal times the earlier log's first.
+int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out);
+
+}  // namespace pangea::session

@@ -1,0 +1,124 @@
+// pangea-log: what is in a captured log, parts of it, and what it amounts to in other formats.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "session/log_edit.h"
+#include "session/log_export.h"
+#include "session/log_info.h"
+
+namespace pangea::session {
+namespace {
+
+struct Arguments {
+  std::vector<std::string> logs;
+  LogCut cut;
+  std::string out, tum, g2o, ply;
+};
+
+void Write(const std::string& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) {
+    throw std::runtime_error(fmt::format("{}: cannot be written", file));
+  }
+}
+
+void Export(const Arguments& arguments) {
+  const std::string& log = arguments.logs.front();
+  if (arguments.tum.empty() && arguments.g2o.empty() && arguments.ply.empty()) {
+    throw std::runtime_error("export: say what, one or more of --tum, --g2o, --ply");
+  }
+  if (!arguments.tum.empty()) {
+    for (const std::string& file : ExportTum(log, arguments.tum)) {
+      std::cout << file << "\n";
+    }
+  }
+  if (!arguments.ply.empty()) {
+    ExportPly(log, arguments.ply);
+    std::cout << arguments.ply << "\n";
+  }
+  if (!arguments.g2o.empty()) {
+    const NamedGraph named = GraphOf(log);
+    std::string text = ToG2o(named.graph);
+    for (size_t i = 0; i < named.names.size(); ++i) {
+      text += fmt::format("# {} is keyframe {}\n", i, named.names[i]);
+    }
+    Write(arguments.g2o, text);
+    std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments.g2o,
+                             named.graph.vertices.size(), named.graph.edges.size(),
+                             Cost(named.graph));
+  }
+}
+
+CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Arguments* arguments,
+                     int num_logs) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->add_option("log", arguments->logs, "LCM log")
+      ->required()
+      ->expected(num_logs)
+      ->check(CLI::ExistingFile);
+  return command;
+}
+
+}  // namespace
+
+void AddCommands(CLI::App& app, Arguments* arguments) {
+  AddCommand(app, "info", "Channels, keyframes and verdicts in a log", arguments, 1)
+      ->callback([arguments] {
+        const std::string& log = arguments->logs.front();
+        std::cout << ToText(Summarise(log), log);
+      });
+  CLI::App* cut = AddCommand(app, "cut", "A part of a log: a time, some channels", arguments, 1);
+  cut->add_option("--from", arguments->cut.from_s, "Seconds since the first event")
+      ->capture_default_str();
+  cut->add_option("--to", arguments->cut.to_s, "Seconds since the first event (default: the end)");
+  cut->add_option("--channels", arguments->cut.channels, "Regular expression for the whole name")
+      ->capture_default_str();
+  cut->add_option("--out", arguments->out, "The new log")->required();
+  cut->callback([arguments] {
+    std::cout << fmt::format("{}: {} events\n", arguments->out,
+                             CutLog(arguments->logs.front(), arguments->cut, arguments->out));
+  });
+  CLI::App* cat = AddCommand(app, "cat", "Several logs in one, by time of capture", arguments, -1);
+  cat->add_option("--out", arguments->out, "The new log")->required();
+  cat->callback([arguments] {
+    std::cout << fmt::format("{}: {} events\n", arguments->out,
+                             MergeLogs(arguments->logs, arguments->out));
+  });
+  CLI::App* out = AddCommand(app, "export", "What a server bus' log amounts to", arguments, 1);
+  out->add_option("--tum", arguments->tum, "Folder for the agents' trajectories, TUM format");
+  out->add_option("--g2o", arguments->g2o, "File for the pose graph, g2o format");
+  out->add_option("--ply", arguments->ply, "File for the largest group's map points");
+  out->callback([arguments] { Export(*arguments); });
+  CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
+  cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
+  cost->callback([arguments] {
+    const Graph graph = ReadG2o(arguments->g2o);
+    std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
+                             graph.vertices.size(), graph.edges.size(), Cost(graph));
+  });
+}
+
+}  // namespace pangea::session
+
+int main(int argc, char** argv) {
+  CLI::App app("What is in a captured LCM log, parts of it, and other formats", "pangea-log");
+  app.require_subcommand(1);
+  pangea::session::Arguments arguments;
+  pangea::session::AddCommands(app, &arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-log: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

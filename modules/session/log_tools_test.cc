@@ -1,0 +1,174 @@
+// pangea-log's parts on the captured sample session.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "session/log_edit.h"
+#include "session/log_export.h"
+#include "session/log_info.h"
+#include "session/log_reader.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kSample = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks/session.lcm";
+
+class LogToolsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        fs::temp_directory_path() / (std::string("pangea_log_tools_") +
+                                     testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  fs::path folder_;
+};
+
+std::vector<std::string> Events(const std::string& log) {
+  std::vector<std::string> events;
+  ReadLog(log, [&events](const LogEvent& event) {
+    events.push_back(std::to_string(event.utime) + event.channel +
+                     std::string(event.data.begin(), event.data.end()));
+  });
+  return events;
+}
+
+// The error and its square as g2o's documentation has them, from the file's numbers alone.
+double CostByG2o(const std::string& path) {
+  std::ifstream file(path);
+  std::map<int, Eigen::Isometry3d> vertices;
+  const auto read_pose = [](std::istream& in) {
+    Eigen::Vector3d t;
+    Eigen::Quaterniond q;
+    in >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translate(t);
+    pose.rotate(q);
+    return pose;
+  };
+  double cost = 0;
+  std::string text;
+  while (std::getline(file, text)) {
+    std::istringstream line(text);
+    std::string kind;
+    line >> kind;
+    if (kind == "VERTEX_SE3:QUAT") {
+      int id = 0;
+      line >> id;
+      vertices[id] = read_pose(line);
+    } else if (kind == "EDGE_SE3:QUAT") {
+      int from = 0, to = 0;
+      line >> from >> to;
+      const Eigen::Isometry3d Z = read_pose(line);
+      const Eigen::Isometry3d delta = Z.inverse() * (vertices[from].inverse() * vertices[to]);
+      Eigen::Quaterniond q(delta.rotation());
+      if (q.w() < 0) {
+        q.coeffs() *= -1;
+      }
+      Eigen::Matrix<double, 6, 1> e;
+      e << delta.translation(), q.vec();
+      Eigen::Matrix<double, 6, 6> information;
+      for (int row = 0; row < 6; ++row) {
+        for (int column = row; column < 6; ++column) {
+          line >> information(row, column);
+          information(column, row) = information(row, column);
+        }
+      }
+      cost += e.dot(information * e);
+    }
+  }
+  return cost;
+}
+
+TEST_F(LogToolsTest, InfoNamesChannelsMapsAndVerdicts) {
+  const LogSummary summary = Summarise(kSample);
+  EXPECT_EQ(summary.unread_bytes, 0);
+  ASSERT_EQ(summary.keyframes.size(), 2U);
+  size_t keyframes = 0;
+  for (const auto& [map, seqs] : summary.keyframes) {
+    keyframes += seqs.size();
+  }
+  EXPECT_EQ(keyframes, 63U);
+  EXPECT_GT(summary.verdicts.at("accepted"), 0);
+  const std::string text = ToText(summary, "sample");
+  EXPECT_NE(text.find("KEYFRAME_1"), std::string::npos);
+  EXPECT_NE(text.find("0-"), std::string::npos);
+}
+
+TEST_F(LogToolsTest, ATornTailIsNamed) {
+  fs::copy_file(kSample, Path("torn.lcm"));
+  fs::resize_file(Path("torn.lcm"), fs::file_size(kSample) - 100);
+  const LogSummary whole = Summarise(kSample), torn = Summarise(Path("torn.lcm"));
+  EXPECT_EQ(torn.events, whole.events - 1);
+  EXPECT_GT(torn.unread_bytes, 0);
+  EXPECT_NE(ToText(torn, "torn").find("cannot be read"), std::string::npos);
+}
+
+TEST_F(LogToolsTest, CutsAddUpToTheWhole) {
+  const double middle = 10;
+  CutLog(kSample, {.to_s = middle}, Path("a.lcm"));
+  CutLog(kSample, {.from_s = middle}, Path("b.lcm"));
+  const auto a = Events(Path("a.lcm")), b = Events(Path("b.lcm"));
+  EXPECT_GT(a.size(), 10U);
+  EXPECT_GT(b.size(), 10U);
+  EXPECT_EQ(MergeLogs({Path("b.lcm"), Path("a.lcm")}, Path("ab.lcm")),
+            static_cast<int64_t>(a.size() + b.size()));
+  auto all = Events(kSample), merged = Events(Path("ab.lcm"));
+  std::ranges::sort(all);
+  std::ranges::sort(merged);
+  EXPECT_TRUE(merged == all);  // too long to print
+}
+
+TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
+  const int64_t events = CutLog(kSample, {.channels = "KEYFRAME_1"}, Path("one.lcm"));
+  const LogSummary summary = Summarise(Path("one.lcm"));
+  EXPECT_EQ(summary.events, events);
+  EXPECT_EQ(summary.channels.size(), 1U);
+  EXPECT_THROW(CutLog(kSample, {}, Path("one.lcm")), std::runtime_error);
+  EXPECT_EQ(Summarise(Path("one.lcm")).events, events);
+  EXPECT_THROW(CutLog(kSample, {.channels = "("}, Path("other.lcm")), std::runtime_error);
+}
+
+// An independent reading of the file has the cost that our own convention gives.
+TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
+  const NamedGraph named = GraphOf(kSample);
+  EXPECT_EQ(named.graph.vertices.size(), 63U);
+  EXPECT_EQ(named.names.size(), 63U);
+  EXPECT_GT(named.graph.edges.size(), 80U);
+  std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
+  const double ours = Cost(named.graph);
+  EXPECT_GT(ours, 1);
+  EXPECT_NEAR(CostByG2o(Path("graph.g2o")) / ours, 1, 1e-3);
+  const Graph again = ReadG2o(Path("graph.g2o"));
+  EXPECT_EQ(again.edges.size(), named.graph.edges.size());
+  EXPECT_EQ(again.fixed, named.graph.fixed);
+  EXPECT_NEAR(Cost(again) / ours, 1, 1e-5);
+}
+
+TEST_F(LogToolsTest, ABadG2oFileNamesTheLine) {
+  std::ofstream(Path("bad.g2o")) << "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n";
+  try {
+    ReadG2o(Path("bad.g2o"));
+    FAIL() << "was read";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("bad.g2o:2: VERTEX_SE2"), std::string::npos);
+  }
+}
+
+TEST_F(LogToolsTest, TrajectoriesAndPoints) {
+  EXPECT_EQ(ExportTum(kSample, Path("tum")).size(), 2U);
+  EXPECT_GT(fs::file_size(Path("tum/agent_1.tum")), 1000U);
+  ExportPly(kSample, Path("map.ply"));
+  EXPECT_GT(fs::file_size(Path("map.ply")), 10000U);
+}
+
+}  // namespace
+}  // namespace pangea::session
