@@ -1,0 +1,159 @@
+// pangea-own-odometry-example: a recording's images, and poses of any odometry ─► KEYFRAME_k
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <lcm/lcm-cpp.hpp>
+#include <optional>
+
+#include "common/bus/keyframe_outlet.h"
+#include "common/bus/node.h"
+#include "common/bus/playback_pace.h"
+#include "common/bus/process.h"
+#include "common/channels.h"
+#include "common/euroc.h"
+#include "common/messages.h"
+#include "common/trajectory.h"
+#include "keyframe_maker.h"
+
+namespace pangea::example {
+namespace {
+
+struct Arguments {
+  int32_t agent_id = 0;
+  std::string recording, poses, bus, out_keyframes;
+};
+
+std::vector<uint8_t> Encode(const Keyframe& keyframe) {
+  const keyframe_t message = ToMessage(keyframe);
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+// Keyframes on the agent's bus, where an uplink takes them to the server.
+class Agent : public Process {
+ public:
+  Agent(Bus& bus, int32_t agent_id)
+      : node_(bus, fmt::format("own_odometry_{}", agent_id)),
+        outlet_(node_, agent_id, /*kept=*/200, WallUtime()) {}
+
+  void Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
+    outlet_.Publish(id, std::move(bytes));
+  }
+  void Tick(int64_t now_utime) override {
+    outlet_.Tick(now_utime);
+    if (now_utime >= next_status_utime_) {
+      next_status_utime_ = now_utime + 1'000'000;
+      node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "poses of another odometry");
+    }
+  }
+  const KeyframeOutlet& outlet() const { return outlet_; }
+
+ private:
+  Node node_;
+  KeyframeOutlet outlet_;
+  int64_t next_status_utime_ = 0;
+};
+
+// The same keyframes as a log, for `keyframes:` in a session file and for pangea-session replay.
+class KeyframeLog {
+ public:
+  explicit KeyframeLog(const std::string& path) : file_(path, "w") {
+    if (!file_.good()) {
+      throw std::runtime_error(fmt::format("--out-keyframes {}: cannot be written", path));
+    }
+  }
+  void Write(const std::string& channel, int64_t utime, std::vector<uint8_t>* bytes) {
+    lcm::LogEvent event;
+    event.eventnum = count_++;
+    event.timestamp = utime;
+    event.channel = channel;
+    event.datalen = static_cast<int32_t>(bytes->size());
+    event.data = bytes->data();
+    file_.writeEvent(&event);
+  }
+
+ private:
+  lcm::LogFile file_;
+  int64_t count_ = 0;
+};
+
+// As fast as the server keeps up; a live odometry calls Add from its camera's callback instead.
+void Play(const Arguments& arguments) {
+  const EurocRecording recording(arguments.recording);
+  const Trajectory poses = ReadTrajectory(arguments.poses, nullptr);
+  KeyframeMaker maker({arguments.agent_id, WallUtime()}, recording.camera(), {});
+  std::optional<LcmBus> bus;
+  std::optional<Agent> agent;
+  std::optional<PlaybackPace> pace;
+  std::optional<KeyframeLog> log;
+  if (!arguments.bus.empty()) {
+    bus.emplace(arguments.bus);
+    agent.emplace(*bus, arguments.agent_id);
+    pace.emplace(&*bus, *agent, agent->outlet());
+  }
+  if (!arguments.out_keyframes.empty()) {
+    log.emplace(arguments.out_keyframes);
+  }
+  int keyframes = 0;
+  for (size_t i = 0; i < recording.images().size() && !StopRequested(); ++i) {
+    constexpr int64_t kMaxGap_us = 200'000;
+    const int64_t utime = recording.images()[i].utime;
+    const auto T_odom_body = Interpolate(poses, utime, kMaxGap_us);
+    std::string why;
+    const cv::Mat image = T_odom_body ? recording.LoadImage(i, &why) : cv::Mat();
+    if (image.empty()) {
+      continue;
+    }
+    if (const auto keyframe = maker.Add(utime, image, *T_odom_body)) {
+      ++keyframes;
+      std::vector<uint8_t> bytes = Encode(*keyframe);
+      if (log) {
+        log->Write(channels::Keyframe(arguments.agent_id), utime, &bytes);
+      }
+      if (agent) {
+        agent->Publish(keyframe->id, std::move(bytes));
+        pace->WaitForAcknowledgements();
+      }
+    }
+  }
+  if (pace) {
+    pace->WaitAtTheEnd();
+  }
+  if (keyframes == 0) {
+    throw std::runtime_error(
+        fmt::format("--poses {}: none lies within 0.2 s of an image of {}; their times must be "
+                    "the images', in seconds (TUM) or nanoseconds (EuRoC)",
+                    arguments.poses, arguments.recording));
+  }
+  std::cout << fmt::format("agent {}: {} keyframes\n", arguments.agent_id, keyframes);
+}
+
+}  // namespace
+}  // namespace pangea::example
+
+int main(int argc, char** argv) {
+  CLI::App app("Makes an agent of any odometry: images and poses in, keyframes out",
+               "pangea-own-odometry-example");
+  pangea::example::Arguments arguments;
+  app.add_option("--agent", arguments.agent_id, "agent id")
+      ->required()
+      ->check(CLI::Range(1, 65535));
+  app.add_option("--recording", arguments.recording, "EuRoC folder with the images")->required();
+  app.add_option("--poses", arguments.poses, "T_odom_body, z up: a TUM or EuRoC trajectory file")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app.add_option("--bus", arguments.bus, "LCM URL of the agent's bus (default: none)");
+  app.add_option("--out-keyframes", arguments.out_keyframes, "write the keyframes as an LCM log");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    pangea::InstallSignalHandlers();
+    pangea::example::Play(arguments);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-own-odometry-example: {}\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,69 @@
+// An odometry that is not ours as an agent: examples/own_odometry with ground-truth poses that
+// drift, and an agent of pangea-vio, become one map.
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/euroc.h"
+#include "common/trajectory.h"
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A random walk of position and yaw, and an odom frame of its own.
+Trajectory Drifting(const Trajectory& truth) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  constexpr double kStep_m = 6e-4, kStep_rad = 1e-4;  // each pose; 200 of them a second
+  Trajectory drifting;
+  Rigid3 T(YawRotation(1.3), {4, -2, 1});
+  for (size_t i = 0; i < truth.size(); ++i) {
+    const Rigid3 step = i == 0 ? truth[0].T : truth[i - 1].T.Inverse() * truth[i].T;  // exact
+    T = T * step;
+    T.t += kStep_m * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    T.q = YawRotation(kStep_rad * normal(random)) * T.q;
+    drifting.push_back({truth[i].utime, T});
+  }
+  return drifting;
+}
+
+TEST(OwnOdometry, FusesWithAnAgentOfVio) {
+  const fs::path folder = FreshFolder("own_odometry");
+  RenderWalk(folder / "walk_1", "--generate walk --path-seed 1 --seed 1 --duration 14");
+  RenderWalk(folder / "walk_2", "--generate walk --path-seed 2 --seed 2 --duration 14");
+  std::vector<std::string> warnings;
+  WriteTum((folder / "poses.tum").string(),
+           Drifting(ReadEurocGroundTruthOf((folder / "walk_2").string(), &warnings)));
+  const auto path = [&folder](const char* name) { return (folder / name).string(); };
+
+  Outcome outcome = RunCommand("pangea-vio --agent 1 --bus none --rate max --recording " +
+                               path("walk_1") + " --out-keyframes " + path("one.lcm"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + path("walk_2") +
+                       " --poses " + path("poses.tum") + " --out-keyframes " + path("two.lcm"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  outcome = RunCommand("pangea-session replay " + path("one.lcm") + " " + path("two.lcm") +
+                       " --out " + path("out") + " --recording 1=" + path("walk_1") +
+                       " --recording 2=" + path("walk_2"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+
+  const auto report = ReadJson(folder / "out" / "report.json");
+  ASSERT_EQ(report["groups"].size(), 1u) << outcome.output;
+  EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
+  std::cout << "joint ATE " << report["ate_joint_m"] << " m\n";
+  EXPECT_LT(report["ate_joint_m"].get<double>(), 0.1) << outcome.output;
+
+  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + path("walk_1") +
+                       " --poses " + path("out/agent_1.tum") + " --out-keyframes " +
+                       path("no/such/folder.lcm"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("--out-keyframes"), std::string::npos) << outcome.output;
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace pangea::tests
