@@ -17,6 +17,15 @@ add_library(lcm::lcm UNKNOWN IMPORTED)
 set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION ${LCM_LIBRARY}
   INTERFACE_INCLUDE_DIRECTORIES ${LCM_INCLUDE_DIR})
 
+# Neither have libsodium and zstd.
+foreach(package sodium zstd)
+  find_path(${package}_INCLUDE_DIR ${package}.h REQUIRED)
+  find_library(${package}_LIBRARY ${package} REQUIRED)
+  add_library(${package}::${package} UNKNOWN IMPORTED)
+  set_target_properties(${package}::${package} PROPERTIES
+    IMPORTED_LOCATION ${${package}_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${${package}_INCLUDE_DIR})
+endforeach()
+
 # OpenCV's config sets plain include directories; as a SYSTEM target its headers stay quiet.
 add_library(pangea_opencv INTERFACE)
 target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})

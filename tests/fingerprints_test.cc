@@ -12,9 +12,6 @@
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "pangea/keyframe_t.hpp"
-#include "pangea/link_ack_t.hpp"
-#include "pangea/link_hello_t.hpp"
-#include "pangea/link_packet_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -33,9 +30,6 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(image_t::getHash()), 0xcf3cd5c496fbbc4fu);
   EXPECT_EQ(static_cast<uint64_t>(imu_t::getHash()), 0x831ef36c48e5cf62u);
   EXPECT_EQ(static_cast<uint64_t>(keyframe_t::getHash()), 0x59b338437f11086du);
-  EXPECT_EQ(static_cast<uint64_t>(link_ack_t::getHash()), 0x70a3cb32136e68d2u);
-  EXPECT_EQ(static_cast<uint64_t>(link_hello_t::getHash()), 0x1924bf0086a589u);
-  EXPECT_EQ(static_cast<uint64_t>(link_packet_t::getHash()), 0x5e7620d79fc3b390u);
   EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
   EXPECT_EQ(static_cast<uint64_t>(place_match_t::getHash()), 0x5be9f82364c3b435u);
   EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);

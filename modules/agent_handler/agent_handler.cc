@@ -1,23 +1,26 @@
 #include "agent_handler/agent_handler.h"
 
-#include "pangea/pose_t.hpp"
+#include <algorithm>
+
+#include "common/link/compression.h"
 
 namespace pangea {
 namespace {
 
-// An uplink silent for this long may be replaced by one whose clock is behind.
-constexpr int64_t kSilent_us = 3'000'000;
 constexpr int64_t kAckSpacing_us = 4'000;
 constexpr int64_t kAckDelay_us = 20'000;
-constexpr int kAckPackets = 16;
+constexpr int kAckPieces = 16;
 constexpr int64_t kCorrectionRepeat_us = 300'000;
-constexpr size_t kMaxReason = 300;
 // Corrections are remembered for the newest submaps only; an agent drives one at a time.
 constexpr size_t kMaxCorrections = kMaxLinkMaps;
 
-std::string CheckKeyframe(const KeyframeId& id, Bytes bytes) {
+std::string CheckKeyframe(const KeyframeId& id, Bytes compressed) {
+  const auto bytes = Decompress(compressed, kMaxKeyframeBytes);
+  if (!bytes) {
+    return "keyframe does not decompress";
+  }
   keyframe_t message{};
-  if (!DecodeMessage(bytes, &message)) {
+  if (!DecodeMessage(*bytes, &message)) {
     return "keyframe_t does not decode";
   }
   const auto keyframe = Parse(message);
@@ -29,85 +32,75 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes bytes) {
 
 }  // namespace
 
-AgentHandler::AgentHandler(int32_t agent_id, int64_t run, const ReceiverOptions& options)
-    : agent_id_(agent_id), run_(run), receiver_(options, CheckKeyframe) {}
+AgentHandler::AgentHandler(int32_t agent_id, const ReceiverOptions& options)
+    : agent_id_(agent_id), receiver_(options, CheckKeyframe) {}
 
 void AgentHandler::Resume(const MapId& map, int32_t journalled_seq) {
   receiver_.Resume(map, journalled_seq);
 }
 
-std::string AgentHandler::OnPacket(const LinkPacket& packet, int64_t now_us) {
-  if (std::string reason = CheckRun(packet, now_us); !reason.empty()) {
-    return reason;
-  }
-  highest_number_ = std::max(highest_number_, packet.number);
-  last_packet_us_ = now_us;
-  ++packets_since_ack_;
-  switch (packet.kind) {
-    case LinkPacket::Kind::kHello:
-      return OnHello(packet);
-    case LinkPacket::Kind::kPose:
-      return OnPose(packet);
-    case LinkPacket::Kind::kKeyframe:
-      return receiver_.Add(packet);
-  }
-  return "";
+void AgentHandler::OnNewUplink() {
+  has_uplink_ = true;
+  highest_number_ = 0;
+  slots_.fill(std::nullopt);
+  receiver_.OnNewUplink();
 }
 
-std::string AgentHandler::CheckRun(const LinkPacket& packet, int64_t now_us) {
-  if (packet.run == uplink_run_) {
-    return "";
+std::string AgentHandler::OnPacket(const LinkPacket& packet) {
+  highest_number_ = std::max(highest_number_, packet.number);
+  switch (packet.kind) {
+    case LinkKind::kHello:
+      return OnHello(packet);
+    case LinkKind::kPose:
+      return OnPose(packet);
+    case LinkKind::kPiece:
+    case LinkKind::kLastPiece:
+      return OnPiece(packet);
+    default:
+      return "packet of an unknown kind";
   }
-  const bool follows = packet.run > uplink_run_ || now_us - last_packet_us_ > kSilent_us;
-  if (packet.kind != LinkPacket::Kind::kHello || !follows) {
-    return "packet of another run of the uplink";
-  }
-  uplink_run_ = packet.run;
-  highest_number_ = 0;
-  return "";
 }
 
 std::string AgentHandler::OnHello(const LinkPacket& packet) {
-  link_hello_t message{};
-  if (!DecodeMessage(packet.data, &message)) {
-    return "link_hello_t does not decode";
-  }
-  const auto hello = Parse(message);
+  const auto hello = ParseHello(agent_id_, packet.body);
   if (!hello.value) {
     return hello.refused;
-  }
-  for (const LinkMap& map : hello.value->maps) {
-    if (map.map.agent_id != agent_id_) {
-      return "hello with another agent's map";
-    }
   }
   software_ = hello.value->software;
   receiver_.OnHello(*hello.value);
   for (const LinkMap& map : hello.value->maps) {
+    slots_[map.slot] = map.map;
     const auto it = corrections_.find(map.map);
     if (it != corrections_.end()) {
       it->second.confirmed_revision = map.correction_revision;
     }
   }
-  ack_urgent_ = true;
+  hello_since_ack_ = true;
   return "";
 }
 
+std::string AgentHandler::OnPiece(const LinkPacket& packet) {
+  ++pieces_since_ack_;
+  const auto piece = ParsePiece(packet);
+  if (!piece.value) {
+    return piece.refused;
+  }
+  const std::optional<MapId>& map = slots_[piece.value->slot];
+  return map ? receiver_.Add(*map, *piece.value) : "piece of a map that was not announced";
+}
+
 std::string AgentHandler::OnPose(const LinkPacket& packet) {
-  pose_t message{};
-  if (!DecodeMessage(packet.data, &message)) {
-    return "pose_t does not decode";
+  auto pose = ParsePose(agent_id_, packet.body);
+  pose_ = std::move(pose.value);
+  return pose.refused;
+}
+
+std::vector<Receiver::Keyframe> AgentHandler::TakeReady() {
+  std::vector<Receiver::Keyframe> ready = receiver_.TakeReady();
+  for (Receiver::Keyframe& keyframe : ready) {
+    keyframe.bytes = *Decompress(keyframe.bytes, kMaxKeyframeBytes);  // it has been checked
   }
-  const auto map = Parse(message.map);
-  if (!map.value || map.value->agent_id != agent_id_ || message.reason.size() > kMaxReason) {
-    return "pose of another agent, or absurd";
-  }
-  const bool valid = Parse(message.T_odom_body).value && Parse(message.T_map_body).value;
-  if (message.state == pose_t::STATE_TRACKING && !valid) {
-    return "pose is no rigid transform";
-  }
-  pose_ = packet.data;
-  return "";
+  return ready;
 }
 
 void AgentHandler::Journalled(const KeyframeId& id) {
@@ -139,25 +132,22 @@ const Correction* AgentHandler::Unconfirmed() const {
 std::optional<LinkAck> AgentHandler::TakeAck(int64_t now_us) {
   const int64_t since = now_us - last_ack_us_;
   const Correction* correction = Unconfirmed();
-  const bool soon = ack_urgent_ || packets_since_ack_ >= kAckPackets;
+  const bool soon = ack_urgent_ || hello_since_ack_ || pieces_since_ack_ >= kAckPieces;
   const bool due = (soon && since >= kAckSpacing_us) ||
-                   (packets_since_ack_ > 0 && since >= kAckDelay_us) ||
+                   (pieces_since_ack_ > 0 && since >= kAckDelay_us) ||
                    (correction != nullptr && since >= kCorrectionRepeat_us);
-  if (uplink_run_ == 0 || !due) {
+  if (!has_uplink_ || !due) {
     return std::nullopt;
   }
   LinkAck ack;
-  ack.agent_id = agent_id_;
-  ack.run = run_;
-  ack.number = ++acks_;
-  ack.uplink_run = uplink_run_;
   ack.highest_number = highest_number_;
-  receiver_.FillAck(&ack);
+  receiver_.FillAck(hello_since_ack_, &ack);
   if (correction != nullptr) {
     ack.corrections.push_back(*correction);
   }
   last_ack_us_ = now_us;
-  packets_since_ack_ = 0;
+  pieces_since_ack_ = 0;
+  hello_since_ack_ = false;
   ack_urgent_ = false;
   return ack;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
 // The server's side of one agent (paper, IV.A): its communication module (receive cache,
-// acknowledgements), its parser, and the manager of its submaps. Created by the agent's hello.
+// acknowledgements), its parser, and the manager of its submaps. Created by the agent's first
+// session; packets come here once they are opened.
 //
 // A state machine: time goes in (monotonic microseconds); no clock, no bus, no file, one thread.
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -17,22 +19,23 @@ namespace pangea {
 
 class AgentHandler {
  public:
-  // `run`: wall clock at the handler process' start, microseconds.
-  AgentHandler(int32_t agent_id, int64_t run, const ReceiverOptions& options);
+  AgentHandler(int32_t agent_id, const ReceiverOptions& options);
 
   // The journal already has this submap up to `journalled_seq`.
   void Resume(const MapId& map, int32_t journalled_seq);
 
+  // The packets that follow are another run's of the uplink.
+  void OnNewUplink();
   // Why it was refused, or an empty string.
-  std::string OnPacket(const LinkPacket& packet, int64_t now_us);
+  std::string OnPacket(const LinkPacket& packet);
   // Keyframes that are valid and next in their submap; say when the journal's disk has them.
-  std::vector<Receiver::Keyframe> TakeReady() { return receiver_.TakeReady(); }
+  std::vector<Receiver::Keyframe> TakeReady();
   void Journalled(const KeyframeId& id);
-  // The newest pose_t's bytes since the last call; empty if there is none.
-  std::vector<uint8_t> TakePose() { return std::exchange(pose_, {}); }
+  // The newest pose since the last call.
+  std::optional<pose_t> TakePose() { return std::exchange(pose_, std::nullopt); }
   // Told to the agent until it confirms; the highest revision of each submap wins.
   void OnCorrection(const Correction& correction);
-  // The acknowledgement due now, if one is.
+  // The acknowledgement due now, if one is. Its number is the session's to give.
   std::optional<LinkAck> TakeAck(int64_t now_us);
 
   const std::string& software() const { return software_; }
@@ -45,22 +48,21 @@ class AgentHandler {
   };
 
   std::string OnHello(const LinkPacket& packet);
+  std::string OnPiece(const LinkPacket& packet);
   std::string OnPose(const LinkPacket& packet);
-  std::string CheckRun(const LinkPacket& packet, int64_t now_us);
   const Correction* Unconfirmed() const;
 
   const int32_t agent_id_;
-  const int64_t run_;
   Receiver receiver_;
   std::string software_;
-  int64_t uplink_run_ = 0;
+  bool has_uplink_ = false;
   int64_t highest_number_ = 0;
-  int64_t last_packet_us_ = 0;
-  std::vector<uint8_t> pose_;
+  std::array<std::optional<MapId>, 256> slots_;  // of this run's hellos
+  std::optional<pose_t> pose_;
   std::map<MapId, Told> corrections_;
-  int64_t acks_ = 0;
   int64_t last_ack_us_ = 0;
-  int packets_since_ack_ = 0;
+  int pieces_since_ack_ = 0;
+  bool hello_since_ack_ = false;
   bool ack_urgent_ = false;
 };
 

@@ -55,14 +55,16 @@ auto DecodeAndParse(Bytes data) -> decltype(Parse(Message{})) {
 }  // namespace
 
 AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
-                                         const std::string& journal_path, int64_t run,
+                                         const std::string& journal_path,
+                                         const std::string& key_folder, int64_t now_utime,
                                          const AgentHandlerOptions& options)
     : link_bus_(link_bus),
-      run_(run),
+      key_folder_(key_folder),
       options_(options),
       node_(server_bus, "agent_handler"),
       resend_pacer_(options.resend_bytes_per_s, kResendBurst),
-      now_utime_(run) {
+      now_utime_(now_utime) {
+  ReadKeys();
   journal_ = std::make_unique<Journal>(
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
         return LoadEvent(channel, data, place);
@@ -145,51 +147,80 @@ void AgentHandlerProcess::OnCorrection(const Correction& correction) {
     corrections_.erase(corrections_.begin());
   }
   const auto agent = agents_.find(correction.map.agent_id);
-  if (agent != agents_.end()) {
-    agent->second.handler.OnCorrection(correction);
+  if (agent != agents_.end() && agent->second.handler) {
+    agent->second.handler->OnCorrection(correction);
   }
 }
 
-AgentHandlerProcess::Agent* AgentHandlerProcess::FindOrCreate(const LinkPacket& packet) {
-  const auto it = agents_.find(packet.agent_id);
-  if (it != agents_.end()) {
-    return &it->second;
+// An agent whose key has gone is shut out; what it sent stays. One whose key has changed begins a
+// new session.
+void AgentHandlerProcess::ReadKeys() {
+  const std::map<int32_t, SecretKey> keys = key_folder_.Read();
+  if (keys.size() > kMaxAgents) {
+    throw std::runtime_error(
+        fmt::format("{} keys: one server takes {} agents at most", keys.size(), kMaxAgents));
   }
-  if (packet.kind != LinkPacket::Kind::kHello || agents_.size() >= kMaxAgents) {
-    return nullptr;
+  std::erase_if(agents_, [&](const auto& item) { return !keys.contains(item.first); });
+  for (const auto& [agent_id, key] : keys) {
+    const auto agent = agents_.find(agent_id);
+    if (agent == agents_.end()) {
+      agents_.emplace(agent_id, Agent{HandlerSession(agent_id, key), std::nullopt});
+    } else if (!(agent->second.session.agent_key() == key)) {
+      agent->second.session = HandlerSession(agent_id, key);
+    }
   }
-  AgentHandler handler(packet.agent_id, run_, options_.receiver);
-  for (auto have = have_.lower_bound({packet.agent_id, 0});
-       have != have_.end() && have->first.agent_id == packet.agent_id; ++have) {
+}
+
+AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
+  AgentHandler handler(agent_id, options_.receiver);
+  for (auto have = have_.lower_bound({agent_id, 0});
+       have != have_.end() && have->first.agent_id == agent_id; ++have) {
     handler.Resume(have->first, have->second);
   }
   for (const auto& [map, correction] : corrections_) {
-    if (map.agent_id == packet.agent_id) {
+    if (map.agent_id == agent_id) {
       handler.OnCorrection(correction);
     }
   }
-  return &agents_.emplace(packet.agent_id, Agent(std::move(handler))).first->second;
+  return handler;
+}
+
+void AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes packet) {
+  const std::string channel = channels::LinkDown(agent_id);
+  link_bus_.Publish(channel, packet);
+  agent->bytes_down += BytesOnTheWire(channel, packet);
 }
 
 void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
-  const auto packet = DecodeAndParse<link_packet_t>(data);
-  if (!packet.value) {
-    return node_.Refuse(packet.refused);
+  const auto found = agents_.find(channels::LinkUpAgent(channel).value_or(0));
+  if (found == agents_.end()) {
+    return node_.Refuse("packet of an agent without a key");
   }
-  if (channel != channels::LinkUp(packet.value->agent_id)) {
-    return node_.Refuse("packet on another agent's channel");
+  const int32_t agent_id = found->first;
+  Agent& agent = found->second;
+  const HandlerSession::Opened opened = agent.session.Open(data);
+  if (!opened.refused.empty()) {
+    return node_.Refuse(opened.refused);
   }
-  Agent* agent = FindOrCreate(*packet.value);
-  if (agent == nullptr) {
-    return node_.Refuse("packet of an agent without a hello");
+  agent.bytes_up += BytesOnTheWire(channel, data);
+  if (!opened.welcome.empty()) {
+    SendDown(agent_id, &agent, opened.welcome);
   }
-  agent->bytes_up += static_cast<int64_t>(data.size()) + kDatagramOverheadBytes;
-  const std::string reason = agent->handler.OnPacket(*packet.value, now_us_);
+  if (!opened.packet) {
+    return;
+  }
+  if (!agent.handler) {
+    agent.handler.emplace(MakeHandler(agent_id));
+  }
+  if (opened.new_uplink) {
+    agent.handler->OnNewUplink();
+  }
+  const std::string reason = agent.handler->OnPacket(*opened.packet);
   if (!reason.empty()) {
     node_.Refuse(reason);
   }
-  if (const std::vector<uint8_t> pose = agent->handler.TakePose(); !pose.empty()) {
-    node_.bus().Publish(channels::Pose(packet.value->agent_id), pose);
+  if (const auto pose = agent.handler->TakePose()) {
+    node_.Publish(channels::Pose(agent_id), *pose);
   }
   JournalReady();
 }
@@ -199,7 +230,10 @@ void AgentHandlerProcess::JournalReady() {
     if (journal_->Full()) {
       return;  // it stays in the receive cache
     }
-    for (Receiver::Keyframe& keyframe : agent.handler.TakeReady()) {
+    if (!agent.handler) {
+      continue;
+    }
+    for (Receiver::Keyframe& keyframe : agent.handler->TakeReady()) {
       if (unsynced_.empty()) {
         oldest_unsynced_us_ = now_us_;
       }
@@ -222,9 +256,11 @@ void AgentHandlerProcess::SyncJournal() {
   for (const Unsynced& keyframe : unsynced_) {
     index_.AddKeyframe(keyframe.id, keyframe.place);
     have_[keyframe.id.map] = keyframe.id.seq;
-    Agent& agent = agents_.at(keyframe.id.map.agent_id);
-    ++agent.keyframes;
-    agent.handler.Journalled(keyframe.id);
+    const auto agent = agents_.find(keyframe.id.map.agent_id);
+    if (agent != agents_.end() && agent->second.handler) {
+      ++agent->second.keyframes;
+      agent->second.handler->Journalled(keyframe.id);
+    }
     node_.bus().Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe.bytes);
   }
   unsynced_.clear();
@@ -250,10 +286,9 @@ void AgentHandlerProcess::OnAnswer(const std::string& channel, Bytes data) {
 
 void AgentHandlerProcess::SendAcks() {
   for (auto& [agent_id, agent] : agents_) {
-    if (const auto ack = agent.handler.TakeAck(now_us_)) {
-      const std::vector<uint8_t> bytes = EncodeMessage(ToMessage(*ack));
-      link_bus_.Publish(channels::LinkDown(agent_id), bytes);
-      agent.bytes_down += static_cast<int64_t>(bytes.size()) + kDatagramOverheadBytes;
+    const auto ack = agent.handler ? agent.handler->TakeAck(now_us_) : std::nullopt;
+    if (ack && agent.session.HasUplink()) {
+      SendDown(agent_id, &agent, agent.session.Seal(LinkKind::kAck, Encode(*ack)));
     }
   }
 }
@@ -291,7 +326,7 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
   AnswerResendRequests();
   const bool busy = journal_->HasUnsynced() || resend_queue_.waiting() > 0 ||
                     std::any_of(agents_.begin(), agents_.end(), [](const auto& item) {
-                      return item.second.handler.receiver().pending() > 0;
+                      return item.second.handler && item.second.handler->receiver().pending() > 0;
                     });
   return busy ? kBusy_ms : kIdle_ms;
 }
@@ -329,17 +364,32 @@ void AgentHandlerProcess::AskForOwed(int64_t now_utime) {
   }
 }
 
+void AgentHandlerProcess::LookForKeys() {
+  try {
+    if (key_folder_.Changed()) {
+      ReadKeys();
+    }
+  } catch (const std::exception& error) {
+    node_.Refuse(error.what());  // the keys stay as they were
+  }
+}
+
 void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
-  int64_t pending = 0, given_up = 0, keyframes = 0;
+  int64_t pending = 0, given_up = 0, keyframes = 0, connected = 0;
   for (const auto& [agent_id, agent] : agents_) {
-    pending += static_cast<int64_t>(agent.handler.receiver().pending());
-    given_up += agent.handler.receiver().given_up();
+    if (!agent.handler) {
+      continue;
+    }
+    ++connected;
+    pending += static_cast<int64_t>(agent.handler->receiver().pending());
+    given_up += agent.handler->receiver().given_up();
     keyframes += agent.keyframes;
     node_.Set(fmt::format("keyframes_{}", agent_id), agent.keyframes);
     node_.Set(fmt::format("bytes_up_{}", agent_id), agent.bytes_up);
     node_.Set(fmt::format("bytes_down_{}", agent_id), agent.bytes_down);
   }
-  node_.Set("agents", static_cast<int64_t>(agents_.size()));
+  node_.Set("agents", connected);
+  node_.Set("agents_with_key", static_cast<int64_t>(agents_.size()));
   node_.Set("keyframes", keyframes);
   node_.Set("keyframes_given_up", given_up);
   node_.Set("journal_bytes", journal_->size());
@@ -349,14 +399,15 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   node_.Set("verdicts_missing", index_.num_missing_verdicts());
   node_.PublishStatus(
       now_utime, pending,
-      fmt::format("{} agents, {} keyframes in the journal{}", agents_.size(),
-                  index_.num_keyframes(), disk_refuses_ ? "; THE DISK REFUSES WRITES" : ""));
+      fmt::format("{} agents, {} keyframes in the journal{}", connected, index_.num_keyframes(),
+                  disk_refuses_ ? "; THE DISK REFUSES WRITES" : ""));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
   if (now_utime >= next_have_utime_) {
     next_have_utime_ = now_utime + kSecond_us;
+    LookForKeys();
     PublishHave();
     AskForOwed(now_utime);
   }

@@ -4,11 +4,14 @@
 //   link bus:   LINK_UP_* in; LINK_DOWN_k out
 //   server bus: KEYFRAME_k, POSE_k, HAVE, AGAIN_*, RESEND_REQUEST, STATUS_agent_handler out;
 //               PLACE_MATCH, CONSTRAINT, CORRECTION_k, RESEND_REQUEST, AGAIN_agent_handler in
-// Keyframes are acknowledged and published once the journal's disk has them.
+// Keyframes are acknowledged and published once the journal's disk has them. What does not open
+// under the key of the agent it claims to be from is dropped and counted; it costs one attempt to
+// open it, and leaves nothing behind.
 
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +20,7 @@
 #include "agent_handler/owed_questions.h"
 #include "agent_handler/resend_queue.h"
 #include "common/bus/node.h"
+#include "common/link/agent_key.h"
 #include "common/link/pacer.h"
 #include "common/link/poll_loop.h"
 
@@ -31,10 +35,11 @@ struct AgentHandlerOptions {
 
 class AgentHandlerProcess : public PolledProcess {
  public:
-  static constexpr size_t kMaxAgents = 64;
+  static constexpr size_t kMaxAgents = 64;  // beyond it, keys are refused
 
-  // `run`: wall clock now, microseconds. Throws if the journal cannot be used.
-  AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path, int64_t run,
+  // `now_utime`: wall clock. Throws if the journal or a key cannot be used.
+  AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path,
+                      const std::string& key_folder, int64_t now_utime,
                       const AgentHandlerOptions& options);
 
   int Poll(int64_t steady_us) override;
@@ -42,8 +47,8 @@ class AgentHandlerProcess : public PolledProcess {
 
  private:
   struct Agent {
-    explicit Agent(AgentHandler h) : handler(std::move(h)) {}
-    AgentHandler handler;
+    HandlerSession session;
+    std::optional<AgentHandler> handler;  // since its first session
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;
     int64_t keyframes = 0;
@@ -57,7 +62,10 @@ class AgentHandlerProcess : public PolledProcess {
 
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   void OnLinkUp(const std::string& channel, Bytes data);
-  Agent* FindOrCreate(const LinkPacket& packet);
+  void SendDown(int32_t agent_id, Agent* agent, Bytes packet);
+  void ReadKeys();
+  void LookForKeys();
+  AgentHandler MakeHandler(int32_t agent_id) const;
   void OnCorrection(const Correction& correction);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
   template <typename Message>
@@ -73,12 +81,12 @@ class AgentHandlerProcess : public PolledProcess {
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;
-  const int64_t run_;
+  KeyFolder key_folder_;
   const AgentHandlerOptions options_;
   Node node_;
   JournalIndex index_;
   std::unique_ptr<Journal> journal_;
-  std::map<int32_t, Agent> agents_;
+  std::map<int32_t, Agent> agents_;  // those with a key
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;
   std::map<MapId, int32_t> have_;  // highest seq on the disk

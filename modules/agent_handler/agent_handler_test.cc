@@ -7,6 +7,7 @@
 #include "agent_handler/owed_questions.h"
 #include "agent_handler/resend_queue.h"
 #include "agent_handler/test_keyframes.h"
+#include "common/link/compression.h"
 
 namespace pangea {
 namespace {
@@ -14,37 +15,27 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 const MapId kMap{1, 1000};
 
-LinkPacket HelloPacket(int64_t run, const std::vector<LinkMap>& maps, int64_t number = 1) {
-  LinkPacket packet;
-  packet.agent_id = 1;
-  packet.run = run;
-  packet.number = number;
-  packet.data = EncodeMessage(ToMessage(LinkHello{"test", maps}));
-  return packet;
+LinkPacket HelloPacket(const std::vector<LinkMap>& maps, int64_t number = 1) {
+  return {LinkKind::kHello, number, Encode(LinkHello{"test", maps})};
 }
 
-LinkPacket WholeKeyframe(int64_t run, const KeyframeId& id, std::vector<uint8_t> bytes) {
-  LinkPacket packet;
-  packet.agent_id = 1;
-  packet.run = run;
-  packet.number = 2;
-  packet.kind = LinkPacket::Kind::kKeyframe;
-  packet.keyframe = id;
-  packet.total_bytes = static_cast<int>(bytes.size());
-  packet.crc32 = Crc32(bytes);
-  packet.data = std::move(bytes);
-  return packet;
+LinkPacket WholeKeyframe(int seq, const std::vector<uint8_t>& compressed) {
+  return {LinkKind::kLastPiece, 2,
+          Encode(LinkPiece{0, static_cast<uint8_t>(seq), 0, true, compressed})};
 }
 
 class AgentHandlerTest : public testing::Test {
  protected:
-  AgentHandler handler{1, 77, {}};
+  AgentHandlerTest() {
+    handler.OnNewUplink();
+    handler.OnPacket(HelloPacket({{kMap, 0, 0}}));
+  }
+  AgentHandler handler{1, {}};
 };
 
 TEST_F(AgentHandlerTest, AcknowledgesOnlyWhatIsOnTheDisk) {
-  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
   const auto bytes = EncodeTestKeyframe({kMap, 0});
-  EXPECT_EQ(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, bytes), kSecond), "");
+  EXPECT_EQ(handler.OnPacket(WholeKeyframe(0, Compress(bytes))), "");
   const auto ready = handler.TakeReady();
   ASSERT_EQ(ready.size(), 1u);
   EXPECT_EQ(ready[0].bytes, bytes);
@@ -61,28 +52,54 @@ TEST_F(AgentHandlerTest, AcknowledgesOnlyWhatIsOnTheDisk) {
 }
 
 TEST_F(AgentHandlerTest, RefusesWhatDoesNotParse) {
-  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
   keyframe_t absurd = ToMessage(TestKeyframe({kMap, 0}));
   absurd.T_odom_body.translation.x = 1e12;
-  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, EncodeMessage(absurd)), kSecond), "");
-  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, {1, 2, 3}), kSecond), "");
-  EXPECT_NE(handler.OnPacket(WholeKeyframe(5, {kMap, 0}, EncodeTestKeyframe({kMap, 1})), kSecond),
-            "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(EncodeMessage(absurd)))), "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(std::vector<uint8_t>{1, 2, 3}))), "");
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(0, {1, 2, 3})), "") << "not even compressed";
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(EncodeTestKeyframe({kMap, 1})))), "");
+  // A few kilobytes that would become 64 MB.
+  EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(std::vector<uint8_t>(1 << 26)))), "");
+  EXPECT_NE(handler.OnPacket({LinkKind{77}, 3, {}}), "");
   EXPECT_TRUE(handler.TakeReady().empty());
   EXPECT_EQ(handler.receiver().cached_bytes(), 0);
 }
 
-TEST_F(AgentHandlerTest, AnotherRunNeedsAHelloAndALaterOrSilentClock) {
-  EXPECT_EQ(handler.OnPacket(HelloPacket(5, {}), kSecond), "");
-  EXPECT_NE(handler.OnPacket(WholeKeyframe(6, {kMap, 0}, {1}), kSecond), "");
-  EXPECT_NE(handler.OnPacket(HelloPacket(4, {}), kSecond), "");
-  EXPECT_EQ(handler.OnPacket(HelloPacket(6, {}), kSecond), "");
-  EXPECT_EQ(handler.OnPacket(HelloPacket(4, {}), 10 * kSecond), "");
-  EXPECT_NE(handler.OnPacket(HelloPacket(7, {{{2, 1}, 0, 0}}), 10 * kSecond), "");
+TEST_F(AgentHandlerTest, AnotherUplinkAnnouncesItsMapsAnew) {
+  const auto keyframe = WholeKeyframe(0, Compress(EncodeTestKeyframe({kMap, 0})));
+  handler.OnNewUplink();
+  EXPECT_NE(handler.OnPacket(keyframe), "");
+  handler.OnPacket(HelloPacket({{kMap, 0, 0, 7}}));
+  EXPECT_NE(handler.OnPacket(keyframe), "") << "the map has another slot now";
+  handler.OnPacket(HelloPacket({{kMap, 0, 0, 0}}));
+  EXPECT_EQ(handler.OnPacket(keyframe), "");
+}
+
+// Poses are not answered one by one.
+TEST_F(AgentHandlerTest, AcknowledgesHellosAndPieces) {
+  ASSERT_TRUE(handler.TakeAck(kSecond));
+  pose_t pose{};
+  pose.state = pose_t::STATE_TRACKING;
+  pose.map = ToMessage(kMap);
+  pose.T_odom_body = pose.T_map_body = ToMessage(Rigid3());
+  EXPECT_EQ(handler.OnPacket({LinkKind::kPose, 3, EncodePose(pose)}), "");
+  EXPECT_TRUE(handler.TakePose());
+  EXPECT_FALSE(handler.TakePose());
+  EXPECT_FALSE(handler.TakeAck(2 * kSecond));
+  handler.OnPacket(HelloPacket({{kMap, 0, 0}}, 4));
+  EXPECT_EQ(handler.TakeAck(3 * kSecond).value().highest_number, 4);
+}
+
+// What only the journal knows is told in answer to a hello, not each time.
+TEST_F(AgentHandlerTest, OldMapsAreToldInAnswerToAHello) {
+  const MapId old{1, 500};
+  handler.Resume(old, 9);
+  EXPECT_EQ(handler.TakeAck(kSecond).value().journalled_seq.at(old), 9);
+  handler.OnPacket(WholeKeyframe(0, Compress(EncodeTestKeyframe({kMap, 0}))));
+  EXPECT_FALSE(handler.TakeAck(2 * kSecond).value().journalled_seq.contains(old));
 }
 
 TEST_F(AgentHandlerTest, TellsTheHighestCorrectionUntilItIsConfirmed) {
-  handler.OnPacket(HelloPacket(5, {{kMap, 0, 0}}), kSecond);
   Correction correction;
   correction.map = kMap;
   for (const int revision : {3, 7, 5}) {
@@ -95,7 +112,7 @@ TEST_F(AgentHandlerTest, TellsTheHighestCorrectionUntilItIsConfirmed) {
     ASSERT_EQ(ack->corrections.size(), 1u);
     EXPECT_EQ(ack->corrections[0].revision, 7);
   }
-  handler.OnPacket(HelloPacket(5, {{kMap, 0, 7}}, 9), 6 * kSecond);
+  handler.OnPacket(HelloPacket({{kMap, 0, 7}}, 9));
   EXPECT_TRUE(handler.TakeAck(7 * kSecond)->corrections.empty());
   EXPECT_FALSE(handler.TakeAck(8 * kSecond));
 }

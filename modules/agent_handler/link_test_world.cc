@@ -7,6 +7,7 @@
 
 #include "agent_handler/test_keyframes.h"
 #include "common/channels.h"
+#include "common/link/agent_key.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 
@@ -33,8 +34,11 @@ void SwitchedBus::Subscribe(const std::string& channel_regex, Handler handler) {
 }
 
 void LinkWorld::SetUp() {
-  journal_path = testing::TempDir() + "pangea_link_" + std::to_string(getpid()) + ".lcm";
-  std::filesystem::remove(journal_path);
+  folder = testing::TempDir() + "pangea_link_" + std::to_string(getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder / "keys");
+  MakeKeyFile(KeyFile(1), 1);
+  journal_path = folder / "journal.lcm";
   // The odometry keeps its keyframes and answers requests.
   agent_bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
     resend_request_t request{};
@@ -62,14 +66,14 @@ void LinkWorld::SetUp() {
 
 void LinkWorld::TearDown() {
   handler.reset();
-  std::filesystem::remove(journal_path);
+  std::filesystem::remove_all(folder);
 }
 
 void LinkWorld::StartUplink() {
   uplink_agent_side = std::make_unique<SwitchedBus>(agent_bus);
   uplink_link_side = std::make_unique<SwitchedBus>(link_bus);
-  uplink =
-      std::make_unique<UplinkProcess>(*uplink_agent_side, *uplink_link_side, 1, ++run, options);
+  uplink = std::make_unique<UplinkProcess>(*uplink_agent_side, *uplink_link_side, 1,
+                                           ReadKeyFileOf(KeyFile(1), 1), options);
 }
 
 void LinkWorld::KillUplink() {
@@ -83,8 +87,9 @@ void LinkWorld::KillUplink() {
 void LinkWorld::StartHandler() {
   handler_link_side = std::make_unique<SwitchedBus>(link_bus);
   handler_server_side = std::make_unique<SwitchedBus>(server_bus);
-  handler = std::make_unique<AgentHandlerProcess>(*handler_link_side, *handler_server_side,
-                                                  journal_path, ++run, AgentHandlerOptions{});
+  handler =
+      std::make_unique<AgentHandlerProcess>(*handler_link_side, *handler_server_side, journal_path,
+                                            folder / "keys", kWall + now, AgentHandlerOptions{});
 }
 
 void LinkWorld::KillHandler() {

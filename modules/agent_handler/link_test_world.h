@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <memory>
 #include <random>
 #include <string>
@@ -50,6 +51,9 @@ class LinkWorld : public testing::Test {
   void SetUp() override;
   void TearDown() override;
 
+  std::filesystem::path KeyFile(int32_t agent_id) const {
+    return folder / "keys" / KeyFileName(agent_id);
+  }
   void StartUplink();
   void KillUplink();
   void StartHandler();
@@ -63,6 +67,7 @@ class LinkWorld : public testing::Test {
   LocalBus agent_bus, server_bus;
   LossyBus link_bus;
   UplinkOptions options;
+  std::filesystem::path folder;  // journal and keys
   std::string journal_path;
   std::vector<std::unique_ptr<SwitchedBus>> dead_buses;
   std::vector<std::unique_ptr<UplinkProcess>> dead_uplinks;
@@ -72,7 +77,6 @@ class LinkWorld : public testing::Test {
   std::unique_ptr<AgentHandlerProcess> handler;
   std::vector<std::vector<uint8_t>> delivered;
   int64_t now = kSecond;
-  int64_t run = 100;
   int32_t published = 0;
   int32_t oldest_kept = 0;
   int32_t acknowledged = -1;

@@ -16,6 +16,7 @@
 #include "agent_handler/test_keyframes.h"
 #include "common/bus/process.h"
 #include "common/channels.h"
+#include "common/link/agent_key.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -108,17 +109,23 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   const std::string agent_urls[] = {RandomUrl(device), RandomUrl(device)};
   const std::string journal = testing::TempDir() + fmt::format("pangea_system_{}.lcm", getpid());
   std::filesystem::remove(journal);
+  const std::filesystem::path keys = testing::TempDir() + fmt::format("pangea_system_{}", getpid());
+  std::filesystem::create_directories(keys);
+  for (const int agent_id : {1, 2}) {
+    MakeKeyFile(keys / KeyFileName(agent_id), agent_id);
+  }
   const std::string bin = std::string(PANGEA_BINARY_DIR) + "/bin/";
 
   const auto start_handler = [&] {
-    return std::make_unique<Program>(std::vector<std::string>{
-        bin + "pangea-agent-handler", "--link", link, "--server", server, "--journal", journal});
+    return std::make_unique<Program>(
+        std::vector<std::string>{bin + "pangea-agent-handler", "--link", link, "--server", server,
+                                 "--journal", journal, "--keys", keys.string()});
   };
   auto handler = start_handler();
   const auto start_uplink = [&](int i) {
-    return std::make_unique<Program>(std::vector<std::string>{bin + "pangea-uplink", "--agent",
-                                                              std::to_string(i + 1), "--bus",
-                                                              agent_urls[i], "--link", link});
+    return std::make_unique<Program>(std::vector<std::string>{
+        bin + "pangea-uplink", "--agent", std::to_string(i + 1), "--key",
+        (keys / KeyFileName(i + 1)).string(), "--bus", agent_urls[i], "--link", link});
   };
   std::vector<std::unique_ptr<Program>> uplinks;
   std::vector<std::unique_ptr<Agent>> agents;
@@ -180,6 +187,7 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   // What was journalled but not yet published when the handler was killed is served, not seen.
   EXPECT_GE(seen.size(), 2u * kKeyframes - 32);
   std::filesystem::remove(journal);
+  std::filesystem::remove_all(keys);
 }
 
 }  // namespace

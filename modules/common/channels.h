@@ -4,10 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace pangea::channels {
 
@@ -32,6 +34,16 @@ inline std::string Keyframe(int32_t agent_id) { return fmt::format("KEYFRAME_{}"
 inline std::string Correction(int32_t agent_id) { return fmt::format("CORRECTION_{}", agent_id); }
 inline std::string LinkUp(int32_t agent_id) { return fmt::format("LINK_UP_{}", agent_id); }
 inline std::string LinkDown(int32_t agent_id) { return fmt::format("LINK_DOWN_{}", agent_id); }
+// Whose LINK_UP_k it is.
+inline std::optional<int32_t> LinkUpAgent(std::string_view channel) {
+  constexpr std::string_view kPrefix = "LINK_UP_";
+  int32_t agent_id = 0;
+  const char* const end = channel.data() + channel.size();
+  const bool named = channel.starts_with(kPrefix);
+  const auto read = named ? std::from_chars(channel.data() + kPrefix.size(), end, agent_id)
+                          : std::from_chars_result{nullptr, std::errc::invalid_argument};
+  return read.ec == std::errc() && read.ptr == end ? std::optional(agent_id) : std::nullopt;
+}
 inline std::string Status(std::string_view process) { return fmt::format("STATUS_{}", process); }
 inline std::string Again(std::string_view process) { return fmt::format("AGAIN_{}", process); }
 

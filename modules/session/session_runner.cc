@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "common/bus/process.h"
+#include "common/link/agent_key.h"
 #include "link_emulator/link_conditions_yaml.h"
 #include "session/buses.h"
 #include "session/child_process.h"
@@ -69,6 +70,7 @@ class Runner {
     // The processes are one-threaded by design; BLAS must not start threads behind their back.
     setenv("OMP_NUM_THREADS", "1", 1);
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
+    MakeKeys();
     StartServer();
     StartLinks();
     Play();
@@ -108,6 +110,17 @@ class Runner {
     kept_.push_back({std::move(argv), std::move(child)});
   }
 
+  fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
+
+  // Only this session's processes know them.
+  void MakeKeys() {
+    fs::remove_all(options_.out / "keys");
+    fs::create_directories(options_.out / "keys");
+    for (const Player& player : players_) {
+      MakeKeyFile(KeyFile(player.script.id), player.script.id);
+    }
+  }
+
   // lcm-logger refuses an existing file, and a restarted one must go on in it: append.
   void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
     const auto logger = FindOnPath("lcm-logger");
@@ -120,7 +133,8 @@ class Runner {
   void StartServer() {
     KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
     Keep("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link, "--server",
-                           buses_.server, "--journal", (options_.out / "journal.lcm").string()});
+                           buses_.server, "--journal", (options_.out / "journal.lcm").string(),
+                           "--keys", (options_.out / "keys").string()});
     for (const auto& [name, program] :
          {std::pair{"place_recognition", "pangea-place-recognition"},
           std::pair{"inter_map_ba", "pangea-inter-map-ba"}, std::pair{"fusion", "pangea-fusion"},
@@ -150,8 +164,9 @@ class Runner {
       if (player.script.link) {
         StartLinkEmulator(id, *player.script.link);
       }
-      Keep(fmt::format("uplink_{}", id), {Program("pangea-uplink"), "--agent", std::to_string(id),
-                                          "--bus", bus, "--link", buses_.LinkOf(id)});
+      Keep(fmt::format("uplink_{}", id),
+           {Program("pangea-uplink"), "--agent", std::to_string(id), "--key", KeyFile(id).string(),
+            "--bus", bus, "--link", buses_.LinkOf(id)});
     }
   }
 

@@ -5,19 +5,22 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "common/link/agent_key.h"
 #include "uplink/uplink_process.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Carries one agent's keyframes to the server, and its corrections back",
                "pangea-uplink");
   int32_t agent_id = 0;
+  std::string key;
   std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
   std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
   pangea::UplinkOptions options;
   app.add_option("--agent", agent_id, "agent id")->required()->check(CLI::Range(1, 65535));
+  app.add_option("--key", key, "the agent's key file (pangea-agent-handler keygen)")->required();
   app.add_option("--bus", bus, "LCM URL of the agent's bus")->capture_default_str();
   app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
-  app.add_option("--packet-bytes", options.sender.payload_bytes, "data bytes per packet")
+  app.add_option("--packet-bytes", options.sender.payload_bytes, "keyframe bytes per packet")
       ->capture_default_str();
   app.add_option("--rate", options.sender.rate_bytes_per_s, "bytes per second at most")
       ->capture_default_str();
@@ -31,7 +34,8 @@ int main(int argc, char** argv) {
     }
     pangea::LcmBus agent_bus(bus);
     pangea::LcmBus link_bus(link);
-    pangea::UplinkProcess process(agent_bus, link_bus, agent_id, pangea::WallUtime(), options);
+    pangea::UplinkProcess process(agent_bus, link_bus, agent_id,
+                                  pangea::ReadKeyFileOf(key, agent_id), options);
     return pangea::RunPolledProcess(agent_bus, link_bus, process);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-uplink: {}\n", error.what());

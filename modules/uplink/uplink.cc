@@ -1,6 +1,7 @@
 #include "uplink/uplink.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace pangea {
 namespace {
@@ -17,22 +18,22 @@ constexpr int32_t kMaxAsked = 50;
 // A gap the odometry has not filled after so many asks is lost for good.
 constexpr int kMaxUnanswered = 30;
 // An agent opens a map each time its odometry starts anew; the oldest that are done are
-// forgotten.
+// forgotten. Fewer than there are slots.
 constexpr size_t kMaxMaps = 200;
 
 }  // namespace
 
-Uplink::Uplink(int32_t agent_id, int64_t run, std::string software, const UplinkOptions& options)
+Uplink::Uplink(int32_t agent_id, std::string software, const UplinkOptions& options)
     : agent_id_(agent_id),
-      run_(run),
       software_(std::move(software)),
       options_(options),
-      sender_(agent_id, run, options.sender) {}
+      sender_(options.sender) {}
 
 Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);
   if (added) {
     hello_due_ = true;
+    it->second.slot = next_slot_++;
     for (auto old = maps_.begin(); maps_.size() > kMaxMaps && old != maps_.end();) {
       const bool done = old != it && !sender_.FirstSeqFrom(old->first, 0);
       if (done) {
@@ -69,22 +70,20 @@ void Uplink::SetNext(const MapId& id, Map* map, int32_t next) {
   }
 }
 
-std::string Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
-  if (ack.agent_id != agent_id_) {
-    return "acknowledgement for another agent";
+void Uplink::OnNewSession() {
+  newest_ack_ = 0;
+  last_ack_us_.reset();
+  hello_due_ = true;
+  for (auto& [id, map] : maps_) {
+    map.listed = false;
   }
-  if (ack.run != handler_run_ && ack.run < handler_run_ && Connected(now_us)) {
-    return "acknowledgement of an earlier handler";
+}
+
+void Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
+  if (ack.number <= newest_ack_) {
+    return;  // overtaken
   }
-  if (ack.run == handler_run_ && ack.number <= newest_ack_) {
-    return "";  // overtaken
-  }
-  NoteHandler(ack.run);
   newest_ack_ = ack.number;
-  if (ack.uplink_run != run_) {
-    hello_due_ = true;  // it answers the uplink before this one
-    return "";
-  }
   last_ack_us_ = now_us;
   const size_t spooled = sender_.spooled();
   sender_.OnAck(ack, now_us);
@@ -102,30 +101,18 @@ std::string Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
     }
     hello_due_ = true;  // confirms it
   }
-  return "";
-}
-
-// A new handler may have another journal: what it has, it says anew, and it may be less.
-void Uplink::NoteHandler(int64_t run) {
-  if (run == handler_run_) {
-    return;
-  }
-  handler_run_ = run;
-  hello_due_ = true;
-  for (auto& [id, map] : maps_) {
-    map.listed = false;
-  }
 }
 
 bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-LinkPacket Uplink::Hello(int64_t now_us) {
+std::vector<uint8_t> Uplink::Hello() const {
   LinkHello hello;
   hello.software = software_;
   const auto announce = [&](const MapId& id, const Map& map) {
-    hello.maps.push_back({id, map.given_up, map.correction ? map.correction->revision : 0});
+    hello.maps.push_back(
+        {id, map.given_up, map.correction ? map.correction->revision : 0, map.slot});
   };
   for (const auto& [id, map] : maps_) {
     if (hello.maps.size() < kMaxLinkMaps - 1 && sender_.FirstSeqFrom(id, 0)) {
@@ -135,7 +122,7 @@ LinkPacket Uplink::Hello(int64_t now_us) {
   if (!maps_.empty() && (hello.maps.empty() || hello.maps.back().map != maps_.rbegin()->first)) {
     announce(maps_.rbegin()->first, maps_.rbegin()->second);
   }
-  return sender_.Wrap(LinkPacket::Kind::kHello, EncodeMessage(ToMessage(hello)), now_us);
+  return Encode(hello);
 }
 
 bool Uplink::HelloIsUrgent(int64_t now_us) const {
@@ -150,7 +137,7 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   std::vector<LinkPacket> packets;
   const int64_t since_hello = last_hello_us_ ? now_us - *last_hello_us_ : kHelloInterval_us;
   if (since_hello >= (HelloIsUrgent(now_us) ? kHelloUrgent_us : kHelloInterval_us)) {
-    packets.push_back(Hello(now_us));
+    packets.push_back({LinkKind::kHello, sender_.NextNumber(now_us), Hello()});
     last_hello_us_ = now_us;
     hello_due_ = false;
   }
@@ -160,12 +147,13 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   const auto pose_interval_us =
       options_.pose_hz > 0 ? static_cast<int64_t>(1e6 / options_.pose_hz) : 0;
   if (!pose_.empty() && pose_interval_us > 0 && now_us - last_pose_us_ >= pose_interval_us) {
-    packets.push_back(sender_.Wrap(LinkPacket::Kind::kPose, std::move(pose_), now_us));
-    pose_.clear();
+    packets.push_back({LinkKind::kPose, sender_.NextNumber(now_us), std::exchange(pose_, {})});
     last_pose_us_ = now_us;
   }
-  for (LinkPacket& packet : sender_.Poll(now_us)) {
-    packets.push_back(std::move(packet));
+  for (Sender::Sent& sent : sender_.Poll(now_us)) {
+    sent.piece.slot = maps_.at(sent.keyframe.map).slot;
+    packets.push_back({sent.piece.last ? LinkKind::kLastPiece : LinkKind::kPiece, sent.number,
+                       Encode(sent.piece)});
   }
   return packets;
 }
@@ -198,7 +186,7 @@ bool Uplink::GiveUp(const MapId& id, Map* map, const SeqGap& gap) {
 
 std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
   std::vector<Ask> asks;
-  const bool full = sender_.spooled_bytes() + kMaxKeyframeBytes > options_.sender.max_spool_bytes;
+  const bool full = sender_.spooled_bytes() + kMaxCompressedBytes > options_.sender.max_spool_bytes;
   for (auto& [id, map] : maps_) {
     const bool newest = id == maps_.rbegin()->first;
     if (full || now_us - map.asked_us < kAskInterval_us) {

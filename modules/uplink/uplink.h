@@ -24,17 +24,19 @@ struct UplinkOptions {
 
 class Uplink {
  public:
-  // `run`: wall clock at the start, microseconds. `software`: for people.
-  Uplink(int32_t agent_id, int64_t run, std::string software, const UplinkOptions& options);
+  // `software`: for people.
+  Uplink(int32_t agent_id, std::string software, const UplinkOptions& options);
 
   enum class Taken { kNew, kRepeat, kSpoolFull };
-  // An encoded keyframe_t that has passed Parse.
+  // A keyframe_t that has passed Parse, encoded and compressed.
   Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);
-  // An encoded pose_t; its map, and the revision of the correction it had applied.
+  // A pose in EncodePose's form; its map, and the revision of the correction it had applied.
   void AddPose(const MapId& map, int64_t group_revision, std::vector<uint8_t> bytes);
-  // Why it was ignored, or an empty string.
-  std::string OnAck(const LinkAck& ack, int64_t now_us);
+  // Perhaps with a handler that has another journal: what it has, it says anew, and it may be less.
+  void OnNewSession();
+  void OnAck(const LinkAck& ack, int64_t now_us);
 
+  // Only hellos until the session's first acknowledgement.
   std::vector<LinkPacket> Poll(int64_t now_us);
   struct Ask {
     SeqGap gap;
@@ -59,6 +61,7 @@ class Uplink {
     int32_t given_up = 0;  // those before are lost for good, unless they are journalled
     int32_t highest = -1;  // the highest the agent is known to have published
     bool listed = false;   // the handler knows the map
+    uint8_t slot = 0;      // in hellos and pieces
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
@@ -71,18 +74,16 @@ class Uplink {
   Map& FindOrAdd(const MapId& id);
   void SetNext(const MapId& id, Map* map, int32_t next);
   std::optional<SeqGap> Missing(const MapId& id, const Map& map) const;
-  void NoteHandler(int64_t run);
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
-  LinkPacket Hello(int64_t now_us);
+  std::vector<uint8_t> Hello() const;
 
   const int32_t agent_id_;
-  const int64_t run_;
   const std::string software_;
   const UplinkOptions options_;
   Sender sender_;
   std::map<MapId, Map> maps_;
-  int64_t handler_run_ = 0;
+  uint8_t next_slot_ = 0;
   int64_t newest_ack_ = 0;
   std::optional<int64_t> last_ack_us_;
   std::optional<int64_t> last_hello_us_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/channels.h"
+#include "common/link/compression.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -19,12 +20,13 @@ constexpr int kIdle_ms = 20;
 
 }  // namespace
 
-UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, int64_t run,
+UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
                              const UplinkOptions& options)
     : agent_id_(agent_id),
       link_bus_(link_bus),
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
-      uplink_(agent_id, run, kSoftware, options) {
+      session_(agent_id, key),
+      uplink_(agent_id, kSoftware, options) {
   agent_bus.Subscribe(channels::Keyframe(agent_id),
                       [this](const std::string&, Bytes data) { OnKeyframe(data); });
   agent_bus.Subscribe(channels::Pose(agent_id),
@@ -52,8 +54,11 @@ void UplinkProcess::OnKeyframe(Bytes data) {
   if (keyframe.value->id.map.agent_id != agent_id_) {
     return node_.Refuse("another agent's keyframe");
   }
-  switch (uplink_.AddKeyframe(keyframe.value->id, {data.begin(), data.end()}, now_us_)) {
+  std::vector<uint8_t> compressed = Compress(data);
+  const auto compressed_bytes = static_cast<int64_t>(compressed.size());
+  switch (uplink_.AddKeyframe(keyframe.value->id, std::move(compressed), now_us_)) {
     case Uplink::Taken::kNew:
+      node_.Count("keyframe_bytes", compressed_bytes);
       return node_.Count("keyframes");
     case Uplink::Taken::kRepeat:
       return node_.Count("keyframes_repeated");
@@ -64,38 +69,55 @@ void UplinkProcess::OnKeyframe(Bytes data) {
 
 void UplinkProcess::OnPose(Bytes data) {
   pose_t message{};
-  const bool decoded =
-      data.size() <= static_cast<size_t>(kMaxPayloadBytes) && DecodeMessage(data, &message);
-  if (!decoded) {
-    return node_.Refuse("pose_t does not decode, or is too large");
+  if (!DecodeMessage(data, &message)) {
+    return node_.Refuse("pose_t does not decode");
   }
   const auto map = Parse(message.map);
   // While it initialises there is no map yet.
   if (map.value && map.value->agent_id == agent_id_) {
-    uplink_.AddPose(*map.value, message.group_revision, {data.begin(), data.end()});
+    uplink_.AddPose(*map.value, message.group_revision, EncodePose(message));
   }
 }
 
 void UplinkProcess::OnLinkDown(Bytes data) {
-  node_.Count("bytes_down", static_cast<int64_t>(data.size()) + kDatagramOverheadBytes);
-  link_ack_t message{};
-  if (!DecodeMessage(data, &message)) {
-    return node_.Refuse("link_ack_t does not decode");
+  const UplinkSession::Opened opened = session_.Open(data);
+  if (!opened.refused.empty()) {
+    return node_.Refuse(opened.refused);
   }
-  const auto ack = Parse(message);
-  const std::string reason = ack.value ? uplink_.OnAck(*ack.value, now_us_) : ack.refused;
-  if (!reason.empty()) {
-    node_.Refuse(reason);
+  node_.Count("bytes_down", BytesOnTheWire(channels::LinkDown(agent_id_), data));
+  if (opened.new_session) {
+    uplink_.OnNewSession();
   }
+  if (!opened.packet) {
+    return;
+  }
+  if (opened.packet->kind != LinkKind::kAck) {
+    return node_.Refuse("packet of an unknown kind");
+  }
+  const auto ack = ParseAck(agent_id_, *opened.packet);
+  if (!ack.value) {
+    return node_.Refuse(ack.refused);
+  }
+  uplink_.OnAck(*ack.value, now_us_);
+}
+
+void UplinkProcess::Send(const LinkPacket& packet) {
+  const std::string channel = channels::LinkUp(agent_id_);
+  const std::vector<uint8_t> bytes = session_.Seal(packet);
+  link_bus_.Publish(channel, bytes);
+  const int on_the_wire = BytesOnTheWire(channel, bytes);
+  node_.Count("packets_up");
+  node_.Count("bytes_up", on_the_wire);
+  node_.Count(packet.kind == LinkKind::kHello  ? "bytes_up_hellos"
+              : packet.kind == LinkKind::kPose ? "bytes_up_poses"
+                                               : "bytes_up_keyframes",
+              on_the_wire);
 }
 
 int UplinkProcess::Poll(int64_t steady_us) {
   now_us_ = steady_us;
   for (const LinkPacket& packet : uplink_.Poll(steady_us)) {
-    const std::vector<uint8_t> bytes = EncodeMessage(ToMessage(packet));
-    link_bus_.Publish(channels::LinkUp(agent_id_), bytes);
-    node_.Count("packets_up");
-    node_.Count("bytes_up", static_cast<int64_t>(bytes.size()) + kDatagramOverheadBytes);
+    Send(packet);
   }
   PublishHave();
   PublishAsks();

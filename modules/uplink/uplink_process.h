@@ -15,8 +15,7 @@ namespace pangea {
 
 class UplinkProcess : public PolledProcess {
  public:
-  // `run`: wall clock now, microseconds.
-  UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, int64_t run,
+  UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
                 const UplinkOptions& options);
 
   int Poll(int64_t steady_us) override;
@@ -26,6 +25,7 @@ class UplinkProcess : public PolledProcess {
   void OnKeyframe(Bytes data);
   void OnPose(Bytes data);
   void OnLinkDown(Bytes data);
+  void Send(const LinkPacket& packet);
   void PublishHave();
   void PublishAsks();
   void PublishCorrections();
@@ -33,6 +33,7 @@ class UplinkProcess : public PolledProcess {
   const int32_t agent_id_;
   Bus& link_bus_;
   Node node_;
+  UplinkSession session_;
   Uplink uplink_;
   int64_t now_us_ = 0;
   int64_t next_have_us_ = 0;

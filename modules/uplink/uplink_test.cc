@@ -9,22 +9,19 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 const MapId kMap{1, 1000};
 
-LinkAck Ack(int64_t run, int64_t number, int32_t journalled, const MapId& map = kMap) {
+LinkAck Ack(int64_t number, int32_t journalled, const MapId& map = kMap) {
   LinkAck ack;
-  ack.agent_id = 1;
-  ack.run = run;
   ack.number = number;
-  ack.uplink_run = 5;
   ack.cache_bytes = 210 * 1024;
   ack.journalled_seq[map] = journalled;
   return ack;
 }
 
-std::vector<int32_t> SentSeqs(const std::vector<LinkPacket>& packets) {
-  std::vector<int32_t> seqs;
+std::vector<int> SentSeqs(const std::vector<LinkPacket>& packets) {
+  std::vector<int> seqs;
   for (const LinkPacket& packet : packets) {
-    if (packet.kind == LinkPacket::Kind::kKeyframe) {
-      seqs.push_back(packet.keyframe.seq);
+    if (packet.kind == LinkKind::kLastPiece) {  // they have one piece
+      seqs.push_back(ParsePiece(packet).value->seq_low);
     }
   }
   return seqs;
@@ -32,10 +29,8 @@ std::vector<int32_t> SentSeqs(const std::vector<LinkPacket>& packets) {
 
 LinkHello HelloIn(const std::vector<LinkPacket>& packets) {
   for (const LinkPacket& packet : packets) {
-    if (packet.kind == LinkPacket::Kind::kHello) {
-      link_hello_t message{};
-      EXPECT_TRUE(DecodeMessage(packet.data, &message));
-      return *Parse(message).value;
+    if (packet.kind == LinkKind::kHello) {
+      return *ParseHello(1, packet.body).value;
     }
   }
   ADD_FAILURE() << "no hello";
@@ -47,7 +42,7 @@ class UplinkTest : public testing::Test {
   void Add(int32_t seq, int64_t now = 0) {
     uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(500), now);
   }
-  Uplink uplink{1, 5, "test", {}};
+  Uplink uplink{1, "test", {}};
 };
 
 TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {
@@ -60,7 +55,7 @@ TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {
   }
   EXPECT_GE(hellos, 9);
   EXPECT_LE(hellos, 41);
-  EXPECT_EQ(uplink.OnAck(Ack(1, 1, -1), 10 * kSecond), "");
+  uplink.OnAck(Ack(1, -1), 10 * kSecond);
   EXPECT_THAT(SentSeqs(uplink.Poll(10 * kSecond)), testing::ElementsAre(0));
 }
 
@@ -68,7 +63,7 @@ TEST_F(UplinkTest, WhatTheJournalHasIsReleased) {
   for (int seq = 0; seq < 5; ++seq) {
     Add(seq);
   }
-  uplink.OnAck(Ack(1, 1, 2), kSecond);
+  uplink.OnAck(Ack(1, 2), kSecond);
   EXPECT_EQ(uplink.Acknowledged().at(kMap), 2);
   EXPECT_EQ(uplink.sender().spooled(), 2u);
   EXPECT_EQ(uplink.keyframes_acked(), 3);
@@ -82,7 +77,7 @@ TEST_F(UplinkTest, AsksTheOdometryForWhatItMissed) {
   ASSERT_EQ(asks.size(), 1u);
   EXPECT_EQ(asks[0].gap.from_seq, 0);
   EXPECT_EQ(asks[0].gap.to_seq, 6);
-  uplink.OnAck(Ack(1, 1, 4), kSecond);
+  uplink.OnAck(Ack(1, 4), kSecond);
   EXPECT_TRUE(SentSeqs(uplink.Poll(kSecond)).empty()) << "never out of order";
   asks = uplink.Asks(2 * kSecond);
   ASSERT_EQ(asks.size(), 1u);
@@ -106,7 +101,7 @@ TEST_F(UplinkTest, GivesUpWhatNobodyHas) {
   int64_t now = 0;
   for (int i = 1; i < 60; ++i) {
     now += kSecond / 2;
-    uplink.OnAck(Ack(1, i, -1), now);
+    uplink.OnAck(Ack(i, -1), now);
     uplink.Asks(now);
   }
   EXPECT_EQ(uplink.keyframes_lost(), 3);
@@ -120,9 +115,10 @@ TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
   for (int seq = 0; seq < 3; ++seq) {
     Add(seq);
   }
-  uplink.OnAck(Ack(1, 1, 2), kSecond);
+  uplink.OnAck(Ack(1, 2), kSecond);
   EXPECT_TRUE(uplink.Idle());
-  uplink.OnAck(Ack(2, 1, -1), 2 * kSecond);
+  uplink.OnNewSession();
+  uplink.OnAck(Ack(1, -1), 2 * kSecond);
   const auto asks = uplink.Asks(3 * kSecond);
   ASSERT_EQ(asks.size(), 1u);
   EXPECT_EQ(asks[0].gap.from_seq, 0);
@@ -130,24 +126,35 @@ TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
   EXPECT_EQ(HelloIn(uplink.Poll(3 * kSecond)).maps[0].first_seq, 0);
 }
 
-TEST_F(UplinkTest, OvertakenAndForeignAcksChangeNothing) {
+TEST_F(UplinkTest, OvertakenAcksChangeNothing) {
   for (int seq = 0; seq < 3; ++seq) {
     Add(seq);
   }
-  uplink.OnAck(Ack(2, 5, 0), kSecond);
-  uplink.OnAck(Ack(2, 4, 1), kSecond);
-  EXPECT_NE(uplink.OnAck(Ack(1, 9, 2), kSecond), "");
-  LinkAck foreign = Ack(2, 6, 2);
-  foreign.agent_id = 2;
-  EXPECT_NE(uplink.OnAck(foreign, kSecond), "");
-  LinkAck to_another_run = Ack(2, 7, 2);
-  to_another_run.uplink_run = 4;
-  uplink.OnAck(to_another_run, kSecond);
+  uplink.OnAck(Ack(5, 0), kSecond);
+  uplink.OnAck(Ack(4, 1), kSecond);
   EXPECT_EQ(uplink.Acknowledged().at(kMap), 0);
 }
 
+// Pieces name their map by its slot in the hello.
+TEST_F(UplinkTest, EveryMapHasASlotOfItsOwn) {
+  const MapId later{1, 2000};
+  Add(0);
+  uplink.AddKeyframe({later, 0}, std::vector<uint8_t>(500), 0);
+  const LinkHello hello = HelloIn(uplink.Poll(0));
+  ASSERT_EQ(hello.maps.size(), 2u);
+  EXPECT_NE(hello.maps[0].slot, hello.maps[1].slot);
+  LinkAck ack = Ack(1, 0);
+  ack.journalled_seq[later] = -1;
+  uplink.OnAck(ack, kSecond);
+  for (const LinkPacket& packet : uplink.Poll(kSecond)) {
+    if (packet.kind == LinkKind::kLastPiece) {
+      EXPECT_EQ(ParsePiece(packet).value->slot, hello.maps[1].slot);
+    }
+  }
+}
+
 TEST_F(UplinkTest, TheHighestCorrectionWinsAndIsConfirmed) {
-  LinkAck ack = Ack(1, 1, -1);
+  LinkAck ack = Ack(1, -1);
   Correction correction;
   correction.map = kMap;
   correction.revision = 4;
@@ -171,9 +178,9 @@ TEST_F(UplinkTest, PosesGoUpAtTenHertz) {
   for (int i = 1; i <= 300; ++i) {
     const int64_t now = int64_t{10'000} * i;
     uplink.AddPose(kMap, 0, {1, 2, 3});
-    uplink.OnAck(Ack(1, i, -1), now);
+    uplink.OnAck(Ack(i, -1), now);
     for (const LinkPacket& packet : uplink.Poll(now)) {
-      poses += packet.kind == LinkPacket::Kind::kPose ? 1 : 0;
+      poses += packet.kind == LinkKind::kPose ? 1 : 0;
     }
   }
   EXPECT_GE(poses, 29);

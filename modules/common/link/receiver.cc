@@ -8,7 +8,7 @@ Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
 
 void Receiver::Resume(const MapId& map, int32_t journalled_seq) {
-  maps_[map] = {journalled_seq + 1, journalled_seq};
+  maps_[map] = {journalled_seq + 1, journalled_seq, false};
 }
 
 void Receiver::OnHello(const LinkHello& hello) {
@@ -20,6 +20,7 @@ void Receiver::OnHello(const LinkHello& hello) {
   });
   for (const LinkMap& announced : hello.maps) {
     Map& map = maps_[announced.map];
+    map.announced = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
       given_up_ += announced.first_seq - map.next;
       map.next = announced.first_seq;
@@ -40,17 +41,30 @@ void Receiver::OnHello(const LinkHello& hello) {
   }
 }
 
+void Receiver::OnNewUplink() {
+  for (auto& [id, map] : maps_) {
+    map.announced = false;
+  }
+  for (auto it = cache_.begin(); it != cache_.end();) {
+    const auto entry = it++;
+    if (!entry->second.taken) {
+      Erase(entry);
+    }
+  }
+}
+
 void Receiver::Erase(std::map<KeyframeId, Entry>::iterator it) {
-  cached_bytes_ -= it->second.total_bytes;
+  cached_bytes_ -= it->second.bytes;
   cache_.erase(it);
 }
 
-bool Receiver::MakeRoom(const KeyframeId& id, int bytes) {
+bool Receiver::MakeRoom(const KeyframeId& id, size_t bytes) {
   const auto full = [&] {
-    return cached_bytes_ + bytes > options_.cache_bytes || cache_.size() >= kMaxPartialKeyframes;
+    return cached_bytes_ + static_cast<int64_t>(bytes) > options_.cache_bytes ||
+           (!cache_.contains(id) && cache_.size() >= kMaxPartialKeyframes);
   };
   while (full()) {
-    if (cache_.empty() || std::prev(cache_.end())->first < id ||
+    if (cache_.empty() || !(id < std::prev(cache_.end())->first) ||
         std::prev(cache_.end())->second.taken) {
       return false;
     }
@@ -59,79 +73,77 @@ bool Receiver::MakeRoom(const KeyframeId& id, int bytes) {
   return true;
 }
 
-Receiver::Entry* Receiver::FindOrStart(const LinkPacket& packet) {
-  auto it = cache_.find(packet.keyframe);
-  if (it != cache_.end()) {
-    Entry& entry = it->second;
-    if (entry.taken || (entry.crc32 == packet.crc32 && entry.count == packet.count &&
-                        entry.total_bytes == packet.total_bytes)) {
-      return &entry;
-    }
-    // Another cut or content of the same keyframe: the newer one counts, or a forged packet could
-    // block the true ones for ever.
-    Erase(it);
+std::string Receiver::Add(const MapId& map_id, const LinkPiece& piece) {
+  const auto map = maps_.find(map_id);
+  if (map == maps_.end() || !map->second.announced) {
+    return "piece of a map that was not announced";
   }
-  if (!MakeRoom(packet.keyframe, packet.total_bytes)) {
-    return nullptr;
-  }
-  Entry& entry = cache_[packet.keyframe];
-  entry.bytes.resize(static_cast<size_t>(packet.total_bytes));
-  entry.received.resize(static_cast<size_t>(packet.count + 7) / 8);
-  entry.crc32 = packet.crc32;
-  entry.count = entry.missing = packet.count;
-  entry.total_bytes = packet.total_bytes;
-  cached_bytes_ += packet.total_bytes;
-  return &entry;
-}
-
-std::string Receiver::Add(const LinkPacket& packet) {
-  const KeyframeId& id = packet.keyframe;
-  const auto map = maps_.find(id.map);
-  if (map == maps_.end()) {
-    return "packet of a map that was not announced";
-  }
-  if (id.seq < map->second.next) {
+  // The seq with this low byte that is nearest to the next one.
+  const int32_t next = map->second.next;
+  const KeyframeId id{map_id,
+                      next + static_cast<int8_t>(piece.seq_low - static_cast<uint8_t>(next))};
+  if (id.seq < next) {
     return "";  // a repeat of what is handed over already
   }
-  if (id.seq >= map->second.next + kMaxPartialKeyframes) {
-    return "packet too far ahead";
+  if (id.seq >= next + kMaxPartialKeyframes) {
+    return "piece too far ahead";
   }
-  Entry* entry = FindOrStart(packet);
-  if (entry == nullptr) {
+  const auto index = static_cast<size_t>(piece.index);
+  const auto found = cache_.find(id);
+  if (found != cache_.end()) {
+    const Entry& entry = found->second;
+    if (entry.taken || (index < entry.pieces.size() && !entry.pieces[index].empty())) {
+      return "";
+    }
+    if ((entry.count > 0 && piece.index >= entry.count) ||
+        (piece.last && index + 1 < entry.pieces.size())) {
+      Erase(found);
+      return "piece does not fit its keyframe";
+    }
+  }
+  if (!MakeRoom(id, piece.data.size())) {
     return "receive cache full";
   }
-  const auto index = static_cast<size_t>(packet.index);
-  const auto bit = static_cast<uint8_t>(1 << (index % 8));
-  if ((entry->received[index / 8] & bit) != 0) {
-    return "";
+  return Store(id, piece);
+}
+
+std::string Receiver::Store(const KeyframeId& id, const LinkPiece& piece) {
+  Entry& entry = cache_[id];
+  const auto index = static_cast<size_t>(piece.index);
+  entry.pieces.resize(std::max(entry.pieces.size(), index + 1));
+  entry.pieces[index].assign(piece.data.begin(), piece.data.end());
+  entry.bytes += static_cast<int64_t>(piece.data.size());
+  cached_bytes_ += static_cast<int64_t>(piece.data.size());
+  entry.count = piece.last ? piece.index + 1 : entry.count;
+  ++entry.present;
+  std::string reason;
+  if (entry.bytes > kMaxCompressedBytes) {
+    reason = "keyframe is too large";
+  } else if (entry.whole()) {
+    reason = check_(id, Joined(entry));
   }
-  std::copy(packet.data.begin(), packet.data.end(), entry->bytes.begin() + packet.offset);
-  entry->received[index / 8] |= bit;
-  if (--entry->missing > 0) {
-    return "";
-  }
-  std::string reason = Complete(id, *entry);
   if (!reason.empty()) {
     Erase(cache_.find(id));
   }
   return reason;
 }
 
-std::string Receiver::Complete(const KeyframeId& id, const Entry& entry) {
-  if (Crc32(entry.bytes) != entry.crc32) {
-    return "keyframe's checksum is wrong";
+std::vector<uint8_t> Receiver::Joined(const Entry& entry) {
+  std::vector<uint8_t> bytes;
+  bytes.reserve(static_cast<size_t>(entry.bytes));
+  for (const std::vector<uint8_t>& piece : entry.pieces) {
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
-  return check_(id, entry.bytes);
+  return bytes;
 }
 
 std::vector<Receiver::Keyframe> Receiver::TakeReady() {
   std::vector<Keyframe> ready;
   for (auto& [map_id, map] : maps_) {
     auto it = cache_.find({map_id, map.next});
-    while (it != cache_.end() && it->first == KeyframeId{map_id, map.next} &&
-           it->second.missing == 0) {
+    while (it != cache_.end() && it->first == KeyframeId{map_id, map.next} && it->second.whole()) {
       it->second.taken = true;
-      ready.push_back({it->first, std::move(it->second.bytes)});
+      ready.push_back({it->first, Joined(it->second)});
       ++map.next;
       ++it;
     }
@@ -150,16 +162,22 @@ void Receiver::Journalled(const KeyframeId& id) {
   }
 }
 
-void Receiver::FillAck(LinkAck* ack) const {
+void Receiver::FillAck(bool all_maps, LinkAck* ack) const {
   ack->cache_bytes = options_.cache_bytes;
   // The newest maps; and of those an uplink may still be sending none is older than its hello's.
   for (auto it = maps_.rbegin(); it != maps_.rend() && ack->journalled_seq.size() < kMaxAckMaps;
        ++it) {
-    ack->journalled_seq[it->first] = it->second.journalled;
+    if (all_maps || it->second.announced) {
+      ack->journalled_seq[it->first] = it->second.journalled;
+    }
   }
   for (const auto& [id, entry] : cache_) {
-    if (ack->partial.size() < kMaxPartialKeyframes) {
-      ack->partial[id] = entry.received;
+    if (ack->partial.size() < kMaxPartialKeyframes && ack->journalled_seq.contains(id.map)) {
+      std::vector<uint8_t>& received = ack->partial[id];
+      received.resize((entry.pieces.size() + 7) / 8);
+      for (size_t i = 0; i < entry.pieces.size(); ++i) {
+        received[i / 8] |= static_cast<uint8_t>(entry.pieces[i].empty() ? 0 : 1 << (i % 8));
+      }
     }
   }
 }

@@ -1,10 +1,10 @@
 #pragma once
 
-// The server's half of the link, for one agent: puts packets together to keyframes in a bounded
+// The server's half of the link, for one agent: puts pieces together to keyframes in a bounded
 // receive cache (paper, IV.A: 210 KiB), checks them, hands them over in seq order per map, and says
 // what it has. A state machine: no clock, no bus, one thread.
 //
-// A keyframe stays in the cache's account until it is journalled. Full cache: a packet of a later
+// A keyframe stays in the cache's account until it is journalled. Full cache: a piece of a later
 // keyframe is dropped (it will be sent again); for an earlier one the latest make room.
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct ReceiverOptions {
 
 class Receiver {
  public:
-  // Why a complete message is no valid keyframe of this id; empty if it is one.
+  // Why a complete (compressed) message is no valid keyframe of this id; empty if it is one.
   using Check = std::function<std::string(const KeyframeId&, Bytes)>;
 
   struct Keyframe {
@@ -38,13 +38,17 @@ class Receiver {
   // Only maps of a hello (or of the journal) are received. What the uplink cannot deliver any more
   // is given up here, and counted.
   void OnHello(const LinkHello& hello);
-  // A keyframe packet; why it was refused, or an empty string (a repeat is no fault).
-  std::string Add(const LinkPacket& packet);
+  // Another run of the uplink: what is not whole comes again, and perhaps cut otherwise.
+  void OnNewUplink();
+  // A piece of a keyframe of this map; why it was refused, or an empty string (a repeat is no
+  // fault).
+  std::string Add(const MapId& map, const LinkPiece& piece);
   // The keyframes that are complete and next in their map, each once. Say when they are on disk.
   std::vector<Keyframe> TakeReady();
   void Journalled(const KeyframeId& id);
 
-  void FillAck(LinkAck* ack) const;
+  // `all_maps`: also those that only the journal knows.
+  void FillAck(bool all_maps, LinkAck* ack) const;
 
   // Keyframes in the cache: being put together, or not yet journalled.
   size_t pending() const { return cache_.size(); }
@@ -56,20 +60,20 @@ class Receiver {
   struct Map {
     int32_t next = 0;  // to hand over
     int32_t journalled = -1;
+    bool announced = false;  // by this run of the uplink
   };
   struct Entry {
-    std::vector<uint8_t> bytes;
-    std::vector<uint8_t> received;  // bits
-    uint32_t crc32 = 0;
-    int count = 0;
-    int missing = 0;
-    int total_bytes = 0;
+    std::vector<std::vector<uint8_t>> pieces;
+    int count = 0;  // of pieces; known once the last one is there
+    int present = 0;
+    int64_t bytes = 0;
     bool taken = false;
+    bool whole() const { return count > 0 && present == count; }
   };
 
-  bool MakeRoom(const KeyframeId& id, int bytes);
-  Entry* FindOrStart(const LinkPacket& packet);
-  std::string Complete(const KeyframeId& id, const Entry& entry);
+  bool MakeRoom(const KeyframeId& id, size_t bytes);
+  std::string Store(const KeyframeId& id, const LinkPiece& piece);
+  static std::vector<uint8_t> Joined(const Entry& entry);
   void Erase(std::map<KeyframeId, Entry>::iterator it);
 
   const ReceiverOptions options_;

@@ -27,17 +27,14 @@ std::optional<std::string> SenderOptions::Invalid() const {
   if (!(rate_bytes_per_s >= 1000)) {
     return "rate must be at least 1000 bytes/s";
   }
-  if (max_in_flight_bytes < payload_bytes || max_spool_bytes < kMaxKeyframeBytes) {
+  if (max_in_flight_bytes < payload_bytes || max_spool_bytes < kMaxCompressedBytes) {
     return "window or spool is too small";
   }
   return std::nullopt;
 }
 
-Sender::Sender(int32_t agent_id, int64_t run, const SenderOptions& options)
-    : agent_id_(agent_id),
-      run_(run),
-      options_(options),
-      pacer_(options.rate_bytes_per_s, kBurstBytes) {}
+Sender::Sender(const SenderOptions& options)
+    : options_(options), pacer_(options.rate_bytes_per_s, kBurstBytes) {}
 
 bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
   const auto size = static_cast<int64_t>(bytes.size());
@@ -45,7 +42,6 @@ bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
     return false;
   }
   Item item;
-  item.crc32 = Crc32(bytes);
   item.bytes = std::move(bytes);
   if (spool_.emplace(id, std::move(item)).second) {
     spooled_bytes_ += size;
@@ -168,18 +164,17 @@ std::vector<KeyframeId> Sender::UnderWay() const {
   return ids;
 }
 
-std::vector<LinkPacket> Sender::Poll(int64_t now_us) {
-  std::vector<LinkPacket> packets;
+std::vector<Sender::Sent> Sender::Poll(int64_t now_us) {
+  std::vector<Sent> sent;
   pacer_.Refill(now_us);
   FindLost(highest_acked_, now_us);
   for (const KeyframeId& id : UnderWay()) {
-    SendPieces(id, &spool_.at(id), now_us, &packets);
+    SendPieces(id, &spool_.at(id), now_us, &sent);
   }
-  return packets;
+  return sent;
 }
 
-void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us,
-                        std::vector<LinkPacket>* out) {
+void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<Sent>* out) {
   const int count = NumPieces(static_cast<int>(item->bytes.size()), options_.payload_bytes);
   item->pieces.resize(static_cast<size_t>(count));
   started_.insert(id);
@@ -193,33 +188,20 @@ void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us,
     if (!pacer_.Ready() || in_flight_bytes_ + size > options_.max_in_flight_bytes) {
       return;
     }
-    LinkPacket packet = Wrap(LinkPacket::Kind::kKeyframe, {data.begin(), data.end()}, now_us);
-    packet.keyframe = id;
-    packet.index = i;
-    packet.count = count;
-    packet.total_bytes = static_cast<int>(item->bytes.size());
-    packet.crc32 = item->crc32;
     resent_ += piece.tries > 0 ? 1 : 0;
-    piece = {packet.number, now_us, piece.tries + 1, true, false};
+    piece = {NextNumber(now_us), now_us, piece.tries + 1, true, false};
     pacer_.Take(size);
     in_flight_bytes_ += size;
-    out->push_back(std::move(packet));
+    out->push_back({piece.number, id, {0, static_cast<uint8_t>(id.seq), i, i == count - 1, data}});
   }
 }
 
-LinkPacket Sender::Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data, int64_t now_us) {
-  LinkPacket packet;
-  packet.agent_id = agent_id_;
-  packet.run = run_;
-  packet.number = ++last_number_;
-  packet.kind = kind;
-  packet.total_bytes = static_cast<int>(data.size());
-  packet.data = std::move(data);
-  recent_.push_back({packet.number, now_us});
+int64_t Sender::NextNumber(int64_t now_us) {
+  recent_.push_back({++last_number_, now_us});
   if (recent_.size() > kRecent) {
     recent_.pop_front();
   }
-  return packet;
+  return last_number_;
 }
 
 }  // namespace pangea

@@ -26,7 +26,8 @@
 namespace pangea {
 
 struct SenderOptions {
-  int payload_bytes = 1200;  // data per packet; 1200 fits one Ethernet frame, the paper has 4096
+  // Keyframe bytes per packet: by default what fills one Ethernet frame; the paper has 4096.
+  int payload_bytes = kFramePayloadBytes;
   double rate_bytes_per_s = 4e6;
   // Sent, neither arrived nor given up: what the receiver's cache takes (paper, IV.A). A smaller
   // window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take 200 kB.
@@ -38,10 +39,9 @@ struct SenderOptions {
 
 class Sender {
  public:
-  // `run`: wall clock at the start, microseconds.
-  Sender(int32_t agent_id, int64_t run, const SenderOptions& options);
+  explicit Sender(const SenderOptions& options);
 
-  // Takes an encoded keyframe. False if the spool is full.
+  // Takes a compressed keyframe. False if the spool is full.
   bool Add(const KeyframeId& id, std::vector<uint8_t> bytes);
   bool Has(const KeyframeId& id) const { return spool_.contains(id); }
   // The first spooled keyframe of the map at or after `seq`.
@@ -52,11 +52,16 @@ class Sender {
   void Forget(const MapId& map) { next_.erase(map); }
 
   void OnAck(const LinkAck& ack, int64_t now_us);
-  // The keyframe packets due now. Call it every few milliseconds while there is something to send.
-  std::vector<LinkPacket> Poll(int64_t now_us);
-  // A packet of its own, neither kept nor repeated. Its acknowledgement measures the round trip
-  // too, so that the first keyframes already wait as long as they have to.
-  LinkPacket Wrap(LinkPacket::Kind kind, std::vector<uint8_t> data, int64_t now_us);
+  struct Sent {
+    int64_t number = 0;
+    KeyframeId keyframe;
+    LinkPiece piece;  // its slot is the caller's to fill in; valid until the next call
+  };
+  // The pieces due now. Call it every few milliseconds while there is something to send.
+  std::vector<Sent> Poll(int64_t now_us);
+  // The number of a packet of another kind, which is neither kept nor repeated. Its acknowledgement
+  // measures the round trip too, so that the first keyframes already wait as long as they have to.
+  int64_t NextNumber(int64_t now_us);
 
   size_t spooled() const { return spool_.size(); }
   int64_t spooled_bytes() const { return spooled_bytes_; }
@@ -73,7 +78,6 @@ class Sender {
   };
   struct Item {
     std::vector<uint8_t> bytes;
-    uint32_t crc32 = 0;
     std::vector<Piece> pieces;  // empty until it is under way
   };
   struct Transmission {
@@ -87,11 +91,9 @@ class Sender {
   void FindLost(int64_t highest_number, int64_t now_us);
   int64_t Timeout_us(int tries) const;
   std::vector<KeyframeId> UnderWay() const;
-  void SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<LinkPacket>* out);
+  void SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<Sent>* out);
   int PieceBytes(const Item& item, const Piece& piece) const;
 
-  const int32_t agent_id_;
-  const int64_t run_;
   const SenderOptions options_;
   Pacer pacer_;
   std::map<KeyframeId, Item> spool_;

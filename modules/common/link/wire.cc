@@ -1,57 +1,63 @@
 #include "common/link/wire.h"
 
 #include <algorithm>
-#include <array>
+#include <limits>
+#include <set>
+
+#include "common/link/bytes_io.h"
 
 namespace pangea {
 namespace {
 
 constexpr size_t kMaxSoftwareName = 100;
-constexpr int kMaxPieces = kMaxKeyframeBytes / kMinPayloadBytes + 1;
+constexpr size_t kMaxReason = 300;
+constexpr uint64_t kMaxSeq = 10'000'000;
+constexpr uint64_t kMaxInt32 = std::numeric_limits<int32_t>::max();
+constexpr uint64_t kMaxInt64 = std::numeric_limits<int64_t>::max();
+constexpr uint64_t kMaxEncodedCorrection = 1000;
 
 template <typename T>
 Parsed<T> Refused(std::string reason) {
   return {std::nullopt, std::move(reason)};
 }
 
-bool IsAgentId(int32_t id) { return id >= 1 && id <= 65535; }
+int32_t ReadInt32(ByteReader* reader, uint64_t max = kMaxInt32) {
+  return static_cast<int32_t>(reader->Varint(max));
+}
 
-// The size of all pieces but the last, which follows from the header; nothing if they do not add
-// up.
-std::optional<int> PieceBytes(const link_packet_t& m) {
-  if (m.total_bytes < 1 || m.total_bytes > kMaxKeyframeBytes || m.count < 1 ||
-      m.count > kMaxPieces || m.index < 0 || m.index >= m.count) {
-    return std::nullopt;
+int64_t ReadInt64(ByteReader* reader) { return static_cast<int64_t>(reader->Varint(kMaxInt64)); }
+
+void Write(const rigid3_t& T, ByteWriter* writer) {
+  for (const double value : {T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z,
+                             T.translation.x, T.translation.y, T.translation.z}) {
+    writer->Fixed(static_cast<float>(value));
   }
-  int piece_bytes = m.num_bytes;
-  if (m.index == m.count - 1 && m.count > 1) {
-    piece_bytes = (m.total_bytes - m.num_bytes) / (m.count - 1);
+}
+
+void Write(const vector3_t& v, ByteWriter* writer) {
+  for (const double value : {v.x, v.y, v.z}) {
+    writer->Fixed(static_cast<float>(value));
   }
-  const bool adds_up = piece_bytes >= 1 && NumPieces(m.total_bytes, piece_bytes) == m.count &&
-                       m.num_bytes == std::min(piece_bytes, m.total_bytes - m.index * piece_bytes);
-  return adds_up ? std::optional<int>(piece_bytes) : std::nullopt;
+}
+
+vector3_t ReadVector(ByteReader* reader) {
+  vector3_t v{};
+  for (double* value : {&v.x, &v.y, &v.z}) {
+    *value = reader->Fixed<float>();
+  }
+  return v;
+}
+
+rigid3_t ReadRigid3(ByteReader* reader) {
+  rigid3_t T{};
+  for (double* value : {&T.rotation.w, &T.rotation.x, &T.rotation.y, &T.rotation.z}) {
+    *value = reader->Fixed<float>();
+  }
+  T.translation = ReadVector(reader);
+  return T;
 }
 
 }  // namespace
-
-uint32_t Crc32(Bytes data) {
-  static const auto table = [] {
-    std::array<uint32_t, 256> t{};
-    for (uint32_t i = 0; i < 256; ++i) {
-      uint32_t c = i;
-      for (int bit = 0; bit < 8; ++bit) {
-        c = (c & 1) ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-      }
-      t[i] = c;
-    }
-    return t;
-  }();
-  uint32_t crc = 0xFFFFFFFFu;
-  for (const uint8_t byte : data) {
-    crc = table[(crc ^ byte) & 0xFF] ^ (crc >> 8);
-  }
-  return ~crc;
-}
 
 int NumPieces(int total_bytes, int payload_bytes) {
   return (total_bytes + payload_bytes - 1) / payload_bytes;
@@ -63,149 +69,164 @@ Bytes Piece(Bytes message, int payload_bytes, int index) {
                          std::min(static_cast<size_t>(payload_bytes), message.size() - begin));
 }
 
-link_packet_t ToMessage(const LinkPacket& packet) {
-  link_packet_t m{};
-  m.agent_id = packet.agent_id;
-  m.run = packet.run;
-  m.number = packet.number;
-  m.kind = static_cast<int8_t>(packet.kind);
-  m.keyframe = ToMessage(packet.keyframe);
-  m.index = static_cast<int16_t>(packet.index);
-  m.count = static_cast<int16_t>(packet.count);
-  m.total_bytes = packet.total_bytes;
-  m.crc32 = static_cast<int32_t>(packet.crc32);
-  m.num_bytes = static_cast<int16_t>(packet.data.size());
-  m.data = packet.data;
-  return m;
-}
-
-link_hello_t ToMessage(const LinkHello& hello) {
-  link_hello_t m{};
-  m.software = hello.software;
+std::vector<uint8_t> Encode(const LinkHello& hello) {
+  ByteWriter writer;
+  writer.Text(std::string_view(hello.software).substr(0, kMaxSoftwareName));
+  writer.Varint(hello.maps.size());
   for (const LinkMap& map : hello.maps) {
-    link_map_t item{};
-    item.map = ToMessage(map.map);
-    item.first_seq = map.first_seq;
-    item.correction_revision = map.correction_revision;
-    m.maps.push_back(item);
+    writer.Fixed(map.slot);
+    writer.Fixed(map.map.opened_utime);
+    writer.Varint(static_cast<uint64_t>(map.first_seq));
+    writer.Varint(static_cast<uint64_t>(map.correction_revision));
   }
-  m.num_maps = static_cast<int16_t>(m.maps.size());
-  return m;
+  return writer.Take();
 }
 
-link_ack_t ToMessage(const LinkAck& ack) {
-  link_ack_t m{};
-  m.agent_id = ack.agent_id;
-  m.run = ack.run;
-  m.number = ack.number;
-  m.uplink_run = ack.uplink_run;
-  m.highest_number = ack.highest_number;
-  m.cache_bytes = ack.cache_bytes;
-  for (const auto& [map, seq] : ack.journalled_seq) {
-    m.maps.push_back(ToMessage(map));
-    m.journalled_seq.push_back(seq);
-  }
-  m.num_maps = static_cast<int16_t>(m.maps.size());
-  for (const auto& [keyframe, received] : ack.partial) {
-    link_partial_t item{};
-    item.keyframe = ToMessage(keyframe);
-    item.num_bytes = static_cast<int16_t>(received.size());
-    item.received = received;
-    m.partial.push_back(item);
-  }
-  m.num_partial = static_cast<int16_t>(m.partial.size());
-  for (const Correction& correction : ack.corrections) {
-    m.corrections.push_back(ToMessage(correction));
-  }
-  m.num_corrections = static_cast<int16_t>(m.corrections.size());
-  return m;
-}
-
-Parsed<LinkPacket> Parse(const link_packet_t& m) {
-  if (!IsAgentId(m.agent_id) || m.run < 1 || m.number < 1) {
-    return Refused<LinkPacket>("packet: agent, run or number out of range");
-  }
-  LinkPacket packet;
-  packet.agent_id = m.agent_id;
-  packet.run = m.run;
-  packet.number = m.number;
-  if (m.num_bytes < 1 || m.num_bytes > kMaxPayloadBytes) {
-    return Refused<LinkPacket>("packet: size out of range");
-  }
-  switch (m.kind) {
-    case link_packet_t::KIND_HELLO:
-    case link_packet_t::KIND_POSE:
-      break;
-    case link_packet_t::KIND_KEYFRAME: {
-      const auto keyframe = Parse(m.keyframe);
-      if (!keyframe.value || keyframe.value->map.agent_id != m.agent_id) {
-        return Refused<LinkPacket>("packet: keyframe id invalid or another agent's");
-      }
-      const auto piece_bytes = PieceBytes(m);
-      if (!piece_bytes) {
-        return Refused<LinkPacket>("packet: pieces do not add up");
-      }
-      packet.offset = m.index * *piece_bytes;
-      packet.keyframe = *keyframe.value;
-      break;
-    }
-    default:
-      return Refused<LinkPacket>("packet: unknown kind");
-  }
-  packet.kind = static_cast<LinkPacket::Kind>(m.kind);
-  packet.index = m.index;
-  packet.count = m.count;
-  packet.total_bytes = m.total_bytes;
-  packet.crc32 = static_cast<uint32_t>(m.crc32);
-  packet.data = m.data;
-  return {std::move(packet), ""};
-}
-
-Parsed<LinkHello> Parse(const link_hello_t& m) {
-  if (m.num_maps < 0 || m.num_maps > kMaxLinkMaps) {
-    return Refused<LinkHello>("hello: too many maps");
-  }
+Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body) {
+  ByteReader reader(body);
   LinkHello hello;
-  hello.software = m.software.substr(0, kMaxSoftwareName);
-  for (const link_map_t& item : m.maps) {
-    const auto map = Parse(item.map);
-    if (!map.value || item.first_seq < 0 || item.correction_revision < 0) {
-      return Refused<LinkHello>("hello: map invalid");
+  hello.software = reader.Text(kMaxSoftwareName);
+  const uint64_t num_maps = reader.Varint(kMaxLinkMaps);
+  std::set<uint8_t> slots;
+  for (uint64_t i = 0; i < num_maps && reader.ok(); ++i) {
+    LinkMap& map = hello.maps.emplace_back();
+    map.slot = reader.Fixed<uint8_t>();
+    map.map = {agent_id, reader.Fixed<int64_t>()};
+    map.first_seq = ReadInt32(&reader, kMaxSeq);
+    map.correction_revision = ReadInt64(&reader);
+    if (!Parse(ToMessage(map.map)).value || !slots.insert(map.slot).second) {
+      return Refused<LinkHello>("hello: map or slot invalid");
     }
-    hello.maps.push_back({*map.value, item.first_seq, item.correction_revision});
   }
-  return {std::move(hello), ""};
+  return reader.AtEnd() ? Parsed<LinkHello>{std::move(hello), ""}
+                        : Refused<LinkHello>("hello does not decode");
 }
 
-Parsed<LinkAck> Parse(const link_ack_t& m) {
-  if (!IsAgentId(m.agent_id) || m.run < 1 || m.number < 1 || m.highest_number < 0 ||
-      m.cache_bytes < 1 || m.num_maps < 0 || m.num_maps > kMaxAckMaps || m.num_partial < 0 ||
-      m.num_partial > kMaxPartialKeyframes || m.num_corrections < 0 ||
-      m.num_corrections > kMaxLinkCorrections) {
-    return Refused<LinkAck>("acknowledgement: a field is out of range");
+std::vector<uint8_t> Encode(const LinkPiece& piece) {
+  ByteWriter writer;
+  writer.Fixed(piece.slot);
+  writer.Fixed(piece.seq_low);
+  writer.Fixed(static_cast<uint8_t>(piece.index));
+  writer.Raw(piece.data);
+  return writer.Take();
+}
+
+Parsed<LinkPiece> ParsePiece(const LinkPacket& packet) {
+  ByteReader reader(packet.body);
+  LinkPiece piece;
+  piece.slot = reader.Fixed<uint8_t>();
+  piece.seq_low = reader.Fixed<uint8_t>();
+  piece.index = reader.Fixed<uint8_t>();
+  piece.last = packet.kind == LinkKind::kLastPiece;
+  piece.data = reader.Rest();
+  if (piece.data.empty() || piece.data.size() > size_t{kMaxPayloadBytes} ||
+      piece.index >= kMaxPieces) {
+    return Refused<LinkPiece>("piece: size or index out of range");
   }
-  LinkAck ack{m.agent_id, m.run, m.number, m.uplink_run, m.highest_number, m.cache_bytes,
-              {},         {},    {}};
-  for (int i = 0; i < m.num_maps; ++i) {
-    const auto map = Parse(m.maps[i]);
-    if (!map.value || map.value->agent_id != m.agent_id || m.journalled_seq[i] < -1) {
+  return {piece, ""};
+}
+
+std::vector<uint8_t> EncodePose(const pose_t& pose) {
+  ByteWriter writer;
+  writer.Fixed(pose.utime);
+  writer.Fixed(pose.state);
+  writer.Text(std::string_view(pose.reason).substr(0, kMaxReason));
+  writer.Fixed(pose.map.opened_utime);
+  Write(pose.T_odom_body, &writer);
+  Write(pose.v_odom_body, &writer);
+  Write(pose.T_map_body, &writer);
+  writer.Varint(static_cast<uint64_t>(std::max<int64_t>(0, pose.group_revision)));
+  writer.Varint(static_cast<uint64_t>(std::max(0, pose.num_tracked)));
+  return writer.Take();
+}
+
+Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
+  ByteReader reader(body);
+  pose_t pose{};
+  pose.utime = reader.Fixed<int64_t>();
+  pose.state = reader.Fixed<int8_t>();
+  pose.reason = reader.Text(kMaxReason);
+  pose.map.agent_id = agent_id;
+  pose.map.opened_utime = reader.Fixed<int64_t>();
+  pose.T_odom_body = ReadRigid3(&reader);
+  pose.v_odom_body = ReadVector(&reader);
+  pose.T_map_body = ReadRigid3(&reader);
+  pose.group_revision = ReadInt64(&reader);
+  pose.num_tracked = ReadInt32(&reader);
+  if (!reader.AtEnd() || !Parse(pose.map).value) {
+    return Refused<pose_t>("pose does not decode");
+  }
+  const auto T_odom_body = Parse(pose.T_odom_body), T_map_body = Parse(pose.T_map_body);
+  if (T_odom_body.value && T_map_body.value) {
+    pose.T_odom_body = ToMessage(*T_odom_body.value);  // of unit norm in double precision again
+    pose.T_map_body = ToMessage(*T_map_body.value);
+  } else if (pose.state == pose_t::STATE_TRACKING) {
+    return Refused<pose_t>("pose is no rigid transform");
+  }
+  return {std::move(pose), ""};
+}
+
+std::vector<uint8_t> Encode(const LinkAck& ack) {
+  ByteWriter writer;
+  writer.Varint(static_cast<uint64_t>(ack.highest_number));
+  writer.Varint(static_cast<uint64_t>(ack.cache_bytes));
+  writer.Varint(ack.journalled_seq.size());
+  std::map<MapId, uint8_t> index_of;
+  for (const auto& [map, seq] : ack.journalled_seq) {
+    index_of.emplace(map, static_cast<uint8_t>(index_of.size()));
+    writer.Fixed(map.opened_utime);
+    writer.Varint(static_cast<uint64_t>(int64_t{seq} + 1));
+  }
+  writer.Varint(ack.partial.size());
+  for (const auto& [keyframe, received] : ack.partial) {
+    writer.Fixed(index_of.at(keyframe.map));
+    writer.Varint(static_cast<uint64_t>(keyframe.seq));
+    writer.Sized(received);
+  }
+  writer.Varint(ack.corrections.size());
+  for (const Correction& correction : ack.corrections) {
+    writer.Sized(EncodeMessage(ToMessage(correction)));
+  }
+  return writer.Take();
+}
+
+Parsed<LinkAck> ParseAck(int32_t agent_id, const LinkPacket& packet) {
+  ByteReader reader(packet.body);
+  LinkAck ack;
+  ack.number = packet.number;
+  ack.highest_number = ReadInt64(&reader);
+  ack.cache_bytes = ReadInt32(&reader);
+  std::vector<MapId> maps;
+  const uint64_t num_maps = reader.Varint(kMaxAckMaps);
+  for (uint64_t i = 0; i < num_maps && reader.ok(); ++i) {
+    maps.push_back({agent_id, reader.Fixed<int64_t>()});
+    ack.journalled_seq[maps.back()] = ReadInt32(&reader, kMaxSeq + 1) - 1;
+    if (!Parse(ToMessage(maps.back())).value) {
       return Refused<LinkAck>("acknowledgement: map invalid");
     }
-    ack.journalled_seq[*map.value] = m.journalled_seq[i];
   }
-  for (const link_partial_t& item : m.partial) {
-    const auto keyframe = Parse(item.keyframe);
-    if (!keyframe.value || item.num_bytes < 1 || item.num_bytes > kMaxPieces / 8 + 1) {
+  const uint64_t num_partial = reader.Varint(kMaxPartialKeyframes);
+  for (uint64_t i = 0; i < num_partial && reader.ok(); ++i) {
+    const auto map = reader.Fixed<uint8_t>();
+    const int32_t seq = ReadInt32(&reader, kMaxSeq);
+    const Bytes received = reader.Sized(kMaxPieces / 8 + 1);
+    if (map >= maps.size()) {
       return Refused<LinkAck>("acknowledgement: keyframe invalid");
     }
-    ack.partial[*keyframe.value] = item.received;
+    ack.partial[{maps[map], seq}].assign(received.begin(), received.end());
   }
-  for (const correction_t& item : m.corrections) {
-    auto correction = Parse(item);
-    if (!correction.value || correction.value->map.agent_id != m.agent_id) {
+  const uint64_t num_corrections = reader.Varint(kMaxLinkCorrections);
+  for (uint64_t i = 0; i < num_corrections && reader.ok(); ++i) {
+    correction_t message{};
+    const bool decoded = DecodeMessage(reader.Sized(kMaxEncodedCorrection), &message);
+    auto correction = decoded ? Parse(message) : Refused<Correction>("");
+    if (!correction.value || correction.value->map.agent_id != agent_id) {
       return Refused<LinkAck>("acknowledgement: correction invalid");
     }
     ack.corrections.push_back(std::move(*correction.value));
+  }
+  if (!reader.AtEnd() || ack.cache_bytes < 1) {
+    return Refused<LinkAck>("acknowledgement does not decode");
   }
   return {std::move(ack), ""};
 }

@@ -1,10 +1,17 @@
 #pragma once
 
-// What crosses the agent link, as domain types: packets up, acknowledgements down. Like
-// common/messages.h, this is a border: past Parse every field is bounded.
+// What crosses the agent link, as domain types, and as the compact bodies of packets
+// (link_session.h seals those). Like common/messages.h, this is a border: past Parse every field is
+// bounded.
 //
-// A keyframe's encoded bytes are cut into pieces of one size, each a packet of its own (paper,
+// A keyframe's encoded bytes are compressed and cut into pieces, each a packet of its own (paper,
 // IV.A: "we divide the packet ... artificially"; 4 KiB there, one Ethernet frame by default here).
+//   hello: software, count, and of each map: slot, opened_utime, first_seq, correction_revision
+//   piece: slot of the map, low byte of seq, index; the rest is keyframe
+//   pose:  a pose_t in single precision
+//   ack:   highest_number, cache_bytes; count, and of each map: opened_utime, journalled_seq + 1;
+//          count, and of each keyframe in the cache: index of its map, seq, bits of its pieces;
+//          count, and of each correction: an encoded correction_t
 
 #include <cstdint>
 #include <map>
@@ -12,45 +19,44 @@
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/link/link_session.h"
 #include "common/messages.h"
-#include "pangea/link_ack_t.hpp"
-#include "pangea/link_hello_t.hpp"
-#include "pangea/link_packet_t.hpp"
+#include "pangea/pose_t.hpp"
 
 namespace pangea {
 
-// A keyframe has to fit one LCM datagram.
+// A keyframe has to fit one LCM datagram; compressed it may come out a little larger.
 inline constexpr int kMaxKeyframeBytes = 60'000;
+inline constexpr int kMaxCompressedBytes = kMaxKeyframeBytes + kMaxKeyframeBytes / 128;
 inline constexpr int kMinPayloadBytes = 256;
 inline constexpr int kMaxPayloadBytes = 30'000;
+inline constexpr int kMaxPieces = kMaxCompressedBytes / kMinPayloadBytes + 1;
+static_assert(kMaxPieces <= 256);
 // Keyframes one agent may have in the receive cache, and maps a hello or an acknowledgement names:
 // so that both fit one Ethernet frame.
 inline constexpr int kMaxPartialKeyframes = 16;
 inline constexpr int kMaxLinkMaps = 20;
 inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
-// What UDP, IP and LCM's small-message header (8 bytes, channel, 0) add to a packet of bytes.
-inline constexpr int kDatagramOverheadBytes = 28 + 8 + 12;
 
-struct LinkPacket {
-  enum class Kind : int8_t { kHello = 1, kKeyframe = 2, kPose = 3 };
-  int32_t agent_id = 0;
-  int64_t run = 0;     // wall clock at the sender's start, microseconds
-  int64_t number = 0;  // of this transmission in the run, from 1
-  Kind kind = Kind::kHello;
-  KeyframeId keyframe;  // kKeyframe only
-  int index = 0;        // piece `index` of `count`
-  int count = 1;
-  int offset = 0;       // bytes; where the piece lies in the message
-  int total_bytes = 0;  // of the whole message
-  uint32_t crc32 = 0;
-  std::vector<uint8_t> data;
-};
+// UDP, IP and LCM's small-message header (8 bytes, the channel, 0): a packet's bytes on the wire.
+inline constexpr int kUdpIpBytes = 28;
+inline constexpr int kLcmHeaderBytes = 8;
+inline int BytesOnTheWire(const std::string& channel, Bytes packet) {
+  return kUdpIpBytes + kLcmHeaderBytes + static_cast<int>(channel.size()) + 1 +
+         static_cast<int>(packet.size());
+}
+// Keyframe bytes in a packet that fills an Ethernet frame, whatever the agent's id.
+inline constexpr int kPieceHeaderBytes = 3;
+inline constexpr int kFramePayloadBytes = 1500 - kUdpIpBytes - kLcmHeaderBytes -
+                                          static_cast<int>(sizeof("LINK_UP_65535")) -
+                                          kSessionOverheadBytes - kPieceHeaderBytes;
 
 struct LinkMap {
   MapId map;
   int32_t first_seq = 0;  // keyframes before are lost for good, unless they are journalled
   int64_t correction_revision = 0;
+  uint8_t slot = 0;  // pieces name the map by it; each in the hello has another
 };
 
 struct LinkHello {
@@ -58,27 +64,33 @@ struct LinkHello {
   std::vector<LinkMap> maps;
 };
 
+struct LinkPiece {
+  uint8_t slot = 0;
+  uint8_t seq_low = 0;  // the few keyframes under way differ in it
+  int index = 0;
+  bool last = false;
+  Bytes data;
+};
+
 struct LinkAck {
-  int32_t agent_id = 0;
-  int64_t run = 0;
-  int64_t number = 0;
-  int64_t uplink_run = 0;
-  int64_t highest_number = 0;
+  int64_t number = 0;          // of the packet; the newest counts
+  int64_t highest_number = 0;  // of the uplink's packets
   int cache_bytes = 0;
   std::map<MapId, int32_t> journalled_seq;             // -1: none
   std::map<KeyframeId, std::vector<uint8_t>> partial;  // bit i: piece i is there
   std::vector<Correction> corrections;
 };
 
-link_packet_t ToMessage(const LinkPacket& packet);
-link_hello_t ToMessage(const LinkHello& hello);
-link_ack_t ToMessage(const LinkAck& ack);
+std::vector<uint8_t> Encode(const LinkHello& hello);
+std::vector<uint8_t> Encode(const LinkPiece& piece);
+std::vector<uint8_t> Encode(const LinkAck& ack);
+std::vector<uint8_t> EncodePose(const pose_t& pose);
 
-Parsed<LinkPacket> Parse(const link_packet_t& message);
-Parsed<LinkHello> Parse(const link_hello_t& message);
-Parsed<LinkAck> Parse(const link_ack_t& message);
-
-uint32_t Crc32(Bytes data);
+// `agent_id`: whose link it came over; all ids in it are that agent's.
+Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body);
+Parsed<LinkPiece> ParsePiece(const LinkPacket& packet);  // points into the packet
+Parsed<LinkAck> ParseAck(int32_t agent_id, const LinkPacket& packet);
+Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body);
 
 template <typename Message>
 std::vector<uint8_t> EncodeMessage(const Message& message) {
