@@ -23,11 +23,8 @@ constexpr size_t kMaxMaps = 200;
 
 }  // namespace
 
-Uplink::Uplink(int32_t agent_id, std::string software, const UplinkOptions& options)
-    : agent_id_(agent_id),
-      software_(std::move(software)),
-      options_(options),
-      sender_(options.sender) {}
+Uplink::Uplink(std::string software, const UplinkOptions& options)
+    : software_(std::move(software)), options_(options), sender_(options.sender) {}
 
 Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);

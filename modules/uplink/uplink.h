@@ -25,7 +25,7 @@ struct UplinkOptions {
 class Uplink {
  public:
   // `software`: for people.
-  Uplink(int32_t agent_id, std::string software, const UplinkOptions& options);
+  Uplink(std::string software, const UplinkOptions& options);
 
   enum class Taken { kNew, kRepeat, kSpoolFull };
   // A keyframe_t that has passed Parse, encoded and compressed.
@@ -78,7 +78,6 @@ class Uplink {
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
   std::vector<uint8_t> Hello() const;
 
-  const int32_t agent_id_;
   const std::string software_;
   const UplinkOptions options_;
   Sender sender_;

@@ -26,7 +26,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       link_bus_(link_bus),
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
-      uplink_(agent_id, kSoftware, options) {
+      uplink_(kSoftware, options) {
   agent_bus.Subscribe(channels::Keyframe(agent_id),
                       [this](const std::string&, Bytes data) { OnKeyframe(data); });
   agent_bus.Subscribe(channels::Pose(agent_id),

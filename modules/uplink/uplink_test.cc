@@ -42,7 +42,7 @@ class UplinkTest : public testing::Test {
   void Add(int32_t seq, int64_t now = 0) {
     uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(500), now);
   }
-  Uplink uplink{1, "test", {}};
+  Uplink uplink{"test", {}};
 };
 
 TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {

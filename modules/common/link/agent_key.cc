@@ -43,7 +43,7 @@ std::optional<SecretKey> FromHex(std::string_view text) {
   const bool whole =
       text.size() == kHexBytes && sodium_hex2bin(bytes.data(), bytes.size(), text.data(),
                                                  text.size(), nullptr, nullptr, nullptr) == 0;
-  const auto key = whole ? std::optional<SecretKey>(bytes) : std::nullopt;
+  auto key = whole ? std::optional<SecretKey>(bytes) : std::nullopt;
   sodium_memzero(bytes.data(), bytes.size());
   return key;
 }
