@@ -5,8 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <fstream>
 #include <iostream>
-#include <memory>
+#include <map>
+#include <optional>
 
+#include "session/explain.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
 #include "session/log_info.h"
@@ -18,6 +20,8 @@ struct Arguments {
   std::vector<std::string> logs;
   LogCut cut;
   std::string out, tum, g2o, ply;
+  std::optional<int64_t> constraint;
+  std::vector<std::string> recordings;  // ID=DIR
 };
 
 void Write(const std::string& file, const std::string& text) {
@@ -53,6 +57,33 @@ void Export(const Arguments& arguments) {
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments.g2o,
                              named.graph.vertices.size(), named.graph.edges.size(),
                              Cost(named.graph));
+  }
+}
+
+std::map<int32_t, std::string> ById(const std::vector<std::string>& given) {
+  std::map<int32_t, std::string> folders;
+  for (const std::string& text : given) {
+    const size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos ||
+        text.find_first_not_of("0123456789") != equals) {
+      throw std::runtime_error(fmt::format(
+          "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", text));
+    }
+    folders[std::stoi(text.substr(0, equals))] = text.substr(equals + 1);
+  }
+  return folders;
+}
+
+void ExplainVerdict(const Arguments& arguments) {
+  const std::string& log = arguments.logs.front();
+  if (!arguments.constraint) {
+    std::cout << ListVerdicts(log);
+    return;
+  }
+  const Explanation explanation = Explain(log, *arguments.constraint);
+  std::cout << ToText(explanation);
+  if (!arguments.out.empty()) {
+    WriteExplanationPng(explanation, ById(arguments.recordings), arguments.out);
   }
 }
 
@@ -96,6 +127,14 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   out->add_option("--g2o", arguments->g2o, "File for the pose graph, g2o format");
   out->add_option("--ply", arguments->ply, "File for the largest group's map points");
   out->callback([arguments] { Export(*arguments); });
+  CLI::App* explain = AddCommand(
+      app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
+      arguments, 1);
+  explain->add_option("--constraint", arguments->constraint, "Its id");
+  explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
+  explain->add_option("--recording", arguments->recordings,
+                      "ID=FOLDER: an agent's recording, for its images");
+  explain->callback([arguments] { ExplainVerdict(*arguments); });
   CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
   cost->callback([arguments] {

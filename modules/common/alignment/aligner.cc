@@ -56,6 +56,7 @@ class Alignment {
       matches.insert(matches.end(), nearest.begin(), nearest.end());
     }
     matches = Distinct(matches);
+    first_matches_ = matches;
     if (static_cast<int>(matches.size()) < options_.min_pnp_inliers) {
       return "too few matched points with a depth";
     }
@@ -70,6 +71,7 @@ class Alignment {
       landmarks.emplace(matches[i].direction, matches[i].landmark);
     }
     pose_ = pnp->pose;
+    pnp_ = *pnp;
     report_.pnp_inliers = static_cast<int>(landmarks.size());
     return report_.pnp_inliers < options_.min_pnp_inliers ? "PnP found too few inliers" : "";
   }
@@ -245,7 +247,19 @@ class Alignment {
     return T_odom_m * (ba_ ? ba_->T_m_c : pose_.T_m_c) * T_odom_c.Inverse();
   }
 
-  const AlignmentReport& report() const { return report_; }
+  AlignmentReport Report() const {
+    AlignmentReport report = report_;
+    std::vector<bool> inlier(first_matches_.size(), false);
+    for (const int i : pnp_ ? pnp_->inliers : std::vector<int>()) {
+      inlier[i] = true;
+    }
+    const Rigid3 guess = pnp_ ? pnp_->pose.T_m_c : Rigid3();
+    report.first = Shown(window_m_, window_c_, first_matches_, inlier, guess, guess);
+    if (ba_) {
+      report.found = Shown(window_m_, window_c_, matches_, ba_->inlier, guess, ba_->T_m_c);
+    }
+    return report;
+  }
 
   void FillIn(Constraint* constraint) const {
     if (!ba_) {
@@ -262,9 +276,10 @@ class Alignment {
   // Where the rest of the view leaves a direction open, one near point decides it, right or wrong:
   // it was looked for where the guess had it, and whatever was found there fits. So of what is
   // known in the worst direction no landmark may say more than all others together.
-  bool SaysMostAlone() const {
+  bool SaysMostAlone() {
     const double sigma_m = LargestSigma(ba_->covariance.topLeftCorner<3, 3>());
     const double without_m = LargestSigma(ba_->covariance_without_one.topLeftCorner<3, 3>());
+    report_.sigma_without_one_m = without_m;
     return without_m * without_m > 2 * sigma_m * sigma_m;
   }
 
@@ -325,6 +340,8 @@ class Alignment {
   double tilt_sigma_ = 0;
   PoseEstimate pose_;
   AlignmentReport report_;
+  std::vector<PointMatch> first_matches_;
+  std::optional<UprightPnpResult> pnp_;
   std::vector<PointMatch> matches_;
   std::optional<JointBaResult> ba_;
 };
@@ -360,7 +377,7 @@ Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& 
   step([&] { return alignment.CheckHalves(); });
   constraint.accepted = constraint.reason.empty();
   if (report != nullptr) {
-    *report = alignment.report();
+    *report = alignment.Report();
   }
   return constraint;
 }

@@ -18,8 +18,10 @@
 #include <algorithm>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "common/alignment/joint_ba.h"
+#include "common/alignment/match_sets.h"
 #include "common/alignment/projection_search.h"
 #include "common/alignment/surroundings.h"
 #include "common/alignment/upright_pnp.h"
@@ -73,17 +75,20 @@ struct AlignmentOptions {
   double max_halves_chi2 = 16.8;
 };
 
-// What the steps saw, beside the verdict: for tests and for choosing the options.
+// What the steps saw, beside the verdict: for tests, for choosing the options, and for people.
 struct AlignmentReport {
   int pnp_inliers = 0;
   int comparable = 0;  // points that ought to be found in the two keyframes
   double found_share = 0;
   double first_supported_share = 0;
-  double supported_share = 0;
+  double supported_share = 0;  // 0 when it was not looked at
   int landmarks = 0;  // distinct inliers of the BA
   int cells = 0;      // image cells these occupy in one of the keyframes
   double tilt = 0;    // radians
-  double halves_chi2 = 0;
+  double sigma_without_one_m = 0;  // worst, were the landmark that says most not there
+  double halves_chi2 = 0;          // 0 when it was not looked at
+  std::vector<ShownMatch> first;  // the candidate's and the nearest descriptors'; inliers of PnP
+  std::vector<ShownMatch> found;  // by projection, in the two keyframes; inliers of the BA
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the

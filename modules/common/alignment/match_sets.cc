@@ -66,4 +66,34 @@ std::vector<PointMatch> Agreeing(const Window& window_m, const Window& window_c,
   return agreeing;
 }
 
+std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
+                              const std::vector<PointMatch>& matches,
+                              const std::vector<bool>& inlier, const Rigid3& T_m_c_before,
+                              const Rigid3& T_m_c_after) {
+  std::vector<ShownMatch> shown;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const PointMatch& match = matches[i];
+    const bool forward = match.direction == Direction::kForward;
+    const Window& holder = forward ? window_m : window_c;
+    const Window& observer = forward ? window_c : window_m;
+    if (match.observed.frame != observer.newest()) {
+      continue;
+    }
+    const Eigen::Vector3d& p_w = holder.landmarks[match.landmark].p_w;
+    const Eigen::Vector2d corner = observer.corner(match.observed).pixel.cast<double>();
+    const auto pixel = [&p_w](const Window& window, const Rigid3& T_window_holder) {
+      return window.keyframe(window.newest())
+          .camera.Project(window.T_w_cam.back().Inverse() * (T_window_holder * p_w))
+          .value_or(Eigen::Vector2d::Constant(-1));
+    };
+    const Eigen::Vector2d own = pixel(holder, Rigid3());
+    const auto miss = [&](const Rigid3& T_m_c) {
+      return (pixel(observer, forward ? T_m_c.Inverse() : T_m_c) - corner).norm();
+    };
+    shown.push_back({forward ? own : corner, forward ? corner : own, inlier[i], miss(T_m_c_before),
+                     miss(T_m_c_after)});
+  }
+  return shown;
+}
+
 }  // namespace pangea

@@ -9,6 +9,21 @@
 
 namespace pangea {
 
+// A match of the two keyframes as it can be drawn: a point's corner in one, and in the other where
+// the odometry has it; for matches found by projection how far the guess and the result miss it.
+struct ShownMatch {
+  Eigen::Vector2d pixel_m, pixel_c;
+  bool inlier = false;
+  double miss_before_px = 0;  // at PnP's pose
+  double miss_after_px = 0;   // at the bundle adjustment's
+};
+
+// Those in the two keyframes themselves, none of their neighbours.
+std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
+                              const std::vector<PointMatch>& matches,
+                              const std::vector<bool>& inlier, const Rigid3& T_m_c_before,
+                              const Rigid3& T_m_c_after);
+
 // The candidate's matched corners that have a depth, in either keyframe or by their landmark in a
 // neighbour.
 std::vector<PointMatch> CandidateMatches(const Window& window_m, const Window& window_c,
