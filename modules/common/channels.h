@@ -47,4 +47,20 @@ inline std::optional<int32_t> LinkUpAgent(std::string_view channel) {
 inline std::string Status(std::string_view process) { return fmt::format("STATUS_{}", process); }
 inline std::string Again(std::string_view process) { return fmt::format("AGAIN_{}", process); }
 
+// The agent of "KEYFRAME_7" and its like, by the digits after `prefix`; 0 if there is anything
+// else.
+inline int32_t AgentOf(std::string_view channel, std::string_view prefix) {
+  if (!channel.starts_with(prefix) || channel.size() > prefix.size() + 5) {
+    return 0;
+  }
+  int32_t id = 0;
+  for (const char c : channel.substr(prefix.size())) {
+    if (c < '0' || c > '9') {
+      return 0;
+    }
+    id = 10 * id + (c - '0');
+  }
+  return id;
+}
+
 }  // namespace pangea::channels

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <string_view>
 
+#include "common/bus/log_reader.h"
 #include "common/channels.h"
 #include "common/keyframe.h"
 #include "common/messages.h"
 #include "common/state_chunks.h"
 #include "pangea/correction_t.hpp"
 #include "pangea/pose_t.hpp"
-#include "session/log_reader.h"
 
 namespace pangea::session {
 namespace {
@@ -85,21 +84,6 @@ class States {
   CapturedSession* session_;
   StateChunks chunks_;
 };
-
-// POSE_<id>, by its digits; 0 for any other channel.
-int32_t AgentOf(std::string_view channel, std::string_view prefix) {
-  if (!channel.starts_with(prefix) || channel.size() > prefix.size() + 5) {
-    return 0;
-  }
-  int32_t id = 0;
-  for (const char c : channel.substr(prefix.size())) {
-    if (c < '0' || c > '9') {
-      return 0;
-    }
-    id = 10 * id + (c - '0');
-  }
-  return id;
-}
 
 void AddPose(Bytes data, PoseTrack* track) {
   pose_t message{};
@@ -209,7 +193,7 @@ CapturedSession ReadServerLog(const std::string& path) {
     begin = begin.value_or(event.utime);
     const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
     bool good = true;
-    if (AgentOf(event.channel, "KEYFRAME_") > 0) {
+    if (channels::AgentOf(event.channel, "KEYFRAME_") > 0) {
       good = AddKeyframe(event.data, &session);
     } else if (event.channel == channels::kConstraint) {
       good = AddConstraint(event.data, &session);

@@ -121,20 +121,9 @@ void SessionMonitor::OnCorrection(int32_t agent_id, Bytes data) {
     return;
   }
   Drift& drift = drifts_[correction.value->map];
-  if (correction.value->revision <= drift.revision) {
-    return;
+  if (drift.Take(*correction.value)) {
+    agents_[agent_id].drift_m = drift.Moved(T_odom_body_[agent_id].t);
   }
-  // A lone map starts uncorrected; in a new group the first correction is where the map was put.
-  const bool joined = drift.revision == 0 || drift.group != correction.value->group;
-  if (joined) {
-    const bool own = correction.value->group == correction.value->map;
-    drift.T_map_odom_first = own ? Rigid3() : correction.value->T_map_odom;
-  }
-  drift.group = correction.value->group;
-  drift.revision = correction.value->revision;
-  const Eigen::Vector3d p_odom = T_odom_body_[agent_id].t;
-  agents_[agent_id].drift_m =
-      (correction.value->T_map_odom * p_odom - drift.T_map_odom_first * p_odom).norm();
 }
 
 void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "common/bus/bus.h"
-#include "common/server_messages.h"
+#include "common/drift.h"
 #include "pangea/status_t.hpp"
 #include "session/buses.h"
 
@@ -63,12 +63,6 @@ class SessionMonitor {
   void OnPose(int32_t agent_id, Bytes data);
   void OnKeyframe(int32_t agent_id, Bytes data);
   void OnStatus(Bytes data);
-
-  struct Drift {
-    MapId group;
-    int64_t revision = 0;
-    Rigid3 T_map_odom_first;
-  };
 
   std::vector<std::unique_ptr<LcmBus>> buses_;
   std::map<int32_t, AgentProgress> agents_;

@@ -25,16 +25,25 @@ class Node {
   // handler(channel, message). What does not decode is counted and dropped.
   template <typename Message, typename Handler>
   void Subscribe(const std::string& channel_regex, Handler handler) {
-    bus_.Subscribe(channel_regex,
+    SubscribeBytes(channel_regex,
                    [this, handler = std::move(handler)](const std::string& channel, Bytes data) {
                      Message message{};
-                     ++messages_in_;
-                     const int64_t begin_ns = MonotonicNs();
                      if (DecodeMessage(data, &message)) {
                        handler(channel, message);
                      } else {
                        Refuse(std::string(Message::getTypeName()) + " does not decode");
                      }
+                   });
+  }
+
+  // handler(channel, bytes), for several types at once.
+  template <typename Handler>
+  void SubscribeBytes(const std::string& channel_regex, Handler handler) {
+    bus_.Subscribe(channel_regex,
+                   [this, handler = std::move(handler)](const std::string& channel, Bytes data) {
+                     ++messages_in_;
+                     const int64_t begin_ns = MonotonicNs();
+                     handler(channel, data);
                      NoteHandling(MonotonicNs() - begin_ns);
                    });
   }

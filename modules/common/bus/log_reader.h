@@ -8,7 +8,7 @@
 
 #include "common/bus/bus.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct LogEvent {
   int64_t utime = 0;  // when the event was captured, wall clock, microseconds
@@ -20,4 +20,4 @@ struct LogEvent {
 // std::runtime_error when the file cannot be opened.
 void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>& handler);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -1,4 +1,4 @@
-#include "session/log_reader.h"
+#include "common/bus/log_reader.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
-namespace pangea::session {
+namespace pangea {
 
 void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>& handler) {
   if (!std::filesystem::is_regular_file(path)) {
@@ -22,4 +22,4 @@ void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -1,0 +1,60 @@
+#pragma once
+
+// A captured log, to be played, stopped and looked at at any time. Read once, at the start; what is
+// drawn of it stays in memory. Going back builds the scene again from the beginning.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "viewer/scene_events.h"
+#include "viewer/show.h"
+
+namespace pangea::viewer {
+
+class LogShow : public Show {
+ public:
+  // Poses in solved states that are kept; of more, every second solve that changes no group is
+  // left out until they fit (a pose is about 100 bytes).
+  static constexpr size_t kMaxSolvedPoses = 4'000'000;
+
+  // Throws std::runtime_error naming the log when it cannot be read or shows nothing.
+  explicit LogShow(const std::string& path);
+
+  // The player's clock goes on by this much, if it plays.
+  void Advance(double wall_s);
+
+  const Scene& scene() const override { return *scene_; }
+  int64_t epoch() const override { return epoch_; }
+  ShowClock clock() const override { return clock_; }
+  std::string source() const override { return source_; }
+  std::vector<Fusion> all_fusions() const override { return all_fusions_; }
+  void Seek(double time_s) override;
+  void Play(bool play) override;
+  void SetSpeed(double speed) override { clock_.speed = speed; }
+
+  // Messages that were refused while reading.
+  int64_t num_refused() const { return num_refused_; }
+
+ private:
+  struct Timed {
+    double time_s = 0;
+    SceneEvent event;
+  };
+
+  void Read(const std::string& path);
+  void ThinStates();
+  void Reset();
+  void RunTo(double time_s);
+
+  std::string source_;
+  std::vector<Timed> events_;
+  std::vector<Fusion> all_fusions_;
+  int64_t num_refused_ = 0;
+  ShowClock clock_;
+  int64_t epoch_ = 0;
+  std::unique_ptr<Scene> scene_;
+  size_t next_ = 0;  // into events_
+};
+
+}  // namespace pangea::viewer

@@ -1,0 +1,44 @@
+// The WebSocket, opened again when it is lost.
+
+import { decode } from "./protocol";
+import type { Said, Update } from "./protocol";
+
+const kRetry_ms = 1000;
+
+export class Connection {
+  bytes = 0; // received since the page was opened
+  open = false;
+  private socket?: WebSocket;
+
+  constructor(
+    private readonly onUpdate: (update: Update) => void,
+    private readonly onState: (open: boolean) => void,
+  ) {
+    this.connect();
+  }
+
+  say(said: Said) {
+    if (this.open) this.socket?.send(JSON.stringify(said));
+  }
+
+  private connect() {
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/`);
+    this.socket = socket;
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.open = true;
+      this.onState(true);
+    };
+    socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
+      this.bytes += data.byteLength;
+      const update = decode(data);
+      this.onUpdate(update);
+      this.say({ taken: update.version });
+    };
+    socket.onclose = () => {
+      this.open = false;
+      this.onState(false);
+      setTimeout(() => this.connect(), kRetry_ms);
+    };
+  }
+}

@@ -1,0 +1,150 @@
+import "./style.css";
+import { Connection } from "./connection";
+import { Model } from "./model";
+import {
+  byId, clock, drawAgents, drawHealth, drawLegend, drawMarks, fusionText, tipOf,
+} from "./panels";
+import { onThemeChange } from "./palette";
+import type { Update } from "./protocol";
+import { Stage } from "./stage";
+
+const kNotice_ms = 5000;
+
+const model = new Model();
+const canvas = byId<HTMLCanvasElement>("stage");
+const stage = new Stage(canvas, byId("labels"), model);
+let panelsDirty = true;
+let dragging = false;
+
+const connection = new Connection(take, (open) => {
+  byId("connection").textContent = open ? "" : "not connected, trying again…";
+});
+
+function take(update: Update) {
+  model.apply(update);
+  stage.take(update);
+  if (update.start) drawMarks(model);
+  for (const fusion of update.fusions) {
+    // Not what happened before the page was opened, or was jumped over.
+    if (!update.start && model.now_s - fusion.time_s < 3) announce(fusionText(fusion));
+  }
+  panelsDirty = true;
+}
+
+function announce(text: string) {
+  const notice = byId("notice");
+  notice.textContent = text;
+  notice.classList.add("shown");
+  setTimeout(() => notice.classList.remove("shown"), kNotice_ms);
+}
+
+function drawPanels() {
+  const { start } = model;
+  if (!start) return;
+  byId("source").textContent = start.live ? `live · ${start.source}` : start.source;
+  byId("empty").textContent =
+    model.agents.size > 0 ? "" : start.live ? `Waiting for agents on ${start.source}` : "Nothing yet: play on";
+  byId("player").hidden = start.live;
+  byId("play").textContent = model.playing ? "❚❚" : "▶";
+  byId("time").textContent = `${clock(model.now_s)} / ${clock(start.end_s)}`;
+  const slider = byId<HTMLInputElement>("slider");
+  slider.max = String(start.end_s);
+  if (!dragging) slider.value = String(model.now_s);
+  drawAgents(model);
+  drawHealth(model);
+  drawLegend(stage.gridCell_m, model.leftOut);
+}
+
+// --- what people do
+
+for (const what of ["points", "accepted", "refused"] as const) {
+  const box = byId<HTMLInputElement>(`show_${what}`);
+  box.onchange = () => stage.show(what, box.checked);
+}
+byId<HTMLSelectElement>("ellipses").onchange = ({ target }) => {
+  stage.ellipseScale = Number((target as HTMLSelectElement).value);
+  stage.redraw();
+};
+byId("fit").onclick = () => stage.fit();
+for (const which of ["before", "after"] as const) {
+  byId(which).onclick = () => {
+    model.before = which === "before";
+    byId("before").classList.toggle("chosen", model.before);
+    byId("after").classList.toggle("chosen", !model.before);
+    model.place();
+    stage.fit();
+  };
+}
+byId("play").onclick = () => connection.say({ play: !model.playing });
+byId<HTMLSelectElement>("speed").onchange = ({ target }) =>
+  connection.say({ speed: Number((target as HTMLSelectElement).value) });
+const slider = byId<HTMLInputElement>("slider");
+slider.oninput = () => {
+  dragging = true;
+  connection.say({ seek: Number(slider.value) });
+};
+slider.onchange = () => (dragging = false);
+addEventListener("keydown", ({ key, target }) => {
+  if (key === " " && (target === canvas || target === document.body)) byId("play").click();
+});
+
+function hover(x: number, y: number) {
+  const box = canvas.getBoundingClientRect();
+  const constraint = stage.constraintAt(x - box.left, y - box.top);
+  stage.highlight(constraint);
+  const tip = byId("tip");
+  tip.textContent = constraint ? tipOf(constraint, model) : "";
+  tip.style.left = `${Math.min(x + 14, innerWidth - 300)}px`;
+  tip.style.top = `${y + 14}px`;
+}
+canvas.addEventListener("pointermove", ({ clientX, clientY, buttons }) => {
+  if (buttons === 0) hover(clientX, clientY);
+});
+canvas.addEventListener("click", ({ clientX, clientY }) => hover(clientX, clientY));
+onThemeChange(() => stage.recolour());
+
+// --- frames
+
+let frames = 0;
+let measuring = false;
+let secondBegan = performance.now();
+let bytesBefore = 0;
+
+function showFigures(now: number) {
+  const seconds = (now - secondBegan) / 1000;
+  if (seconds < 1) return;
+  const rate = (connection.bytes - bytesBefore) / 1000 / seconds;
+  byId("figures").textContent =
+    `${model.numPoints.toLocaleString("en")} points · ${rate.toFixed(rate < 10 ? 1 : 0)} kB/s`;
+  secondBegan = now;
+  bytesBefore = connection.bytes;
+}
+
+function frame(now: number) {
+  if (panelsDirty) {
+    panelsDirty = false;
+    drawPanels();
+  }
+  if (stage.frame(now, measuring)) ++frames;
+  showFigures(now);
+  requestAnimationFrame(frame);
+}
+requestAnimationFrame(frame);
+
+// For tests and the curious: what the page holds, and how fast it draws.
+Object.assign(window, {
+  pangea: {
+    model,
+    stage,
+    received: () => connection.bytes,
+    // Draws every frame for a while, also where nothing moves.
+    async framesPerSecond(seconds: number): Promise<number> {
+      measuring = true;
+      const before = frames;
+      const began = performance.now();
+      await new Promise((done) => setTimeout(done, 1000 * seconds));
+      measuring = false;
+      return (frames - before) / ((performance.now() - began) / 1000);
+    },
+  },
+});

@@ -1,0 +1,235 @@
+// What the page knows of the scene, and where each keyframe is to be drawn.
+
+import { Matrix4, Quaternion, Vector3 } from "three";
+import type {
+  AgentSaid, ConstraintSaid, FusionSaid, MapSaid, PoseNumbers, ProcessSaid, Update,
+} from "./protocol";
+
+export class Pose {
+  constructor(public t = new Vector3(), public q = new Quaternion()) {}
+  static of(n: PoseNumbers): Pose {
+    return new Pose(new Vector3(n[0], n[1], n[2]), new Quaternion(n[4], n[5], n[6], n[3]));
+  }
+  times(other: Pose): Pose {
+    return new Pose(this.apply(other.t), this.q.clone().multiply(other.q));
+  }
+  inverse(): Pose {
+    const q = this.q.clone().conjugate();
+    return new Pose(this.t.clone().negate().applyQuaternion(q), q);
+  }
+  apply(p: Vector3): Vector3 {
+    return p.clone().applyQuaternion(this.q).add(this.t);
+  }
+  matrix(): Matrix4 {
+    return new Matrix4().compose(this.t, this.q, new Vector3(1, 1, 1));
+  }
+}
+
+export interface Keyframe {
+  map: number;
+  seq: number;
+  arrived: boolean; // a solved pose may come first
+  T_odom_body: Pose;
+  solved?: { group: number; T_map_body: Pose };
+  target: Pose; // where it belongs on the stage
+  shown: Pose; // where it is, on its way there
+}
+
+interface Map_ {
+  said: MapSaid;
+  T_map_odom: Pose;
+  seqs: Map<number, number>; // keyframe by seq
+  newest: number; // keyframe with the highest seq; -1: none
+  newestSeq: number;
+}
+
+// Metres. A cell of the layout grows in such steps, so that a growing map does not push the others
+// about all the time.
+const kCellStep = 5;
+const kMargin = 3;
+
+export class Model {
+  start?: Update["start"];
+  now_s = 0;
+  playing = true;
+  speed = 1;
+  leftOut = 0;
+  before = false; // every map by its own odometry
+  maps: Map_[] = [];
+  agents = new Map<number, AgentSaid>();
+  keyframes: Keyframe[] = [];
+  numKeyframes = 0;
+  numPoints = 0;
+  constraints: ConstraintSaid[] = [];
+  processes = new Map<string, ProcessSaid>();
+  fusions: FusionSaid[] = [];
+
+  apply(update: Update) {
+    if (update.start) {
+      const before = this.before;
+      Object.assign(this, new Model());
+      this.before = before;
+      this.start = update.start;
+    }
+    this.now_s = update.now_s;
+    this.playing = update.playing;
+    this.speed = update.speed;
+    this.leftOut = update.left_out;
+    for (const said of update.maps) {
+      const map = this.map(said.index);
+      map.said = said;
+      map.T_map_odom = Pose.of(said.T_map_odom);
+    }
+    for (const agent of update.agents) this.agents.set(agent.id, agent);
+    for (const process of update.processes) this.processes.set(process.name, process);
+    for (const constraint of update.constraints) this.constraints[constraint.index] = constraint;
+    this.fusions.push(...update.fusions);
+    for (const said of update.keyframes) {
+      const keyframe = this.keyframe(said.index);
+      keyframe.map = said.map;
+      keyframe.seq = said.seq;
+      keyframe.arrived = true;
+      keyframe.T_odom_body = Pose.of(said.T_odom_body);
+      const map = this.map(said.map);
+      map.seqs.set(said.seq, said.index);
+      if (said.seq > map.newestSeq) {
+        map.newestSeq = said.seq;
+        map.newest = said.index;
+      }
+      ++this.numKeyframes;
+      this.numPoints += said.points.length / 3;
+    }
+    for (const said of update.solved) {
+      this.keyframe(said.index).solved = {
+        group: said.group,
+        T_map_body: Pose.of(said.T_map_body),
+      };
+    }
+    if (update.start || update.maps.length + update.keyframes.length + update.solved.length > 0) this.place();
+    for (const { index } of update.keyframes) {
+      const keyframe = this.keyframes[index];
+      keyframe.shown = new Pose(keyframe.target.t.clone(), keyframe.target.q.clone());
+    }
+  }
+
+  private map(index: number): Map_ {
+    return (this.maps[index] ??= {
+      said: { index, agent: 0, name: "", group: index, T_map_odom: [] },
+      T_map_odom: new Pose(),
+      seqs: new Map(),
+      newest: -1,
+      newestSeq: -1,
+    });
+  }
+
+  private keyframe(index: number): Keyframe {
+    return (this.keyframes[index] ??= {
+      map: -1, seq: -1, arrived: false,
+      T_odom_body: new Pose(), target: new Pose(), shown: new Pose(),
+    });
+  }
+
+  agentOf(keyframe: Keyframe): number {
+    return this.maps[keyframe.map]?.said.agent ?? 0;
+  }
+
+  // The maps that are one group with the agent's, as agents.
+  fusedWith(agent: AgentSaid): number[] {
+    if (agent.map < 0 || !this.maps[agent.map]) return [];
+    const group = this.maps[agent.map].said.group;
+    const others = this.maps.filter((m) => m && m.said.group === group).map((m) => m.said.agent);
+    return [...new Set(others)].filter((id) => id !== agent.id).sort((a, b) => a - b);
+  }
+
+  // Keyframes at both ends of a constraint, where they have arrived.
+  ends(constraint: ConstraintSaid): [number, number] | undefined {
+    const a = this.maps[constraint.from[0]]?.seqs.get(constraint.from[1]);
+    const b = this.maps[constraint.to[0]]?.seqs.get(constraint.to[1]);
+    return a === undefined || b === undefined ? undefined : [a, b];
+  }
+
+  // The agent's pose among the keyframes as they are shown: from the newest of its map, by odometry.
+  shownPose(agent: AgentSaid): Pose | undefined {
+    const map = agent.map < 0 ? undefined : this.maps[agent.map];
+    if (!map || map.newest < 0) return undefined;
+    const keyframe = this.keyframes[map.newest];
+    return keyframe.shown
+      .times(keyframe.T_odom_body.inverse())
+      .times(Pose.of(agent.T_odom_body));
+  }
+
+  // Where every keyframe belongs: in its group's frame, the groups side by side.
+  place() {
+    const boxes = new Map<number, { min: Vector3; max: Vector3; agent: number }>();
+    for (const keyframe of this.keyframes) {
+      if (!keyframe?.arrived) continue;
+      const map = this.maps[keyframe.map];
+      const cell = this.before ? keyframe.map : map.said.group;
+      keyframe.target = this.inGroup(keyframe, map);
+      const box = boxes.get(cell);
+      if (box) {
+        box.min.min(keyframe.target.t);
+        box.max.max(keyframe.target.t);
+        box.agent = Math.min(box.agent, map.said.agent);
+      } else {
+        const t = keyframe.target.t;
+        boxes.set(cell, { min: t.clone(), max: t.clone(), agent: map.said.agent });
+      }
+    }
+    const offsets = layOut(boxes);
+    for (const keyframe of this.keyframes) {
+      if (!keyframe?.arrived) continue;
+      const map = this.maps[keyframe.map];
+      keyframe.target.t.add(offsets.get(this.before ? keyframe.map : map.said.group)!);
+    }
+  }
+
+  private inGroup(keyframe: Keyframe, map: Map_): Pose {
+    const { T_odom_body, solved } = keyframe;
+    if (this.before) return new Pose(T_odom_body.t.clone(), T_odom_body.q.clone());
+    if (solved && solved.group === map.said.group) {
+      return new Pose(solved.T_map_body.t.clone(), solved.T_map_body.q.clone());
+    }
+    return map.T_map_odom.times(T_odom_body);
+  }
+
+  // Moves what is shown towards where it belongs; false once it is there.
+  settle(share: number): boolean {
+    let moving = false;
+    for (const keyframe of this.keyframes) {
+      if (!keyframe?.arrived) continue;
+      const { shown, target } = keyframe;
+      const far =
+        shown.t.distanceToSquared(target.t) > 1e-6 || shown.q.angleTo(target.q) > 1e-3;
+      shown.t.lerp(target.t, far ? share : 1);
+      shown.q.slerp(target.q, far ? share : 1);
+      moving ||= far;
+    }
+    return moving;
+  }
+}
+
+type Boxes = Map<number, { min: Vector3; max: Vector3; agent: number }>;
+
+// Shifts that put the boxes into the cells of a square, by their lowest agent; one alone stays where it is.
+function layOut(boxes: Boxes): Map<number, Vector3> {
+  const cells = [...boxes.entries()].sort(([i, a], [j, b]) => a.agent - b.agent || i - j);
+  if (cells.length === 1) return new Map([[cells[0][0], new Vector3()]]);
+  const columns = Math.ceil(Math.sqrt(cells.length));
+  const step = (size: number) => kCellStep * Math.ceil((size + kMargin) / kCellStep);
+  const width = Math.max(0, ...cells.map(([, b]) => step(b.max.x - b.min.x)));
+  const depth = Math.max(0, ...cells.map(([, b]) => step(b.max.y - b.min.y)));
+  return new Map(
+    cells.map(([index, box], i) => {
+      const centre = box.min.clone().add(box.max).multiplyScalar(0.5).round();
+      return [
+        index,
+        new Vector3(
+          (i % columns) * width - centre.x,
+          -Math.floor(i / columns) * depth - centre.y,
+          0,
+        ),
+      ];
+    }),
+  );
+}

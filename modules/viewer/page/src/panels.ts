@@ -1,0 +1,159 @@
+// Everything around the drawing: agents, health, legend, player, tips.
+
+import type { Model } from "./model";
+import type { ConstraintSaid, ProcessSaid } from "./protocol";
+import { agentColour, colours } from "./palette";
+
+// A process that was not heard for this long, or an agent, is marked. Processes speak once a second.
+const kSilent_s = 3.5;
+
+export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+
+// A new element; text never becomes markup.
+function element(tag: string, className: string, text = ""): HTMLElement {
+  const made = document.createElement(tag);
+  made.className = className;
+  made.textContent = text;
+  return made;
+}
+
+export function metres(value: number): string {
+  if (value < 0.01) return `${(1000 * value).toFixed(0)} mm`;
+  return value < 1 ? `${(100 * value).toFixed(1)} cm` : `${value.toFixed(2)} m`;
+}
+
+export function clock(seconds: number): string {
+  const whole = Math.floor(seconds);
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
+}
+
+const milliseconds = (value: number) => (value < 10 ? value.toFixed(1) : value.toFixed(0));
+
+// Half the length of the 95 % ellipse's longer axis.
+function radius95(covariance: [number, number, number, number]): number {
+  const [xx, xy, yy] = covariance;
+  const largest = (xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
+  return 2.4477 * Math.sqrt(largest);
+}
+
+export function drawAgents(model: Model) {
+  const keyframes = new Map<number, number>();
+  for (const map of model.maps) {
+    if (map) keyframes.set(map.said.agent, (keyframes.get(map.said.agent) ?? 0) + map.seqs.size);
+  }
+  const rows = [...model.agents.values()]
+    .sort((a, b) => a.id - b.id)
+    .map((agent) => {
+      const row = element("div", "agent");
+      row.dataset.agent = String(agent.id);
+      const badge = element("span", "badge", String(agent.id));
+      badge.style.background = agentColour(agent.id);
+      const fused = model.fusedWith(agent);
+      const state = agent.state ?? "";
+      const what = element("div", "what");
+      what.append(
+        element("b", "", `Agent ${agent.id}`),
+        element("span", state && state !== "tracking" ? "state bad" : "state", state),
+        element("div", "fused", fused.length ? `one map with ${fused.join(", ")}` : "a map of its own"),
+        element(
+          "div", "numbers",
+          `${keyframes.get(agent.id) ?? 0} keyframes` +
+            (agent.num_tracked === undefined ? "" : ` · ${agent.num_tracked} tracks`),
+        ),
+        element(
+          "div", "numbers",
+          `drift ${metres(agent.drift_m)}` +
+            (agent.covariance_m2 ? ` · ± ${metres(radius95(agent.covariance_m2))}` : ""),
+        ),
+      );
+      row.title =
+        (agent.reason ? `${agent.reason}\n` : "") +
+        "drift: how far corrections have moved the agent since it joined its map; ±: longer half axis of the 95 % ellipse";
+      row.append(badge, what);
+      return row;
+    });
+  byId("agents").replaceChildren(...rows);
+}
+
+function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: string } {
+  if (now_s - process.heard_s > kSilent_s) return { mark: "✕", state: "silent" };
+  if (lossesOf(process) > 0) return { mark: "▲", state: "losses" };
+  return process.pending > 0 ? { mark: "◐", state: "busy" } : { mark: "●", state: "idle" };
+}
+
+const lossesOf = (process: ProcessSaid) =>
+  process.dropped + process.refused.reduce((sum, [, count]) => sum + count, 0);
+
+export function drawHealth(model: Model) {
+  const chips = [...model.processes.values()]
+    .sort((a, b) => a.name.localeCompare(b.name))
+    .map((process) => {
+      const { mark, state } = healthOf(process, model.now_s);
+      const chip = element("div", `process ${state}`);
+      chip.dataset.process = process.name;
+      chip.append(
+        element("b", "", `${mark} ${process.name}`),
+        element("span", "", `queue ${process.pending}`),
+        element("span", "", `${milliseconds(process.median_ms)} / ${milliseconds(process.p99_ms)} ms`),
+        element("span", "", `lost ${lossesOf(process)}`),
+      );
+      chip.title = [
+        `${process.name}: ${state}`,
+        process.summary,
+        `${process.in} messages in, ${process.out} out, ${process.dropped} dropped, ${process.resends_asked} asked for again`,
+        `time per message: median ${milliseconds(process.median_ms)} ms, 99 % under ${milliseconds(process.p99_ms)} ms`,
+        `${process.memory_mb.toFixed(0)} MB, ${process.cpu_s.toFixed(1)} s of CPU`,
+        ...process.refused.map(([reason, count]) => `refused ${count}: ${reason}`),
+      ].join("\n");
+      return chip;
+    });
+  byId("health").replaceChildren(...chips);
+}
+
+export function drawLegend(gridCell_m: number, leftOut: number) {
+  const { accepted, refused } = colours();
+  const line = (colour: string, style: string, text: string) => {
+    const entry = element("span", "entry");
+    const sample = element("i", "sample");
+    sample.style.borderTop = `2px ${style} ${colour}`;
+    entry.append(sample, text);
+    return entry;
+  };
+  byId("legend").replaceChildren(
+    line("currentColor", "solid", `grid ${gridCell_m} m`),
+    line(accepted, "solid", "accepted constraint"),
+    line(refused, "dashed", "refused"),
+    ...(leftOut > 0 ? [element("span", "entry", `${leftOut} items beyond what is shown`)] : []),
+  );
+}
+
+export function tipOf(constraint: ConstraintSaid, model: Model): string {
+  const end = ([map, seq]: [number, number]) =>
+    `agent ${model.maps[map]?.said.agent ?? "?"}, keyframe ${seq}`;
+  return [
+    constraint.accepted ? "Accepted" : `Refused: ${constraint.reason || "no reason given"}`,
+    constraint.inter ? "between two maps" : "within one map",
+    `${end(constraint.from)} ↔ ${end(constraint.to)}`,
+    constraint.inliers > 0
+      ? `${constraint.inliers} inliers (${(100 * constraint.inlier_ratio).toFixed(0)} %), ${constraint.rms_px.toFixed(2)} px rms`
+      : "",
+  ].filter(Boolean).join("\n");
+}
+
+export function drawMarks(model: Model) {
+  const end = model.start?.end_s || 1;
+  const marks = (model.start?.all_fusions ?? []).map((fusion) => {
+    const mark = element("i", "mark");
+    mark.style.left = `${(100 * fusion.time_s) / end}%`;
+    mark.title = `${clock(fusion.time_s)}: ${fusionText(fusion)}`;
+    return mark;
+  });
+  byId("marks").replaceChildren(...marks);
+}
+
+export function fusionText(fusion: { fused: boolean; agents: number[] }): string {
+  const agents = fusion.agents.join(", ");
+  return fusion.fused ? `one map now: agents ${agents}` : `taken apart: agents ${agents}`;
+}

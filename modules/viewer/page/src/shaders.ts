@@ -1,0 +1,135 @@
+// Everything that hangs on keyframes is placed by the graphics card: the poses of all keyframes are one
+// texture, a vertex names its keyframe. So when a solve moves a map, three texels a keyframe change,
+// and neither points nor lines are touched.
+
+import { DataTexture, FloatType, NearestFilter, RGBAFormat, ShaderMaterial } from "three";
+import type { Color, Vector2 } from "three";
+import type { Keyframe } from "./model";
+
+const kPerRow = 256; // keyframes in a row of the texture
+
+const lookUp = /* glsl */ `
+  uniform highp sampler2D poses;
+  vec4 texel(float keyframe, int i) {
+    int k = int(keyframe + 0.5);
+    return texelFetch(poses, ivec2(3 * (k % ${kPerRow}) + i, k / ${kPerRow}), 0);
+  }
+  vec3 place(float keyframe, vec3 p) {
+    vec4 t = texel(keyframe, 0);
+    vec4 q = texel(keyframe, 1);
+    return t.xyz + p + 2.0 * cross(q.xyz, cross(q.xyz, p) + q.w * p);
+  }
+`;
+
+// Texels of a keyframe: (t, there), q, (colour, 0).
+export class PoseTexture {
+  readonly uniform: { value: DataTexture };
+  private data = new Float32Array(0);
+
+  constructor() {
+    this.uniform = { value: this.make(1) };
+  }
+
+  private make(rows: number): DataTexture {
+    const data = new Float32Array(kPerRow * 3 * 4 * rows);
+    data.set(this.data);
+    this.data = data;
+    const texture = new DataTexture(data, kPerRow * 3, rows, RGBAFormat, FloatType);
+    texture.minFilter = texture.magFilter = NearestFilter;
+    texture.needsUpdate = true;
+    return texture;
+  }
+
+  write(keyframes: Keyframe[], colourOf: (keyframe: Keyframe) => Color) {
+    const rows = Math.max(1, Math.ceil(keyframes.length / kPerRow));
+    if (rows > this.uniform.value.image.height) {
+      this.uniform.value.dispose();
+      this.uniform.value = this.make(2 * rows);
+    }
+    const { data } = this;
+    data.fill(0);
+    keyframes.forEach((keyframe, k) => {
+      if (!keyframe.arrived) return;
+      const { t, q } = keyframe.shown;
+      const colour = colourOf(keyframe);
+      data.set([t.x, t.y, t.z, 1, q.x, q.y, q.z, q.w, colour.r, colour.g, colour.b, 0], 12 * k);
+    });
+    this.uniform.value.needsUpdate = true;
+  }
+}
+
+type Poses = PoseTexture["uniform"];
+
+export const pointMaterial = (poses: Poses, size: { value: number }) =>
+  new ShaderMaterial({
+    uniforms: { poses, size },
+    vertexShader: /* glsl */ `
+      ${lookUp}
+      uniform float size;
+      in float keyframe;
+      out vec3 colour;
+      void main() {
+        colour = texel(keyframe, 2).rgb;
+        vec4 eye = viewMatrix * vec4(place(keyframe, position), 1.0);
+        gl_Position = projectionMatrix * eye;
+        gl_PointSize = clamp(size * 12.0 / -eye.z, 0.6 * size, 2.0 * size);
+      }`,
+    fragmentShader: /* glsl */ `
+      precision mediump float;
+      in vec3 colour;
+      void main() {
+        gl_FragColor = vec4(colour, 1.0);
+        #include <colorspace_fragment>
+      }`,
+  });
+
+// Lines of a width in pixels between two keyframes; dashed where `dash` is not 0. A negative red takes the
+// first keyframe's colour.
+export const lineMaterial = (poses: Poses, screen: { value: Vector2 }, width: number, lift: number) =>
+  new ShaderMaterial({
+    uniforms: { poses, screen, width: { value: width }, lift: { value: lift } },
+    transparent: true,
+    depthWrite: false,
+    vertexShader: /* glsl */ `
+      ${lookUp}
+      uniform vec2 screen;
+      uniform float width;
+      uniform float lift;
+      in vec2 ends;
+      in vec4 style;  // colour, dash length in pixels
+      out vec3 colour;
+      out float along;
+      flat out float dash;
+      void main() {
+        float there = texel(ends.x, 0).w * texel(ends.y, 0).w;
+        vec4 a = projectionMatrix * viewMatrix * vec4(place(ends.x, vec3(0.0)), 1.0);
+        vec4 b = projectionMatrix * viewMatrix * vec4(place(ends.y, vec3(0.0)), 1.0);
+        // A line that begins behind the eye is cut at the near plane.
+        float near = 0.01;
+        if (there < 0.5 || (a.w < near && b.w < near)) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+        if (a.w < near) a = mix(b, a, (b.w - near) / (b.w - a.w));
+        if (b.w < near) b = mix(a, b, (a.w - near) / (a.w - b.w));
+        vec2 pa = a.xy / a.w * screen * 0.5;
+        vec2 pb = b.xy / b.w * screen * 0.5;
+        vec2 along2 = pb - pa;
+        float length2 = max(length(along2), 1e-3);
+        vec2 side = vec2(-along2.y, along2.x) / length2;
+        vec4 end = position.x < 0.5 ? a : b;
+        end.xy += side * position.y * width / screen * end.w;
+        end.z -= lift * end.w;
+        gl_Position = end;
+        colour = style.r < 0.0 ? texel(ends.x, 2).rgb : style.rgb;
+        along = position.x * length2;
+        dash = style.a;
+      }`,
+    fragmentShader: /* glsl */ `
+      precision mediump float;
+      in vec3 colour;
+      in float along;
+      flat in float dash;
+      void main() {
+        if (dash > 0.0 && mod(along, 2.0 * dash) > dash) discard;
+        gl_FragColor = vec4(colour, 0.9);
+        #include <colorspace_fragment>
+      }`,
+  });

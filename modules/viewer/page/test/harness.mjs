@@ -1,0 +1,90 @@
+// What tests of the page need: the viewer as a process, a browser, checks that say what they saw.
+
+import { spawn } from "node:child_process";
+import { parseArgs } from "node:util";
+import { chromium } from "playwright-core";
+
+export const { values: options } = parseArgs({
+  options: {
+    bin: { type: "string" }, // folder of the programs
+    chromium: { type: "string" },
+    log: { type: "string" },
+    out: { type: "string" }, // for screenshots
+  },
+});
+
+const children = [];
+
+export function start(program, ...args) {
+  const child = spawn(program, args, { stdio: ["ignore", "pipe", "inherit"] });
+  children.push(child);
+  return child;
+}
+
+// Starts pangea-viewer on a free port; resolves to the page's address.
+export function startViewer(...args) {
+  const viewer = start(`${options.bin}/pangea-viewer`, "--port", "0", ...args);
+  return new Promise((resolve, reject) => {
+    let said = "";
+    viewer.stdout.on("data", (text) => {
+      said += text;
+      const url = said.match(/http:\S+/);
+      if (url) resolve({ url: url[0], viewer });
+    });
+    viewer.on("exit", (code) => reject(new Error(`pangea-viewer ended with ${code}`)));
+  });
+}
+
+export const launch = () =>
+  chromium.launch({
+    executablePath: options.chromium,
+    // Software rendering: there is no graphics card where CI runs.
+    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  });
+
+const consoleErrors = [];
+
+export async function openPage(browser, url, context = {}) {
+  const page = await (
+    await browser.newContext({ viewport: { width: 1280, height: 800 }, ...context })
+  ).newPage();
+  page.on("console", (message) => {
+    if (["error", "warning"].includes(message.type())) consoleErrors.push(message.text());
+  });
+  page.on("pageerror", (error) => consoleErrors.push(String(error)));
+  await page.goto(url);
+  return page;
+}
+
+// Chromium's own remarks on software rendering are not the page's.
+const ownErrors = () =>
+  consoleErrors.filter((text) => !/GPU stall|software WebGL|swiftshader/i.test(text));
+
+let failures = 0;
+
+export function check(what, good, saw = "") {
+  if (!good) ++failures;
+  console.log(`${good ? "ok    " : "FAILED"} ${what}${saw === "" ? "" : `: ${saw}`}`);
+}
+
+// Waits until `condition` holds in the page; `what` it is about.
+export async function becomes(page, what, condition, argument, timeout = 15000) {
+  try {
+    await page.waitForFunction(condition, argument, { timeout });
+    check(what, true);
+  } catch (error) {
+    check(what, false, String(error).split("\n")[0]);
+  }
+}
+
+export async function run(test) {
+  try {
+    await test();
+    check("no error in the console", ownErrors().length === 0, ownErrors().join(" | "));
+  } catch (error) {
+    check("the test ran to its end", false, error.stack);
+  } finally {
+    for (const child of children) child.kill();
+  }
+  process.exit(failures === 0 ? 0 : 1);
+}

@@ -1,0 +1,142 @@
+// The page in headless Chromium: on a captured log, and on a live bus into which the log is played.
+// Writes screenshots to --out; `scripts/viewer --screenshots` puts them into docs/.
+
+import { becomes, check, launch, openPage, options, run, start, startViewer } from "./harness.mjs";
+
+const screenshot = (page, name) => page.screenshot({ path: `${options.out}/viewer_${name}.png` });
+
+const numGroups = () =>
+  new Set(pangea.model.maps.filter((m) => m && m.seqs.size > 0).map((m) => m.said.group)).size;
+
+async function seek(page, share) {
+  const box = await page.locator("#slider").boundingBox();
+  await page.mouse.click(box.x + 8 + share * (box.width - 16), box.y + box.height / 2);
+}
+
+// Once nothing moves any more.
+const settled = (page) =>
+  becomes(page, "the maps come to rest", () => pangea.model.keyframes.every(
+    (k) => !k.arrived || k.shown.t.distanceTo(k.target.t) < 1e-2));
+
+async function testLog(browser) {
+  const { url, viewer } = await startViewer("--log", options.log);
+  const page = await openPage(browser, url);
+  await becomes(page, "it connects and shows two agents", () =>
+    document.querySelectorAll(".agent").length === 2);
+  await page.locator("#play").click();
+  await becomes(page, "the player stops", () => !pangea.model.playing);
+
+  await seek(page, 0.2);
+  await becomes(page, "the slider goes to the time before the fusion", () =>
+    Math.abs(pangea.model.now_s - 0.2 * pangea.model.start.end_s) < 0.3);
+  check("two maps there", (await page.evaluate(numGroups)) === 2);
+  await settled(page);
+  await screenshot(page, "before");
+
+  await seek(page, 1);
+  await becomes(page, "the slider goes to the end", () =>
+    pangea.model.now_s > pangea.model.start.end_s - 0.3 && pangea.model.numKeyframes === 63);
+  check("one map there", (await page.evaluate(numGroups)) === 1);
+  check("points of both", (await page.evaluate(() => pangea.model.numPoints)) > 1000);
+  check("the fusion has its mark", (await page.locator(".mark").count()) >= 1);
+  check("health of the five processes", (await page.locator(".process").count()) === 5);
+  const text = await page.locator("#agents").innerText();
+  check("drift is told", /drift [\d.]+ (mm|cm|m)/.test(text), text.replaceAll("\n", " | "));
+  check("who is fused with whom is told", text.includes("one map with 2") && text.includes("one map with 1"));
+
+  await page.locator("#show_refused").check();
+  await settled(page);
+  for (const accepted of [true, false]) await testHover(page, accepted);
+  await testBeforeAfter(page);
+  await screenshot(page, "fused");
+  await testSeekBack(page);
+
+  for (const [name, context] of [
+    ["dark", { colorScheme: "dark" }],
+    ["phone", { viewport: { width: 390, height: 780 }, hasTouch: true, isMobile: true }],
+  ]) {
+    await seek(page, 1);
+    const other = await openPage(browser, url, context);
+    await becomes(other, `a second browser (${name}) shows the same`, () =>
+      document.querySelectorAll(".agent").length === 2 && pangea.model.numKeyframes === 63);
+    await settled(other);
+    await other.waitForTimeout(500);
+    await screenshot(other, name);
+    await other.close();
+  }
+  await page.close();
+  viewer.removeAllListeners("exit");
+  viewer.kill();
+}
+
+// A constraint's line tells its verdict. Not every line has a place of its own: any of them will do.
+async function testHover(page, accepted) {
+  const spots = await page.evaluate((wanted) => {
+    const { model, stage } = pangea;
+    return model.constraints.filter((c) => c.accepted === wanted).slice(0, 20).flatMap((c) => {
+      const ends = stage.onScreen(c);
+      return ends ? [{ x: (ends[0].x + ends[1].x) / 2, y: (ends[0].y + ends[1].y) / 2 }] : [];
+    });
+  }, accepted);
+  const wanted = accepted ? /^Accepted\n/ : /^Refused: \S/;
+  let tip = "";
+  for (const { x, y } of spots) {
+    await page.mouse.move(x, y);
+    tip = await page.locator("#tip").textContent();
+    if (wanted.test(tip)) break;
+  }
+  check(`hovering over ${accepted ? "an accepted" : "a refused"} constraint tells`, wanted.test(tip),
+    tip.replaceAll("\n", " | "));
+  if (!accepted) await screenshot(page, "refused");
+  await page.mouse.move(5, 400);
+}
+
+async function testBeforeAfter(page) {
+  const distance = () => page.evaluate(() => {
+    const [a, b] = pangea.model.maps.filter((m) => m?.newest >= 0);
+    const at = (m) => pangea.model.keyframes[m.newest].shown.t;
+    return at(a).distanceTo(at(b));
+  });
+  const fused = await distance();
+  await page.locator("#before").click();
+  await becomes(page, "before fusion: the maps slide apart", (was) => {
+    const [a, b] = pangea.model.maps.filter((m) => m?.newest >= 0);
+    const at = (m) => pangea.model.keyframes[m.newest].shown.t;
+    return Math.abs(at(a).distanceTo(at(b)) - was) > 1;
+  }, fused);
+  await page.locator("#after").click();
+  await settled(page);
+  check("and back into place", Math.abs((await distance()) - fused) < 0.05);
+}
+
+async function testSeekBack(page) {
+  await seek(page, 0.5);
+  await becomes(page, "the slider goes back", () => pangea.model.numKeyframes < 50);
+  await page.locator("#speed").selectOption("20");
+  await page.locator("#play").click();
+  await becomes(page, "it plays on to the end, fast", () => pangea.model.numKeyframes === 63);
+}
+
+async function testLive(browser) {
+  const bus = `udpm://239.255.76.67:${20000 + (process.pid % 30000)}?ttl=0&recv_buf_size=4194304`;
+  const { url } = await startViewer("--bus", bus);
+  const page = await openPage(browser, url);
+  await becomes(page, "an empty bus says what it waits for", () =>
+    document.getElementById("empty").textContent.startsWith("Waiting for agents on udpm:"));
+  await screenshot(page, "empty");
+  start("lcm-logplayer", "--speed=4", `--lcm-url=${bus}`, options.log);
+  await becomes(page, "live: two maps at first", () =>
+    pangea.model.maps.filter((m) => m && m.seqs.size > 0 && m.said.group === m.said.index).length === 2);
+  await becomes(page, "live: the fusion is followed and announced", () =>
+    document.querySelector("#notice.shown")?.textContent.startsWith("one map now: agents 1, 2"));
+  await becomes(page, "live: every keyframe arrives", () => pangea.model.numKeyframes === 63);
+  check("live: one group", (await page.evaluate(numGroups)) === 1);
+  check("live: no time slider", await page.locator("#player").isHidden());
+}
+
+await run(async () => {
+  const browser = await launch();
+  await testLog(browser);
+  await testLive(browser);
+  await browser.close();
+});

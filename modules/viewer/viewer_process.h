@@ -1,0 +1,46 @@
+#pragma once
+
+// A live bus as a show: everything people may want to see of it in, STATUS_viewer out. A viewer
+// that starts late asks for the keyframes and verdicts it missed, as any process does.
+
+#include <set>
+#include <string>
+
+#include "common/bus/bus.h"
+#include "common/bus/missing.h"
+#include "common/bus/node.h"
+#include "common/bus/process.h"
+#include "pangea/have_t.hpp"
+#include "viewer/scene_events.h"
+#include "viewer/show.h"
+
+namespace pangea::viewer {
+
+class ViewerProcess : public Process, public Show {
+ public:
+  ViewerProcess(Bus& bus, std::string source, int64_t start_utime);
+
+  void Tick(int64_t now_utime) override;
+
+  const Scene& scene() const override { return scene_; }
+  int64_t epoch() const override { return 1; }
+  ShowClock clock() const override { return clock_; }
+  std::string source() const override { return source_; }
+
+ private:
+  void OnMessage(const std::string& channel, Bytes data);
+  void OnHave(const have_t& message);
+  void AskForMissing(int64_t now_utime);
+
+  Node node_;
+  std::string source_;
+  int64_t start_utime_;
+  Scene scene_;
+  SceneEvents events_;
+  ShowClock clock_;
+  MissingMessages keyframes_;
+  std::set<MapId> verdicts_asked_;  // maps whose verdicts of before were asked for
+  int64_t next_status_utime_ = 0;
+};
+
+}  // namespace pangea::viewer

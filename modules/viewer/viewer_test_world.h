@@ -1,0 +1,34 @@
+#pragma once
+
+// A small world for the viewer's tests: agents on straight lines, one point a keyframe.
+
+#include "viewer/scene.h"
+#include "viewer/show.h"
+
+namespace pangea::viewer {
+
+// The first map of an agent.
+MapId TestMap(int32_t agent_id);
+// A metre further along x with each seq; one point two metres ahead.
+ShownKeyframe TestKeyframe(const MapId& map, int32_t seq);
+// All keyframes of the maps up to `highest_seq`, shifted to y = 10 times their place in the list.
+MapState TestState(const std::vector<MapId>& maps, int32_t highest_seq, int64_t revision);
+Constraint TestConstraint(const KeyframeId& from, const KeyframeId& to, bool accepted);
+
+// A show that a test moves by hand.
+class TestShow : public Show {
+ public:
+  const Scene& scene() const override { return scene_; }
+  int64_t epoch() const override { return epoch_; }
+  ShowClock clock() const override { return clock_; }
+  std::string source() const override { return "test"; }
+  void Seek(double time_s) override { clock_.now_s = time_s; }
+  void Play(bool play) override { clock_.playing = play; }
+  void SetSpeed(double speed) override { clock_.speed = speed; }
+
+  Scene scene_;
+  int64_t epoch_ = 1;
+  ShowClock clock_;
+};
+
+}  // namespace pangea::viewer
