@@ -23,7 +23,10 @@ const connection = new Connection(take, (open) => {
 function take(update: Update) {
   model.apply(update);
   stage.take(update);
-  if (update.start) drawMarks(model);
+  if (update.start) {
+    drawMarks(model);
+    byId("notice").classList.remove("shown");
+  }
   for (const fusion of update.fusions) {
     // Not what happened before the page was opened, or was jumped over.
     if (!update.start && model.now_s - fusion.time_s < 3) announce(fusionText(fusion));
@@ -52,7 +55,7 @@ function drawPanels() {
   if (!dragging) slider.value = String(model.now_s);
   drawAgents(model);
   drawHealth(model);
-  drawLegend(stage.gridCell_m, model.leftOut);
+  drawLegend(stage.gridCell_m, stage.ellipseScale, model.leftOut);
 }
 
 // --- what people do
@@ -64,6 +67,7 @@ for (const what of ["points", "accepted", "refused"] as const) {
 byId<HTMLSelectElement>("ellipses").onchange = ({ target }) => {
   stage.ellipseScale = Number((target as HTMLSelectElement).value);
   stage.redraw();
+  panelsDirty = true;
 };
 byId("fit").onclick = () => stage.fit();
 for (const which of ["before", "after"] as const) {

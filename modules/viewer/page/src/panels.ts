@@ -79,12 +79,13 @@ export function drawAgents(model: Model) {
 
 function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: string } {
   if (now_s - process.heard_s > kSilent_s) return { mark: "✕", state: "silent" };
-  if (lossesOf(process) > 0) return { mark: "▲", state: "losses" };
+  if (process.dropped > 0) return { mark: "▲", state: "losses" };
   return process.pending > 0 ? { mark: "◐", state: "busy" } : { mark: "●", state: "idle" };
 }
 
-const lossesOf = (process: ProcessSaid) =>
-  process.dropped + process.refused.reduce((sum, [, count]) => sum + count, 0);
+// Messages that made no sense, and verdicts against a candidate.
+const refusalsOf = (process: ProcessSaid) =>
+  process.refused.reduce((sum, [, count]) => sum + count, 0);
 
 export function drawHealth(model: Model) {
   const chips = [...model.processes.values()]
@@ -97,7 +98,8 @@ export function drawHealth(model: Model) {
         element("b", "", `${mark} ${process.name}`),
         element("span", "", `queue ${process.pending}`),
         element("span", "", `${milliseconds(process.median_ms)} / ${milliseconds(process.p99_ms)} ms`),
-        element("span", "", `lost ${lossesOf(process)}`),
+        element("span", "", `lost ${process.dropped}`),
+        element("span", "", refusalsOf(process) > 0 ? `refused ${refusalsOf(process)}` : ""),
       );
       chip.title = [
         `${process.name}: ${state}`,
@@ -112,7 +114,7 @@ export function drawHealth(model: Model) {
   byId("health").replaceChildren(...chips);
 }
 
-export function drawLegend(gridCell_m: number, leftOut: number) {
+export function drawLegend(gridCell_m: number, ellipseScale: number, leftOut: number) {
   const { accepted, refused } = colours();
   const line = (colour: string, style: string, text: string) => {
     const entry = element("span", "entry");
@@ -125,6 +127,7 @@ export function drawLegend(gridCell_m: number, leftOut: number) {
     line("currentColor", "solid", `grid ${gridCell_m} m`),
     line(accepted, "solid", "accepted constraint"),
     line(refused, "dashed", "refused"),
+    ...(ellipseScale > 0 ? [element("span", "entry", `◯ 95 % ellipse of the position${ellipseScale > 1 ? `, × ${ellipseScale}` : ""}`)] : []),
     ...(leftOut > 0 ? [element("span", "entry", `${leftOut} items beyond what is shown`)] : []),
   );
 }

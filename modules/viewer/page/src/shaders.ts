@@ -85,9 +85,11 @@ export const pointMaterial = (poses: Poses, size: { value: number }) =>
 
 // Lines of a width in pixels between two keyframes; dashed where `dash` is not 0. A negative red takes the
 // first keyframe's colour.
-export const lineMaterial = (poses: Poses, screen: { value: Vector2 }, width: number, lift: number) =>
+export const lineMaterial = (
+  poses: Poses, screen: { value: Vector2 }, width: number, lift: number, opacity: number,
+) =>
   new ShaderMaterial({
-    uniforms: { poses, screen, width: { value: width }, lift: { value: lift } },
+    uniforms: { poses, screen, width: { value: width }, lift: { value: lift }, opacity: { value: opacity } },
     transparent: true,
     depthWrite: false,
     vertexShader: /* glsl */ `
@@ -124,12 +126,13 @@ export const lineMaterial = (poses: Poses, screen: { value: Vector2 }, width: nu
       }`,
     fragmentShader: /* glsl */ `
       precision mediump float;
+      uniform float opacity;
       in vec3 colour;
       in float along;
       flat in float dash;
       void main() {
         if (dash > 0.0 && mod(along, 2.0 * dash) > dash) discard;
-        gl_FragColor = vec4(colour, 0.9);
+        gl_FragColor = vec4(colour, opacity);
         #include <colorspace_fragment>
       }`,
   });

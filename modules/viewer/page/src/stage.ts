@@ -47,7 +47,7 @@ export class Stage {
   private dirty = true;
   private posesDirty = true;
   private last_ms = 0;
-  ellipseScale = 1;
+  ellipseScale = 10;
   gridCell_m = 1;
 
   constructor(
@@ -64,10 +64,10 @@ export class Stage {
     this.controls.addEventListener("change", () => (this.dirty = true));
     this.controls.addEventListener("start", () => (this.userMoved = true));
     this.points = new PointCloud(pointMaterial(this.poses.uniform, this.pointSize));
-    this.trajectories = new Lines(lineMaterial(this.poses.uniform, this.screen, 2.5, 0));
-    this.accepted = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.5, 1e-4));
-    this.refused = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.5, 1e-4));
-    this.hovered = new Lines(lineMaterial(this.poses.uniform, this.screen, 5, 2e-4));
+    this.trajectories = new Lines(lineMaterial(this.poses.uniform, this.screen, 3, 0, 0.95));
+    this.accepted = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.3, 1e-4, 0.5));
+    this.refused = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.3, 1e-4, 0.7));
+    this.hovered = new Lines(lineMaterial(this.poses.uniform, this.screen, 5, 2e-4, 1));
     for (const drawn of [this.points, this.trajectories, this.accepted, this.refused, this.hovered]) {
       this.scene.add(drawn.object);
     }

@@ -1,0 +1,180 @@
+// The two shows: a captured log, and a bus.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/bus/log_reader.h"
+#include "common/channels.h"
+#include "common/messages.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "pangea/resend_request_t.hpp"
+#include "viewer/log_show.h"
+#include "viewer/viewer_process.h"
+#include "viewer/viewer_test_world.h"
+
+namespace pangea::viewer {
+namespace {
+
+using testing::SizeIs;
+
+const std::string kLog = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks/session.lcm";
+constexpr int64_t kStart = 1'700'000'000'000'000;
+
+class LogShowTest : public testing::Test {
+ protected:
+  LogShow show_{kLog};
+};
+
+TEST_F(LogShowTest, KnowsTheWholeLogFromTheStart) {
+  EXPECT_EQ(show_.num_refused(), 0);
+  EXPECT_FALSE(show_.clock().live);
+  EXPECT_NEAR(show_.clock().end_s, 13.95, 0.1);
+  ASSERT_THAT(show_.all_fusions(), SizeIs(1));
+  EXPECT_TRUE(show_.all_fusions()[0].fused);
+  EXPECT_EQ(show_.clock().now_s, 0);
+  EXPECT_TRUE(show_.scene().keyframes().empty());
+}
+
+TEST_F(LogShowTest, PlaysAtItsSpeedAndStopsAtTheEnd) {
+  show_.SetSpeed(2);
+  show_.Advance(1.5);
+  EXPECT_NEAR(show_.clock().now_s, 3, 1e-9);
+  EXPECT_FALSE(show_.scene().keyframes().empty());
+  EXPECT_LT(show_.scene().keyframes().size(), 30U);
+  show_.Play(false);
+  show_.Advance(1);
+  EXPECT_NEAR(show_.clock().now_s, 3, 1e-9);
+  show_.Play(true);
+  show_.Advance(100);
+  EXPECT_EQ(show_.clock().now_s, show_.clock().end_s);
+  EXPECT_FALSE(show_.clock().playing);
+  EXPECT_THAT(show_.scene().keyframes(), SizeIs(63));
+  EXPECT_THAT(show_.scene().constraints(), SizeIs(65));
+  EXPECT_THAT(show_.scene().agents(), SizeIs(2));
+  show_.Play(true);
+  EXPECT_EQ(show_.clock().now_s, 0);
+}
+
+// Whichever way a time is reached, the same is seen there.
+TEST_F(LogShowTest, SeekingBackShowsWhatPlayingShowed) {
+  show_.Advance(6);
+  const size_t keyframes = show_.scene().keyframes().size();
+  const size_t constraints = show_.scene().constraints().size();
+  const int64_t epoch = show_.epoch();
+  show_.Seek(9);
+  EXPECT_EQ(show_.epoch(), epoch) << "forward, pages keep what they have";
+  EXPECT_GT(show_.scene().keyframes().size(), keyframes);
+  show_.Seek(6);
+  EXPECT_NE(show_.epoch(), epoch);
+  EXPECT_EQ(show_.scene().keyframes().size(), keyframes);
+  EXPECT_EQ(show_.scene().constraints().size(), constraints);
+  show_.Seek(-5);
+  EXPECT_EQ(show_.clock().now_s, 0);
+  show_.Seek(1e9);
+  EXPECT_EQ(show_.clock().now_s, show_.clock().end_s);
+}
+
+TEST(LogShow, SaysWhatIsWrongWithAFile) {
+  EXPECT_THROW(LogShow("no/such.lcm"), std::runtime_error);
+  try {
+    LogShow show(std::string(PANGEA_SOURCE_DIR) + "/README.md");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("README.md: holds nothing to show"));
+  }
+}
+
+class ViewerProcessTest : public testing::Test {
+ protected:
+  ViewerProcessTest() {
+    bus_.Subscribe(std::string(channels::kResendRequest), [this](const std::string&, Bytes data) {
+      asked_.emplace_back();
+      EXPECT_TRUE(DecodeMessage(data, &asked_.back()));
+    });
+    bus_.Subscribe("STATUS_viewer", [this](const std::string&, Bytes data) {
+      EXPECT_TRUE(DecodeMessage(data, &status_));
+    });
+  }
+
+  void TickAt(double time_s) {
+    process_.Tick(kStart + static_cast<int64_t>(1e6 * time_s));
+    bus_.Drain();
+  }
+
+  LocalBus bus_;
+  ViewerProcess process_{bus_, "memory", kStart};
+  std::vector<resend_request_t> asked_;
+  status_t status_{};
+};
+
+TEST_F(ViewerProcessTest, ShowsACapturedSession) {
+  ReadLog(kLog, [this](const LogEvent& event) { bus_.Publish(event.channel, event.data); });
+  bus_.Drain();
+  TickAt(1);
+  EXPECT_THAT(process_.scene().keyframes(), SizeIs(63));
+  EXPECT_THAT(process_.scene().constraints(), SizeIs(65));
+  EXPECT_THAT(process_.scene().fusions(), SizeIs(1));
+  EXPECT_EQ(status_.num_refused, 0);
+  EXPECT_GT(status_.messages_in, 300);
+}
+
+// A viewer that starts late asks for the keyframes before it, and takes the answers.
+TEST_F(ViewerProcessTest, AsksForWhatCameBefore) {
+  have_t have{};
+  have.num_maps = 1;
+  have.maps = {ToMessage(TestMap(1))};
+  have.highest_seq = {120};
+  PublishMessage(bus_, std::string(channels::kHave), have);
+  bus_.Drain();
+  for (const double time_s : {0.1, 1.2, 1.3}) {
+    TickAt(time_s);
+  }
+  ASSERT_THAT(asked_, SizeIs(2));
+  EXPECT_EQ(asked_[0].channel, "CONSTRAINT");
+  EXPECT_EQ(asked_[1].channel, "KEYFRAME_1");
+  EXPECT_EQ(asked_[1].requester, "viewer");
+  EXPECT_EQ(asked_[1].from_seq, 0);
+
+  again_t again{};
+  ReadLog(kLog, [&again](const LogEvent& event) {
+    if (event.channel == "KEYFRAME_1") {
+      again.channel = event.channel;
+      again.data.assign(event.data.begin(), event.data.end());
+      again.num_bytes = static_cast<int32_t>(again.data.size());
+    }
+  });
+  PublishMessage(bus_, "AGAIN_viewer", again);
+  bus_.Drain();
+  EXPECT_THAT(process_.scene().keyframes(), SizeIs(1));
+}
+
+// What strangers say is counted, and nothing of it is shown.
+TEST_F(ViewerProcessTest, RefusesNonsense) {
+  const std::vector<uint8_t> noise(100, 0xff);
+  for (const char* channel : {"KEYFRAME_1", "POSE_1", "CORRECTION_1", "CONSTRAINT", "MAP_STATE",
+                              "STATUS_x", "HAVE", "AGAIN_viewer"}) {
+    bus_.Publish(channel, noise);
+  }
+  pose_t pose{};
+  pose.state = 9;
+  PublishMessage(bus_, "POSE_1", pose);
+  pose.state = pose_t::STATE_TRACKING;
+  PublishMessage(bus_, "POSE_1", pose);
+  again_t again{};
+  again.channel = "AGAIN_viewer";
+  PublishMessage(bus_, "AGAIN_viewer", again);
+  bus_.Drain();
+  TickAt(1);
+  int64_t refused = 0;
+  for (const counter_t& counter : status_.refused) {
+    refused += counter.count;
+  }
+  EXPECT_EQ(refused, 11);
+  EXPECT_TRUE(process_.scene().agents().empty());
+  EXPECT_TRUE(process_.scene().keyframes().empty());
+}
+
+}  // namespace
+}  // namespace pangea::viewer
