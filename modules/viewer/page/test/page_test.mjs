@@ -60,7 +60,7 @@ async function testLog(browser) {
     await becomes(other, `a second browser (${name}) shows the same`, () =>
       document.querySelectorAll(".agent").length === 2 && pangea.model.numKeyframes === 63);
     await settled(other);
-    await other.waitForTimeout(500);
+    await other.waitForTimeout(1500);
     await screenshot(other, name);
     await other.close();
   }
