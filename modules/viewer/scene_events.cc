@@ -54,7 +54,7 @@ ShownKeyframe Shown(const Keyframe& keyframe) {
 
 Outcome FromPose(const pose_t& message) {
   constexpr std::array<std::string_view, 4> kStates = {"", "initialising", "tracking", "lost"};
-  const int state = message.state;
+  const auto state = static_cast<int>(message.state);
   const Parsed<MapId> map = Parse(message.map);
   if (state < 1 || state > 3 || message.num_tracked < 0) {
     return {std::nullopt, "pose: state or number of tracks is none"};
