@@ -9,11 +9,11 @@
 #include <optional>
 #include <stdexcept>
 
+#include "common/bus/log_reader.h"
 #include "common/median.h"
 #include "common/messages.h"
 #include "fusion/fusion.h"
 #include "inter_map_ba/inter_map_ba.h"
-#include "session/log_reader.h"
 
 namespace pangea::session {
 namespace {

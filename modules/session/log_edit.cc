@@ -1,4 +1,5 @@
 #include "session/log_edit.h"
+#include "common/bus/log_reader.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +10,6 @@
 #include <optional>
 #include <regex>
 #include <stdexcept>
-
-#include "session/log_reader.h"
 
 namespace pangea::session {
 namespace {

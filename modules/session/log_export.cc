@@ -7,8 +7,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "common/bus/log_reader.h"
 #include "common/messages.h"
-#include "session/log_reader.h"
 #include "session/report_figures.h"
 #include "session/report_pictures.h"
 #include "session/report_text.h"

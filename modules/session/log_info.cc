@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/bus/log_reader.h"
 #include "common/messages.h"
-#include "session/log_reader.h"
 
 namespace pangea::session {
 namespace {

@@ -7,11 +7,11 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/bus/log_reader.h"
 #include "session/explain.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
 #include "session/log_info.h"
-#include "session/log_reader.h"
 
 namespace pangea::session {
 namespace {

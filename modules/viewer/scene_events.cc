@@ -1,6 +1,5 @@
 #include "viewer/scene_events.h"
 
-#include <array>
 #include <string_view>
 
 #include "common/channels.h"
@@ -52,19 +51,31 @@ ShownKeyframe Shown(const Keyframe& keyframe) {
   return shown;
 }
 
+// Empty for what is none.
+std::string StateName(int8_t state) {
+  switch (state) {
+    case pose_t::STATE_INITIALISING:
+      return "initialising";
+    case pose_t::STATE_TRACKING:
+      return "tracking";
+    case pose_t::STATE_LOST:
+      return "lost";
+    default:
+      return "";
+  }
+}
+
 Outcome FromPose(const pose_t& message) {
-  constexpr std::array<std::string_view, 4> kStates = {"", "initialising", "tracking", "lost"};
-  const auto state = static_cast<int>(message.state);
   const Parsed<MapId> map = Parse(message.map);
-  if (state < 1 || state > 3 || message.num_tracked < 0) {
+  if (StateName(message.state).empty() || message.num_tracked < 0) {
     return {std::nullopt, "pose: state or number of tracks is none"};
   }
   ShownPose pose;
   pose.utime = message.utime;
-  pose.state = kStates[static_cast<size_t>(state)];
+  pose.state = StateName(message.state);
   pose.reason = Bounded(message.reason);
   pose.num_tracked = message.num_tracked;
-  if (state == pose_t::STATE_TRACKING) {
+  if (message.state == pose_t::STATE_TRACKING) {
     const Parsed<Rigid3> T_odom_body = Parse(message.T_odom_body);
     if (!map.value || !T_odom_body.value) {
       return {std::nullopt, "pose: " + map.refused + T_odom_body.refused};
