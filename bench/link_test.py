@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from link_lib.figures import LCM_SYNC, Row, keyframes, table  # noqa: E402
+from link_lib.figures import LCM_SYNC, Row, keyframes, rungs, status_counters, table  # noqa: E402
 from link_lib.plan import ROWS, Agent, jobs_of, session_yaml  # noqa: E402
 
 
@@ -39,7 +39,7 @@ class LinkTest(unittest.TestCase):
         write_log(session / "agent_1.lcm", 1, range(10))
         write_log(session / "session.lcm", 1, range(10), late_us=30_000)
         write_log(session / "journal.lcm", 1, journalled)
-        report = {"groups": [{"agents": [1]}], "ate_joint_m": ate, "agents": [{"bytes_up": 2000, "bytes_down": 100}],
+        report = {"groups": [{"agents": [1]}], "ate_joint_m": ate, "agents": [{"id": 1, "bytes_up": 2000, "bytes_down": 100}],
                   "fused_at": [{"change": "fused", "session_s": 7.53}]}
         (session / "report.json").write_text(json.dumps(report))
         return Row(job, self.options)
@@ -54,6 +54,23 @@ class LinkTest(unittest.TestCase):
         self.assertEqual((figures["keyframes_sent"], figures["keyframes_journalled"]), (10, 10))
         self.assertEqual((figures["late_median_s"], figures["fused_s"]), (0.03, 7.6))
         self.assertAlmostEqual(figures["bytes_up_over_keyframes"], 2000 / (10 * 132), places=3)
+
+    def test_a_status_of_an_uplink(self):
+        def text(value):
+            return struct.pack(">i", len(value) + 1) + value.encode() + b"\0"
+
+        data = bytes(8) + text("uplink_1") + bytes(20) + text("connected") + bytes(56)
+        data += struct.pack(">h", 1) + text("a reason") + struct.pack(">q", 9)
+        data += struct.pack(">h", 2) + text("rung") + struct.pack(">q", 3) + text("bytes_up") + struct.pack(">q", 70_000)
+        self.assertEqual(status_counters(data), {"rung": 3, "bytes_up": 70_000})
+        self.assertEqual(rungs([(0, {"rung": 3}), (1, {"rung": 4}), (2, {})]), (3.5, 4))
+
+    def test_a_budget_costs_accuracy_but_no_keyframe(self):
+        perfect = self.row("perfect", range(10), 0.010)
+        coarse, torn = self.row("budget_10", range(10), 0.030), self.row("budget_20", range(9), 0.010)
+        rows = [perfect, coarse, torn]
+        self.assertEqual([row.passes(rows) for row in rows], [True, True, False])
+        self.assertIn("budget_kb_per_s: 10, link: {seed: 1}", session_yaml(self.options, ROWS["budget_10"]))
 
     def test_passes_only_whole_and_the_same(self):
         perfect = self.row("perfect", range(10), 0.010)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from accuracy_lib.jobs import OUT, Command, Job
 
-# One factor at a time; both directions of every agent's link. The first one is what the others are compared with.
+# One factor at a time; both directions of every agent's link, or every agent's budget. The first one is what the others are compared with.
 ROWS = {
     "perfect": "",
     "loss_1": "loss: 0.01",
@@ -19,6 +19,9 @@ ROWS = {
     "reorder_5": "reorder: 0.05",
     "duplicate_5": "duplicate: 0.05",
     "partition_60": "partitions: [{at: 30, seconds: 60}]",
+    "budget_40": "budget_kb_per_s: 40",
+    "budget_20": "budget_kb_per_s: 20",
+    "budget_10": "budget_kb_per_s: 10",
 }
 SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
 
@@ -30,6 +33,10 @@ class Agent:
     recording: Path
 
 
+def is_budget(conditions):
+    return conditions.startswith("budget")
+
+
 def session_yaml(options, conditions):
     lines = ["agents:"]
     for index, agent in enumerate(options.agents):
@@ -37,7 +44,10 @@ def session_yaml(options, conditions):
         keys = [f"id: {agent.id}", f"recording: {agent.recording.resolve()}", f"keyframes: {agent.keyframes.resolve()}",
                 f"delay: {SECOND_STARTS_AFTER_S * index}"]
         keys += [f"duration: {options.seconds:g}"] if options.seconds else []
-        keys.append(f"link: {{{', '.join(filter(None, [conditions, seed]))}}}")
+        if is_budget(conditions):
+            keys += [conditions, f"link: {{{seed}}}"]
+        else:
+            keys.append(f"link: {{{', '.join(filter(None, [conditions, seed]))}}}")
         lines.append(f"  - {{{', '.join(keys)}}}")
     return "\n".join(lines) + "\n"
 

@@ -1,8 +1,10 @@
 #include "agent_handler/agent_handler.h"
 
 #include <algorithm>
+#include <memory>
 
 #include "common/link/compression.h"
+#include "common/link/map_continuity.h"
 
 namespace pangea {
 namespace {
@@ -14,7 +16,8 @@ constexpr int64_t kCorrectionRepeat_us = 300'000;
 // Corrections are remembered for the newest submaps only; an agent drives one at a time.
 constexpr size_t kMaxCorrections = kMaxLinkMaps;
 
-std::string CheckKeyframe(const KeyframeId& id, Bytes compressed) {
+// A repeat may differ: an uplink that was restarted may have thinned the keyframe otherwise.
+std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity* continuity) {
   const auto bytes = Decompress(compressed, kMaxKeyframeBytes);
   if (!bytes) {
     return "keyframe does not decompress";
@@ -27,13 +30,18 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes compressed) {
   if (!keyframe.value) {
     return keyframe.refused;
   }
-  return keyframe.value->id == id ? "" : "keyframe under another's id";
+  return keyframe.value->id == id ? continuity->Check(*keyframe.value, 0)
+                                  : "keyframe under another's id";
 }
 
 }  // namespace
 
 AgentHandler::AgentHandler(int32_t agent_id, const ReceiverOptions& options)
-    : agent_id_(agent_id), receiver_(options, CheckKeyframe) {}
+    : agent_id_(agent_id),
+      receiver_(options, [continuity = std::make_shared<MapContinuity>()](const KeyframeId& id,
+                                                                          Bytes bytes) {
+        return CheckKeyframe(id, bytes, continuity.get());
+      }) {}
 
 void AgentHandler::Resume(const MapId& map, int32_t journalled_seq) {
   receiver_.Resume(map, journalled_seq);

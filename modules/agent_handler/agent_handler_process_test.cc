@@ -3,8 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <random>
+#include <set>
 
 #include "agent_handler/link_test_world.h"
 #include "agent_handler/test_keyframes.h"
@@ -12,6 +17,7 @@
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
+#include "pangea/status_t.hpp"
 
 namespace pangea {
 namespace {
@@ -254,6 +260,97 @@ TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
   EXPECT_THAT(channels,
               testing::ElementsAre(testing::Pair("CONSTRAINT", 1), testing::Pair("KEYFRAME_1", 4),
                                    testing::Pair("PLACE_MATCH", 4)));
+}
+
+// A budget costs corners, never a keyframe: the chain of poses has no gap.
+TEST_F(LinkWorld, UnderABudgetKeyframesAreThinnedAndAllArrive) {
+  KillUplink();
+  options.budget_bytes_per_s = 20e3;
+  StartUplink();
+  status_t status{};
+  agent_bus.Subscribe("STATUS_uplink_1", [&](const std::string&, Bytes data) {
+    ASSERT_TRUE(DecodeMessage(data, &status));
+  });
+  for (int i = 0; i < 80; ++i) {
+    PublishKeyframes(1);
+    Run(0.5);
+  }
+  Run(10);
+  ASSERT_EQ(delivered.size(), 80u);
+  size_t bytes = 0, with_corners = 0;
+  for (int seq = 0; seq < 80; ++seq) {
+    keyframe_t message{};
+    ASSERT_TRUE(DecodeMessage(delivered[static_cast<size_t>(seq)], &message));
+    const auto keyframe = Parse(message);
+    ASSERT_TRUE(keyframe.value) << keyframe.refused;
+    EXPECT_EQ(keyframe.value->id.seq, seq);
+    EXPECT_EQ(keyframe.value->edge.has_value(), seq > 0);
+    bytes += delivered[static_cast<size_t>(seq)].size();
+    with_corners += keyframe.value->corners.empty() ? 0 : 1;
+  }
+  EXPECT_LT(static_cast<double>(bytes), 20e3 * 40 * 1.2) << "the first ones were full";
+  EXPECT_GE(with_corners, 20u);
+  const auto counter = [&](const std::string& name) {
+    const auto it = std::find_if(status.counters.begin(), status.counters.end(),
+                                 [&](const counter_t& c) { return c.name == name; });
+    return it == status.counters.end() ? -1 : it->count;
+  };
+  EXPECT_EQ(counter("budget_bytes_per_s"), 20'000);
+  EXPECT_GE(counter("rung"), 1);
+  EXPECT_GT(counter("keyframes_thinned"), 20);
+  EXPECT_THAT(status.summary, testing::HasSubstr(" of 20.0 kB/s, rung "));
+}
+
+// Each class of a hostile field shows by its reason in STATUS_*, and nothing else comes of it.
+TEST_F(LinkWorld, RefusalsShowInTheStatus) {
+  std::map<std::string, std::set<std::string>> refused;
+  const auto listen = [&](Bus& bus) {
+    bus.Subscribe("STATUS_.*", [&](const std::string& channel, Bytes data) {
+      status_t status{};
+      ASSERT_TRUE(DecodeMessage(data, &status));
+      for (const counter_t& reason : status.refused) {
+        refused[channel].insert(reason.name);
+      }
+    });
+  };
+  listen(agent_bus);
+  listen(server_bus);
+  PublishKeyframes(2);
+  Run(2);
+  const auto publish = [&](int32_t seq, const std::function<void(keyframe_t*)>& damage) {
+    keyframe_t message = ToMessage(TestKeyframe({kMap, seq}));
+    damage(&message);
+    PublishMessage(agent_bus, "KEYFRAME_1", message);
+  };
+  publish(2, [](keyframe_t* m) { m->v_odom_body.x = std::nan(""); });
+  publish(2, [](keyframe_t* m) {
+    m->T_odom_body.translation.z = std::numeric_limits<double>::infinity();
+  });
+  publish(2, [](keyframe_t* m) { m->camera.height = 1 << 30; });
+  publish(2, [](keyframe_t* m) { m->camera.fx += 1; });
+  publish(2, [](keyframe_t* m) { m->utime = 1; });
+  publish(1, [](keyframe_t* m) { m->v_odom_body.x += 1; });
+  PublishMessage(server_bus, "RESEND_REQUEST", resend_request_t{});
+  Constraint verdict;
+  verdict.from = {kMap, 0};
+  verdict.to = {kMap, 1};
+  constraint_t forged = ToMessage(verdict);
+  forged.id += 1;
+  PublishMessage(server_bus, "CONSTRAINT", forged);
+  link_bus.Publish("LINK_UP_1", std::vector<uint8_t>(50, 7));
+  Run(3);
+  EXPECT_THAT(refused["STATUS_uplink_1"],
+              testing::UnorderedElementsAre("velocity or biases out of range",
+                                            "T_odom_body: translation out of range",
+                                            "camera: image size must be 16 to 2047 pixels",
+                                            "keyframe with another camera than its map's",
+                                            "keyframe's time does not go forward with its seq",
+                                            "keyframe seq used again for another keyframe"));
+  EXPECT_THAT(refused["STATUS_agent_handler"],
+              testing::IsSupersetOf({"resend request: requester, map or range is invalid",
+                                     "constraint: id does not follow from its keyframes"}));
+  EXPECT_GE(refused["STATUS_agent_handler"].size(), 3u) << "and the link's noise";
+  ExpectDelivered(2);
 }
 
 // Noise, and every message with damaged bytes, on every channel that is listened to.

@@ -99,6 +99,21 @@ TEST_F(AgentHandlerTest, OldMapsAreToldInAnswerToAHello) {
   EXPECT_FALSE(handler.TakeAck(2 * kSecond).value().journalled_seq.contains(old));
 }
 
+// An agent that is not ours may send what our uplink would refuse.
+TEST_F(AgentHandlerTest, RefusesWhatCannotBeOfItsMap) {
+  const auto send = [&](const keyframe_t& message) {
+    return handler.OnPacket(WholeKeyframe(message.id.seq, Compress(EncodeMessage(message))));
+  };
+  EXPECT_EQ(send(ToMessage(TestKeyframe({kMap, 0}))), "");
+  keyframe_t other = ToMessage(TestKeyframe({kMap, 1}));
+  other.camera.fy += 1;
+  EXPECT_EQ(send(other), "keyframe with another camera than its map's");
+  other = ToMessage(TestKeyframe({kMap, 1}));
+  other.utime = 1;
+  EXPECT_EQ(send(other), "keyframe's time does not go forward with its seq");
+  EXPECT_EQ(send(ToMessage(TestKeyframe({kMap, 1}))), "");
+}
+
 TEST_F(AgentHandlerTest, TellsTheHighestCorrectionUntilItIsConfirmed) {
   Correction correction;
   correction.map = kMap;

@@ -2,34 +2,28 @@
 
 #include <algorithm>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
-#include "common/messages.h"
 
 namespace pangea {
-namespace {
 
-bool IsProcessName(const std::string& name) {
-  constexpr size_t kMaxName = 40;  // with AGAIN_ below LCM's 63 characters
-  return !name.empty() && name.size() <= kMaxName &&
-         std::all_of(name.begin(), name.end(), [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-         });
-}
-
-}  // namespace
-
-std::string ResendQueue::Add(const resend_request_t& m, const JournalIndex& index) {
-  const auto map = Parse(m.map);
-  if (!IsProcessName(m.requester) || !map.value || m.from_seq < 0 || m.to_seq < m.from_seq) {
-    return "resend request out of range";
+std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex& index) {
+  const auto parsed = Parse(message);
+  if (!parsed.value) {
+    return parsed.refused;
   }
-  Request request{m.requester, m.channel,  JournalChannel::kKeyframe,
-                  *map.value,  m.from_seq, std::min(m.to_seq, index.Highest(*map.value))};
-  if (m.channel == channels::kPlaceMatch) {
+  const auto& [map, from_seq, to_seq] = parsed.value->range;
+  Request request{parsed.value->requester,
+                  parsed.value->channel,
+                  JournalChannel::kKeyframe,
+                  map,
+                  from_seq,
+                  std::min(to_seq, index.Highest(map))};
+  if (request.channel_name == channels::kPlaceMatch) {
     request.channel = JournalChannel::kPlaceMatch;
-  } else if (m.channel == channels::kConstraint) {
+  } else if (request.channel_name == channels::kConstraint) {
     request.channel = JournalChannel::kConstraint;
-  } else if (m.channel != channels::Keyframe(map.value->agent_id)) {
+  } else if (request.channel_name != channels::Keyframe(map.agent_id)) {
     return "resend request for a channel that is not journalled";
   }
   const bool covered = std::any_of(requests_.begin(), requests_.end(), [&](const Request& r) {

@@ -135,8 +135,9 @@ std::optional<std::string> CameraModel::Invalid() const {
   if (!(fx > 1 && fx < 1e5 && fy > 1 && fy < 1e5)) {
     return "focal lengths must be between 1 and 1e5 pixels";
   }
-  if (!(std::isfinite(cx) && std::isfinite(cy) && distortion.allFinite())) {
-    return "principal point and distortion must be finite";
+  if (!(std::abs(cx) < 1e5 && std::abs(cy) < 1e5) || !distortion.allFinite() ||
+      distortion.cwiseAbs().maxCoeff() > 1e3) {
+    return "principal point or distortion out of range";
   }
   if (!T_body_cam.t.allFinite() || !(std::abs(T_body_cam.q.norm() - 1) < 1e-6)) {
     return "T_body_cam must be a finite rigid transform";

@@ -14,6 +14,7 @@ using namespace messages_checks;
 namespace {
 
 constexpr size_t kMaxText = 500;
+constexpr int16_t kMaxChunks = 2000;  // a million keyframes
 
 }  // namespace
 
@@ -156,7 +157,6 @@ Parsed<KeyframeId> Parse(const keyframe_id_t& m) {
   if (!map.value) {
     return Refused<KeyframeId>(map.refused);
   }
-  constexpr int32_t kMaxSeq = 10'000'000;
   if (m.seq < 0 || m.seq > kMaxSeq) {
     return Refused<KeyframeId>("keyframe seq out of range");
   }
@@ -255,6 +255,9 @@ Parsed<Constraint> Parse(const constraint_t& m) {
   if (!T_from_to.value || !covariance) {
     return Refused<Constraint>("constraint: transform or covariance is invalid");
   }
+  if (m.num_inliers < 0 || !std::isfinite(m.inlier_ratio) || !std::isfinite(m.rms_px)) {
+    return Refused<Constraint>("constraint: inliers or error out of range");
+  }
   Constraint constraint;
   constraint.from = *from.value;
   constraint.to = *to.value;
@@ -277,7 +280,7 @@ Parsed<Correction> Parse(const correction_t& m) {
   const auto group = Parse(m.group);
   const auto T_map_odom = Parse(m.T_map_odom);
   const auto covariance = ToCovariance<6>(m.covariance);
-  if (!map.value || !group.value || m.seq < 0 || m.revision < 1) {
+  if (!map.value || !group.value || m.seq < 0 || m.seq > kMaxSeq || m.revision < 1) {
     return Refused<Correction>("correction: invalid ids, seq or revision");
   }
   if (!T_map_odom.value || !covariance) {
@@ -289,7 +292,7 @@ Parsed<Correction> Parse(const correction_t& m) {
 
 Parsed<MapState> Parse(const map_state_t& m) {
   const auto group = Parse(m.group);
-  if (!group.value || m.revision < 1 || m.chunk < 0 || m.num_chunks < 1 ||
+  if (!group.value || m.revision < 1 || m.chunk < 0 || m.num_chunks > kMaxChunks ||
       m.chunk >= m.num_chunks) {
     return Refused<MapState>("map state: invalid group, revision or chunk");
   }

@@ -15,6 +15,8 @@ namespace pangea::messages_checks {
 
 // Nothing in a building is further than this from where its agent started, metres.
 inline constexpr double kMaxDistance = 1e5;
+// Keyframes of one map: months of walking.
+inline constexpr int32_t kMaxSeq = 10'000'000;
 
 template <typename T>
 Parsed<T> Refused(std::string reason) {

@@ -11,6 +11,8 @@ using namespace messages_checks;
 namespace {
 
 constexpr double kPixelScale = 16.0;
+// Of position to accelerometer bias, half the duration squared, after an hour.
+constexpr double kMaxBiasJacobian = 1e7;
 
 preintegration_t ToMessage(const Preintegration& p) {
   preintegration_t m{};
@@ -41,8 +43,8 @@ Parsed<Preintegration> Parse(const preintegration_t& m) {
   const auto covariance = ToCovariance<9>(m.covariance);
   if (!(p.duration_s > 0 && p.duration_s < 3600) || !(std::abs(p.delta_q.norm() - 1) < 1e-3) ||
       !Bounded(p.delta_v, kMaxDistance) || !Bounded(p.delta_p, kMaxDistance) ||
-      !p.bias_jacobian.allFinite() || !Bounded(p.gyro_bias, 10) || !Bounded(p.accel_bias, 100) ||
-      !covariance) {
+      !p.bias_jacobian.allFinite() || p.bias_jacobian.cwiseAbs().maxCoeff() > kMaxBiasJacobian ||
+      !Bounded(p.gyro_bias, 10) || !Bounded(p.accel_bias, 100) || !covariance) {
     return Refused<Preintegration>("preintegration out of range");
   }
   p.delta_q.normalize();

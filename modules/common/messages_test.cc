@@ -4,9 +4,11 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "common/bus/bus.h"
+#include "common/catch_up_messages.h"
 
 namespace pangea {
 namespace {
@@ -95,6 +97,13 @@ TEST(Messages, BadKeyframesAreRefusedWithAReason) {
       [](keyframe_t* m) { m->utime = -5; },
       [&](keyframe_t* m) { m->camera.fx = nan; },
       [](keyframe_t* m) { m->camera.model = 9; },
+      [](keyframe_t* m) { m->camera.cx = 1e300; },
+      [&](keyframe_t* m) { m->camera.distortion[2] = -1e10; },
+      [](keyframe_t* m) { m->camera.width = 1 << 20; },
+      [](keyframe_t* m) { m->camera.readout_s = std::numeric_limits<double>::infinity(); },
+      [&](keyframe_t* m) { m->v_odom_body.y = nan; },
+      [](keyframe_t* m) { m->preintegration.bias_jacobian[3] = 1e200; },
+      [](keyframe_t* m) { m->num_corners = 701; },
       [](keyframe_t* m) { m->T_odom_body.rotation.w += 1; },
       [&](keyframe_t* m) { m->T_odom_body.translation.x = nan; },
       [](keyframe_t* m) { m->T_odom_body.translation.x = 1e9; },
@@ -135,8 +144,21 @@ TEST(Messages, ConstraintRoundTripAndForgedId) {
   ASSERT_TRUE(parsed.value) << parsed.refused;
   EXPECT_EQ(parsed.value->Id(), in.Id());
   EXPECT_DOUBLE_EQ(parsed.value->covariance(0, 1), 0.3);
-  message.id += 1;
-  EXPECT_FALSE(Parse(message).value);
+  const std::vector<std::function<void(constraint_t*)>> damages = {
+      [](constraint_t* m) { m->id += 1; },
+      [](constraint_t* m) { m->rms_px = std::nanf(""); },
+      [](constraint_t* m) { m->inlier_ratio = std::numeric_limits<float>::infinity(); },
+      [](constraint_t* m) { m->num_inliers = -1; },
+      [](constraint_t* m) { m->kind = 7; },
+      [](constraint_t* m) { m->T_from_to.translation.z = 1e30; },
+      [](constraint_t* m) { m->covariance[7] = std::nan(""); },
+      [](constraint_t* m) { m->to = m->from; },
+  };
+  for (size_t i = 0; i < damages.size(); ++i) {
+    constraint_t bad = message;
+    damages[i](&bad);
+    EXPECT_FALSE(Parse(bad).refused.empty()) << "damage " << i;
+  }
 }
 
 TEST(Messages, PlaceMatchRoundTrip) {
@@ -169,6 +191,44 @@ TEST(Messages, MapStateIsCutIntoChunks) {
   }
   EXPECT_EQ(messages.size(), 3u);
   EXPECT_EQ(total, 1234u);
+}
+
+TEST(Messages, HaveAndResendRequestAreBounded) {
+  have_t have{};
+  have.num_maps = have.num_gaps = 1;
+  have.maps = {ToMessage(MapId{1, 100})};
+  have.highest_seq = {7};
+  have.gaps.resize(1);
+  have.gaps[0].map = have.maps[0];
+  have.gaps[0].from_seq = 2;
+  have.gaps[0].to_seq = 3;
+  const auto parsed = Parse(ThroughBytes(have));
+  ASSERT_TRUE(parsed.value) << parsed.refused;
+  EXPECT_EQ(parsed.value->highest_seq.at(0), std::pair(MapId{1, 100}, 7));
+  EXPECT_EQ(parsed.value->gaps.at(0).to_seq, 3);
+  const std::vector<std::function<void(have_t*)>> damages = {
+      [](have_t* m) { m->highest_seq[0] = std::numeric_limits<int32_t>::max(); },
+      [](have_t* m) { m->highest_seq[0] = -1; },
+      [](have_t* m) { m->maps[0].agent_id = 0; },
+      [](have_t* m) { m->gaps[0].to_seq = std::numeric_limits<int32_t>::max(); },
+      [](have_t* m) { m->gaps[0].from_seq = 4; },
+      [](have_t* m) { m->gaps[0].from_seq = -4; },
+  };
+  for (size_t i = 0; i < damages.size(); ++i) {
+    have_t bad = have;
+    damages[i](&bad);
+    EXPECT_FALSE(Parse(bad).refused.empty()) << "damage " << i;
+  }
+  resend_request_t request{};
+  request.requester = "fusion";
+  request.map = ToMessage(MapId{1, 100});
+  request.to_seq = std::numeric_limits<int32_t>::max();
+  ASSERT_TRUE(Parse(request).value);
+  EXPECT_LT(Parse(request).value->range.to_seq, 1 << 30);
+  for (const char* name : {"", "a b", "AGAIN_0123456789012345678901234567890123456789"}) {
+    request.requester = name;
+    EXPECT_FALSE(Parse(request).refused.empty()) << name;
+  }
 }
 
 TEST(Messages, CorrectionRoundTrip) {

@@ -8,9 +8,10 @@ namespace pangea {
 std::optional<MapState> StateChunks::Add(int chunk, int num_chunks, MapState part) {
   const std::pair key(part.revision, part.group);
   auto& chunks = pending_[key];
-  chunks.emplace(chunk, std::move(part));
+  num_chunks_ += chunks.emplace(chunk, std::move(part)).second ? 1 : 0;
   if (chunks.size() < static_cast<size_t>(num_chunks)) {
-    if (pending_.size() > kMaxPending) {
+    if (pending_.size() > kMaxPending || num_chunks_ > kMaxChunks) {
+      num_chunks_ -= pending_.begin()->second.size();
       pending_.erase(pending_.begin());
     }
     return std::nullopt;
@@ -19,6 +20,7 @@ std::optional<MapState> StateChunks::Add(int chunk, int num_chunks, MapState par
   for (auto it = std::next(chunks.begin()); it != chunks.end(); ++it) {
     std::ranges::move(it->second.keyframes, std::back_inserter(whole.keyframes));
   }
+  num_chunks_ -= chunks.size();
   pending_.erase(key);
   return whole;
 }

@@ -46,5 +46,13 @@ TEST(StateChunks, StatesThatNeverGetWholeAreForgotten) {
   EXPECT_TRUE(chunks.Add(1, 2, Part(999, 1)).has_value());
 }
 
+TEST(StateChunks, StatesOfMoreChunksThanFitAreForgotten) {
+  StateChunks chunks;
+  for (int i = 0; i < 6 * 1999; ++i) {
+    EXPECT_FALSE(chunks.Add(i % 1999, 2000, Part(1 + i / 1999, i)).has_value());
+  }
+  EXPECT_EQ(chunks.pending(), StateChunks::kMaxChunks / 1999);
+}
+
 }  // namespace
 }  // namespace pangea

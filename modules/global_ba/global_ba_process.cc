@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
 
@@ -82,30 +83,25 @@ void GlobalBaProcess::OnMapState(const map_state_t& message) {
 }
 
 void GlobalBaProcess::OnHave(const have_t& message) {
-  for (int i = 0; i < message.num_maps; ++i) {
-    const Parsed<MapId> map = Parse(message.maps[i]);
-    if (!map.value || message.highest_seq[i] < 0) {
-      node_.Refuse("have: invalid map or seq");
-      continue;
-    }
-    keyframes_.Announce(*map.value, message.highest_seq[i]);
-    matches_.Announce(*map.value, message.highest_seq[i]);
+  const Parsed<Have> have = Parse(message);
+  if (!have.value) {
+    node_.Refuse(have.refused);
+    return;
+  }
+  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+    keyframes_.Announce(map, highest_seq);
+    matches_.Announce(map, highest_seq);
     // What was judged before this process started.
-    if (verdicts_asked_.insert(*map.value).second) {
-      for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
+    if (verdicts_asked_.insert(map).second) {
+      for (int32_t seq = 0; seq <= highest_seq; seq += kMaxVerdictsAsked) {
         AskAgain(node_, std::string(channels::kConstraint),
-                 {*map.value, seq, seq + kMaxVerdictsAsked - 1});
+                 {map, seq, seq + kMaxVerdictsAsked - 1});
       }
     }
   }
-  for (const seq_gap_t& gap : message.gaps) {
-    const Parsed<MapId> map = Parse(gap.map);
-    if (!map.value || gap.from_seq < 0 || gap.to_seq < gap.from_seq) {
-      node_.Refuse("have: invalid gap");
-      continue;
-    }
-    keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq});
-    matches_.Skip({*map.value, gap.from_seq, gap.to_seq});
+  for (const SeqGap& gap : have.value->gaps) {
+    keyframes_.Skip(gap);
+    matches_.Skip(gap);
   }
 }
 

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
 
@@ -110,23 +110,20 @@ void PlaceRecognitionProcess::ReleaseHeld() {
 }
 
 void PlaceRecognitionProcess::OnHave(const have_t& message) {
-  for (int i = 0; i < message.num_maps; ++i) {
-    const auto map = Parse(message.maps[i]);
-    if (!map.value) {
-      node_.Refuse(map.refused);
-      continue;
-    }
+  const Parsed<Have> have = Parse(message);
+  if (!have.value) {
+    node_.Refuse(have.refused);
+    return;
+  }
+  for (const auto& [map, highest_seq] : have.value->highest_seq) {
     // A map we know nothing of, yet the journal does: we are the one who came late.
-    if (keyframes_.next(*map.value) == 0 && message.highest_seq[i] >= 0) {
+    if (keyframes_.next(map) == 0) {
       catching_up_ = true;
     }
-    keyframes_.Announce(*map.value, message.highest_seq[i]);
+    keyframes_.Announce(map, highest_seq);
   }
-  for (const seq_gap_t& gap : message.gaps) {
-    if (const auto map = Parse(gap.map);
-        map.value && gap.to_seq < std::numeric_limits<int32_t>::max()) {
-      HandleAll(keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq}));
-    }
+  for (const SeqGap& gap : have.value->gaps) {
+    HandleAll(keyframes_.Skip(gap));
   }
 }
 
@@ -160,16 +157,21 @@ void PlaceRecognitionProcess::OnMapState(const map_state_t& message) {
 }
 
 void PlaceRecognitionProcess::OnResendRequest(const resend_request_t& message) {
-  const auto map = Parse(message.map);
-  if (message.channel != channels::kPlaceMatch || message.requester == node_.name() || !map.value) {
+  if (message.channel != channels::kPlaceMatch || message.requester == node_.name()) {
     return;
   }
-  const auto sent = sent_.find(*map.value);
+  const Parsed<ResendRequest> request = Parse(message);
+  if (!request.value) {
+    node_.Refuse(request.refused);
+    return;
+  }
+  const SeqGap& range = request.value->range;
+  const auto sent = sent_.find(range.map);
   if (sent == sent_.end()) {
     return;
   }
-  for (auto it = sent->second.lower_bound(message.from_seq);
-       it != sent->second.end() && it->first <= message.to_seq; ++it) {
+  for (auto it = sent->second.lower_bound(range.from_seq);
+       it != sent->second.end() && it->first <= range.to_seq; ++it) {
     again_t again{};
     again.channel = channels::kPlaceMatch;
     again.data.resize(it->second.getEncodedSize());

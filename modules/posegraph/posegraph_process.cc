@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
 
@@ -130,22 +131,22 @@ void PoseGraphProcess::OnRefinement(const map_state_t& message) {
 }
 
 void PoseGraphProcess::OnHave(const have_t& message) {
-  for (int i = 0; i < message.num_maps; ++i) {
-    const Parsed<MapId> map = Parse(message.maps[i]);
-    if (!map.value || message.highest_seq[i] < 0) {
-      node_.Refuse("have: invalid map or seq");
-      continue;
-    }
-    graph_.NoteMap(*map.value);
+  const Parsed<Have> have = Parse(message);
+  if (!have.value) {
+    node_.Refuse(have.refused);
+    return;
+  }
+  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+    graph_.NoteMap(map);
     // What was judged before this process started.
-    if (verdicts_asked_.insert(*map.value).second) {
-      for (int32_t seq = 0; seq <= message.highest_seq[i]; seq += kMaxVerdictsAsked) {
+    if (verdicts_asked_.insert(map).second) {
+      for (int32_t seq = 0; seq <= highest_seq; seq += kMaxVerdictsAsked) {
         AskAgain(node_, std::string(channels::kConstraint),
-                 {*map.value, seq, seq + kMaxVerdictsAsked - 1});
+                 {map, seq, seq + kMaxVerdictsAsked - 1});
       }
     }
-    keyframes_.Announce(*map.value, message.highest_seq[i]);
-    matches_.Announce(*map.value, message.highest_seq[i]);
+    keyframes_.Announce(map, highest_seq);
+    matches_.Announce(map, highest_seq);
   }
 }
 

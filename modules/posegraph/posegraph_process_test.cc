@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "common/channels.h"
@@ -301,6 +302,21 @@ TEST(PoseGraphProcess, AfterARestartItAsksForWhatTheJournalHas) {
     server.Send(keyframe);
   }
   EXPECT_EQ(server.states.back().revision, 1'000'000);
+}
+
+// It would ask for two thousand million verdicts, and never come to an end.
+TEST(PoseGraphProcess, AnAbsurdHaveIsRefused) {
+  Server server;
+  have_t have{};
+  have.num_maps = 1;
+  have.maps = {ToMessage(MapId{1, 100})};
+  have.highest_seq = {std::numeric_limits<int32_t>::max()};
+  PublishMessage(server.bus, "HAVE", have);
+  server.bus.Drain();
+  server.Tick(20);
+  EXPECT_TRUE(server.requests.empty());
+  ASSERT_EQ(server.status.num_refused, 1);
+  EXPECT_EQ(server.status.refused[0].name, "have: invalid map or seq");
 }
 
 TEST(PoseGraphProcess, RefusesWhatIsNotValid) {

@@ -65,6 +65,11 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
           "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
           file, agent.id));
     }
+    if (!(agent.budget_kb_per_s == 0 ||
+          (agent.budget_kb_per_s >= 5 && agent.budget_kb_per_s < 1e6))) {
+      throw std::runtime_error(fmt::format(
+          "{}: agent {}: budget_kb_per_s must be at least 5, or 0 for no bound", file, agent.id));
+    }
     if (const auto invalid = agent.link ? agent.link->Invalid() : std::nullopt) {
       throw std::runtime_error(fmt::format("{}: agent {}: link: {}", file, agent.id, *invalid));
     }
@@ -99,6 +104,7 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
     item.Add("start", &agent.start_s);
     item.Add("duration", &agent.duration_s);
     item.Add("keyframes", &agent.keyframes);
+    item.Add("budget_kb_per_s", &agent.budget_kb_per_s);
     item.AddOptional("link", &agent.link,
                      [](YamlOptions& link, LinkConditions& conditions) { Bind(link, conditions); });
   });

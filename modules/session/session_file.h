@@ -31,6 +31,7 @@ struct AgentScript {
   // file; empty for none.
   std::string keyframes;
   std::optional<LinkConditions> link;  // a bad link of its own to the server
+  double budget_kb_per_s = 0;          // what its uplink may send, kB/s; 0: no bound
   std::filesystem::path resolved;      // the recording's folder, found; empty without a recording
   std::filesystem::path resolved_keyframes;
 };

@@ -52,6 +52,16 @@ TEST_F(SessionFileTest, ReadsAgentsAndFindsRecordings) {
   EXPECT_EQ(script.agents[1].duration_s, 60);
 }
 
+TEST_F(SessionFileTest, ReadsABudget) {
+  const std::string agent =
+      "agents:\n  - {id: 1, recording: ../recordings/MH_01, budget_kb_per_s: ";
+  EXPECT_EQ(ReadSessionFile(Write(agent + "20}\n"), std::nullopt).agents[0].budget_kb_per_s, 20);
+  for (const char* bad : {"1", "-20", ".nan", ".inf"}) {
+    EXPECT_THAT(ErrorOf(agent + bad + "}\n"), HasSubstr("budget_kb_per_s must be at least 5"))
+        << bad;
+  }
+}
+
 TEST_F(SessionFileTest, ReadsLinkAndKeyframes) {
   std::ofstream(folder_ / "sessions" / "one.lcm") << "log";
   const SessionScript script =

@@ -166,7 +166,8 @@ class Runner {
       }
       Keep(fmt::format("uplink_{}", id),
            {Program("pangea-uplink"), "--agent", std::to_string(id), "--key", KeyFile(id).string(),
-            "--bus", bus, "--link", buses_.LinkOf(id)});
+            "--bus", bus, "--link", buses_.LinkOf(id), "--budget",
+            fmt::format("{}", player.script.budget_kb_per_s)});
     }
   }
 

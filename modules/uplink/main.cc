@@ -27,9 +27,14 @@ int main(int argc, char** argv) {
   app.add_option("--spool-bytes", options.sender.max_spool_bytes,
                  "unacknowledged keyframes kept; beyond it the newest are not taken")
       ->capture_default_str();
+  double budget_kb_per_s = 0;
+  app.add_option("--budget", budget_kb_per_s,
+                 "kB/s that may be sent; keyframes are thinned to fit (0: no bound)")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
-    if (const auto invalid = options.sender.Invalid()) {
+    options.budget_bytes_per_s = 1000 * budget_kb_per_s;
+    if (const auto invalid = options.Invalid()) {
       throw std::runtime_error(*invalid);
     }
     pangea::LcmBus agent_bus(bus);

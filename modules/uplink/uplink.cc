@@ -21,10 +21,31 @@ constexpr int kMaxUnanswered = 30;
 // forgotten. Fewer than there are slots.
 constexpr size_t kMaxMaps = 200;
 
+// A pose's packet on the wire, and what poses may take of a budget.
+constexpr double kPoseBytes = 180;
+constexpr double kPoseShare = 0.05;
+constexpr double kMinBudget = 5000;  // bare keyframes alone take 3 kB/s
+
 }  // namespace
 
+std::optional<std::string> UplinkOptions::Invalid() const {
+  if (budget_bytes_per_s != 0 && !(budget_bytes_per_s >= kMinBudget)) {
+    return "the budget must be at least 5 kB/s, or 0 for none";
+  }
+  return sender.Invalid();
+}
+
+UplinkOptions WithinBudget(UplinkOptions options) {
+  if (const double budget = options.budget_bytes_per_s; budget > 0) {
+    options.sender.rate_bytes_per_s =
+        std::min(options.sender.rate_bytes_per_s, (1 - kPoseShare) * budget);
+    options.pose_hz = std::min(options.pose_hz, kPoseShare * budget / kPoseBytes);
+  }
+  return options;
+}
+
 Uplink::Uplink(std::string software, const UplinkOptions& options)
-    : software_(std::move(software)), options_(options), sender_(options.sender) {}
+    : software_(std::move(software)), options_(WithinBudget(options)), sender_(options_.sender) {}
 
 Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);
@@ -42,12 +63,16 @@ Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   return it->second;
 }
 
-Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes,
-                                  int64_t now_us) {
+bool Uplink::Hear(const KeyframeId& id, int64_t now_us) {
   Map& map = FindOrAdd(id.map);
   map.heard_us = now_us;
   map.highest = std::max(map.highest, id.seq);
-  if (id.seq < map.next || sender_.Has(id)) {
+  return id.seq >= map.next && !sender_.Has(id);
+}
+
+Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes,
+                                  int64_t now_us) {
+  if (!Hear(id, now_us)) {
     return Taken::kRepeat;
   }
   return sender_.Add(id, std::move(bytes)) ? Taken::kNew : Taken::kSpoolFull;

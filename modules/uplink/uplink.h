@@ -20,13 +20,24 @@ namespace pangea {
 struct UplinkOptions {
   SenderOptions sender;
   double pose_hz = 10;  // poses sent up at most this often; 0 for none
+  // Bytes a second that the agent may send, packets and repeats included; 0 for no bound. Keyframes
+  // are thinned to fit (ladder.h), poses sent more seldom.
+  double budget_bytes_per_s = 0;
+
+  // Why the options cannot be used, or nothing.
+  std::optional<std::string> Invalid() const;
 };
+
+// With the pace and the poses that the budget allows.
+UplinkOptions WithinBudget(UplinkOptions options);
 
 class Uplink {
  public:
   // `software`: for people.
   Uplink(std::string software, const UplinkOptions& options);
 
+  // The agent has published it; whether it is still to be taken.
+  bool Hear(const KeyframeId& id, int64_t now_us);
   enum class Taken { kNew, kRepeat, kSpoolFull };
   // A keyframe_t that has passed Parse, encoded and compressed.
   Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);

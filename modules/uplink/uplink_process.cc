@@ -2,12 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <functional>
+#include <string_view>
+
 #include "common/channels.h"
 #include "common/link/compression.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
+#include "uplink/thin.h"
 
 namespace pangea {
 namespace {
@@ -18,6 +23,10 @@ constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
+size_t Checksum(Bytes data) {
+  return std::hash<std::string_view>{}({reinterpret_cast<const char*>(data.data()), data.size()});
+}
+
 }  // namespace
 
 UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
@@ -27,6 +36,9 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
       uplink_(kSoftware, options) {
+  if (options.budget_bytes_per_s > 0) {
+    ladder_.emplace(options.budget_bytes_per_s);
+  }
   agent_bus.Subscribe(channels::Keyframe(agent_id),
                       [this](const std::string&, Bytes data) { OnKeyframe(data); });
   agent_bus.Subscribe(channels::Pose(agent_id),
@@ -54,17 +66,41 @@ void UplinkProcess::OnKeyframe(Bytes data) {
   if (keyframe.value->id.map.agent_id != agent_id_) {
     return node_.Refuse("another agent's keyframe");
   }
-  std::vector<uint8_t> compressed = Compress(data);
+  if (const std::string reason = continuity_.Check(*keyframe.value, Checksum(data));
+      !reason.empty()) {
+    return node_.Refuse(reason);
+  }
+  if (!uplink_.Hear(keyframe.value->id, now_us_)) {
+    return node_.Count("keyframes_repeated");
+  }
+  std::vector<uint8_t> compressed = Compress(FitBudget(*keyframe.value, data));
   const auto compressed_bytes = static_cast<int64_t>(compressed.size());
   switch (uplink_.AddKeyframe(keyframe.value->id, std::move(compressed), now_us_)) {
     case Uplink::Taken::kNew:
       node_.Count("keyframe_bytes", compressed_bytes);
+      if (ladder_) {
+        ladder_->Charge(compressed_bytes);
+      }
       return node_.Count("keyframes");
     case Uplink::Taken::kRepeat:
       return node_.Count("keyframes_repeated");
     case Uplink::Taken::kSpoolFull:
       return node_.Count("keyframes_spool_full");
   }
+}
+
+std::vector<uint8_t> UplinkProcess::FitBudget(const Keyframe& keyframe, Bytes data) {
+  const size_t corners = keyframe.corners.size();
+  if (ladder_) {
+    const auto choice = ladder_->Next(now_us_, uplink_.sender().spooled_bytes());
+    const Keyframe thin = choice.bare ? Bare(keyframe) : Thinned(keyframe, choice.untracked);
+    if (thin.corners.size() < corners) {
+      node_.Count(choice.bare ? "keyframes_bare" : "keyframes_thinned");
+      node_.Count("corners_left_out", static_cast<int64_t>(corners - thin.corners.size()));
+      return EncodeMessage(ToMessage(thin));
+    }
+  }
+  return {data.begin(), data.end()};
 }
 
 void UplinkProcess::OnPose(Bytes data) {
@@ -108,6 +144,7 @@ void UplinkProcess::Send(const LinkPacket& packet) {
   const int on_the_wire = BytesOnTheWire(channel, bytes);
   node_.Count("packets_up");
   node_.Count("bytes_up", on_the_wire);
+  bytes_up_ += on_the_wire;
   node_.Count(packet.kind == LinkKind::kHello  ? "bytes_up_hellos"
               : packet.kind == LinkKind::kPose ? "bytes_up_poses"
                                                : "bytes_up_keyframes",
@@ -165,6 +202,23 @@ void UplinkProcess::PublishCorrections() {
   }
 }
 
+// Called once a second.
+std::string UplinkProcess::RateForPeople() {
+  constexpr double kSmoothing = 0.1;
+  const auto last_s = static_cast<double>(bytes_up_ - bytes_up_at_status_);
+  bytes_up_at_status_ = bytes_up_;
+  bytes_per_s_ += kSmoothing * (last_s - bytes_per_s_);
+  node_.Set("bytes_up_per_s", std::llround(bytes_per_s_));
+  if (!ladder_) {
+    return "";
+  }
+  node_.Set("budget_bytes_per_s", std::llround(ladder_->budget_bytes_per_s()));
+  node_.Set("rung", ladder_->rung());
+  return fmt::format(", {:.1f} of {:.1f} kB/s, rung {} of {}", 1e-3 * bytes_per_s_,
+                     1e-3 * ladder_->budget_bytes_per_s(), ladder_->rung(),
+                     RateLadder::kNumRungs - 1);
+}
+
 void UplinkProcess::Tick(int64_t now_utime) {
   if (now_utime < next_status_utime_) {
     return;
@@ -178,9 +232,9 @@ void UplinkProcess::Tick(int64_t now_utime) {
   node_.Set("spool", pending);
   node_.Set("spool_bytes", sender.spooled_bytes());
   node_.PublishStatus(now_utime, pending,
-                      fmt::format("{}, {} keyframes acknowledged, {} in the spool",
+                      fmt::format("{}, {} keyframes acknowledged, {} in the spool{}",
                                   uplink_.Connected(now_us_) ? "connected" : "handler is away",
-                                  uplink_.keyframes_acked(), pending));
+                                  uplink_.keyframes_acked(), pending, RateForPeople()));
 }
 
 }  // namespace pangea

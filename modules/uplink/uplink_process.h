@@ -5,10 +5,14 @@
 //              STATUS_uplink_k out
 //   link bus:  LINK_DOWN_k in, LINK_UP_k out
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "common/bus/node.h"
+#include "common/link/map_continuity.h"
 #include "common/link/poll_loop.h"
+#include "uplink/ladder.h"
 #include "uplink/uplink.h"
 
 namespace pangea {
@@ -25,16 +29,24 @@ class UplinkProcess : public PolledProcess {
   void OnKeyframe(Bytes data);
   void OnPose(Bytes data);
   void OnLinkDown(Bytes data);
+  // The keyframe's bytes as they are sent: all of them, or what the budget leaves.
+  std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
   void Send(const LinkPacket& packet);
   void PublishHave();
   void PublishAsks();
   void PublishCorrections();
+  std::string RateForPeople();
 
   const int32_t agent_id_;
   Bus& link_bus_;
   Node node_;
   UplinkSession session_;
+  MapContinuity continuity_;
   Uplink uplink_;
+  std::optional<RateLadder> ladder_;
+  int64_t bytes_up_ = 0;
+  int64_t bytes_up_at_status_ = 0;
+  double bytes_per_s_ = 0;  // sent, over the last ten seconds or so
   int64_t now_us_ = 0;
   int64_t next_have_us_ = 0;
   int64_t next_status_utime_ = 0;

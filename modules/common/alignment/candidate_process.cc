@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
 
@@ -62,30 +63,25 @@ void CandidateProcess::OnPlaceMatch(const place_match_t& message) {
 }
 
 void CandidateProcess::OnHave(const have_t& message) {
-  for (int i = 0; i < message.num_maps; ++i) {
-    const Parsed<MapId> map = Parse(message.maps[i]);
-    if (!map.value || message.highest_seq[i] < 0) {
-      node_.Refuse("have: invalid map or seq");
-      continue;
-    }
+  const Parsed<Have> have = Parse(message);
+  if (!have.value) {
+    node_.Refuse(have.refused);
+    return;
+  }
+  for (const auto& [map, highest_seq] : have.value->highest_seq) {
     // Verdicts of a former run: no need to repeat them.
-    if (verdicts_asked_.insert(*map.value).second) {
-      AskAgain(node_, std::string(channels::kConstraint), {*map.value, 0, message.highest_seq[i]});
+    if (verdicts_asked_.insert(map).second) {
+      AskAgain(node_, std::string(channels::kConstraint), {map, 0, highest_seq});
     }
-    keyframes_.Announce(*map.value, message.highest_seq[i]);
-    matches_.Announce(*map.value, message.highest_seq[i]);
+    keyframes_.Announce(map, highest_seq);
+    matches_.Announce(map, highest_seq);
   }
-  for (const seq_gap_t& gap : message.gaps) {
-    const Parsed<MapId> map = Parse(gap.map);
-    if (!map.value || gap.from_seq < 0 || gap.to_seq < gap.from_seq) {
-      node_.Refuse("have: invalid gap");
-      continue;
-    }
-    judge_->NoteLost(*map.value, gap.from_seq, gap.to_seq);
-    keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq});
-    matches_.Skip({*map.value, gap.from_seq, gap.to_seq});
+  for (const SeqGap& gap : have.value->gaps) {
+    judge_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
+    keyframes_.Skip(gap);
+    matches_.Skip(gap);
   }
-  if (message.num_gaps > 0) {
+  if (!have.value->gaps.empty()) {
     JudgeReady();
   }
 }

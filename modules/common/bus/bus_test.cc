@@ -2,10 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <limits>
 
 #include "common/bus/in_order.h"
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
+#include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 
 namespace pangea {
@@ -79,6 +83,42 @@ TEST(DecodeMessage, SurvivesDamage) {
     DecodeMessage(damaged, &out);
   }
   EXPECT_TRUE(DecodeMessage(bytes, &out));
+}
+
+void PutInt32(int32_t value, size_t at, std::vector<uint8_t>* bytes) {
+  for (size_t i = 0; i < 4; ++i) {
+    (*bytes)[at + i] = static_cast<uint8_t>(static_cast<uint32_t>(value) >> (24 - 8 * i));
+  }
+}
+
+int64_t PeakMemory_kB() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
+}
+
+// lcm-gen's decoders obey a count before they look what is left of the payload
+// (lcmtypes/harden.sed).
+TEST(DecodeMessage, HugeAndNegativeCountsNeitherAllocateNorReadBeyondTheEnd) {
+  again_t again{};
+  again.channel = "AB";
+  std::vector<uint8_t> bytes(again.getEncodedSize());
+  again.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  const int64_t before = PeakMemory_kB();
+  constexpr size_t kStringLength = 8, kCount = 8 + 4 + 3;
+  for (const int32_t value : {std::numeric_limits<int32_t>::min(), -2, -1, 1 << 30,
+                              std::numeric_limits<int32_t>::max()}) {
+    for (const size_t at : {kStringLength, kCount}) {
+      std::vector<uint8_t> hostile = bytes;
+      PutInt32(value, at, &hostile);
+      EXPECT_FALSE(DecodeMessage(hostile, &again)) << value << " at " << at;
+      EXPECT_LT(again.channel.size() + again.data.capacity(), 100u);
+    }
+  }
+  std::vector<uint8_t> hostile = bytes;
+  PutInt32(0, kStringLength, &hostile);
+  EXPECT_FALSE(DecodeMessage(hostile, &again)) << "a string has at least its end";
+  EXPECT_LT(PeakMemory_kB() - before, 100'000);
 }
 
 TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {

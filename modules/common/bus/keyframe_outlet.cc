@@ -1,26 +1,14 @@
 #include "common/bus/keyframe_outlet.h"
 
 #include <algorithm>
-#include <cctype>
 #include <string>
 
+#include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
 #include "pangea/again_t.hpp"
 
 namespace pangea {
-namespace {
-
-constexpr size_t kMaxRequesterLength = 40;
-
-bool IsProcessName(const std::string& name) {
-  return !name.empty() && name.size() <= kMaxRequesterLength &&
-         std::all_of(name.begin(), name.end(),
-                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
-}
-
-}  // namespace
-
 KeyframeOutlet::KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime)
     : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_heard_utime_(now_utime) {
   node_.Subscribe<have_t>(std::string(channels::kHave),
@@ -58,13 +46,17 @@ int64_t KeyframeOutlet::Unacknowledged() const {
 }
 
 void KeyframeOutlet::OnHave(const have_t& message) {
+  const Parsed<Have> have = Parse(message);
+  if (!have.value) {
+    node_.Refuse(have.refused);
+    return;
+  }
   uplink_heard_ = true;
   uplink_ever_heard_ = true;
-  for (int i = 0; i < message.num_maps; ++i) {
-    const Parsed<MapId> map = Parse(message.maps[static_cast<size_t>(i)]);
-    if (map.value && map.value->agent_id == agent_id_) {
-      int32_t& acknowledged = acknowledged_[*map.value];
-      acknowledged = std::max(acknowledged, message.highest_seq[static_cast<size_t>(i)] + 1);
+  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+    if (map.agent_id == agent_id_) {
+      int32_t& acknowledged = acknowledged_[map];
+      acknowledged = std::max(acknowledged, highest_seq + 1);
     }
   }
 }
@@ -73,15 +65,16 @@ void KeyframeOutlet::OnResendRequest(const resend_request_t& message) {
   if (message.channel != channels::Keyframe(agent_id_)) {
     return;
   }
-  const Parsed<MapId> map = Parse(message.map);
-  if (!map.value || !IsProcessName(message.requester)) {
-    node_.Refuse("resend request: map or requester is malformed");
+  const Parsed<ResendRequest> request = Parse(message);
+  if (!request.value) {
+    node_.Refuse(request.refused);
     return;
   }
+  const SeqGap& range = request.value->range;
   int answers = 0;
   for (const KeptKeyframe& keyframe : kept_) {
-    if (keyframe.id.map != *map.value || keyframe.id.seq < message.from_seq ||
-        keyframe.id.seq > message.to_seq) {
+    if (keyframe.id.map != range.map || keyframe.id.seq < range.from_seq ||
+        keyframe.id.seq > range.to_seq) {
       continue;
     }
     if (++answers > kMaxAnswers) {

@@ -1,0 +1,31 @@
+#pragma once
+
+// The border for what processes tell each other to catch up: what exists (have_t), and what is to
+// be sent again (resend_request_t). As in messages.h, past Parse every field is bounded.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/bus/in_order.h"
+#include "common/messages.h"
+#include "pangea/have_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+
+struct Have {
+  std::vector<std::pair<MapId, int32_t>> highest_seq;  // of each map
+  std::vector<SeqGap> gaps;                            // lost for good
+};
+
+struct ResendRequest {
+  std::string requester;  // a process name: the answers go to AGAIN_<requester>
+  std::string channel;
+  SeqGap range;
+};
+
+Parsed<Have> Parse(const have_t& message);
+Parsed<ResendRequest> Parse(const resend_request_t& message);
+
+}  // namespace pangea

@@ -1,0 +1,83 @@
+#pragma once
+
+// What the fuzz targets share. A target is one function of bytes, in a file fuzz_<name>.cc:
+// whatever the bytes, it must not crash, hang, leak or let memory grow, and what it accepts must
+// keep its promises (Require). Clang's libFuzzer drives it (scripts/fuzz); in every other build
+// replay_main.cc feeds it the corpus.
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/bus.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
+
+namespace pangea::fuzz {
+
+// Ends the process, and so is found, if it does not hold.
+void Require(bool holds, const char* promise);
+
+// One message of an input that is a sequence of them: a byte (low four bits: the channel, high
+// four: how much time passes first), two bytes of length, little-endian, and so many of payload. A
+// length beyond the input's end stops there.
+struct Event {
+  int channel = 0;
+  int64_t wait_us = 0;  // 1 ms to 33 s
+  std::vector<uint8_t> data;
+};
+std::vector<Event> Events(Bytes input);
+void AppendEvent(int channel, Bytes data, std::vector<uint8_t>* sequence);
+
+// The channels a target listens to, and the fingerprint of the type each carries, if it is one of
+// LCM's.
+struct Channel {
+  std::string name;
+  std::optional<int64_t> fingerprint;
+};
+template <typename Message>
+Channel ChannelOf(const std::string& name) {
+  return {name, Message::getHash()};
+}
+// Number of the channel in the table; -1 if it is not there.
+int Find(const std::vector<Channel>& table, const std::string& channel);
+
+// Overwrites the first eight bytes: with any other fingerprint decoding ends at once, and so would
+// nearly all inputs.
+void SetFingerprint(int64_t fingerprint, std::vector<uint8_t>* payload);
+
+// As LocalBus, but many times faster, since it knows no regular expressions but "[0-9]+" at the end
+// and ".*".
+class QuickBus : public Bus {
+ public:
+  void Publish(const std::string& channel, Bytes data) override;
+  void Subscribe(const std::string& channel_regex, Handler handler) override;
+  void Drain();
+
+ private:
+  struct Subscription {
+    std::string prefix;
+    bool whole = true;  // the channel's name is the prefix
+    Handler handler;
+  };
+  struct Message {
+    std::string channel;
+    std::vector<uint8_t> data;
+  };
+  std::deque<Subscription> subscriptions_;
+  std::deque<Message> messages_;
+};
+
+// Plays a sequence of messages to the processes on a bus.
+void Play(Bytes input, const std::vector<Channel>& table, QuickBus* bus,
+          const std::function<void(int64_t wait_us)>& poll);
+
+// A folder of this process alone, in memory where the machine has that; gone at the end.
+const std::filesystem::path& ScratchFolder();
+void WriteFile(const std::filesystem::path& file, Bytes bytes);
+
+}  // namespace pangea::fuzz

@@ -1,0 +1,63 @@
+// The agent_handler with a fresh journal, and everything it hears on the link and the server bus.
+
+#include "agent_handler/agent_handler_process.h"
+#include "common/link/agent_key.h"
+#include "fuzz.h"
+#include "link_channels.h"
+
+namespace pangea::fuzz {
+namespace {
+
+struct Files {
+  Files() {
+    std::filesystem::create_directories(keys);
+    MakeKeyFile(key, 1);
+  }
+  const std::filesystem::path keys = ScratchFolder() / "keys";
+  const std::filesystem::path key = keys / KeyFileName(1);
+  const std::filesystem::path journal = ScratchFolder() / "journal.lcm";
+};
+
+// Seals what a target's input says on HELLO, PIECE, ...
+class Agent {
+ public:
+  Agent(QuickBus* bus, const SecretKey& key) : session_(1, key) {
+    for (const LinkKind kind :
+         {LinkKind::kHello, LinkKind::kPiece, LinkKind::kLastPiece, LinkKind::kPose}) {
+      bus->Subscribe(ChannelOfKind(kind), [this, bus, kind](const std::string&, Bytes body) {
+        bus->Publish("LINK_UP_1", session_.Seal({kind, ++number_, {body.begin(), body.end()}}));
+      });
+    }
+    bus->Subscribe("LINK_DOWN_1",
+                   [this](const std::string&, Bytes packet) { session_.Open(packet); });
+    for (int i = 0; i < 2; ++i) {  // the second names the run that the first was told
+      bus->Publish("HELLO", Encode(LinkHello{}));
+      bus->Drain();
+    }
+  }
+
+ private:
+  UplinkSession session_;
+  int64_t number_ = 0;
+};
+
+}  // namespace
+}  // namespace pangea::fuzz
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace pangea;
+  static const fuzz::Files files;
+  static const SecretKey key = ReadKeyFileOf(files.key, 1);
+  std::filesystem::remove(files.journal);
+  fuzz::QuickBus bus;
+  AgentHandlerProcess process(bus, bus, files.journal.string(), files.keys.string(), 1'000'000,
+                              AgentHandlerOptions{});
+  const fuzz::Agent agent(&bus, key);
+  int64_t now_us = 1'000'000;
+  fuzz::Play({data, size}, fuzz::HandlerChannels(), &bus, [&](int64_t wait_us) {
+    now_us += wait_us;
+    process.Poll(now_us);
+    process.Tick(now_us);
+  });
+  return 0;
+}

@@ -1,0 +1,107 @@
+// Every other type with a Parse, and the bodies of link packets, by the first byte.
+
+#include <iterator>
+
+#include "common/catch_up_messages.h"
+#include "common/link/compression.h"
+#include "common/link/wire.h"
+#include "common/messages.h"
+#include "common/state_chunks.h"
+#include "fuzz.h"
+
+namespace pangea::fuzz {
+namespace {
+
+template <typename Message>
+void ParseBytes(std::vector<uint8_t> bytes) {
+  SetFingerprint(Message::getHash(), &bytes);
+  Message message{};
+  if (!DecodeMessage(bytes, &message)) {
+    return;
+  }
+  const auto parsed = Parse(message);
+  Require(parsed.value.has_value() == parsed.refused.empty(), "a refusal has a reason");
+  if (parsed.value) {
+    Require(Parse(ToMessage(*parsed.value)).value.has_value(), "accepted once, accepted again");
+  }
+}
+
+// In chunks.
+void ParseMapState(std::vector<uint8_t> bytes) {
+  SetFingerprint(map_state_t::getHash(), &bytes);
+  map_state_t message{};
+  if (!DecodeMessage(bytes, &message)) {
+    return;
+  }
+  if (auto parsed = Parse(message); parsed.value) {
+    StateChunks chunks;
+    if (const auto whole =
+            chunks.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+      for (const map_state_t& chunk : ToMessages(*whole)) {
+        Require(Parse(chunk).value.has_value(), "accepted once, accepted again");
+      }
+    }
+  }
+}
+
+template <typename Message>
+void ParseOnly(std::vector<uint8_t> bytes) {
+  SetFingerprint(Message::getHash(), &bytes);
+  Message message{};
+  if (DecodeMessage(bytes, &message)) {
+    const auto parsed = Parse(message);
+    Require(parsed.value.has_value() == parsed.refused.empty(), "a refusal has a reason");
+  }
+}
+
+void ParseHelloBody(std::vector<uint8_t> body) {
+  if (const auto hello = ParseHello(1, body); hello.value) {
+    Require(ParseHello(1, Encode(*hello.value)).value.has_value(), "accepted once, accepted again");
+  }
+}
+
+void ParseAckBody(std::vector<uint8_t> body) {
+  if (const auto ack = ParseAck(1, {LinkKind::kAck, 1, std::move(body)}); ack.value) {
+    Require(ParseAck(1, {LinkKind::kAck, 1, Encode(*ack.value)}).value.has_value(),
+            "accepted once, accepted again");
+  }
+}
+
+void ParsePoseBody(std::vector<uint8_t> body) {
+  if (const auto pose = ParsePose(1, body); pose.value) {
+    Require(ParsePose(1, EncodePose(*pose.value)).value.has_value(),
+            "accepted once, accepted again");
+  }
+}
+
+void DecompressAndParse(std::vector<uint8_t> bytes) {
+  if (const auto data = Decompress(bytes, kMaxKeyframeBytes)) {
+    Require(data->size() <= size_t{kMaxKeyframeBytes}, "no more than allowed");
+    Require(Decompress(Compress(*data), kMaxKeyframeBytes) == data, "there and back");
+  }
+}
+
+}  // namespace
+}  // namespace pangea::fuzz
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace pangea;
+  using namespace pangea::fuzz;
+  void (*const targets[])(std::vector<uint8_t>) = {
+      ParseBytes<camera_t>,
+      ParseBytes<place_match_t>,
+      ParseBytes<constraint_t>,
+      ParseBytes<correction_t>,
+      ParseMapState,
+      ParseOnly<have_t>,
+      ParseOnly<resend_request_t>,
+      ParseHelloBody,
+      ParseAckBody,
+      ParsePoseBody,
+      DecompressAndParse,
+  };
+  if (size > 0) {
+    targets[data[0] % std::size(targets)]({data + 1, data + size});
+  }
+  return 0;
+}

@@ -1,0 +1,30 @@
+// The server's processes together on one bus.
+
+#include "fusion/fusion_process.h"
+#include "fuzz.h"
+#include "global_ba/global_ba_process.h"
+#include "inter_map_ba/inter_map_ba_process.h"
+#include "place_recognition/place_recognition_process.h"
+#include "posegraph/posegraph_process.h"
+#include "server_channels.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace pangea;
+  fuzz::QuickBus bus;
+  PlaceRecognitionProcess place_recognition(bus, PlaceRecognitionOptions{});
+  InterMapBaProcess inter_map_ba(bus, InterMapBaOptions{});
+  FusionProcess fusion(bus, FusionOptions{});
+  PoseGraphProcess posegraph(bus, PoseGraphOptions{});
+  GlobalBaProcess global_ba(bus, GlobalBaOptions{});
+  int64_t now_us = 1'000'000;
+  fuzz::Play({data, size}, fuzz::ServerChannels(), &bus, [&](int64_t wait_us) {
+    now_us += wait_us;
+    for (Process* process : std::initializer_list<Process*>{&place_recognition, &inter_map_ba,
+                                                            &fusion, &posegraph, &global_ba}) {
+      process->Tick(now_us);
+    }
+  });
+  posegraph.Finish();
+  bus.Drain();
+  return 0;
+}

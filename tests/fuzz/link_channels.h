@@ -1,0 +1,68 @@
+#pragma once
+
+// What the two ends of the link listen to. What goes through the link is sealed, so that a
+// stranger's bytes end at the first check; HELLO, PIECE, ... are bodies that a harness seals with
+// the agent's key: what an agent or a server that has been taken over may send.
+
+#include <vector>
+
+#include "common/link/wire.h"
+#include "fuzz.h"
+#include "pangea/again_t.hpp"
+#include "pangea/constraint_t.hpp"
+#include "pangea/correction_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea::fuzz {
+
+inline const SecretKey& AgentKey() {
+  static const SecretKey key({1, 2, 3});
+  return key;
+}
+
+inline const std::vector<Channel>& HandlerChannels() {
+  static const std::vector<Channel> channels = {
+      {"LINK_UP_1", {}},
+      {"HELLO", {}},
+      {"PIECE", {}},
+      {"LAST_PIECE", {}},
+      {"POSE", {}},
+      ChannelOf<place_match_t>("PLACE_MATCH"),
+      ChannelOf<constraint_t>("CONSTRAINT"),
+      ChannelOf<correction_t>("CORRECTION_1"),
+      ChannelOf<resend_request_t>("RESEND_REQUEST"),
+      ChannelOf<again_t>("AGAIN_agent_handler"),
+  };
+  return channels;
+}
+
+inline const std::vector<Channel>& UplinkChannels() {
+  static const std::vector<Channel> channels = {
+      {"LINK_DOWN_1", {}},
+      {"ACK", {}},
+      ChannelOf<keyframe_t>("KEYFRAME_1"),
+      ChannelOf<pose_t>("POSE_1"),
+      ChannelOf<again_t>("AGAIN_uplink_1"),
+  };
+  return channels;
+}
+
+inline std::string ChannelOfKind(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::kHello:
+      return "HELLO";
+    case LinkKind::kPiece:
+      return "PIECE";
+    case LinkKind::kLastPiece:
+      return "LAST_PIECE";
+    case LinkKind::kPose:
+      return "POSE";
+    default:
+      return "ACK";
+  }
+}
+
+}  // namespace pangea::fuzz

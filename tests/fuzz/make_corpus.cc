@@ -1,0 +1,325 @@
+// Seeds for the fuzz targets, from a captured session: make_corpus LOG CORPUS_FOLDER
+//
+// Real messages with their keyframes cut down to a few corners, so that the seeds are small enough
+// for a repository and mutations hit fields, not descriptors.
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <map>
+
+#include "agent_handler/agent_handler.h"
+#include "agent_handler/journal.h"
+#include "common/alignment/alignment_yaml.h"
+#include "common/link/agent_key.h"
+#include "common/link/compression.h"
+#include "common/messages.h"
+#include "fuzz.h"
+#include "global_ba/global_ba_yaml.h"
+#include "link_channels.h"
+#include "posegraph/posegraph_yaml.h"
+#include "sensor_channels.h"
+#include "server_channels.h"
+#include "session/log_reader.h"
+#include "uplink/uplink.h"
+#include "vio/vio_yaml.h"
+
+namespace pangea::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+using Payload = std::vector<uint8_t>;
+
+constexpr size_t kCorners = 12;
+constexpr size_t kPoints = 4;
+
+struct Captured {
+  std::string channel;
+  Payload data;
+};
+
+Payload Small(const Payload& keyframe_bytes, size_t corners) {
+  keyframe_t message{};
+  Require(DecodeMessage(keyframe_bytes, &message), "the log's keyframes decode");
+  Keyframe keyframe = *Parse(message).value;
+  keyframe.corners.resize(std::min(keyframe.corners.size(), corners));
+  std::erase_if(keyframe.points, [&](const MapPoint& point) {
+    return point.corner >= static_cast<int>(keyframe.corners.size());
+  });
+  keyframe.points.resize(std::min(keyframe.points.size(), kPoints));
+  return EncodeMessage(ToMessage(keyframe));
+}
+
+Payload SmallState(const Payload& bytes) {
+  map_state_t message{};
+  Require(DecodeMessage(bytes, &message), "the log's map states decode");
+  message.keyframes.resize(std::min<size_t>(message.keyframes.size(), 4));
+  message.num_keyframes = static_cast<int16_t>(message.keyframes.size());
+  return EncodeMessage(message);
+}
+
+std::vector<Captured> ReadSmall(const std::string& log) {
+  std::vector<Captured> events;
+  session::ReadLog(log, [&](const session::LogEvent& event) {
+    Payload data(event.data.begin(), event.data.end());
+    if (event.channel.starts_with("KEYFRAME_")) {
+      data = Small(data, kCorners);
+    } else if (event.channel == "MAP_STATE") {
+      data = SmallState(data);
+    }
+    events.push_back({event.channel, std::move(data)});
+  });
+  return events;
+}
+
+const Payload& First(const std::vector<Captured>& events, const std::string& channel,
+                     int skip = 0) {
+  for (const Captured& event : events) {
+    if (event.channel == channel && skip-- == 0) {
+      return event.data;
+    }
+  }
+  throw std::runtime_error("the log has too little on " + channel);
+}
+
+class Corpus {
+ public:
+  explicit Corpus(fs::path folder) : folder_(std::move(folder)) {}
+  void Add(const std::string& target, const std::string& name, Bytes bytes) const {
+    fs::create_directories(folder_ / target);
+    WriteFile(folder_ / target / ("seed_" + name), bytes);
+  }
+  void AddText(const std::string& target, const std::string& name, const std::string& text) const {
+    Add(target, name, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+  }
+
+ private:
+  fs::path folder_;
+};
+
+// In the order of fuzz_messages.cc.
+void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
+  const Payload& first = First(events, "KEYFRAME_1");
+  keyframe_t keyframe{};
+  DecodeMessage(first, &keyframe);
+  const MapId map = Parse(keyframe.id).value->map;
+  LinkAck ack{1, 9, 100'000, {{map, 3}}, {{{map, 4}, {7}}}, {}};
+  correction_t correction{};
+  DecodeMessage(First(events, "CORRECTION_1"), &correction);
+  ack.corrections.push_back(*Parse(correction).value);
+  pose_t pose{};
+  DecodeMessage(First(events, "POSE_1", 50), &pose);
+  const std::vector<std::pair<std::string, Payload>> seeds = {
+      {"camera", EncodeMessage(keyframe.camera)},
+      {"place_match", First(events, "PLACE_MATCH", 40)},
+      {"constraint", First(events, "CONSTRAINT")},
+      {"correction", First(events, "CORRECTION_1")},
+      {"map_state", First(events, "MAP_STATE")},
+      {"have", First(events, "HAVE", 5)},
+      {"resend_request", First(events, "RESEND_REQUEST")},
+      {"hello", Encode(LinkHello{"software", {{map, 0, 0, 1}}})},
+      {"ack", Encode(ack)},
+      {"pose", EncodePose(pose)},
+      {"compressed", Compress(first)},
+  };
+  for (size_t i = 0; i < seeds.size(); ++i) {
+    Payload bytes{static_cast<uint8_t>(i)};
+    bytes.insert(bytes.end(), seeds[i].second.begin(), seeds[i].second.end());
+    corpus.Add("messages", seeds[i].first, bytes);
+  }
+}
+
+// Both ends of a link that works, as each end heard it.
+void Link(const std::vector<Captured>& events, const Corpus& corpus) {
+  Uplink uplink("software", UplinkOptions{});
+  AgentHandler handler(1, ReceiverOptions{});
+  Payload to_uplink, to_handler;
+  const auto to = [](const std::vector<Channel>& table, const std::string& channel, Bytes data,
+                     Payload* sequence) { AppendEvent(Find(table, channel), data, sequence); };
+  int64_t now_us = 1'000'000;
+  const auto run = [&](int rounds) {
+    for (int i = 0; i < rounds; ++i, now_us += 30'000) {
+      for (const LinkPacket& packet : uplink.Poll(now_us)) {
+        to(HandlerChannels(), ChannelOfKind(packet.kind), packet.body, &to_handler);
+        handler.OnPacket(packet);
+      }
+      for (const Receiver::Keyframe& keyframe : handler.TakeReady()) {
+        handler.Journalled(keyframe.id);
+      }
+      if (const auto ack = handler.TakeAck(now_us)) {
+        to(UplinkChannels(), "ACK", Encode(*ack), &to_uplink);
+        uplink.OnAck(*ack, now_us);
+      }
+    }
+  };
+  handler.OnNewUplink();
+  for (int seq = 0; seq < 2; ++seq) {
+    const Payload& bytes = First(events, "KEYFRAME_1", seq);
+    keyframe_t message{};
+    DecodeMessage(bytes, &message);
+    to(UplinkChannels(), "KEYFRAME_1", bytes, &to_uplink);
+    uplink.AddKeyframe(*Parse(message.id).value, Compress(bytes), now_us);
+    run(20);
+  }
+  for (const char* channel : {"PLACE_MATCH", "CORRECTION_1", "RESEND_REQUEST"}) {
+    to(HandlerChannels(), channel, First(events, channel), &to_handler);
+  }
+  to(UplinkChannels(), "POSE_1", First(events, "POSE_1", 50), &to_uplink);
+  corpus.Add("agent_handler", "link", to_handler);
+  corpus.Add("uplink", "link", to_uplink);
+}
+
+void Journals(const std::vector<Captured>& events, const Corpus& corpus) {
+  const fs::path file = ScratchFolder() / "made.lcm";
+  fs::remove(file);
+  {
+    Journal journal(file.string(),
+                    [](const std::string&, Bytes, const JournalPlace&) { return true; });
+    for (int seq = 0; seq < 2; ++seq) {
+      journal.Append(seq, "KEYFRAME_1", First(events, "KEYFRAME_1", seq));
+    }
+    journal.Append(2, "PLACE_MATCH", First(events, "PLACE_MATCH"));
+    journal.Append(3, "CONSTRAINT", First(events, "CONSTRAINT"));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  corpus.AddText("journal", "whole", text);
+  corpus.AddText("journal", "torn", text.substr(0, text.size() - 100));
+}
+
+template <typename Options>
+std::string Printed() {
+  Options options;
+  YamlOptions yaml;
+  Bind(yaml, options);
+  return yaml.Print();
+}
+
+std::string KeyText() {
+  const fs::path file = ScratchFolder() / "agent_1.key";
+  fs::remove(file);
+  MakeKeyFile(file, 1);
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// In the order of fuzz_options.cc.
+void OptionFiles(const Corpus& corpus) {
+  const std::string session =
+      "agents:\n  - {id: 1, keyframes: a.lcm, delay: 1.5, duration: 60, link: {loss: 0.1, "
+      "delay_ms: 50, partitions: [{at: 3, seconds: 4}], seed: 7}}\n"
+      "  - {id: 2, recording: MH_01, start: 3}\n";
+  const std::vector<std::pair<std::string, std::string>> seeds = {
+      {"session", session},
+      {"vio", Printed<vio::VioFileOptions>()},
+      {"alignment", Printed<AlignmentOptions>()},
+      {"posegraph", Printed<PoseGraphOptions>()},
+      {"global_ba", Printed<GlobalBaOptions>()},
+      {"key", KeyText()},
+  };
+  for (size_t i = 0; i < seeds.size(); ++i) {
+    corpus.AddText("options", seeds[i].first,
+                   std::string(1, static_cast<char>('B' + static_cast<int>(i))) + seeds[i].second);
+  }
+}
+
+void Recording(const Corpus& corpus) {
+  const std::string extrinsics =
+      "T_BS:\n  rows: 4\n  cols: 4\n  data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n";
+  corpus.AddText(
+      "recording", "whole",
+      extrinsics +
+          "resolution: [32, 24]\nintrinsics: [30, 31, 16, 12]\ndistortion_model: radtan\n"
+          "distortion_coefficients: [0.1, 0.01, 0, 0]\nreadout_s: 0.02\n\f" +
+          extrinsics +
+          "rate_hz: 200\ngyroscope_noise_density: 1e-4\ngyroscope_random_walk: 2e-5\n"
+          "accelerometer_noise_density: 3e-3\naccelerometer_random_walk: 4e-3\n\f"
+          "#timestamp [ns],filename\n1000000000,1000000000.png\n\f"
+          "#timestamp [ns],w,w,w,a,a,a\n999000000,0.1,0.2,0.3,0,0,9.81\n"
+          "1004000000,0.1,0.2,0.3,0,0,9.81\n1010000000,0.1,0.2,0.3,0,0,9.81\n\f"
+          "#t\n1000000000,1,2,3,1,0,0,0\n2000000000,1,2,4,1,0,0,0\n\f" +
+          extrinsics);
+  corpus.AddText("recording", "tum", "\f\f\f\f1.5 1 2 3 0 0 0 1\n2.5 1 2 4 0 0 0 1\n");
+}
+
+// A camera of 32 x 24 pixels, still, then moving.
+void Sensors(const Corpus& corpus) {
+  CameraModel camera;
+  camera.width = 32;
+  camera.height = 24;
+  camera.fx = camera.fy = 30;
+  camera.cx = 16;
+  camera.cy = 12;
+  Payload sequence;
+  AppendEvent(0, EncodeMessage(ToMessage(camera)), &sequence);
+  for (int frame = 0; frame < 4; ++frame) {
+    image_t image{};
+    image.utime = 1'000'000 + 50'000 * frame;
+    image.encoding = image_t::ENCODING_RAW8;
+    image.width = camera.width;
+    image.height = camera.height;
+    image.num_chunks = 2;
+    image.total_bytes = camera.width * camera.height;
+    image.num_bytes = static_cast<int16_t>(image.total_bytes / 2);
+    for (int chunk = 0; chunk < 2; ++chunk) {
+      image.chunk = static_cast<int16_t>(chunk);
+      image.offset_bytes = chunk * image.num_bytes;
+      image.data.resize(static_cast<size_t>(image.num_bytes));
+      for (size_t i = 0; i < image.data.size(); ++i) {
+        image.data[i] = static_cast<uint8_t>((i / 5 + static_cast<size_t>(frame)) % 4 * 60);
+      }
+      AppendEvent(2, EncodeMessage(image), &sequence);
+    }
+    imu_t imu{};
+    imu.utime = image.utime + 10;
+    imu.accel_body.z = 9.81;
+    AppendEvent(1, EncodeMessage(imu), &sequence);
+  }
+  corpus.Add("live_input", "camera", sequence);
+}
+
+void Server(const std::vector<Captured>& events, const Corpus& corpus) {
+  constexpr size_t kMaxBytes = 16'000;
+  std::map<std::string, int> taken;
+  Payload sequence;
+  for (const Captured& event : events) {
+    const int channel = Find(ServerChannels(), event.channel);
+    const int limit = event.channel.starts_with("KEYFRAME_") ? 3 : 2;
+    if (channel >= 0 && taken[event.channel]++ < limit && sequence.size() < kMaxBytes) {
+      AppendEvent(channel, event.data, &sequence);
+    }
+  }
+  corpus.Add("server", "session", sequence);
+}
+
+int Make(const std::string& log, const Corpus& corpus) {
+  const std::vector<Captured> events = ReadSmall(log);
+  corpus.Add("keyframe", "first", First(events, "KEYFRAME_1"));
+  corpus.Add("keyframe", "second", First(events, "KEYFRAME_2", 1));
+  corpus.Add("keyframe", "bare", Small(First(events, "KEYFRAME_1", 1), 0));
+  Messages(events, corpus);
+  Link(events, corpus);
+  Journals(events, corpus);
+  OptionFiles(corpus);
+  Recording(corpus);
+  Sensors(corpus);
+  Server(events, corpus);
+  return 0;
+}
+
+}  // namespace
+}  // namespace pangea::fuzz
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: pangea-fuzz-corpus LOG CORPUS_FOLDER\n");
+    return 2;
+  }
+  try {
+    return pangea::fuzz::Make(argv[1], pangea::fuzz::Corpus(argv[2]));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "pangea-fuzz-corpus: %s\n", error.what());
+    return 1;
+  }
+}

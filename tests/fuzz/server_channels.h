@@ -1,0 +1,36 @@
+#pragma once
+
+// What the server's processes listen to.
+
+#include <vector>
+
+#include "fuzz.h"
+#include "pangea/again_t.hpp"
+#include "pangea/constraint_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/map_state_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea::fuzz {
+
+inline const std::vector<Channel>& ServerChannels() {
+  static const std::vector<Channel> channels = {
+      ChannelOf<keyframe_t>("KEYFRAME_1"),
+      ChannelOf<keyframe_t>("KEYFRAME_2"),
+      ChannelOf<place_match_t>("PLACE_MATCH"),
+      ChannelOf<constraint_t>("CONSTRAINT"),
+      ChannelOf<map_state_t>("MAP_STATE"),
+      ChannelOf<map_state_t>("REFINEMENT"),
+      ChannelOf<have_t>("HAVE"),
+      ChannelOf<resend_request_t>("RESEND_REQUEST"),
+      ChannelOf<again_t>("AGAIN_posegraph"),
+      ChannelOf<again_t>("AGAIN_place_recognition"),
+      ChannelOf<again_t>("AGAIN_fusion"),
+      ChannelOf<again_t>("AGAIN_global_ba"),
+  };
+  return channels;
+}
+
+}  // namespace pangea::fuzz

@@ -1,0 +1,59 @@
+// What an uplink under a budget leaves of keyframes still makes one map.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <lcm/lcm-cpp.hpp>
+
+#include "common/link/wire.h"
+#include "common/trajectory.h"
+#include "programs.h"
+#include "session/keyframe_log.h"
+#include "uplink/thin.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of the sample's keyframes every fourth is bare, the others have few untracked corners.
+void WriteThinLog(const fs::path& path) {
+  lcm::LogFile log(path.string(), "w");
+  ASSERT_TRUE(log.good());
+  int64_t utime = 0;
+  for (const session::LoggedKeyframe& logged : session::ReadKeyframeLog(
+           fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm")) {
+    keyframe_t message{};
+    ASSERT_TRUE(DecodeMessage(logged.data, &message));
+    const Keyframe keyframe = *Parse(message).value;
+    std::vector<uint8_t> bytes = EncodeMessage(
+        ToMessage(keyframe.id.seq % 4 == 3 ? Bare(keyframe) : Thinned(keyframe, 150)));
+    lcm::LogEvent event{};
+    event.timestamp = utime++;
+    event.channel = logged.channel;
+    event.datalen = static_cast<int32_t>(bytes.size());
+    event.data = bytes.data();
+    ASSERT_EQ(log.writeEvent(&event), 0);
+  }
+}
+
+TEST(ThinKeyframes, MakeOneMap) {
+  const fs::path folder = FreshFolder("thin_keyframes");
+  WriteThinLog(folder / "thin.lcm");
+  const fs::path out = folder / "out";
+  const Outcome replay = RunCommand("pangea-session replay " + (folder / "thin.lcm").string() +
+                                    " --out " + out.string());
+  ASSERT_EQ(replay.exit_code, 0) << replay.output;
+  const auto report = ReadJson(out / "report.json");
+  ASSERT_EQ(report["groups"].size(), 1u) << replay.output;
+  EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
+  // Every keyframe has its pose, and it is near the one that whole keyframes give.
+  const fs::path expected = fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "expected";
+  for (const char* name : {"agent_1.tum", "agent_2.tum"}) {
+    EXPECT_LT(Distance_m(out / name, expected / name), 0.05) << name;
+  }
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace pangea::tests
