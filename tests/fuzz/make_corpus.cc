@@ -12,6 +12,7 @@
 #include "agent_handler/agent_handler.h"
 #include "agent_handler/journal.h"
 #include "common/alignment/alignment_yaml.h"
+#include "common/bus/log_reader.h"
 #include "common/link/agent_key.h"
 #include "common/link/compression.h"
 #include "common/messages.h"
@@ -21,7 +22,6 @@
 #include "posegraph/posegraph_yaml.h"
 #include "sensor_channels.h"
 #include "server_channels.h"
-#include "session/log_reader.h"
 #include "uplink/uplink.h"
 #include "vio/vio_yaml.h"
 
@@ -61,7 +61,7 @@ Payload SmallState(const Payload& bytes) {
 
 std::vector<Captured> ReadSmall(const std::string& log) {
   std::vector<Captured> events;
-  session::ReadLog(log, [&](const session::LogEvent& event) {
+  ReadLog(log, [&](const LogEvent& event) {
     Payload data(event.data.begin(), event.data.end());
     if (event.channel.starts_with("KEYFRAME_")) {
       data = Small(data, kCorners);
