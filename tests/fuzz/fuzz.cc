@@ -41,23 +41,23 @@ void Require(bool holds, const char* promise) {
   }
 }
 
-std::vector<Event> Events(Bytes input) {
-  std::vector<Event> events;
+std::vector<Step> Steps(Bytes input) {
+  std::vector<Step> steps;
   while (input.size() >= 3) {
-    Event event;
-    event.channel = input[0] & 15;
-    event.wait_us = int64_t{1000} << (input[0] >> 4);
+    Step step;
+    step.channel = input[0] & 15;
+    step.wait_us = int64_t{1000} << (input[0] >> 4);
     const size_t wanted = input[1] | static_cast<size_t>(input[2]) << 8;
     input = input.subspan(3);
     const Bytes data = input.first(std::min(wanted, input.size()));
-    event.data.assign(data.begin(), data.end());
+    step.data.assign(data.begin(), data.end());
     input = input.subspan(data.size());
-    events.push_back(std::move(event));
+    steps.push_back(std::move(step));
   }
-  return events;
+  return steps;
 }
 
-void AppendEvent(int channel, Bytes data, std::vector<uint8_t>* sequence) {
+void AppendStep(int channel, Bytes data, std::vector<uint8_t>* sequence) {
   sequence->push_back(static_cast<uint8_t>(channel));
   sequence->push_back(static_cast<uint8_t>(data.size() & 255));
   sequence->push_back(static_cast<uint8_t>(data.size() >> 8));
@@ -101,16 +101,16 @@ void QuickBus::Drain() {
 
 void Play(Bytes input, const std::vector<Channel>& table, QuickBus* bus,
           const std::function<void(int64_t wait_us)>& poll) {
-  constexpr size_t kMaxEvents = 100;  // slower than that is no find
-  std::vector<Event> events = Events(input);
-  events.resize(std::min(events.size(), kMaxEvents));
-  for (Event& event : events) {
-    const Channel& channel = table[static_cast<size_t>(event.channel) % table.size()];
+  constexpr size_t kMaxSteps = 100;  // slower than that is no find
+  std::vector<Step> steps = Steps(input);
+  steps.resize(std::min(steps.size(), kMaxSteps));
+  for (Step& step : steps) {
+    const Channel& channel = table[static_cast<size_t>(step.channel) % table.size()];
     if (channel.fingerprint) {
-      SetFingerprint(*channel.fingerprint, &event.data);
+      SetFingerprint(*channel.fingerprint, &step.data);
     }
-    poll(event.wait_us);
-    bus->Publish(channel.name, event.data);
+    poll(step.wait_us);
+    bus->Publish(channel.name, step.data);
     bus->Drain();
   }
   for (int i = 0; i < 3; ++i) {

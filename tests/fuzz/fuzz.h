@@ -25,13 +25,13 @@ void Require(bool holds, const char* promise);
 // One message of an input that is a sequence of them: a byte (low four bits: the channel, high
 // four: how much time passes first), two bytes of length, little-endian, and so many of payload. A
 // length beyond the input's end stops there.
-struct Event {
+struct Step {
   int channel = 0;
   int64_t wait_us = 0;  // 1 ms to 33 s
   std::vector<uint8_t> data;
 };
-std::vector<Event> Events(Bytes input);
-void AppendEvent(int channel, Bytes data, std::vector<uint8_t>* sequence);
+std::vector<Step> Steps(Bytes input);
+void AppendStep(int channel, Bytes data, std::vector<uint8_t>* sequence);
 
 // The channels a target listens to, and the fingerprint of the type each carries, if it is one of
 // LCM's.

@@ -136,7 +136,7 @@ void Link(const std::vector<Captured>& events, const Corpus& corpus) {
   AgentHandler handler(1, ReceiverOptions{});
   Payload to_uplink, to_handler;
   const auto to = [](const std::vector<Channel>& table, const std::string& channel, Bytes data,
-                     Payload* sequence) { AppendEvent(Find(table, channel), data, sequence); };
+                     Payload* sequence) { AppendStep(Find(table, channel), data, sequence); };
   int64_t now_us = 1'000'000;
   const auto run = [&](int rounds) {
     for (int i = 0; i < rounds; ++i, now_us += 30'000) {
@@ -252,7 +252,7 @@ void Sensors(const Corpus& corpus) {
   camera.cx = 16;
   camera.cy = 12;
   Payload sequence;
-  AppendEvent(0, EncodeMessage(ToMessage(camera)), &sequence);
+  AppendStep(0, EncodeMessage(ToMessage(camera)), &sequence);
   for (int frame = 0; frame < 4; ++frame) {
     image_t image{};
     image.utime = 1'000'000 + 50'000 * frame;
@@ -269,12 +269,12 @@ void Sensors(const Corpus& corpus) {
       for (size_t i = 0; i < image.data.size(); ++i) {
         image.data[i] = static_cast<uint8_t>((i / 5 + static_cast<size_t>(frame)) % 4 * 60);
       }
-      AppendEvent(2, EncodeMessage(image), &sequence);
+      AppendStep(2, EncodeMessage(image), &sequence);
     }
     imu_t imu{};
     imu.utime = image.utime + 10;
     imu.accel_body.z = 9.81;
-    AppendEvent(1, EncodeMessage(imu), &sequence);
+    AppendStep(1, EncodeMessage(imu), &sequence);
   }
   corpus.Add("live_input", "camera", sequence);
 }
@@ -287,7 +287,7 @@ void Server(const std::vector<Captured>& events, const Corpus& corpus) {
     const int channel = Find(ServerChannels(), event.channel);
     const int limit = event.channel.starts_with("KEYFRAME_") ? 3 : 2;
     if (channel >= 0 && taken[event.channel]++ < limit && sequence.size() < kMaxBytes) {
-      AppendEvent(channel, event.data, &sequence);
+      AppendStep(channel, event.data, &sequence);
     }
   }
   corpus.Add("server", "session", sequence);
