@@ -86,6 +86,9 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
                                   }
                                   OnCorrection(*correction.value);
                                 });
+  node_.Subscribe<landmarks_t>(
+      std::string(channels::kAllLandmarks),
+      [this](const std::string&, const landmarks_t& message) { OnLandmarks(message); });
   node_.Subscribe<resend_request_t>(std::string(channels::kResendRequest),
                                     [this](const std::string&, const resend_request_t& request) {
                                       if (request.requester == node_.name()) {
@@ -149,6 +152,20 @@ void AgentHandlerProcess::OnCorrection(const Correction& correction) {
   const auto agent = agents_.find(correction.map.agent_id);
   if (agent != agents_.end() && agent->second.handler) {
     agent->second.handler->OnCorrection(correction);
+  }
+}
+
+// Best effort: an agent that is away misses them.
+void AgentHandlerProcess::OnLandmarks(const landmarks_t& message) {
+  const auto landmarks = Parse(message);
+  if (!landmarks.value || message.getEncodedSize() > kMaxLandmarksBytes) {
+    return node_.Refuse(landmarks.value ? "landmarks: too large" : landmarks.refused);
+  }
+  const int32_t agent_id = landmarks.value->map.agent_id;
+  const auto agent = agents_.find(agent_id);
+  if (agent != agents_.end() && agent->second.session.HasUplink()) {
+    SendDown(agent_id, &agent->second,
+             agent->second.session.Seal(LinkKind::kLandmarks, EncodeMessage(message)));
   }
 }
 

@@ -67,6 +67,7 @@ class AgentHandlerProcess : public PolledProcess {
   void LookForKeys();
   AgentHandler MakeHandler(int32_t agent_id) const;
   void OnCorrection(const Correction& correction);
+  void OnLandmarks(const landmarks_t& message);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
   template <typename Message>
   bool LoadAnswer(Bytes data, const JournalPlace& place);

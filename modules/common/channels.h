@@ -23,6 +23,7 @@ inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 // LCM subscriptions are anchored regular expressions without grouping of alternatives.
 inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";
 inline constexpr std::string_view kAllCorrections = "CORRECTION_[0-9]+";
+inline constexpr std::string_view kAllLandmarks = "LANDMARKS_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllStatus = "STATUS_.*";
 
@@ -32,6 +33,7 @@ inline std::string Camera(int32_t agent_id) { return fmt::format("CAMERA_{}", ag
 inline std::string Pose(int32_t agent_id) { return fmt::format("POSE_{}", agent_id); }
 inline std::string Keyframe(int32_t agent_id) { return fmt::format("KEYFRAME_{}", agent_id); }
 inline std::string Correction(int32_t agent_id) { return fmt::format("CORRECTION_{}", agent_id); }
+inline std::string Landmarks(int32_t agent_id) { return fmt::format("LANDMARKS_{}", agent_id); }
 inline std::string LinkUp(int32_t agent_id) { return fmt::format("LINK_UP_{}", agent_id); }
 inline std::string LinkDown(int32_t agent_id) { return fmt::format("LINK_DOWN_{}", agent_id); }
 // Whose LINK_UP_k it is.

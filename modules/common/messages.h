@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "common/keyframe.h"
+#include "common/map_landmarks.h"
 #include "common/server_messages.h"
 #include "pangea/camera_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/keyframe_t.hpp"
+#include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/rigid3_t.hpp"
@@ -34,6 +36,7 @@ keyframe_t ToMessage(const Keyframe& keyframe);
 place_match_t ToMessage(const PlaceMatch& match);
 constraint_t ToMessage(const Constraint& constraint);
 correction_t ToMessage(const Correction& correction);
+landmarks_t ToMessage(const MapLandmarks& landmarks);
 // At most 500 keyframes a chunk.
 std::vector<map_state_t> ToMessages(const MapState& state);
 
@@ -45,6 +48,7 @@ Parsed<Keyframe> Parse(const keyframe_t& message);
 Parsed<PlaceMatch> Parse(const place_match_t& message);
 Parsed<Constraint> Parse(const constraint_t& message);
 Parsed<Correction> Parse(const correction_t& message);
+Parsed<MapLandmarks> Parse(const landmarks_t& message);
 // One chunk as a MapState of its own.
 Parsed<MapState> Parse(const map_state_t& message);
 

@@ -242,5 +242,50 @@ TEST(Messages, CorrectionRoundTrip) {
   EXPECT_LT(parsed.value->T_map_odom.Minus(in.T_map_odom).norm(), 1e-12);
 }
 
+MapLandmarks SomeLandmarks() {
+  MapLandmarks in{{2, 200}, {1, 100}, 7, {{{{1, 100}, 5}, {1, 2, 3}}}, {}};
+  for (int i = 0; i < 18; ++i) {
+    in.landmarks.push_back({0, i, {4, 0.5 * i, 1}, 0.05, 0.01, {1, 2, 3, 1ULL << i}});
+  }
+  return in;
+}
+
+TEST(Messages, LandmarksRoundTrip) {
+  const MapLandmarks in = SomeLandmarks();
+  const auto parsed = Parse(ThroughBytes(ToMessage(in)));
+  ASSERT_TRUE(parsed.value) << parsed.refused;
+  ASSERT_EQ(parsed.value->landmarks.size(), in.landmarks.size());
+  EXPECT_EQ(parsed.value->sources.front().keyframe, in.sources.front().keyframe);
+  EXPECT_EQ(parsed.value->landmarks[9].p_map, in.landmarks[9].p_map);
+  EXPECT_EQ(parsed.value->landmarks[9].descriptor, in.landmarks[9].descriptor);
+  EXPECT_EQ(parsed.value->landmarks[9].landmark_id, 9);
+}
+
+TEST(Messages, RefusesHostileLandmarks) {
+  const auto refused = [](const std::function<void(landmarks_t&)>& spoil) {
+    landmarks_t message = ToMessage(SomeLandmarks());
+    spoil(message);
+    return !Parse(message).value;
+  };
+  EXPECT_FALSE(refused([](landmarks_t&) {}));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.map.agent_id = 0; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.revision = 0; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.num_landmarks = -1; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.num_landmarks = 65; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.num_sources = 9; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.sources[0].p_map_cam[1] = NAN; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.sources[0].keyframe.seq = -1; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].source = 1; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].source = -1; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].landmark_id = -2; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].p_map[0] = INFINITY; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].p_map[0] = 1e7f; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].sigma_along_m = NAN; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) { m.landmarks[3].sigma_across_m = 0; }));
+  EXPECT_TRUE(refused([](landmarks_t& m) {  // on its own source: no line of sight
+    std::copy_n(m.sources[0].p_map_cam, 3, m.landmarks[3].p_map);
+  }));
+}
+
 }  // namespace
 }  // namespace pangea

@@ -138,7 +138,8 @@ class Runner {
     for (const auto& [name, program] :
          {std::pair{"place_recognition", "pangea-place-recognition"},
           std::pair{"inter_map_ba", "pangea-inter-map-ba"}, std::pair{"fusion", "pangea-fusion"},
-          std::pair{"posegraph", "pangea-posegraph"}, std::pair{"global_ba", "pangea-global-ba"}}) {
+          std::pair{"posegraph", "pangea-posegraph"}, std::pair{"global_ba", "pangea-global-ba"},
+          std::pair{"map_points", "pangea-map-points"}}) {
       Keep(name, {Program(program), "--bus", buses_.server});
       server_names_.emplace_back(name);
     }

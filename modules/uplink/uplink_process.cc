@@ -127,6 +127,9 @@ void UplinkProcess::OnLinkDown(Bytes data) {
   if (!opened.packet) {
     return;
   }
+  if (opened.packet->kind == LinkKind::kLandmarks) {
+    return OnLandmarks(opened.packet->body);
+  }
   if (opened.packet->kind != LinkKind::kAck) {
     return node_.Refuse("packet of an unknown kind");
   }
@@ -135,6 +138,19 @@ void UplinkProcess::OnLinkDown(Bytes data) {
     return node_.Refuse(ack.refused);
   }
   uplink_.OnAck(*ack.value, now_us_);
+}
+
+void UplinkProcess::OnLandmarks(Bytes body) {
+  landmarks_t message{};
+  if (body.size() > size_t{kMaxLandmarksBytes} || !DecodeMessage(body, &message)) {
+    return node_.Refuse("landmarks_t does not decode, or is too large");
+  }
+  const auto landmarks = Parse(message);
+  if (!landmarks.value || landmarks.value->map.agent_id != agent_id_) {
+    return node_.Refuse(landmarks.value ? "another agent's landmarks" : landmarks.refused);
+  }
+  node_.Publish(channels::Landmarks(agent_id_), message);
+  node_.Count("landmark_messages");
 }
 
 void UplinkProcess::Send(const LinkPacket& packet) {

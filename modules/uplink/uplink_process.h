@@ -31,6 +31,7 @@ class UplinkProcess : public PolledProcess {
   void OnLinkDown(Bytes data);
   // The keyframe's bytes as they are sent: all of them, or what the budget leaves.
   std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
+  void OnLandmarks(Bytes body);
   void Send(const LinkPacket& packet);
   void PublishHave();
   void PublishAsks();

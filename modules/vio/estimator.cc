@@ -354,6 +354,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   result.state = EstimatorState::kTracking;
   result.T_odom_body = Newest().imu.T_odom_body;
   result.v_odom_body = Newest().imu.v_odom_body;
+  result.omega_body = Newest().omega_body;
   result.gyro_bias = Newest().imu.gyro_bias;
   result.accel_bias = Newest().imu.accel_bias;
   result.is_keyframe = Newest().is_keyframe;
@@ -384,6 +385,21 @@ CameraModel Estimator::camera() const {
   camera.T_body_cam = impl_->problem.state.T_body_cam;
   camera.time_offset_s = impl_->problem.state.time_offset_s;
   return camera;
+}
+
+WindowPoses Estimator::Poses() const {
+  const WindowState& state = impl_->problem.state;
+  WindowPoses poses;
+  std::vector<int> rows;
+  for (int i = 0; i <= state.Newest(); ++i) {
+    poses.utimes.push_back(state.frames[i].utime);
+    poses.T_odom_body.push_back(state.frames[i].imu.T_odom_body);
+    for (int row = 0; row < kPoseSize; ++row) {
+      rows.push_back(state.Offset(i) + row);
+    }
+  }
+  poses.covariance = WindowCovariance(impl_->problem)(rows, rows);
+  return poses;
 }
 
 }  // namespace pangea::vio

@@ -21,6 +21,7 @@
 #include "common/preintegration.h"
 #include "common/rigid3.h"
 #include "vio/tracks.h"
+#include "vio/window_poses.h"
 
 namespace pangea::vio {
 
@@ -74,6 +75,7 @@ struct FrameResult {
   std::string reason;  // why it is not tracking
   Rigid3 T_odom_body;  // at this frame; valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   bool is_keyframe = false;  // this frame will be finished as a keyframe later
@@ -95,6 +97,8 @@ class Estimator {
   std::vector<FinishedKeyframe> Flush();
   // The calibration in use, refined online.
   CameraModel camera() const;
+  // The window as the newest frame left it; only while tracking. Costs about an iteration.
+  WindowPoses Poses() const;
 
  private:
   struct Impl;

@@ -25,6 +25,8 @@ class ShownPose {
   void Reset(const MapId& map);
   // Takes a correction of this map with a higher revision than all before; false otherwise.
   bool Correct(const Correction& correction);
+  // The newest correction, known better: what is shown goes there instead.
+  void Sharpen(const Rigid3& T_map_odom) { target_ = T_map_odom; }
   // T_map_body of an odometry pose; `utime` ascending.
   Rigid3 Show(int64_t utime, const Rigid3& T_odom_body);
 

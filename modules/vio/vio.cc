@@ -81,6 +81,8 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.map = map_;
   output.T_odom_body = result.T_odom_body;
   output.v_odom_body = result.v_odom_body;
+  output.omega_body = result.omega_body;
+  output.is_keyframe = result.is_keyframe;
   output.num_tracked = static_cast<int>(frame.observations.size());
   output.keyframes = Complete(result.finished);
   if (result.state == EstimatorState::kLost) {
@@ -95,6 +97,15 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   }
   tracker_.Drop(result.outlier_landmarks);
   return output;
+}
+
+Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
+  Keyframe keyframe;
+  keyframe.camera = estimator_->camera();
+  keyframe.corners = described_.at(output.utime);
+  TakeOutReadout({output.omega_body, output.T_odom_body.q.conjugate() * output.v_odom_body},
+                 keyframe);
+  return {keyframe.camera, std::move(keyframe.corners), estimator_->Poses()};
 }
 
 std::vector<Keyframe> Vio::Flush() { return Complete(estimator_->Flush()); }

@@ -38,7 +38,9 @@ struct VioOutput {
   MapId map;
   Rigid3 T_odom_body;  // valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
   int num_tracked = 0;
+  bool is_keyframe = false;         // it was described, and will be finished as a keyframe later
   std::vector<Keyframe> keyframes;  // finished by this image
 };
 
@@ -62,6 +64,14 @@ class Vio {
   int64_t ImuTimeOf(int64_t image_utime) const;
   const MapId& map() const { return map_; }
   int maps_opened() const { return maps_opened_; }
+  // The newest image when it became a keyframe, and the window around it. Looking changes nothing.
+  struct View {
+    CameraModel camera;
+    std::vector<Corner> corners;  // as a global shutter would have seen them
+    WindowPoses window;
+  };
+  // `output`: of that image.
+  View NewestKeyframe(const VioOutput& output) const;
   // Goes into the keyframes: the newest correction applied to this map.
   void set_group_revision(int64_t revision) { group_revision_ = revision; }
 

@@ -43,6 +43,9 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
   node_.Subscribe<correction_t>(
       channels::Correction(options_.agent_id),
       [this](const std::string&, const correction_t& message) { OnCorrection(message); });
+  node_.Subscribe<landmarks_t>(
+      channels::Landmarks(options_.agent_id),
+      [this](const std::string&, const landmarks_t& message) { OnLandmarks(message); });
   if (!options_.out_keyframes.empty()) {
     keyframe_log_ = std::make_unique<lcm::LogFile>(options_.out_keyframes, "w");
     if (!keyframe_log_->good()) {
@@ -94,6 +97,8 @@ void VioProcess::Handle(const VioOutput& output) {
   if (output.state == EstimatorState::kLost) {
     node_.Count("lost");
   }
+  FollowMaps(output);
+  Align(output);
   PublishPose(output);
   for (const Keyframe& keyframe : output.keyframes) {
     PublishKeyframe(keyframe);
@@ -103,11 +108,32 @@ void VioProcess::Handle(const VioOutput& output) {
   }
 }
 
-void VioProcess::PublishPose(const VioOutput& output) {
+void VioProcess::FollowMaps(const VioOutput& output) {
   if (output.map != shown_map_) {
     shown_map_ = output.map;
     shown_.Reset(output.map);
+    alignment_.Reset(output.map);
   }
+  for (const Keyframe& keyframe : output.keyframes) {
+    alignment_.NotePublished(keyframe);
+  }
+}
+
+// Looks for the map's landmarks in a new keyframe. Without any the window is not even looked at.
+void VioProcess::Align(const VioOutput& output) {
+  if (!output.is_keyframe || !alignment_.HasLandmarks()) {
+    return;
+  }
+  const Vio::View view = vio_->NewestKeyframe(output);
+  alignment_.AddKeyframe(view.camera, view.corners, view.window);
+  shown_.Sharpen(*alignment_.T_map_odom());
+  const LiveAlignment::Counters& counters = alignment_.counters();
+  node_.Set("keyframes_aligned", counters.aligned);
+  node_.Set("keyframes_not_aligned", counters.not_aligned);
+  node_.Set("landmarks_seen", counters.seen);
+}
+
+void VioProcess::PublishPose(const VioOutput& output) {
   pose_t message{};
   message.utime = output.utime;
   message.state = ToMessage(output.state);
@@ -186,7 +212,18 @@ void VioProcess::OnCorrection(const correction_t& message) {
   if (shown_.Correct(*correction.value)) {
     node_.Count("corrections");
     vio_->set_group_revision(shown_.revision());
+    alignment_.Correct(*correction.value);
+    shown_.Sharpen(*alignment_.T_map_odom());
   }
+}
+
+void VioProcess::OnLandmarks(const landmarks_t& message) {
+  const Parsed<MapLandmarks> landmarks = Parse(message);
+  if (!landmarks.value) {
+    node_.Refuse(landmarks.refused);
+    return;
+  }
+  node_.Count(alignment_.Take(*landmarks.value) ? "landmark_messages" : "landmark_messages_unused");
 }
 
 }  // namespace pangea::vio

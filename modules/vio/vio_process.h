@@ -4,8 +4,8 @@
 // (live_input.h); this class knows only "an image and its inertial samples".
 //
 //   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz out;
-//   CORRECTION_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in keyframe_outlet.h, for
-//   the newest kKeptKeyframes.
+//   CORRECTION_k, LANDMARKS_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
+//   keyframe_outlet.h, for the newest kKeptKeyframes.
 
 #include <cstdint>
 #include <fstream>
@@ -20,7 +20,9 @@
 #include "common/bus/process.h"
 #include "common/euroc.h"
 #include "pangea/correction_t.hpp"
+#include "pangea/landmarks_t.hpp"
 #include "pangea/pose_t.hpp"
+#include "vio/live_alignment.h"
 #include "vio/shown_pose.h"
 #include "vio/vio.h"
 
@@ -69,6 +71,9 @@ class VioProcess : public Process {
 
  private:
   void OnCorrection(const correction_t& message);
+  void OnLandmarks(const landmarks_t& message);
+  void FollowMaps(const VioOutput& output);
+  void Align(const VioOutput& output);
   void Handle(const VioOutput& output);
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
@@ -80,6 +85,7 @@ class VioProcess : public Process {
   KeyframeOutlet outlet_;
   std::optional<Vio> vio_;
   ShownPose shown_;
+  LiveAlignment alignment_;
   MapId shown_map_;
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;

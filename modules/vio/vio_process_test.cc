@@ -198,6 +198,62 @@ TEST_F(VioProcessTest, TheSameRecordingGivesTheSameBytes) {
   EXPECT_EQ(runs[0], runs[1]);
 }
 
+// Landmarks sharpen what is shown; what is published of the odometry must not know of them, or the
+// server would count its own information twice.
+TEST_F(VioProcessTest, LandmarksDoNotReachTheOdometry) {
+  std::vector<std::vector<uint8_t>> published[2];
+  for (const bool with_landmarks : {false, true}) {
+    LocalBus bus;
+    std::vector<std::vector<uint8_t>>& run = published[with_landmarks ? 1 : 0];
+    bus.Subscribe("KEYFRAME_7", [&run](const std::string&, Bytes data) {
+      run.emplace_back(data.begin(), data.end());
+    });
+    bus.Subscribe("STATUS_vio_7",
+                  [this](const std::string&, Bytes data) { DecodeMessage(data, &status_); });
+    VioProcess process(bus, options_, 0);
+    process.Open(world_.camera(), ImuNoise{});
+    next_imu_ = 0;
+    Play(process, 0, 6);
+    bus.Drain();
+    ASSERT_FALSE(run.empty());
+    keyframe_t last{};
+    ASSERT_TRUE(DecodeMessage(run.back(), &last));
+    const Keyframe keyframe = *Parse(last).value;
+    Correction correction;
+    correction.map = correction.group = keyframe.id.map;
+    correction.seq = keyframe.id.seq;
+    correction.revision = 1;
+    correction.T_map_odom.t = {0.02, 0, 0};
+    correction.covariance *= 1e-4;
+    PublishMessage(bus, "CORRECTION_7", ToMessage(correction));
+    if (with_landmarks) {
+      MapLandmarks landmarks{keyframe.id.map, keyframe.id.map, 1, {}, {}};
+      landmarks.sources.push_back({keyframe.id, keyframe.T_odom_cam().t});
+      for (const MapPoint& point : keyframe.points) {
+        const Corner& corner = keyframe.corners[point.corner];
+        if (landmarks.landmarks.size() < 60) {
+          landmarks.landmarks.push_back({0, corner.landmark_id,
+                                         keyframe.T_odom_cam() * *PointInCamera(keyframe, point),
+                                         0.05, 0.02, corner.descriptor});
+        }
+      }
+      PublishMessage(bus, "LANDMARKS_7", ToMessage(landmarks));
+      landmarks_t hostile = ToMessage(landmarks);
+      hostile.landmarks[0].p_map[0] = NAN;
+      PublishMessage(bus, "LANDMARKS_7", hostile);
+    }
+    bus.Drain();
+    Play(process, 6, 10);
+    process.Flush();
+    process.PublishFinished(0);
+    bus.Drain();
+  }
+  EXPECT_EQ(Counter("landmark_messages"), 1);
+  EXPECT_EQ(status_.num_refused, 1);
+  EXPECT_GT(Counter("keyframes_aligned") + Counter("keyframes_not_aligned"), 0);
+  EXPECT_EQ(published[0], published[1]);
+}
+
 TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});

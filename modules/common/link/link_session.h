@@ -28,6 +28,7 @@ enum class LinkKind : uint8_t {
   kPose = 4,
   kWelcome = 16,
   kAck = 17,
+  kLandmarks = 18,
 };
 
 struct LinkPacket {

@@ -12,6 +12,7 @@
 //   ack:   highest_number, cache_bytes; count, and of each map: opened_utime, journalled_seq + 1;
 //          count, and of each keyframe in the cache: index of its map, seq, bits of its pieces;
 //          count, and of each correction: an encoded correction_t
+//   landmarks: an encoded landmarks_t; best effort
 
 #include <cstdint>
 #include <map>
@@ -38,6 +39,8 @@ inline constexpr int kMaxPartialKeyframes = 16;
 inline constexpr int kMaxLinkMaps = 20;
 inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
+// An encoded landmarks_t: fits one Ethernet frame.
+inline constexpr int kMaxLandmarksBytes = 1300;
 
 // UDP, IP and LCM's small-message header (8 bytes, the channel, 0): a packet's bytes on the wire.
 inline constexpr int kUdpIpBytes = 28;

@@ -1,0 +1,224 @@
+#include "map_points/map_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace pangea {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kMinDepth = 0.3;     // m
+constexpr double kBorder_px = 20;     // the agent's motion is not known to less
+constexpr double kMinSigma = 0.002;   // m; no point is known better
+constexpr double kMaxAxes_rad = 1.2;  // between two cameras' axes
+constexpr size_t kMinPoints = 8;      // that a source must have in view
+constexpr size_t kMaxSources = 12;    // looked at for one message
+// Landmarks are spread: at most so many in a cell of the image.
+constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
+
+}  // namespace
+
+void MapPoints::Take(MapState state) {
+  auto group = std::make_shared<Group>();
+  group->id = state.group;
+  group->revision = state.revision;
+  for (const KeyframePose& pose : state.keyframes) {
+    group->poses[pose.id] = pose.T_map_body;
+  }
+  for (const MapId& map : state.maps) {
+    auto& known = groups_[map];
+    if (known == nullptr || known->revision < group->revision) {
+      known = group;
+    }
+  }
+}
+
+void MapPoints::TakeRefined(const MapState& refined) {
+  for (const KeyframePose& pose : refined.keyframes) {
+    if (store_.Contains(pose.id)) {
+      refined_.insert(pose.id);
+    }
+  }
+}
+
+std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent, const Group& group) {
+  auto newest = group.poses.upper_bound({agent.map, std::numeric_limits<int32_t>::max()});
+  if (newest == group.poses.begin() || (--newest)->first.map != agent.map) {
+    return std::nullopt;
+  }
+  const auto view = store_.Find(newest->first);
+  if (view == nullptr) {
+    return std::nullopt;
+  }
+  Rigid3 T_map_body = agent.T_map_body;
+  T_map_body.t += options_.ahead_s * agent.v_map_body;
+  const CameraModel& camera = view->keyframe().camera;
+  return Outlook{camera, T_map_body * camera.T_body_cam, newest->first.seq};
+}
+
+// What of a keyframe's points the agent will see, and much as the keyframe did.
+MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_cam,
+                                  const Outlook& outlook) const {
+  const Keyframe& keyframe = view.keyframe();
+  const Rigid3 T_cam_map = outlook.T_map_cam.Inverse();
+  Source source{keyframe.id, T_map_cam, {}};
+  for (const MapPoint& point : keyframe.points) {
+    const auto p_keyframe = PointInCamera(keyframe, point);
+    if (!p_keyframe || keyframe.corners[point.corner].landmark_id == kNoLandmark) {
+      continue;
+    }
+    const Vector3d p_map = T_map_cam * *p_keyframe;
+    const Vector3d p_cam = T_cam_map * p_map;
+    const auto pixel = p_cam.z() > kMinDepth ? outlook.camera.Project(p_cam) : std::nullopt;
+    const Vector3d now = p_map - outlook.T_map_cam.t, then = p_map - T_map_cam.t;
+    const double scale = now.norm() / then.norm();
+    if (pixel && outlook.camera.Contains(*pixel, kBorder_px) &&
+        now.normalized().dot(then.normalized()) > std::cos(options_.max_angle_rad) &&
+        scale < options_.max_scale && scale > 1 / options_.max_scale) {
+      source.points.emplace_back(point.corner, *pixel);
+    }
+  }
+  return source;
+}
+
+// Those that saw most of it first.
+std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent, const Group& group,
+                                                     const Outlook& outlook) {
+  const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
+  std::vector<Source> sources;
+  for (const KeyframeId& id : refined_) {
+    const auto pose = group.poses.find(id);
+    const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - options_.own_recent;
+    if (pose == group.poses.end() || is_recent ||
+        (pose->second.t - outlook.T_map_cam.t).norm() > options_.max_distance_m) {
+      continue;
+    }
+    const auto view = store_.Find(id);
+    if (view == nullptr) {
+      continue;
+    }
+    const Rigid3 T_map_cam = pose->second * view->keyframe().camera.T_body_cam;
+    if (axis.dot(T_map_cam.q * Vector3d::UnitZ()) < std::cos(kMaxAxes_rad)) {
+      continue;
+    }
+    Source source = Look(*view, T_map_cam, outlook);
+    if (source.points.size() >= kMinPoints) {
+      sources.push_back(std::move(source));
+    }
+  }
+  std::stable_sort(sources.begin(), sources.end(), [](const Source& a, const Source& b) {
+    return a.points.size() > b.points.size();
+  });
+  sources.resize(std::min(sources.size(), kMaxSources));
+  return sources;
+}
+
+// One message as it fills.
+class MapPoints::Selection {
+ public:
+  Selection(const MapPointsOptions& options, const Group& group, const Outlook& outlook,
+            SubmapStore* store, Told* told)
+      : options_(options), group_(group), outlook_(outlook), store_(store), told_(told) {
+    ++told_->messages;
+    std::erase_if(told_->tracks, [&](const auto& track) {
+      return track.second.message + options_.repeat_after < told_->messages;
+    });
+  }
+
+  void Add(const Source& source) {
+    const int share = (options_.max_landmarks + options_.max_sources - 1) / options_.max_sources;
+    const auto view = store_->Find(source.id);
+    int taken = 0;
+    for (const auto& [corner, pixel] : source.points) {
+      if (taken == share || IsFull()) {
+        return;
+      }
+      auto landmark = Landmark(*view, source, corner, pixel);
+      if (!landmark) {
+        continue;
+      }
+      if (taken++ == 0) {
+        message_.sources.push_back({source.id, source.T_map_cam.t});
+      }
+      landmark->source = static_cast<int>(message_.sources.size()) - 1;
+      message_.landmarks.push_back(*landmark);
+    }
+  }
+
+  bool IsFull() const {
+    return static_cast<int>(message_.landmarks.size()) >= options_.max_landmarks;
+  }
+  bool HasAllSources() const {
+    return static_cast<int>(message_.sources.size()) >= options_.max_sources;
+  }
+  MapLandmarks TakeMessage() { return std::move(message_); }
+
+ private:
+  std::optional<MapLandmark> Landmark(const KeyframeView& view, const Source& source, int corner,
+                                      const Vector2d& pixel) {
+    const Corner& seen = view.keyframe().corners[corner];
+    const Track track{source.id.map, seen.landmark_id};
+    int& in_cell = in_cell_[{static_cast<int>(pixel.x() * kColumns / outlook_.camera.width),
+                             static_cast<int>(pixel.y() * kRows / outlook_.camera.height)}];
+    if (in_cell >= kPerCell || taken_.contains(track)) {
+      return std::nullopt;
+    }
+    const auto point = PointOfTrack(group_.poses, view, corner, options_.track, store_);
+    const auto sent = told_->tracks.find(track);
+    if (!point || (sent != told_->tracks.end() &&
+                   (sent->second.p_map - point->p_map).norm() < options_.moved_m)) {
+      return std::nullopt;
+    }
+    ++in_cell;
+    taken_.insert(track);
+    told_->tracks[track] = {told_->messages, point->p_map};
+    const Vector3d along = (point->p_map - source.T_map_cam.t).normalized();
+    const double variance = along.dot(point->covariance * along);
+    MapLandmark landmark;
+    landmark.landmark_id = seen.landmark_id;
+    landmark.p_map = point->p_map;
+    landmark.sigma_along_m = std::max(kMinSigma, std::sqrt(variance));
+    landmark.sigma_across_m =
+        std::max(kMinSigma, std::sqrt(0.5 * std::max(0.0, point->covariance.trace() - variance)));
+    landmark.descriptor = seen.descriptor;
+    return landmark;
+  }
+
+  const MapPointsOptions& options_;
+  const Group& group_;
+  const Outlook& outlook_;
+  SubmapStore* store_;
+  Told* told_;
+  MapLandmarks message_;
+  std::set<Track> taken_;
+  std::map<std::pair<int, int>, int> in_cell_;
+};
+
+std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
+  const auto group = groups_.find(agent.map);
+  const auto outlook = group == groups_.end() ? std::nullopt : OutlookOf(agent, *group->second);
+  if (!outlook) {
+    return std::nullopt;
+  }
+  const std::vector<Source> sources = SourcesFor(agent, *group->second, *outlook);
+  Selection selection(options_, *group->second, *outlook, &store_, &told_[agent.map]);
+  for (const Source& source : sources) {
+    if (selection.IsFull() || selection.HasAllSources()) {
+      break;
+    }
+    selection.Add(source);
+  }
+  MapLandmarks message = selection.TakeMessage();
+  if (message.landmarks.empty()) {
+    return std::nullopt;
+  }
+  message.map = agent.map;
+  message.group = group->second->id;
+  message.revision = group->second->revision;
+  return message;
+}
+
+}  // namespace pangea

@@ -1,0 +1,107 @@
+#pragma once
+
+// Chooses landmarks of a fused map for an agent: those it is likely to see next.
+//
+// In: keyframes, group states, refinements (groups after bundle adjustment), an agent's newest
+// pose. Out: MapLandmarks, small enough for one Ethernet frame. A landmark is a track of some
+// odometry; its descriptor is that of the keyframe that saw it most like the agent will. Only
+// keyframes that were bundle adjusted are a source, and of the agent's own map only those it left
+// long ago: what the pose graph alone has placed says less than the correction made of it, and of
+// what the agent saw just now the map knows nothing that its odometry does not
+// (docs/decisions/live_pose.md). Poses are always the newest state's.
+//
+// No clock, no thread; the same calls give the same bytes. Bounded: keyframes as SubmapStore, and
+// what one agent was told lately.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/map_landmarks.h"
+#include "common/server_messages.h"
+#include "common/submap_store.h"
+#include "map_points/track_point.h"
+
+namespace pangea {
+
+struct MapPointsOptions {
+  int max_landmarks = 18;      // in one message: with max_sources it fits 1200 bytes
+  int max_sources = 4;         // keyframes they come from
+  double ahead_s = 0.5;        // how far the agent's motion is led on
+  double max_distance_m = 8;   // from the agent to a source
+  double max_angle_rad = 0.4;  // between the two lines of sight to a landmark
+  double max_scale = 1.4;      // of the two distances to it
+  int own_recent = 15;         // newest keyframes of the agent's own map, no sources
+  // A landmark is told again after so many messages to the agent, or when it has moved so far.
+  int repeat_after = 20;
+  double moved_m = 0.005;
+  TrackPointOptions track;
+};
+
+// What an agent says of itself (POSE_k).
+struct AgentPose {
+  MapId map;
+  Rigid3 T_map_body;  // as it shows it
+  Eigen::Vector3d v_map_body = Eigen::Vector3d::Zero();
+};
+
+class MapPoints {
+ public:
+  explicit MapPoints(const MapPointsOptions& options) : options_(options) {}
+
+  void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
+  // Whole; the highest revision wins, map by map.
+  void Take(MapState state);
+  void TakeRefined(const MapState& refined);
+  // Nothing when the group knows nothing new that the agent could see.
+  std::optional<MapLandmarks> Choose(const AgentPose& agent);
+
+  size_t num_keyframes() const { return store_.size(); }
+  size_t num_refined() const { return refined_.size(); }
+
+ private:
+  struct Group {
+    MapId id;
+    int64_t revision = 0;
+    MapPoses poses;
+  };
+  // Where the agent will be.
+  struct Outlook {
+    CameraModel camera;
+    Rigid3 T_map_cam;
+    int32_t newest_seq = 0;
+  };
+  struct Source {
+    KeyframeId id;
+    Rigid3 T_map_cam;
+    std::vector<std::pair<int, Eigen::Vector2d>> points;  // (corner, predicted pixel)
+  };
+  using Track = std::pair<MapId, int32_t>;
+  struct Sent {
+    int64_t message = 0;
+    Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
+  };
+  struct Told {
+    int64_t messages = 0;
+    std::map<Track, Sent> tracks;
+  };
+  class Selection;
+
+  std::optional<Outlook> OutlookOf(const AgentPose& agent, const Group& group);
+  std::vector<Source> SourcesFor(const AgentPose& agent, const Group& group,
+                                 const Outlook& outlook);
+  Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
+
+  MapPointsOptions options_;
+  SubmapStore store_{{.max_views = 512}};
+  std::map<MapId, std::shared_ptr<const Group>> groups_;  // of each map
+  std::set<KeyframeId> refined_;
+  std::map<MapId, Told> told_;
+};
+
+}  // namespace pangea

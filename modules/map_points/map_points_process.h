@@ -1,0 +1,50 @@
+#pragma once
+
+// KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE in; LANDMARKS_k, STATUS_map_points out.
+//
+// At most two messages a second to each agent that is in a group, 1200 bytes each: 2.4 kB/s. Best
+// effort: what is lost is told again when the agent still looks there.
+
+#include <cstdint>
+#include <map>
+
+#include "common/bus/missing.h"
+#include "common/bus/node.h"
+#include "common/bus/process.h"
+#include "common/state_chunks.h"
+#include "map_points/map_points.h"
+#include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/map_state_t.hpp"
+#include "pangea/pose_t.hpp"
+
+namespace pangea {
+
+class MapPointsProcess : public Process {
+ public:
+  static constexpr int64_t kInterval_us = 500'000;  // between two messages to one agent
+
+  MapPointsProcess(Bus& bus, const MapPointsOptions& options);
+
+  void Tick(int64_t now_utime) override;
+
+ private:
+  void OnKeyframe(const keyframe_t& message);
+  void OnMapState(const map_state_t& message);
+  void OnRefinement(const map_state_t& message);
+  void OnPose(const pose_t& message);
+  void OnHave(const have_t& message);
+  void OnAgain(const again_t& message);
+  void PublishStatus(int64_t now_utime);
+
+  Node node_;
+  MapPoints points_;
+  StateChunks states_;
+  StateChunks refinements_;
+  MissingMessages keyframes_;
+  std::map<int32_t, int64_t> told_utime_;  // by agent: its pose's, at its last message
+  int64_t next_status_utime_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,34 @@
+#pragma once
+
+// A track of some odometry as a point of the fused map: triangulated from every keyframe that
+// tracked it, where the group's state has them.
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+
+#include "common/keyframe.h"
+#include "common/submap_store.h"
+
+namespace pangea {
+
+struct TrackPointOptions {
+  double sigma_px = 1.0;  // of a tracked corner, with what neighbouring poses add
+  int min_rays = 3;
+  double max_relative_sigma = 0.1;  // of the distance
+};
+
+struct TrackPoint {
+  Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+// T_map_body by keyframe.
+using MapPoses = std::map<KeyframeId, Rigid3>;
+
+// `corner` of `source` must be a landmark's. Nothing when the rays do not say where it is.
+std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
+                                       int corner, const TrackPointOptions& options,
+                                       SubmapStore* store);
+
+}  // namespace pangea
