@@ -22,7 +22,7 @@ constexpr std::array kFiles = {"cam0/sensor.yaml",
 
 // With the one image that the corpus' data.csv names.
 fs::path MakeFolders() {
-  const fs::path mav0 = ScratchFolder() / "recording" / "mav0";
+  fs::path mav0 = ScratchFolder() / "recording" / "mav0";
   for (const char* folder : {"cam0/data", "imu0", "state_groundtruth_estimate0"}) {
     fs::create_directories(mav0 / folder);
   }
