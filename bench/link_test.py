@@ -10,8 +10,24 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from link_lib.figures import LCM_SYNC, Row, keyframes, rungs, status_counters, table  # noqa: E402
+from link_lib.figures import LCM_SYNC, Row, decode_status, keyframes, rungs, table  # noqa: E402
 from link_lib.plan import ROWS, Agent, jobs_of, session_yaml  # noqa: E402
+
+
+def text(value):
+    return struct.pack(">i", len(value) + 1) + value.encode() + b"\0"
+
+
+def status(process, refused, counters):
+    def counts(of):
+        return struct.pack(">h", len(of)) + b"".join(text(name) + struct.pack(">q", count) for name, count in of.items())
+
+    numbers = struct.pack(">qqqqqffff", 1, 2, 0, 0, 0, 0.1, 0.2, 30, 1.5)
+    return bytes(8) + text(process) + struct.pack(">qqi", 9, 1, 77) + text("all is well") + numbers + counts(refused) + counts(counters)
+
+
+def event(channel, utime, data):
+    return struct.pack(">IqqII", LCM_SYNC, 0, utime, len(channel), len(data)) + channel.encode() + data
 
 
 def write_log(path, agent, seqs, late_us=0):
@@ -30,15 +46,22 @@ class LinkTest(unittest.TestCase):
         self.work = Path(folder.name)
         write_log(self.work / "stored.lcm", 1, range(10))
         self.options = Namespace(agents=[Agent(1, self.work / "stored.lcm", self.work)], seconds=None, bin=".",
-                                 rows=list(ROWS))
+                                 rows=list(ROWS), port=24600)
 
-    def row(self, name, journalled, ate):
+    def row(self, name, journalled, ate, opened=3):
         job = next(job for job in jobs_of(self.options, self.work) if job.name == name)
         session = job.folder / "session"
         session.mkdir(parents=True)
         write_log(session / "agent_1.lcm", 1, range(10))
         write_log(session / "session.lcm", 1, range(10), late_us=30_000)
         write_log(session / "journal.lcm", 1, journalled)
+        counters = {"keyframe_bytes": 1000, "bytes_up_keyframes": 1100, "packets_up_keyframes": 1, "packets_up": 3}
+        with open(session / "agent_1.lcm", "ab") as log:
+            log.write(event("STATUS_uplink_1", 6_000_000, status("uplink_1", {}, {"keyframe_bytes": 5})))
+            log.write(event("STATUS_uplink_1", 7_000_000, status("uplink_1", {}, counters)))
+        with open(session / "session.lcm", "ab") as log:
+            log.write(event("STATUS_agent_handler", 7_000_000,
+                            status("agent_handler", {"forged": 4, "repeated": 3}, {"packets_1": opened})))
         report = {"groups": [{"agents": [1]}], "ate_joint_m": ate, "agents": [{"id": 1, "bytes_up": 2000, "bytes_down": 100}],
                   "fused_at": [{"change": "fused", "session_s": 7.53}]}
         (session / "report.json").write_text(json.dumps(report))
@@ -53,17 +76,15 @@ class LinkTest(unittest.TestCase):
         figures = self.row("perfect", range(10), 0.01).figures
         self.assertEqual((figures["keyframes_sent"], figures["keyframes_journalled"]), (10, 10))
         self.assertEqual((figures["late_median_s"], figures["fused_s"]), (0.03, 7.6))
-        self.assertAlmostEqual(figures["bytes_up_over_keyframes"], 2000 / (10 * 132), places=3)
+        self.assertEqual((figures["bytes_up"], figures["bytes_compressed"]), (2000, 1000))
+        self.assertEqual((figures["keyframes_over_compressed"], figures["packets_refused"]), (1.1, 7))
+        self.assertAlmostEqual(figures["keyframes_given_to_lcm_over_compressed"], (1100 - 46) / 1000)
+        self.assertEqual(figures["handler_cpu_s"], 1.5)
 
     def test_a_status_of_an_uplink(self):
-        def text(value):
-            return struct.pack(">i", len(value) + 1) + value.encode() + b"\0"
-
-        data = bytes(8) + text("uplink_1") + bytes(20) + text("connected") + bytes(56)
-        data += struct.pack(">h", 1) + text("a reason") + struct.pack(">q", 9)
-        data += struct.pack(">h", 2) + text("rung") + struct.pack(">q", 3) + text("bytes_up") + struct.pack(">q", 70_000)
-        self.assertEqual(status_counters(data), {"rung": 3, "bytes_up": 70_000})
-        self.assertEqual(rungs([(0, {"rung": 3}), (1, {"rung": 4}), (2, {})]), (3.5, 4))
+        data = status("uplink_1", {"a reason": 9}, {"rung": 3, "bytes_up": 70_000})
+        self.assertEqual(decode_status(data)["counters"], {"rung": 3, "bytes_up": 70_000})
+        self.assertEqual(rungs([(0, {"counters": {"rung": 3}}), (1, {"counters": {"rung": 4}}), (2, {"counters": {}})]), (3.5, 4))
 
     def test_a_budget_costs_accuracy_but_no_keyframe(self):
         perfect = self.row("perfect", range(10), 0.010)
@@ -79,6 +100,21 @@ class LinkTest(unittest.TestCase):
         rows = [perfect, good, wrong, torn]
         self.assertEqual([row.passes(rows) for row in rows], [True, True, False, False])
         self.assertEqual(len(table(rows).splitlines()), 6)
+
+    def test_a_forged_packet_that_opens_is_a_failure(self):
+        rows = [self.row("perfect", range(10), 0.010), self.row("forged", range(10), 0.010, opened=3)]
+        self.assertTrue(rows[1].passes(rows))
+        rows[1].figures["packets_opened"] = 4
+        self.assertFalse(rows[1].passes(rows))
+
+    def test_the_forger_runs_the_session(self):
+        job = next(job for job in jobs_of(self.options, self.work) if job.name == "forged")
+        argv = job.commands[0].argv
+        session = argv[argv.index("--") + 1:]
+        self.assertTrue(session[0].endswith("pangea-session"))
+        self.assertEqual(session[-2:], ["--port", "24600"])
+        self.assertIn(":24601?", argv[argv.index("--link") + 1])
+        self.assertIn(":24603?", argv[argv.index("--overhear") + 1])
 
     def test_a_session_for_a_row(self):
         self.options.seconds = 60

@@ -22,7 +22,9 @@ ROWS = {
     "budget_40": "budget_kb_per_s: 40",
     "budget_20": "budget_kb_per_s: 20",
     "budget_10": "budget_kb_per_s: 10",
+    "forged": "",
 }
+FORGED_PACKETS = 1_000_000  # in that row, on the server's link bus
 SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
 
 
@@ -52,12 +54,28 @@ def session_yaml(options, conditions):
     return "\n".join(lines) + "\n"
 
 
+def bus(port):
+    """As pangea-session makes them: the server's, its link, the agents', the agents' links, from --port upwards."""
+    return f"udpm://239.255.76.67:{port}?ttl=0&recv_buf_size=4194304"
+
+
+def forger(options, run):
+    """Floods the server's link bus while `run` runs; what it repeats and changes it overhears on the agents' ends."""
+    agents = len(options.agents)
+    seconds = options.seconds or 100
+    overheard = [word for k in range(agents) for word in ("--overhear", bus(options.port + 2 + agents + k))]
+    return [str(Path(options.bin).resolve() / "pangea-link-forger"), "--link", bus(options.port + 1), *overheard,
+            "--agents", *[str(agent.id) for agent in options.agents], "--packets", str(FORGED_PACKETS),
+            "--rate", f"{FORGED_PACKETS / seconds:.0f}", "--", *run, "--port", str(options.port)]
+
+
 def jobs_of(options, work):
     program = Path(options.bin).resolve() / "pangea-session"
     outside = [agent.keyframes.resolve() for agent in options.agents]
     jobs = []
     for name in options.rows:
-        run = Command([str(program), "run", f"{OUT}/session.yaml", "--out", f"{OUT}/session"])
-        jobs.append(Job("link", name, work / name, [run], outside=outside,
+        run = [str(program), "run", f"{OUT}/session.yaml", "--out", f"{OUT}/session"]
+        command = Command(forger(options, run) if name == "forged" else run)
+        jobs.append(Job("link", name, work / name, [command], outside=outside,
                         files={"session.yaml": session_yaml(options, ROWS[name])}))
     return jobs

@@ -226,6 +226,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   if (!opened.packet) {
     return;
   }
+  ++agent.packets;
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));
   }
@@ -402,6 +403,7 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
     given_up += agent.handler->receiver().given_up();
     keyframes += agent.keyframes;
     node_.Set(fmt::format("keyframes_{}", agent_id), agent.keyframes);
+    node_.Set(fmt::format("packets_{}", agent_id), agent.packets);
     node_.Set(fmt::format("bytes_up_{}", agent_id), agent.bytes_up);
     node_.Set(fmt::format("bytes_down_{}", agent_id), agent.bytes_down);
   }

@@ -14,6 +14,7 @@
 #include "agent_handler/link_test_world.h"
 #include "agent_handler/test_keyframes.h"
 #include "common/channels.h"
+#include "common/link/agent_key.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -379,6 +380,100 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
                                      "constraint: id does not follow from its keyframes"}));
   EXPECT_GE(refused["STATUS_agent_handler"].size(), 3u) << "and the link's noise";
   ExpectDelivered(2);
+}
+
+// Everything that ever crossed the link again: as it was, changed, to another agent, turned back,
+// after either side has restarted.
+TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
+  MakeKeyFile(KeyFile(2), 2);
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> recorded;
+  bool recording = true;
+  link_bus.Subscribe("LINK_.*", [&](const std::string& channel, Bytes data) {
+    if (recording) {
+      recorded.emplace_back(channel, std::vector<uint8_t>(data.begin(), data.end()));
+    }
+  });
+  std::map<std::string, int64_t> refused, counters;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    for (const counter_t& counter : status.refused) {
+      refused[counter.name] = counter.count;
+    }
+    for (const counter_t& counter : status.counters) {
+      counters[counter.name] = counter.count;
+    }
+  });
+  int poses = 0;
+  server_bus.Subscribe("POSE_.*", [&](const std::string&, Bytes) { ++poses; });
+  const auto shout = [&] {
+    recording = false;
+    for (const auto& [channel, data] : recorded) {
+      std::vector<uint8_t> changed = data;
+      changed[data.size() / 2] ^= 1;
+      link_bus.Publish(channel, data);
+      link_bus.Publish(channel, changed);
+      for (const char* other : {"LINK_UP_1", "LINK_UP_2", "LINK_UP_3", "LINK_DOWN_1"}) {
+        if (channel != other) {
+          link_bus.Publish(other, data);
+        }
+      }
+      Run(0.005);
+    }
+  };
+  PublishKeyframes(5);
+  Run(3);
+  const int64_t accepted = counters.at("packets_1");
+  const auto sent = std::count_if(recorded.begin(), recorded.end(),
+                                  [](const auto& item) { return item.first == "LINK_UP_1"; });
+  EXPECT_LE(accepted, sent);
+  EXPECT_GT(accepted, sent / 2);
+  shout();
+  Run(2);
+  EXPECT_EQ(refused["packet of an agent without a key"], static_cast<int64_t>(recorded.size()));
+  EXPECT_GT(refused["repeated or too old"], 50);
+  EXPECT_GT(refused["not sealed for this session: forged, damaged, or of an earlier one"], 0);
+  EXPECT_GT(refused["packet before there is a session"], 50) << "agent 2 has a key, but no uplink";
+  EXPECT_GT(refused["hello is forged or damaged"], 0);
+  EXPECT_LE(counters.at("packets_1"), accepted + 10) << "the uplink's hellos alone";
+  EXPECT_EQ(counters.at("agents"), 1);
+  EXPECT_EQ(counters.at("agents_with_key"), 2);
+  KillHandler();
+  StartHandler();
+  shout();
+  KillUplink();
+  StartUplink();
+  shout();
+  EXPECT_EQ(poses, 0);
+  PublishKeyframes(5);
+  Run(5);
+  ExpectDelivered(10);
+}
+
+TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
+  PublishKeyframes(2);
+  Run(3);
+  ExpectDelivered(2);
+  std::filesystem::rename(KeyFile(1), folder / "away");
+  Run(2);
+  PublishKeyframes(2);
+  Run(5);
+  EXPECT_EQ(delivered.size(), 2u);
+  std::filesystem::rename(folder / "away", KeyFile(1));
+  Run(10);
+  ExpectDelivered(4);
+}
+
+TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothing) {
+  KillUplink();
+  std::filesystem::rename(KeyFile(1), folder / "server.key");
+  MakeKeyFile(KeyFile(1), 1);
+  StartUplink();
+  std::filesystem::remove(KeyFile(1));
+  std::filesystem::rename(folder / "server.key", KeyFile(1));
+  PublishKeyframes(2);
+  Run(10);
+  EXPECT_TRUE(delivered.empty());
 }
 
 // Noise, and every message with damaged bytes, on every channel that is listened to.

@@ -158,13 +158,14 @@ void UplinkProcess::Send(const LinkPacket& packet) {
   const std::vector<uint8_t> bytes = session_.Seal(packet);
   link_bus_.Publish(channel, bytes);
   const int on_the_wire = BytesOnTheWire(channel, bytes);
+  const char* const kind = packet.kind == LinkKind::kHello  ? "hellos"
+                           : packet.kind == LinkKind::kPose ? "poses"
+                                                            : "keyframes";
   node_.Count("packets_up");
   node_.Count("bytes_up", on_the_wire);
   bytes_up_ += on_the_wire;
-  node_.Count(packet.kind == LinkKind::kHello  ? "bytes_up_hellos"
-              : packet.kind == LinkKind::kPose ? "bytes_up_poses"
-                                               : "bytes_up_keyframes",
-              on_the_wire);
+  node_.Count(fmt::format("packets_up_{}", kind));
+  node_.Count(fmt::format("bytes_up_{}", kind), on_the_wire);
 }
 
 int UplinkProcess::Poll(int64_t steady_us) {
