@@ -24,6 +24,8 @@ namespace {
 constexpr size_t kRemembered = 4000;
 constexpr size_t kLargest = 1450;
 constexpr int kBatch_us = 2000;
+// The session looks first whether its ports are free.
+constexpr int64_t kListenAfter_us = 5'000'000;
 
 struct Packet {
   std::string channel;
@@ -116,9 +118,6 @@ int Run(const Arguments& arguments) {
   LcmBus link(arguments.link);
   Forger forger(link, arguments.agents);
   std::deque<LcmBus> buses;
-  for (const std::string& url : arguments.overheard) {
-    forger.Overhear(buses.emplace_back(url));
-  }
   const pid_t child = Start(arguments.command);
   const int64_t begin_us = SteadyMicros();
   int64_t sent = 0;
@@ -126,6 +125,11 @@ int Run(const Arguments& arguments) {
   while (waitpid(child, &status, WNOHANG) == 0) {
     if (StopRequested()) {
       kill(child, SIGTERM);
+    }
+    if (buses.empty() && SteadyMicros() - begin_us > kListenAfter_us) {
+      for (const std::string& url : arguments.overheard) {
+        forger.Overhear(buses.emplace_back(url));
+      }
     }
     for (LcmBus& bus : buses) {
       while (bus.Handle(0)) {

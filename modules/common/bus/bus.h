@@ -42,8 +42,10 @@ class LocalBus : public Bus {
   std::unique_ptr<Impl> impl_;
 };
 
-// A bus by LCM URL, e.g. "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304".
-// Not for concurrent Handle calls; Publish may be called from any thread.
+// A bus by LCM URL, e.g. "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304", or
+// "tcpq://host:7700" where multicast is blocked: LCM's relay, which may come and go, and stop; what
+// is published meanwhile is lost, as on multicast. Not for concurrent Handle calls; Publish may be
+// called from any thread.
 class LcmBus : public Bus {
  public:
   // Throws std::runtime_error naming the URL and the likely mend when it cannot be opened.
@@ -55,11 +57,14 @@ class LcmBus : public Bus {
   // An exception from a handler is rethrown here, not through LCM's C frames.
   bool Handle(int timeout_ms);
   bool MoreWaits() override;
-  // File descriptor to poll on; -1 when the connection is gone.
+  // File descriptor to poll on; -1 while there is no connection to a relay, and Handle looks for
+  // one.
   int fd();
 
  private:
   struct Impl;
+  struct Library;
+  struct Relayed;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/bus/bus.h"
+#include "common/bus/tcpq_connection.h"
 
 namespace pangea {
 namespace {
@@ -19,11 +20,28 @@ constexpr int kQueueCapacity = 2000;
 
 }  // namespace
 
+// Two kinds: LCM itself, and for tcpq:// our own, which cannot block (tcpq_connection.h).
 struct LcmBus::Impl {
-  explicit Impl(const std::string& url) : lcm(url) {}
+  virtual ~Impl() = default;
+  virtual void Publish(const std::string& channel, Bytes data) = 0;
+  virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
+  virtual bool Handle(int timeout_ms) = 0;
+  virtual bool MoreWaits() = 0;
+  virtual int fd() = 0;
+};
+
+struct LcmBus::Library : LcmBus::Impl {
+  explicit Library(const std::string& url) : lcm(url) {
+    if (!lcm.good()) {
+      throw std::runtime_error(fmt::format(
+          "cannot open the bus '{}': check the URL, and that the machine has a multicast route "
+          "(ip route add 224.0.0.0/4 dev lo)",
+          url));
+    }
+  }
 
   struct Subscription {
-    Impl* owner;
+    Library* owner;
     Handler handler;
     // LCM's C interface: built by GCC 12 with -fsanitize=address,undefined, the C++ wrapper called
     // its member function on the wrong object.
@@ -37,50 +55,68 @@ struct LcmBus::Impl {
     }
   };
 
+  void Publish(const std::string& channel, Bytes data) override {
+    lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
+  }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    subscriptions.push_back({this, std::move(handler)});
+    lcm_subscription_t* subscription =
+        lcm_subscribe(lcm.getUnderlyingLCM(), channel_regex.c_str(), &Subscription::OnMessage,
+                      &subscriptions.back());
+    lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
+  }
+  bool Handle(int timeout_ms) override {
+    const bool handled = lcm.handleTimeout(timeout_ms) > 0;
+    if (failure) {
+      std::rethrow_exception(std::exchange(failure, nullptr));
+    }
+    return handled;
+  }
+  bool MoreWaits() override {
+    pollfd poll_fd{fd(), POLLIN, 0};
+    return poll(&poll_fd, 1, 0) > 0 && (poll_fd.revents & POLLIN) != 0;
+  }
+  int fd() override { return lcm.getFileno(); }
+
   lcm::LCM lcm;
   std::deque<Subscription> subscriptions;
   std::exception_ptr failure;
 };
 
-LcmBus::LcmBus(const std::string& url) : impl_(std::make_unique<Impl>(url)) {
-  if (!impl_->lcm.good()) {
-    throw std::runtime_error(fmt::format(
-        "cannot open the bus '{}': check the URL, and that the machine has a multicast route "
-        "(ip route add 224.0.0.0/4 dev lo)",
-        url));
+struct LcmBus::Relayed : LcmBus::Impl {
+  explicit Relayed(const std::string& url) : connection(url) {}
+  void Publish(const std::string& channel, Bytes data) override {
+    connection.Publish(channel, data);
+  }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    connection.Subscribe(channel_regex, std::move(handler));
+  }
+  bool Handle(int timeout_ms) override { return connection.Handle(timeout_ms); }
+  bool MoreWaits() override { return connection.MoreWaits(); }
+  int fd() override { return connection.fd(); }
+
+  TcpqConnection connection;
+};
+
+LcmBus::LcmBus(const std::string& url) {
+  if (url.starts_with("tcpq://")) {
+    impl_ = std::make_unique<Relayed>(url);
+  } else {
+    impl_ = std::make_unique<Library>(url);
   }
 }
 LcmBus::~LcmBus() = default;
 
-void LcmBus::Publish(const std::string& channel, Bytes data) {
-  impl_->lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
-}
+void LcmBus::Publish(const std::string& channel, Bytes data) { impl_->Publish(channel, data); }
 
 void LcmBus::Subscribe(const std::string& channel_regex, Handler handler) {
-  impl_->subscriptions.push_back({impl_.get(), std::move(handler)});
-  lcm_subscription_t* subscription =
-      lcm_subscribe(impl_->lcm.getUnderlyingLCM(), channel_regex.c_str(),
-                    &Impl::Subscription::OnMessage, &impl_->subscriptions.back());
-  lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
+  impl_->Subscribe(channel_regex, std::move(handler));
 }
 
-int LcmBus::fd() { return impl_->lcm.getFileno(); }
+int LcmBus::fd() { return impl_->fd(); }
 
-bool LcmBus::MoreWaits() {
-  pollfd poll_fd{fd(), POLLIN, 0};
-  return poll(&poll_fd, 1, 0) > 0 && (poll_fd.revents & POLLIN) != 0;
-}
+bool LcmBus::MoreWaits() { return impl_->MoreWaits(); }
 
-bool LcmBus::Handle(int timeout_ms) {
-  // A tcpq connection that broke has fd -1, and handling it would abort.
-  if (fd() < 0) {
-    throw std::runtime_error("the bus connection is gone");
-  }
-  const bool handled = impl_->lcm.handleTimeout(timeout_ms) > 0;
-  if (impl_->failure) {
-    std::rethrow_exception(std::exchange(impl_->failure, nullptr));
-  }
-  return handled;
-}
+bool LcmBus::Handle(int timeout_ms) { return impl_->Handle(timeout_ms); }
 
 }  // namespace pangea

@@ -3,7 +3,6 @@
 #include <poll.h>
 
 #include <chrono>
-#include <stdexcept>
 
 namespace pangea {
 namespace {
@@ -30,11 +29,8 @@ int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process) {
   int64_t next_tick = 0;
   int timeout_ms = 0;
   while (!StopRequested()) {
-    pollfd fds[2] = {{a.fd(), POLLIN, 0}, {b.fd(), POLLIN, 0}};
-    if (fds[0].fd < 0 || fds[1].fd < 0) {
-      throw std::runtime_error("the bus connection is gone");
-    }
-    poll(fds, 2, timeout_ms);
+    pollfd fds[2] = {{a.fd(), POLLIN, 0}, {b.fd(), POLLIN, 0}};  // poll leaves out negative ones
+    poll(fds, 2, a.MoreWaits() || b.MoreWaits() ? 0 : timeout_ms);
     HandleWaiting(a);
     HandleWaiting(b);
     timeout_ms = process.Poll(SteadyMicros());
