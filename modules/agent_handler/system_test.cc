@@ -102,10 +102,23 @@ struct Agent {
   bool uplink_listens = false;
 };
 
-TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
+// LCM's own relay for TCP.
+std::unique_ptr<Program> StartRelay(int port) {
+  return std::make_unique<Program>(
+      std::vector<std::string>{"/usr/bin/env", "java", "-cp", "/usr/share/java/lcm.jar",
+                               "lcm.lcm.TCPService", std::to_string(port)});
+}
+
+// Over multicast, or through a relay that is killed too.
+class LinkSystem : public testing::TestWithParam<bool> {};
+
+TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   constexpr int kKeyframes = 150;
   std::random_device device;  // only for the addresses, which must not meet another run's
-  const std::string link = RandomUrl(device), server = RandomUrl(device);
+  const int relay_port = GetParam() ? static_cast<int>(20000 + device() % 12000) : 0;
+  const std::string link =
+      relay_port != 0 ? fmt::format("tcpq://127.0.0.1:{}", relay_port) : RandomUrl(device);
+  const std::string server = RandomUrl(device);
   const std::string agent_urls[] = {RandomUrl(device), RandomUrl(device)};
   const std::string journal = testing::TempDir() + fmt::format("pangea_system_{}.lcm", getpid());
   std::filesystem::remove(journal);
@@ -121,6 +134,7 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
         std::vector<std::string>{bin + "pangea-agent-handler", "--link", link, "--server", server,
                                  "--journal", journal, "--keys", keys.string()});
   };
+  auto relay = relay_port != 0 ? StartRelay(relay_port) : nullptr;
   auto handler = start_handler();
   const auto start_uplink = [&](int i) {
     return std::make_unique<Program>(std::vector<std::string>{
@@ -139,9 +153,9 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
     seen.emplace(data.begin(), data.end());
   });
 
-  bool handler_killed = false, uplink_killed = false;
+  bool handler_killed = false, uplink_killed = false, relay_killed = relay_port == 0;
   const auto begin = Clock::now();
-  const auto deadline = begin + std::chrono::seconds(12);
+  const auto deadline = begin + std::chrono::seconds(20);
   const auto done = [&] {
     return agents[0]->acknowledged == kKeyframes - 1 && agents[1]->acknowledged == kKeyframes - 1;
   };
@@ -153,6 +167,11 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
     for (auto& agent : agents) {
       while (agent->bus.Handle(0)) {
       }
+    }
+    if (!relay_killed && agents[0]->acknowledged > 90) {
+      relay->End(SIGKILL);
+      relay = StartRelay(relay_port);
+      relay_killed = true;
     }
     if (!handler_killed && agents[0]->acknowledged > 30) {
       handler->End(SIGKILL);
@@ -189,6 +208,8 @@ TEST(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   std::filesystem::remove(journal);
   std::filesystem::remove_all(keys);
 }
+
+INSTANTIATE_TEST_SUITE_P(Buses, LinkSystem, testing::Bool());
 
 }  // namespace
 }  // namespace pangea
