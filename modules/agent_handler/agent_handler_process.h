@@ -49,7 +49,7 @@ class AgentHandlerProcess : public PolledProcess {
   struct Agent {
     HandlerSession session;
     std::optional<AgentHandler> handler;  // since its first session
-    int64_t packets = 0;  // opened
+    int64_t packets = 0;                  // opened
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;
     int64_t keyframes = 0;
