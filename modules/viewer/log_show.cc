@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -25,6 +27,7 @@ LogShow::LogShow(const std::string& path)
   Reset();
   RunTo(clock_.end_s);
   all_fusions_ = scene_->fusions();
+  DropUnseenImages();
   ThinStates();
   Reset();
 }
@@ -42,6 +45,25 @@ void LogShow::Read(const std::string& path) {
     if (outcome.event) {
       events_.push_back({time_s, std::move(*outcome.event)});
     }
+  });
+}
+
+// Only images of keyframes are shown; the others are most of what an agent's log holds.
+void LogShow::DropUnseenImages() {
+  std::map<int32_t, std::set<int64_t>> times;  // of keyframes, by agent
+  for (const Timed& timed : events_) {
+    if (const auto* keyframe = std::get_if<ShownKeyframe>(&timed.event)) {
+      times[keyframe->id.map.agent_id].insert(keyframe->utime);
+    }
+  }
+  std::erase_if(events_, [&times](const Timed& timed) {
+    const auto* image = std::get_if<std::shared_ptr<const ShownImage>>(&timed.event);
+    if (image == nullptr) {
+      return false;
+    }
+    const std::set<int64_t>& of_agent = times[(*image)->agent_id];
+    const auto after = of_agent.lower_bound((*image)->utime - AgentView::kSameTime_us);
+    return after == of_agent.end() || *after > (*image)->utime + AgentView::kSameTime_us;
   });
 }
 

@@ -43,6 +43,7 @@ class LogShow : public Show {
   };
 
   void Read(const std::string& path);
+  void DropUnseenImages();
   void ThinStates();
   void Reset();
   void RunTo(double time_s);

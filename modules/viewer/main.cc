@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
+#include <memory>
+#include <vector>
 
 #include "common/bus/process.h"
 #include "viewer/log_show.h"
@@ -29,13 +31,26 @@ void Announce(const WebServer& server, const WebOptions& options) {
   std::cout << fmt::format("http://{}:{}/\n", options.listen, server.port()) << std::flush;
 }
 
-void ShowBus(const std::string& url, const WebOptions& options, const std::string& page) {
+void HandleWaiting(LcmBus& bus) {
+  for (int n = 0; n < kMaxMessagesAtOnce && bus.Handle(0); ++n) {
+  }
+}
+
+void ShowBus(const std::string& url, const std::vector<std::string>& agent_urls,
+             const WebOptions& options, const std::string& page) {
   LcmBus bus(url);
   ViewerProcess process(bus, url, WallUtime());
+  std::vector<std::unique_ptr<LcmBus>> agent_buses;
+  for (const std::string& agent_url : agent_urls) {
+    agent_buses.push_back(std::make_unique<LcmBus>(agent_url));
+    process.WatchAgent(*agent_buses.back());
+  }
   WebServer server(options, ReadPage(page), process);
   Announce(server, options);
   while (!StopRequested()) {
-    for (int n = 0; n < kMaxMessagesAtOnce && bus.Handle(0); ++n) {
+    HandleWaiting(bus);
+    for (const auto& agent_bus : agent_buses) {
+      HandleWaiting(*agent_bus);
     }
     process.Tick(WallUtime());
     server.Serve(kServe_ms);
@@ -59,12 +74,15 @@ void ShowLog(const std::string& log, const WebOptions& options, const std::strin
 
 int main(int argc, char** argv) {
   std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::vector<std::string> agent_urls;
   std::string log;
   std::string page = DefaultPage().string();
   WebOptions options;
   CLI::App app("Shows a running system, or a captured log, in a browser", "pangea-viewer");
   auto* bus_option =
       app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
+  app.add_option("--agent-bus", agent_urls,
+                 "LCM URL of an agent's own bus, for its images; repeatable");
   app.add_option("--log", log, "a captured log of a server bus instead, with a time slider")
       ->excludes(bus_option);
   app.add_option("--port", options.port, "TCP port of the page; 0 for a free one")
@@ -79,7 +97,7 @@ int main(int argc, char** argv) {
   InstallSignalHandlers();
   try {
     if (log.empty()) {
-      ShowBus(url, options, page);
+      ShowBus(url, agent_urls, options, page);
     } else {
       ShowLog(log, options, page);
     }

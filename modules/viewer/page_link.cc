@@ -8,6 +8,7 @@ namespace {
 
 // Of records in one update: what a phone takes in within a frame or two.
 constexpr size_t kBudget = 300'000;
+constexpr uint64_t kMaxAgent = 100'000;
 
 }  // namespace
 
@@ -31,6 +32,9 @@ bool PageLink::Hear(std::string_view text) {
   const auto& value = said.begin().value();
   if (key == "taken" && value.is_number_unsigned()) {
     under_way_ = false;
+  } else if (key == "watch" && value.is_number_unsigned() && value.get<uint64_t>() < kMaxAgent) {
+    seen_.watched = value.get<int32_t>();
+    seen_.view = 0;
   } else if (key == "play" && value.is_boolean()) {
     show_.Play(value.get<bool>());
   } else if (key == "seek" && value.is_number() && std::isfinite(value.get<double>())) {

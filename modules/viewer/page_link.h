@@ -24,8 +24,8 @@ class PageLink {
   // What to send now; nothing while the last one is under way or when there is no news.
   std::optional<std::vector<uint8_t>> Next();
 
-  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}. False for anything
-  // else: no page of ours says it.
+  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT}.
+  // False for anything else: no page of ours says it.
   bool Hear(std::string_view text);
 
  private:

@@ -139,6 +139,38 @@ TEST(PageLink, ARefusalComesWithItsReasonWhateverItsBytes) {
   EXPECT_EQ(said["to"], json({1, 1}));
 }
 
+TEST(PageLink, OnlyTheWatchedCameraIsSent) {
+  TestShow show;
+  ShownKeyframe keyframe = TestKeyframe(kOne, 0);
+  keyframe.corners = {kOne, 0, 0, 752, 480, {{7, Eigen::Vector2f(30, 40)}}};
+  show.scene_.Take(keyframe);
+  PageLink link(show);
+  EXPECT_FALSE(TakeAll(link)[0].contains("view"));
+  EXPECT_TRUE(link.Hear(R"({"watch": 2})"));
+  EXPECT_FALSE(link.Next().has_value());
+  EXPECT_TRUE(link.Hear(R"({"watch": 1})"));
+  const std::vector<uint8_t> bytes = link.Next().value();
+  EXPECT_EQ(JsonOf(bytes)["view"]["width"], 752);
+  const size_t view = 4 + WordAt(bytes, 0);
+  EXPECT_EQ(WordAt(bytes, view), 1U);      // tracks
+  EXPECT_EQ(WordAt(bytes, view + 4), 1U);  // pixels of the first
+  EXPECT_EQ(FloatAt(bytes, view + 8), 30.0F);
+  EXPECT_EQ(FloatAt(bytes, view + 12), 40.0F);
+  EXPECT_EQ(WordAt(bytes, view + 16), 0U);  // bytes of the image
+  EXPECT_EQ(bytes.size(), view + 20);
+  EXPECT_TRUE(link.Hear(R"({"taken": 1})"));
+  EXPECT_FALSE(link.Next().has_value()) << "seen already";
+
+  auto image = std::make_shared<ShownImage>(ShownImage{1, 0, 1, 3, 1, {1, 2, 3}});
+  show.scene_.Take(std::shared_ptr<const ShownImage>(image));
+  keyframe.id.seq = keyframe.corners.seq = 1;
+  show.scene_.Take(keyframe);
+  const std::vector<uint8_t> with_image = link.Next().value();
+  EXPECT_EQ(JsonOf(with_image)["view"]["encoding"], 1);
+  EXPECT_EQ(WordAt(with_image, with_image.size() - 8), 3U);
+  EXPECT_EQ(with_image[with_image.size() - 2], 3);
+}
+
 TEST(PageLink, HearsTheControls) {
   TestShow show;
   PageLink link(show);
@@ -168,7 +200,8 @@ TEST(PageLink, NoPageOfOursSaysThis) {
   for (const char* text :
        {"", "[]", "{}", "null", "{", R"({"seek": "1"})", R"({"seek": 1e999})", R"({"speed": 0})",
         R"({"speed": -1})", R"({"speed": 1e9})", R"({"play": 1})", R"({"taken": -1})",
-        R"({"seek": 1, "play": true})", R"({"shutdown": true})"}) {
+        R"({"watch": -1})", R"({"watch": 1e9})", R"({"seek": 1, "play": true})",
+        R"({"shutdown": true})"}) {
     EXPECT_FALSE(link.Hear(text)) << text;
   }
   EXPECT_FALSE(link.Hear(std::string(PageLink::kMaxText + 1, ' ')));

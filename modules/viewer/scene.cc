@@ -93,6 +93,7 @@ void Scene::Take(const ShownKeyframe& keyframe) {
   SceneKeyframe& known = keyframes_[static_cast<size_t>(index)];
   known.arrived = true;
   known.shown = keyframe;
+  known.shown.corners = {};
   if (num_points_ + keyframe.p_body.size() > kMaxPoints) {
     known.shown.p_body.clear();
     ++num_left_out_;
@@ -105,6 +106,7 @@ void Scene::Take(const ShownKeyframe& keyframe) {
   if (agent != nullptr) {
     agent->T_body_cam = keyframe.T_body_cam;
     agent->view = keyframe.view;
+    agent->camera.Take(keyframe.corners);
     if (!agent->pose || agent->pose->map != keyframe.id.map) {
       WorksIn(*agent, known.map, keyframe.T_odom_body);
     }
@@ -121,6 +123,13 @@ void Scene::Take(const ShownPose& pose) {
     WorksIn(*agent, map, pose.T_odom_body);
   }
   agent->pose = pose;
+}
+
+void Scene::Take(const std::shared_ptr<const ShownImage>& image) {
+  SceneAgent* agent = AgentOf(image->agent_id);
+  if (agent != nullptr) {
+    agent->camera.Take(image);
+  }
 }
 
 void Scene::Take(const Constraint& constraint) {

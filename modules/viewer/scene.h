@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -17,6 +18,7 @@
 #include "common/drift.h"
 #include "common/ids.h"
 #include "common/server_messages.h"
+#include "viewer/agent_view.h"
 #include "viewer/changes.h"
 
 namespace pangea::viewer {
@@ -30,6 +32,7 @@ struct ShownKeyframe {
   // The image's edges on the camera's plane z = 1: left, top, right, bottom.
   Eigen::Vector4d view = Eigen::Vector4d::Zero();
   std::vector<Eigen::Vector3f> p_body;  // map points, metres
+  ShownCorners corners;
 };
 
 struct ShownPose {
@@ -84,6 +87,7 @@ struct SceneAgent {
   Rigid3 T_odom_body;  // newest pose, or newest keyframe's where no poses are published
   Rigid3 T_body_cam;
   Eigen::Vector4d view = Eigen::Vector4d::Zero();
+  AgentView camera;
   double heard_s = 0;
 };
 
@@ -114,6 +118,7 @@ class Scene {
 
   void Take(const ShownKeyframe& keyframe);
   void Take(const ShownPose& pose);
+  void Take(const std::shared_ptr<const ShownImage>& image);
   void Take(const Constraint& constraint);
   void Take(const Correction& correction);
   void Take(const MapState& state);

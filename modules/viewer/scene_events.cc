@@ -38,7 +38,15 @@ ShownKeyframe Shown(const Keyframe& keyframe) {
                       keyframe.T_odom_body,
                       keyframe.camera.T_body_cam,
                       ViewOf(keyframe.camera),
+                      {},
                       {}};
+  shown.corners = {keyframe.id.map,       keyframe.id.seq,        keyframe.utime,
+                   keyframe.camera.width, keyframe.camera.height, {}};
+  for (const Corner& corner : keyframe.corners) {
+    if (corner.landmark_id != kNoLandmark) {
+      shown.corners.pixels.emplace(corner.landmark_id, corner.pixel);
+    }
+  }
   for (const MapPoint& point : keyframe.points) {
     const double sigma = std::sqrt(static_cast<double>(point.inverse_depth_var));
     if (sigma > kMaxRelativeSigma * static_cast<double>(point.inverse_depth)) {
@@ -142,6 +150,14 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
         std::get<ShownPose>(*outcome.event).agent_id = agent_id;
       }
       return outcome;
+    });
+  }
+  if (const int32_t agent_id = channels::AgentOf(channel, "IMAGE_"); agent_id > 0) {
+    return Decoded<image_t>(data, [this, agent_id](const image_t& message) -> Outcome {
+      std::string refused;
+      auto whole = images_.Add(agent_id, message, &refused);
+      return whole ? Outcome{std::make_shared<const ShownImage>(std::move(*whole)), ""}
+                   : Outcome{std::nullopt, refused};
     });
   }
   if (channels::AgentOf(channel, "CORRECTION_") > 0) {

@@ -3,23 +3,26 @@
 // The border: what comes on a bus or out of a log becomes what a Scene takes, or is refused with a
 // reason.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 
 #include "common/bus/bus.h"
 #include "common/state_chunks.h"
+#include "viewer/image_parts.h"
 #include "viewer/scene.h"
 
 namespace pangea::viewer {
 
-using SceneEvent =
-    std::variant<ShownKeyframe, ShownPose, Constraint, Correction, MapState, ProcessHealth>;
+using SceneEvent = std::variant<ShownKeyframe, ShownPose, std::shared_ptr<const ShownImage>,
+                                Constraint, Correction, MapState, ProcessHealth>;
 
 class SceneEvents {
  public:
   struct Outcome {
-    std::optional<SceneEvent> event;  // also none for a chunk of a state that is not whole yet
+    // Also none for a chunk of a state or an image that is not whole yet.
+    std::optional<SceneEvent> event;
     std::string refused;
   };
   // By the channel's name; what is not shown is neither an event nor refused.
@@ -27,6 +30,7 @@ class SceneEvents {
 
  private:
   StateChunks chunks_;
+  ImageParts images_;
 };
 
 }  // namespace pangea::viewer

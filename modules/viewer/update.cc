@@ -85,6 +85,30 @@ class Update {
     }
   }
 
+  void AddView(const SceneAgent& agent) {
+    const AgentView& camera = agent.camera;
+    const auto& image = camera.image();
+    json_["view"] = {{"agent", agent.id},
+                     {"width", camera.width()},
+                     {"height", camera.height()},
+                     {"encoding", image ? image->encoding : 0}};
+    const auto tracks = camera.Tracks();
+    view_.AddIndex(static_cast<int64_t>(tracks.size()));
+    for (const auto& track : tracks) {
+      view_.AddIndex(static_cast<int64_t>(track.size()));
+      for (const Eigen::Vector2f& pixel : track) {
+        view_.Add(pixel.x());
+        view_.Add(pixel.y());
+      }
+    }
+    const size_t bytes = image ? image->bytes.size() : 0;
+    view_.AddIndex(static_cast<int64_t>(bytes));
+    if (image) {
+      view_.Append(image->bytes.data(), bytes);
+      view_.Append("\0\0\0", (4 - bytes % 4) % 4);
+    }
+  }
+
   // Bytes, about.
   size_t size() const { return keyframes_.size() + solved_.size() + kItemBytes * num_items_; }
 
@@ -119,6 +143,7 @@ class Update {
     whole.Append(text.data(), text.size());
     whole.Append(keyframes_.bytes().data(), keyframes_.size());
     whole.Append(solved_.bytes().data(), solved_.size());
+    whole.Append(view_.bytes().data(), view_.size());
     return whole.bytes();
   }
 
@@ -228,10 +253,19 @@ class Update {
   json json_ = json::object();
   Records keyframes_;
   Records solved_;
+  Records view_;
   size_t num_items_ = 0;
   int num_keyframes_ = 0;
   int num_solved_ = 0;
 };
+
+// The watched agent, if its camera saw something that the page has not.
+const SceneAgent* NewView(const Show& show, const Seen& seen) {
+  const auto watched = show.scene().agents().find(seen.watched);
+  const bool is_new =
+      watched != show.scene().agents().end() && watched->second.camera.number() != seen.view;
+  return is_new ? &watched->second : nullptr;
+}
 
 }  // namespace
 
@@ -239,13 +273,13 @@ bool HasNews(const Show& show, const Seen& seen) {
   const ShowClock clock = show.clock();
   return seen.epoch != show.epoch() || seen.version < show.scene().changes().version() ||
          clock.playing != seen.clock.playing || clock.speed != seen.clock.speed ||
-         std::abs(clock.now_s - seen.clock.now_s) >= kTimeStep_s;
+         std::abs(clock.now_s - seen.clock.now_s) >= kTimeStep_s || NewView(show, seen) != nullptr;
 }
 
 std::vector<uint8_t> EncodeUpdate(const Show& show, size_t budget, Seen* seen) {
   const bool first = seen->epoch != show.epoch();
   if (first) {
-    *seen = {show.epoch(), 0, {}};
+    *seen = {show.epoch(), 0, {}, seen->watched, 0};
   }
   seen->clock = show.clock();
   Update update(show);
@@ -255,6 +289,10 @@ std::vector<uint8_t> EncodeUpdate(const Show& show, size_t budget, Seen* seen) {
        it != by_version.end() && update.size() < budget; ++it) {
     update.Add(it->second);
     seen->version = it->first;
+  }
+  if (const SceneAgent* agent = NewView(show, *seen)) {
+    update.AddView(*agent);
+    seen->view = agent->camera.number();
   }
   return update.Finish(*seen);
 }

@@ -13,6 +13,7 @@ namespace pangea::viewer {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
+constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
 // What is beyond would not be shown anyway.
 constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
@@ -23,13 +24,18 @@ ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
     : node_(bus, "viewer"), source_(std::move(source)), start_utime_(start_utime) {
   for (const std::string_view channel :
        {channels::kAllKeyframes, channels::kAllPoses, channels::kAllCorrections,
-        channels::kConstraint, channels::kMapState, channels::kAllStatus,
+        channels::kConstraint, channels::kMapState, channels::kAllStatus, kAllImages,
         std::string_view("AGAIN_viewer")}) {
     node_.SubscribeBytes(std::string(channel),
                          [this](const std::string& name, Bytes data) { OnMessage(name, data); });
   }
   node_.Subscribe<have_t>(std::string(channels::kHave),
                           [this](const std::string&, const have_t& message) { OnHave(message); });
+}
+
+void ViewerProcess::WatchAgent(Bus& agent_bus) {
+  agent_bus.Subscribe(std::string(kAllImages),
+                      [this](const std::string& name, Bytes data) { OnMessage(name, data); });
 }
 
 void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {

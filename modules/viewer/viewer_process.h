@@ -20,6 +20,9 @@ class ViewerProcess : public Process, public Show {
  public:
   ViewerProcess(Bus& bus, std::string source, int64_t start_utime);
 
+  // An agent's own bus: its images, which do not go further.
+  void WatchAgent(Bus& agent_bus);
+
   void Tick(int64_t now_utime) override;
 
   const Scene& scene() const override { return scene_; }

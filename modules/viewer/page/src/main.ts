@@ -7,6 +7,7 @@ import {
 import { onThemeChange } from "./palette";
 import type { Update } from "./protocol";
 import { Stage } from "./stage";
+import { drawView } from "./view";
 
 const kNotice_ms = 5000;
 
@@ -16,7 +17,10 @@ const stage = new Stage(canvas, byId("labels"), model);
 let panelsDirty = true;
 let dragging = false;
 
+let watched = 0; // the agent whose camera is shown
+
 const connection = new Connection(take, (open) => {
+  if (open && watched > 0) connection.say({ watch: watched });
   byId("connection").textContent = open ? "" : "not connected, trying again…";
 });
 
@@ -27,6 +31,7 @@ function take(update: Update) {
     drawMarks(model);
     byId("notice").classList.remove("shown");
   }
+  if (update.view?.agent === watched) void drawView(update.view);
   for (const fusion of update.fusions) {
     // Not what happened before the page was opened, or was jumped over.
     if (!update.start && model.now_s - fusion.time_s < 3) announce(fusionText(fusion));
@@ -68,6 +73,19 @@ byId<HTMLSelectElement>("ellipses").onchange = ({ target }) => {
   stage.ellipseScale = Number((target as HTMLSelectElement).value);
   stage.redraw();
   panelsDirty = true;
+};
+byId("agents").onclick = ({ target }) => {
+  const card = (target as HTMLElement).closest<HTMLElement>(".agent");
+  if (!card) return;
+  const agent = Number(card.dataset.key);
+  watched = agent === watched ? 0 : agent;
+  byId("view").hidden = true;
+  connection.say({ watch: watched });
+};
+byId("view_close").onclick = () => {
+  watched = 0;
+  byId("view").hidden = true;
+  connection.say({ watch: 0 });
 };
 byId("fit").onclick = () => stage.fit();
 for (const which of ["before", "after"] as const) {

@@ -19,6 +19,26 @@ function element(tag: string, className: string, text = ""): HTMLElement {
   return made;
 }
 
+// The children of `parent`, one a key and in their order. Those that are there stay, so that what people point at,
+// press or read is not taken from under them ten times a second.
+function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLElement): HTMLElement[] {
+  const known = new Map([...parent.children].map((child) => [(child as HTMLElement).dataset.key, child]));
+  const children = keys.map((key) => {
+    const child = (known.get(key) as HTMLElement | undefined) ?? make(key);
+    child.dataset.key = key;
+    return child;
+  });
+  if (children.length !== parent.childElementCount || children.some((c, i) => parent.children[i] !== c)) {
+    parent.replaceChildren(...children);
+  }
+  return children;
+}
+
+function tell(at: HTMLElement, selector: string, text: string) {
+  const told = at.querySelector(selector)!;
+  if (told.textContent !== text) told.textContent = text;
+}
+
 export function metres(value: number): string {
   if (value < 0.01) return `${(1000 * value).toFixed(0)} mm`;
   return value < 1 ? `${(100 * value).toFixed(1)} cm` : `${value.toFixed(2)} m`;
@@ -43,38 +63,39 @@ export function drawAgents(model: Model) {
   for (const map of model.maps) {
     if (map) keyframes.set(map.said.agent, (keyframes.get(map.said.agent) ?? 0) + map.seqs.size);
   }
-  const rows = [...model.agents.values()]
-    .sort((a, b) => a.id - b.id)
-    .map((agent) => {
-      const row = element("div", "agent");
-      row.dataset.agent = String(agent.id);
-      const badge = element("span", "badge", String(agent.id));
-      badge.style.background = agentColour(agent.id);
-      const fused = model.fusedWith(agent);
-      const state = agent.state ?? "";
-      const what = element("div", "what");
-      what.append(
-        element("b", "", `Agent ${agent.id}`),
-        element("span", state && state !== "tracking" ? "state bad" : "state", state),
-        element("div", "fused", fused.length ? `one map with ${fused.join(", ")}` : "a map of its own"),
-        element(
-          "div", "numbers",
-          `${keyframes.get(agent.id) ?? 0} keyframes` +
-            (agent.num_tracked === undefined ? "" : ` · ${agent.num_tracked} tracks`),
-        ),
-        element(
-          "div", "numbers",
-          `drift ${metres(agent.drift_m)}` +
-            (agent.covariance_m2 ? ` · ± ${metres(radius95(agent.covariance_m2))}` : ""),
-        ),
-      );
-      row.title =
-        (agent.reason ? `${agent.reason}\n` : "") +
-        "drift: how far corrections have moved the agent since it joined its map; ±: longer half axis of the 95 % ellipse";
-      row.append(badge, what);
-      return row;
-    });
-  byId("agents").replaceChildren(...rows);
+  const agents = [...model.agents.values()].sort((a, b) => a.id - b.id);
+  const cards = keyed(byId("agents"), agents.map(({ id }) => String(id)), (id) => {
+    const card = element("button", "agent");
+    const what = element("span", "what");
+    what.append(
+      element("b", "", `Agent ${id}`), element("span", "state"), element("span", "fused"),
+      element("span", "numbers seen"), element("span", "numbers drift"),
+    );
+    card.append(element("span", "badge", id), what);
+    return card;
+  });
+  agents.forEach((agent, i) => {
+    const card = cards[i];
+    const fused = model.fusedWith(agent);
+    const state = agent.state ?? "";
+    (card.firstChild as HTMLElement).style.background = agentColour(agent.id);
+    tell(card, ".state", state);
+    card.querySelector(".state")!.classList.toggle("bad", state !== "" && state !== "tracking");
+    tell(card, ".fused", fused.length ? `one map with ${fused.join(", ")}` : "a map of its own");
+    tell(
+      card, ".seen",
+      `${keyframes.get(agent.id) ?? 0} keyframes` +
+        (agent.num_tracked === undefined ? "" : ` · ${agent.num_tracked} tracks`),
+    );
+    tell(
+      card, ".drift",
+      `drift ${metres(agent.drift_m)}` +
+        (agent.covariance_m2 ? ` · ± ${metres(radius95(agent.covariance_m2))}` : ""),
+    );
+    card.title =
+      (agent.reason ? `${agent.reason}\n` : "") +
+      "Click: through its camera\ndrift: how far corrections have moved the agent since it joined its map; ±: longer half axis of the 95 % ellipse";
+  });
 }
 
 function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: string } {
@@ -88,30 +109,33 @@ const refusalsOf = (process: ProcessSaid) =>
   process.refused.reduce((sum, [, count]) => sum + count, 0);
 
 export function drawHealth(model: Model) {
-  const chips = [...model.processes.values()]
-    .sort((a, b) => a.name.localeCompare(b.name))
-    .map((process) => {
-      const { mark, state } = healthOf(process, model.now_s);
-      const chip = element("div", `process ${state}`);
-      chip.dataset.process = process.name;
-      chip.append(
-        element("b", "", `${mark} ${process.name}`),
-        element("span", "", `queue ${process.pending}`),
-        element("span", "", `${milliseconds(process.median_ms)} / ${milliseconds(process.p99_ms)} ms`),
-        element("span", "", `lost ${process.dropped}`),
-        element("span", "", refusalsOf(process) > 0 ? `refused ${refusalsOf(process)}` : ""),
-      );
-      chip.title = [
-        `${process.name}: ${state}`,
-        process.summary,
-        `${process.in} messages in, ${process.out} out, ${process.dropped} dropped, ${process.resends_asked} asked for again`,
-        `time per message: median ${milliseconds(process.median_ms)} ms, 99 % under ${milliseconds(process.p99_ms)} ms`,
-        `${process.memory_mb.toFixed(0)} MB, ${process.cpu_s.toFixed(1)} s of CPU`,
-        ...process.refused.map(([reason, count]) => `refused ${count}: ${reason}`),
-      ].join("\n");
-      return chip;
-    });
-  byId("health").replaceChildren(...chips);
+  const processes = [...model.processes.values()].sort((a, b) => a.name.localeCompare(b.name));
+  const boxes = keyed(byId("health"), processes.map(({ name }) => name), () => {
+    const box = element("div", "process");
+    for (const part of ["name", "queue", "latency", "lost", "refused"]) {
+      box.append(element(part === "name" ? "b" : "span", part));
+    }
+    return box;
+  });
+  processes.forEach((process, i) => {
+    const box = boxes[i];
+    const { mark, state } = healthOf(process, model.now_s);
+    const latency = `${milliseconds(process.median_ms)} / ${milliseconds(process.p99_ms)} ms`;
+    box.className = `process ${state}`;
+    tell(box, ".name", `${mark} ${process.name}`);
+    tell(box, ".queue", `queue ${process.pending}`);
+    tell(box, ".latency", latency);
+    tell(box, ".lost", `lost ${process.dropped}`);
+    tell(box, ".refused", refusalsOf(process) > 0 ? `refused ${refusalsOf(process)}` : "");
+    box.title = [
+      `${process.name}: ${state}`,
+      process.summary,
+      `${process.in} messages in, ${process.out} out, ${process.dropped} dropped, ${process.resends_asked} asked for again`,
+      `time per message, median and 99 %: ${latency}`,
+      `${process.memory_mb.toFixed(0)} MB, ${process.cpu_s.toFixed(1)} s of CPU`,
+      ...process.refused.map(([reason, count]) => `refused ${count}: ${reason}`),
+    ].join("\n");
+  });
 }
 
 export function drawLegend(gridCell_m: number, ellipseScale: number, leftOut: number) {

@@ -73,6 +73,15 @@ export interface SolvedSaid {
   T_map_body: Float32Array;
 }
 
+export interface ViewSaid {
+  agent: number;
+  width: number;
+  height: number;
+  encoding: number; // image_t.ENCODING_*; 0: no image
+  tracks: Float32Array[]; // u v, newest first
+  image: Uint8Array;
+}
+
 export interface Update {
   epoch: number;
   version: number;
@@ -89,6 +98,7 @@ export interface Update {
   fusions: FusionSaid[];
   keyframes: KeyframeSaid[];
   solved: SolvedSaid[];
+  view?: ViewSaid;
 }
 
 export function decode(bytes: ArrayBuffer): Update {
@@ -118,6 +128,16 @@ export function decode(bytes: ArrayBuffer): Update {
       T_map_body: floats.subarray(at + 2, at + 9),
     });
   }
+  if (json.view) {
+    const tracks: Float32Array[] = [];
+    for (let left = integers[at++]; left > 0; --left) {
+      const end = at + 1 + 2 * integers[at];
+      tracks.push(floats.subarray(at + 1, end));
+      at = end;
+    }
+    json.view.tracks = tracks;
+    json.view.image = new Uint8Array(bytes, 4 + length + 4 * (at + 1), integers[at]);
+  }
   const none = { maps: [], agents: [], constraints: [], processes: [], fusions: [] };
   return { ...none, ...json, keyframes, solved };
 }
@@ -126,4 +146,5 @@ export type Said =
   | { taken: number }
   | { seek: number }
   | { play: boolean }
-  | { speed: number };
+  | { speed: number }
+  | { watch: number };

@@ -24,6 +24,7 @@ interface AgentDrawing {
   tail: Line;
   trail: { map: number; p_odom: Vector3 }[];
   label: HTMLElement;
+  view: string; // what the frustum was made of
 }
 
 export class Stage {
@@ -157,7 +158,7 @@ export class Stage {
     label.textContent = String(agent.id);
     label.style.background = agentColour(agent.id);
     this.labels.append(label);
-    const drawing = { group, frustum, ellipse, tail, trail: [], label };
+    const drawing = { group, frustum, ellipse, tail, trail: [], label, view: String(agent.view) };
     this.agents.set(agent.id, drawing);
     return drawing;
   }
@@ -171,8 +172,11 @@ export class Stage {
       drawing.group.visible = pose !== undefined;
       drawing.label.hidden = pose === undefined;
       if (!pose) continue;
-      drawing.frustum.geometry.dispose();
-      drawing.frustum.geometry = frustumGeometry(agent);
+      if (drawing.view !== String(agent.view)) {
+        drawing.view = String(agent.view);
+        drawing.frustum.geometry.dispose();
+        drawing.frustum.geometry = frustumGeometry(agent);
+      }
       drawing.frustum.matrix.copy(pose.times(Pose.of(agent.T_body_cam)).matrix());
       this.drawEllipse(agent, pose, drawing.ellipse);
       this.drawTail(agent, pose, drawing);

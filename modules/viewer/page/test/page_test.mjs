@@ -47,6 +47,7 @@ async function testLog(browser) {
   await page.locator("#show_refused").check();
   await settled(page);
   for (const accepted of [true, false]) await testHover(page, accepted);
+  await testCamera(page);
   await testBeforeAfter(page);
   await screenshot(page, "fused");
   await testSeekBack(page);
@@ -89,6 +90,23 @@ async function testHover(page, accepted) {
     tip.replaceAll("\n", " | "));
   if (!accepted) await screenshot(page, "refused");
   await page.mouse.move(5, 400);
+}
+
+// Through an agent's camera: its tracks (the log holds no images), in its colour.
+async function testCamera(page) {
+  await page.locator('.agent[data-key="2"]').click();
+  await becomes(page, "a click on an agent shows its tracks", () =>
+    /^Agent 2, newest keyframe: [1-9]\d* tracks/.test(document.getElementById("view_caption").textContent));
+  const painted = await page.evaluate(() => {
+    const canvas = document.getElementById("view_canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let i = 0; i < data.length; i += 4) count += data[i] > 180 && data[i + 2] < 60 ? 1 : 0;
+    return count;
+  });
+  check("they are painted", painted > 100, `${painted} pixels of orange`);
+  await page.waitForTimeout(1500);
+  await screenshot(page, "camera");
 }
 
 async function testBeforeAfter(page) {

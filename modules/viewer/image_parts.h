@@ -1,0 +1,35 @@
+#pragma once
+
+// Puts images together that come in chunks (image_t). Bounded: kMaxPending images of an agent may
+// lack a chunk, the oldest go first; larger ones than kMaxImageBytes are refused.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pangea/image_t.hpp"
+#include "viewer/agent_view.h"
+
+namespace pangea::viewer {
+
+class ImageParts {
+ public:
+  static constexpr size_t kMaxPending = 4;
+  static constexpr int32_t kMaxImageBytes = 8'000'000;
+
+  // The whole image when this was the last chunk it lacked. `refused` says why a chunk is none.
+  std::optional<ShownImage> Add(int32_t agent_id, const image_t& chunk, std::string* refused);
+
+ private:
+  struct Pending {
+    ShownImage image;
+    std::vector<bool> have;
+    size_t missing = 0;
+  };
+  std::map<int32_t, std::map<int64_t, Pending>> pending_;  // by agent and time
+};
+
+}  // namespace pangea::viewer
