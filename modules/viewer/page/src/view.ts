@@ -18,6 +18,7 @@ async function bitmapOf(view: ViewSaid): Promise<ImageBitmap | undefined> {
 }
 
 export async function drawView(view: ViewSaid) {
+  byId("view").hidden = false;
   const canvas = byId<HTMLCanvasElement>("view_canvas");
   const image = await bitmapOf(view).catch(() => undefined);
   canvas.width = view.width;
@@ -44,5 +45,4 @@ export async function drawView(view: ViewSaid) {
   byId("view_caption").textContent =
     `Agent ${view.agent}, newest keyframe: ${view.tracks.length} tracks` +
     (image ? "" : " (no images on this bus)");
-  byId("view").hidden = false;
 }
