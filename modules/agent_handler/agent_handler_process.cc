@@ -69,6 +69,9 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
         return LoadEvent(channel, data, place);
       });
+  for (const MapId& map : by_age_) {
+    missing_corrections_.Announce(map);
+  }
   node_.Set("journal_bytes_cut", journal_->cut_bytes());
   link_bus.Subscribe("LINK_UP_[0-9]+",
                      [this](const std::string& channel, Bytes data) { OnLinkUp(channel, data); });
@@ -109,13 +112,21 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
                            });
 }
 
+void AgentHandlerProcess::NoteJournalled(const KeyframeId& id) {
+  const auto [highest, is_new] = have_.try_emplace(id.map, id.seq);
+  highest->second = std::max(highest->second, id.seq);
+  if (is_new) {
+    by_age_.push_back(id.map);
+  }
+}
+
 bool AgentHandlerProcess::LoadEvent(const std::string& channel, Bytes data,
                                     const JournalPlace& place) {
   if (channel.starts_with("KEYFRAME_")) {
     if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {
       const KeyframeId& id = keyframe.value->id;
       index_.AddKeyframe(id, place);
-      have_[id.map] = std::max(have_.try_emplace(id.map, -1).first->second, id.seq);
+      NoteJournalled(id);
       return true;
     }
     node_.Count("journal_events_unreadable");
@@ -142,6 +153,7 @@ bool AgentHandlerProcess::LoadAnswer(Bytes data, const JournalPlace& place) {
 
 void AgentHandlerProcess::OnCorrection(const Correction& correction) {
   // Kept for an agent whose hello is still to come: after a restart, it is.
+  missing_corrections_.Note({correction.map});
   Correction& newest = corrections_[correction.map];
   if (newest.revision < correction.revision) {
     newest = correction;
@@ -273,7 +285,7 @@ void AgentHandlerProcess::SyncJournal() {
   }
   for (const Unsynced& keyframe : unsynced_) {
     index_.AddKeyframe(keyframe.id, keyframe.place);
-    have_[keyframe.id.map] = keyframe.id.seq;
+    NoteJournalled(keyframe.id);
     const auto agent = agents_.find(keyframe.id.map.agent_id);
     if (agent != agents_.end() && agent->second.handler) {
       ++agent->second.keyframes;
@@ -350,13 +362,13 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
 }
 
 void AgentHandlerProcess::PublishHave() {
-  auto it = have_.begin();
+  auto it = by_age_.begin();
   do {
     have_t message{};
-    for (; it != have_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
-      message.maps.push_back(ToMessage(it->first));
-      message.highest_seq.push_back(it->second);
-      for (const SeqGap& gap : index_.Gaps(it->first)) {
+    for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
+      message.maps.push_back(ToMessage(*it));
+      message.highest_seq.push_back(have_.at(*it));
+      for (const SeqGap& gap : index_.Gaps(*it)) {
         if (message.gaps.size() < kMaxHaveGaps) {
           message.gaps.push_back(ToMessage(gap));
         }
@@ -365,7 +377,7 @@ void AgentHandlerProcess::PublishHave() {
     message.num_maps = static_cast<int16_t>(message.maps.size());
     message.num_gaps = static_cast<int16_t>(message.gaps.size());
     node_.Publish(std::string(channels::kHave), message);
-  } while (it != have_.end());
+  } while (it != by_age_.end());
 }
 
 void AgentHandlerProcess::AskForOwed(int64_t now_utime) {
@@ -429,6 +441,9 @@ void AgentHandlerProcess::Tick(int64_t now_utime) {
     LookForKeys();
     PublishHave();
     AskForOwed(now_utime);
+    for (const MapId& map : missing_corrections_.Due(now_utime)) {
+      AskForState(node_, map);
+    }
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond_us;

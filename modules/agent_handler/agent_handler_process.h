@@ -19,6 +19,7 @@
 #include "agent_handler/journal.h"
 #include "agent_handler/owed_questions.h"
 #include "agent_handler/resend_queue.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/link/agent_key.h"
 #include "common/link/pacer.h"
@@ -61,6 +62,7 @@ class AgentHandlerProcess : public PolledProcess {
     JournalPlace place;
   };
 
+  void NoteJournalled(const KeyframeId& id);
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   void OnLinkUp(const std::string& channel, Bytes data);
   void SendDown(int32_t agent_id, Agent* agent, Bytes packet);
@@ -92,8 +94,10 @@ class AgentHandlerProcess : public PolledProcess {
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;
   std::map<MapId, int32_t> have_;  // highest seq on the disk
+  std::vector<MapId> by_age_;      // of have_, in the journal's order
   OwedQuestions owed_;
   std::map<MapId, Correction> corrections_;  // the newest of each map, at most 1000
+  MissingStates missing_corrections_;        // of the maps that were in the journal at the start
   ResendQueue resend_queue_;
   Pacer resend_pacer_;
   int64_t now_us_ = 0;

@@ -6,80 +6,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/bus/log_event.h"
+
 namespace pangea {
-namespace {
-
-// LCM's log format, big-endian: magic, event number, time stamp, length of the channel's name and
-// of the payload; then both.
-constexpr uint32_t kMagic = 0xEDA1DA01;
-constexpr size_t kHeaderBytes = 28;
-constexpr uint32_t kMaxChannelName = 63;
-constexpr uint32_t kMaxPayload = 16 << 20;
-using Header = std::array<uint8_t, kHeaderBytes>;
-
-void PutBigEndian(uint64_t value, int num_bytes, uint8_t* out) {
-  for (int i = num_bytes - 1; i >= 0; --i, value >>= 8) {
-    out[i] = static_cast<uint8_t>(value & 0xFF);
-  }
-}
-
-uint64_t GetBigEndian(const uint8_t* in, int num_bytes) {
-  uint64_t value = 0;
-  for (int i = 0; i < num_bytes; ++i) {
-    value = value << 8 | in[i];
-  }
-  return value;
-}
-
-bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
-  while (size > 0) {
-    const ssize_t got = pread(fd, out, size, offset);
-    if (got <= 0) {
-      if (got < 0 && errno == EINTR) {
-        continue;
-      }
-      return false;
-    }
-    out += got;
-    offset += got;
-    size -= static_cast<size_t>(got);
-  }
-  return true;
-}
-
-bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {
-  while (size > 0) {
-    const ssize_t put = pwrite(fd, data, size, offset);
-    if (put < 0) {
-      if (errno == EINTR) {
-        continue;
-      }
-      return false;
-    }
-    data += put;
-    offset += put;
-    size -= static_cast<size_t>(put);
-  }
-  return true;
-}
-
-// A file that is new is only safe once its directory is.
-void SyncFolder(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
-  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd >= 0) {
-    fsync(fd);
-    close(fd);
-  }
-}
-
-}  // namespace
 
 Journal::Journal(const std::string& path, const Visitor& visitor) : path_(path) {
   fd_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
@@ -96,7 +31,7 @@ Journal::Journal(const std::string& path, const Visitor& visitor) : path_(path) 
     close(fd_);
     throw;
   }
-  SyncFolder(path);
+  SyncFolder(std::filesystem::absolute(path).parent_path());
 }
 
 Journal::~Journal() {
@@ -111,34 +46,29 @@ void Journal::Load(const Visitor& visitor) {
         fmt::format("cannot read the journal '{}': {}", path_, std::strerror(errno)));
   }
   const int64_t file_bytes = info.st_size;
-  std::vector<uint8_t> body;
-  Header header{};
+  std::vector<uint8_t> body, start(LogEventHeader::kBytes);
   while (synced_bytes_ < file_bytes) {
-    if (!ReadFully(fd_, synced_bytes_, header.data(), header.size()) ||
-        GetBigEndian(header.data(), 4) != kMagic) {
+    if (!ReadFully(fd_, synced_bytes_, start.data(), start.size())) {
       break;
     }
-    const auto name_bytes = static_cast<uint32_t>(GetBigEndian(header.data() + 20, 4));
-    const auto data_bytes = static_cast<uint32_t>(GetBigEndian(header.data() + 24, 4));
-    const int64_t body_offset = synced_bytes_ + static_cast<int64_t>(kHeaderBytes);
-    const int64_t end = body_offset + name_bytes + data_bytes;
-    if (name_bytes < 1 || name_bytes > kMaxChannelName || data_bytes > kMaxPayload ||
-        end > file_bytes) {
+    const auto header = ParseLogEventHeader(start);
+    if (!header || synced_bytes_ + header->event_bytes() > file_bytes) {
       break;
     }
-    body.resize(name_bytes + data_bytes);
+    const int64_t body_offset = synced_bytes_ + static_cast<int64_t>(LogEventHeader::kBytes);
+    body.resize(static_cast<size_t>(header->event_bytes()) - LogEventHeader::kBytes);
     if (!ReadFully(fd_, body_offset, body.data(), body.size())) {
       break;
     }
-    const std::string channel(body.begin(), body.begin() + name_bytes);
-    const bool good = visitor(channel, Bytes(body).subspan(name_bytes),
-                              {body_offset + name_bytes, static_cast<int32_t>(data_bytes)});
+    const std::string channel(body.begin(), body.begin() + header->channel_bytes);
+    const bool good = visitor(channel, Bytes(body).subspan(channel.size()),
+                              {body_offset + header->channel_bytes, header->data_bytes});
     // Pages of the last writes may have reached the disk in any order: damage there is a torn tail.
     if (!good && file_bytes - synced_bytes_ <= kMaxTornBytes) {
       break;
     }
-    next_event_ = static_cast<int64_t>(GetBigEndian(header.data() + 4, 8)) + 1;
-    synced_bytes_ = end;
+    next_event_ = header->number + 1;
+    synced_bytes_ += header->event_bytes();
   }
   cut_bytes_ = file_bytes - synced_bytes_;
   if (cut_bytes_ > kMaxTornBytes) {
@@ -154,17 +84,8 @@ void Journal::Load(const Visitor& visitor) {
 }
 
 JournalPlace Journal::Append(int64_t utime, const std::string& channel, Bytes data) {
-  Header header{};
-  PutBigEndian(kMagic, 4, header.data());
-  PutBigEndian(static_cast<uint64_t>(next_event_++), 8, header.data() + 4);
-  PutBigEndian(static_cast<uint64_t>(utime), 8, header.data() + 12);
-  PutBigEndian(channel.size(), 4, header.data() + 20);
-  PutBigEndian(data.size(), 4, header.data() + 24);
-  queue_.insert(queue_.end(), header.begin(), header.end());
-  queue_.insert(queue_.end(), channel.begin(), channel.end());
-  const int64_t offset = synced_bytes_ + static_cast<int64_t>(queue_.size());
-  queue_.insert(queue_.end(), data.begin(), data.end());
-  return {offset, static_cast<int32_t>(data.size())};
+  const size_t begin = AppendLogEvent(next_event_++, utime, channel, data, &queue_);
+  return {synced_bytes_ + static_cast<int64_t>(begin), static_cast<int32_t>(data.size())};
 }
 
 bool Journal::Sync() {

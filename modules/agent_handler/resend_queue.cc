@@ -8,6 +8,9 @@
 namespace pangea {
 
 std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex& index) {
+  if (message.channel == channels::kMapState) {
+    return "";  // for the pose graph
+  }
   const auto parsed = Parse(message);
   if (!parsed.value) {
     return parsed.refused;

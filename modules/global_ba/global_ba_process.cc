@@ -78,6 +78,7 @@ void GlobalBaProcess::OnMapState(const map_state_t& message) {
     return;
   }
   if (auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+    missing_states_.Note(whole->maps);
     global_ba_.Take(std::move(*whole));
   }
 }
@@ -89,6 +90,9 @@ void GlobalBaProcess::OnHave(const have_t& message) {
     return;
   }
   for (const auto& [map, highest_seq] : have.value->highest_seq) {
+    if (keyframes_.Lacks(map, 0)) {
+      missing_states_.Announce(map);
+    }
     keyframes_.Announce(map, highest_seq);
     matches_.Announce(map, highest_seq);
     // What was judged before this process started.
@@ -141,6 +145,9 @@ void GlobalBaProcess::Tick(int64_t now_utime) {
   }
   for (const SeqGap& gap : matches_.Due(now_utime)) {
     AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  }
+  for (const MapId& map : missing_states_.Due(now_utime)) {
+    AskForState(node_, map);
   }
   if (num_news_ != num_news_at_change_) {
     num_news_at_change_ = num_news_;

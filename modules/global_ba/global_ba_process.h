@@ -7,8 +7,9 @@
 // session that runs; a replay calls Finish.
 //
 // What is missing is asked for at ticks (RESEND_REQUEST, answers on AGAIN_global_ba): keyframes and
-// matches that a gap or HAVE tells of, and once per map the verdicts of a former run. A verdict
-// that is lost later costs its matches, nothing else.
+// matches that a gap or HAVE tells of, once per map the verdicts of a former run, and the states
+// that were said before this process came. A verdict that is lost later costs its matches, nothing
+// else.
 
 #include <set>
 
@@ -50,6 +51,7 @@ class GlobalBaProcess : public Process {
   StateChunks chunks_;
   MissingMessages keyframes_;
   MissingMessages matches_;
+  MissingStates missing_states_;
   std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
   int64_t num_news_ = 0;
   int64_t num_news_at_change_ = 0;

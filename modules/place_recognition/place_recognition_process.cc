@@ -46,6 +46,9 @@ PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitio
 
 void PlaceRecognitionProcess::Tick(int64_t now_utime) {
   AskForGaps(now_utime);
+  for (const MapId& map : missing_states_.Due(now_utime)) {
+    AskForState(node_, map);
+  }
   if (catching_up_ && ++ticks_without_keyframe_ > kGiveUpCatchingUpTicks) {
     ReleaseHeld();
   }
@@ -119,6 +122,7 @@ void PlaceRecognitionProcess::OnHave(const have_t& message) {
     // A map we know nothing of, yet the journal does: we are the one who came late.
     if (keyframes_.next(map) == 0) {
       catching_up_ = true;
+      missing_states_.Announce(map);
     }
     keyframes_.Announce(map, highest_seq);
   }
@@ -153,6 +157,7 @@ void PlaceRecognitionProcess::OnMapState(const map_state_t& message) {
     node_.Refuse(parsed.refused);
     return;
   }
+  missing_states_.Note(parsed.value->maps);
   recognition_.SetGroup(parsed.value->group, parsed.value->revision, parsed.value->maps);
 }
 

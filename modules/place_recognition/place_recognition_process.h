@@ -5,7 +5,8 @@
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks. After a
 // restart the journal's PLACE_MATCHes are asked for along with its keyframes: a keyframe that has
 // its match is only remembered, and those without one wait until all the others are in, so that no
-// pair of keyframes goes unseen. It answers requests for the newest PLACE_MATCHes itself.
+// pair of keyframes goes unseen. The groups are asked of the pose graph. It answers requests for
+// the newest PLACE_MATCHes itself.
 
 #include <deque>
 #include <map>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "common/bus/in_order.h"
+#include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "pangea/again_t.hpp"
@@ -60,6 +62,7 @@ class PlaceRecognitionProcess : public Process {
   std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
   std::deque<Keyframe> held_;                       // without a match
   std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again
+  MissingStates missing_states_;
   int64_t next_status_utime_ = 0;
 };
 

@@ -216,9 +216,11 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   Server after;  // a#3 and b#3 arrived while it was down
   after.Have({{kMapA, 3}, {kMapB, 3}});
   after.Tick();
-  ASSERT_EQ(after.requests.size(), 4u);
+  ASSERT_EQ(after.requests.size(), 6u);
   EXPECT_EQ(after.requests[0].channel, "PLACE_MATCH");
   EXPECT_EQ(after.requests[1].channel, "KEYFRAME_1");
+  EXPECT_EQ(after.requests[4].channel, "MAP_STATE");  // who is in a group decides on the kind
+  EXPECT_EQ(after.requests[5].channel, "MAP_STATE");
   for (const Payload& match : before.matches) {
     after.Again("PLACE_MATCH", match);
   }

@@ -26,6 +26,13 @@ int PoseGraph::MapNumber(const MapId& id) {
   return it->second;
 }
 
+void PoseGraph::PublishAgain(const MapId& map) {
+  if (const auto number = numbers_.find(map); number != numbers_.end()) {
+    Group& group = GroupOf(number->second);
+    group.unpublished = group.publish_now = true;
+  }
+}
+
 PoseGraphUpdate PoseGraph::AddKeyframe(const Keyframe& keyframe) {
   Take(keyframe);
   return Settle();

@@ -92,6 +92,9 @@ class PoseGraph {
   // The map has its place in the order of age from now on, keyframes or not.
   void NoteMap(const MapId& map) { MapNumber(map); }
 
+  // The map's group is published again with the next solve, or by Settle alone.
+  void PublishAgain(const MapId& map);
+
   Counters counters() const;
   // As the next state would say it.
   std::vector<MapState> States() const;

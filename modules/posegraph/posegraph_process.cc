@@ -16,6 +16,8 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 constexpr int64_t kAskAgainAfter_us = kSecond;
 constexpr int64_t kVerdictAfter_us = 2 * kSecond;
+constexpr int64_t kMaxVerdictAfter_us = 60 * kSecond;
+constexpr int64_t kGiveUpCatchingUp_us = 5 * kSecond;
 // One request's answers must fit the receive buffer: a keyframe is about 28 kB.
 constexpr int32_t kMaxKeyframesAsked = 50;
 constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
@@ -44,6 +46,9 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
+  node_.Subscribe<resend_request_t>(
+      std::string(channels::kResendRequest),
+      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
 }
 
 void PoseGraphProcess::OnKeyframe(const keyframe_t& message) {
@@ -109,7 +114,7 @@ void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
     promised.to = query;
     promised.kind = candidate.kind;
     if (!verdicts_.contains(promised.Id()) && due_.size() < kMaxDue) {
-      due_.try_emplace(promised.Id(), Due{query, now_utime_});
+      due_.try_emplace(promised.Id(), Due{query, now_utime_ + kVerdictAfter_us, kVerdictAfter_us});
     }
   }
   SettleUnlessMoreWaits();
@@ -147,6 +152,43 @@ void PoseGraphProcess::OnHave(const have_t& message) {
     }
     keyframes_.Announce(map, highest_seq);
     matches_.Announce(map, highest_seq);
+    if (!have_heard_ && keyframes_.next(map) == 0) {
+      catching_up_to_[map] = highest_seq;
+    }
+  }
+  have_heard_ = true;
+}
+
+// Keyframes and matches' maps and verdicts of the journal that are still to come.
+int64_t PoseGraphProcess::NumToCatchUp() const {
+  int64_t count = 0;
+  for (const auto& [map, seq] : catching_up_to_) {
+    count += std::max(0, seq + 1 - keyframes_.next(map)) + (matches_.Lacks(map, seq) ? 1 : 0);
+  }
+  for (const auto& [id, due] : due_) {
+    const auto goal = catching_up_to_.find(due.query.map);
+    count += goal != catching_up_to_.end() && due.query.seq <= goal->second ? 1 : 0;
+  }
+  return count;
+}
+
+void PoseGraphProcess::CatchUp(int64_t now_utime) {
+  const int64_t count = NumToCatchUp();
+  if (count < num_to_catch_up_ || caught_up_utime_ == 0) {
+    caught_up_utime_ = now_utime;
+  }
+  num_to_catch_up_ = count;
+  if (count == 0 || now_utime >= caught_up_utime_ + kGiveUpCatchingUp_us) {
+    catching_up_to_.clear();
+  }
+}
+
+void PoseGraphProcess::OnResendRequest(const resend_request_t& message) {
+  const Parsed<MapId> map = Parse(message.map);
+  if (message.channel == channels::kMapState && map.value) {
+    graph_.PublishAgain(*map.value);
+    ++num_unsettled_;
+    SettleUnlessMoreWaits();
   }
 }
 
@@ -167,7 +209,8 @@ void PoseGraphProcess::OnAgain(const again_t& message) {
 }
 
 void PoseGraphProcess::SettleUnlessMoreWaits() {
-  if (num_unsettled_ > 0 && (num_unsettled_ >= kMaxUnsettled || !node_.bus().MoreWaits())) {
+  if (num_unsettled_ > 0 && catching_up_to_.empty() &&
+      (num_unsettled_ >= kMaxUnsettled || !node_.bus().MoreWaits())) {
     num_unsettled_ = 0;
     Publish(graph_.Settle());
   }
@@ -191,6 +234,9 @@ void PoseGraphProcess::Finish() {
 
 void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
+  if (!catching_up_to_.empty()) {
+    CatchUp(now_utime);
+  }
   SettleUnlessMoreWaits();
   AskForKeyframes(now_utime);
   for (const SeqGap& gap : matches_.Due(now_utime)) {
@@ -200,7 +246,8 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
     last_change_utime_ = now_utime;
-  } else if (num_finished_ != num_arrived_ && now_utime >= last_change_utime_ + kSecond) {
+  } else if (num_finished_ != num_arrived_ && catching_up_to_.empty() &&
+             now_utime >= last_change_utime_ + kSecond) {
     num_finished_ = num_arrived_;
     Finish();
   }
@@ -230,8 +277,9 @@ void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
 void PoseGraphProcess::AskForVerdicts(int64_t now_utime) {
   std::map<MapId, std::pair<int32_t, int32_t>> overdue;
   for (auto& [id, due] : due_) {
-    if (now_utime >= due.since_utime + kVerdictAfter_us) {
-      due.since_utime = now_utime;
+    if (now_utime >= due.next_ask_utime) {
+      due.wait_us = std::min(2 * due.wait_us, kMaxVerdictAfter_us);
+      due.next_ask_utime = now_utime + due.wait_us;
       auto& [first, last] =
           overdue.try_emplace(due.query.map, due.query.seq, due.query.seq).first->second;
       first = std::min(first, due.query.seq);
@@ -255,6 +303,11 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   node_.Set("edges_bridged", counters.bridged);
   node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
   node_.Set("verdicts_due", static_cast<int64_t>(due_.size()));
+  if (!catching_up_to_.empty()) {
+    return node_.PublishStatus(
+        now_utime, num_to_catch_up_,
+        fmt::format("catching up with the journal: {} to go", num_to_catch_up_));
+  }
   node_.PublishStatus(
       now_utime,
       counters.parked + static_cast<int64_t>(keyframes_.parked()) +

@@ -5,9 +5,14 @@
 //
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
 // (RESEND_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of, verdicts that a
-// PLACE_MATCH promised and that did not come in two seconds, and after a restart all of them. Live,
-// when nothing has come for a second, and at the end of a replay (Finish) every group is solved
-// from the beginning and published in full.
+// PLACE_MATCH promised and that did not come in two seconds (then ever more rarely: a candidate of
+// a match that the journal does not have may never be judged), and after a restart all of them.
+// Live, when nothing has come for a second, and at the end of a replay (Finish) every group is
+// solved from the beginning and published in full.
+//
+// After a restart nothing is told until the journal's keyframes and verdicts are in, or for five
+// seconds none of them came: half a map would be taken for what became of the whole. Whoever comes
+// late asks for MAP_STATE, and the group is told again.
 //
 // What already waits on the bus is taken before anything is solved (at most kMaxUnsettled of it): a
 // solve costs the same after one verdict as after ten, and verdicts that come faster than solves
@@ -32,6 +37,7 @@
 #include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
+#include "pangea/resend_request_t.hpp"
 #include "posegraph/posegraph.h"
 
 namespace pangea {
@@ -60,7 +66,8 @@ class PoseGraphProcess : public Process {
   };
   struct Due {
     KeyframeId query;
-    int64_t since_utime = 0;
+    int64_t next_ask_utime = 0;
+    int64_t wait_us = 0;
   };
 
   void OnKeyframe(const keyframe_t& message);
@@ -69,7 +76,10 @@ class PoseGraphProcess : public Process {
   void OnRefinement(const map_state_t& message);
   void OnHave(const have_t& message);
   void OnAgain(const again_t& message);
+  void OnResendRequest(const resend_request_t& message);
 
+  int64_t NumToCatchUp() const;
+  void CatchUp(int64_t now_utime);
   void Enqueue(const MapId& map, int32_t seq, Item item);
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
@@ -86,9 +96,14 @@ class PoseGraphProcess : public Process {
   std::map<int64_t, Due> due_;      // promised verdicts, by constraint id
   std::set<int64_t> verdicts_;      // that came
   std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
-  int64_t now_utime_ = 0;           // of the newest tick
-  int64_t num_arrived_ = 0;         // keyframes, verdicts
-  int num_unsettled_ = 0;           // of them: taken since the last solve
+  bool have_heard_ = false;
+  // What the journal had of each map when this process came, until that is in.
+  std::map<MapId, int32_t> catching_up_to_;
+  int64_t num_to_catch_up_ = 0;
+  int64_t caught_up_utime_ = 0;  // when that fell last
+  int64_t now_utime_ = 0;        // of the newest tick
+  int64_t num_arrived_ = 0;      // keyframes, verdicts
+  int num_unsettled_ = 0;        // of them: taken since the last solve
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish

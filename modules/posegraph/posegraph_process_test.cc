@@ -298,10 +298,61 @@ TEST(PoseGraphProcess, AfterARestartItAsksForWhatTheJournalHas) {
   }
   EXPECT_EQ(verdicts, 2);
   EXPECT_EQ(keyframes, 2);
+  EXPECT_EQ(server.status.pending, 20 + 2);  // keyframes, and both maps' matches
+  // Half of it says nothing of the whole.
   for (const Keyframe& keyframe : world.agents[0].keyframes) {
     server.Send(keyframe);
   }
-  EXPECT_EQ(server.states.back().revision, 1'000'000);
+  server.Tick(20);
+  EXPECT_TRUE(server.states.empty());
+  for (const Keyframe& keyframe : world.agents[1].keyframes) {
+    server.Send(keyframe);
+  }
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      PlaceMatch match;
+      match.query = keyframe.id;
+      PublishMessage(server.bus, "PLACE_MATCH", ToMessage(match));
+    }
+  }
+  server.bus.Drain();
+  server.Tick(12);
+  ASSERT_FALSE(server.states.empty());
+  EXPECT_EQ(server.states.front().revision, 1'000'000);
+}
+
+TEST(PoseGraphProcess, DoesNotWaitForWhatNobodyHas) {
+  const SyntheticWorld world = MakeWorld(10);
+  Server server;
+  server.Have(world);
+  for (const Keyframe& keyframe : world.agents[0].keyframes) {
+    server.Send(keyframe);
+  }
+  server.Tick(45);
+  EXPECT_TRUE(server.states.empty());
+  server.Tick(10);
+  EXPECT_FALSE(server.states.empty());
+}
+
+TEST(PoseGraphProcess, WhoComesLateIsToldTheStateAgain) {
+  const SyntheticWorld world = MakeWorld();
+  Server server;
+  SendAll(world, MakeConstraints(world), &server);
+  server.Finish();
+  const map_state_t before = server.states.back();
+  const size_t corrections = server.corrections.size();
+  resend_request_t request{};
+  request.requester = "global_ba";
+  request.channel = "MAP_STATE";
+  request.map = ToMessage(world.agents[1].map);
+  PublishMessage(server.bus, "RESEND_REQUEST", request);
+  server.bus.Drain();
+  const map_state_t& again = server.states.back();
+  EXPECT_GT(again.revision, before.revision);
+  EXPECT_EQ(again.num_keyframes, before.num_keyframes);
+  EXPECT_EQ(again.keyframes.back().T_map_body.translation.x,
+            before.keyframes.back().T_map_body.translation.x);
+  EXPECT_EQ(server.corrections.size(), corrections + 2);
 }
 
 // It would ask for two thousand million verdicts, and never come to an end.

@@ -41,6 +41,7 @@ struct RunArguments {
   std::string out;
   std::string recordings;
   std::string rate = "1";
+  std::string journal;
   int first_port = 0;
 };
 
@@ -52,6 +53,8 @@ int Run(const RunArguments& arguments) {
   RunOptions options;
   options.out = fs::path(arguments.out);
   options.rate = arguments.rate;
+  options.journal =
+      arguments.journal.empty() ? options.out / "journal.lcm" : fs::path(arguments.journal);
   if (arguments.first_port != 0) {
     options.first_port = static_cast<uint16_t>(arguments.first_port);
   }
@@ -144,6 +147,9 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                   "1 = as recorded, 2 = twice as fast, ..., max = as fast as everybody keeps up")
       ->check(CLI::PositiveNumber | CLI::IsMember({"max"}))
       ->capture_default_str();
+  run->add_option("--journal", arguments->journal,
+                  "The server's journal; one of an earlier session is gone on with (default: "
+                  "journal.lcm in the folder)");
   run->add_option("--port", arguments->first_port,
                   "First UDP port of the session's buses (default: free ones are chosen)")
       ->check(CLI::Range(1024, 65000));

@@ -1,6 +1,7 @@
 #include "session/session_file.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <set>
 #include <stdexcept>
@@ -76,6 +77,40 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
   }
 }
 
+// What a session's processes are called.
+std::set<std::string> ProcessNames(const SessionScript& script) {
+  std::set<std::string> names(std::begin(kServerProcesses), std::end(kServerProcesses));
+  names.insert("logger_server");
+  for (const AgentScript& agent : script.agents) {
+    names.insert(fmt::format("{}_{}", agent.keyframes.empty() ? "vio" : "keyframes", agent.id));
+    names.insert(fmt::format("uplink_{}", agent.id));
+    names.insert(fmt::format("logger_agent_{}", agent.id));
+    if (agent.link) {
+      names.insert(fmt::format("link_emulator_{}", agent.id));
+    }
+  }
+  return names;
+}
+
+void CheckFaults(const SessionScript& script, const std::string& file) {
+  const std::set<std::string> names = ProcessNames(script);
+  for (const Fault& fault : script.faults) {
+    if (fault.at_s < 0 || fault.seconds < 0) {
+      throw std::runtime_error(
+          fmt::format("{}: faults: 'at' and 'seconds' must not be negative", file));
+    }
+    if (fault.kill.empty() == fault.disk_full.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: faults: at {} s: give either 'kill' or 'disk_full', a process", file, fault.at_s));
+    }
+    const std::string& process = fault.kill.empty() ? fault.disk_full : fault.kill;
+    if (!names.contains(process)) {
+      throw std::runtime_error(fmt::format("{}: faults: no process '{}' in this session: it has {}",
+                                           file, process, fmt::join(names, ", ")));
+    }
+  }
+}
+
 void FindKeyframes(const fs::path& file, SessionScript* script) {
   for (AgentScript& agent : script->agents) {
     if (agent.keyframes.empty()) {
@@ -109,8 +144,16 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
                      [](YamlOptions& link, LinkConditions& conditions) { Bind(link, conditions); });
   });
   yaml.Require("agents");
+  yaml.AddList("faults", &script.faults, [](YamlOptions& item, Fault& fault) {
+    item.Add("at", &fault.at_s);
+    item.Require("at");
+    item.Add("kill", &fault.kill);
+    item.Add("disk_full", &fault.disk_full);
+    item.Add("seconds", &fault.seconds);
+  });
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());
+  CheckFaults(script, file.string());
   FindKeyframes(file, &script);
 
   const fs::path base = recordings.value_or(fs::absolute(file).parent_path());

@@ -7,6 +7,8 @@
 //     - {id: 2, recording: ../recordings/MH_02, delay: 5, start: 10, duration: 60}
 //     - {id: 3, recording: ../recordings/MH_03, keyframes: MH_03/keyframes.lcm,
 //        link: {loss: 0.05, delay_ms: 50, partitions: [{at: 30, seconds: 60}]}}
+//   faults:
+//     - {at: 12.5, kill: fusion}                        # faults.h
 
 #include <cstdint>
 #include <filesystem>
@@ -15,6 +17,7 @@
 #include <vector>
 
 #include "link_emulator/link_conditions.h"
+#include "session/faults.h"
 
 namespace pangea::session {
 
@@ -38,7 +41,12 @@ struct AgentScript {
 
 struct SessionScript {
   std::vector<AgentScript> agents;
+  std::vector<Fault> faults;
 };
+
+// Processes of a session that are started once, whoever its agents are.
+inline constexpr const char* kServerProcesses[] = {
+    "agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba"};
 
 // Reads and checks a session file and finds its recordings: relative to `recordings` if that is
 // given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Throws

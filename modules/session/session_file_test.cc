@@ -103,6 +103,11 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
               HasSubstr("'agents[0].link.loss'"));
   EXPECT_THAT(ErrorOf("agents: [{id: 4, recording: ../recordings/MH_02, link: {loss: 5}}]\n"),
               testing::AllOf(HasSubstr("agent 4: link: loss 5"), HasSubstr("0 to 1")));
+  const std::string agent = "agents: [{id: 1, recording: ../recordings/MH_02}]\n";
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, kill: fusoin}]\n"),
+              testing::AllOf(HasSubstr("'fusoin'"), HasSubstr("fusion"), HasSubstr("uplink_1")));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3}]\n"), HasSubstr("'kill' or 'disk_full'"));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: -3, kill: vio_1}]\n"), HasSubstr("negative"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, keyframes: no.lcm}]\n"),
               testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));
 }

@@ -36,7 +36,8 @@ double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 struct Kept {
   std::vector<std::string> argv;
   ChildProcess child;
-  int restarts = 0;
+  int restarts = 0;      // not counting planned ones
+  bool planned = false;  // its end is a fault of the session file
 };
 
 // One agent's vio, or the player of its stored keyframes: ends by itself when its recording is
@@ -56,6 +57,7 @@ class Runner {
  public:
   Runner(const SessionScript& script, const RunOptions& options)
       : options_(options),
+        faults_(script.faults),
         buses_(ChooseBuses(Ids(script, false), Ids(script, true), options.first_port)),
         monitor_(buses_),
         progress_(isatty(STDOUT_FILENO) != 0) {
@@ -132,18 +134,17 @@ class Runner {
 
   void StartServer() {
     KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
-    Keep("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link, "--server",
-                           buses_.server, "--journal", (options_.out / "journal.lcm").string(),
-                           "--keys", (options_.out / "keys").string()});
-    for (const auto& [name, program] :
-         {std::pair{"place_recognition", "pangea-place-recognition"},
-          std::pair{"inter_map_ba", "pangea-inter-map-ba"}, std::pair{"fusion", "pangea-fusion"},
-          std::pair{"posegraph", "pangea-posegraph"}, std::pair{"global_ba", "pangea-global-ba"},
-          std::pair{"map_points", "pangea-map-points"}}) {
-      Keep(name, {Program(program), "--bus", buses_.server});
-      server_names_.emplace_back(name);
+    Keep("agent_handler",
+         {Program("pangea-agent-handler"), "--link", buses_.link, "--server", buses_.server,
+          "--journal", options_.journal.string(), "--keys", (options_.out / "keys").string()});
+    for (const std::string name : kServerProcesses) {
+      if (name != "agent_handler") {
+        std::string program = "pangea-" + name;
+        std::ranges::replace(program, '_', '-');
+        Keep(name, {Program(program), "--bus", buses_.server});
+      }
+      server_names_.push_back(name);
     }
-    server_names_.emplace_back("agent_handler");
     const double deadline = Now() + kStartTimeout_s;
     while (!monitor_.Idle(server_names_, 0) && !StopRequested()) {
       if (Now() > deadline) {
@@ -168,7 +169,8 @@ class Runner {
       Keep(fmt::format("uplink_{}", id),
            {Program("pangea-uplink"), "--agent", std::to_string(id), "--key", KeyFile(id).string(),
             "--bus", bus, "--link", buses_.LinkOf(id), "--budget",
-            fmt::format("{}", player.script.budget_kb_per_s)});
+            fmt::format("{}", player.script.budget_kb_per_s), "--spool",
+            (options_.out / fmt::format("spool_{}", id)).string()});
     }
   }
 
@@ -234,7 +236,12 @@ class Runner {
   void Play() {
     play_begin_ = Now();
     const auto done = [](const Player& player) { return player.done(); };
-    while (!std::all_of(players_.begin(), players_.end(), done) && !StopRequested()) {
+    // At rate max nothing happens after the last recording: there is no time any more.
+    const auto faults_to_come = [&] {
+      return options_.rate != "max" && SessionTime() < faults_.end_s();
+    };
+    while ((!std::all_of(players_.begin(), players_.end(), done) || faults_to_come()) &&
+           !StopRequested()) {
       for (Player& player : players_) {
         const bool due = player.script.delay_s <= 0 || SessionTime() >= player.script.delay_s;
         if (!player.child && due) {
@@ -286,12 +293,12 @@ class Runner {
                                                   : fmt::format("exit code {}", exit->code),
                                 kept.child.LastLine()));
       summary_.restarted.push_back(name);
-      const int restarts = kept.restarts + 1;
+      const int restarts = kept.restarts + (kept.planned ? 0 : 1);
       std::vector<std::string> argv = kept.argv;
       std::destroy_at(&kept);
       std::construct_at(
-          &kept,
-          Kept{argv, ChildProcess(name, argv, options_.out / "logs" / (name + ".txt")), restarts});
+          &kept, Kept{argv, ChildProcess(name, argv, options_.out / "logs" / (name + ".txt")),
+                      restarts, false});
       if (restarts == kMaxRestarts) {
         summary_.failures.push_back(
             fmt::format("{} ended {} times and was given up", name, restarts));
@@ -299,7 +306,39 @@ class Runner {
     }
   }
 
+  ChildProcess* Find(const std::string& name) {
+    for (Kept& kept : kept_) {
+      if (kept.child.name() == name) {
+        return &kept.child;
+      }
+    }
+    for (Player& player : players_) {
+      if (player.child && player.child->name() == name && !player.done()) {
+        return &*player.child;
+      }
+    }
+    return nullptr;
+  }
+
+  void InjectFaults() {
+    for (const std::string& name : faults_.TakeKills(SessionTime())) {
+      if (ChildProcess* child = Find(name)) {
+        child->Signal(SIGKILL);
+      }
+      for (Kept& kept : kept_) {
+        kept.planned |= kept.child.name() == name;
+      }
+    }
+    const std::set<std::string> full = faults_.DisksFull(SessionTime());
+    for (const std::string& name : faults_.DisksEverFull()) {
+      if (ChildProcess* child = Find(name)) {
+        SetDiskFull(child->pid(), full.contains(name));
+      }
+    }
+  }
+
   void Step() {
+    InjectFaults();
     monitor_.Handle(100);
     Revive();
     std::vector<AgentLine> lines;
@@ -341,6 +380,7 @@ class Runner {
   }
 
   RunOptions options_;
+  FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;
   SessionProgress progress_;

@@ -17,6 +17,7 @@ namespace pangea::session {
 struct RunOptions {
   std::filesystem::path out;           // created; an earlier session there is moved aside
   std::string rate = "1";              // "1", "2", ... or "max"
+  std::filesystem::path journal;       // an earlier session's is gone on with
   std::optional<uint16_t> first_port;  // chosen free when not given
 };
 

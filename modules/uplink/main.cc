@@ -16,6 +16,8 @@ int main(int argc, char** argv) {
   std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
   std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
   pangea::UplinkOptions options;
+  std::string spool_folder;
+  int64_t spool_disk_bytes = 4'000'000'000;  // 40 hours of walking
   app.add_option("--agent", agent_id, "agent id")->required()->check(CLI::Range(1, 65535));
   app.add_option("--key", key, "the agent's key file (pangea-agent-handler keygen)")->required();
   app.add_option("--bus", bus, "LCM URL of the agent's bus")->capture_default_str();
@@ -24,8 +26,12 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--rate", options.sender.rate_bytes_per_s, "bytes per second at most")
       ->capture_default_str();
+  app.add_option("--spool", spool_folder,
+                 "folder for unacknowledged keyframes (default: none, they are kept in memory)");
+  app.add_option("--spool-disk-bytes", spool_disk_bytes, "what the folder may hold; then memory")
+      ->capture_default_str();
   app.add_option("--spool-bytes", options.sender.max_spool_bytes,
-                 "unacknowledged keyframes kept; beyond it the newest are not taken")
+                 "unacknowledged keyframes kept in memory; beyond it the newest are not taken")
       ->capture_default_str();
   double budget_kb_per_s = 0;
   app.add_option("--budget", budget_kb_per_s,
@@ -37,10 +43,15 @@ int main(int argc, char** argv) {
     if (const auto invalid = options.Invalid()) {
       throw std::runtime_error(*invalid);
     }
+    std::optional<pangea::Spool> spool;
+    if (!spool_folder.empty()) {
+      spool.emplace(spool_folder, agent_id, spool_disk_bytes);
+    }
     pangea::LcmBus agent_bus(bus);
     pangea::LcmBus link_bus(link);
     pangea::UplinkProcess process(agent_bus, link_bus, agent_id,
-                                  pangea::ReadKeyFileOf(key, agent_id), options);
+                                  pangea::ReadKeyFileOf(key, agent_id), options,
+                                  spool ? &*spool : nullptr);
     return pangea::RunPolledProcess(agent_bus, link_bus, process);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-uplink: {}\n", error.what());

@@ -44,8 +44,16 @@ UplinkOptions WithinBudget(UplinkOptions options) {
   return options;
 }
 
-Uplink::Uplink(std::string software, const UplinkOptions& options)
-    : software_(std::move(software)), options_(WithinBudget(options)), sender_(options_.sender) {}
+Uplink::Uplink(std::string software, const UplinkOptions& options, Sender::Load load)
+    : software_(std::move(software)),
+      options_(WithinBudget(options)),
+      sender_(options_.sender, std::move(load)) {}
+
+void Uplink::SetStored(const KeyframeId& id) {
+  Map& map = FindOrAdd(id.map);
+  map.highest = std::max(map.highest, id.seq);
+  sender_.SetStored(id);
+}
 
 Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);
@@ -136,14 +144,13 @@ std::vector<uint8_t> Uplink::Hello() const {
     hello.maps.push_back(
         {id, map.given_up, map.correction ? map.correction->revision : 0, map.slot});
   };
-  for (const auto& [id, map] : maps_) {
-    if (hello.maps.size() < kMaxLinkMaps - 1 && sender_.FirstSeqFrom(id, 0)) {
-      announce(id, map);
+  // The newest, and of the others those with something to send, newest first.
+  for (auto it = maps_.rbegin(); it != maps_.rend() && hello.maps.size() < kMaxLinkMaps; ++it) {
+    if (it == maps_.rbegin() || sender_.FirstSeqFrom(it->first, 0)) {
+      announce(it->first, it->second);
     }
   }
-  if (!maps_.empty() && (hello.maps.empty() || hello.maps.back().map != maps_.rbegin()->first)) {
-    announce(maps_.rbegin()->first, maps_.rbegin()->second);
-  }
+  std::ranges::reverse(hello.maps);
   return Encode(hello);
 }
 
@@ -208,7 +215,7 @@ bool Uplink::GiveUp(const MapId& id, Map* map, const SeqGap& gap) {
 
 std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
   std::vector<Ask> asks;
-  const bool full = sender_.spooled_bytes() + kMaxCompressedBytes > options_.sender.max_spool_bytes;
+  const bool full = sender_.Full();
   for (auto& [id, map] : maps_) {
     const bool newest = id == maps_.rbegin()->first;
     if (full || now_us - map.asked_us < kAskInterval_us) {

@@ -34,13 +34,16 @@ UplinkOptions WithinBudget(UplinkOptions options);
 class Uplink {
  public:
   // `software`: for people.
-  Uplink(std::string software, const UplinkOptions& options);
+  // `load` gives what SetStored was told of.
+  Uplink(std::string software, const UplinkOptions& options, Sender::Load load = nullptr);
 
   // The agent has published it; whether it is still to be taken.
   bool Hear(const KeyframeId& id, int64_t now_us);
   enum class Taken { kNew, kRepeat, kSpoolFull };
   // A keyframe_t that has passed Parse, encoded and compressed.
   Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);
+  // The keyframe can be loaded from now on; also one of an earlier run.
+  void SetStored(const KeyframeId& id);
   // A pose in EncodePose's form; its map, and the revision of the correction it had applied.
   void AddPose(const MapId& map, int64_t group_revision, std::vector<uint8_t> bytes);
   // Perhaps with a handler that has another journal: what it has, it says anew, and it may be less.

@@ -30,14 +30,20 @@ size_t Checksum(Bytes data) {
 }  // namespace
 
 UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
-                             const UplinkOptions& options)
+                             const UplinkOptions& options, Spool* spool)
     : agent_id_(agent_id),
       link_bus_(link_bus),
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
-      uplink_(kSoftware, options) {
+      spool_(spool),
+      uplink_(kSoftware, options, [this](const KeyframeId& id) { return Load(id); }) {
   if (options.budget_bytes_per_s > 0) {
     ladder_.emplace(options.budget_bytes_per_s);
+  }
+  if (spool_ != nullptr) {
+    for (const KeyframeId& id : spool_->Kept()) {
+      uplink_.SetStored(id);
+    }
   }
   agent_bus.Subscribe(channels::Keyframe(agent_id),
                       [this](const std::string&, Bytes data) { OnKeyframe(data); });
@@ -73,13 +79,17 @@ void UplinkProcess::OnKeyframe(Bytes data) {
   if (!uplink_.Hear(keyframe.value->id, now_us_)) {
     return node_.Count("keyframes_repeated");
   }
-  std::vector<uint8_t> compressed = Compress(FitBudget(*keyframe.value, data));
+  const std::vector<uint8_t> bytes = FitBudget(*keyframe.value, data);
+  std::vector<uint8_t> compressed = Compress(bytes);
   const auto compressed_bytes = static_cast<int64_t>(compressed.size());
   switch (uplink_.AddKeyframe(keyframe.value->id, std::move(compressed), now_us_)) {
     case Uplink::Taken::kNew:
       node_.Count("keyframe_bytes", compressed_bytes);
       if (ladder_) {
         ladder_->Charge(compressed_bytes);
+      }
+      if (spool_ != nullptr && spool_->Add(keyframe.value->id, bytes, now_utime_)) {
+        uplink_.SetStored(keyframe.value->id);
       }
       return node_.Count("keyframes");
     case Uplink::Taken::kRepeat:
@@ -101,6 +111,15 @@ std::vector<uint8_t> UplinkProcess::FitBudget(const Keyframe& keyframe, Bytes da
     }
   }
   return {data.begin(), data.end()};
+}
+
+std::vector<uint8_t> UplinkProcess::Load(const KeyframeId& id) {
+  const std::vector<uint8_t> stored = spool_->Read(id);
+  if (stored.empty()) {
+    node_.Count("spool_reads_failed");
+    return {};
+  }
+  return Compress(stored);
 }
 
 void UplinkProcess::OnPose(Bytes data) {
@@ -186,6 +205,9 @@ void UplinkProcess::PublishHave() {
   }
   have_t message{};
   for (const auto& [map, seq] : have) {
+    if (spool_ != nullptr) {
+      spool_->Release(map, seq);
+    }
     if (seq >= 0) {
       message.maps.push_back(ToMessage(map));
       message.highest_seq.push_back(seq);
@@ -237,6 +259,7 @@ std::string UplinkProcess::RateForPeople() {
 }
 
 void UplinkProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
   if (now_utime < next_status_utime_) {
     return;
   }
@@ -247,11 +270,18 @@ void UplinkProcess::Tick(int64_t now_utime) {
   node_.Set("keyframes_lost", uplink_.keyframes_lost());
   node_.Set("packets_resent", sender.resent());
   node_.Set("spool", pending);
-  node_.Set("spool_bytes", sender.spooled_bytes());
+  node_.Set("spool_memory_bytes", sender.spooled_bytes());
+  if (spool_ != nullptr) {
+    spool_->Sync();
+    node_.Set("spool_disk_bytes", spool_->bytes());
+  }
   node_.PublishStatus(now_utime, pending,
                       fmt::format("{}, {} keyframes acknowledged, {} in the spool{}",
                                   uplink_.Connected(now_us_) ? "connected" : "handler is away",
-                                  uplink_.keyframes_acked(), pending, RateForPeople()));
+                                  uplink_.keyframes_acked(), pending,
+                                  RateForPeople() + (spool_ != nullptr && spool_->refuses()
+                                                         ? "; THE SPOOL'S DISK REFUSES WRITES"
+                                                         : "")));
 }
 
 }  // namespace pangea

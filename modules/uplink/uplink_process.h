@@ -13,6 +13,7 @@
 #include "common/link/map_continuity.h"
 #include "common/link/poll_loop.h"
 #include "uplink/ladder.h"
+#include "uplink/spool.h"
 #include "uplink/uplink.h"
 
 namespace pangea {
@@ -20,7 +21,7 @@ namespace pangea {
 class UplinkProcess : public PolledProcess {
  public:
   UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
-                const UplinkOptions& options);
+                const UplinkOptions& options, Spool* spool = nullptr);
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
@@ -33,6 +34,7 @@ class UplinkProcess : public PolledProcess {
   std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
   void OnLandmarks(Bytes body);
   void Send(const LinkPacket& packet);
+  std::vector<uint8_t> Load(const KeyframeId& id);
   void PublishHave();
   void PublishAsks();
   void PublishCorrections();
@@ -43,12 +45,14 @@ class UplinkProcess : public PolledProcess {
   Node node_;
   UplinkSession session_;
   MapContinuity continuity_;
+  Spool* const spool_;
   Uplink uplink_;
   std::optional<RateLadder> ladder_;
   int64_t bytes_up_ = 0;
   int64_t bytes_up_at_status_ = 0;
   double bytes_per_s_ = 0;  // sent, over the last ten seconds or so
   int64_t now_us_ = 0;
+  int64_t now_utime_ = 0;
   int64_t next_have_us_ = 0;
   int64_t next_status_utime_ = 0;
   std::map<MapId, int32_t> last_have_;

@@ -173,6 +173,53 @@ TEST_F(UplinkTest, TheHighestCorrectionWinsAndIsConfirmed) {
   EXPECT_TRUE(uplink.TakeCorrections(9 * kSecond).empty());
 }
 
+TEST(UplinkSpool, WhatIsStoredLeavesMemoryAndIsLoadedWhenItsTurnComes) {
+  constexpr int kKeyframes = 400;
+  constexpr size_t kBytes = 50'000;
+  std::vector<int> loaded;
+  Uplink uplink("test", {}, [&](const KeyframeId& id) {
+    loaded.push_back(id.seq);
+    return id.seq == 250 ? std::vector<uint8_t>() : std::vector<uint8_t>(kBytes);
+  });
+  for (int seq = 0; seq < kKeyframes; ++seq) {
+    uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(kBytes), 0);
+    uplink.SetStored({kMap, seq});
+  }
+  EXPECT_LE(uplink.sender().spooled_bytes(), Sender::kMaxStoredInMemory + int64_t{kBytes});
+  EXPECT_EQ(uplink.sender().spooled(), 400u);
+  uplink.OnAck(Ack(1, 199), kSecond);
+  uplink.Poll(kSecond);
+  EXPECT_EQ(loaded[0], 200);
+  EXPECT_LE(loaded.size(), 4u) << "no more than the receiver has room for";
+  // One that cannot be read is asked of the odometry.
+  uplink.OnAck(Ack(2, 249), 2 * kSecond);
+  uplink.Poll(2 * kSecond);
+  const auto asks = uplink.Asks(3 * kSecond);
+  ASSERT_EQ(asks.size(), 1u);
+  EXPECT_EQ(asks[0].gap.from_seq, 250);
+  EXPECT_EQ(asks[0].gap.to_seq, 250);
+}
+
+TEST(UplinkSpool, AnEarlierRunsKeyframesAreAnnouncedAndSent) {
+  Uplink uplink("test", {}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
+  uplink.SetStored({kMap, 7});
+  uplink.SetStored({kMap, 8});
+  EXPECT_EQ(HelloIn(uplink.Poll(kSecond)).maps.size(), 1u);
+  uplink.OnAck(Ack(1, 6), kSecond);
+  EXPECT_THAT(SentSeqs(uplink.Poll(kSecond)), testing::ElementsAre(7, 8));
+}
+
+TEST_F(UplinkTest, TheNewestMapGoesFirst) {
+  const MapId newer{1, 2000};
+  Add(0);
+  Add(1);
+  uplink.AddKeyframe({newer, 5}, std::vector<uint8_t>(500), 0);
+  LinkAck ack = Ack(1, -1);
+  ack.journalled_seq[newer] = 4;
+  uplink.OnAck(ack, kSecond);
+  EXPECT_THAT(SentSeqs(uplink.Poll(kSecond)), testing::ElementsAre(5, 0, 1));
+}
+
 TEST_F(UplinkTest, PosesGoUpAtTenHertz) {
   int poses = 0;
   for (int i = 1; i <= 300; ++i) {

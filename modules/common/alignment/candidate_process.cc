@@ -10,6 +10,8 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
+constexpr char kJournalOwner[] = "agent_handler";
+
 }  // namespace
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
@@ -26,6 +28,9 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
   node_.Subscribe<again_t>(
       channels::Again(name),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
+  node_.Subscribe<resend_request_t>(
+      std::string(channels::kResendRequest),
+      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
 }
 
 void CandidateProcess::OnKeyframe(const keyframe_t& message) {
@@ -102,6 +107,26 @@ void CandidateProcess::OnAgain(const again_t& message) {
   }
 }
 
+void CandidateProcess::OnResendRequest(const resend_request_t& message) {
+  const Parsed<MapId> map = Parse(message.map);
+  if (message.channel != channels::kConstraint || message.requester != kJournalOwner ||
+      !map.value) {
+    return;
+  }
+  for (const Constraint& constraint : sent_) {
+    if (constraint.to.map == *map.value && constraint.to.seq >= message.from_seq &&
+        constraint.to.seq <= message.to_seq) {
+      const constraint_t verdict = ToMessage(constraint);
+      again_t again{};
+      again.channel = channels::kConstraint;
+      again.data.resize(static_cast<size_t>(verdict.getEncodedSize()));
+      again.num_bytes = static_cast<int32_t>(again.data.size());
+      verdict.encode(again.data.data(), 0, again.num_bytes);
+      node_.Publish(channels::Again(message.requester), again);
+    }
+  }
+}
+
 void CandidateProcess::JudgeReady() {
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     const KeyframeId& query = it->first.first;
@@ -112,6 +137,10 @@ void CandidateProcess::JudgeReady() {
     const Constraint constraint = judge_->Judge(query, it->second);
     if (judged_.insert(constraint.Id()).second) {
       node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
+      sent_.push_back(constraint);
+      if (sent_.size() > kMaxSent) {
+        sent_.pop_front();
+      }
       if (constraint.accepted) {
         node_.Count("accepted");
         ++num_accepted_;

@@ -2,14 +2,16 @@
 
 // The process around a PairJudge: KEYFRAME_* and PLACE_MATCH in, CONSTRAINT out, exactly one a
 // candidate of its kind. A candidate about a keyframe not seen yet waits for it; what is missing is
-// asked for at ticks (RESEND_REQUEST, answers on AGAIN_<name>). A verdict depends on the keyframes
-// alone, not on when they came: live and replay agree, and a restart that repeats one repeats it
-// exactly.
+// asked for at ticks (RESEND_REQUEST, answers on AGAIN_<name>). Verdicts of this run that the
+// journal lacks are answered to its owner, the agent_handler, which everyone else asks. A verdict
+// depends on the keyframes alone, not on when they came: live and replay agree, and a restart that
+// repeats one repeats it exactly.
 //
 // Bounds: at most kMaxWaiting candidates wait; beyond that a match is not taken and asked for
-// again later.
+// again later. The newest kMaxSent verdicts are kept to be said again.
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <set>
@@ -25,6 +27,7 @@
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/place_match_t.hpp"
+#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 
@@ -36,11 +39,13 @@ class CandidateProcess : public Process {
 
  private:
   static constexpr size_t kMaxWaiting = 2000;
+  static constexpr size_t kMaxSent = 5000;
 
   void OnKeyframe(const keyframe_t& message);
   void OnPlaceMatch(const place_match_t& message);
   void OnHave(const have_t& message);
   void OnAgain(const again_t& message);
+  void OnResendRequest(const resend_request_t& message);
   void JudgeReady();
 
   Node node_;
@@ -50,6 +55,7 @@ class CandidateProcess : public Process {
   MissingMessages matches_;
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;  // by (query, match)
   std::set<int64_t> judged_;                                             // constraint ids
+  std::deque<Constraint> sent_;  // newest verdicts, to repeat
   std::set<MapId> verdicts_asked_;
   int64_t next_status_utime_ = 0;
   int64_t num_accepted_ = 0;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/bus/in_order.h"
+#include "common/bus/journal_first.h"
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "pangea/again_t.hpp"
@@ -167,6 +168,51 @@ TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
   EXPECT_THAT(stream.Skip({map, 1, 3}), testing::ElementsAre(104));
   EXPECT_EQ(stream.next(map), 5);
   EXPECT_TRUE(stream.Gaps().empty());
+}
+
+TEST(JournalFirstBus, DeliversHaveBeforeWhatCameBeforeIt) {
+  LocalBus local;
+  JournalFirstBus bus(local, 0);
+  std::vector<std::string> seen;
+  bus.Subscribe("KEYFRAME_1|PLACE_MATCH", [&](const std::string& c, Bytes) { seen.push_back(c); });
+  bus.Subscribe("HAVE", [&](const std::string& channel, Bytes) { seen.push_back(channel); });
+  for (const char* channel : {"KEYFRAME_1", "PLACE_MATCH", "HAVE", "KEYFRAME_1"}) {
+    local.Publish(channel, {});
+  }
+  local.Drain();
+  EXPECT_THAT(seen, testing::ElementsAre("HAVE"));
+  bus.Poll(1000);
+  EXPECT_THAT(seen, testing::ElementsAre("HAVE", "KEYFRAME_1", "PLACE_MATCH", "KEYFRAME_1"));
+  local.Publish("PLACE_MATCH", {});
+  local.Drain();
+  EXPECT_EQ(seen.size(), 5u);
+}
+
+TEST(JournalFirstBus, WaitsNotForEverWhereThereIsNoJournal) {
+  LocalBus local;
+  JournalFirstBus bus(local, 0);
+  int seen = 0;
+  bus.Subscribe("KEYFRAME_1", [&](const std::string&, Bytes) { ++seen; });
+  local.Publish("KEYFRAME_1", {});
+  local.Drain();
+  bus.Poll(JournalFirstBus::kLongest_us - 1);
+  EXPECT_EQ(seen, 0);
+  bus.Poll(JournalFirstBus::kLongest_us);
+  EXPECT_EQ(seen, 1);
+}
+
+TEST(MissingStates, AreAskedForUntilTheyAreSaidButNotForEver) {
+  MissingStates missing;
+  missing.Announce({1, 1});
+  missing.Announce({2, 1});
+  EXPECT_EQ(missing.Due(0).size(), 2u);
+  EXPECT_TRUE(missing.Due(1'000'000).empty());
+  missing.Note({{2, 1}});
+  int asked = 0;
+  for (int64_t second = 2; second < 60; ++second) {
+    asked += static_cast<int>(missing.Due(second * 1'000'000).size());
+  }
+  EXPECT_EQ(asked, 4);
 }
 
 }  // namespace

@@ -26,6 +26,10 @@ void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
   node.NoteResendAsked();
 }
 
+void AskForState(Node& node, const MapId& map) {
+  AskAgain(node, std::string(channels::kMapState), {map, 0, 0});
+}
+
 std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {
   std::vector<SeqGap> due;
   for (const SeqGap& gap : stream_.Gaps()) {
@@ -36,6 +40,25 @@ std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {
       asked.next_utime = now_utime + 2 * kSecond;
       due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
     }
+  }
+  return due;
+}
+
+void MissingStates::Note(const std::vector<MapId>& maps) {
+  for (const MapId& map : maps) {
+    times_asked_.erase(map);
+  }
+}
+
+std::vector<MapId> MissingStates::Due(int64_t now_utime) {
+  std::vector<MapId> due;
+  if (now_utime < next_utime_) {
+    return due;
+  }
+  next_utime_ = now_utime + 2 * kSecond;
+  for (auto it = times_asked_.begin(); it != times_asked_.end() && due.size() < kMaxAsked;) {
+    due.push_back(it->first);
+    it = ++it->second < kMaxTimes ? std::next(it) : times_asked_.erase(it);
   }
   return due;
 }

@@ -7,6 +7,8 @@
 #include <csignal>
 #include <iostream>
 
+#include "common/bus/journal_first.h"
+
 namespace pangea {
 namespace {
 
@@ -28,16 +30,22 @@ void InstallSignalHandlers() {
   action.sa_handler = [](int) { stop_requested = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  // A file that may not grow (a quota, ulimit -f) is a full disk like any other: an error, no
+  // death.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 bool StopRequested() { return stop_requested != 0; }
 
-int RunProcess(LcmBus& bus, Process& process) {
+int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
   while (!StopRequested()) {
     bus.Handle(kHandleTimeout_ms);
     const int64_t now = WallUtime();
+    if (journal_first != nullptr) {
+      journal_first->Poll(now);
+    }
     if (now >= next_tick) {
       process.Tick(now);
       next_tick = now + kTickInterval_us;
@@ -64,8 +72,9 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
   }
   try {
     LcmBus bus(url);
-    const std::unique_ptr<Process> process = factory(bus, options_file);
-    return RunProcess(bus, *process);
+    JournalFirstBus journal_first(bus, WallUtime());
+    const std::unique_ptr<Process> process = factory(journal_first, options_file);
+    return RunProcess(bus, *process, &journal_first);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("{}: {}\n", description.name, error.what());
     return 1;

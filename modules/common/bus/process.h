@@ -29,8 +29,10 @@ int64_t WallUtime();
 void InstallSignalHandlers();
 bool StopRequested();
 
+class JournalFirstBus;
+
 // Handles messages and ticks until a signal. Returns the exit code.
-int RunProcess(LcmBus& bus, Process& process);
+int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first = nullptr);
 
 struct ProcessDescription {
   std::string name;                  // "pangea-fusion"
@@ -38,8 +40,9 @@ struct ProcessDescription {
   std::string default_options_yaml;  // printed by --print-options; empty if it has none
 };
 
-// Command line of a server process: --bus URL, --options FILE.yaml, --print-options. Errors become
-// one line and exit code 1.
+// A server process: command line (--bus URL, --options FILE.yaml, --print-options), then messages,
+// the journal's HAVE first (journal_first.h), and ticks until a signal. Errors become one line and
+// exit code 1.
 using ProcessFactory =
     std::function<std::unique_ptr<Process>(Bus& bus, const std::string& options_file)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,

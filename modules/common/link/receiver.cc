@@ -18,9 +18,12 @@ void Receiver::OnHello(const LinkHello& hello) {
            std::none_of(hello.maps.begin(), hello.maps.end(),
                         [&](const auto& m) { return m.map == item.first; });
   });
+  for (auto& [id, map] : maps_) {
+    map.in_hello = false;
+  }
   for (const LinkMap& announced : hello.maps) {
     Map& map = maps_[announced.map];
-    map.announced = true;
+    map.announced = map.in_hello = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
       given_up_ += announced.first_seq - map.next;
       map.next = announced.first_seq;
@@ -164,11 +167,13 @@ void Receiver::Journalled(const KeyframeId& id) {
 
 void Receiver::FillAck(bool all_maps, LinkAck* ack) const {
   ack->cache_bytes = options_.cache_bytes;
-  // The newest maps; and of those an uplink may still be sending none is older than its hello's.
-  for (auto it = maps_.rbegin(); it != maps_.rend() && ack->journalled_seq.size() < kMaxAckMaps;
-       ++it) {
-    if (all_maps || it->second.announced) {
-      ack->journalled_seq[it->first] = it->second.journalled;
+  // What the uplink is sending, which is in its hello; then the newest maps.
+  for (const bool in_hello : {true, false}) {
+    for (auto it = maps_.rbegin(); it != maps_.rend() && ack->journalled_seq.size() < kMaxAckMaps;
+         ++it) {
+      if (it->second.in_hello == in_hello && (all_maps || it->second.announced)) {
+        ack->journalled_seq[it->first] = it->second.journalled;
+      }
     }
   }
   for (const auto& [id, entry] : cache_) {

@@ -61,6 +61,7 @@ class Receiver {
     int32_t next = 0;  // to hand over
     int32_t journalled = -1;
     bool announced = false;  // by this run of the uplink
+    bool in_hello = false;   // the newest one
   };
   struct Entry {
     std::vector<std::vector<uint8_t>> pieces;

@@ -33,8 +33,8 @@ std::optional<std::string> SenderOptions::Invalid() const {
   return std::nullopt;
 }
 
-Sender::Sender(const SenderOptions& options)
-    : options_(options), pacer_(options.rate_bytes_per_s, kBurstBytes) {}
+Sender::Sender(const SenderOptions& options, Load load)
+    : options_(options), load_(std::move(load)), pacer_(options.rate_bytes_per_s, kBurstBytes) {}
 
 bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
   const auto size = static_cast<int64_t>(bytes.size());
@@ -47,6 +47,23 @@ bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
     spooled_bytes_ += size;
   }
   return true;
+}
+
+void Sender::SetStored(const KeyframeId& id) {
+  Item& item = spool_[id];
+  item.stored = true;
+  if (item.pieces.empty() && spooled_bytes_ > kMaxStoredInMemory) {
+    spooled_bytes_ -= static_cast<int64_t>(item.bytes.size());
+    item.bytes = {};
+  }
+}
+
+bool Sender::LoadBytes(const KeyframeId& id, Item* item) {
+  if (item->bytes.empty() && load_) {
+    item->bytes = load_(id);
+    spooled_bytes_ += static_cast<int64_t>(item->bytes.size());
+  }
+  return !item->bytes.empty();
 }
 
 std::optional<int32_t> Sender::FirstSeqFrom(const MapId& map, int32_t seq) const {
@@ -77,13 +94,18 @@ void Sender::Settle(const Item& item, Piece* piece) {
 void Sender::Release(const MapId& map, int32_t journalled_seq) {
   auto it = spool_.lower_bound({map, 0});
   while (it != spool_.end() && it->first.map == map && it->first.seq <= journalled_seq) {
-    for (Piece& piece : it->second.pieces) {
-      Settle(it->second, &piece);
-    }
-    spooled_bytes_ -= static_cast<int64_t>(it->second.bytes.size());
-    started_.erase(it->first);
-    it = spool_.erase(it);
+    it = Erase(it);
   }
+}
+
+std::map<KeyframeId, Sender::Item>::iterator Sender::Erase(
+    std::map<KeyframeId, Item>::iterator it) {
+  for (Piece& piece : it->second.pieces) {
+    Settle(it->second, &piece);
+  }
+  spooled_bytes_ -= static_cast<int64_t>(it->second.bytes.size());
+  started_.erase(it->first);
+  return spool_.erase(it);
 }
 
 void Sender::OnAck(const LinkAck& ack, int64_t now_us) {
@@ -144,17 +166,21 @@ void Sender::FindLost(int64_t highest_number, int64_t now_us) {
   }
 }
 
-// In each map the unbroken run from the next seq on; all together within the receiver's cache.
+// In each map the unbroken run from the next seq on, the newest map first; all together within the
+// receiver's cache.
 std::vector<KeyframeId> Sender::UnderWay() const {
   std::vector<KeyframeId> ids;
   int64_t bytes = 0;
-  for (const auto& [map, next] : next_) {
+  for (auto newest = next_.rbegin(); newest != next_.rend(); ++newest) {
+    const auto& [map, next] = *newest;
     int32_t seq = next;
     for (auto it = spool_.find({map, seq}); it != spool_.end(); ++it, ++seq) {
       if (it->first != KeyframeId{map, seq}) {
         break;
       }
-      bytes += static_cast<int64_t>(it->second.bytes.size());
+      // What is not loaded yet is taken for as large as it may be.
+      bytes += it->second.bytes.empty() ? kMaxCompressedBytes
+                                        : static_cast<int64_t>(it->second.bytes.size());
       if (!ids.empty() && (ids.size() >= kMaxPartialKeyframes || bytes > cache_bytes_)) {
         return ids;
       }
@@ -169,7 +195,12 @@ std::vector<Sender::Sent> Sender::Poll(int64_t now_us) {
   pacer_.Refill(now_us);
   FindLost(highest_acked_, now_us);
   for (const KeyframeId& id : UnderWay()) {
-    SendPieces(id, &spool_.at(id), now_us, &sent);
+    const auto it = spool_.find(id);
+    if (LoadBytes(id, &it->second)) {
+      SendPieces(id, &it->second, now_us, &sent);
+    } else {
+      Erase(it);  // the odometry may still have it
+    }
   }
   return sent;
 }

@@ -9,11 +9,17 @@
 // packet sent 24 numbers before one that arrived is gone), or after a time-out that follows the
 // measured round trip (RFC 6298's estimator) and doubles with each try.
 //
-// Bounds: the spool (options) refuses new keyframes when it is full: the oldest are the ones the
-// pose chain hangs on, and the newest can still be asked from the odometry. In flight: options.
+// Of several maps the newest goes first: what it brings is new to the server, and loops it closes
+// are of use to the agent now. The history of older maps takes what room is left.
+//
+// Bounds: memory (options); beyond it new keyframes are refused: the oldest are the ones the pose
+// chain hangs on, and the newest can still be asked from the odometry. Keyframes that are stored
+// elsewhere (SetStored) are held in memory up to kMaxStoredInMemory only, and read again when their
+// turn comes. In flight: options.
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -32,18 +38,24 @@ struct SenderOptions {
   // Sent, neither arrived nor given up: what the receiver's cache takes (paper, IV.A). A smaller
   // window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take 200 kB.
   int max_in_flight_bytes = 210 * 1024;
-  int64_t max_spool_bytes = 256 << 20;  // about 9,000 keyframes, an hour's walk
+  int64_t max_spool_bytes = 256 << 20;  // in memory; about 9,000 keyframes, an hour's walk
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;
 };
 
 class Sender {
  public:
-  explicit Sender(const SenderOptions& options);
+  static constexpr int64_t kMaxStoredInMemory = 8 << 20;
+  // A stored keyframe, compressed; empty if it is lost.
+  using Load = std::function<std::vector<uint8_t>(const KeyframeId&)>;
+
+  explicit Sender(const SenderOptions& options, Load load = nullptr);
 
   // Takes a compressed keyframe. False if the spool is full.
   bool Add(const KeyframeId& id, std::vector<uint8_t> bytes);
   bool Has(const KeyframeId& id) const { return spool_.contains(id); }
+  // It is stored from now on, and can be loaded; also one that an earlier run has stored.
+  void SetStored(const KeyframeId& id);
   // The first spooled keyframe of the map at or after `seq`.
   std::optional<int32_t> FirstSeqFrom(const MapId& map, int32_t seq) const;
   // Only maps that the other side knows are sent, from this seq on; before it all is acknowledged.
@@ -64,7 +76,9 @@ class Sender {
   int64_t NextNumber(int64_t now_us);
 
   size_t spooled() const { return spool_.size(); }
+  // In memory.
   int64_t spooled_bytes() const { return spooled_bytes_; }
+  bool Full() const { return spooled_bytes_ + kMaxCompressedBytes > options_.max_spool_bytes; }
   int64_t resent() const { return resent_; }
   int in_flight_bytes() const { return in_flight_bytes_; }
 
@@ -77,7 +91,8 @@ class Sender {
     bool received = false;
   };
   struct Item {
-    std::vector<uint8_t> bytes;
+    std::vector<uint8_t> bytes;  // empty while it is only stored
+    bool stored = false;
     std::vector<Piece> pieces;  // empty until it is under way
   };
   struct Transmission {
@@ -86,6 +101,8 @@ class Sender {
   };
 
   void Release(const MapId& map, int32_t journalled_seq);
+  std::map<KeyframeId, Item>::iterator Erase(std::map<KeyframeId, Item>::iterator it);
+  bool LoadBytes(const KeyframeId& id, Item* item);
   void Settle(const Item& item, Piece* piece);  // no longer in flight
   void MeasureRoundTrip(int64_t highest_number, int64_t now_us);
   void FindLost(int64_t highest_number, int64_t now_us);
@@ -95,6 +112,7 @@ class Sender {
   int PieceBytes(const Item& item, const Piece& piece) const;
 
   const SenderOptions options_;
+  const Load load_;
   Pacer pacer_;
   std::map<KeyframeId, Item> spool_;
   std::set<KeyframeId> started_;  // those with pieces

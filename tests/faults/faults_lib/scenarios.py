@@ -1,0 +1,95 @@
+"""The scenarios: each runs its session and says whether all its claims hold; None when it cannot run here."""
+
+import shutil
+from collections import Counter
+from pathlib import Path
+
+from faults_lib import offline
+from faults_lib.checks import Row, delivery, kills, print_rows, replays, same_map
+from faults_lib.session import SECOND_STARTS_AFTER_S, Agent, Session, random_kills, whole_keyframes
+
+
+def length_s(options):
+    """Of the session: until its last agent is done."""
+    ends = []
+    for index, agent in enumerate(options.agents):
+        times = [own for id, own, _ in whole_keyframes(agent.log) if id[0] == agent.id]
+        played = 1e-6 * (max(times) - min(times))
+        ends.append(SECOND_STARTS_AFTER_S * index + min(played, options.seconds or played))
+    return max(ends)
+
+
+def session(options, name, faults=(), **more):
+    folder = options.work / name
+    shutil.rmtree(folder, ignore_errors=True)
+    return Session(folder, options.bin, options.agents, faults, options.seconds, **more)
+
+
+def calm(options):
+    """The undisturbed session, made once."""
+    if not hasattr(options, "calm"):
+        options.calm = session(options, "calm").run()
+        if options.calm.exit_code != 0:
+            raise SystemExit(f"the undisturbed session failed: see {options.calm.folder}/session.txt")
+    return options.calm
+
+
+def compare(options, disturbed, planned):
+    undisturbed = calm(options)
+    ended = [Row("the session's exit code", str(disturbed.exit_code), disturbed.exit_code == 0)]
+    if disturbed.exit_code != 0:
+        return ended
+    return (ended + kills(disturbed, planned) + delivery(disturbed, options.agents, options.seconds) +
+            same_map(disturbed, undisturbed) + replays(disturbed, undisturbed, options.agents))
+
+
+def run_kills(options):
+    planned = random_kills(options.seed, options.kills, 1, length_s(options), options.agents)
+    disturbed = session(options, f"kills_{options.seed}", planned).run()
+    title = f"{options.kills} random kill -9 of server processes and uplinks, seed {options.seed}"
+    return print_rows(title, compare(options, disturbed, planned))
+
+
+def run_disk_full(options):
+    """RLIMIT_FSIZE: no root, no disk to fill."""
+    begin = length_s(options) / 3
+    planned = [f"at: {begin:.1f}, disk_full: agent_handler, seconds: 10"]
+    disturbed = session(options, "disk_full", planned).run()
+    said = any("THE DISK REFUSES WRITES" in line for line in disturbed.statuses("agent_handler"))
+    healed = "THE DISK REFUSES WRITES" not in disturbed.statuses("agent_handler")[-1]
+    rows = compare(options, disturbed, planned)
+    rows += [Row("the handler's status says so", "yes" if said else "no", said),
+             Row("and that it is over", "yes" if healed else "no", healed)]
+    return print_rows("the journal's disk full for ten seconds", rows)
+
+
+def run_vio(options):
+    """Keyframes of one agent are played; the other's odometry runs on its recording, and is killed halfway."""
+    if not options.vio:
+        print("\nkilling vio: not run, give it a recording with --vio ID RECORDING")
+        return None
+    id, recording = int(options.vio[0]), Path(options.vio[1])
+    agents = [options.agents[0], Agent(id, None, recording)]
+    seconds = options.seconds or 40
+    folder = options.work / "vio"
+    shutil.rmtree(folder, ignore_errors=True)
+    planned = [f"at: {SECOND_STARTS_AFTER_S + seconds / 2:.1f}, kill: vio_{id}"]
+    disturbed = Session(folder, options.bin, agents, planned, seconds).run()
+    rows = [Row("the session's exit code", str(disturbed.exit_code), disturbed.exit_code == 0)]
+    if disturbed.exit_code == 0:
+        maps = Counter(key[1] for key, _, _ in whole_keyframes(disturbed.journal) if key[0] == id)
+        group = max(disturbed.report()["groups"], key=lambda group: len(group["map_ids"]))
+        ate = disturbed.report()["ate_joint_m"]
+        rows += [
+            Row("maps of the killed agent, keyframes in each", ", ".join(map(str, maps.values())), len(maps) == 2),
+            Row("maps in the group", str(len(group["map_ids"])), len(group["map_ids"]) == 3),
+            Row("joint ATE, m", f"{ate or float('nan'):.4f}", ate is not None and ate < 0.1),
+        ]
+    return print_rows(f"vio killed after {seconds / 2:.0f} s: a new map, fused again, the old one kept", rows)
+
+
+ALL = {"kills": run_kills, "disk_full": run_disk_full, "vio": run_vio, "spool": offline.run}
+
+
+def run(name, options):
+    return ALL[name](options)
