@@ -46,7 +46,8 @@ struct SessionScript {
 
 // Processes of a session that are started once, whoever its agents are.
 inline constexpr const char* kServerProcesses[] = {
-    "agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba"};
+    "agent_handler", "place_recognition", "inter_map_ba", "fusion",
+    "posegraph",     "global_ba",         "map_points"};
 
 // Reads and checks a session file and finds its recordings: relative to `recordings` if that is
 // given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Throws
