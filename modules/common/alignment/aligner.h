@@ -81,14 +81,14 @@ struct AlignmentReport {
   int comparable = 0;  // points that ought to be found in the two keyframes
   double found_share = 0;
   double first_supported_share = 0;
-  double supported_share = 0;  // 0 when it was not looked at
-  int landmarks = 0;  // distinct inliers of the BA
-  int cells = 0;      // image cells these occupy in one of the keyframes
-  double tilt = 0;    // radians
+  double supported_share = 0;      // 0 when it was not looked at
+  int landmarks = 0;               // distinct inliers of the BA
+  int cells = 0;                   // image cells these occupy in one of the keyframes
+  double tilt = 0;                 // radians
   double sigma_without_one_m = 0;  // worst, were the landmark that says most not there
   double halves_chi2 = 0;          // 0 when it was not looked at
-  std::vector<ShownMatch> first;  // the candidate's and the nearest descriptors'; inliers of PnP
-  std::vector<ShownMatch> found;  // by projection, in the two keyframes; inliers of the BA
+  std::vector<ShownMatch> first;   // the candidate's and the nearest descriptors'; inliers of PnP
+  std::vector<ShownMatch> found;   // by projection, in the two keyframes; inliers of the BA
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
