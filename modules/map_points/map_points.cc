@@ -21,7 +21,7 @@ constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
 
 }  // namespace
 
-void MapPoints::Take(MapState state) {
+void MapPoints::Take(const MapState& state) {
   auto group = std::make_shared<Group>();
   group->id = state.group;
   group->revision = state.revision;

@@ -56,7 +56,7 @@ class MapPoints {
 
   void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
   // Whole; the highest revision wins, map by map.
-  void Take(MapState state);
+  void Take(const MapState& state);
   void TakeRefined(const MapState& refined);
   // Nothing when the group knows nothing new that the agent could see.
   std::optional<MapLandmarks> Choose(const AgentPose& agent);

@@ -54,7 +54,7 @@ void MapPointsProcess::OnMapState(const map_state_t& message) {
     return;
   }
   if (auto whole = states_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
-    points_.Take(std::move(*whole));
+    points_.Take(*whole);
   }
 }
 
