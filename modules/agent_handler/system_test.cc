@@ -57,10 +57,11 @@ class Program {
   pid_t pid_ = -1;
 };
 
-// A multicast group and port of its own for each bus of this run.
+// A multicast group and port of its own for each bus of this run; below those that the kernel gives
+// to sockets without a port, as every LCM sender's is.
 std::string RandomUrl(std::random_device& device) {
   return fmt::format("udpm://239.{}.{}.{}:{}?ttl=0&recv_buf_size=4194304", 192 + device() % 60,
-                     device() % 256, 1 + device() % 250, 20000 + device() % 30000);
+                     device() % 256, 1 + device() % 250, 20000 + device() % 12000);
 }
 
 // An odometry at full speed: it waits until its uplink listens (nobody would tell that one of the

@@ -37,7 +37,9 @@ std::string Url(uint16_t port) {
 Buses ChooseBuses(const std::vector<int32_t>& agent_ids, const std::vector<int32_t>& with_own_link,
                   std::optional<uint16_t> first_port) {
   std::random_device random;
-  uint16_t port = first_port.value_or(static_cast<uint16_t>(20000 + random() % 30000));
+  // Below the ports that the kernel gives to sockets without one, as every LCM sender's is: such a
+  // socket could take a port between this look and the bus' opening.
+  uint16_t port = first_port.value_or(static_cast<uint16_t>(20000 + random() % 12000));
   const auto next_url = [&] {
     while (!PortIsFree(port)) {
       if (first_port) {
