@@ -110,17 +110,11 @@ void GlobalBaProcess::OnHave(const have_t& message) {
 }
 
 void GlobalBaProcess::OnAgain(const again_t& message) {
-  const Bytes data(message.data.data(), message.data.size());
-  keyframe_t keyframe{};
-  constraint_t constraint{};
-  place_match_t match{};
-  if (message.channel == channels::kConstraint && DecodeMessage(data, &constraint)) {
-    OnConstraint(constraint);
-  } else if (message.channel == channels::kPlaceMatch && DecodeMessage(data, &match)) {
-    OnPlaceMatch(match);
-  } else if (DecodeMessage(data, &keyframe)) {
-    OnKeyframe(keyframe);
-  } else {
+  const bool known =
+      TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); }) ||
+      TakeAgain<place_match_t>(message, [this](const place_match_t& m) { OnPlaceMatch(m); }) ||
+      TakeAgain<constraint_t>(message, [this](const constraint_t& m) { OnConstraint(m); });
+  if (!known) {
     node_.Refuse("again: not what was asked for");
   }
 }

@@ -112,10 +112,8 @@ void MapPointsProcess::OnHave(const have_t& message) {
 }
 
 void MapPointsProcess::OnAgain(const again_t& message) {
-  keyframe_t keyframe{};
-  if (DecodeMessage(Bytes(message.data.data(), message.data.size()), &keyframe)) {
-    OnKeyframe(keyframe);
-  } else {
+  const bool known = TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); });
+  if (!known) {
     node_.Refuse("again: not what was asked for");
   }
 }

@@ -92,17 +92,11 @@ void CandidateProcess::OnHave(const have_t& message) {
 }
 
 void CandidateProcess::OnAgain(const again_t& message) {
-  const Bytes data(message.data.data(), message.data.size());
-  keyframe_t keyframe{};
-  place_match_t match{};
-  constraint_t constraint{};
-  if (DecodeMessage(data, &keyframe)) {
-    OnKeyframe(keyframe);
-  } else if (DecodeMessage(data, &match)) {
-    OnPlaceMatch(match);
-  } else if (DecodeMessage(data, &constraint)) {
-    judged_.insert(constraint.id);
-  } else {
+  const bool known =
+      TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); }) ||
+      TakeAgain<place_match_t>(message, [this](const place_match_t& m) { OnPlaceMatch(m); }) ||
+      TakeAgain<constraint_t>(message, [this](const constraint_t& m) { judged_.insert(m.id); });
+  if (!known) {
     node_.Refuse("again: neither keyframe, match nor constraint");
   }
 }

@@ -10,11 +10,23 @@
 
 #include "common/bus/in_order.h"
 #include "common/bus/node.h"
+#include "pangea/again_t.hpp"
 
 namespace pangea {
 
 // RESEND_REQUEST for the gap's messages of a channel; the answers come on AGAIN_<node's name>.
 void AskAgain(Node& node, const std::string& channel, const SeqGap& gap);
+// Gives an answer to `handler` if it holds such a message (LCM's fingerprint tells); whether it
+// does.
+template <typename Message, typename Handler>
+bool TakeAgain(const again_t& again, Handler handler) {
+  Message message{};
+  const bool is_one = DecodeMessage(Bytes(again.data.data(), again.data.size()), &message);
+  if (is_one) {
+    handler(message);
+  }
+  return is_one;
+}
 // MAP_STATE of the map's group again, to all, with the corrections of its maps.
 void AskForState(Node& node, const MapId& map);
 
