@@ -4,10 +4,12 @@
 #include <deque>
 #include <exception>
 #include <lcm/lcm-cpp.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "common/bus/bus.h"
+#include "common/bus/host_only.h"
 #include "common/bus/tcpq_connection.h"
 
 namespace pangea {
@@ -31,7 +33,7 @@ struct LcmBus::Impl {
 };
 
 struct LcmBus::Library : LcmBus::Impl {
-  explicit Library(const std::string& url) : lcm(url) {
+  explicit Library(const std::string& url) : lcm(url), host_only_port(HostOnlyPort(url)) {
     if (!lcm.good()) {
       throw std::runtime_error(fmt::format(
           "cannot open the bus '{}': check the URL, and that the machine has a multicast route "
@@ -58,7 +60,19 @@ struct LcmBus::Library : LcmBus::Impl {
   void Publish(const std::string& channel, Bytes data) override {
     lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
   }
+  // LCM opens its socket with the first subscription. So the first one is to nothing, and others'
+  // messages are kept out before anybody listens.
+  void KeepOthersOut(uint16_t port) {
+    lcm_t* const c_lcm = lcm.getUnderlyingLCM();
+    lcm_unsubscribe(
+        c_lcm, lcm_subscribe(
+                   c_lcm, "nothing", [](const lcm_recv_buf_t*, const char*, void*) {}, nullptr));
+    TakeOnlyFromThisHost(port);
+  }
   void Subscribe(const std::string& channel_regex, Handler handler) override {
+    if (host_only_port && subscriptions.empty()) {
+      KeepOthersOut(*host_only_port);
+    }
     subscriptions.push_back({this, std::move(handler)});
     lcm_subscription_t* subscription =
         lcm_subscribe(lcm.getUnderlyingLCM(), channel_regex.c_str(), &Subscription::OnMessage,
@@ -79,6 +93,7 @@ struct LcmBus::Library : LcmBus::Impl {
   int fd() override { return lcm.getFileno(); }
 
   lcm::LCM lcm;
+  const std::optional<uint16_t> host_only_port;
   std::deque<Subscription> subscriptions;
   std::exception_ptr failure;
 };
