@@ -30,6 +30,12 @@ def acknowledged(agent_log):
     return highest
 
 
+def all_acknowledged(session, agents):
+    """(agent, map, seq) of every keyframe that was ever called acknowledged."""
+    return {(id, opened, s) for agent in agents
+            for (id, opened), seq in acknowledged(session.out / f"agent_{agent.id}.lcm").items() for s in range(seq + 1)}
+
+
 def delivery(session, agents, seconds=None):
     """Everything played is in the journal, once and as it was; so is all that was ever acknowledged."""
     journalled, wrong = Counter(), 0
@@ -37,10 +43,7 @@ def delivery(session, agents, seconds=None):
     for id, _, data in whole_keyframes(session.journal):
         journalled[id] += 1
         wrong += stored.get(id) != data
-    promised = set()
-    for agent in agents:
-        for (id, opened), seq in acknowledged(session.out / f"agent_{agent.id}.lcm").items():
-            promised |= {(id, opened, s) for s in range(seq + 1)}
+    promised = all_acknowledged(session, agents)
     return [
         Row("acknowledged keyframes that are missing", f"{len(promised - set(journalled))} of {len(promised)}",
             bool(promised) and promised <= set(journalled)),

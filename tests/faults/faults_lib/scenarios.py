@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 from faults_lib import offline
-from faults_lib.checks import Row, delivery, kills, print_rows, replays, same_map
+from faults_lib.checks import Row, all_acknowledged, delivery, kills, print_rows, replays, same_map
 from faults_lib.session import SECOND_STARTS_AFTER_S, Agent, Session, random_kills, whole_keyframes
 
 
@@ -77,12 +77,19 @@ def run_vio(options):
     disturbed = Session(folder, options.bin, agents, planned, seconds).run()
     rows = [Row("the session's exit code", str(disturbed.exit_code), disturbed.exit_code == 0)]
     if disturbed.exit_code == 0:
-        maps = Counter(key[1] for key, _, _ in whole_keyframes(disturbed.journal) if key[0] == id)
-        group = max(disturbed.report()["groups"], key=lambda group: len(group["map_ids"]))
-        ate = disturbed.report()["ate_joint_m"]
-        rows += [
+        journalled = [key for key, _, _ in whole_keyframes(disturbed.journal)]
+        maps = Counter(key[1] for key in journalled if key[0] == id)
+        promised = all_acknowledged(disturbed, agents)
+        report = disturbed.report()
+        group = max(report["groups"], key=lambda group: len(group["map_ids"]))
+        fused = [f"{change['session_s']:.1f}" for change in report["fused_at"] if change["change"] == "fused"]
+        ate = report["ate_joint_m"]
+        rows += kills(disturbed, planned) + [
             Row("maps of the killed agent, keyframes in each", ", ".join(map(str, maps.values())), len(maps) == 2),
-            Row("maps in the group", str(len(group["map_ids"])), len(group["map_ids"]) == 3),
+            Row("acknowledged keyframes that are missing", f"{len(promised - set(journalled))} of {len(promised)}",
+                bool(promised) and promised <= set(journalled)),
+            Row("maps in the group, fused after s", f"{len(group['map_ids'])}, {' and '.join(fused)}",
+                len(group["map_ids"]) == 3),
             Row("joint ATE, m", f"{ate or float('nan'):.4f}", ate is not None and ate < 0.1),
         ]
     return print_rows(f"vio killed after {seconds / 2:.0f} s: a new map, fused again, the old one kept", rows)
