@@ -1,4 +1,5 @@
-# Every package the project builds on; scripts/packages.txt lists the Debian names.
+# Every package that a module links; scripts/packages.txt lists the Debian names. Installed too: it
+# is how find_package(pangea) finds them again.
 find_package(Boost 1.74 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(Ceres 2.1 REQUIRED)
@@ -7,13 +8,11 @@ find_package(yaml-cpp REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(GTest REQUIRED)
 find_package(Threads REQUIRED)
 
 # Debian's LCM has no CMake package.
 find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)
 find_library(LCM_LIBRARY lcm REQUIRED)
-find_program(LCM_GEN lcm-gen REQUIRED)
 add_library(lcm::lcm UNKNOWN IMPORTED)
 set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION ${LCM_LIBRARY}
   INTERFACE_INCLUDE_DIRECTORIES ${LCM_INCLUDE_DIR})
@@ -28,6 +27,6 @@ foreach(package sodium zstd)
 endforeach()
 
 # OpenCV's config sets plain include directories; as a SYSTEM target its headers stay quiet.
-add_library(pangea_opencv INTERFACE)
+add_library(pangea_opencv INTERFACE IMPORTED)
 target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(pangea_opencv INTERFACE ${OpenCV_LIBS})

@@ -22,24 +22,42 @@ if(PANGEA_SANITIZE)
   endif()
 endif()
 
-# pangea_library(name SOURCES ... DEPENDS ...): a static library included as "<module>/<header>.h".
+# pangea_library(name [INTERNAL] [SOURCES ...] DEPENDS ...): a static library, or one of headers alone,
+# included as "<module>/<header>.h"; installed as pangea::<name without pangea_>. INTERNAL: not
+# installed (of tests and benches).
 function(pangea_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
-  add_library(${name} STATIC ${ARG_SOURCES})
-  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR}/modules)
-  target_link_libraries(${name} PUBLIC ${ARG_DEPENDS})
+  cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+  else()
+    add_library(${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_include_directories(${name} ${scope} $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/modules>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/pangea>)
+  target_compile_features(${name} ${scope} cxx_std_20)
+  target_link_libraries(${name} ${scope} ${ARG_DEPENDS})
+  if(NOT ARG_INTERNAL)
+    string(REGEX REPLACE "^pangea_" "" short ${name})
+    set_target_properties(${name} PROPERTIES EXPORT_NAME ${short})
+    install(TARGETS ${name} EXPORT pangea ARCHIVE COMPONENT dev)
+  endif()
 endfunction()
 
 add_custom_target(programs)
 
-# pangea_program(name SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
+# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
 function(pangea_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   add_dependencies(programs ${name})
+  if(NOT ARG_INTERNAL)
+    install(TARGETS ${name} RUNTIME COMPONENT runtime)
+  endif()
   add_test(NAME ${name}.help COMMAND ${name} --help)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
 endfunction()

@@ -1,0 +1,27 @@
+# `cmake --install`, beside what each target says of itself: headers, the CMake package, units, session files.
+#   --component runtime   programs, the viewer's page, the types' jar, units, session files
+#   --component dev       libraries, headers, lcmtypes, find_package(pangea)
+include(CMakePackageConfigHelpers)
+
+# A module's own tests and their worlds stay here.
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/modules/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pangea
+  COMPONENT dev FILES_MATCHING PATTERN "*.h"
+  REGEX "/testing$|/page$|/test_[a-z_]*\\.h$|_test_world\\.h$" EXCLUDE)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/pangea)
+set(generated_config ${CMAKE_BINARY_DIR}/pangeaConfig.cmake)
+set(generated_version ${CMAKE_BINARY_DIR}/pangeaConfigVersion.cmake)
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/pangeaConfig.cmake.in ${generated_config}
+  INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${generated_version} COMPATIBILITY SameMinorVersion)
+install(FILES ${generated_config} ${generated_version} ${CMAKE_CURRENT_LIST_DIR}/pangea_dependencies.cmake
+  DESTINATION ${package_dir} COMPONENT dev)
+install(EXPORT pangea FILE pangeaTargets.cmake NAMESPACE pangea:: DESTINATION ${package_dir} COMPONENT dev)
+
+# systemd looks for these under /usr/lib and, the units, under /usr/local/lib.
+set(packaging ${CMAKE_SOURCE_DIR}/packaging)
+install(DIRECTORY ${packaging}/systemd/ DESTINATION lib/systemd/system COMPONENT runtime)
+foreach(kind sysctl sysusers tmpfiles)
+  install(FILES ${packaging}/${kind}.conf DESTINATION lib/${kind}.d RENAME pangea.conf COMPONENT runtime)
+endforeach()
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/sessions DESTINATION ${CMAKE_INSTALL_DATADIR}/pangea COMPONENT runtime)
