@@ -1,6 +1,6 @@
 #pragma once
 
-// Channel names, built in this one place. lcmtypes/README.md is their table.
+// Channel names, built in this one place. docs/bus.md is their table.
 
 #include <fmt/format.h>
 

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""docs/bus.md against what it describes: every type with every field, every channel, who names it, how large it gets."""
+
+import re
+import struct
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DOC = (ROOT / "docs/bus.md").read_text()
+SAMPLE = ROOT / "logs/two_walks/session.lcm"
+
+
+def table(heading):
+    """Rows of the first table of a section, as lists of cells."""
+    section = DOC.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    rows = [line for line in section.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in row.strip("|").split(" | ")] for row in rows[1:]]
+
+
+def quoted(text):
+    return re.findall(r"`([^`]+)`", text)
+
+
+# Subscribe<imu_t>(channels::Imu(... or (std::string(channels::kAllPoses)
+SUBSCRIPTION = re.compile(r"Subscribe<(\w+)>\(\s*(?:std::string\()?channels::(\w+)")
+
+
+def plain(name):
+    """KEYFRAME_k, kAllKeyframes and Keyframe() are one; singular, for kAllPoses is POSE_k's."""
+    bare = re.sub(r"_(k|<process>)$|^kAll|^k(?=[A-Z])", "", name)
+    return bare.replace("_", "").lower().rstrip("s")
+
+
+CHANNELS = [(quoted(row[0])[0], row) for row in table("Channels")]
+
+
+def documented(channel):
+    """The documented channels of which this one of the bus is an instance."""
+    pattern = {"k": r"[0-9]+", "<process>": r"\w+"}
+    return [row for name, row in CHANNELS
+            if re.fullmatch(re.sub(r"(?<=_)(k|<process>)$", lambda m: pattern[m[0]], name), channel)]
+
+
+def fields(type_file):
+    text = re.sub(r"//.*", "", type_file.read_text())
+    body = text[text.index("{") + 1:text.rindex("}")]
+    members = [m for m in body.split(";") if m.strip() and not m.split()[0] == "const"]
+    return {m.split()[1].split("[")[0] for m in members}
+
+
+def bytes_of(text):
+    number, unit = re.fullmatch(r"([\d.]+) (B|kB)", text).groups()
+    return float(number) * (1000 if unit == "kB" else 1)
+
+
+def log_events(path):
+    """(channel, size) of an LCM log."""
+    data = path.read_bytes()
+    at = 0
+    while at < len(data):
+        channel_bytes, size = struct.unpack(">II", data[at + 20:at + 28])
+        yield data[at + 28:at + 28 + channel_bytes].decode(), size
+        at += 28 + channel_bytes + size
+
+
+class BusDoc(unittest.TestCase):
+    def test_every_type_with_every_field(self):
+        described = {quoted(row[0])[0]: set(quoted(row[1])) for row in table("Messages")}
+        types = {path.stem: fields(path) for path in (ROOT / "lcmtypes").glob("*.lcm")}
+        self.assertEqual(sorted(described), sorted(types))
+        for name, members in types.items():
+            self.assertEqual(described[name], members, name)
+
+    def test_every_channel(self):
+        header = (ROOT / "modules/common/channels.h").read_text()
+        named = set(re.findall(r'"([A-Z_]+_)\{\}"', header)) | set(re.findall(r' = "([A-Z_]+)";', header))
+        in_doc = {re.sub(r"_(k|<process>)$", "_", name) for name, _ in CHANNELS}
+        self.assertEqual(in_doc, named)
+
+    def test_subscriptions_in_the_code(self):
+        """Each has the type of a documented row, and its module stands there."""
+        checked = 0
+        for path in (ROOT / "modules").rglob("*.cc"):
+            if path.name.endswith("_test.cc") or "node_modules" in path.parts:
+                continue
+            for type_name, symbol in SUBSCRIPTION.findall(path.read_text()):
+                rows = [row for name, row in CHANNELS if plain(name) == plain(symbol)]
+                self.assertTrue(rows, f"{path.name}: channels::{symbol}")
+                self.assertEqual({quoted(row[1])[0] for row in rows}, {type_name}, symbol)
+                module = path.relative_to(ROOT / "modules").parts[0]
+                if module != "common":  # there it is a helper of several processes
+                    self.assertTrue(any(module in row[3] for row in rows), f"{module} listens to {rows[0][0]}")
+                checked += 1
+        self.assertGreater(checked, 30)
+
+    def test_the_sample_is_within_the_sizes(self):
+        seen = set()
+        for channel, size in log_events(SAMPLE):
+            if channel == "LCM_SELF_TEST":
+                continue
+            rows = documented(channel)
+            self.assertTrue(rows, channel)
+            self.assertLessEqual(size, min(bytes_of(row[5]) for row in rows), channel)
+            seen.add(rows[0][0])
+        self.assertGreater(len(seen), 9)
+
+    def test_default_urls_are_the_programs(self):
+        described = set(quoted(" ".join(row[2] for row in table("Three buses"))))
+        sources = [ROOT / "modules" / name for name in ("agent_handler/main.cc", "uplink/main.cc", "common/bus/process.cc")]
+        in_code = {url for path in sources for url in re.findall(r'"(udpm://[^"]+)"', path.read_text())}
+        self.assertEqual(in_code, {url for url in described if url.startswith("udpm")})
+
+    def test_links_lead_somewhere(self):
+        for link in re.findall(r"\]\(([^)]+)\)", DOC):
+            self.assertTrue((ROOT / "docs" / link).exists(), link)
+
+
+if __name__ == "__main__":
+    unittest.main()
