@@ -1,8 +1,11 @@
 // The main job with real processes on real buses: two recordings of one hall go in, one map comes
-// out; its capture replays to the same map; and what users get wrong gets an answer.
+// out; its capture replays to the same map; what was expected is told; and what users get wrong
+// gets an answer.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <fstream>
 
 #include "programs.h"
 
@@ -19,10 +22,10 @@ class SessionTest : public ::testing::Test {
     folder_ = new fs::path(FreshFolder("session"));
     RenderWalk(*folder_ / "walk_1", "--generate walk --path-seed 1 --seed 1 --duration 14");
     RenderWalk(*folder_ / "walk_2", "--generate walk --path-seed 2 --seed 2 --duration 14");
-    const fs::path file =
-        WriteSession(*folder_, {"id: 1, recording: walk_1", "id: 2, recording: walk_2, delay: 2"});
-    run_ = new Outcome(RunCommand("pangea-session run " + file.string() + " --out " +
-                                  (*folder_ / "out").string() + " --rate max"));
+    run_ = new Outcome(RunCommand("pangea-session run " PANGEA_SOURCE_DIR "/sessions/demo.yaml"
+                                  " --recordings " +
+                                  folder_->string() + " --out " + (*folder_ / "out").string() +
+                                  " --rate max"));
   }
   static void TearDownTestSuite() {
     fs::remove_all(*folder_);
@@ -77,6 +80,35 @@ TEST_F(SessionTest, ReplayGivesTheSameBytesTwiceAndTheSameMap) {
   EXPECT_NEAR(live["ate_joint_m"].get<double>(), replayed["ate_joint_m"].get<double>(), 0.005);
 }
 
+TEST_F(SessionTest, ExpectationsAreTold) {
+  const auto met = ReadJson(Out("report.json"))["expectations"];
+  ASSERT_EQ(met.size(), 6u) << run_->output;
+  for (const auto& expectation : met) {
+    EXPECT_TRUE(expectation["met"].get<bool>()) << expectation;
+  }
+  EXPECT_THAT(run_->output, HasSubstr("## Expectations"));
+  EXPECT_THAT(ReadFile(Out("report.md")), HasSubstr("## Expectations"));
+  // A report and a replay remember them.
+  const std::string log = Out("session.lcm").string();
+  Outcome again =
+      RunCommand("pangea-session report " + log + " --out " + (*folder_ / "report").string());
+  EXPECT_EQ(again.exit_code, 0) << again.output;
+  EXPECT_EQ(ReadJson(*folder_ / "report" / "report.json")["expectations"], met);
+  again = RunCommand("pangea-session replay " + log + " --out " + (*folder_ / "replay").string());
+  EXPECT_EQ(again.exit_code, 0) << again.output;
+  EXPECT_THAT(again.output, testing::AllOf(HasSubstr("| fused_by "), HasSubstr("| met ")));
+  // Others are given, and missed.
+  const fs::path strict = *folder_ / "strict.yaml";
+  std::ofstream(strict) << "agents: [{id: 1, recording: walk_1}]\n"
+                           "expect: {groups: 1, ate_joint_m: 0.000001}\n";
+  again = RunCommand("pangea-session report " + log + " --expect " + strict.string() + " --out " +
+                     (*folder_ / "report").string());
+  EXPECT_EQ(again.exit_code, 2) << again.output;
+  EXPECT_THAT(again.output,
+              HasSubstr("pangea-session: expected ate_joint_m at most 1e-06 m, got "));
+  EXPECT_THAT(again.output, testing::Not(HasSubstr("expected groups")));
+}
+
 TEST_F(SessionTest, AnEarlierSessionIsMovedAside) {
   const fs::path out = *folder_ / "again";
   fs::create_directories(out);
@@ -100,6 +132,14 @@ TEST(SessionMistakes, GetAnAnswer) {
       RunCommand("pangea-session run " + unknown.string() + " --out " + (folder / "out").string());
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("recordin"), HasSubstr("recording")));
+
+  const fs::path cut_off =
+      WriteSession(folder, {"id: 1, keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm"});
+  std::ofstream(cut_off, std::ios::app) << "faults: [{at: 1, disconnect: 1}]\n";
+  outcome = RunCommand("pangea-session run " + cut_off.string() + " --rate max --out " +
+                       (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("'disconnect'"), HasSubstr("--rate")));
 
   outcome = RunCommand("pangea-session replay " + (folder / "no.lcm").string() + " --out x");
   EXPECT_NE(outcome.exit_code, 0);

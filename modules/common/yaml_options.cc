@@ -10,6 +10,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "common/nearest_word.h"
+
 namespace pangea {
 
 struct YamlOptions::Entry {
@@ -36,24 +38,6 @@ std::string Where(const std::string& file, const YAML::Node& node) {
                                                 : "nothing";
   throw std::runtime_error(
       fmt::format("{}: key '{}' must be {}, not {}", Where(file, node), path, expected, found));
-}
-
-// Levenshtein distance: which known key did they mean?
-int EditDistance(const std::string& a, const std::string& b) {
-  std::vector<int> row(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) {
-    row[j] = static_cast<int>(j);
-  }
-  for (size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const int substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row.back();
 }
 
 template <typename T>
@@ -113,6 +97,19 @@ void YamlOptions::AddScalar(const std::string& key, const std::string& type, T* 
     *value = ScalarValue<T>(node, file, path, type);
   };
   entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::Add(const std::string& key, std::optional<double>* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value](const YAML::Node& node, const std::string& file, const std::string& path) {
+    value->reset();
+    if (!node.IsNull()) {
+      *value = ScalarValue<double>(node, file, path, "a number");
+    }
+  };
+  entry.print = [value](int) {
+    return fmt::format(" {}\n", value->has_value() ? ScalarText(**value) : "~");
+  };
 }
 
 template <typename T>
@@ -260,13 +257,12 @@ void YamlOptions::Read(const YAML::Node& node, const std::string& file, const st
     }
     const auto entry = std::ranges::find_if(entries_, [&](const auto& e) { return e->key == key; });
     if (entry == entries_.end()) {
-      const auto nearest = std::ranges::min_element(
-          entries_, {}, [&](const auto& e) { return EditDistance(e->key, key); });
-      throw std::runtime_error(fmt::format(
-          "{}: unknown key '{}{}'{}", Where(file, item.first), path, key,
-          nearest == entries_.end()
-              ? std::string("; no key is known here")
-              : fmt::format("; the nearest known key is '{}{}'", path, (*nearest)->key)));
+      std::vector<std::string> known;
+      for (const auto& e : entries_) {
+        known.push_back(e->key);
+      }
+      throw std::runtime_error(fmt::format("{}: unknown key '{}{}'{}", Where(file, item.first),
+                                           path, key, NearestWordHint(key, known, path)));
     }
     (*entry)->read(item.second, file, path + key);
   }

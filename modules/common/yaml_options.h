@@ -1,7 +1,8 @@
 #pragma once
 
 // Options on disk: YAML keys bound to the members of plain structs, strictly. An unknown or doubled
-// key, a wrong type and a missing required key are errors that name file, line and key.
+// key, a wrong type and a missing required key are errors that name file, line and key, and for an
+// unknown key the nearest known one.
 //
 //   void Bind(YamlOptions& yaml, FusionOptions& o) {
 //     yaml.Add("min_inliers", &o.min_inliers);
@@ -44,6 +45,7 @@ class YamlOptions {
   void Add(const std::string& key, float* value);
   void Add(const std::string& key, double* value);
   void Add(const std::string& key, std::string* value);
+  void Add(const std::string& key, std::optional<double>* value);  // "~": none
   void Add(const std::string& key, std::vector<double>* value);
   void Add(const std::string& key, std::vector<std::string>* value);
 

@@ -12,6 +12,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 enum class Scope { kAll, kPaper };
 
@@ -35,6 +36,7 @@ struct Options {
   } window;
   std::vector<Item> items;
   std::optional<Item> extra;
+  std::optional<double> bound;
 };
 
 void Bind(YamlOptions& yaml, Options& o) {
@@ -57,6 +59,7 @@ void Bind(YamlOptions& yaml, Options& o) {
     y.Add("id", &item.id);
     y.Add("name", &item.name);
   });
+  yaml.Add("bound", &o.bound);
 }
 
 Options Read(const std::string& text) {
@@ -115,10 +118,26 @@ TEST(YamlOptions, AnOptionalSectionIsThereOnlyWhenGiven) {
   }
 }
 
+TEST(YamlOptions, AnOptionalNumberIsThereOnlyWhenGiven) {
+  EXPECT_FALSE(Read("count: 4").bound);
+  EXPECT_FALSE(Read("bound: ~").bound);
+  EXPECT_EQ(Read("bound: 0").bound, 0.0);
+  EXPECT_THAT(Complaint("bound: high"), HasSubstr("'bound' must be a number, not 'high'"));
+  for (const char* text : {"count: 4", "bound: 0.1"}) {
+    Options options = Read(text);
+    YamlOptions yaml;
+    Bind(yaml, options);
+    EXPECT_EQ(Read(yaml.Print()).bound, options.bound) << yaml.Print();
+  }
+}
+
 TEST(YamlOptions, UnknownKeyNamesFileLineAndNearest) {
   EXPECT_THAT(Complaint("flag: true\ngate: 2\n"),
               AllOf(HasSubstr("test.yaml:2"), HasSubstr("unknown key 'gate'"),
-                    HasSubstr("nearest known key is 'gate_m'")));
+                    HasSubstr("did you mean 'gate_m'?")));
+  EXPECT_THAT(Complaint("gatem: 2\n"), Not(HasSubstr("count")));
+  EXPECT_THAT(Complaint("xylophone: 2\n"),
+              AllOf(HasSubstr("known are flag, count"), Not(HasSubstr("did you mean"))));
   EXPECT_THAT(Complaint("window: {keyframe: 2}"), HasSubstr("'window.keyframes'"));
   EXPECT_THAT(Complaint("items: [{id: 1}, {id: 2, nam: x}]"),
               AllOf(HasSubstr("'items[1].nam'"), HasSubstr("'items[1].name'")));

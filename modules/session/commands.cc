@@ -9,6 +9,7 @@
 
 #include "session/replay.h"
 #include "session/session_file.h"
+#include "session/session_list.h"
 #include "session/session_report.h"
 #include "session/session_runner.h"
 
@@ -36,6 +37,23 @@ void PrepareOut(const fs::path& out) {
   fs::create_directories(out);
 }
 
+// Exit codes; a wrong command line has CLI11's, above 100.
+constexpr int kFailed = 1;
+constexpr int kMissed = 2;
+
+// Prints the report; the exit code of a session that was played.
+int Tell(const ReportOutcome& outcome) {
+  std::cout << outcome.text << std::flush;
+  for (const std::string& missed : outcome.missed) {
+    std::cerr << fmt::format("pangea-session: {}\n", missed);
+  }
+  return outcome.missed.empty() ? 0 : kMissed;
+}
+
+std::optional<fs::path> FolderOf(const std::string& recordings) {
+  return recordings.empty() ? std::nullopt : std::make_optional<fs::path>(recordings);
+}
+
 struct RunArguments {
   std::string file;
   std::string out;
@@ -46,10 +64,9 @@ struct RunArguments {
 };
 
 int Run(const RunArguments& arguments) {
-  const SessionScript script =
-      ReadSessionFile(arguments.file, arguments.recordings.empty()
-                                          ? std::nullopt
-                                          : std::make_optional<fs::path>(arguments.recordings));
+  SessionScript script =
+      ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
+  PlaceDisconnects(arguments.rate, &script);
   RunOptions options;
   options.out = fs::path(arguments.out);
   options.rate = arguments.rate;
@@ -61,11 +78,11 @@ int Run(const RunArguments& arguments) {
   PrepareOut(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
-  std::cout << ReportRun(script, summary, options.out) << std::flush;
+  const int exit_code = Tell(ReportRun(script, summary, options.out));
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
   }
-  return summary.failures.empty() ? 0 : 1;
+  return summary.failures.empty() ? exit_code : kFailed;
 }
 
 // Of replay and report; the latter has one log.
@@ -73,11 +90,15 @@ struct LogArguments {
   std::vector<std::string> logs;
   std::string out;
   std::vector<std::string> recordings;  // ID=DIR
+  std::string expect;                   // a session file
 };
 
-// "2=folder" given on the command line goes before what the capture remembers.
-std::vector<AgentRun> RecordingsOf(const LogArguments& arguments) {
-  std::vector<AgentRun> runs = ReadRecordings({arguments.logs.begin(), arguments.logs.end()});
+// What is given on the command line goes before what the capture remembers.
+Remembered KnownOf(const LogArguments& arguments) {
+  Remembered known = ReadRecordings({arguments.logs.begin(), arguments.logs.end()});
+  if (!arguments.expect.empty()) {
+    known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
+  }
   for (const std::string& given : arguments.recordings) {
     const size_t equals = given.find('=');
     AgentRun run;
@@ -91,10 +112,10 @@ std::vector<AgentRun> RecordingsOf(const LogArguments& arguments) {
           "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", given));
     }
     run.recording = given.substr(equals + 1);
-    std::erase_if(runs, [&](const AgentRun& known) { return known.id == run.id; });
-    runs.push_back(run);
+    std::erase_if(known.agents, [&](const AgentRun& other) { return other.id == run.id; });
+    known.agents.push_back(run);
   }
-  return runs;
+  return known;
 }
 
 int RunReplay(const LogArguments& arguments) {
@@ -105,14 +126,13 @@ int RunReplay(const LogArguments& arguments) {
           "--out {}: holds the log that is to be replayed; give another folder", arguments.out));
     }
   }
-  const std::vector<AgentRun> recordings = RecordingsOf(arguments);
+  const Remembered known = KnownOf(arguments);
   PrepareOut(out);
   const ReplaySummary summary =
       Replay({arguments.logs.begin(), arguments.logs.end()}, out / "session.lcm");
   std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                            summary.agent_ids.size());
-  std::cout << ReportLog(out / "session.lcm", recordings, out) << std::flush;
-  return 0;
+  return Tell(ReportLog(out / "session.lcm", known, out));
 }
 
 int RunReport(const LogArguments& arguments) {
@@ -121,9 +141,7 @@ int RunReport(const LogArguments& arguments) {
         "--out {}: holds a session and its own report; give another folder", arguments.out));
   }
   fs::create_directories(arguments.out);
-  std::cout << ReportLog(arguments.logs.front(), RecordingsOf(arguments), arguments.out)
-            << std::flush;
-  return 0;
+  return Tell(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out));
 }
 
 void AddResultOptions(CLI::App& command, LogArguments* arguments) {
@@ -132,6 +150,10 @@ void AddResultOptions(CLI::App& command, LogArguments* arguments) {
       "--recording", arguments->recordings,
       "ID=FOLDER: an agent's recording, for its ground truth (default: as the session "
       "remembers it beside its log)");
+  command.add_option(
+      "--expect", arguments->expect,
+      "Session file, or name of one in sessions/, whose 'expect' is checked (default: "
+      "what the session remembers)");
 }
 
 }  // namespace
@@ -139,7 +161,8 @@ void AddResultOptions(CLI::App& command, LogArguments* arguments) {
 void AddRunCommand(CLI::App& app, int* exit_code) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app.add_subcommand("run", "Play a session file through real processes");
-  run->add_option("file", arguments->file, "Session file (YAML)")->required();
+  run->add_option("file", arguments->file, "Session file (YAML), or the name of one in sessions/")
+      ->required();
   run->add_option("--out", arguments->out, "Folder for everything the session leaves")->required();
   run->add_option("--recordings", arguments->recordings,
                   "Folder the recordings are relative to (default: the session file's)");
@@ -154,6 +177,33 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
                   "First UDP port of the session's buses (default: free ones are chosen)")
       ->check(CLI::Range(1024, 65000));
   run->callback([arguments, exit_code] { *exit_code = Run(*arguments); });
+}
+
+void AddListCommand(CLI::App& app) {
+  struct Arguments {
+    std::string folder = kSessionFolder;
+    std::string recordings;
+    bool names = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* list =
+      app.add_subcommand("list", "Session files: who is in them, and what they lack to be run");
+  list->add_option("folder", arguments->folder, "Folder of session files")
+      ->check(CLI::ExistingDirectory)
+      ->capture_default_str();
+  list->add_option("--recordings", arguments->recordings,
+                   "Folder the recordings are relative to (default: the session file's)");
+  list->add_flag("--names", arguments->names, "Names only");
+  list->callback([arguments] {
+    const std::vector<fs::path> files = SessionFiles(arguments->folder);
+    if (!arguments->names) {
+      std::cout << DescribeSessions(files, FolderOf(arguments->recordings));
+      return;
+    }
+    for (const fs::path& file : files) {
+      std::cout << file.stem().string() << "\n";
+    }
+  });
 }
 
 void AddReplayCommand(CLI::App& app, int* exit_code) {

@@ -43,7 +43,7 @@ std::set<std::string> FaultSchedule::DisksEverFull() const {
 double FaultSchedule::end_s() const {
   double end = 0;
   for (const Fault& fault : faults_) {
-    end = std::max(end, fault.at_s + (fault.disk_full.empty() ? 0 : fault.seconds));
+    end = std::max(end, fault.at_s + (fault.kill.empty() ? fault.seconds : 0));
   }
   return end;
 }

@@ -5,13 +5,16 @@
 //   faults:
 //     - {at: 12.5, kill: fusion}
 //     - {at: 30, disk_full: agent_handler, seconds: 10}
+//     - {at: 50, disconnect: 2, seconds: 10}
 //
 // kill: SIGKILL; what dies is started again, planned or not. disk_full: the process can make no
 // file longer (RLIMIT_FSIZE; the error is EFBIG in place of a full disk's ENOSPC), which needs
-// neither root nor a disk to fill.
+// neither root nor a disk to fill. disconnect: nothing passes between the agent and the server, a
+// partition of its link (link_emulator); the agent goes on, and its uplink sends what has waited.
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
@@ -19,10 +22,11 @@
 namespace pangea::session {
 
 struct Fault {
-  double at_s = 0;        // session time
-  std::string kill;       // a process, as its log in logs/ is named; or
-  std::string disk_full;  // a process
-  double seconds = 10;    // how long the disk is full
+  double at_s = 0;         // session time
+  std::string kill;        // a process, as its log in logs/ is named; or
+  std::string disk_full;   // a process
+  double seconds = 10;     // how long the disk is full, or the agent cut off
+  int32_t disconnect = 0;  // or an agent; 0: none
 };
 
 class FaultSchedule {

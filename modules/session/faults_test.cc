@@ -29,6 +29,13 @@ TEST(FaultSchedule, ADiskIsFullForItsTime) {
   EXPECT_THAT(faults.DisksEverFull(), ElementsAre("agent_handler"));
 }
 
+TEST(FaultSchedule, ADisconnectedAgentIsWaitedFor) {
+  FaultSchedule faults({{4, "", "", 20, 2}, {9, "fusion", "", 0, 0}});
+  EXPECT_EQ(faults.end_s(), 24);
+  EXPECT_THAT(faults.TakeKills(30), ElementsAre("fusion"));
+  EXPECT_THAT(faults.DisksEverFull(), ElementsAre());
+}
+
 TEST(DiskFull, RefusesWritesAndHeals) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::string path = testing::TempDir() + "disk_full_XXXXXX";

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <lcm/lcm-cpp.hpp>
+#include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -43,7 +45,11 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
   }
   std::vector<LoggedKeyframe> keyframes;
   std::map<MapId, std::set<int32_t>> seqs;
+  std::optional<int64_t> begin;
+  int64_t latest = std::numeric_limits<int64_t>::min();
   while (const lcm::LogEvent* event = file.readNextEvent()) {
+    begin = begin.value_or(event->timestamp);
+    latest = std::max(latest, event->timestamp);
     if (!event->channel.starts_with("KEYFRAME_")) {
       continue;
     }
@@ -60,6 +66,8 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
     }
     keyframe.id = *id.value;
     keyframe.utime = message.utime;
+    keyframe.captured_utime = latest;
+    keyframe.elapsed_us = latest - *begin;
     if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
       keyframes.push_back(std::move(keyframe));
     }
@@ -86,6 +94,9 @@ std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, 
 }
 
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs) {
+  if (logs.size() == 1) {
+    return std::move(logs.front());
+  }
   std::vector<LoggedKeyframe> merged;
   std::vector<size_t> next(logs.size(), 0);
   while (true) {
@@ -105,6 +116,7 @@ std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> 
     }
     // A copy: the log's first keyframe is its clock to the end.
     merged.push_back(logs[best][next[best]++]);
+    merged.back().elapsed_us = best_elapsed;
   }
 }
 

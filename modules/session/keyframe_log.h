@@ -14,8 +14,10 @@ namespace pangea::session {
 struct LoggedKeyframe {
   std::string channel;
   KeyframeId id;
-  int64_t utime = 0;          // sensor clock
-  std::vector<uint8_t> data;  // the encoded keyframe_t
+  int64_t utime = 0;           // sensor clock
+  std::vector<uint8_t> data;   // the encoded keyframe_t
+  int64_t captured_utime = 0;  // wall clock; never steps back from one to the next
+  int64_t elapsed_us = 0;      // of the capture, since the log's first event
 };
 
 // All distinct keyframes of one log in log order. Throws std::runtime_error naming the log when it
@@ -27,7 +29,8 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log);
 std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id);
 
 // Several logs as if they had started together: ordered by the time since each log's first
-// keyframe, ties by the order of the logs; each log keeps its own order.
+// keyframe, ties by the order of the logs; each log keeps its own order. That time, by the sensor
+// clock, is then the elapsed one; a single log is left as it is.
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs);
 
 }  // namespace pangea::session

@@ -54,6 +54,16 @@ TEST(KeyframeLog, RepeatsCountOnce) {
   EXPECT_EQ(keyframes[2].utime, 30);
 }
 
+// Capture times may step back by a little in a log; the time since its beginning does not.
+TEST(KeyframeLog, ElapsedTimeIsThatOfTheCapture) {
+  const auto keyframes = Interleave({ReadKeyframeLog(
+      WriteLog("elapsed.lcm", 1, {{0, 1'000'010}, {1, 1'000'030}, {2, 1'000'020}}))});
+  ASSERT_EQ(keyframes.size(), 3u);
+  EXPECT_EQ(keyframes[1].elapsed_us, 20);
+  EXPECT_EQ(keyframes[2].elapsed_us, 20);
+  EXPECT_EQ(keyframes[2].utime, 1'000'020);
+}
+
 TEST(KeyframeLog, OfOneAgent) {
   const auto log = WriteLog("one_agent.lcm", 3, {{0, 10}, {1, 20}});
   EXPECT_EQ(ReadKeyframeLogOf(log, 3).size(), 2u);
@@ -76,9 +86,12 @@ TEST(KeyframeLog, InterleavesByElapsedTime) {
   logs.push_back(ReadKeyframeLog(WriteLog("a.lcm", 1, {{0, 1000}, {1, 1500}, {2, 2000}})));
   logs.push_back(ReadKeyframeLog(WriteLog("b.lcm", 2, {{0, 90}, {1, 500}, {2, 1200}})));
   std::vector<std::pair<int32_t, int32_t>> order;
+  std::vector<int64_t> elapsed_us;
   for (const LoggedKeyframe& keyframe : Interleave(logs)) {
     order.emplace_back(keyframe.id.map.agent_id, keyframe.id.seq);
+    elapsed_us.push_back(keyframe.elapsed_us);
   }
+  EXPECT_THAT(elapsed_us, testing::ElementsAre(0, 0, 410, 500, 1000, 1110));
   EXPECT_THAT(order, testing::ElementsAre(std::pair{1, 0}, std::pair{2, 0}, std::pair{2, 1},
                                           std::pair{1, 1}, std::pair{1, 2}, std::pair{2, 2}));
 }

@@ -18,8 +18,8 @@
 namespace pangea::session {
 namespace {
 
-// Everything said on the bus, into an LCM log. Time stamps are the replay's own: recorded time,
-// never the clock's.
+// Everything said on the bus, into an LCM log. Time stamps are those of the logs replayed, never
+// the clock's.
 class Recorder {
  public:
   Recorder(Bus& bus, const std::filesystem::path& log) : file_(log.string(), "w") {
@@ -65,9 +65,11 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
   GlobalBaProcess global_ba(bus, GlobalBaOptions{});
 
+  const LoggedKeyframe& first = keyframes.front().front();
+  const int64_t begin_utime = first.captured_utime - first.elapsed_us;
   ReplaySummary summary;
   for (const LoggedKeyframe& keyframe : Interleave(std::move(keyframes))) {
-    recorder.SetTime(keyframe.utime);
+    recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
     bus.Drain();
     ++summary.keyframes;

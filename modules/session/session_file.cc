@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <set>
 #include <stdexcept>
 
+#include "common/nearest_word.h"
 #include "common/yaml_options.h"
 #include "link_emulator/link_conditions_yaml.h"
 
@@ -92,6 +94,15 @@ std::set<std::string> ProcessNames(const SessionScript& script) {
   return names;
 }
 
+void CheckProcess(const std::set<std::string>& names, const std::string& process,
+                  const std::string& file) {
+  if (!names.contains(process)) {
+    throw std::runtime_error(fmt::format("{}: faults: no process '{}' in this session{}", file,
+                                         process,
+                                         NearestWordHint(process, {names.begin(), names.end()})));
+  }
+}
+
 void CheckFaults(const SessionScript& script, const std::string& file) {
   const std::set<std::string> names = ProcessNames(script);
   for (const Fault& fault : script.faults) {
@@ -99,36 +110,27 @@ void CheckFaults(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(
           fmt::format("{}: faults: 'at' and 'seconds' must not be negative", file));
     }
-    if (fault.kill.empty() == fault.disk_full.empty()) {
+    if (!fault.kill.empty() + !fault.disk_full.empty() + (fault.disconnect != 0) != 1) {
       throw std::runtime_error(fmt::format(
-          "{}: faults: at {} s: give either 'kill' or 'disk_full', a process", file, fault.at_s));
+          "{}: faults: at {} s: give one of 'kill' or 'disk_full', a process, or 'disconnect', an "
+          "agent's id",
+          file, fault.at_s));
     }
-    const std::string& process = fault.kill.empty() ? fault.disk_full : fault.kill;
-    if (!names.contains(process)) {
-      throw std::runtime_error(fmt::format("{}: faults: no process '{}' in this session: it has {}",
-                                           file, process, fmt::join(names, ", ")));
-    }
-  }
-}
-
-void FindKeyframes(const fs::path& file, SessionScript* script) {
-  for (AgentScript& agent : script->agents) {
-    if (agent.keyframes.empty()) {
-      continue;
-    }
-    agent.resolved_keyframes =
-        (fs::absolute(file).parent_path() / agent.keyframes).lexically_normal();
-    if (!fs::is_regular_file(agent.resolved_keyframes)) {
+    if (fault.disconnect == 0) {
+      CheckProcess(names, fault.kill.empty() ? fault.disk_full : fault.kill, file);
+    } else if (std::ranges::none_of(script.agents, [&fault](const AgentScript& agent) {
+                 return agent.id == fault.disconnect;
+               })) {
       throw std::runtime_error(
-          fmt::format("{}: agent {}: no keyframe log at {}: pangea-vio --out-keyframes writes one",
-                      file.string(), agent.id, agent.resolved_keyframes.string()));
+          fmt::format("{}: faults: at {} s: disconnect: there is no agent {} in this session", file,
+                      fault.at_s, fault.disconnect));
     }
   }
 }
 
 }  // namespace
 
-SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path>& recordings) {
+SessionScript ParseSessionFile(const fs::path& file) {
   SessionScript script;
   YamlOptions yaml;
   yaml.AddList("agents", &script.agents, [](YamlOptions& item, AgentScript& agent) {
@@ -149,34 +151,76 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
     item.Require("at");
     item.Add("kill", &fault.kill);
     item.Add("disk_full", &fault.disk_full);
+    item.Add("disconnect", &fault.disconnect);
     item.Add("seconds", &fault.seconds);
   });
+  const ExpectationsSection expect(yaml, "expect");
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());
   CheckFaults(script, file.string());
-  FindKeyframes(file, &script);
+  script.expect = expect.Take(file.string());
+  return script;
+}
 
-  const fs::path base = recordings.value_or(fs::absolute(file).parent_path());
-  std::string missing;
-  for (AgentScript& agent : script.agents) {
-    if (agent.recording.empty()) {
-      continue;
+std::vector<std::string> FindInputs(const fs::path& file, const std::optional<fs::path>& recordings,
+                                    SessionScript* script) {
+  const fs::path own_folder = fs::absolute(file).parent_path();
+  std::vector<std::string> missing;
+  for (AgentScript& agent : script->agents) {
+    if (!agent.recording.empty()) {
+      const fs::path wanted =
+          (recordings.value_or(own_folder) / agent.recording).lexically_normal();
+      if (const auto found = FindRecording(wanted)) {
+        agent.resolved = *found;
+      } else {
+        missing.push_back(fmt::format("agent {}: recording {}", agent.id, wanted.string()));
+      }
     }
-    const auto found = FindRecording((base / agent.recording).lexically_normal());
-    if (found) {
-      agent.resolved = *found;
-    } else {
-      missing += fmt::format("\n  agent {}: {}", agent.id,
-                             (base / agent.recording).lexically_normal().string());
+    if (!agent.keyframes.empty()) {
+      agent.resolved_keyframes = (own_folder / agent.keyframes).lexically_normal();
+      if (!fs::is_regular_file(agent.resolved_keyframes)) {
+        missing.push_back(
+            fmt::format("agent {}: keyframes {}", agent.id, agent.resolved_keyframes.string()));
+      }
     }
   }
+  return missing;
+}
+
+SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path>& recordings) {
+  SessionScript script = ParseSessionFile(file);
+  const std::vector<std::string> missing = FindInputs(file, recordings, &script);
   if (!missing.empty()) {
-    throw std::runtime_error(
-        fmt::format("{}: no EuRoC recording (a folder with mav0/cam0 and mav0/imu0) at:{}\n"
-                    "Put them there, or name the folder that holds them with --recordings DIR.",
-                    file.string(), missing));
+    throw std::runtime_error(fmt::format(
+        "{}: these are not there:\n  {}\n"
+        "A recording is a EuRoC folder (with mav0/cam0 and mav0/imu0): put it there, or name the "
+        "folder that holds the recordings with --recordings DIR. Keyframes are a log that "
+        "pangea-vio "
+        "--out-keyframes writes, or an earlier session's agent_<id>.lcm.",
+        file.string(), fmt::join(missing, "\n  ")));
   }
   return script;
+}
+
+void PlaceDisconnects(const std::string& rate, SessionScript* script) {
+  for (const Fault& fault : script->faults) {
+    for (AgentScript& agent : script->agents) {
+      if (agent.id != fault.disconnect) {
+        continue;
+      }
+      if (rate == "max") {
+        throw std::runtime_error(
+            "a session with a 'disconnect' needs a --rate in numbers: at max there is no session "
+            "time");
+      }
+      if (!agent.link) {
+        agent.link.emplace();
+      }
+      const double seconds_per_second = std::stod(rate);
+      agent.link->partitions.push_back(
+          {fault.at_s / seconds_per_second, fault.seconds / seconds_per_second});
+    }
+  }
 }
 
 }  // namespace pangea::session

@@ -7,8 +7,10 @@
 //     - {id: 2, recording: ../recordings/MH_02, delay: 5, start: 10, duration: 60}
 //     - {id: 3, recording: ../recordings/MH_03, keyframes: MH_03/keyframes.lcm,
 //        link: {loss: 0.05, delay_ms: 50, partitions: [{at: 30, seconds: 60}]}}
-//   faults:
-//     - {at: 12.5, kill: fusion}                        # faults.h
+//   faults:                                             # faults.h
+//     - {at: 12.5, kill: fusion}
+//     - {at: 20, disconnect: 2, seconds: 10}
+//   expect: {fused_by: 40, ate_joint_m: 0.1}            # expectations.h
 
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +19,7 @@
 #include <vector>
 
 #include "link_emulator/link_conditions.h"
+#include "session/expectations.h"
 #include "session/faults.h"
 
 namespace pangea::session {
@@ -42,6 +45,7 @@ struct AgentScript {
 struct SessionScript {
   std::vector<AgentScript> agents;
   std::vector<Fault> faults;
+  Expectations expect;
 };
 
 // Processes of a session that are started once, whoever its agents are.
@@ -49,10 +53,24 @@ inline constexpr const char* kServerProcesses[] = {
     "agent_handler", "place_recognition", "inter_map_ba", "fusion",
     "posegraph",     "global_ba",         "map_points"};
 
-// Reads and checks a session file and finds its recordings: relative to `recordings` if that is
-// given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Throws
-// std::runtime_error that names file, key and mend, and every recording or log that is missing.
+// Reads and checks a session file, without a look at the recordings and logs it names. Throws
+// std::runtime_error that names file, key and mend.
+SessionScript ParseSessionFile(const std::filesystem::path& file);
+
+// Finds the recordings and keyframe logs of a session: recordings relative to `recordings` if that
+// is given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Returns what is
+// missing, a line each: "agent 2: /data/MH_09".
+std::vector<std::string> FindInputs(const std::filesystem::path& file,
+                                    const std::optional<std::filesystem::path>& recordings,
+                                    SessionScript* script);
+
+// Both; throws for missing inputs too.
 SessionScript ReadSessionFile(const std::filesystem::path& file,
                               const std::optional<std::filesystem::path>& recordings);
+
+// `disconnect` faults become partitions of the agents' links, which count wall time, for a session
+// played at this rate ("1", "2", ...). Throws std::runtime_error at rate "max", which has no
+// session time.
+void PlaceDisconnects(const std::string& rate, SessionScript* script);
 
 }  // namespace pangea::session

@@ -86,6 +86,61 @@ TEST_F(SessionFileTest, RecordingsFolderOnTheCommandLine) {
   EXPECT_EQ(script.agents[0].resolved, folder_ / "recordings" / "MH_02");
 }
 
+TEST_F(SessionFileTest, ReadsExpectations) {
+  const std::string agent = "agents: [{id: 1, recording: ../recordings/MH_02}]\n";
+  EXPECT_TRUE(ReadSessionFile(Write(agent), std::nullopt).expect.empty());
+  const SessionScript script =
+      ReadSessionFile(Write(agent + "expect: {fused_by: 40, ate_joint_m: 0.1}\n"), std::nullopt);
+  EXPECT_THAT(script.expect,
+              testing::ElementsAre(std::pair("ate_joint_m", 0.1), std::pair("fused_by", 40)));
+  EXPECT_THAT(ErrorOf(agent + "expect: {ate_joint: 0.1}\n"),
+              testing::AllOf(HasSubstr("two.yaml:2"), HasSubstr("'expect.ate_joint'"),
+                             HasSubstr("did you mean 'expect.ate_joint_m'?")));
+  EXPECT_THAT(ErrorOf(agent + "expect: {coverage: -1}\n"), HasSubstr("coverage"));
+}
+
+TEST_F(SessionFileTest, ADisconnectIsAPartitionOfTheLink) {
+  SessionScript script = ReadSessionFile(
+      Write("agents:\n"
+            "  - {id: 1, recording: ../recordings/MH_01}\n"
+            "  - {id: 2, recording: ../recordings/MH_02,\n"
+            "     link: {loss: 0.1, partitions: [{at: 1, seconds: 2}]}}\n"
+            "  - {id: 3, recording: ../recordings/MH_02}\n"
+            "faults: [{at: 12, disconnect: 1, seconds: 6}, {at: 20, disconnect: 2}]\n"),
+      std::nullopt);
+  EXPECT_THROW(PlaceDisconnects("max", &script), std::runtime_error);
+  PlaceDisconnects("2", &script);
+  ASSERT_TRUE(script.agents[0].link && script.agents[1].link);
+  EXPECT_FALSE(script.agents[2].link);
+  ASSERT_EQ(script.agents[0].link->partitions.size(), 1u);
+  EXPECT_EQ(script.agents[0].link->partitions[0].at_s, 6);
+  EXPECT_EQ(script.agents[0].link->partitions[0].seconds, 3);
+  EXPECT_EQ(script.agents[0].link->loss, 0);
+  ASSERT_EQ(script.agents[1].link->partitions.size(), 2u);
+  EXPECT_EQ(script.agents[1].link->partitions[1].at_s, 10);
+  EXPECT_EQ(script.agents[1].link->loss, 0.1);
+}
+
+TEST_F(SessionFileTest, UnknownKeysNameTheirLineAndTheNearest) {
+  const std::string agent = "# a comment\nagents:\n  - {id: 1, recording: ../recordings/MH_02}\n";
+  EXPECT_THAT(ErrorOf(agent + "fualts: []\n"),
+              testing::AllOf(HasSubstr("two.yaml:4: unknown key 'fualts'"),
+                             HasSubstr("did you mean 'faults'?")));
+  EXPECT_THAT(ErrorOf(agent + "faults:\n  - {at: 1, disconect: 1}\n"),
+              testing::AllOf(HasSubstr("two.yaml:5: unknown key 'faults[0].disconect'"),
+                             HasSubstr("did you mean 'faults[0].disconnect'?")));
+  EXPECT_THAT(ErrorOf(agent + "  - {id: 2, delya: 3, recording: x}\n"),
+              testing::AllOf(HasSubstr("two.yaml:4"), HasSubstr("'agents[1].delay'")));
+}
+
+TEST_F(SessionFileTest, WhatIsMissingIsNamedAllAtOnce) {
+  EXPECT_THAT(ErrorOf("agents:\n  - {id: 1, recording: ../recordings/MH_08}\n"
+                      "  - {id: 2, recording: ../recordings/MH_09, keyframes: no.lcm}\n"),
+              testing::AllOf(HasSubstr("agent 1: recording"), HasSubstr("MH_08"),
+                             HasSubstr("agent 2: recording"), HasSubstr("agent 2: keyframes"),
+                             HasSubstr("--recordings")));
+}
+
 TEST_F(SessionFileTest, ErrorsNameTheMend) {
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_09}]\n"),
               testing::AllOf(HasSubstr("MH_09"), HasSubstr("--recordings")));
@@ -105,8 +160,14 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
               testing::AllOf(HasSubstr("agent 4: link: loss 5"), HasSubstr("0 to 1")));
   const std::string agent = "agents: [{id: 1, recording: ../recordings/MH_02}]\n";
   EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, kill: fusoin}]\n"),
-              testing::AllOf(HasSubstr("'fusoin'"), HasSubstr("fusion"), HasSubstr("uplink_1")));
-  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3}]\n"), HasSubstr("'kill' or 'disk_full'"));
+              testing::AllOf(HasSubstr("'fusoin'"), HasSubstr("did you mean 'fusion'?")));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, kill: everything_there_is}]\n"),
+              testing::AllOf(HasSubstr("fusion, global_ba"), HasSubstr("uplink_1")));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3}]\n"), HasSubstr("one of 'kill' or 'disk_full'"));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, kill: vio_1, disconnect: 1}]\n"),
+              HasSubstr("one of 'kill' or 'disk_full'"));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, disconnect: 2}]\n"),
+              HasSubstr("there is no agent 2"));
   EXPECT_THAT(ErrorOf(agent + "faults: [{at: -3, kill: vio_1}]\n"), HasSubstr("negative"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, keyframes: no.lcm}]\n"),
               testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));

@@ -54,9 +54,35 @@ AgentRun RunOf(const AgentScript& script) {
   return run;
 }
 
+// The report, and at its end what was expected.
+ReportOutcome WriteChecked(const ReportInput& input, const Expectations& expect,
+                           const fs::path& out) {
+  ReportOutcome outcome{WriteReport(input, out.string()), {}};
+  if (expect.empty()) {
+    return outcome;
+  }
+  const fs::path file = out / "report.json";
+  std::ifstream stream(file);
+  nlohmann::ordered_json report = nlohmann::ordered_json::parse(stream);
+  const std::vector<CheckedExpectation> checked = Check(expect, report);
+  report["expectations"] = ToJson(checked);
+  std::ofstream(file) << report.dump(2) << "\n";
+  const std::string section = ToMarkdown(checked);
+  std::ofstream(out / "report.md", std::ios::app) << section;
+  outcome.text += section;
+  for (const CheckedExpectation& one : checked) {
+    if (!one.met) {
+      outcome.missed.push_back(
+          fmt::format("expected {} {}, got {}", one.name, one.text, one.figure));
+    }
+  }
+  return outcome;
+}
+
 }  // namespace
 
-std::string ReportRun(const SessionScript& script, const RunSummary& summary, const fs::path& out) {
+ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
+                        const fs::path& out) {
   ReportInput input;
   input.server_log = (out / "session.lcm").string();
   double recorded_s = 0;
@@ -90,15 +116,14 @@ std::string ReportRun(const SessionScript& script, const RunSummary& summary, co
   if (summary.interrupted) {
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
-  return WriteReport(input, out.string());
+  return WriteChecked(input, script.expect, out);
 }
 
-std::string ReportLog(const fs::path& log, const std::vector<AgentRun>& agents,
-                      const fs::path& out) {
+ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::path& out) {
   ReportInput input;
   input.server_log = log.string();
-  input.agents = agents;
-  return WriteReport(input, out.string());
+  input.agents = known.agents;
+  return WriteChecked(input, known.expect, out);
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
@@ -110,11 +135,12 @@ void WriteRecordings(const SessionScript& script, const fs::path& out) {
                       {"start", agent.start_s},
                       {"duration", agent.duration_s}});
   }
-  std::ofstream(out / "recordings.json") << json{{"agents", agents}}.dump(2) << "\n";
+  std::ofstream(out / "recordings.json")
+      << json{{"agents", agents}, {"expect", script.expect}}.dump(2) << "\n";
 }
 
-std::vector<AgentRun> ReadRecordings(const std::vector<fs::path>& logs) {
-  std::vector<AgentRun> runs;
+Remembered ReadRecordings(const std::vector<fs::path>& logs) {
+  Remembered known;
   std::set<fs::path> seen;
   for (const fs::path& log : logs) {
     const fs::path file = fs::absolute(log).parent_path() / "recordings.json";
@@ -130,13 +156,15 @@ std::vector<AgentRun> ReadRecordings(const std::vector<fs::path>& logs) {
         script.resolved = agent.at("recording").get<std::string>();
         script.start_s = agent.at("start").get<double>();
         script.duration_s = agent.at("duration").get<double>();
-        runs.push_back(RunOf(script));
+        known.agents.push_back(RunOf(script));
       }
+      // Of several sessions together nothing was expected.
+      known.expect = seen.size() == 1 ? recordings.value("expect", Expectations()) : Expectations();
     } catch (const json::exception& error) {
       throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
     }
   }
-  return runs;
+  return known;
 }
 
 }  // namespace pangea::session

@@ -1,7 +1,8 @@
 #pragma once
 
-// Joins what a run or a replay knows with the captured logs into the report, and remembers beside a
-// capture which recordings it came from, so that a later replay finds their ground truth.
+// Joins what a run or a replay knows with the captured logs into the report, checks what was
+// expected of it, and remembers beside a capture which recordings it came from, so that a later
+// replay finds their ground truth.
 
 #include <filesystem>
 #include <map>
@@ -15,18 +16,29 @@
 
 namespace pangea::session {
 
-// Writes the report of a live run into `out`; returns report.md's text.
-std::string ReportRun(const SessionScript& script, const RunSummary& summary,
-                      const std::filesystem::path& out);
+// What a session of its own folder remembers beside its log (recordings.json): what each agent
+// played, and what was expected of it.
+struct Remembered {
+  std::vector<AgentRun> agents;
+  Expectations expect;
+};
 
-// The same for any log of a server bus. `agents` may lack agents of the log.
-std::string ReportLog(const std::filesystem::path& log, const std::vector<AgentRun>& agents,
-                      const std::filesystem::path& out);
+struct ReportOutcome {
+  std::string text;                 // report.md's
+  std::vector<std::string> missed;  // expectations that were not met, a line each
+};
 
-// recordings.json in a session's folder: what each agent played.
+// Writes the report of a live run into `out`.
+ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
+                        const std::filesystem::path& out);
+
+// The same for any log of a server bus. `known` may lack agents of the log.
+ReportOutcome ReportLog(const std::filesystem::path& log, const Remembered& known,
+                        const std::filesystem::path& out);
+
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);
 // Of the folders that hold `logs`; empty where there is none. Throws std::runtime_error when one
 // cannot be read.
-std::vector<AgentRun> ReadRecordings(const std::vector<std::filesystem::path>& logs);
+Remembered ReadRecordings(const std::vector<std::filesystem::path>& logs);
 
 }  // namespace pangea::session

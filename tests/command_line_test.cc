@@ -1,0 +1,75 @@
+// What a shell sees of the programs: completion, and the list of sessions.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsSupersetOf;
+using testing::Not;
+
+// What bash offers behind these words; the last one, perhaps empty, is being typed.
+std::vector<std::string> Complete(const std::vector<std::string>& words) {
+  std::string quoted;
+  for (const std::string& word : words) {
+    quoted += " \"" + word + "\"";
+  }
+  const size_t n = words.size();
+  const Outcome outcome = RunCommand(
+      "cd " PANGEA_SOURCE_DIR " && bash -c '. scripts/completion/pangea.bash && COMP_WORDS=(" +
+      quoted + ") && COMP_CWORD=" + std::to_string(n - 1) + " && _pangea \"" + words.front() +
+      "\" \"" + words.back() + "\" \"" + words[n - 2] +
+      "\" && { [ ${#COMPREPLY[@]} -eq 0 ] || printf \"%s\\n\" \"${COMPREPLY[@]}\"; }'");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  std::vector<std::string> replies;
+  std::istringstream lines(outcome.output);
+  for (std::string line; std::getline(lines, line);) {
+    replies.push_back(line);
+  }
+  return replies;
+}
+
+TEST(Completion, OffersSubCommands) {
+  EXPECT_THAT(Complete({"pangea-session", ""}), IsSupersetOf({"run", "list", "replay", "report"}));
+  EXPECT_THAT(Complete({"pangea-session", "li"}), ElementsAre("list"));
+  EXPECT_THAT(Complete({"pangea-log", "e"}), IsSupersetOf({"explain", "export"}));
+}
+
+TEST(Completion, OffersTheOptionsOfTheSubCommand) {
+  const auto options = Complete({"pangea-session", "run", "--"});
+  EXPECT_THAT(options, IsSupersetOf({"--out", "--rate", "--recordings"}));
+  EXPECT_THAT(options, Not(Contains("--expect")));
+  EXPECT_THAT(Complete({"pangea-session", "report", "--ex"}), ElementsAre("--expect"));
+  EXPECT_THAT(Complete({"pangea-uplink", "--li"}), ElementsAre("--link"));
+}
+
+TEST(Completion, OffersSessionsAndTheirFiles) {
+  EXPECT_THAT(Complete({"pangea-session", "run", "dem"}), ElementsAre("demo"));
+  EXPECT_THAT(Complete({"pangea-session", "run", "sessions/dem"}),
+              ElementsAre("sessions/demo.yaml"));
+  EXPECT_THAT(Complete({"pangea-session", "run", "--rate", ""}), Contains("max"));
+  // Anything else is a file: left to bash.
+  EXPECT_THAT(Complete({"pangea-session", "report", "logs/"}), ElementsAre());
+  EXPECT_THAT(Complete({"pangea-session", "run", "--out", ""}), ElementsAre());
+}
+
+TEST(SessionList, ShowsTheSessionsAtHand) {
+  Outcome outcome = RunCommand("cd " PANGEA_SOURCE_DIR " && pangea-session list");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, HasSubstr("sessions/demo.yaml: Two agents walk"));
+  EXPECT_THAT(outcome.output, HasSubstr("agent 2: walk_2, after 3 s"));
+  EXPECT_THAT(outcome.output, HasSubstr("missing: agent 1: recording "));
+  outcome = RunCommand("pangea-session list " PANGEA_SOURCE_DIR "/sessions --names");
+  EXPECT_THAT(outcome.output, HasSubstr("demo\ntable2_MH_01\n"));
+}
+
+}  // namespace
+}  // namespace pangea::tests
