@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""What the documentation refers to exists: files linked, source files named in docs/maths*.md, scripts and programs in commands."""
+
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / name for name in subprocess.run(
+    ["git", "-C", ROOT, "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"],
+    capture_output=True, text=True, check=True).stdout.split("\0") if name and (ROOT / name).exists()]
+
+
+def without_code(text):
+    return re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.S)
+
+
+class DocLinks(unittest.TestCase):
+    def test_links(self):
+        count = 0
+        for page in PAGES:
+            for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", without_code(page.read_text())):
+                if not re.match(r"\w+:", link):
+                    self.assertTrue((page.parent / link).exists(), f"{page.relative_to(ROOT)}: {link}")
+                    count += 1
+        self.assertGreater(count, 30)
+
+    def test_sources_named_in_the_mathematics(self):
+        for page in (ROOT / "docs").glob("maths*.md"):
+            named = re.findall(r"`([\w/]+\.(?:cc|h))`", page.read_text())
+            self.assertTrue(named)
+            for name in named:
+                found = (ROOT / name).exists() or any((ROOT / "modules").rglob(name))
+                self.assertTrue(found, f"{page.name}: {name}")
+
+    def test_scripts_and_session_files_named(self):
+        for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+            for name in re.findall(r"(?<![\w/.-])((?:scripts|sessions|tests)/[\w/]+(?:\.\w+)?)", page.read_text()):
+                self.assertTrue((ROOT / name.rstrip("/")).exists(), f"{page.name}: {name}")
+
+    def test_programs_named(self):
+        cmake = " ".join(path.read_text() for path in ROOT.glob("*/*/CMakeLists.txt"))
+        known = set(re.findall(r"(?:pangea_program|add_executable)\((pangea-[\w-]+)", cmake)) | {"pangea-spy"}
+        for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+            for name in re.findall(r"bin/(pangea-[\w-]+)", page.read_text()):
+                self.assertIn(name, known, page.name)
+
+
+if __name__ == "__main__":
+    unittest.main()
