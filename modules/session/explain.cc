@@ -162,8 +162,10 @@ std::string ToText(const Explanation& e) {
       CountOf(report.found), c.num_inliers, 100 * c.inlier_ratio, 100 * limits.min_inlier_ratio,
       Median(Misses(report.found, &ShownMatch::miss_before_px)),
       Median(Misses(report.found, &ShownMatch::miss_after_px)));
-  text += fmt::format("tilt           {:.2f} degrees between the two gravities\n",
-                      Degrees(report.tilt));
+  text += fmt::format(
+      "tilt           {:.2f} degrees between the two gravities, chi-squared {:.1f} (at most "
+      "{:.1f})\n",
+      Degrees(report.tilt), report.tilt_chi2, limits.max_tilt_chi2);
   text +=
       fmt::format("landmarks      {} (at least {}) in {} cells of the image (at least {})\n",
                   report.landmarks, limits.min_inliers, report.cells, limits.min_occupied_cells);

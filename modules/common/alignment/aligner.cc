@@ -39,13 +39,8 @@ class Alignment {
         frames_c_(frames_c),
         window_m_(MakeWindow(Last(frames_m, options.window.num_keyframes), options.window)),
         window_c_(MakeWindow(Last(frames_c, options.window.num_keyframes), options.window)) {
-    double tilt_var = 0;
-    for (const Window* window : {&window_m_, &window_c_}) {
-      const double floor = options.tilt_floor;
-      tilt_var +=
-          window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2 + floor * floor;
-    }
-    tilt_sigma_ = std::sqrt(tilt_var);
+    const double floor = options.guess_tilt_floor;
+    guess_tilt_sigma_ = std::sqrt(OdometryTiltVariance() + 2 * floor * floor);
   }
 
   std::string FirstGuess(const PlaceCandidate& candidate, uint64_t seed) {
@@ -61,8 +56,9 @@ class Alignment {
       return "too few matched points with a depth";
     }
     const std::vector<PointObservation> observations = Observations(matches);
-    const auto pnp = SolveUprightPnp(observations, RayPairs(candidate), window_c_.T_w_cam.back().t,
-                                     window_m_.T_w_cam.back().t, tilt_sigma_, seed, options_.pnp);
+    const auto pnp =
+        SolveUprightPnp(observations, RayPairs(candidate), window_c_.T_w_cam.back().t,
+                        window_m_.T_w_cam.back().t, guess_tilt_sigma_, seed, options_.pnp);
     if (!pnp) {
       return "PnP found no pose";
     }
@@ -105,7 +101,7 @@ class Alignment {
       if (static_cast<int>(matches.size()) < options_.min_found) {
         return "too few points found by projection";
       }
-      pose_ = RefinePose(Observations(matches), pose_.T_m_c, tilt_sigma_);
+      pose_ = RefinePose(Observations(matches), pose_.T_m_c, guess_tilt_sigma_);
       report_.comparable = surroundings.comparable();
       report_.found_share = surroundings.found_share();
       report_.first_supported_share = surroundings.supported_share();
@@ -162,12 +158,19 @@ class Alignment {
   }
 
   std::string CheckGravity() {
-    const Eigen::Vector2d tilt = (ba_->T_m_c.q * Eigen::Vector3d::UnitZ()).head<2>();
+    const Eigen::Vector3d up = ba_->T_m_c.q * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector2d tilt(-up.y(), up.x());
+    const Eigen::Matrix3d R_m_Km =
+        window_m_.keyframe(window_m_.newest()).T_odom_body.q.toRotationMatrix();
+    const Eigen::Matrix3d visual =
+        R_m_Km * ba_->covariance.bottomRightCorner<3, 3>() * R_m_Km.transpose();
+    const double floor = options_.gravity_floor;
+    const Eigen::Matrix2d covariance =
+        visual.topLeftCorner<2, 2>() +
+        (OdometryTiltVariance() + 2 * floor * floor) * Eigen::Matrix2d::Identity();
     report_.tilt = tilt.norm();
-    const double visual_var =
-        ba_->covariance.bottomRightCorner<3, 3>().eigenvalues().real().maxCoeff();
-    const double sigma = std::sqrt(tilt_sigma_ * tilt_sigma_ + visual_var);
-    return tilt.norm() > std::min(options_.max_tilt, options_.max_tilt_sigmas * sigma)
+    report_.tilt_chi2 = tilt.dot(covariance.ldlt().solve(tilt));
+    return report_.tilt > options_.max_tilt || report_.tilt_chi2 > options_.max_tilt_chi2
                ? "roll or pitch contradicts gravity"
                : "";
   }
@@ -273,6 +276,15 @@ class Alignment {
   }
 
  private:
+  // Of roll or pitch between the two odometries.
+  double OdometryTiltVariance() const {
+    double variance = 0;
+    for (const Window* window : {&window_m_, &window_c_}) {
+      variance += window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2;
+    }
+    return variance;
+  }
+
   // Where the rest of the view leaves a direction open, one near point decides it, right or wrong:
   // it was looked for where the guess had it, and whatever was found there fits. So of what is
   // known in the worst direction no landmark may say more than all others together.
@@ -312,7 +324,7 @@ class Alignment {
           CornerSigma(m.keyframe().corners[corner_m], options_.search.pixel_sigma) *
           m.keyframe().camera.PixelAngle();
       const double sigma =
-          std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m + tilt_sigma_ * tilt_sigma_);
+          std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m + guess_tilt_sigma_ * guess_tilt_sigma_);
       const auto unit = [](const Rigid3& T_w_cam, const Eigen::Vector2d& ray) {
         return Eigen::Vector3d(T_w_cam.q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized());
       };
@@ -337,7 +349,7 @@ class Alignment {
   const KeyframeWindow& frames_c_;
   Window window_m_;
   Window window_c_;
-  double tilt_sigma_ = 0;
+  double guess_tilt_sigma_ = 0;  // radians, of roll and pitch between the windows
   PoseEstimate pose_;
   AlignmentReport report_;
   std::vector<PointMatch> first_matches_;

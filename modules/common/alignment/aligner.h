@@ -46,10 +46,12 @@ struct AlignmentOptions {
   double max_view_angle = 1.3;  // radians
   double max_distance_m = 15;
 
-  // Roll and pitch between two gravity-aligned frames are zero within what the odometries say,
-  // and never better than this.
-  double tilt_floor = 0.006;  // radians, of each odometry
-  double max_tilt_sigmas = 4;
+  // Roll and pitch between two gravity-aligned frames are zero within what the odometries say.
+  // Guesses are led by it loosely, so that a wrong one is not bent into what gravity allows; what
+  // the images alone say in the end must agree with it: 99 % of 2 degrees of freedom.
+  double guess_tilt_floor = 0.006;  // radians, of each odometry
+  double gravity_floor = 0.001;     // radians, the same at the end
+  double max_tilt_chi2 = 9.2;
   double max_tilt = 0.06;  // radians, whatever the odometries say
 
   // Surroundings, first in the two keyframes, then along the way to them: of the points that ought
@@ -81,10 +83,11 @@ struct AlignmentReport {
   int comparable = 0;  // points that ought to be found in the two keyframes
   double found_share = 0;
   double first_supported_share = 0;
-  double supported_share = 0;      // 0 when it was not looked at
-  int landmarks = 0;               // distinct inliers of the BA
-  int cells = 0;                   // image cells these occupy in one of the keyframes
-  double tilt = 0;                 // radians
+  double supported_share = 0;  // 0 when it was not looked at
+  int landmarks = 0;           // distinct inliers of the BA
+  int cells = 0;               // image cells these occupy in one of the keyframes
+  double tilt = 0;             // radians
+  double tilt_chi2 = 0;
   double sigma_without_one_m = 0;  // worst, were the landmark that says most not there
   double halves_chi2 = 0;          // 0 when it was not looked at
   std::vector<ShownMatch> first;   // the candidate's and the nearest descriptors'; inliers of PnP

@@ -31,8 +31,9 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   yaml.Add("min_pnp_inliers", &options.min_pnp_inliers);
   yaml.Add("max_view_angle", &options.max_view_angle);
   yaml.Add("max_distance_m", &options.max_distance_m);
-  yaml.Add("tilt_floor", &options.tilt_floor);
-  yaml.Add("max_tilt_sigmas", &options.max_tilt_sigmas);
+  yaml.Add("guess_tilt_floor", &options.guess_tilt_floor);
+  yaml.Add("gravity_floor", &options.gravity_floor);
+  yaml.Add("max_tilt_chi2", &options.max_tilt_chi2);
   yaml.Add("max_tilt", &options.max_tilt);
   yaml.Add("min_found", &options.min_found);
   yaml.Add("min_comparable", &options.min_comparable);
