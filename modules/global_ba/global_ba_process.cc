@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <utility>
 
 #include "common/catch_up_messages.h"
@@ -14,106 +15,70 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 // Longer than the pose graph waits before it solves all from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;
-constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
 
 }  // namespace
 
 GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options)
     : node_(bus, "global_ba"), global_ba_(options) {
-  node_.Subscribe<keyframe_t>(
-      std::string(channels::kAllKeyframes),
-      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
-  node_.Subscribe<place_match_t>(
-      std::string(channels::kPlaceMatch),
-      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
-  node_.Subscribe<constraint_t>(
-      std::string(channels::kConstraint),
-      [this](const std::string&, const constraint_t& message) { OnConstraint(message); });
-  node_.Subscribe<map_state_t>(
-      std::string(channels::kMapState),
-      [this](const std::string&, const map_state_t& message) { OnMapState(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&GlobalBaProcess::OnKeyframe, this));
+  node_.Listen<place_match_t>(channels::kPlaceMatch,
+                              std::bind_front(&GlobalBaProcess::OnPlaceMatch, this));
+  node_.Listen<constraint_t>(channels::kConstraint,
+                             std::bind_front(&GlobalBaProcess::OnConstraint, this));
+  node_.Listen<map_state_t>(channels::kMapState,
+                            std::bind_front(&GlobalBaProcess::OnMapState, this));
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&GlobalBaProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
 }
 
-void GlobalBaProcess::OnKeyframe(const keyframe_t& message) {
-  Parsed<Keyframe> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
+void GlobalBaProcess::OnKeyframe(Keyframe keyframe) {
   ++num_news_;
-  keyframes_.Note(parsed.value->id.map, parsed.value->id.seq);
-  global_ba_.Take(std::move(*parsed.value));
+  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
+  global_ba_.Take(std::move(keyframe));
 }
 
-void GlobalBaProcess::OnPlaceMatch(const place_match_t& message) {
-  const Parsed<PlaceMatch> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
+void GlobalBaProcess::OnPlaceMatch(const PlaceMatch& match) {
   ++num_news_;
-  matches_.Note(parsed.value->query.map, parsed.value->query.seq);
-  global_ba_.Take(*parsed.value);
+  matches_.Note(match.query.map, match.query.seq);
+  global_ba_.Take(match);
 }
 
-void GlobalBaProcess::OnConstraint(const constraint_t& message) {
-  const Parsed<Constraint> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
+void GlobalBaProcess::OnConstraint(const Constraint& constraint) {
   ++num_news_;
-  global_ba_.Take(*parsed.value);
+  global_ba_.Take(constraint);
 }
 
-void GlobalBaProcess::OnMapState(const map_state_t& message) {
-  Parsed<MapState> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  if (auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+void GlobalBaProcess::OnMapState(MapState state, const map_state_t& message) {
+  if (auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(state))) {
     missing_states_.Note(whole->maps);
     global_ba_.Take(std::move(*whole));
   }
 }
 
-void GlobalBaProcess::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+void GlobalBaProcess::OnHave(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
     if (keyframes_.Lacks(map, 0)) {
       missing_states_.Announce(map);
     }
-    keyframes_.Announce(map, highest_seq);
-    matches_.Announce(map, highest_seq);
     // What was judged before this process started.
     if (verdicts_asked_.insert(map).second) {
-      for (int32_t seq = 0; seq <= highest_seq; seq += kMaxVerdictsAsked) {
-        AskAgain(node_, std::string(channels::kConstraint),
-                 {map, seq, seq + kMaxVerdictsAsked - 1});
-      }
+      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
     }
   }
-  for (const SeqGap& gap : have.value->gaps) {
-    keyframes_.Skip(gap);
-    matches_.Skip(gap);
-  }
+  keyframes_.Announce(have);
+  matches_.Announce(have);
 }
 
 void GlobalBaProcess::OnAgain(const again_t& message) {
   const bool known =
-      TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); }) ||
-      TakeAgain<place_match_t>(message, [this](const place_match_t& m) { OnPlaceMatch(m); }) ||
-      TakeAgain<constraint_t>(message, [this](const constraint_t& m) { OnConstraint(m); });
+      TakeAgain<keyframe_t>(node_, message, std::bind_front(&GlobalBaProcess::OnKeyframe, this)) ||
+      TakeAgain<place_match_t>(node_, message,
+                               std::bind_front(&GlobalBaProcess::OnPlaceMatch, this)) ||
+      TakeAgain<constraint_t>(node_, message,
+                              std::bind_front(&GlobalBaProcess::OnConstraint, this));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }

@@ -16,14 +16,11 @@
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
+#include "common/catch_up_messages.h"
 #include "common/state_chunks.h"
 #include "global_ba/global_ba.h"
 #include "pangea/again_t.hpp"
-#include "pangea/constraint_t.hpp"
-#include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
-#include "pangea/place_match_t.hpp"
 
 namespace pangea {
 
@@ -36,11 +33,11 @@ class GlobalBaProcess : public Process {
   void Finish();
 
  private:
-  void OnKeyframe(const keyframe_t& message);
-  void OnPlaceMatch(const place_match_t& message);
-  void OnConstraint(const constraint_t& message);
-  void OnMapState(const map_state_t& message);
-  void OnHave(const have_t& message);
+  void OnKeyframe(Keyframe keyframe);
+  void OnPlaceMatch(const PlaceMatch& match);
+  void OnConstraint(const Constraint& constraint);
+  void OnMapState(MapState state, const map_state_t& message);
+  void OnHave(const Have& have);
   void OnAgain(const again_t& message);
 
   void Advance();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -19,53 +20,33 @@ constexpr int64_t kSecond = 1'000'000;
 
 MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options)
     : node_(bus, "map_points"), points_(options) {
-  node_.Subscribe<keyframe_t>(
-      std::string(channels::kAllKeyframes),
-      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
-  node_.Subscribe<map_state_t>(
-      std::string(channels::kMapState),
-      [this](const std::string&, const map_state_t& message) { OnMapState(message); });
-  node_.Subscribe<map_state_t>(
-      std::string(channels::kRefinement),
-      [this](const std::string&, const map_state_t& message) { OnRefinement(message); });
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&MapPointsProcess::OnKeyframe, this));
+  node_.Listen<map_state_t>(channels::kMapState,
+                            std::bind_front(&MapPointsProcess::OnMapState, this));
+  node_.Listen<map_state_t>(channels::kRefinement,
+                            std::bind_front(&MapPointsProcess::OnRefinement, this));
   node_.Subscribe<pose_t>(std::string(channels::kAllPoses),
                           [this](const std::string&, const pose_t& message) { OnPose(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<have_t>(channels::kHave, [this](const Have& have) { keyframes_.Announce(have); });
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
 }
 
-void MapPointsProcess::OnKeyframe(const keyframe_t& message) {
-  Parsed<Keyframe> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  keyframes_.Note(parsed.value->id.map, parsed.value->id.seq);
-  points_.Take(std::move(*parsed.value));
+void MapPointsProcess::OnKeyframe(Keyframe keyframe) {
+  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
+  points_.Take(std::move(keyframe));
 }
 
-void MapPointsProcess::OnMapState(const map_state_t& message) {
-  Parsed<MapState> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  if (auto whole = states_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+void MapPointsProcess::OnMapState(MapState state, const map_state_t& message) {
+  if (auto whole = states_.Add(message.chunk, message.num_chunks, std::move(state))) {
     points_.Take(*whole);
   }
 }
 
-void MapPointsProcess::OnRefinement(const map_state_t& message) {
-  Parsed<MapState> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  if (const auto whole =
-          refinements_.Add(message.chunk, message.num_chunks, std::move(*parsed.value))) {
+void MapPointsProcess::OnRefinement(MapState state, const map_state_t& message) {
+  if (const auto whole = refinements_.Add(message.chunk, message.num_chunks, std::move(state))) {
     points_.TakeRefined(*whole);
   }
 }
@@ -97,23 +78,9 @@ void MapPointsProcess::OnPose(const pose_t& message) {
   }
 }
 
-void MapPointsProcess::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
-    keyframes_.Announce(map, highest_seq);
-  }
-  for (const SeqGap& gap : have.value->gaps) {
-    keyframes_.Skip(gap);
-  }
-}
-
 void MapPointsProcess::OnAgain(const again_t& message) {
-  const bool known = TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); });
-  if (!known) {
+  if (!TakeAgain<keyframe_t>(node_, message,
+                             std::bind_front(&MapPointsProcess::OnKeyframe, this))) {
     node_.Refuse("again: not what was asked for");
   }
 }

@@ -14,8 +14,6 @@
 #include "common/state_chunks.h"
 #include "map_points/map_points.h"
 #include "pangea/again_t.hpp"
-#include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/pose_t.hpp"
 
@@ -30,11 +28,10 @@ class MapPointsProcess : public Process {
   void Tick(int64_t now_utime) override;
 
  private:
-  void OnKeyframe(const keyframe_t& message);
-  void OnMapState(const map_state_t& message);
-  void OnRefinement(const map_state_t& message);
+  void OnKeyframe(Keyframe keyframe);
+  void OnMapState(MapState state, const map_state_t& message);
+  void OnRefinement(MapState state, const map_state_t& message);
   void OnPose(const pose_t& message);
-  void OnHave(const have_t& message);
   void OnAgain(const again_t& message);
   void PublishStatus(int64_t now_utime);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "common/catch_up_messages.h"
@@ -28,20 +29,16 @@ constexpr int kGiveUpCatchingUpTicks = 50;
 
 PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options)
     : node_(bus, "place_recognition"), recognition_(options) {
-  node_.Subscribe<keyframe_t>(
-      std::string(channels::kAllKeyframes),
-      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
-  node_.Subscribe<map_state_t>(
-      std::string(channels::kMapState),
-      [this](const std::string&, const map_state_t& message) { OnMapState(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this));
+  node_.Listen<map_state_t>(channels::kMapState,
+                            std::bind_front(&PlaceRecognitionProcess::OnMapState, this));
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&PlaceRecognitionProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
-  node_.Subscribe<resend_request_t>(
-      std::string(channels::kResendRequest),
-      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&PlaceRecognitionProcess::OnResendRequest, this));
 }
 
 void PlaceRecognitionProcess::Tick(int64_t now_utime) {
@@ -58,19 +55,14 @@ void PlaceRecognitionProcess::Tick(int64_t now_utime) {
   }
 }
 
-void PlaceRecognitionProcess::OnKeyframe(const keyframe_t& message) {
-  Parsed<Keyframe> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  const KeyframeId id = parsed.value->id;
-  const std::optional<OdometryEdge>& edge = parsed.value->edge;
+void PlaceRecognitionProcess::OnKeyframe(Keyframe keyframe) {
+  const KeyframeId id = keyframe.id;
+  const std::optional<OdometryEdge>& edge = keyframe.edge;
   if (edge && edge->from_seq < id.seq - 1) {
     // What lies between was lost for good, or the edge would begin at the keyframe before.
     HandleAll(keyframes_.Skip({id.map, edge->from_seq + 1, id.seq - 1}));
   }
-  HandleAll(keyframes_.Add(id.map, id.seq, std::move(*parsed.value)));
+  HandleAll(keyframes_.Add(id.map, id.seq, std::move(keyframe)));
 }
 
 void PlaceRecognitionProcess::HandleAll(const std::vector<Keyframe>& ready) {
@@ -112,13 +104,8 @@ void PlaceRecognitionProcess::ReleaseHeld() {
   }
 }
 
-void PlaceRecognitionProcess::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+void PlaceRecognitionProcess::OnHave(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
     // A map we know nothing of, yet the journal does: we are the one who came late.
     if (keyframes_.next(map) == 0) {
       catching_up_ = true;
@@ -126,63 +113,46 @@ void PlaceRecognitionProcess::OnHave(const have_t& message) {
     }
     keyframes_.Announce(map, highest_seq);
   }
-  for (const SeqGap& gap : have.value->gaps) {
+  for (const SeqGap& gap : have.gaps) {
     HandleAll(keyframes_.Skip(gap));
   }
 }
 
 void PlaceRecognitionProcess::OnAgain(const again_t& message) {
-  const auto* bytes = reinterpret_cast<const uint8_t*>(message.data.data());
-  const Bytes data(bytes, message.data.size());
-  keyframe_t keyframe{};
-  place_match_t match{};
-  if (message.channel == channels::kPlaceMatch && DecodeMessage(data, &match)) {
-    Parsed<PlaceMatch> parsed = Parse(match);
-    if (!parsed.value) {
-      node_.Refuse(parsed.refused);
-    } else if (parsed.value->query.seq >= keyframes_.next(parsed.value->query.map) &&
-               known_matches_.size() < kMaxKnownMatches) {
-      known_matches_.insert_or_assign(parsed.value->query, std::move(*parsed.value));
-    }
-  } else if (message.channel.starts_with("KEYFRAME_") && DecodeMessage(data, &keyframe)) {
-    OnKeyframe(keyframe);
-  } else {
-    node_.Refuse("again_t: not what was asked for");
+  const bool known =
+      TakeAgain<place_match_t>(node_, message,
+                               std::bind_front(&PlaceRecognitionProcess::OnKnownMatch, this)) ||
+      TakeAgain<keyframe_t>(node_, message,
+                            std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this));
+  if (!known) {
+    node_.Refuse("again: neither match nor keyframe");
   }
 }
 
-void PlaceRecognitionProcess::OnMapState(const map_state_t& message) {
-  const Parsed<MapState> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
+void PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
+  const KeyframeId query = match.query;
+  if (query.seq >= keyframes_.next(query.map) && known_matches_.size() < kMaxKnownMatches) {
+    known_matches_.insert_or_assign(query, std::move(match));
   }
-  missing_states_.Note(parsed.value->maps);
-  recognition_.SetGroup(parsed.value->group, parsed.value->revision, parsed.value->maps);
 }
 
-void PlaceRecognitionProcess::OnResendRequest(const resend_request_t& message) {
-  if (message.channel != channels::kPlaceMatch || message.requester == node_.name()) {
+void PlaceRecognitionProcess::OnMapState(const MapState& state) {
+  missing_states_.Note(state.maps);
+  recognition_.SetGroup(state.group, state.revision, state.maps);
+}
+
+void PlaceRecognitionProcess::OnResendRequest(const ResendRequest& request) {
+  if (request.channel != channels::kPlaceMatch || request.requester == node_.name()) {
     return;
   }
-  const Parsed<ResendRequest> request = Parse(message);
-  if (!request.value) {
-    node_.Refuse(request.refused);
-    return;
-  }
-  const SeqGap& range = request.value->range;
+  const SeqGap& range = request.range;
   const auto sent = sent_.find(range.map);
   if (sent == sent_.end()) {
     return;
   }
   for (auto it = sent->second.lower_bound(range.from_seq);
        it != sent->second.end() && it->first <= range.to_seq; ++it) {
-    again_t again{};
-    again.channel = channels::kPlaceMatch;
-    again.data.resize(it->second.getEncodedSize());
-    again.num_bytes = static_cast<int32_t>(again.data.size());
-    it->second.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
-    node_.Publish(channels::Again(message.requester), again);
+    TellAgain(node_, request.requester, request.channel, it->second);
   }
 }
 

@@ -17,12 +17,9 @@
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
+#include "common/catch_up_messages.h"
 #include "pangea/again_t.hpp"
-#include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
-#include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
-#include "pangea/resend_request_t.hpp"
 #include "place_recognition/place_recognition.h"
 
 namespace pangea {
@@ -39,11 +36,12 @@ class PlaceRecognitionProcess : public Process {
     int64_t utime = 0;
   };
 
-  void OnKeyframe(const keyframe_t& message);
-  void OnHave(const have_t& message);
+  void OnKeyframe(Keyframe keyframe);
+  void OnHave(const Have& have);
   void OnAgain(const again_t& message);
-  void OnMapState(const map_state_t& message);
-  void OnResendRequest(const resend_request_t& message);
+  void OnKnownMatch(PlaceMatch match);
+  void OnMapState(const MapState& state);
+  void OnResendRequest(const ResendRequest& request);
 
   void HandleAll(const std::vector<Keyframe>& ready);
   void Handle(const Keyframe& keyframe);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "common/catch_up_messages.h"
@@ -29,44 +30,33 @@ constexpr int kMaxTimesAsked = 15;
 PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                                    int64_t first_revision)
     : node_(bus, "posegraph"), graph_(options, first_revision) {
-  node_.Subscribe<keyframe_t>(
-      std::string(channels::kAllKeyframes),
-      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
-  node_.Subscribe<constraint_t>(
-      std::string(channels::kConstraint),
-      [this](const std::string&, const constraint_t& message) { OnConstraint(message); });
-  node_.Subscribe<place_match_t>(
-      std::string(channels::kPlaceMatch),
-      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
-  node_.Subscribe<map_state_t>(
-      std::string(channels::kRefinement),
-      [this](const std::string&, const map_state_t& message) { OnRefinement(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&PoseGraphProcess::OnKeyframe, this));
+  node_.Listen<constraint_t>(channels::kConstraint,
+                             std::bind_front(&PoseGraphProcess::OnConstraint, this));
+  node_.Listen<place_match_t>(channels::kPlaceMatch,
+                              std::bind_front(&PoseGraphProcess::OnPlaceMatch, this));
+  node_.Listen<map_state_t>(channels::kRefinement,
+                            std::bind_front(&PoseGraphProcess::OnRefinement, this));
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&PoseGraphProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
-  node_.Subscribe<resend_request_t>(
-      std::string(channels::kResendRequest),
-      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&PoseGraphProcess::OnResendRequest, this));
 }
 
-void PoseGraphProcess::OnKeyframe(const keyframe_t& message) {
-  Parsed<Keyframe> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  const KeyframeId id = parsed.value->id;
+void PoseGraphProcess::OnKeyframe(Keyframe keyframe) {
+  const KeyframeId id = keyframe.id;
   graph_.NoteMap(id.map);
-  const int32_t from = parsed.value->edge ? parsed.value->edge->from_seq : id.seq - 1;
+  const int32_t from = keyframe.edge ? keyframe.edge->from_seq : id.seq - 1;
   // An edge that begins further back says that what lies between is lost for good.
   const int32_t first_lost = std::max(from + 1, keyframes_.next(id.map));
   const bool credible = id.seq - first_lost <= static_cast<int32_t>(InOrder<Item>::kMaxParked);
   for (int32_t seq = first_lost; credible && seq < id.seq; ++seq) {
     Enqueue(id.map, seq, std::nullopt);
   }
-  Enqueue(id.map, id.seq, std::move(parsed.value));
+  Enqueue(id.map, id.seq, std::move(keyframe));
   SettleUnlessMoreWaits();
 }
 
@@ -82,33 +72,24 @@ void PoseGraphProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
   }
 }
 
-void PoseGraphProcess::OnConstraint(const constraint_t& message) {
-  const Parsed<Constraint> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  due_.erase(message.id);
-  if (verdicts_.insert(message.id).second) {
+void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
+  const int64_t id = constraint.Id();
+  due_.erase(id);
+  if (verdicts_.insert(id).second) {
     ++num_arrived_;
-    node_.Count(parsed.value->accepted ? "verdicts_accepted" : "verdicts_refused");
+    node_.Count(constraint.accepted ? "verdicts_accepted" : "verdicts_refused");
   } else {
     node_.Count("verdicts_repeated");
   }
-  graph_.Take(*parsed.value);
+  graph_.Take(constraint);
   ++num_unsettled_;
   SettleUnlessMoreWaits();
 }
 
-void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
-  const Parsed<PlaceMatch> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  const KeyframeId& query = parsed.value->query;
+void PoseGraphProcess::OnPlaceMatch(const PlaceMatch& match) {
+  const KeyframeId& query = match.query;
   matches_.Note(query.map, query.seq);
-  for (const PlaceCandidate& candidate : parsed.value->candidates) {
+  for (const PlaceCandidate& candidate : match.candidates) {
     Constraint promised;
     promised.from = candidate.match;
     promised.to = query;
@@ -120,13 +101,8 @@ void PoseGraphProcess::OnPlaceMatch(const place_match_t& message) {
   SettleUnlessMoreWaits();
 }
 
-void PoseGraphProcess::OnRefinement(const map_state_t& message) {
-  Parsed<MapState> parsed = Parse(message);
-  if (!parsed.value) {
-    node_.Refuse(parsed.refused);
-    return;
-  }
-  const auto whole = refinements_.Add(message.chunk, message.num_chunks, std::move(*parsed.value));
+void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) {
+  const auto whole = refinements_.Add(message.chunk, message.num_chunks, std::move(state));
   if (whole) {
     node_.Count("refinements");
     graph_.TakeRefined(*whole);
@@ -135,27 +111,19 @@ void PoseGraphProcess::OnRefinement(const map_state_t& message) {
   }
 }
 
-void PoseGraphProcess::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+void PoseGraphProcess::OnHave(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
     graph_.NoteMap(map);
     // What was judged before this process started.
     if (verdicts_asked_.insert(map).second) {
-      for (int32_t seq = 0; seq <= highest_seq; seq += kMaxVerdictsAsked) {
-        AskAgain(node_, std::string(channels::kConstraint),
-                 {map, seq, seq + kMaxVerdictsAsked - 1});
-      }
+      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
     }
     keyframes_.Announce(map, highest_seq);
-    matches_.Announce(map, highest_seq);
     if (!have_heard_ && keyframes_.next(map) == 0) {
       catching_up_to_[map] = highest_seq;
     }
   }
+  matches_.Announce(have);
   have_heard_ = true;
 }
 
@@ -183,10 +151,9 @@ void PoseGraphProcess::CatchUp(int64_t now_utime) {
   }
 }
 
-void PoseGraphProcess::OnResendRequest(const resend_request_t& message) {
-  const Parsed<MapId> map = Parse(message.map);
-  if (message.channel == channels::kMapState && map.value) {
-    graph_.PublishAgain(*map.value);
+void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
+  if (request.channel == channels::kMapState) {
+    graph_.PublishAgain(request.range.map);
     ++num_unsettled_;
     SettleUnlessMoreWaits();
   }
@@ -194,9 +161,11 @@ void PoseGraphProcess::OnResendRequest(const resend_request_t& message) {
 
 void PoseGraphProcess::OnAgain(const again_t& message) {
   const bool known =
-      TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); }) ||
-      TakeAgain<place_match_t>(message, [this](const place_match_t& m) { OnPlaceMatch(m); }) ||
-      TakeAgain<constraint_t>(message, [this](const constraint_t& m) { OnConstraint(m); });
+      TakeAgain<keyframe_t>(node_, message, std::bind_front(&PoseGraphProcess::OnKeyframe, this)) ||
+      TakeAgain<place_match_t>(node_, message,
+                               std::bind_front(&PoseGraphProcess::OnPlaceMatch, this)) ||
+      TakeAgain<constraint_t>(node_, message,
+                              std::bind_front(&PoseGraphProcess::OnConstraint, this));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }

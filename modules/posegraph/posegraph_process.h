@@ -30,14 +30,10 @@
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
+#include "common/catch_up_messages.h"
 #include "common/state_chunks.h"
 #include "pangea/again_t.hpp"
-#include "pangea/constraint_t.hpp"
-#include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
-#include "pangea/place_match_t.hpp"
-#include "pangea/resend_request_t.hpp"
 #include "posegraph/posegraph.h"
 
 namespace pangea {
@@ -70,13 +66,13 @@ class PoseGraphProcess : public Process {
     int64_t wait_us = 0;
   };
 
-  void OnKeyframe(const keyframe_t& message);
-  void OnConstraint(const constraint_t& message);
-  void OnPlaceMatch(const place_match_t& message);
-  void OnRefinement(const map_state_t& message);
-  void OnHave(const have_t& message);
+  void OnKeyframe(Keyframe keyframe);
+  void OnConstraint(const Constraint& constraint);
+  void OnPlaceMatch(const PlaceMatch& match);
+  void OnRefinement(MapState state, const map_state_t& message);
+  void OnHave(const Have& have);
   void OnAgain(const again_t& message);
-  void OnResendRequest(const resend_request_t& message);
+  void OnResendRequest(const ResendRequest& request);
 
   int64_t NumToCatchUp() const;
   void CatchUp(int64_t now_utime);

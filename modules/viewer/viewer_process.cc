@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <string_view>
 #include <utility>
 
@@ -14,7 +15,6 @@ namespace {
 
 constexpr int64_t kSecond = 1'000'000;
 constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
-constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
 // What is beyond would not be shown anyway.
 constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
 
@@ -29,8 +29,7 @@ ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
     node_.SubscribeBytes(std::string(channel),
                          [this](const std::string& name, Bytes data) { OnMessage(name, data); });
   }
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&ViewerProcess::OnHave, this));
 }
 
 void ViewerProcess::WatchAgent(Bus& agent_bus) {
@@ -52,30 +51,14 @@ void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
   std::visit([this](const auto& event) { scene_.Take(event); }, *outcome.event);
 }
 
-void ViewerProcess::OnHave(const have_t& message) {
-  for (size_t i = 0; i < message.maps.size(); ++i) {
-    const Parsed<MapId> map = Parse(message.maps[i]);
-    if (!map.value || message.highest_seq[i] < 0) {
-      node_.Refuse("have: invalid map or seq");
-      continue;
-    }
-    const int32_t highest_seq = std::min(message.highest_seq[i], kMaxSeqAsked);
-    keyframes_.Announce(*map.value, highest_seq);
-    if (verdicts_asked_.size() < Scene::kMaxMaps && verdicts_asked_.insert(*map.value).second) {
-      for (int32_t seq = 0; seq <= highest_seq; seq += kMaxVerdictsAsked) {
-        AskAgain(node_, std::string(channels::kConstraint),
-                 {*map.value, seq, seq + kMaxVerdictsAsked - 1});
-      }
+void ViewerProcess::OnHave(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
+    if (verdicts_asked_.size() < Scene::kMaxMaps && verdicts_asked_.insert(map).second) {
+      AskAllAgain(node_, std::string(channels::kConstraint), map,
+                  std::min(highest_seq, kMaxSeqAsked));
     }
   }
-  for (const seq_gap_t& gap : message.gaps) {
-    const Parsed<MapId> map = Parse(gap.map);
-    if (map.value && gap.from_seq >= 0 && gap.to_seq >= gap.from_seq) {
-      keyframes_.Skip({*map.value, gap.from_seq, gap.to_seq});
-    } else {
-      node_.Refuse("have: invalid gap");
-    }
-  }
+  keyframes_.Announce(have);
 }
 
 void ViewerProcess::AskForMissing(int64_t now_utime) {

@@ -10,7 +10,7 @@
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
-#include "pangea/have_t.hpp"
+#include "common/catch_up_messages.h"
 #include "viewer/scene_events.h"
 #include "viewer/show.h"
 
@@ -32,7 +32,7 @@ class ViewerProcess : public Process, public Show {
 
  private:
   void OnMessage(const std::string& channel, Bytes data);
-  void OnHave(const have_t& message);
+  void OnHave(const Have& have);
   void AskForMissing(int64_t now_utime);
 
   Node node_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@
 #include "common/messages.h"
 #include "common/trajectory.h"
 #include "pangea/keyframe_t.hpp"
+#include "pangea/pose_t.hpp"
 
 namespace pangea::vio {
 namespace {
@@ -40,12 +42,10 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
     : options_(options),
       node_(bus, fmt::format("vio_{}", options.agent_id)),
       outlet_(node_, options.agent_id, kKeptKeyframes, now_utime) {
-  node_.Subscribe<correction_t>(
-      channels::Correction(options_.agent_id),
-      [this](const std::string&, const correction_t& message) { OnCorrection(message); });
-  node_.Subscribe<landmarks_t>(
-      channels::Landmarks(options_.agent_id),
-      [this](const std::string&, const landmarks_t& message) { OnLandmarks(message); });
+  node_.Listen<correction_t>(channels::Correction(options_.agent_id),
+                             std::bind_front(&VioProcess::OnCorrection, this));
+  node_.Listen<landmarks_t>(channels::Landmarks(options_.agent_id),
+                            std::bind_front(&VioProcess::OnLandmarks, this));
   if (!options_.out_keyframes.empty()) {
     keyframe_log_ = std::make_unique<lcm::LogFile>(options_.out_keyframes, "w");
     if (!keyframe_log_->good()) {
@@ -203,27 +203,17 @@ std::string VioProcess::Summary() const {
   return fmt::format("agent {}: {}", options_.agent_id, state_text_);
 }
 
-void VioProcess::OnCorrection(const correction_t& message) {
-  const Parsed<Correction> correction = Parse(message);
-  if (!correction.value) {
-    node_.Refuse("correction: " + correction.refused);
-    return;
-  }
-  if (shown_.Correct(*correction.value)) {
+void VioProcess::OnCorrection(const Correction& correction) {
+  if (shown_.Correct(correction)) {
     node_.Count("corrections");
     vio_->set_group_revision(shown_.revision());
-    alignment_.Correct(*correction.value);
+    alignment_.Correct(correction);
     shown_.Sharpen(*alignment_.T_map_odom());
   }
 }
 
-void VioProcess::OnLandmarks(const landmarks_t& message) {
-  const Parsed<MapLandmarks> landmarks = Parse(message);
-  if (!landmarks.value) {
-    node_.Refuse(landmarks.refused);
-    return;
-  }
-  node_.Count(alignment_.Take(*landmarks.value) ? "landmark_messages" : "landmark_messages_unused");
+void VioProcess::OnLandmarks(const MapLandmarks& landmarks) {
+  node_.Count(alignment_.Take(landmarks) ? "landmark_messages" : "landmark_messages_unused");
 }
 
 }  // namespace pangea::vio

@@ -19,9 +19,6 @@
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/euroc.h"
-#include "pangea/correction_t.hpp"
-#include "pangea/landmarks_t.hpp"
-#include "pangea/pose_t.hpp"
 #include "vio/live_alignment.h"
 #include "vio/shown_pose.h"
 #include "vio/vio.h"
@@ -70,8 +67,8 @@ class VioProcess : public Process {
   Node& node() { return node_; }
 
  private:
-  void OnCorrection(const correction_t& message);
-  void OnLandmarks(const landmarks_t& message);
+  void OnCorrection(const Correction& correction);
+  void OnLandmarks(const MapLandmarks& landmarks);
   void FollowMaps(const VioOutput& output);
   void Align(const VioOutput& output);
   void Handle(const VioOutput& output);

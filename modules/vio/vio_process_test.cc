@@ -14,6 +14,7 @@
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "pangea/keyframe_t.hpp"
+#include "pangea/pose_t.hpp"
 #include "vio/live_input.h"
 #include "vio/test_images.h"
 

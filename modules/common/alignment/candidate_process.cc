@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include "common/catch_up_messages.h"
 #include "common/channels.h"
 #include "common/messages.h"
@@ -17,106 +18,79 @@ constexpr char kJournalOwner[] = "agent_handler";
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                                    std::unique_ptr<PairJudge> judge)
     : node_(bus, name), kind_(kind), judge_(std::move(judge)) {
-  node_.Subscribe<keyframe_t>(
-      std::string(channels::kAllKeyframes),
-      [this](const std::string&, const keyframe_t& message) { OnKeyframe(message); });
-  node_.Subscribe<place_match_t>(
-      std::string(channels::kPlaceMatch),
-      [this](const std::string&, const place_match_t& message) { OnPlaceMatch(message); });
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&CandidateProcess::OnKeyframe, this));
+  node_.Listen<place_match_t>(channels::kPlaceMatch,
+                              std::bind_front(&CandidateProcess::OnPlaceMatch, this));
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&CandidateProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(name),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
-  node_.Subscribe<resend_request_t>(
-      std::string(channels::kResendRequest),
-      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&CandidateProcess::OnResendRequest, this));
 }
 
-void CandidateProcess::OnKeyframe(const keyframe_t& message) {
-  Parsed<Keyframe> keyframe = Parse(message);
-  if (!keyframe.value) {
-    node_.Refuse(keyframe.refused);
-    return;
-  }
-  keyframes_.Note(keyframe.value->id.map, keyframe.value->id.seq);
-  judge_->Add(std::move(*keyframe.value));
+void CandidateProcess::OnKeyframe(Keyframe keyframe) {
+  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
+  judge_->Add(std::move(keyframe));
   JudgeReady();
 }
 
-void CandidateProcess::OnPlaceMatch(const place_match_t& message) {
-  const Parsed<PlaceMatch> match = Parse(message);
-  if (!match.value) {
-    node_.Refuse(match.refused);
-    return;
-  }
-  if (waiting_.size() + match.value->candidates.size() > kMaxWaiting) {
+void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
+  if (waiting_.size() + match.candidates.size() > kMaxWaiting) {
     node_.Refuse("too many candidates wait for keyframes");
     return;
   }
-  matches_.Note(match.value->query.map, match.value->query.seq);
-  for (const PlaceCandidate& candidate : match.value->candidates) {
+  matches_.Note(match.query.map, match.query.seq);
+  for (const PlaceCandidate& candidate : match.candidates) {
     Constraint constraint;
     constraint.from = candidate.match;
-    constraint.to = match.value->query;
+    constraint.to = match.query;
     constraint.kind = candidate.kind;
     if (candidate.kind == kind_ && !judged_.contains(constraint.Id())) {
-      waiting_.emplace(std::make_pair(match.value->query, candidate.match), candidate);
+      waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }
   JudgeReady();
 }
 
-void CandidateProcess::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+void CandidateProcess::OnHave(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
     // Verdicts of a former run: no need to repeat them.
     if (verdicts_asked_.insert(map).second) {
-      AskAgain(node_, std::string(channels::kConstraint), {map, 0, highest_seq});
+      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
     }
-    keyframes_.Announce(map, highest_seq);
-    matches_.Announce(map, highest_seq);
   }
-  for (const SeqGap& gap : have.value->gaps) {
+  keyframes_.Announce(have);
+  matches_.Announce(have);
+  for (const SeqGap& gap : have.gaps) {
     judge_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
-    keyframes_.Skip(gap);
-    matches_.Skip(gap);
   }
-  if (!have.value->gaps.empty()) {
+  if (!have.gaps.empty()) {
     JudgeReady();
   }
 }
 
 void CandidateProcess::OnAgain(const again_t& message) {
   const bool known =
-      TakeAgain<keyframe_t>(message, [this](const keyframe_t& m) { OnKeyframe(m); }) ||
-      TakeAgain<place_match_t>(message, [this](const place_match_t& m) { OnPlaceMatch(m); }) ||
-      TakeAgain<constraint_t>(message, [this](const constraint_t& m) { judged_.insert(m.id); });
+      TakeAgain<keyframe_t>(node_, message, std::bind_front(&CandidateProcess::OnKeyframe, this)) ||
+      TakeAgain<place_match_t>(node_, message,
+                               std::bind_front(&CandidateProcess::OnPlaceMatch, this)) ||
+      TakeAgain<constraint_t>(node_, message,
+                              [this](const Constraint& verdict) { judged_.insert(verdict.Id()); });
   if (!known) {
     node_.Refuse("again: neither keyframe, match nor constraint");
   }
 }
 
-void CandidateProcess::OnResendRequest(const resend_request_t& message) {
-  const Parsed<MapId> map = Parse(message.map);
-  if (message.channel != channels::kConstraint || message.requester != kJournalOwner ||
-      !map.value) {
+void CandidateProcess::OnResendRequest(const ResendRequest& request) {
+  if (request.channel != channels::kConstraint || request.requester != kJournalOwner) {
     return;
   }
+  const auto& [map, from_seq, to_seq] = request.range;
   for (const Constraint& constraint : sent_) {
-    if (constraint.to.map == *map.value && constraint.to.seq >= message.from_seq &&
-        constraint.to.seq <= message.to_seq) {
-      const constraint_t verdict = ToMessage(constraint);
-      again_t again{};
-      again.channel = channels::kConstraint;
-      again.data.resize(static_cast<size_t>(verdict.getEncodedSize()));
-      again.num_bytes = static_cast<int32_t>(again.data.size());
-      verdict.encode(again.data.data(), 0, again.num_bytes);
-      node_.Publish(channels::Again(message.requester), again);
+    if (constraint.to.map == map && constraint.to.seq >= from_seq && constraint.to.seq <= to_seq) {
+      TellAgain(node_, request.requester, request.channel, ToMessage(constraint));
     }
   }
 }

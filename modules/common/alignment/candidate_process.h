@@ -23,11 +23,8 @@
 #include "common/bus/missing.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
+#include "common/catch_up_messages.h"
 #include "pangea/again_t.hpp"
-#include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
-#include "pangea/place_match_t.hpp"
-#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 
@@ -41,11 +38,11 @@ class CandidateProcess : public Process {
   static constexpr size_t kMaxWaiting = 2000;
   static constexpr size_t kMaxSent = 5000;
 
-  void OnKeyframe(const keyframe_t& message);
-  void OnPlaceMatch(const place_match_t& message);
-  void OnHave(const have_t& message);
+  void OnKeyframe(Keyframe keyframe);
+  void OnPlaceMatch(const PlaceMatch& match);
+  void OnHave(const Have& have);
   void OnAgain(const again_t& message);
-  void OnResendRequest(const resend_request_t& message);
+  void OnResendRequest(const ResendRequest& request);
   void JudgeReady();
 
   Node node_;

@@ -145,7 +145,7 @@ TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
   const MapId map{1, 100};
   MissingMessages missing;
   missing.Note(map, 0);
-  missing.Announce(map, 99);
+  missing.Announce(Have{{{map, 99}}, {}});
   EXPECT_TRUE(missing.Due(0).empty());  // it may be under way
   const auto due = missing.Due(kSecond);
   ASSERT_EQ(due.size(), 1u);
@@ -153,7 +153,7 @@ TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
   EXPECT_EQ(due[0].to_seq, 50);  // not all at once
   EXPECT_TRUE(missing.Due(2 * kSecond).empty());
   EXPECT_EQ(missing.Due(3 * kSecond).size(), 1u);
-  missing.Skip({map, 1, 98});
+  missing.Announce(Have{{}, {{map, 1, 98}}});
   missing.Note(map, 99);
   missing.Due(4 * kSecond);
   EXPECT_TRUE(missing.Due(9 * kSecond).empty());

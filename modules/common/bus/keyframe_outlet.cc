@@ -1,6 +1,7 @@
 #include "common/bus/keyframe_outlet.h"
 
 #include <algorithm>
+#include <functional>
 #include <string>
 
 #include "common/catch_up_messages.h"
@@ -11,11 +12,9 @@
 namespace pangea {
 KeyframeOutlet::KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime)
     : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_heard_utime_(now_utime) {
-  node_.Subscribe<have_t>(std::string(channels::kHave),
-                          [this](const std::string&, const have_t& message) { OnHave(message); });
-  node_.Subscribe<resend_request_t>(
-      std::string(channels::kResendRequest),
-      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&KeyframeOutlet::OnHave, this));
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&KeyframeOutlet::OnResendRequest, this));
 }
 
 void KeyframeOutlet::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
@@ -45,15 +44,10 @@ int64_t KeyframeOutlet::Unacknowledged() const {
   return count;
 }
 
-void KeyframeOutlet::OnHave(const have_t& message) {
-  const Parsed<Have> have = Parse(message);
-  if (!have.value) {
-    node_.Refuse(have.refused);
-    return;
-  }
+void KeyframeOutlet::OnHave(const Have& have) {
   uplink_heard_ = true;
   uplink_ever_heard_ = true;
-  for (const auto& [map, highest_seq] : have.value->highest_seq) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
     if (map.agent_id == agent_id_) {
       int32_t& acknowledged = acknowledged_[map];
       acknowledged = std::max(acknowledged, highest_seq + 1);
@@ -61,16 +55,11 @@ void KeyframeOutlet::OnHave(const have_t& message) {
   }
 }
 
-void KeyframeOutlet::OnResendRequest(const resend_request_t& message) {
-  if (message.channel != channels::Keyframe(agent_id_)) {
+void KeyframeOutlet::OnResendRequest(const ResendRequest& request) {
+  if (request.channel != channels::Keyframe(agent_id_)) {
     return;
   }
-  const Parsed<ResendRequest> request = Parse(message);
-  if (!request.value) {
-    node_.Refuse(request.refused);
-    return;
-  }
-  const SeqGap& range = request.value->range;
+  const SeqGap& range = request.range;
   int answers = 0;
   for (const KeptKeyframe& keyframe : kept_) {
     if (keyframe.id.map != range.map || keyframe.id.seq < range.from_seq ||
@@ -81,10 +70,10 @@ void KeyframeOutlet::OnResendRequest(const resend_request_t& message) {
       break;
     }
     again_t again{};
-    again.channel = message.channel;
+    again.channel = request.channel;
     again.data = keyframe.bytes;
     again.num_bytes = static_cast<int32_t>(again.data.size());
-    node_.Publish(channels::Again(message.requester), again);
+    node_.Publish(channels::Again(request.requester), again);
     node_.Count("resent");
   }
 }

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "common/bus/node.h"
+#include "common/catch_up_messages.h"
 #include "common/ids.h"
-#include "pangea/have_t.hpp"
-#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 
@@ -41,8 +40,8 @@ class KeyframeOutlet {
     std::vector<uint8_t> bytes;
   };
 
-  void OnHave(const have_t& message);
-  void OnResendRequest(const resend_request_t& message);
+  void OnHave(const Have& have);
+  void OnResendRequest(const ResendRequest& request);
 
   Node& node_;
   const int32_t agent_id_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/channels.h"
 #include "common/messages.h"
 #include "pangea/resend_request_t.hpp"
 
@@ -12,6 +11,7 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 // One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
 constexpr int32_t kMaxAsked = 50;
+constexpr int32_t kMaxSmallAsked = 500;
 
 }  // namespace
 
@@ -26,8 +26,23 @@ void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
   node.NoteResendAsked();
 }
 
+void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq) {
+  for (int32_t seq = 0; seq <= highest_seq; seq += kMaxSmallAsked) {
+    AskAgain(node, channel, {map, seq, seq + kMaxSmallAsked - 1});
+  }
+}
+
 void AskForState(Node& node, const MapId& map) {
   AskAgain(node, std::string(channels::kMapState), {map, 0, 0});
+}
+
+void MissingMessages::Announce(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
+    stream_.Announce(map, highest_seq);
+  }
+  for (const SeqGap& gap : have.gaps) {
+    stream_.Skip(gap);
+  }
 }
 
 std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {

@@ -10,20 +10,38 @@
 
 #include "common/bus/in_order.h"
 #include "common/bus/node.h"
+#include "common/catch_up_messages.h"
+#include "common/channels.h"
 #include "pangea/again_t.hpp"
 
 namespace pangea {
 
 // RESEND_REQUEST for the gap's messages of a channel; the answers come on AGAIN_<node's name>.
 void AskAgain(Node& node, const std::string& channel, const SeqGap& gap);
-// Gives an answer to `handler` if it holds such a message (LCM's fingerprint tells); whether it
-// does.
+// The same for all the messages from a map's first keyframe to its `highest_seq`th, in several
+// requests; for small messages.
+void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq);
+
+// The answer to such a request.
+template <typename Message>
+void TellAgain(Node& node, const std::string& requester, const std::string& channel,
+               const Message& message) {
+  again_t again{};
+  again.channel = channel;
+  again.data.resize(static_cast<size_t>(message.getEncodedSize()));
+  again.num_bytes = static_cast<int32_t>(again.data.size());
+  message.encode(again.data.data(), 0, again.num_bytes);
+  node.Publish(channels::Again(requester), again);
+}
+
+// Gives what an answer holds to `handler`, as Node::Listen would, if it is such a message (LCM's
+// fingerprint tells); whether it is.
 template <typename Message, typename Handler>
-bool TakeAgain(const again_t& again, Handler handler) {
+bool TakeAgain(Node& node, const again_t& again, const Handler& handler) {
   Message message{};
   const bool is_one = DecodeMessage(Bytes(again.data.data(), again.data.size()), &message);
   if (is_one) {
-    handler(message);
+    node.Take(message, handler);
   }
   return is_one;
 }
@@ -34,10 +52,8 @@ void AskForState(Node& node, const MapId& map);
 class MissingMessages {
  public:
   void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
-  // Somebody says this much exists (HAVE).
-  void Announce(const MapId& map, int32_t highest_seq) { stream_.Announce(map, highest_seq); }
-  // Nobody has these any more (the gaps in HAVE).
-  void Skip(const SeqGap& gap) { stream_.Skip(gap); }
+  // What exists, and what nobody has any more.
+  void Announce(const Have& have);
   // Up to the map's `highest_seq`.
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;

@@ -8,6 +8,9 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 
 #include "common/bus/bus.h"
 #include "pangea/status_t.hpp"
@@ -34,6 +37,29 @@ class Node {
                        Refuse(std::string(Message::getTypeName()) + " does not decode");
                      }
                    });
+  }
+
+  // handler(value) or handler(value, message), with what messages.h' Parse makes of it. What it
+  // refuses is counted and dropped.
+  template <typename Message, typename Handler>
+  void Listen(std::string_view channel_regex, Handler handler) {
+    Subscribe<Message>(std::string(channel_regex),
+                       [this, handler = std::move(handler)](
+                           const std::string&, const Message& message) { Take(message, handler); });
+  }
+
+  // The same, of a message at hand.
+  template <typename Message, typename Handler>
+  void Take(const Message& message, const Handler& handler) {
+    auto parsed = Parse(message);
+    if (!parsed.value) {
+      Refuse(parsed.refused);
+    } else if constexpr (std::is_invocable_v<Handler, decltype(*std::move(parsed.value)),
+                                             const Message&>) {
+      handler(*std::move(parsed.value), message);
+    } else {
+      handler(*std::move(parsed.value));
+    }
   }
 
   // handler(channel, bytes), for several types at once.
