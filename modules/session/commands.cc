@@ -2,11 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <limits>
+#include <map>
 #include <memory>
 #include <stdexcept>
 
+#include "session/explain.h"
+#include "session/log_diff.h"
 #include "session/replay.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
@@ -118,7 +123,44 @@ Remembered KnownOf(const LogArguments& arguments) {
   return known;
 }
 
-int RunReplay(const LogArguments& arguments) {
+struct ReplayArguments : LogArguments {
+  double until_s = std::numeric_limits<double>::infinity();
+  std::vector<std::string> only;
+  std::string diff;
+  std::optional<int64_t> explain;
+};
+
+int TellDiff(const std::string& a, const std::string& b, double until_s) {
+  const LogDiff diff = DiffLogs(a, b, until_s);
+  std::cout << fmt::format("first: {}, second: {}\n\n{}", a, b, ToText(diff)) << std::flush;
+  return diff.First() == nullptr ? 0 : kMissed;
+}
+
+// Some processes alone, and where what they say now parts from what they said.
+int RunReplayOnly(const ReplayArguments& arguments) {
+  if (arguments.logs.size() != 1) {
+    throw std::runtime_error("--only: takes one log, in which the other processes' words are");
+  }
+  const std::string log = fs::path(arguments.out) / "session.lcm";
+  PrepareOut(arguments.out);
+  ReplayOnly({arguments.only.begin(), arguments.only.end()}, arguments.logs.front(),
+             arguments.until_s, log);
+  return TellDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
+                  arguments.until_s);
+}
+
+void ExplainInto(const fs::path& out, int64_t constraint, const Remembered& known) {
+  const Explanation explanation = Explain(out / "session.lcm", constraint);
+  std::map<int32_t, std::string> recordings;
+  for (const AgentRun& agent : known.agents) {
+    recordings.emplace(agent.id, agent.recording);
+  }
+  const fs::path picture = out / fmt::format("constraint_{}.png", constraint);
+  WriteExplanationPng(explanation, recordings, picture);
+  std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
+}
+
+int RunReplay(const ReplayArguments& arguments) {
   const fs::path out(arguments.out);
   for (const std::string& log : arguments.logs) {
     if (fs::exists(out) && fs::equivalent(fs::absolute(log).parent_path(), out)) {
@@ -126,13 +168,24 @@ int RunReplay(const LogArguments& arguments) {
           "--out {}: holds the log that is to be replayed; give another folder", arguments.out));
     }
   }
+  if (!arguments.only.empty()) {
+    return RunReplayOnly(arguments);
+  }
   const Remembered known = KnownOf(arguments);
   PrepareOut(out);
-  const ReplaySummary summary =
-      Replay({arguments.logs.begin(), arguments.logs.end()}, out / "session.lcm");
+  const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()},
+                                       arguments.until_s, out / "session.lcm");
   std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                            summary.agent_ids.size());
-  return Tell(ReportLog(out / "session.lcm", known, out));
+  int exit_code = Tell(ReportLog(out / "session.lcm", known, out));
+  if (arguments.explain) {
+    ExplainInto(out, *arguments.explain, known);
+  }
+  if (!arguments.diff.empty()) {
+    exit_code =
+        std::max(exit_code, TellDiff(arguments.diff, out / "session.lcm", arguments.until_s));
+  }
+  return exit_code;
 }
 
 int RunReport(const LogArguments& arguments) {
@@ -207,7 +260,7 @@ void AddListCommand(CLI::App& app) {
 }
 
 void AddReplayCommand(CLI::App& app, int* exit_code) {
-  auto arguments = std::make_shared<LogArguments>();
+  auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* replay = app.add_subcommand(
       "replay", "Run the server over the keyframes of captured logs, deterministically");
   replay
@@ -218,6 +271,25 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
       ->required()
       ->check(CLI::ExistingFile);
   AddResultOptions(*replay, arguments.get());
+  replay
+      ->add_option("--until", arguments->until_s,
+                   "Only the first so many seconds of the log (default: all of it)")
+      ->check(CLI::PositiveNumber);
+  replay
+      ->add_option("--only", arguments->only,
+                   "These processes alone (a,b,...), fed with what the others said in the log, and "
+                   "where their words part from those in the log; no report")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kReplayed), std::end(kReplayed))));
+  replay
+      ->add_option("--diff", arguments->diff,
+                   "Another log: where the replay parts from it (exit code 2 when it does)")
+      ->check(CLI::ExistingFile);
+  replay->add_option(
+      "--explain", arguments->explain,
+      "A constraint's id: why it was accepted or refused, as text, and as a picture in "
+      "the folder");
   replay->callback([arguments, exit_code] { *exit_code = RunReplay(*arguments); });
 }
 

@@ -1,15 +1,18 @@
 #include "session/log_edit.h"
-#include "common/bus/log_reader.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <deque>
 #include <filesystem>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <regex>
 #include <stdexcept>
+
+#include "common/bus/log_reader.h"
+#include "session/message_fields.h"
 
 namespace pangea::session {
 namespace {
@@ -58,6 +61,51 @@ std::regex Expression(const std::string& text) {
   }
 }
 
+// handler(event, seconds since the log's first event).
+template <typename Handler>
+void ReadCut(const std::string& log, const LogCut& cut, Handler handler) {
+  const std::regex channels = Expression(cut.channels);
+  std::optional<int64_t> first;
+  ReadLog(log, [&](const LogEvent& event) {
+    first = first.value_or(event.utime);
+    // Capture times may step back by a little, before the first one too.
+    const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
+    if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
+      handler(event, seconds);
+    }
+  });
+}
+
+// "a.b[12].c[3]" has the item 12 of an array.
+bool IsFarInArray(const std::string& path) {
+  constexpr int kShown = 8;
+  for (size_t open = path.find('['); open != std::string::npos; open = path.find('[', open + 1)) {
+    if (std::atoi(path.c_str() + open + 1) >= kShown) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void ListFields(Bytes data, std::ostream& out) {
+  const auto message = DecodeFields(data);
+  if (!message) {
+    out << "            does not decode\n";
+    return;
+  }
+  size_t hidden = 0;
+  for (const MessageField& field : message->fields) {
+    if (IsFarInArray(field.path)) {
+      ++hidden;
+    } else {
+      out << fmt::format("            {} = {}\n", field.path, field.value);
+    }
+  }
+  if (hidden > 0) {
+    out << fmt::format("            and {} further items of arrays\n", hidden);
+  }
+}
+
 // The place of an event in its log.
 struct Place {
   int64_t utime = 0;
@@ -67,17 +115,22 @@ struct Place {
 
 }  // namespace
 
-int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out) {
-  const std::regex channels = Expression(cut.channels);
-  LogWriter writer(out);
-  std::optional<int64_t> first;
-  ReadLog(log, [&](const LogEvent& event) {
-    first = first.value_or(event.utime);
-    // Capture times may step back by a little, before the first one too.
-    const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
-    if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
-      writer.Write(event.utime, event.channel, event.data);
+void ListEvents(const std::string& log, const LogCut& cut, bool fields, std::ostream& out) {
+  ReadCut(log, cut, [&](const LogEvent& event, double seconds) {
+    const auto type = TypeOf(event.data);
+    out << fmt::format("{:>10.6f}  {}  {}  {} bytes\n", seconds, event.channel,
+                       type.value_or("of no type of ours"), event.data.size());
+    if (fields) {
+      ListFields(event.data, out);
     }
+  });
+}
+
+int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out) {
+  Expression(cut.channels);  // before a file is made
+  LogWriter writer(out);
+  ReadCut(log, cut, [&writer](const LogEvent& event, double) {
+    writer.Write(event.utime, event.channel, event.data);
   });
   return writer.count();
 }

@@ -1,9 +1,11 @@
 #pragma once
 
-// LCM logs cut and put together. The logs made are ordinary ones; events keep their capture time.
+// LCM logs listed, cut and put together. The logs made are ordinary ones; events keep their capture
+// time.
 
 #include <cstdint>
 #include <limits>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,10 @@ struct LogCut {
   double to_s = std::numeric_limits<double>::infinity();
   std::string channels = ".*";  // regular expression for the whole name
 };
+
+// The events of a cut, one a line: when, seconds since the log's first; channel, type, bytes. With
+// `fields`, below it each field of the message, of arrays the first eight items.
+void ListEvents(const std::string& log, const LogCut& cut, bool fields, std::ostream& out);
 
 // Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
 // read, an output that exists or cannot be written, and an expression that is none.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "session/explain.h"
+#include "session/log_diff.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
 #include "session/log_info.h"
@@ -22,6 +23,8 @@ struct Arguments {
   std::string out, tum, g2o, ply;
   std::optional<int64_t> constraint;
   std::vector<std::string> recordings;  // ID=DIR
+  bool fields = false;
+  int exit_code = 0;
 };
 
 void Write(const std::string& file, const std::string& text) {
@@ -97,6 +100,16 @@ CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Argument
   return command;
 }
 
+void AddCutOptions(CLI::App& command, Arguments* arguments) {
+  command.add_option("--from", arguments->cut.from_s, "Seconds since the first event")
+      ->capture_default_str();
+  command.add_option("--to", arguments->cut.to_s,
+                     "Seconds since the first event (default: the end)");
+  command
+      .add_option("--channels", arguments->cut.channels, "Regular expression for the whole name")
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void AddCommands(CLI::App& app, Arguments* arguments) {
@@ -105,18 +118,31 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
         const std::string& log = arguments->logs.front();
         std::cout << ToText(Summarise(log), log);
       });
+  CLI::App* list = AddCommand(app, "list", "The messages of a log, one a line", arguments, 1);
+  AddCutOptions(*list, arguments);
+  list->add_flag("--fields", arguments->fields, "Every field, of arrays the first eight items");
+  list->callback([arguments] {
+    ListEvents(arguments->logs.front(), arguments->cut, arguments->fields, std::cout);
+  });
+  CLI::App* diff =
+      AddCommand(app, "diff",
+                 "Where two runs part: the first message of each channel that differs, "
+                 "and its field; exit code 2 when one does",
+                 arguments, 2);
+  diff->callback([arguments] {
+    const LogDiff differences = DiffLogs(arguments->logs[0], arguments->logs[1]);
+    std::cout << ToText(differences);
+    arguments->exit_code = differences.First() == nullptr ? 0 : 2;
+  });
   CLI::App* cut = AddCommand(app, "cut", "A part of a log: a time, some channels", arguments, 1);
-  cut->add_option("--from", arguments->cut.from_s, "Seconds since the first event")
-      ->capture_default_str();
-  cut->add_option("--to", arguments->cut.to_s, "Seconds since the first event (default: the end)");
-  cut->add_option("--channels", arguments->cut.channels, "Regular expression for the whole name")
-      ->capture_default_str();
+  AddCutOptions(*cut, arguments);
   cut->add_option("--out", arguments->out, "The new log")->required();
   cut->callback([arguments] {
     std::cout << fmt::format("{}: {} events\n", arguments->out,
                              CutLog(arguments->logs.front(), arguments->cut, arguments->out));
   });
   CLI::App* cat = AddCommand(app, "cat", "Several logs in one, by time of capture", arguments, -1);
+  cat->alias("merge");
   cat->add_option("--out", arguments->out, "The new log")->required();
   cat->callback([arguments] {
     std::cout << fmt::format("{}: {} events\n", arguments->out,
@@ -159,5 +185,5 @@ int main(int argc, char** argv) {
     std::cerr << fmt::format("pangea-log: {}\n", error.what());
     return 1;
   }
-  return 0;
+  return arguments.exit_code;
 }

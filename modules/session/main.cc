@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when an expectation of the session file "
-      "was missed; above 100 for a wrong command line.");
+      "was missed or logs differ; above 100 for a wrong command line.");
   int exit_code = 0;
   pangea::session::AddRunCommand(app, &exit_code);
   pangea::session::AddListCommand(app);

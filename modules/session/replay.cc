@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <lcm/lcm-cpp.hpp>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "common/bus/bus.h"
+#include "common/bus/log_reader.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -18,11 +20,13 @@
 namespace pangea::session {
 namespace {
 
+namespace fs = std::filesystem;
+
 // Everything said on the bus, into an LCM log. Time stamps are those of the logs replayed, never
 // the clock's.
 class Recorder {
  public:
-  Recorder(Bus& bus, const std::filesystem::path& log) : file_(log.string(), "w") {
+  Recorder(Bus& bus, const fs::path& log) : file_(log.string(), "w") {
     if (!file_.good()) {
       throw std::runtime_error(fmt::format("cannot write {}", log.string()));
     }
@@ -48,27 +52,123 @@ class Recorder {
   int64_t utime_ = 0;
 };
 
+// The server's processes, or some of them.
+class Server {
+ public:
+  Server(LocalBus& bus, const std::set<std::string>& processes) : bus_(bus) {
+    const auto wanted = [&processes](const char* process) { return processes.contains(process); };
+    if (wanted("place_recognition")) {
+      place_recognition_.emplace(bus, PlaceRecognitionOptions{});
+    }
+    if (wanted("inter_map_ba")) {
+      inter_map_ba_.emplace(bus, InterMapBaOptions{});
+    }
+    if (wanted("fusion")) {
+      fusion_.emplace(bus, FusionOptions{});
+    }
+    if (wanted("posegraph")) {
+      posegraph_.emplace(bus, PoseGraphOptions{});
+    }
+    if (wanted("global_ba")) {
+      global_ba_.emplace(bus, GlobalBaOptions{});
+    }
+  }
+
+  // What waits for a quiet bus when live.
+  void Finish() {
+    if (posegraph_) {
+      posegraph_->Finish();
+      bus_.Drain();
+    }
+    if (global_ba_) {
+      global_ba_->Finish();
+      bus_.Drain();
+    }
+  }
+
+ private:
+  LocalBus& bus_;
+  std::optional<PlaceRecognitionProcess> place_recognition_;
+  std::optional<InterMapBaProcess> inter_map_ba_;
+  std::optional<FusionProcess> fusion_;
+  std::optional<PoseGraphProcess> posegraph_;
+  std::optional<GlobalBaProcess> global_ba_;
+};
+
+void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
+  std::erase_if(*keyframes, [until_s](const LoggedKeyframe& keyframe) {
+    return 1e-6 * static_cast<double>(keyframe.elapsed_us) > until_s;
+  });
+  if (keyframes->empty()) {
+    throw std::runtime_error(fmt::format("--until {:g}: no keyframe had come by then", until_s));
+  }
+}
+
+// A message of a log that is replayed for some processes.
+struct LoggedWord {
+  int64_t utime = 0;
+  std::string channel;
+  std::vector<uint8_t> data;
+  bool own = false;  // one of them said it
+};
+
+bool IsNews(const std::string& channel) {
+  return channel.starts_with("KEYFRAME_") || channel == "PLACE_MATCH" || channel == "CONSTRAINT";
+}
+
+// Who says so; empty for agents.
+std::string Speaker(const LogEvent& event) {
+  if (event.channel == "PLACE_MATCH") {
+    return "place_recognition";
+  }
+  if (event.channel == "MAP_STATE" || event.channel.starts_with("CORRECTION_")) {
+    return "posegraph";
+  }
+  if (event.channel == "REFINEMENT") {
+    return "global_ba";
+  }
+  constraint_t message{};
+  if (event.channel == "CONSTRAINT" && DecodeMessage(event.data, &message)) {
+    return message.kind == place_candidate_t::KIND_INTRA ? "inter_map_ba" : "fusion";
+  }
+  return "";
+}
+
+// What says something of the map; not who has what and asks for what again.
+std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const fs::path& log,
+                                  double until_s) {
+  std::vector<LoggedWord> words;
+  std::optional<int64_t> begin;
+  ReadLog(log.string(), [&](const LogEvent& event) {
+    begin = begin.value_or(event.utime);
+    const std::string speaker = Speaker(event);
+    const bool counts = !speaker.empty() || event.channel.starts_with("KEYFRAME_");
+    if (counts && 1e-6 * static_cast<double>(event.utime - *begin) <= until_s) {
+      words.push_back({event.utime,
+                       event.channel,
+                       {event.data.begin(), event.data.end()},
+                       processes.contains(speaker)});
+    }
+  });
+  return words;
+}
+
 }  // namespace
 
-ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
-                     const std::filesystem::path& out_log) {
-  std::vector<std::vector<LoggedKeyframe>> keyframes;
-  for (const std::filesystem::path& log : logs) {
-    keyframes.push_back(ReadKeyframeLog(log));
+ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log) {
+  std::vector<std::vector<LoggedKeyframe>> by_log;
+  for (const fs::path& log : logs) {
+    by_log.push_back(ReadKeyframeLog(log));
   }
+  std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
+  const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
+  DropLater(until_s, &keyframes);
 
   LocalBus bus;
   Recorder recorder(bus, out_log);
-  PlaceRecognitionProcess place_recognition(bus, PlaceRecognitionOptions{});
-  InterMapBaProcess inter_map_ba(bus, InterMapBaOptions{});
-  FusionProcess fusion(bus, FusionOptions{});
-  PoseGraphProcess posegraph(bus, PoseGraphOptions{});
-  GlobalBaProcess global_ba(bus, GlobalBaOptions{});
-
-  const LoggedKeyframe& first = keyframes.front().front();
-  const int64_t begin_utime = first.captured_utime - first.elapsed_us;
+  Server server(bus, {std::begin(kReplayed), std::end(kReplayed)});
   ReplaySummary summary;
-  for (const LoggedKeyframe& keyframe : Interleave(std::move(keyframes))) {
+  for (const LoggedKeyframe& keyframe : keyframes) {
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
     bus.Drain();
@@ -79,11 +179,37 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
       summary.agent_ids.push_back(agent_id);
     }
   }
-  posegraph.Finish();
-  bus.Drain();
-  global_ba.Finish();
-  bus.Drain();
+  server.Finish();
   return summary;
+}
+
+void ReplayOnly(const std::set<std::string>& processes, const fs::path& log, double until_s,
+                const fs::path& out_log) {
+  ReadKeyframeLog(log);  // throws if keyframes are missing
+  const std::vector<LoggedWord> words = ReadWords(processes, log, until_s);
+  size_t after_news = words.size();
+  while (after_news > 0 && (!IsNews(words[after_news - 1].channel) || words[after_news - 1].own)) {
+    --after_news;
+  }
+
+  LocalBus bus;
+  Recorder recorder(bus, out_log);
+  Server server(bus, processes);
+  bool finished = false;
+  for (size_t i = 0; i < words.size(); ++i) {
+    recorder.SetTime(words[i].utime);
+    if (!words[i].own) {
+      bus.Publish(words[i].channel, words[i].data);
+      bus.Drain();
+    } else if (i >= after_news && !finished) {
+      // There is no news any more, and yet one of them spoke: it took the time for what waits.
+      server.Finish();
+      finished = true;
+    }
+  }
+  if (!finished) {
+    server.Finish();
+  }
 }
 
 }  // namespace pangea::session

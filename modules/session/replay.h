@@ -1,10 +1,11 @@
 #pragma once
 
-// Deterministic replay: the server's modules in one process, on one thread, over the KEYFRAME_* of
-// captured logs, in log order, each handled to completion. Same binary, same logs: the same bytes.
+// Deterministic replay: the server's modules in one process, on one thread, over captured logs, in
+// log order, each message handled to completion. Same binary, same logs: the same bytes.
 
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,22 @@ struct ReplaySummary {
 
 // Reads the keyframes of `logs` and writes everything the server says about them, with them, to
 // `out_log` (an LCM log like a session's). Several logs are interleaved by the time since each
-// one's first keyframe, as if they had started together; the first log's map is the oldest. Throws
-// std::runtime_error for a log that cannot be read, has no keyframes, or has gaps (named).
-ReplaySummary Replay(const std::vector<std::filesystem::path>& logs,
+// one's first keyframe, as if they had started together; the first log's map is the oldest.
+// `until_s`: only keyframes of so many seconds, since the log's first event, or since the first
+// keyframes of several. Throws std::runtime_error for a log that cannot be read, has no keyframes,
+// or has gaps (named).
+ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, double until_s,
                      const std::filesystem::path& out_log);
+
+inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
+                                            "posegraph", "global_ba"};
+
+// Some of these processes alone, fed with what the others said in the log in its order: keyframes,
+// matches, verdicts, states. Writes that and their own words, which stand in the log where they
+// said them now. A log of a replay gives the same words again. In a live session some of them
+// depend on what came while the process was busy: there, matches and states may differ for no fault
+// of anyone's.
+void ReplayOnly(const std::set<std::string>& processes, const std::filesystem::path& log,
+                double until_s, const std::filesystem::path& out_log);
 
 }  // namespace pangea::session

@@ -1,0 +1,101 @@
+#include "session/log_diff.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <lcm/lcm-cpp.hpp>
+
+#include "pangea/correction_t.hpp"
+#include "pangea/status_t.hpp"
+
+namespace pangea::session {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class LogDiffTest : public testing::Test {
+ protected:
+  // Corrections of agent 1 with these revisions, one a second.
+  std::string Log(const std::string& name, const std::vector<int64_t>& revisions) {
+    std::string path = testing::TempDir() + "log_diff_" + name + "_" +
+                       testing::UnitTest::GetInstance()->current_test_info()->name() + ".lcm";
+    std::filesystem::remove(path);
+    lcm::LogFile file(path, "w");
+    int64_t utime = 1'000'000 * (1 + std::ssize(revisions));  // logs need not begin together
+    status_t status{};
+    status.utime = utime;
+    Write(&file, "STATUS_posegraph", utime, status);
+    for (const int64_t revision : revisions) {
+      correction_t correction{};
+      correction.revision = revision;
+      correction.covariance[7] = 0.5 * static_cast<double>(revision);
+      Write(&file, "CORRECTION_1", utime += 1'000'000, correction);
+      Write(&file, "CORRECTION_2", utime, correction_t{});
+    }
+    return path;
+  }
+
+ private:
+  template <typename Message>
+  static void Write(lcm::LogFile* file, const std::string& channel, int64_t utime,
+                    const Message& message) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    lcm::LogEvent event{};
+    event.timestamp = utime;
+    event.channel = channel;
+    event.data = bytes.data();
+    event.datalen = static_cast<int32_t>(bytes.size());
+    ASSERT_EQ(file->writeEvent(&event), 0);
+  }
+};
+
+TEST_F(LogDiffTest, TheSameMessagesAtOtherTimesAreTheSame) {
+  const LogDiff diff = DiffLogs(Log("a", {1, 2, 3}), Log("b", {1, 2, 3}));
+  EXPECT_EQ(diff.First(), nullptr);
+  ASSERT_EQ(diff.channels.size(), 2u);  // nobody's status
+  EXPECT_EQ(diff.channels[0].count_a, 3);
+  EXPECT_THAT(ToText(diff), HasSubstr("no message differs"));
+}
+
+TEST_F(LogDiffTest, NamesTheFirstFieldOfTheFirstMessage) {
+  const LogDiff diff = DiffLogs(Log("a", {1, 2, 3, 4}), Log("b", {1, 2, 5, 6}));
+  ASSERT_NE(diff.First(), nullptr);
+  EXPECT_EQ(diff.First()->channel, "CORRECTION_1");
+  EXPECT_EQ(diff.First()->first, 2);
+  EXPECT_EQ(diff.First()->seconds, 3);
+  EXPECT_EQ(diff.First()->how, "revision: 3 | 5, and 1 more");
+  EXPECT_THAT(ToText(diff), AllOf(HasSubstr("CORRECTION_2        4        4        4"),
+                                  HasSubstr("part at 3.000 s, with message 2 on CORRECTION_1")));
+}
+
+TEST_F(LogDiffTest, OneThatEndsFirst) {
+  const std::string a = Log("a", {1, 2}), b = Log("b", {1, 2, 3});
+  EXPECT_EQ(DiffLogs(a, b).First()->how, "the first has no more");
+  EXPECT_EQ(DiffLogs(b, a).First()->how, "the second has no more");
+  EXPECT_EQ(DiffLogs(b, a).First()->first, 2);
+  EXPECT_EQ(DiffLogs(a, b, 2.5).First(), nullptr);
+}
+
+TEST_F(LogDiffTest, AChannelOfOneLogAloneComesLast) {
+  LogDiff diff;
+  diff.channels = {{"POSE_1", 9, 0, 0, 0.1, "the second has none"},
+                   {"MAP_STATE", 4, 5, 4, 3.5, "the first has no more"}};
+  EXPECT_EQ(diff.First()->channel, "MAP_STATE");
+  diff.channels.pop_back();
+  EXPECT_EQ(diff.First()->channel, "POSE_1");
+}
+
+TEST_F(LogDiffTest, AChannelOfOneLogAlone) {
+  const LogDiff diff = DiffLogs(Log("a", {}), Log("b", {1}));
+  ASSERT_EQ(diff.channels.size(), 2u);
+  EXPECT_EQ(diff.channels[0].count_a, 0);
+  EXPECT_EQ(diff.channels[0].first, 0);
+  EXPECT_EQ(diff.channels[0].how, "the first has none");
+  EXPECT_THROW(DiffLogs("/nonexistent.lcm", "/nonexistent.lcm"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace pangea::session
