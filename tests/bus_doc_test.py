@@ -22,8 +22,8 @@ def quoted(text):
     return re.findall(r"`([^`]+)`", text)
 
 
-# Subscribe<imu_t>(channels::Imu(... or (std::string(channels::kAllPoses)
-SUBSCRIPTION = re.compile(r"Subscribe<(\w+)>\(\s*(?:std::string\()?channels::(\w+)")
+# Listen<have_t>(channels::kHave, Subscribe<imu_t>(channels::Imu(... or (std::string(channels::kAllPoses)
+SUBSCRIPTION = re.compile(r"(?:Subscribe|Listen)<(\w+)>\(\s*(?:std::string\()?channels::(\w+)")
 
 
 def plain(name):

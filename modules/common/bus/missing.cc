@@ -28,7 +28,7 @@ void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
 
 void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq) {
   for (int32_t seq = 0; seq <= highest_seq; seq += kMaxSmallAsked) {
-    AskAgain(node, channel, {map, seq, seq + kMaxSmallAsked - 1});
+    AskAgain(node, channel, {map, seq, std::min(seq + kMaxSmallAsked - 1, highest_seq)});
   }
 }
 
