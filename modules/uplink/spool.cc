@@ -60,7 +60,7 @@ std::optional<int64_t> NumberOf(const fs::path& file) {
 }  // namespace
 
 Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
-    : folder_(std::move(folder)), channel_(channels::Keyframe(agent_id)), max_bytes_(max_bytes) {
+    : folder_(std::move(folder)), agent_id_(agent_id), max_bytes_(max_bytes) {
   std::error_code error;
   fs::create_directories(folder_, error);
   lock_ = open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -69,10 +69,7 @@ Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
         fmt::format("cannot use the spool '{}': {}", folder_.string(), std::strerror(errno)));
   }
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    close(lock_);
-    throw std::runtime_error(
-        fmt::format("the spool '{}' is in use by another process: give each uplink its own --spool",
-                    folder_.string()));
+    Refuse("is in use by another process");
   }
   std::map<int64_t, fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
@@ -90,6 +87,12 @@ Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
 Spool::~Spool() {
   CloseFile();
   close(lock_);
+}
+
+void Spool::Refuse(const std::string& reason) const {
+  close(lock_);
+  throw std::runtime_error(
+      fmt::format("the spool '{}' {}: give each uplink its own --spool", folder_.string(), reason));
 }
 
 fs::path Spool::File(int64_t segment) const {
@@ -118,6 +121,11 @@ void Spool::Load(int64_t number) {
       break;
     }
     const auto id = IdOf(begin);
+    if (id && id->map.agent_id != agent_id_) {
+      close(fd);
+      Refuse(fmt::format("holds keyframes of agent {}, this is agent {}", id->map.agent_id,
+                         agent_id_));
+    }
     if (id && places_.try_emplace(*id, Place{number, data_at, header->data_bytes}).second) {
       ++segment.kept;
     }
@@ -149,7 +157,8 @@ bool Spool::Write(const KeyframeId& id, Bytes data, int64_t utime) {
   }
   Segment& segment = segments_.at(newest_);
   std::vector<uint8_t> event;
-  const size_t begin = AppendLogEvent(next_event_, utime, channel_, data, &event);
+  const size_t begin =
+      AppendLogEvent(next_event_, utime, channels::Keyframe(agent_id_), data, &event);
   // A part that was written before the disk refused is written over by the next keyframe.
   if (!WriteFully(fd_, segment.bytes, event.data(), event.size())) {
     return false;

@@ -30,7 +30,7 @@ class Spool {
   static constexpr int64_t kLeastSegmentBytes = 1 << 20;
 
   // Creates the folder, or finds what an earlier run left. Throws std::runtime_error: cannot be
-  // used, in use by another process.
+  // used, in use by another process, another agent's.
   Spool(std::filesystem::path folder, int32_t agent_id, int64_t max_bytes);
   ~Spool();
   Spool(const Spool&) = delete;
@@ -60,6 +60,7 @@ class Spool {
     int32_t size = 0;
   };
 
+  [[noreturn]] void Refuse(const std::string& reason) const;  // in the constructor
   std::filesystem::path File(int64_t segment) const;
   void Load(int64_t segment);
   bool Write(const KeyframeId& id, Bytes data, int64_t utime);
@@ -67,7 +68,7 @@ class Spool {
   void RemoveIfRead(int64_t segment);
 
   const std::filesystem::path folder_;
-  const std::string channel_;
+  const int32_t agent_id_;
   const int64_t max_bytes_;
   int lock_ = -1;
   std::map<int64_t, Segment> segments_;

@@ -137,6 +137,17 @@ TEST_F(SpoolTest, ADiskThatRefusesHeals) {
   EXPECT_EQ(spool.Kept().size(), 2u);
 }
 
+// Its keyframes would go out under this agent's name, and never be taken.
+TEST_F(SpoolTest, AnotherAgentsIsRefusedAndStays) {
+  const MapId other{2, 1000};
+  {
+    Spool spool(folder, 2, kLarge);
+    Add(&spool, 0, other);
+  }
+  EXPECT_THROW(Spool(folder, 1, kLarge), std::runtime_error);
+  EXPECT_THAT(Spool(folder, 2, kLarge).Kept(), testing::ElementsAre(KeyframeId{other, 0}));
+}
+
 TEST_F(SpoolTest, BelongsToOneProcess) {
   const Spool spool(folder, 1, kLarge);
   EXPECT_THROW(Spool(folder, 1, kLarge), std::runtime_error);

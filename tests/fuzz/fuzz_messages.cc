@@ -99,6 +99,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       ParseAckBody,
       ParsePoseBody,
       DecompressAndParse,
+      ParseBytes<landmarks_t>,
   };
   if (size > 0) {
     targets[data[0] % std::size(targets)]({data + 1, data + size});

@@ -7,6 +7,7 @@
 #include "common/link/agent_key.h"
 #include "fuzz.h"
 #include "global_ba/global_ba_yaml.h"
+#include "map_points/map_points_yaml.h"
 #include "posegraph/posegraph_yaml.h"
 #include "session/session_file.h"
 #include "vio/vio_yaml.h"
@@ -52,6 +53,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       fuzz::ReadOptions<AlignmentOptions>,
       fuzz::ReadOptions<PoseGraphOptions>,
       fuzz::ReadOptions<GlobalBaOptions>,
+      fuzz::ReadOptions<MapPointsOptions>,
       fuzz::ReadKey,
   };
   if (size > 0) {

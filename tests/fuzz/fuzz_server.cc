@@ -4,6 +4,7 @@
 #include "fuzz.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "map_points/map_points_process.h"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"
 #include "server_channels.h"
@@ -16,11 +17,12 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   FusionProcess fusion(bus, FusionOptions{});
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
   GlobalBaProcess global_ba(bus, GlobalBaOptions{});
+  MapPointsProcess map_points(bus, MapPointsOptions{});
   int64_t now_us = 1'000'000;
   fuzz::Play({data, size}, fuzz::ServerChannels(), &bus, [&](int64_t wait_us) {
     now_us += wait_us;
-    for (Process* process : std::initializer_list<Process*>{&place_recognition, &inter_map_ba,
-                                                            &fusion, &posegraph, &global_ba}) {
+    for (Process* process : std::initializer_list<Process*>{
+             &place_recognition, &inter_map_ba, &fusion, &posegraph, &global_ba, &map_points}) {
       process->Tick(now_us);
     }
   });

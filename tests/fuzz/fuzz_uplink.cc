@@ -14,11 +14,13 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       bus.Publish("LINK_DOWN_1", opened.welcome);
     }
   });
-  bus.Subscribe("ACK", [&](const std::string&, Bytes body) {
-    if (server.HasUplink()) {
-      bus.Publish("LINK_DOWN_1", server.Seal(LinkKind::kAck, {body.begin(), body.end()}));
-    }
-  });
+  for (const LinkKind kind : {LinkKind::kAck, LinkKind::kLandmarks}) {
+    bus.Subscribe(fuzz::ChannelOfKind(kind), [&bus, &server, kind](const std::string&, Bytes body) {
+      if (server.HasUplink()) {
+        bus.Publish("LINK_DOWN_1", server.Seal(kind, {body.begin(), body.end()}));
+      }
+    });
+  }
   int64_t now_us = 1'000'000;
   const auto poll = [&](int64_t wait_us) {
     now_us += wait_us;

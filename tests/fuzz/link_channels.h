@@ -1,8 +1,8 @@
 #pragma once
 
 // What the two ends of the link listen to. What goes through the link is sealed, so that a
-// stranger's bytes end at the first check; HELLO, PIECE, ... are bodies that a harness seals with
-// the agent's key: what an agent or a server that has been taken over may send.
+// stranger's bytes end at the first check; HELLO, PIECE, LANDMARKS, ... are bodies that a harness
+// seals with the agent's key: what an agent or a server that has been taken over may send.
 
 #include <vector>
 
@@ -12,6 +12,7 @@
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/keyframe_t.hpp"
+#include "pangea/landmarks_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -35,6 +36,7 @@ inline const std::vector<Channel>& HandlerChannels() {
       ChannelOf<correction_t>("CORRECTION_1"),
       ChannelOf<resend_request_t>("RESEND_REQUEST"),
       ChannelOf<again_t>("AGAIN_agent_handler"),
+      ChannelOf<landmarks_t>("LANDMARKS_1"),
   };
   return channels;
 }
@@ -46,6 +48,7 @@ inline const std::vector<Channel>& UplinkChannels() {
       ChannelOf<keyframe_t>("KEYFRAME_1"),
       ChannelOf<pose_t>("POSE_1"),
       ChannelOf<again_t>("AGAIN_uplink_1"),
+      ChannelOf<landmarks_t>("LANDMARKS"),
   };
   return channels;
 }
@@ -60,6 +63,8 @@ inline std::string ChannelOfKind(LinkKind kind) {
       return "LAST_PIECE";
     case LinkKind::kPose:
       return "POSE";
+    case LinkKind::kLandmarks:
+      return "LANDMARKS";
     default:
       return "ACK";
   }

@@ -19,9 +19,11 @@
 #include "fuzz.h"
 #include "global_ba/global_ba_yaml.h"
 #include "link_channels.h"
+#include "map_points/map_points_yaml.h"
 #include "posegraph/posegraph_yaml.h"
 #include "sensor_channels.h"
 #include "server_channels.h"
+#include "uplink/spool.h"
 #include "uplink/uplink.h"
 #include "vio/vio_yaml.h"
 
@@ -98,12 +100,24 @@ class Corpus {
   fs::path folder_;
 };
 
+Payload Landmarks(const MapId& map) {
+  MapLandmarks landmarks{map, map, 3, {{{map, 1}, {0, 0, 1}}}, {}};
+  landmarks.landmarks.push_back({0, 7, {1, 2, 3}, 0.1, 0.01, {}});
+  return EncodeMessage(ToMessage(landmarks));
+}
+
+MapId MapOf(const Payload& keyframe_bytes) {
+  keyframe_t message{};
+  DecodeMessage(keyframe_bytes, &message);
+  return Parse(message.id).value->map;
+}
+
 // In the order of fuzz_messages.cc.
 void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
   const Payload& first = First(events, "KEYFRAME_1");
   keyframe_t keyframe{};
   DecodeMessage(first, &keyframe);
-  const MapId map = Parse(keyframe.id).value->map;
+  const MapId map = MapOf(first);
   LinkAck ack{1, 9, 100'000, {{map, 3}}, {{{map, 4}, {7}}}, {}};
   correction_t correction{};
   DecodeMessage(First(events, "CORRECTION_1"), &correction);
@@ -122,6 +136,7 @@ void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
       {"ack", Encode(ack)},
       {"pose", EncodePose(pose)},
       {"compressed", Compress(first)},
+      {"landmarks", Landmarks(map)},
   };
   for (size_t i = 0; i < seeds.size(); ++i) {
     Payload bytes{static_cast<uint8_t>(i)};
@@ -166,8 +181,16 @@ void Link(const std::vector<Captured>& events, const Corpus& corpus) {
     to(HandlerChannels(), channel, First(events, channel), &to_handler);
   }
   to(UplinkChannels(), "POSE_1", First(events, "POSE_1", 50), &to_uplink);
+  const Payload landmarks = Landmarks(MapOf(First(events, "KEYFRAME_1")));
+  to(HandlerChannels(), "LANDMARKS_1", landmarks, &to_handler);
+  to(UplinkChannels(), "LANDMARKS", landmarks, &to_uplink);
   corpus.Add("agent_handler", "link", to_handler);
   corpus.Add("uplink", "link", to_uplink);
+}
+
+std::string TextOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 void Journals(const std::vector<Captured>& events, const Corpus& corpus) {
@@ -182,10 +205,23 @@ void Journals(const std::vector<Captured>& events, const Corpus& corpus) {
     journal.Append(2, "PLACE_MATCH", First(events, "PLACE_MATCH"));
     journal.Append(3, "CONSTRAINT", First(events, "CONSTRAINT"));
   }
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  const std::string text = TextOf(file);
   corpus.AddText("journal", "whole", text);
   corpus.AddText("journal", "torn", text.substr(0, text.size() - 100));
+}
+
+void Spools(const std::vector<Captured>& events, const Corpus& corpus) {
+  const fs::path folder = ScratchFolder() / "made";
+  {
+    Spool spool(folder, 1, 1 << 20);
+    for (int seq = 0; seq < 2; ++seq) {
+      const Payload& bytes = First(events, "KEYFRAME_1", seq);
+      spool.Add({MapOf(bytes), seq}, bytes, seq);
+    }
+  }
+  const std::string text = TextOf(fs::directory_iterator(folder)->path());
+  corpus.AddText("spool", "whole", text);
+  corpus.AddText("spool", "torn", text.substr(0, text.size() - 100));
 }
 
 template <typename Options>
@@ -200,8 +236,7 @@ std::string KeyText() {
   const fs::path file = ScratchFolder() / "agent_1.key";
   fs::remove(file);
   MakeKeyFile(file, 1);
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  return TextOf(file);
 }
 
 // In the order of fuzz_options.cc.
@@ -216,11 +251,12 @@ void OptionFiles(const Corpus& corpus) {
       {"alignment", Printed<AlignmentOptions>()},
       {"posegraph", Printed<PoseGraphOptions>()},
       {"global_ba", Printed<GlobalBaOptions>()},
+      {"map_points", Printed<MapPointsOptions>()},
       {"key", KeyText()},
   };
   for (size_t i = 0; i < seeds.size(); ++i) {
     corpus.AddText("options", seeds[i].first,
-                   std::string(1, static_cast<char>('B' + static_cast<int>(i))) + seeds[i].second);
+                   std::string(1, static_cast<char>('F' + static_cast<int>(i))) + seeds[i].second);
   }
 }
 
@@ -301,6 +337,7 @@ int Make(const std::string& log, const Corpus& corpus) {
   Messages(events, corpus);
   Link(events, corpus);
   Journals(events, corpus);
+  Spools(events, corpus);
   OptionFiles(corpus);
   Recording(corpus);
   Sensors(corpus);

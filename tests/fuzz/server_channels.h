@@ -11,6 +11,7 @@
 #include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
+#include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
 
 namespace pangea::fuzz {
@@ -29,6 +30,8 @@ inline const std::vector<Channel>& ServerChannels() {
       ChannelOf<again_t>("AGAIN_place_recognition"),
       ChannelOf<again_t>("AGAIN_fusion"),
       ChannelOf<again_t>("AGAIN_global_ba"),
+      ChannelOf<again_t>("AGAIN_map_points"),
+      ChannelOf<pose_t>("POSE_1"),
   };
   return channels;
 }

@@ -1,0 +1,55 @@
+// A segment of a spool as a crash, a power cut or a stranger left it.
+
+#include <stdexcept>
+
+#include "common/messages.h"
+#include "fuzz.h"
+#include "uplink/spool.h"
+
+namespace pangea::fuzz {
+namespace {
+
+constexpr int32_t kAgent = 1;
+constexpr int64_t kMaxBytes = 1 << 20;
+
+bool IsKeyframe(const std::vector<uint8_t>& data, const KeyframeId& id) {
+  keyframe_t message{};
+  return DecodeMessage(data, &message) && Parse(message.id).value == id;
+}
+
+// All that is kept is the agent's, and what can be read is what was asked for.
+void Use(Spool* spool) {
+  for (const KeyframeId& id : spool->Kept()) {
+    Require(id.map.agent_id == kAgent, "only the agent's own keyframes");
+    const std::vector<uint8_t> data = spool->Read(id);
+    Require(data.empty() || IsKeyframe(data, id), "the keyframe that was asked for");
+  }
+}
+
+}  // namespace
+}  // namespace pangea::fuzz
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace pangea;
+  const auto folder = fuzz::ScratchFolder() / "spool";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  fuzz::WriteFile(folder / "keyframes_000001.lcm", {data, size});
+  try {
+    const KeyframeId added{{fuzz::kAgent, 1}, 0};
+    {
+      Spool spool(folder, fuzz::kAgent, fuzz::kMaxBytes);
+      fuzz::Use(&spool);
+      spool.Add(added, {data, size}, 1);
+    }
+    Spool again(folder, fuzz::kAgent, fuzz::kMaxBytes);
+    fuzz::Use(&again);
+    for (const KeyframeId& id : again.Kept()) {
+      again.Release(id.map, id.seq);
+    }
+    fuzz::Require(again.Kept().empty() && again.bytes() == 0, "what is acknowledged goes");
+  } catch (const std::runtime_error& error) {
+    fuzz::Require(*error.what() != 0, "a refusal has a reason");
+  }
+  return 0;
+}
