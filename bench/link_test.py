@@ -4,25 +4,27 @@ import json
 import struct
 import sys
 import tempfile
+import time
 import unittest
 from argparse import Namespace
 from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from link_lib.figures import LCM_SYNC, Row, decode_status, keyframes, rungs, table  # noqa: E402
-from link_lib.plan import ROWS, Agent, jobs_of, session_yaml  # noqa: E402
+from link_lib.figures import LCM_SYNC, Row, decode_status, events, keyframes, rungs, strangers, table  # noqa: E402
+from link_lib.hosts_session import Watch  # noqa: E402
+from link_lib.plan import HOST_ROWS, ROWS, Agent, jobs_of, label, session_yaml  # noqa: E402
 
 
 def text(value):
     return struct.pack(">i", len(value) + 1) + value.encode() + b"\0"
 
 
-def status(process, refused, counters):
+def status(process, refused, counters, pending=0):
     def counts(of):
         return struct.pack(">h", len(of)) + b"".join(text(name) + struct.pack(">q", count) for name, count in of.items())
 
-    numbers = struct.pack(">qqqqqffff", 1, 2, 0, 0, 0, 0.1, 0.2, 30, 1.5)
+    numbers = struct.pack(">qqqqqffff", 1, 2, pending, 0, 0, 0.1, 0.2, 30, 1.5)
     return bytes(8) + text(process) + struct.pack(">qqi", 9, 1, 77) + text("all is well") + numbers + counts(refused) + counts(counters)
 
 
@@ -46,7 +48,7 @@ class LinkTest(unittest.TestCase):
         self.work = Path(folder.name)
         write_log(self.work / "stored.lcm", 1, range(10))
         self.options = Namespace(agents=[Agent(1, self.work / "stored.lcm", self.work)], seconds=None, bin=".",
-                                 rows=list(ROWS), port=24600)
+                                 rows=list(ROWS), port=24600, hosts=False)
 
     def row(self, name, journalled, ate, opened=3):
         job = next(job for job in jobs_of(self.options, self.work) if job.name == name)
@@ -55,14 +57,14 @@ class LinkTest(unittest.TestCase):
         write_log(session / "agent_1.lcm", 1, range(10))
         write_log(session / "session.lcm", 1, range(10), late_us=30_000)
         write_log(session / "journal.lcm", 1, journalled)
-        counters = {"keyframe_bytes": 1000, "bytes_up_keyframes": 1100, "packets_up_keyframes": 1, "packets_up": 3}
+        counters = {"keyframe_bytes": 1000, "bytes_up_keyframes": 1100, "packets_up_keyframes": 1, "packets_up": 3, "bytes_up": 2000}
         with open(session / "agent_1.lcm", "ab") as log:
             log.write(event("STATUS_uplink_1", 6_000_000, status("uplink_1", {}, {"keyframe_bytes": 5})))
             log.write(event("STATUS_uplink_1", 7_000_000, status("uplink_1", {}, counters)))
         with open(session / "session.lcm", "ab") as log:
             log.write(event("STATUS_agent_handler", 7_000_000,
                             status("agent_handler", {"forged": 4, "repeated": 3}, {"packets_1": opened})))
-        report = {"groups": [{"agents": [1]}], "ate_joint_m": ate, "agents": [{"id": 1, "bytes_up": 2000, "bytes_down": 100}],
+        report = {"groups": [{"agents": [1]}], "ate_joint_m": ate,
                   "fused_at": [{"change": "fused", "session_s": 7.53}]}
         (session / "report.json").write_text(json.dumps(report))
         return Row(job, self.options)
@@ -121,6 +123,37 @@ class LinkTest(unittest.TestCase):
         text = session_yaml(self.options, ROWS["loss_10"])
         self.assertIn("link: {loss: 0.1, seed: 1}", text)
         self.assertIn("duration: 60", text)
+
+
+    def test_hosts_of_their_own(self):
+        self.options.hosts, self.options.rows, self.options.seconds = True, ["loss_5", "packets_4096_loss_5"], 60
+        job = jobs_of(self.options, self.work)[1]
+        row = json.loads(job.files["row.json"])
+        self.assertEqual((row["loss"], row["packet_bytes"], row["seconds"], row["partition"]), (0.05, 4096, 60, None))
+        self.assertTrue(job.commands[0].argv[1].endswith("hosts_session.py"))
+        self.assertEqual(label(self.options, "packets_4096_loss_5"), "packet_bytes: 4096, loss: 0.05")
+        for name in HOST_ROWS:
+            self.assertTrue(label(self.options, name))
+
+    def test_what_strangers_said_is_told_from_what_was_taken(self):
+        log = self.work / "server.lcm"
+        log.write_bytes(event("RESEND_REQUEST", 1, bytes(100)) * 3 + event("RESEND_REQUEST", 1, b"real" + bytes(96)) +
+                        event("STATUS_a", 1, status("a", {"resend_request_t does not decode": 1}, {})) +
+                        event("STATUS_a", 2, status("a", {"resend_request_t does not decode": 2, "another": 5}, {})))
+        self.assertEqual(strangers(log), {"strangers_heard_by_logger": 3, "strangers_taken": 2})
+
+    def test_a_session_rests_when_nobody_has_work_and_nothing_is_said(self):
+        log, watch = self.work / "server.lcm", Watch()
+        now = int(1e6 * time.time())
+        watch.read[log] = 0
+        log.write_bytes(event("STATUS_a", now, status("a", {}, {}, pending=1)))
+        self.assertFalse(watch.idle(["a"], 0))
+        log.write_bytes(log.read_bytes() + event("STATUS_a", now, status("a", {}, {})))
+        self.assertTrue(watch.idle(["a"], 0))
+        self.assertFalse(watch.idle(["a", "b"], 0), "b has not said anything")
+        self.assertFalse(watch.idle(["a"], 2.5), "it has been quiet for too short a time")
+        self.assertEqual(watch.read[log], log.stat().st_size)
+        self.assertEqual(list(events(log, watch.read[log])), [])
 
 
 if __name__ == "__main__":

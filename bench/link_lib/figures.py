@@ -4,16 +4,17 @@ import json
 import statistics
 import struct
 
-from link_lib.plan import ROWS, is_budget
+from link_lib.plan import ROWS, is_budget, label
 
 LCM_SYNC = 0xEDA1DA01
 MAX_ATE_CHANGE_M = 0.005
 LOWER_HEADERS = 28 + 8 + len("LINK_UP_1") + 1  # UDP, IP, LCM: what LCM was not given to send
 
 
-def events(log):
-    """Of an LCM log: wall clock in microseconds, channel, data. Ends at the first event that is not whole."""
+def events(log, begin=0):
+    """Of an LCM log from byte `begin` on: wall clock in microseconds, channel, data. Ends at the first event that is not whole."""
     with open(log, "rb") as file:
+        file.seek(begin)
         while len(header := file.read(28)) == 28:
             sync, _, utime, channel_bytes, data_bytes = struct.unpack(">IqqII", header)
             channel, data = file.read(channel_bytes), file.read(data_bytes)
@@ -33,7 +34,7 @@ def keyframes(log):
 
 
 def decode_status(data):
-    """An encoded status_t: cpu_s, and the counts of what was refused and done."""
+    """An encoded status_t: pending, memory_mb, cpu_s, and the counts of what was refused and done."""
     at = 8  # behind the type's fingerprint
 
     def take(form):
@@ -52,8 +53,8 @@ def decode_status(data):
     text()
     take("qqi")
     text()
-    *_, cpu_s = take("5q4f")
-    return {"cpu_s": cpu_s, "refused": counts(), "counters": counts()}
+    _, _, pending, _, _, _, _, memory_mb, cpu_s = take("5q4f")
+    return {"pending": pending, "memory_mb": memory_mb, "cpu_s": cpu_s, "refused": counts(), "counters": counts()}
 
 
 def statuses(log, process):
@@ -71,6 +72,14 @@ def rungs(statuses):
     return (statistics.mean(seen), max(seen)) if seen else (0, 0)
 
 
+def strangers(log):
+    """Of stranger.py's messages on the server's bus: those that a logger heard, which takes everything, and our processes took."""
+    heard = sum(channel == "RESEND_REQUEST" and not any(data) for _, channel, data in events(log))
+    last = {channel: decode_status(data) for _, channel, data in events(log) if channel.startswith("STATUS_")}
+    taken = sum(said["refused"].get("resend_request_t does not decode", 0) for said in last.values())
+    return {"strangers_heard_by_logger": heard, "strangers_taken": taken}
+
+
 def to_play(agent, seconds):
     """What the player of an agent's stored keyframes plays."""
     stored = keyframes(agent.keyframes)
@@ -80,7 +89,7 @@ def to_play(agent, seconds):
 
 class Row:
     def __init__(self, job, options):
-        self.name = job.name
+        self.name, self.label = job.name, label(options, job.name)
         session = job.folder / "session"
         report = json.loads((session / "report.json").read_text())
         stored = {}
@@ -107,14 +116,13 @@ class Row:
             "fused_s": round(fused[0] - first_sent, 1) if fused else None,
             "late_median_s": round(statistics.median(late), 3) if late else None,
             "late_p99_s": round(late[int(0.99 * (len(late) - 1))], 3) if late else None,
-            "bytes_up": sum(agent["bytes_up"] for agent in report["agents"]),
-            "bytes_down": sum(agent["bytes_down"] for agent in report["agents"]),
-            "kb_per_s": [round(1e-3 * agent["bytes_up"] / max(1, lasts[agent["id"]]), 1) for agent in report["agents"]],
             "rungs": [tuple(round(rung, 1) for rung in rungs(uplink)) for uplink in uplinks],
-        } | self.traffic(options, session, [newest(uplink) for uplink in uplinks])
+        } | self.traffic(options, session, [newest(uplink) for uplink in uplinks], lasts)
+        if options.hosts:
+            self.figures |= json.loads((session / "frames.json").read_text()) | strangers(session / "session.lcm")
 
     @staticmethod
-    def traffic(options, session, uplinks):
+    def traffic(options, session, uplinks, lasts):
         """Bytes on the wire, all headers counted, over the compressed keyframes; and what the handler made of strangers."""
         handler = newest(statuses(session / "session.lcm", "agent_handler"))
         up = [uplink["counters"] for uplink in uplinks]
@@ -126,6 +134,10 @@ class Row:
         given_to_lcm = total("bytes_up_keyframes") - LOWER_HEADERS * total("packets_up_keyframes")
         opened = sum(handler["counters"].get(f"packets_{a.id}", 0) for a in options.agents)
         return {
+            "bytes_up": total("bytes_up"),
+            "bytes_down": total("bytes_down"),
+            "kb_per_s": [round(1e-3 * counters.get("bytes_up", 0) / max(1, lasts[agent.id]), 1)
+                         for agent, counters in zip(options.agents, up)],
             "bytes_compressed": total("keyframe_bytes"),
             "bytes_up_keyframes": total("bytes_up_keyframes"),
             "keyframes_over_compressed": round(total("bytes_up_keyframes") / compressed, 4),
@@ -151,10 +163,14 @@ class Row:
         perfect = next(row for row in rows if row.name == "perfect")
         change = self.ate_change(rows)
         same = self.figures["groups"] == perfect.figures["groups"]
-        if is_budget(ROWS[self.name]):  # what it costs is said, not judged
+        if is_budget(ROWS.get(self.name, "")):  # what it costs is said, not judged
             return whole and same
         if self.name == "forged":  # each packet that opened is one that an uplink sent
             same = same and self.figures["packets_opened"] <= self.figures["packets_up"]
+        if self.name == "strangers":
+            same = same and self.figures["strangers_heard_by_logger"] > 0 and self.figures["strangers_taken"] == 0
+        if perfect.figures["ate_joint_m"] is None:  # no ground truth
+            return whole and same
         return whole and same and change is not None and abs(change) <= MAX_ATE_CHANGE_M
 
 
@@ -162,23 +178,35 @@ def number(value, form):
     return "–" if value is None else format(value, form)
 
 
+HOST_HEAD = ("their network's MB up over the keyframes", "frames lost up, down")
+
+
+def frames(figures):
+    """What the hosts' network counted itself: all that went up (with hellos), IP headers included."""
+    if "frame_bytes_up" not in figures:
+        return []
+    over = figures["frame_bytes_up"] / (figures["bytes_compressed"] or 1)
+    return [f"{over:.3f}", f"{figures['frames_lost_up']}, {figures['frames_lost_down']}"]
+
+
 def table(rows):
     head = ["link", "keyframes delivered", "groups", "joint ATE m", "change mm", "fused after s",
             "keyframe late s: median", "p99", "MB of keyframes, compressed", "their packets over it", "given to LCM",
-            "kB hellos", "kB poses", "kB down", "kB/s up", "rung: mean, highest", "handler CPU s", "pass"]
+            "kB hellos", "kB poses", "kB down", "kB/s up", "rung: mean, highest", "handler CPU s"]
+    head += [*HOST_HEAD, "pass"] if any("frame_bytes_up" in row.figures for row in rows) else ["pass"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in rows:
         f = row.figures
         change = row.ate_change(rows)
         groups = ", ".join("+".join(map(str, group)) for group in f["groups"])
-        cells = [ROWS[row.name] or row.name, f"{f['keyframes_journalled']} of {f['keyframes_sent']}", groups,
+        cells = [row.label, f"{f['keyframes_journalled']} of {f['keyframes_sent']}", groups,
                  number(f["ate_joint_m"], ".4f"), number(None if change is None else 1000 * change, "+.2f"),
                  number(f["fused_s"], ".1f"), number(f["late_median_s"], ".2f"), number(f["late_p99_s"], ".2f"),
                  number(1e-6 * f["bytes_compressed"], ".3f"), number(f["keyframes_over_compressed"], ".3f"),
-                 number(f["keyframes_given_to_lcm_over_compressed"], ".3f"), number(1e-3 * f["bytes_up_hellos"], ".1f"),
+                 number(None if "frame_bytes_up" in f else f["keyframes_given_to_lcm_over_compressed"], ".3f"), number(1e-3 * f["bytes_up_hellos"], ".1f"),
                  number(1e-3 * f["bytes_up_poses"], ".1f"), number(1e-3 * f["bytes_down"], ".1f"),
                  ", ".join(f"{rate:.1f}" for rate in f["kb_per_s"]),
                  "; ".join(f"{mean}, {high}" for mean, high in f["rungs"]) if any(high for _, high in f["rungs"]) else "–",
-                 number(f["handler_cpu_s"], ".1f"), "pass" if row.passes(rows) else "missed"]
+                 number(f["handler_cpu_s"], ".1f"), *frames(f), "pass" if row.passes(rows) else "missed"]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -43,15 +43,20 @@ inline constexpr int kMaxLinkCorrections = 1;
 inline constexpr int kMaxLandmarksBytes = 1300;
 
 // UDP, IP and LCM's small-message header (8 bytes, the channel, 0): a packet's bytes on the wire.
-inline constexpr int kUdpIpBytes = 28;
+// What is larger than an Ethernet frame is cut by IP, each part with a header of its own.
+inline constexpr int kIpBytes = 20;
+inline constexpr int kUdpIpBytes = kIpBytes + 8;
 inline constexpr int kLcmHeaderBytes = 8;
+inline constexpr int kFrameBytes = 1500;
 inline int BytesOnTheWire(const std::string& channel, Bytes packet) {
-  return kUdpIpBytes + kLcmHeaderBytes + static_cast<int>(channel.size()) + 1 +
-         static_cast<int>(packet.size());
+  constexpr int kFragmentBytes = kFrameBytes - kIpBytes;
+  const int udp_bytes = kUdpIpBytes - kIpBytes + kLcmHeaderBytes +
+                        static_cast<int>(channel.size()) + 1 + static_cast<int>(packet.size());
+  return udp_bytes + kIpBytes * ((udp_bytes + kFragmentBytes - 1) / kFragmentBytes);
 }
 // Keyframe bytes in a packet that fills an Ethernet frame, whatever the agent's id.
 inline constexpr int kPieceHeaderBytes = 3;
-inline constexpr int kFramePayloadBytes = 1500 - kUdpIpBytes - kLcmHeaderBytes -
+inline constexpr int kFramePayloadBytes = kFrameBytes - kUdpIpBytes - kLcmHeaderBytes -
                                           static_cast<int>(sizeof("LINK_UP_65535")) -
                                           kSessionOverheadBytes - kPieceHeaderBytes;
 

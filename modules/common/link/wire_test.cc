@@ -46,6 +46,16 @@ Parsed<LinkAck> ParseAckBody(int32_t agent_id, std::vector<uint8_t> body) {
   return ParseAck(agent_id, {LinkKind::kAck, 1, std::move(body)});
 }
 
+TEST(Wire, WhatExceedsAFrameHasAHeaderForEachPart) {
+  const auto on_the_wire = [](size_t size) {
+    return BytesOnTheWire("LINK_UP_1", std::vector<uint8_t>(size));
+  };
+  constexpr size_t kFull = 1500 - 20 - 8 - 8 - sizeof("LINK_UP_1");
+  EXPECT_EQ(on_the_wire(kFull), 1500);
+  EXPECT_EQ(on_the_wire(kFull + 1), 1501 + 20);
+  EXPECT_EQ(on_the_wire(4096), 4096 + 3 * 20 + 8 + 8 + 10);
+}
+
 TEST(Wire, HelloRoundTrip) {
   const auto parsed = ParseHello(2, Encode(SomeHello()));
   ASSERT_TRUE(parsed.value) << parsed.refused;
