@@ -55,8 +55,7 @@ Keyframe RandomKeyframe(uint64_t seed) {
 
 template <typename Message>
 Message ThroughBytes(const Message& message) {
-  std::vector<uint8_t> bytes(message.getEncodedSize());
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::vector<uint8_t> bytes = EncodeMessage(message);
   Message out;
   EXPECT_TRUE(DecodeMessage(bytes, &out));
   return out;

@@ -133,8 +133,7 @@ TEST_F(VerdictProcesses, AsksForAGapThatStays) {
     const keyframe_t keyframe = ToMessage(agent_m_.keyframes[k]);
     again_t again{};
     again.channel = "KEYFRAME_1";
-    again.data.resize(keyframe.getEncodedSize());
-    keyframe.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
+    again.data = EncodeMessage(keyframe);
     again.num_bytes = static_cast<int32_t>(again.data.size());
     PublishMessage(bus_, channels::Again("fusion"), again);
   }
@@ -164,8 +163,7 @@ TEST_F(VerdictProcesses, AfterARestartKnownVerdictsAreNotRepeated) {
   const constraint_t message = ToMessage(known);
   again_t again{};
   again.channel = channels::kConstraint;
-  again.data.resize(message.getEncodedSize());
-  message.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
+  again.data = EncodeMessage(message);
   again.num_bytes = static_cast<int32_t>(again.data.size());
   PublishMessage(bus_, channels::Again("fusion"), again);
   bus_.Drain();

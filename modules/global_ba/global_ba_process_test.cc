@@ -138,9 +138,8 @@ TEST(GlobalBaProcess, AsksForWhatItLacks) {
   again_t again{};
   again.channel = "KEYFRAME_1";
   const keyframe_t message = ToMessage(lost);
-  again.data.resize(message.getEncodedSize());
+  again.data = EncodeMessage(message);
   again.num_bytes = static_cast<int32_t>(again.data.size());
-  message.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
   PublishMessage(server.bus, "AGAIN_global_ba", again);
   server.bus.Drain();
   server.Tick(90);

@@ -31,8 +31,7 @@ using Begin8 = std::array<uint8_t, 8>;
 std::optional<KeyframeId> IdOf(Bytes begin) {
   static const std::vector<uint8_t> fingerprint = [] {
     const keyframe_t empty{};
-    std::vector<uint8_t> bytes(static_cast<size_t>(empty.getEncodedSize()));
-    empty.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    std::vector<uint8_t> bytes = EncodeMessage(empty);
     bytes.resize(sizeof(Begin8));
     return bytes;
   }();

@@ -162,8 +162,7 @@ class BenchLog {
 
   template <typename Message>
   void Put(const std::string& channel, const Message& message) {
-    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    std::vector<uint8_t> bytes = EncodeMessage(message);
     lcm::LogEvent event{};
     event.timestamp = now_;
     event.channel = channel;

@@ -29,13 +29,6 @@ int8_t ToMessage(EstimatorState state) {
   return pose_t::STATE_INVALID;
 }
 
-template <typename Message>
-std::vector<uint8_t> Encode(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 }  // namespace
 
 VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime)
@@ -150,7 +143,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
 }
 
 void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
-  std::vector<uint8_t> bytes = Encode(pangea::ToMessage(keyframe));
+  std::vector<uint8_t> bytes = EncodeMessage(pangea::ToMessage(keyframe));
   if (keyframe_log_) {
     lcm::LogEvent event{};
     event.timestamp = keyframe.utime;

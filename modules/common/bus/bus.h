@@ -70,10 +70,15 @@ class LcmBus : public Bus {
 
 // Encodes an lcm-gen type.
 template <typename Message>
-void PublishMessage(Bus& bus, const std::string& channel, const Message& message) {
-  std::vector<uint8_t> bytes(message.getEncodedSize());
+std::vector<uint8_t> EncodeMessage(const Message& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  bus.Publish(channel, bytes);
+  return bytes;
+}
+
+template <typename Message>
+void PublishMessage(Bus& bus, const std::string& channel, const Message& message) {
+  bus.Publish(channel, EncodeMessage(message));
 }
 
 // Decodes an lcm-gen type; false on a wrong fingerprint, a short or long payload, or absurd counts.

@@ -72,8 +72,7 @@ TEST(Node, CountsWhatDoesNotDecode) {
 // Every truncation and every single corrupted byte must come back as an answer, not as a crash.
 TEST(DecodeMessage, SurvivesDamage) {
   const have_t have = MakeHave(7);
-  std::vector<uint8_t> bytes(have.getEncodedSize());
-  have.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::vector<uint8_t> bytes = EncodeMessage(have);
   have_t out{};
   for (size_t length = 0; length < bytes.size(); ++length) {
     EXPECT_FALSE(DecodeMessage(Bytes(bytes).first(length), &out));
@@ -103,8 +102,7 @@ int64_t PeakMemory_kB() {
 TEST(DecodeMessage, HugeAndNegativeCountsNeitherAllocateNorReadBeyondTheEnd) {
   again_t again{};
   again.channel = "AB";
-  std::vector<uint8_t> bytes(again.getEncodedSize());
-  again.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::vector<uint8_t> bytes = EncodeMessage(again);
   const int64_t before = PeakMemory_kB();
   constexpr size_t kStringLength = 8, kCount = 8 + 4 + 3;
   for (const int32_t value : {std::numeric_limits<int32_t>::min(), -2, -1, 1 << 30,

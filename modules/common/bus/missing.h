@@ -28,9 +28,8 @@ void TellAgain(Node& node, const std::string& requester, const std::string& chan
                const Message& message) {
   again_t again{};
   again.channel = channel;
-  again.data.resize(static_cast<size_t>(message.getEncodedSize()));
+  again.data = EncodeMessage(message);
   again.num_bytes = static_cast<int32_t>(again.data.size());
-  message.encode(again.data.data(), 0, again.num_bytes);
   node.Publish(channels::Again(requester), again);
 }
 

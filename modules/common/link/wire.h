@@ -100,13 +100,6 @@ Parsed<LinkPiece> ParsePiece(const LinkPacket& packet);  // points into the pack
 Parsed<LinkAck> ParseAck(int32_t agent_id, const LinkPacket& packet);
 Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body);
 
-template <typename Message>
-std::vector<uint8_t> EncodeMessage(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 // A message of `total_bytes` cut into pieces of `payload_bytes`.
 int NumPieces(int total_bytes, int payload_bytes);
 Bytes Piece(Bytes message, int payload_bytes, int index);
