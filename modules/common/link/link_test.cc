@@ -2,6 +2,7 @@
 // a seeded script.
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <queue>
 #include <random>
@@ -306,6 +307,20 @@ TEST(Sender, FullSpoolRefusesTheNewest) {
   EXPECT_TRUE(sender.Has({kMap, 0}));
   sender.SetNext(kMap, 1);
   EXPECT_TRUE(sender.Add({kMap, 1}, std::vector<uint8_t>(60'000)));
+}
+
+TEST(Sender, WhatIsStoredTakesNoMemory) {
+  constexpr int kKeyframes = 2000;
+  constexpr size_t kBytes = 24'000;
+  const auto in_use = [] { return mallinfo2().uordblks; };
+  const size_t before = in_use();
+  Sender sender({});
+  for (int seq = 0; seq < kKeyframes; ++seq) {
+    ASSERT_TRUE(sender.Add({kMap, seq}, std::vector<uint8_t>(kBytes)));
+    sender.SetStored({kMap, seq});
+  }
+  EXPECT_LE(sender.spooled_bytes(), Sender::kMaxStoredInMemory + int64_t{kBytes});
+  EXPECT_LE(in_use() - before, size_t{Sender::kMaxStoredInMemory} + kBytes + 500 * kKeyframes);
 }
 
 TEST(Sender, PacesToItsRate) {

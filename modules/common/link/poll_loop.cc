@@ -8,11 +8,13 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kTickInterval_us = 100'000;
-// Messages handled of one bus before the other has its turn and Poll may send.
-constexpr int kBatch = 32;
+// Messages of one bus are handled for so long before the other has its turn and Poll may send: a
+// flood of them must not take the time between two Polls, which send no more than a burst each.
+constexpr int64_t kBatch_us = 2'000;
 
 void HandleWaiting(LcmBus& bus) {
-  for (int i = 0; i < kBatch && bus.Handle(0); ++i) {
+  const int64_t end = SteadyMicros() + kBatch_us;
+  while (bus.Handle(0) && SteadyMicros() < end) {
   }
 }
 

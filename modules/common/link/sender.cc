@@ -54,7 +54,7 @@ void Sender::SetStored(const KeyframeId& id) {
   item.stored = true;
   if (item.pieces.empty() && spooled_bytes_ > kMaxStoredInMemory) {
     spooled_bytes_ -= static_cast<int64_t>(item.bytes.size());
-    item.bytes = {};
+    item.bytes = std::vector<uint8_t>();  // "= {}" would empty it and keep its memory
   }
 }
 
