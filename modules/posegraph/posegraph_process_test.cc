@@ -1,7 +1,9 @@
 #include "posegraph/posegraph_process.h"
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <limits>
 #include <random>
 
@@ -110,6 +112,21 @@ void SendAll(const SyntheticWorld& world, const std::vector<Constraint>& constra
       }
     }
   }
+}
+
+// Ceres brings OpenMP into the process; this is how CHOLMOD's code asks it for four threads.
+TEST(Process, SolvesInOneThreadWhateverALibraryAsksFor) {
+  using Region = void (*)(void*);
+  void* const symbol = dlsym(RTLD_DEFAULT, "GOMP_parallel");
+  ASSERT_NE(symbol, nullptr);
+  const auto parallel = reinterpret_cast<void (*)(Region, void*, unsigned, unsigned)>(symbol);
+  std::atomic<int> entered = 0;
+  const Region enter = [](void* count) { ++*static_cast<std::atomic<int>*>(count); };
+  parallel(enter, &entered, 4, 0);
+  EXPECT_EQ(entered.exchange(0), 4);
+  UseOneThread();
+  parallel(enter, &entered, 4, 0);
+  EXPECT_EQ(entered, 1);
 }
 
 TEST(PoseGraphProcess, TellsEachAgentItsDriftAndTheMap) {

@@ -156,6 +156,7 @@ std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const 
 }  // namespace
 
 ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log) {
+  UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
   for (const fs::path& log : logs) {
     by_log.push_back(ReadKeyframeLog(log));
@@ -185,6 +186,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs
 
 void ReplayOnly(const std::set<std::string>& processes, const fs::path& log, double until_s,
                 const fs::path& out_log) {
+  UseOneThread();
   ReadKeyframeLog(log);  // throws if keyframes are missing
   const std::vector<LoggedWord> words = ReadWords(processes, log, until_s);
   size_t after_news = words.size();

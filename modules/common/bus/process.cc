@@ -1,5 +1,6 @@
 #include "common/bus/process.h"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -37,6 +38,14 @@ void InstallSignalHandlers() {
 
 bool StopRequested() { return stop_requested != 0; }
 
+// By name: only programs that solve have OpenMP in them. With no level of parallel regions allowed
+// each region runs in one thread.
+void UseOneThread() {
+  if (void* const symbol = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
+    reinterpret_cast<void (*)(int)>(symbol)(0);
+  }
+}
+
 int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
@@ -71,6 +80,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     return 0;
   }
   try {
+    UseOneThread();
     LcmBus bus(url);
     JournalFirstBus journal_first(bus, WallUtime());
     const std::unique_ptr<Process> process = factory(journal_first, options_file);

@@ -29,6 +29,10 @@ int64_t WallUtime();
 void InstallSignalHandlers();
 bool StopRequested();
 
+// What is solved is solved in the thread that asks for it. CHOLMOD would start three more, which
+// OMP_NUM_THREADS does not keep it from: it asks OpenMP for four by number. Call it at the start.
+void UseOneThread();
+
 class JournalFirstBus;
 
 // Handles messages and ticks until a signal. Returns the exit code.
