@@ -5,51 +5,17 @@
 #include <algorithm>
 #include <cstdlib>
 #include <deque>
-#include <filesystem>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <regex>
 #include <stdexcept>
 
 #include "common/bus/log_reader.h"
+#include "session/log_writer.h"
 #include "session/message_fields.h"
 
 namespace pangea::session {
 namespace {
-
-// Appends events to a new log.
-class LogWriter {
- public:
-  explicit LogWriter(const std::string& path) : path_(path) {
-    if (std::filesystem::exists(path)) {
-      throw std::runtime_error(
-          fmt::format("{}: exists; give another name, nothing is overwritten", path));
-    }
-    file_.emplace(path, "w");
-    if (!file_->good()) {
-      throw std::runtime_error(fmt::format("{}: cannot be written", path));
-    }
-  }
-
-  void Write(int64_t utime, const std::string& channel, Bytes data) {
-    lcm::LogEvent event;
-    event.eventnum = count_++;
-    event.timestamp = utime;
-    event.channel = channel;
-    event.datalen = static_cast<int32_t>(data.size());
-    event.data = const_cast<uint8_t*>(data.data());  // it is only read
-    if (file_->writeEvent(&event) != 0) {
-      throw std::runtime_error(fmt::format("{}: cannot be written (disk full?)", path_));
-    }
-  }
-
-  int64_t count() const { return count_; }
-
- private:
-  std::string path_;
-  std::optional<lcm::LogFile> file_;
-  int64_t count_ = 0;
-};
 
 std::regex Expression(const std::string& text) {
   try {
@@ -106,6 +72,14 @@ void ListFields(Bytes data, std::ostream& out) {
   }
 }
 
+void ListJson(const LogEvent& event, std::ostream& out) {
+  const auto message = DecodeFields(event.data);
+  nlohmann::ordered_json json = {{"utime", event.utime}, {"channel", event.channel}};
+  json["type"] = message ? nlohmann::ordered_json(message->type) : nullptr;
+  json["message"] = message ? ToJson(*message) : nullptr;
+  out << json.dump() << "\n";
+}
+
 // The place of an event in its log.
 struct Place {
   int64_t utime = 0;
@@ -115,12 +89,16 @@ struct Place {
 
 }  // namespace
 
-void ListEvents(const std::string& log, const LogCut& cut, bool fields, std::ostream& out) {
+void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out) {
   ReadCut(log, cut, [&](const LogEvent& event, double seconds) {
+    if (as == ListAs::kJson) {
+      ListJson(event, out);
+      return;
+    }
     const auto type = TypeOf(event.data);
     out << fmt::format("{:>10.6f}  {}  {}  {} bytes\n", seconds, event.channel,
                        type.value_or("of no type of ours"), event.data.size());
-    if (fields) {
+    if (as == ListAs::kFields) {
       ListFields(event.data, out);
     }
   });
@@ -128,7 +106,7 @@ void ListEvents(const std::string& log, const LogCut& cut, bool fields, std::ost
 
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out) {
   Expression(cut.channels);  // before a file is made
-  LogWriter writer(out);
+  LogFileWriter writer(out);
   ReadCut(log, cut, [&writer](const LogEvent& event, double) {
     writer.Write(event.utime, event.channel, event.data);
   });
@@ -136,7 +114,7 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
 }
 
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out) {
-  LogWriter writer(out);
+  LogFileWriter writer(out);
   std::vector<Place> places;
   for (size_t log = 0; log < logs.size(); ++log) {
     size_t event = 0;

@@ -17,9 +17,14 @@ struct LogCut {
   std::string channels = ".*";  // regular expression for the whole name
 };
 
-// The events of a cut, one a line: when, seconds since the log's first; channel, type, bytes. With
-// `fields`, below it each field of the message, of arrays the first eight items.
-void ListEvents(const std::string& log, const LogCut& cut, bool fields, std::ostream& out);
+enum class ListAs : uint8_t {
+  kLines,   // when, seconds since the log's first event; channel, type, bytes
+  kFields,  // and below it each field of the message, of arrays the first eight items
+  kJson,    // one object: utime (of capture), channel, type, message
+};
+
+// The events of a cut, one a line.
+void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out);
 
 // Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
 // read, an output that exists or cannot be written, and an expression that is none.

@@ -35,10 +35,10 @@ class GraphBuilder {
   void AddVertices(const FinalGroup& group) {
     bool first = true;
     for (const FinalKeyframe& keyframe : group.keyframes) {
-      const int number = static_cast<int>(graph_.names.size());
+      const int number = static_cast<int>(graph_.keyframes.size());
       numbers_.emplace(keyframe.id, number);
       graph_.graph.vertices.emplace(number, keyframe.T_map_body);
-      graph_.names.push_back(ToString(keyframe.id));
+      graph_.keyframes.push_back(keyframe.id);
       if (first && keyframe.id.map == group.frame) {
         graph_.graph.fixed.push_back(number);
         first = false;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/ids.h"
 #include "session/g2o.h"
 
 namespace pangea::session {
@@ -17,10 +18,10 @@ void ExportPly(const std::string& log, const std::string& file);
 
 // The keyframes of all groups as the log has them last, their odometry edges, and the accepted
 // constraints, those too that a robust solve would switch off. Vertices are numbered from 0 by
-// group, map and seq; `names` tells which keyframe each one is.
+// group, map and seq; `keyframes` tells which keyframe each one is.
 struct NamedGraph {
   Graph graph;
-  std::vector<std::string> names;
+  std::vector<KeyframeId> keyframes;
 };
 NamedGraph GraphOf(const std::string& log);
 

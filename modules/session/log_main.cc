@@ -12,6 +12,7 @@
 #include "session/log_diff.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
+#include "session/log_import.h"
 #include "session/log_info.h"
 
 namespace pangea::session {
@@ -23,7 +24,7 @@ struct Arguments {
   std::string out, tum, g2o, ply;
   std::optional<int64_t> constraint;
   std::vector<std::string> recordings;  // ID=DIR
-  bool fields = false;
+  bool fields = false, json = false;
   int exit_code = 0;
 };
 
@@ -53,8 +54,8 @@ void Export(const Arguments& arguments) {
   if (!arguments.g2o.empty()) {
     const NamedGraph named = GraphOf(log);
     std::string text = ToG2o(named.graph);
-    for (size_t i = 0; i < named.names.size(); ++i) {
-      text += fmt::format("# {} is keyframe {}\n", i, named.names[i]);
+    for (size_t i = 0; i < named.keyframes.size(); ++i) {
+      text += fmt::format("# {} is keyframe {}\n", i, ToString(named.keyframes[i]));
     }
     Write(arguments.g2o, text);
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments.g2o,
@@ -121,8 +122,13 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   CLI::App* list = AddCommand(app, "list", "The messages of a log, one a line", arguments, 1);
   AddCutOptions(*list, arguments);
   list->add_flag("--fields", arguments->fields, "Every field, of arrays the first eight items");
+  list->add_flag("--json", arguments->json, "Every field, one JSON object a line");
   list->callback([arguments] {
-    ListEvents(arguments->logs.front(), arguments->cut, arguments->fields, std::cout);
+    ListEvents(arguments->logs.front(), arguments->cut,
+               arguments->json     ? ListAs::kJson
+               : arguments->fields ? ListAs::kFields
+                                   : ListAs::kLines,
+               std::cout);
   });
   CLI::App* diff =
       AddCommand(app, "diff",
@@ -153,22 +159,35 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   out->add_option("--g2o", arguments->g2o, "File for the pose graph, g2o format");
   out->add_option("--ply", arguments->ply, "File for the largest group's map points");
   out->callback([arguments] { Export(*arguments); });
-  CLI::App* explain = AddCommand(
-      app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
-      arguments, 1);
-  explain->add_option("--constraint", arguments->constraint, "Its id");
-  explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
-  explain->add_option("--recording", arguments->recordings,
-                      "ID=FOLDER: an agent's recording, for its images");
-  explain->callback([arguments] { ExplainVerdict(*arguments); });
-  CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
-  cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
-  cost->callback([arguments] {
-    const Graph graph = ReadG2o(arguments->g2o);
-    std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
-                             graph.vertices.size(), graph.edges.size(), Cost(graph));
-  });
-}
+  CLI::App* import =
+      AddCommand(app, "import",
+                 "A pose graph that was exported and solved elsewhere, back into the "
+                 "log: its poses are the newest state of each group",
+                 arguments, 1);
+  import->add_option("--g2o", arguments->g2o, "g2o file; vertices numbered as exported")
+      ->required()
+      ->check(CLI::ExistingFile);
+  import->add_option("--out", arguments->out, "The new log")->required();
+  import->callback([arguments] {
+    const int64_t placed = ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out);
+  std::cout << fmt::format("{}: {} keyframes as in {}\n", arguments->out, placed, arguments->g2o);
+});
+CLI::App* explain = AddCommand(
+    app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
+    arguments, 1);
+explain->add_option("--constraint", arguments->constraint, "Its id");
+explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
+explain->add_option("--recording", arguments->recordings,
+                    "ID=FOLDER: an agent's recording, for its images");
+explain->callback([arguments] { ExplainVerdict(*arguments); });
+CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
+cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
+cost->callback([arguments] {
+  const Graph graph = ReadG2o(arguments->g2o);
+  std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
+                           graph.vertices.size(), graph.edges.size(), Cost(graph));
+});
+}  // namespace pangea::session
 
 }  // namespace pangea::session
 

@@ -11,6 +11,7 @@
 #include "session/explain.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
+#include "session/log_import.h"
 #include "session/log_info.h"
 
 namespace pangea::session {
@@ -142,7 +143,7 @@ TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
 TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   const NamedGraph named = GraphOf(kSample);
   EXPECT_EQ(named.graph.vertices.size(), 63U);
-  EXPECT_EQ(named.names.size(), 63U);
+  EXPECT_EQ(named.keyframes.size(), 63U);
   EXPECT_GT(named.graph.edges.size(), 80U);
   std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
   const double ours = Cost(named.graph);
@@ -152,6 +153,47 @@ TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   EXPECT_EQ(again.edges.size(), named.graph.edges.size());
   EXPECT_EQ(again.fixed, named.graph.fixed);
   EXPECT_NEAR(Cost(again) / ours, 1, 1e-5);
+}
+
+// Another solver's poses, here a lift of all by a metre, are what a report of the new log sees.
+TEST_F(LogToolsTest, AG2oFileComesBackIntoTheLog) {
+  const NamedGraph named = GraphOf(kSample);
+  Graph lifted = named.graph;
+  for (auto& [number, pose] : lifted.vertices) {
+    pose.t.z() += 1;
+  }
+  std::ofstream(Path("lifted.g2o")) << ToG2o(lifted);
+  EXPECT_EQ(ImportG2o(kSample, Path("lifted.g2o"), Path("lifted.lcm")), 63);
+  const NamedGraph again = GraphOf(Path("lifted.lcm"));
+  EXPECT_EQ(again.keyframes, named.keyframes);
+  EXPECT_EQ(again.graph.edges.size(), named.graph.edges.size());
+  for (const auto& [number, pose] : lifted.vertices) {
+    EXPECT_LT(again.graph.vertices.at(number).Minus(pose).norm(), 1e-7);
+  }
+  // Twice is no more than once: the newest counts.
+  std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
+  ImportG2o(Path("lifted.lcm"), Path("graph.g2o"), Path("back.lcm"));
+  EXPECT_NEAR(Cost(GraphOf(Path("back.lcm")).graph) / Cost(named.graph), 1, 1e-5);
+}
+
+TEST_F(LogToolsTest, AG2oFileOfAnotherLogIsRefused) {
+  const auto error_of = [this](const Graph& graph) {
+    std::ofstream(Path("other.g2o")) << ToG2o(graph);
+    try {
+      ImportG2o(kSample, Path("other.g2o"), Path("other.lcm"));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  Graph graph = GraphOf(kSample).graph;
+  graph.edges.clear();
+  graph.vertices.emplace(63, Rigid3());
+  EXPECT_NE(error_of(graph).find("vertex 63 is none of the log's 63 keyframes"), std::string::npos);
+  graph.vertices.erase(63);
+  graph.vertices.erase(7);
+  EXPECT_NE(error_of(graph).find("vertex 7, keyframe 1/"), std::string::npos) << error_of(graph);
+  EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
 TEST_F(LogToolsTest, ABadG2oFileNamesTheLine) {

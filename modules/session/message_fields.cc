@@ -180,7 +180,9 @@ class Decoder {
       return std::nullopt;
     }
     if (type == "string") {
-      fields_->push_back({path, fmt::format("\"{}\"", reader_.String())});
+      const nlohmann::json text = reader_.String();
+      fields_->push_back(
+          {path, text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)});
     } else if (type == "double") {
       fields_->push_back({path, fmt::format("{}", std::bit_cast<double>(reader_.Unsigned(8)))});
     } else if (type == "float") {
@@ -219,7 +221,39 @@ class Decoder {
   std::vector<MessageField>* fields_;
 };
 
+// "candidates[0].score" as /candidates/0/score.
+nlohmann::ordered_json::json_pointer Pointer(const std::string& path) {
+  std::string pointer = "/";
+  for (const char c : path) {
+    if (c == '.' || c == '[') {
+      pointer += '/';
+    } else if (c != ']') {
+      pointer += c;
+    }
+  }
+  return nlohmann::ordered_json::json_pointer(pointer);
+}
+
+nlohmann::ordered_json Value(const std::string& text) {
+  constexpr int64_t kExact = int64_t{1} << 53;
+  const auto value = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (value.is_discarded()) {
+    return nullptr;  // nan, inf
+  }
+  const bool rounded = value.is_number_integer() &&
+                       (value.get<int64_t>() > kExact || value.get<int64_t>() < -kExact);
+  return rounded ? nlohmann::ordered_json(text) : value;
+}
+
 }  // namespace
+
+nlohmann::ordered_json ToJson(const DecodedMessage& message) {
+  auto json = nlohmann::ordered_json::object();
+  for (const MessageField& field : message.fields) {
+    json[Pointer(field.path)] = Value(field.value);
+  }
+  return json;
+}
 
 std::optional<std::string> TypeOf(Bytes data) {
   const auto fingerprint = static_cast<int64_t>(Reader(data).Unsigned(8));

@@ -58,6 +58,17 @@ TEST(MessageFields, AreThoseOfTheType) {
   EXPECT_EQ(fields["rejected[0]"], "\"far\"");
 }
 
+TEST(MessageFields, AreJsonToo) {
+  const auto json = ToJson(DecodeFields(Match()).value());
+  EXPECT_EQ(json["query"]["seq"], 12);
+  EXPECT_EQ(json["candidates"].size(), 2u);
+  EXPECT_EQ(json["candidates"][1]["match_corner"], nlohmann::ordered_json({4, -1}));
+  EXPECT_EQ(json["candidates"][1]["score"], 0.25);
+  EXPECT_EQ(json["rejected"][0], "far");
+  EXPECT_EQ(ToJson({"", {{"id", "9007199254740993"}}})["id"], "9007199254740993");
+  EXPECT_TRUE(ToJson({"", {{"x", "nan"}}})["x"].is_null());
+}
+
 TEST(MessageFields, WhatDoesNotFitIsNone) {
   const std::vector<uint8_t> good = Match();
   for (size_t size = 0; size < good.size(); ++size) {
