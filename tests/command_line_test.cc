@@ -10,6 +10,7 @@
 namespace pangea::tests {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -69,6 +70,25 @@ TEST(SessionList, ShowsTheSessionsAtHand) {
   EXPECT_THAT(outcome.output, HasSubstr("missing: agent 1: recording "));
   outcome = RunCommand("pangea-session list " PANGEA_SOURCE_DIR "/sessions --names");
   EXPECT_THAT(outcome.output, HasSubstr("demo\ntable2_MH_01\n"));
+}
+
+// An installed program without a folder of sessions at hand has those that came with it.
+TEST(SessionList, FindsTheInstalledSessions) {
+  const fs::path folder = FreshFolder("installed_sessions");
+  fs::create_directories(folder / "bin");
+  fs::create_directories(folder / "share" / "pangea");
+  fs::copy(PANGEA_BINARY_DIR "/bin/pangea-session", folder / "bin" / "pangea-session");
+  const std::string list = "cd " + folder.string() + " && bin/pangea-session ";
+  Outcome outcome = RunCommand(list + "list");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("sessions: no session files here"));
+  fs::copy(PANGEA_SOURCE_DIR "/sessions", folder / "share" / "pangea" / "sessions");
+  outcome = RunCommand(list + "list --names");
+  EXPECT_THAT(outcome.output, HasSubstr("demo\ntable2_MH_01\n"));
+  outcome = RunCommand(list + "run demoo --out out");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("did you mean 'demo'?"));
+  fs::remove_all(folder);
 }
 
 }  // namespace

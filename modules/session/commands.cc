@@ -234,7 +234,7 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
 
 void AddListCommand(CLI::App& app) {
   struct Arguments {
-    std::string folder = kSessionFolder;
+    std::string folder = SessionFolder();
     std::string recordings;
     bool names = false;
   };
@@ -249,6 +249,10 @@ void AddListCommand(CLI::App& app) {
   list->add_flag("--names", arguments->names, "Names only");
   list->callback([arguments] {
     const std::vector<fs::path> files = SessionFiles(arguments->folder);
+    if (files.empty()) {
+      throw std::runtime_error(
+          fmt::format("{}: no session files here; name their folder", arguments->folder));
+    }
     if (!arguments->names) {
       std::cout << DescribeSessions(files, FolderOf(arguments->recordings));
       return;

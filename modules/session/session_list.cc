@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/nearest_word.h"
+#include "session/child_process.h"
 #include "session/session_file.h"
 
 namespace pangea::session {
@@ -78,6 +79,13 @@ std::string DescribeInputs(const fs::path& file, const std::optional<fs::path>& 
 
 }  // namespace
 
+fs::path SessionFolder() {
+  const fs::path here = "sessions";
+  const fs::path installed =
+      (ProgramDirectory() / ".." / "share" / "pangea" / here).lexically_normal();
+  return !fs::is_directory(here) && fs::is_directory(installed) ? installed : here;
+}
+
 std::vector<fs::path> SessionFiles(const fs::path& folder) {
   std::vector<fs::path> files;
   if (fs::is_directory(folder)) {
@@ -95,15 +103,16 @@ fs::path FindSessionFile(const std::string& name_or_file) {
   if (fs::exists(name_or_file)) {
     return name_or_file;
   }
+  const fs::path folder = SessionFolder();
   std::vector<std::string> names;
-  for (const fs::path& file : SessionFiles(kSessionFolder)) {
+  for (const fs::path& file : SessionFiles(folder)) {
     names.push_back(file.stem().string());
     if (names.back() == name_or_file) {
       return file;
     }
   }
   throw std::runtime_error(
-      fmt::format("{}: is no file, and no session in {}/{}", name_or_file, kSessionFolder,
+      fmt::format("{}: is no file, and no session in {}/{}", name_or_file, folder.string(),
                   NearestWordHint(fs::path(name_or_file).stem().string(), names)));
 }
 

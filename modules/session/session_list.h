@@ -9,8 +9,9 @@
 
 namespace pangea::session {
 
-// Where a session that is given by its name is looked for: sessions/demo.yaml is "demo".
-inline constexpr char kSessionFolder[] = "sessions";
+// Where a session that is given by its name is looked for (sessions/demo.yaml is "demo"): sessions/
+// here, or where there is none, those that are installed with the programs.
+std::filesystem::path SessionFolder();
 
 // The *.yaml of a folder, by name; empty when there is no such folder.
 std::vector<std::filesystem::path> SessionFiles(const std::filesystem::path& folder);

@@ -1,7 +1,7 @@
 # Bash completion of Pangea's programs: sub-commands, options and their choices as each program's own --help has them, names of
 # sessions, files.
 #   source scripts/completion/pangea.bash                  (zsh: autoload -U bashcompinit && bashcompinit, before it)
-# All users': copy it to /usr/share/bash-completion/completions/pangea-session and link the other programs' names to it.
+# `cmake --install` and the packages put it where bash-completion finds it by itself.
 
 # The sub-commands of a program.
 _pangea_commands() {
