@@ -31,7 +31,6 @@ std::string Quoted(const std::string& text) {
 // Pixels: with equal axes the picture has the shape of what is drawn.
 Eigen::Vector2i CanvasSize(const Plot& plot) {
   constexpr int kWidth = 1400;
-  constexpr int kHeight = 1000;
   constexpr int kMargins = 170;  // title, legend, axis labels
   Eigen::AlignedBox2d box;
   for (const PlotLine& line : plot.lines) {
@@ -42,13 +41,23 @@ Eigen::Vector2i CanvasSize(const Plot& plot) {
     }
   }
   if (!plot.equal_axes || box.isEmpty() || box.sizes().x() <= 0) {
-    return {kWidth, kHeight};
+    return {kWidth, plot.height};
   }
   const double height = kWidth * std::min(box.sizes().y() / box.sizes().x(), 10.0);
   return {kWidth, std::clamp(static_cast<int>(height), 400, 1200) + kMargins};
 }
 
-std::string Script(const Plot& plot, const std::string& path) {
+std::string NamedTics(const std::vector<std::string>& names) {
+  std::string tics;
+  for (size_t i = 0; i < names.size(); ++i) {
+    tics += fmt::format("{}{} {}", tics.empty() ? "" : ", ", Quoted(names[i]), i + 1);
+  }
+  return names.empty() ? ""
+                       : fmt::format("set ytics ({})\nset yrange [0.4:{}.6]\n", tics, names.size());
+}
+
+// `terminal`: gnuplot's, without the size.
+std::string Script(const Plot& plot, const std::string& terminal, const std::string& output) {
   std::string script;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     script += fmt::format("$line{} << EOD\n", i);
@@ -59,21 +68,21 @@ std::string Script(const Plot& plot, const std::string& path) {
   }
   const Eigen::Vector2i size = CanvasSize(plot);
   script += fmt::format(
-      "set terminal pngcairo noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
+      "set terminal {} noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
       "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
       "set grid linecolor '#dddddd' linewidth 1\n"
       "set key tmargin center horizontal samplen 2\n"
       "set lmargin 11\nset rmargin 5\n",
-      size.x(), size.y());
-  script +=
-      fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
-                  Quoted(path), Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
+      terminal, size.x(), size.y());
+  script += fmt::format("{}set title {} font ',17'\nset xlabel {}\nset ylabel {}\n", output,
+                        Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
   if (plot.equal_axes) {
     script += "set size ratio -1\n";
   }
   if (plot.y_from_zero) {
     script += "set yrange [0:*]\n";
   }
+  script += NamedTics(plot.y_names);
   std::string commands;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     const PlotLine& line = plot.lines[i];
@@ -86,8 +95,8 @@ std::string Script(const Plot& plot, const std::string& path) {
                             line.label.empty() ? "notitle" : "title " + Quoted(line.label));
     if (line.mark_start) {
       commands += fmt::format(
-          ", $line{} every ::0::0 with points pointtype 7 pointsize 1.6 linecolor '{}' notitle", i,
-          line.colour);
+          ", $line{} every ::0:0:0:0 with points pointtype 7 pointsize 1.6 linecolor '{}' notitle",
+          i, line.colour);
     }
   }
   if (commands.empty()) {  // nothing to draw is still a picture that says so
@@ -135,6 +144,36 @@ class MemoryFile {
   int fd_;
 };
 
+// What gnuplot writes to its standard output; `what` is for the error.
+std::string RunGnuplot(const std::string& commands, const std::string& what) {
+  const MemoryFile script("gnuplot script");
+  const MemoryFile written("gnuplot stdout");
+  const MemoryFile complaints("gnuplot stderr");
+  script.Write(commands);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, written.fd(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, complaints.fd(), STDERR_FILENO);
+  std::array<char*, 2> argv = {const_cast<char*>("gnuplot"), nullptr};
+  pid_t pid = 0;
+  const int error = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) {
+    throw std::runtime_error(
+        fmt::format("{}: cannot be drawn, gnuplot does not start ({}); install gnuplot-nox", what,
+                    std::strerror(error)));
+  }
+  int status = 0;
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw std::runtime_error(fmt::format("{}: gnuplot failed: {}", what, complaints.Read()));
+  }
+  return written.Read();
+}
+
 }  // namespace
 
 std::string AgentColour(size_t index) {
@@ -144,29 +183,11 @@ std::string AgentColour(size_t index) {
 }
 
 void WritePng(const Plot& plot, const std::string& path) {
-  const MemoryFile script("gnuplot script");
-  const MemoryFile complaints("gnuplot stderr");
-  script.Write(Script(plot, path));
+  RunGnuplot(Script(plot, "pngcairo", fmt::format("set output {}\n", Quoted(path))), path);
+}
 
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, complaints.fd(), STDERR_FILENO);
-  std::array<char*, 2> argv = {const_cast<char*>("gnuplot"), nullptr};
-  pid_t pid = 0;
-  const int error = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) {
-    throw std::runtime_error(
-        fmt::format("{}: cannot be drawn, gnuplot does not start ({}); install gnuplot-nox", path,
-                    std::strerror(error)));
-  }
-  int status = 0;
-  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    throw std::runtime_error(fmt::format("{}: gnuplot failed: {}", path, complaints.Read()));
-  }
+std::string SvgOf(const Plot& plot) {
+  return RunGnuplot(Script(plot, "svg dynamic", ""), fmt::format("'{}'", plot.title));
 }
 
 }  // namespace pangea

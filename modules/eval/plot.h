@@ -1,7 +1,7 @@
 #pragma once
 
-// Line plots as PNG files, drawn by gnuplot (Debian package gnuplot-nox) as a child process.
-// The same lines give the same bytes.
+// Line plots as PNG files and as SVG, drawn by gnuplot (Debian package gnuplot-nox) as a child
+// process. The same lines give the same bytes.
 
 #include <Eigen/Core>
 #include <limits>
@@ -29,6 +29,9 @@ struct Plot {
   std::string y_label;
   bool equal_axes = false;  // one unit is as long on both axes
   bool y_from_zero = false;
+  int height = 1000;  // pixels, of a width of 1400; with equal axes what is drawn decides
+  // In place of figures at y = 1, 2, ...
+  std::vector<std::string> y_names = {};
   std::vector<PlotLine> lines = {};  // later ones are drawn above earlier ones
 };
 
@@ -38,5 +41,7 @@ inline constexpr const char* kGroundTruthColour = "#999999";
 
 // Throws std::runtime_error when gnuplot is absent, naming the package, or when it fails.
 void WritePng(const Plot& plot, const std::string& path);
+// The same picture as text.
+std::string SvgOf(const Plot& plot);
 
 }  // namespace pangea

@@ -11,6 +11,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "eval/table.h"
+
 namespace pangea {
 namespace {
 
@@ -51,6 +53,39 @@ TEST_F(PlotTest, NothingToDrawIsAPictureToo) {
   plot.lines.push_back({.label = "empty", .colour = AgentColour(0), .points = {kPlotBreak}});
   WritePng(plot, path_);
   EXPECT_THAT(Bytes(), StartsWith("\x89PNG"));
+}
+
+TEST_F(PlotTest, TheSamePictureAsSvg) {
+  Plot plot = Circle();
+  plot.y_names = {"one", "two"};
+  const std::string svg = SvgOf(plot);
+  EXPECT_THAT(svg, HasSubstr("<svg "));
+  EXPECT_THAT(svg, HasSubstr("</svg>"));
+  EXPECT_THAT(svg, HasSubstr("circle_1"));
+  EXPECT_THAT(svg, HasSubstr(">two<"));
+  EXPECT_EQ(SvgOf(plot), svg);
+}
+
+TEST(TableTest, HtmlHoldsTextsAsTheyAre) {
+  Table table({"a < b", "n"});
+  EXPECT_TRUE(table.empty());
+  table.Add({"x & \"y\"", "1.5 %"});
+  EXPECT_FALSE(table.empty());
+  EXPECT_THAT(table.Html(), HasSubstr("<th>a &lt; b</th>"));
+  EXPECT_THAT(table.Html(), HasSubstr("<td>x &amp; &quot;y&quot;</td><td class=\"n\">1.5 %</td>"));
+}
+
+TEST(TableTest, WhatIsNoUtf8IsReplaced) {
+  const std::string replaced = "\xef\xbf\xbd";
+  EXPECT_EQ(EscapeHtml("\xc3\xa9'\n"), "\xc3\xa9&#39;\n");
+  EXPECT_EQ(EscapeHtml("\xff"
+                       "a"),
+            replaced + "a");
+  EXPECT_EQ(EscapeHtml("\xc3"), replaced);
+  EXPECT_EQ(EscapeHtml("\xe2\x82"
+                       "b"),
+            replaced + replaced + "b");
+  EXPECT_EQ(EscapeHtml(std::string("\0\x01", 2)), replaced + replaced);
 }
 
 TEST_F(PlotTest, FailuresAreToldWithTheMend) {

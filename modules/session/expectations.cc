@@ -10,8 +10,6 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "eval/table.h"
-
 namespace pangea::session {
 namespace {
 
@@ -176,12 +174,12 @@ std::vector<CheckedExpectation> Check(const Expectations& expectations,
   return checked;
 }
 
-std::string ToMarkdown(const std::vector<CheckedExpectation>& checked) {
+Table ToTable(const std::vector<CheckedExpectation>& checked) {
   Table table({"expected", "bound", "figure", "result"});
   for (const CheckedExpectation& one : checked) {
     table.Add({one.name, one.text, one.figure, one.met ? "met" : "MISSED"});
   }
-  return fmt::format("\n## Expectations\n\n{}", table.Text());
+  return table;
 }
 
 ordered_json ToJson(const std::vector<CheckedExpectation>& checked) {

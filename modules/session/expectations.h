@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "common/yaml_options.h"
+#include "eval/table.h"
 
 namespace pangea::session {
 
@@ -53,8 +54,8 @@ struct CheckedExpectation {
 std::vector<CheckedExpectation> Check(const Expectations& expectations,
                                       const nlohmann::ordered_json& report);
 
-// For report.md and report.json.
-std::string ToMarkdown(const std::vector<CheckedExpectation>& checked);
+// For report.md and report.html, and for report.json.
+Table ToTable(const std::vector<CheckedExpectation>& checked);
 nlohmann::ordered_json ToJson(const std::vector<CheckedExpectation>& checked);
 
 }  // namespace pangea::session

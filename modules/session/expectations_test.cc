@@ -79,7 +79,7 @@ TEST(Expectations, AFigureThatIsNotThereMisses) {
 
 TEST(Expectations, AreToldWithTheirFigures) {
   const auto checked = Check({{"fused_by", 40}, {"coverage", 0.9}}, Report());
-  const std::string text = ToMarkdown(checked);
+  const std::string text = ToTable(checked).Text();
   EXPECT_THAT(text, HasSubstr("| fused_by | at most 40 s "));
   EXPECT_THAT(text, HasSubstr("30.5 s"));
   EXPECT_THAT(text, HasSubstr("agent 1: 0.99, agent 2: 0.7 | MISSED"));

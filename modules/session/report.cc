@@ -5,6 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "session/report_html.h"
 #include "session/report_pictures.h"
 #include "session/report_text.h"
 
@@ -68,6 +69,7 @@ std::string WriteReport(const ReportInput& input, const std::string& folder) {
   WriteText(folder + "/report.json", ReportJson(input, session, figures));
   std::string markdown = ReportMarkdown(input, session, figures);
   WriteText(folder + "/report.md", markdown);
+  WriteText(folder + "/report.html", ReportHtml(input, session, figures));
   return markdown;
 }
 

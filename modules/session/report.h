@@ -10,7 +10,7 @@
 //                            group that has most of them (other maps: agent_<id>.<map>.tum)
 //   map.ply                  points coloured by agent, in the largest group's map frame (other
 //                            groups, whose frames are unrelated to it: map.<map>.ply)
-//   report.json, report.md
+//   report.json, report.md, report.html
 //   trajectory.png, error.png  (groups that no ground truth places: trajectory.<map>.png)
 //
 // A map that no MAP_STATE mentions is a group of its own with the odometry's poses. <map> is

@@ -78,6 +78,7 @@ void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentFigu
     track = ReadPoses(run.bus_log, run.id);
   }
   agent->odometry = std::move(track.odometry);
+  agent->samples = std::move(track.samples);
   agent->live = LiveFiguresOf(track.live, FusedRevisions(session), agent->ground_truth);
   agent->odometry_at_camera_rate = !agent->odometry.empty();
   std::optional<int64_t> first_pose = track.first_tracking_utime;

@@ -29,7 +29,8 @@ struct AgentFigures {
   std::optional<Ate> vio;               // odometry of the main map, SE(3)
   std::optional<Ate> server;            // its keyframes in the main group, SE(3)
   std::optional<double> coverage;
-  LiveFigures live;  // of what it showed while the session ran
+  LiveFigures live;        // of what it showed while the session ran
+  ProcessSamples samples;  // of the processes on its bus
   AgentRun run;
 
   // Only then does an error say something (coverage >= 0.95 and one map).

@@ -34,7 +34,7 @@ TEST_F(ReportFilesTest, SameLogsSameBytes) {
   for (const auto& entry : fs::directory_iterator(folder_ + "/out")) {
     first[entry.path().filename()] = Text(entry.path().filename());
   }
-  EXPECT_EQ(first.size(), 9U);
+  EXPECT_EQ(first.size(), 10U);
   WriteReport(input_, folder_ + "/out");
   for (const auto& [file, bytes] : first) {
     EXPECT_EQ(Text(file), bytes) << file;

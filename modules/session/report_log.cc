@@ -15,8 +15,8 @@
 namespace pangea::session {
 namespace {
 
-CapturedKeyframe Captured(const Keyframe& keyframe) {
-  CapturedKeyframe captured{keyframe.utime, keyframe.T_odom_body, {}};
+CapturedKeyframe Captured(const Keyframe& keyframe, double session_s) {
+  CapturedKeyframe captured{keyframe.utime, keyframe.T_odom_body, {}, session_s};
   for (const MapPoint& point : keyframe.points) {
     if (const auto p_cam = PointInCamera(keyframe, point)) {
       captured.points.push_back(
@@ -72,7 +72,7 @@ class States {
       }
     }
     if (newest && (fused || split)) {
-      GroupChange change{fused, session_s, state->revision, state->maps, {}};
+      GroupChange change{fused, session_s, state->revision, state->group, state->maps, {}};
       for (const KeyframePose& pose : state->keyframes) {
         auto& utime = change.newest_utime[pose.id.map.agent_id];
         utime = std::max(utime, pose.utime);
@@ -138,14 +138,14 @@ void Finish(const Frames& frames, PoseTrack* track) {
   }
 }
 
-bool AddKeyframe(Bytes data, CapturedSession* session) {
+bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
   keyframe_t message{};
   if (!DecodeMessage(data, &message)) {
     return false;
   }
   const auto keyframe = Parse(message);
   if (keyframe.value) {
-    session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value));
+    session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value, session_s));
   }
   return keyframe.value.has_value();
 }
@@ -174,10 +174,23 @@ bool AddState(Bytes data, double session_s, States* states) {
   return state.value.has_value();
 }
 
-bool AddStatus(Bytes data, CapturedSession* session) {
+void AddSample(const status_t& status, int64_t utime, ProcessSamples* samples) {
+  ProcessSample sample{utime, status.cpu_s, std::nullopt, std::nullopt};
+  for (const counter_t& counter : status.counters) {
+    if (counter.name == "bytes_up") {
+      sample.bytes_up = counter.count;
+    } else if (counter.name == "bytes_down") {
+      sample.bytes_down = counter.count;
+    }
+  }
+  (*samples)[status.process].push_back(sample);
+}
+
+bool AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
   status_t message{};
   const bool good = DecodeMessage(data, &message);
   if (good) {
+    AddSample(message, utime, &session->samples);
     session->statuses.insert_or_assign(message.process, message);
   }
   return good;
@@ -191,16 +204,17 @@ CapturedSession ReadServerLog(const std::string& path) {
   std::optional<int64_t> begin;
   ReadLog(path, [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
+    session.begin_utime = *begin;
     const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
     bool good = true;
     if (channels::AgentOf(event.channel, "KEYFRAME_") > 0) {
-      good = AddKeyframe(event.data, &session);
+      good = AddKeyframe(event.data, session_s, &session);
     } else if (event.channel == channels::kConstraint) {
       good = AddConstraint(event.data, &session);
     } else if (event.channel == channels::kMapState) {
       good = AddState(event.data, session_s, &states);
     } else if (event.channel.starts_with("STATUS_")) {
-      good = AddStatus(event.data, &session);
+      good = AddStatus(event.data, event.utime, &session);
     }
     if (!good) {
       ++session.unreadable[event.channel];
@@ -220,6 +234,11 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
       AddPose(event.data, &track);
     } else if (event.channel == corrections) {
       AddFrame(event.data, &frames);
+    } else if (event.channel.starts_with("STATUS_")) {
+      status_t status{};
+      if (DecodeMessage(event.data, &status)) {
+        AddSample(status, event.utime, &track.samples);
+      }
     }
   });
   Finish(frames, &track);

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "eval/table.h"
+#include "session/report_counts.h"
+#include "session/report_tables.h"
 
 namespace pangea::session {
 namespace {
@@ -20,83 +20,6 @@ ordered_json Number(const std::optional<double>& value) {
 }
 ordered_json Rmse(const std::optional<Ate>& ate) {
   return ate ? Number(ate->position_m.rmse) : ordered_json();
-}
-
-std::string Cell(const std::optional<double>& value, int decimals) {
-  return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
-}
-std::string Cell(const std::optional<Ate>& ate) {
-  return ate ? fmt::format("{:.3f}", ate->position_m.rmse) : "-";
-}
-
-std::string Joined(const std::vector<MapId>& maps) {
-  std::string text;
-  for (const MapId& map : maps) {
-    text += fmt::format("{}{}", text.empty() ? "" : ", ", ToString(map));
-  }
-  return text;
-}
-
-// Recording time played: of its link bytes, what a second of it costs.
-std::optional<double> PlayedSeconds(const AgentFigures& agent) {
-  int64_t begin = 0;
-  int64_t end = 0;
-  for (const auto& [map, odometry] : agent.odometry) {
-    if (!odometry.empty()) {
-      begin = begin == 0 ? odometry.front().utime : std::min(begin, odometry.front().utime);
-      end = std::max(end, odometry.back().utime);
-    }
-  }
-  const double seconds =
-      1e-6 * static_cast<double>(end - begin) + std::max(0.0, agent.initialised_s.value_or(0));
-  return seconds > 0 ? std::optional(seconds) : std::nullopt;
-}
-
-std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
-  const auto seconds = PlayedSeconds(agent);
-  if (!seconds || !agent.run.bytes_up) {
-    return std::nullopt;
-  }
-  return 1e-3 * static_cast<double>(*agent.run.bytes_up) / *seconds;
-}
-
-// Refused for the same reason, whatever the figures in it.
-std::string WithoutFigures(const std::string& reason) {
-  std::string text;
-  for (size_t i = 0; i < reason.size(); ++i) {
-    const bool digit = std::isdigit(static_cast<unsigned char>(reason[i])) != 0;
-    const bool inside_number = !text.empty() && text.back() == '#';
-    const bool point = reason[i] == '.' && inside_number && i + 1 < reason.size() &&
-                       std::isdigit(static_cast<unsigned char>(reason[i + 1])) != 0;
-    if (!digit && !point) {
-      text += reason[i];
-    } else if (!inside_number) {
-      text += '#';
-    }
-  }
-  return text;
-}
-
-struct ConstraintCounts {
-  int accepted_intra = 0;
-  int accepted_inter = 0;
-  std::map<std::string, int> refused;  // by reason
-  int num_refused = 0;
-};
-
-ConstraintCounts CountConstraints(const CapturedSession& session) {
-  ConstraintCounts counts;
-  for (const auto& [id, constraint] : session.constraints) {
-    if (!constraint.accepted) {
-      ++counts.num_refused;
-      ++counts.refused[WithoutFigures(constraint.reason)];
-    } else if (constraint.kind == PlaceKind::kIntra) {
-      ++counts.accepted_intra;
-    } else {
-      ++counts.accepted_inter;
-    }
-  }
-  return counts;
 }
 
 ordered_json NormalisedJson(const NormalisedError& error, bool any) {
@@ -162,22 +85,6 @@ ordered_json JointJson(const GroupFigures& group) {
   return group.joint ? Number(group.joint->position_m.rmse) : ordered_json();
 }
 
-// Time in an agent's recording, since its first pose.
-double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t utime) {
-  for (const AgentFigures& agent : figures.agents) {
-    std::optional<int64_t> first;
-    for (const auto& [map, odometry] : agent.odometry) {
-      if (agent.id == agent_id && !odometry.empty()) {
-        first = std::min(first.value_or(odometry.front().utime), odometry.front().utime);
-      }
-    }
-    if (first) {
-      return 1e-6 * static_cast<double>(utime - *first) + agent.initialised_s.value_or(0);
-    }
-  }
-  return 0;
-}
-
 ordered_json ChangeJson(const GroupChange& change, const ReportFigures& figures) {
   ordered_json json = {{"change", change.fused ? "fused" : "taken apart"},
                        {"session_s", Number(change.session_s)}};
@@ -212,144 +119,6 @@ ordered_json ProcessesJson(const ReportInput& input, const CapturedSession& sess
     processes[name]["restarts"] = count;
   }
   return processes;
-}
-
-std::string AgentTable(const ReportFigures& figures) {
-  Table table({"agent", "maps", "keyframes", "initialised s", "path m", "ATE VIO m", "ATE server m",
-               "coverage", "counts", "up kB/s", "down kB", "realtime"});
-  for (const AgentFigures& agent : figures.agents) {
-    const AgentRun& run = agent.run;
-    table.Add(
-        {fmt::format("{}", agent.id), fmt::format("{}", agent.maps.size()),
-         fmt::format("{}", agent.keyframes), Cell(agent.initialised_s, 2),
-         fmt::format("{:.1f}", agent.path_m), Cell(agent.vio), Cell(agent.server),
-         Cell(agent.coverage, 2), agent.AteCounts() ? "yes" : "no",
-         Cell(KilobytesPerSecondUp(agent), 1),
-         run.bytes_down ? fmt::format("{:.1f}", 1e-3 * static_cast<double>(*run.bytes_down)) : "-",
-         Cell(run.realtime_factor, 2)});
-  }
-  return table.Text();
-}
-
-std::string GroupTable(const ReportFigures& figures) {
-  Table table({"group", "agents", "keyframes", "joint ATE m", "switched off", "maps"});
-  for (size_t i = 0; i < figures.groups.size(); ++i) {
-    const GroupFigures& group = figures.groups[i];
-    table.Add({fmt::format("{}", i + 1), fmt::format("{}", fmt::join(group.group.Agents(), ", ")),
-               fmt::format("{}", group.group.keyframes.size()),
-               group.joint ? fmt::format("{:.3f}", group.joint->position_m.rmse) : "-",
-               fmt::format("{}", group.group.num_switched_off), Joined(group.group.maps)});
-  }
-  return table.Text();
-}
-
-std::string ChangesText(const CapturedSession& session, const ReportFigures& figures) {
-  std::string text;
-  for (const GroupChange& change : session.changes) {
-    std::string times;
-    for (const auto& [agent, utime] : change.newest_utime) {
-      times += fmt::format("{}agent {} at {:.1f} s of its recording", times.empty() ? "" : ", ",
-                           agent, RecordingSeconds(figures, agent, utime));
-    }
-    text += fmt::format("- {:.1f} s: {} {} ({})\n", change.session_s,
-                        change.fused ? "fused into one group:" : "taken apart, leaving",
-                        Joined(change.maps), times);
-  }
-  return text.empty() ? std::string("No maps were fused.\n") : text;
-}
-
-std::string ConstraintsText(const CapturedSession& session) {
-  const ConstraintCounts counts = CountConstraints(session);
-  std::string text = fmt::format("{} accepted ({} by fusion, {} by inter_map_ba), {} refused.\n",
-                                 counts.accepted_inter + counts.accepted_intra,
-                                 counts.accepted_inter, counts.accepted_intra, counts.num_refused);
-  if (!counts.refused.empty()) {
-    Table table({"refused", "reason"});
-    for (const auto& [reason, count] : counts.refused) {
-      table.Add({fmt::format("{}", count), reason});
-    }
-    text += fmt::format("\n{}", table.Text());
-  }
-  return text;
-}
-
-// Empty when no constraint has ground truth.
-std::string TruthText(const ReportFigures& figures) {
-  if (figures.all_constraints.checked == 0) {
-    return {};
-  }
-  Table table({"against ground truth", "checked", "wrong", "NEES / dim", "median", "> 99 %",
-               "position", "yaw", "error median m", "p95 m"});
-  const auto add = [&table](const char* name, const ConstraintsTruth& truth) {
-    if (truth.checked > 0) {
-      table.Add({name, fmt::format("{}", truth.checked), fmt::format("{}", truth.wrong),
-                 fmt::format("{:.2f}", truth.pose.mean), fmt::format("{:.2f}", truth.pose.median),
-                 fmt::format("{:.1f} %", 100 * truth.pose.share_above_99),
-                 fmt::format("{:.2f}", truth.position.mean), fmt::format("{:.2f}", truth.yaw.mean),
-                 fmt::format("{:.3f}", truth.translation_median_m),
-                 fmt::format("{:.3f}", truth.translation_p95_m)});
-    }
-  };
-  add("all", figures.all_constraints);
-  add("between maps", figures.inter_constraints);
-  add("within one", figures.intra_constraints);
-  return fmt::format(
-      "\n{}\nNEES: squared error / covariance, per dimension; 1 when the covariance is honest.\n",
-      table.Text());
-}
-
-// Empty when the session made no link bad.
-std::string LinksText(const ReportFigures& figures) {
-  Table table({"agent", "link", "packets up", "delivered", "packets down", "delivered"});
-  bool any = false;
-  for (const AgentFigures& agent : figures.agents) {
-    if (const auto& link = agent.run.link) {
-      any = true;
-      const auto cell = [](const std::map<std::string, int64_t>& packets, const char* name) {
-        const auto count = packets.find(name);
-        return count == packets.end() ? std::string("-") : fmt::format("{}", count->second);
-      };
-      table.Add({fmt::format("{}", agent.id), link->conditions, cell(link->packets_up, "taken"),
-                 cell(link->packets_up, "delivered"), cell(link->packets_down, "taken"),
-                 cell(link->packets_down, "delivered")});
-    }
-  }
-  return any ? fmt::format("\n{}\nDelivered counts doubled packets twice.\n", table.Text())
-             : std::string();
-}
-
-// Empty when no agent's poses were captured.
-std::string LiveText(const ReportFigures& figures) {
-  Table table({"agent", "live ATE m", "raw ATE m", "largest jump m"});
-  bool any = false;
-  for (const AgentFigures& agent : figures.agents) {
-    any |= agent.live.jump_max_m.has_value();
-    table.Add({fmt::format("{}", agent.id), Cell(agent.live.ate_m, 3),
-               Cell(agent.live.ate_raw_m, 3), Cell(agent.live.jump_max_m, 3)});
-  }
-  return any ? fmt::format(
-                   "\nWhat each agent showed while the session ran, from its first fusion "
-                   "on:\n\n{}",
-                   table.Text())
-             : std::string();
-}
-
-std::string ProcessTable(const ReportInput& input, const CapturedSession& session) {
-  Table table({"process", "realtime", "in", "out", "dropped", "median ms", "p99 ms", "MB", "CPU s",
-               "restarts"});
-  const ordered_json processes = ProcessesJson(input, session);
-  const auto cell = [](const ordered_json& process, const char* key, int decimals) {
-    return process.contains(key) ? fmt::format("{:.{}f}", process[key].get<double>(), decimals)
-                                 : std::string("-");
-  };
-  for (const auto& [name, process] : processes.items()) {
-    table.Add({name, cell(process, "realtime_factor", 2), cell(process, "messages_in", 0),
-               cell(process, "messages_out", 0), cell(process, "dropped", 0),
-               cell(process, "handling_median_ms", 2), cell(process, "handling_p99_ms", 2),
-               cell(process, "memory_mb", 0), cell(process, "cpu_s", 1),
-               cell(process, "restarts", 0)});
-  }
-  return table.Text();
 }
 
 }  // namespace
@@ -399,16 +168,30 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
       "# Session report\n\n{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
       "counts "
       "with coverage of at least 0.95 and one map.\n",
-      AgentTable(figures));
-  text += LinksText(figures);
-  text += LiveText(figures);
+      AgentTable(figures).Text());
+  if (const Table links = LinksTable(figures); !links.empty()) {
+    text += fmt::format("\n{}\nDelivered counts doubled packets twice.\n", links.Text());
+  }
+  if (const Table live = LiveTable(figures); !live.empty()) {
+    text += fmt::format(
+        "\nWhat each agent showed while the session ran, from its first fusion on:\n\n{}",
+        live.Text());
+  }
   text +=
-      fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n{}",
-                  GroupTable(figures), ChangesText(session, figures));
-  text += fmt::format("\n## Constraints\n\n{}", ConstraintsText(session));
-  text += TruthText(figures);
-  if (!session.statuses.empty() || !input.realtime_factors.empty() || !input.restarts.empty()) {
-    text += fmt::format("\n## Processes\n\n{}", ProcessTable(input, session));
+      fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n",
+                  GroupTable(figures).Text());
+  const std::vector<std::string> changes = ChangeLines(session, figures);
+  text +=
+      changes.empty() ? "No maps were fused.\n" : fmt::format("- {}\n", fmt::join(changes, "\n- "));
+  text += fmt::format("\n## Constraints\n\n{}\n", ConstraintsLine(session));
+  if (const Table refused = RefusedTable(session); !refused.empty()) {
+    text += fmt::format("\n{}", refused.Text());
+  }
+  if (const Table truth = TruthTable(figures); !truth.empty()) {
+    text += fmt::format("\n{}\n{}\n", truth.Text(), kNeesExplained);
+  }
+  if (const Table processes = ProcessTable(input, session); !processes.empty()) {
+    text += fmt::format("\n## Processes\n\n{}", processes.Text());
   }
   if (!figures.notes.empty()) {
     text += fmt::format("\n## Notes\n\n- {}\n", fmt::join(figures.notes, "\n- "));

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
+
+#include "session/report_html.h"
 
 namespace pangea::session {
 namespace {
@@ -54,6 +57,11 @@ AgentRun RunOf(const AgentScript& script) {
   return run;
 }
 
+std::string TextOf(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
 // The report, and at its end what was expected.
 ReportOutcome WriteChecked(const ReportInput& input, const Expectations& expect,
                            const fs::path& out) {
@@ -67,8 +75,11 @@ ReportOutcome WriteChecked(const ReportInput& input, const Expectations& expect,
   const std::vector<CheckedExpectation> checked = Check(expect, report);
   report["expectations"] = ToJson(checked);
   std::ofstream(file) << report.dump(2) << "\n";
-  const std::string section = ToMarkdown(checked);
+  const Table table = ToTable(checked);
+  const std::string section = fmt::format("\n## Expectations\n\n{}", table.Text());
   std::ofstream(out / "report.md", std::ios::app) << section;
+  const std::string page = TextOf(out / "report.html");
+  std::ofstream(out / "report.html") << WithSection(page, "expectations", "Expectations", table);
   outcome.text += section;
   for (const CheckedExpectation& one : checked) {
     if (!one.met) {

@@ -1,0 +1,81 @@
+#include "session/report_counts.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace pangea::session {
+namespace {
+
+// Recording time played: of its link bytes, what a second of it costs.
+std::optional<double> PlayedSeconds(const AgentFigures& agent) {
+  int64_t begin = 0;
+  int64_t end = 0;
+  for (const auto& [map, odometry] : agent.odometry) {
+    if (!odometry.empty()) {
+      begin = begin == 0 ? odometry.front().utime : std::min(begin, odometry.front().utime);
+      end = std::max(end, odometry.back().utime);
+    }
+  }
+  const double seconds =
+      1e-6 * static_cast<double>(end - begin) + std::max(0.0, agent.initialised_s.value_or(0));
+  return seconds > 0 ? std::optional(seconds) : std::nullopt;
+}
+
+// Refused for the same reason, whatever the figures in it.
+std::string WithoutFigures(const std::string& reason) {
+  std::string text;
+  for (size_t i = 0; i < reason.size(); ++i) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(reason[i])) != 0;
+    const bool inside_number = !text.empty() && text.back() == '#';
+    const bool point = reason[i] == '.' && inside_number && i + 1 < reason.size() &&
+                       std::isdigit(static_cast<unsigned char>(reason[i + 1])) != 0;
+    if (!digit && !point) {
+      text += reason[i];
+    } else if (!inside_number) {
+      text += '#';
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+ConstraintCounts CountConstraints(const CapturedSession& session) {
+  ConstraintCounts counts;
+  for (const auto& [id, constraint] : session.constraints) {
+    if (!constraint.accepted) {
+      ++counts.num_refused;
+      ++counts.refused[WithoutFigures(constraint.reason)];
+    } else if (constraint.kind == PlaceKind::kIntra) {
+      ++counts.accepted_intra;
+    } else {
+      ++counts.accepted_inter;
+    }
+  }
+  return counts;
+}
+
+std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
+  const auto seconds = PlayedSeconds(agent);
+  if (!seconds || !agent.run.bytes_up) {
+    return std::nullopt;
+  }
+  return 1e-3 * static_cast<double>(*agent.run.bytes_up) / *seconds;
+}
+
+double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t utime) {
+  for (const AgentFigures& agent : figures.agents) {
+    std::optional<int64_t> first;
+    for (const auto& [map, odometry] : agent.odometry) {
+      if (agent.id == agent_id && !odometry.empty()) {
+        first = std::min(first.value_or(odometry.front().utime), odometry.front().utime);
+      }
+    }
+    if (first) {
+      return 1e-6 * static_cast<double>(utime - *first) + agent.initialised_s.value_or(0);
+    }
+  }
+  return 0;
+}
+
+}  // namespace pangea::session
