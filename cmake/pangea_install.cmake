@@ -25,10 +25,4 @@ foreach(kind sysctl sysusers tmpfiles)
   install(FILES ${packaging}/${kind}.conf DESTINATION lib/${kind}.d RENAME pangea.conf COMPONENT runtime)
 endforeach()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/sessions DESTINATION ${CMAKE_INSTALL_DATADIR}/pangea COMPONENT runtime)
-# Bash looks for a file of the program's name.
-foreach(program agent-handler eval fusion global-ba inter-map-ba keyframe-player link-emulator log map-points
-        place-recognition posegraph session sim uplink viewer vio)
-  install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME pangea-${program}
-    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
-endforeach()
 install(PROGRAMS ${packaging}/pangea-spy DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)

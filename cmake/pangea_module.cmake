@@ -57,6 +57,9 @@ function(pangea_program name)
   add_dependencies(programs ${name})
   if(NOT ARG_INTERNAL)
     install(TARGETS ${name} RUNTIME COMPONENT runtime)
+    # Bash looks for a file of the program's name.
+    install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME ${name} COMPONENT runtime
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
   endif()
   add_test(NAME ${name}.help COMMAND ${name} --help)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
