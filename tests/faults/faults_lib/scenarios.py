@@ -4,7 +4,7 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
-from faults_lib import offline
+from faults_lib import memory, offline, sanitized
 from faults_lib.checks import Row, all_acknowledged, delivery, kills, print_rows, replays, same_map
 from faults_lib.session import SECOND_STARTS_AFTER_S, Agent, Session, random_kills, whole_keyframes
 
@@ -95,7 +95,8 @@ def run_vio(options):
     return print_rows(f"vio killed after {seconds / 2:.0f} s: a new map, fused again, the old one kept", rows)
 
 
-ALL = {"kills": run_kills, "disk_full": run_disk_full, "vio": run_vio, "spool": offline.run}
+ALL = {"kills": run_kills, "disk_full": run_disk_full, "vio": run_vio, "spool": offline.run, "sanitized": sanitized.run,
+       "memory": memory.run}
 
 
 def run(name, options):

@@ -45,18 +45,18 @@ def session_yaml(agents, faults, seconds=None):
 class Session:
     """Run once in `folder`, and read from it then."""
 
-    def __init__(self, folder, bin, agents, faults=(), seconds=None, rate="1", arguments=(), around=()):
+    def __init__(self, folder, bin, agents, faults=(), seconds=None, rate="1", environment=None):
+        self.environment = os.environ | (environment or {})
         self.folder, self.bin, self.agents, self.out = folder, Path(bin), agents, folder / "out"
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / "session.yaml"
         file.write_text(session_yaml(agents, faults, seconds))
-        self.command = [*around, str(self.bin / "pangea-session"), "run", str(file), "--out", str(self.out),
-                        "--rate", rate, *arguments]
+        self.command = [str(self.bin / "pangea-session"), "run", str(file), "--out", str(self.out), "--rate", rate]
         self.journal = self.out / "journal.lcm"
 
     def start(self):
         with open(self.folder / "session.txt", "w") as output:
-            return subprocess.Popen(self.command, stdout=output, stderr=subprocess.STDOUT)
+            return subprocess.Popen(self.command, stdout=output, stderr=subprocess.STDOUT, env=self.environment)
 
     def run(self):
         self.exit_code = self.start().wait()
