@@ -26,9 +26,9 @@ TEST(SessionFaults, ACutOffAgentAndAKilledProcessCostNothing) {
                                         "expect: {groups: 1, maps: 1}\n";
   const fs::path out = folder / "out";
   const Outcome run =
-      RunCommand("pangea-session run " + file.string() + " --out " + out.string() + " --rate 3");
+      RunCommand("pangea-session run " + file.string() + " --out " + out.string() + " --rate 6");
   EXPECT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("cut at 1 s for 4 s"));
+  EXPECT_THAT(run.output, HasSubstr("cut at 0.5 s for 2 s"));
   const auto report = ReadJson(out / "report.json");
   ASSERT_EQ(report["agents"].size(), 2u) << run.output;
   EXPECT_TRUE(report["agents"][0]["link"].is_null());
