@@ -57,9 +57,9 @@ TEST_F(SessionTest, TwoAgentsBecomeOneMap) {
 }
 
 TEST_F(SessionTest, LeavesEveryFile) {
-  for (const char* name :
-       {"session.lcm", "agent_1.lcm", "agent_2.lcm", "agent_1.vio.tum", "agent_1.tum",
-        "agent_2.tum", "map.ply", "report.json", "report.md", "trajectory.png", "error.png"}) {
+  for (const char* name : {"session.lcm", "agent_1.lcm", "agent_2.lcm", "agent_1.vio.tum",
+                           "agent_1.tum", "agent_2.tum", "map.ply", "report.json", "report.md",
+                           "report.html", "trajectory.png", "error.png"}) {
     EXPECT_TRUE(fs::exists(Out(name)) && fs::file_size(Out(name)) > 0) << name;
   }
 }
@@ -101,6 +101,14 @@ TEST_F(SessionTest, ExpectationsAreTold) {
   EXPECT_THAT(again.output,
               HasSubstr("pangea-session: expected ate_joint_m at most 1e-06 m, got "));
   EXPECT_THAT(again.output, testing::Not(HasSubstr("expected groups")));
+  EXPECT_THAT(ReadFile(*folder_ / "report" / "report.html"), HasSubstr("id=\"expectations\""));
+  // The agents' own logs lie beside the server's.
+  const auto reported = ReadJson(*folder_ / "report" / "report.json");
+  const auto live = ReadJson(Out("report.json"));
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(reported["agents"][i]["ate_live_m"], live["agents"][i]["ate_live_m"]);
+    EXPECT_GT(reported["agents"][i]["bytes_up"].get<int64_t>(), 100'000);
+  }
 }
 
 TEST_F(SessionTest, AnEarlierSessionIsMovedAside) {

@@ -140,6 +140,15 @@ void ChooseMain(const std::vector<GroupFigures>& groups, const CapturedSession& 
   }
 }
 
+// What the agent's uplink said last, where nobody counted for the report.
+void CountBytes(AgentFigures* agent) {
+  const auto uplink = agent->samples.find(fmt::format("uplink_{}", agent->id));
+  if (uplink != agent->samples.end() && !agent->run.bytes_up) {
+    agent->run.bytes_up = uplink->second.back().bytes_up;
+    agent->run.bytes_down = uplink->second.back().bytes_down;
+  }
+}
+
 AgentFigures FiguresOf(const AgentRun& run, const CapturedSession& session,
                        const std::vector<GroupFigures>& groups, std::vector<std::string>* notes) {
   AgentFigures agent;
@@ -147,6 +156,7 @@ AgentFigures FiguresOf(const AgentRun& run, const CapturedSession& session,
   agent.run = run;
   ReadGroundTruth(run, &agent, notes);
   ReadOdometry(run, session, &agent, notes);
+  CountBytes(&agent);
   ChooseMain(groups, session, &agent);
   const Trajectory keyframes =
       groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id);

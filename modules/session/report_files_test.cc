@@ -77,6 +77,15 @@ TEST_F(ReportFilesTest, TheLogAloneIsEnough) {
   EXPECT_THAT(markdown_, HasSubstr("odometry is that of its keyframes"));
 }
 
+TEST_F(ReportFilesTest, BytesThatNobodyCountedAreTheUplinks) {
+  LogBoth();
+  input_.agents[0].bytes_up = input_.agents[0].bytes_down = std::nullopt;
+  const json report = Report();
+  EXPECT_EQ(report["agents"][0]["bytes_up"], 250'000);
+  EXPECT_EQ(report["agents"][0]["bytes_down"], 900);
+  EXPECT_EQ(report["agents"][1]["bytes_up"], 600'000);
+}
+
 TEST_F(ReportFilesTest, ASecondMapOfAnAgentHasFilesOfItsOwn) {
   LogKeyframes(Map(1), 0, 40);
   LogKeyframes(Map(1, 5), 40, NumKeyframes());

@@ -79,7 +79,7 @@ TEST_F(ReportHtmlTest, ParsesAndHasEverySection) {
                                             "constraints", "load", "traffic", "paper", "notes"));
   std::vector<std::string> pictures;
   Collect(page, "src", &pictures);  // attributes are children too
-  EXPECT_EQ(pictures.size(), 4U) << "trajectories, error, fusions, load";
+  EXPECT_EQ(pictures.size(), 5U) << "trajectories, error, fusions, load, traffic";
   EXPECT_THAT(pictures, Each(StartsWith("data:image/svg+xml;base64,")));
   std::vector<std::string> cells;
   Collect(page, "td", &cells);

@@ -10,6 +10,7 @@
 #include "common/channels.h"
 #include "common/messages.h"
 #include "pangea/pose_t.hpp"
+#include "pangea/status_t.hpp"
 
 namespace pangea::session {
 
@@ -111,6 +112,13 @@ void ReportWorld::WriteAgentLog(int32_t agent) const {
   correction.group = Map(1);
   correction.revision = 1;
   log.Write(channels::Correction(agent), ToMessage(correction));
+  for (const int64_t bytes : {0, 250'000}) {
+    status_t status{};
+    status.process = fmt::format("uplink_{}", agent);
+    status.counters = {{"bytes_up", bytes}, {"bytes_down", 900}};
+    status.num_counters = 2;
+    log.Write(channels::Status(status.process), status);
+  }
 }
 
 Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s) {

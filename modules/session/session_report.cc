@@ -134,6 +134,10 @@ ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
+  for (AgentRun& run : input.agents) {  // a session's own log has its agents' beside it
+    const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
+    run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
+  }
   return WriteChecked(input, known.expect, out);
 }
 
