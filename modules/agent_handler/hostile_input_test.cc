@@ -1,0 +1,214 @@
+// What strangers, broken agents and broken processes may send the agent_handler.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "agent_handler/link_test_world.h"
+#include "agent_handler/test_keyframes.h"
+#include "common/link/agent_key.h"
+#include "pangea/again_t.hpp"
+#include "pangea/pose_t.hpp"
+#include "pangea/status_t.hpp"
+
+namespace pangea {
+namespace {
+
+// Each class of a hostile field shows by its reason in STATUS_*, and nothing else comes of it.
+TEST_F(LinkWorld, RefusalsShowInTheStatus) {
+  std::map<std::string, std::set<std::string>> refused;
+  const auto listen = [&](Bus& bus) {
+    bus.Subscribe("STATUS_.*", [&](const std::string& channel, Bytes data) {
+      status_t status{};
+      ASSERT_TRUE(DecodeMessage(data, &status));
+      for (const counter_t& reason : status.refused) {
+        refused[channel].insert(reason.name);
+      }
+    });
+  };
+  listen(agent_bus);
+  listen(server_bus);
+  PublishKeyframes(2);
+  Run(2);
+  const auto publish = [&](int32_t seq, const std::function<void(keyframe_t*)>& damage) {
+    keyframe_t message = ToMessage(TestKeyframe({kMap, seq}));
+    damage(&message);
+    PublishMessage(agent_bus, "KEYFRAME_1", message);
+  };
+  publish(2, [](keyframe_t* m) { m->v_odom_body.x = std::nan(""); });
+  publish(2, [](keyframe_t* m) {
+    m->T_odom_body.translation.z = std::numeric_limits<double>::infinity();
+  });
+  publish(2, [](keyframe_t* m) { m->camera.height = 1 << 30; });
+  publish(2, [](keyframe_t* m) { m->camera.fx += 1; });
+  publish(2, [](keyframe_t* m) { m->utime = 1; });
+  publish(1, [](keyframe_t* m) { m->v_odom_body.x += 1; });
+  PublishMessage(server_bus, "RESEND_REQUEST", resend_request_t{});
+  Constraint verdict;
+  verdict.from = {kMap, 0};
+  verdict.to = {kMap, 1};
+  constraint_t forged = ToMessage(verdict);
+  forged.id += 1;
+  PublishMessage(server_bus, "CONSTRAINT", forged);
+  link_bus.Publish("LINK_UP_1", std::vector<uint8_t>(50, 7));
+  Run(3);
+  EXPECT_THAT(refused["STATUS_uplink_1"],
+              testing::UnorderedElementsAre("velocity or biases out of range",
+                                            "T_odom_body: translation out of range",
+                                            "camera: image size must be 16 to 2047 pixels",
+                                            "keyframe with another camera than its map's",
+                                            "keyframe's time does not go forward with its seq",
+                                            "keyframe seq used again for another keyframe"));
+  EXPECT_THAT(refused["STATUS_agent_handler"],
+              testing::IsSupersetOf({"resend request: requester, map or range is invalid",
+                                     "constraint: id does not follow from its keyframes"}));
+  EXPECT_GE(refused["STATUS_agent_handler"].size(), 3u) << "and the link's noise";
+  ExpectDelivered(2);
+}
+
+// Everything that ever crossed the link again: as it was, changed, to another agent, turned back,
+// after either side has restarted.
+TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
+  MakeKeyFile(KeyFile(2), 2);
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> recorded;
+  bool recording = true;
+  link_bus.Subscribe("LINK_.*", [&](const std::string& channel, Bytes data) {
+    if (recording) {
+      recorded.emplace_back(channel, std::vector<uint8_t>(data.begin(), data.end()));
+    }
+  });
+  std::map<std::string, int64_t> refused, counters;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    for (const counter_t& counter : status.refused) {
+      refused[counter.name] = counter.count;
+    }
+    for (const counter_t& counter : status.counters) {
+      counters[counter.name] = counter.count;
+    }
+  });
+  int poses = 0;
+  server_bus.Subscribe("POSE_.*", [&](const std::string&, Bytes) { ++poses; });
+  const auto shout = [&] {
+    recording = false;
+    for (const auto& [channel, data] : recorded) {
+      std::vector<uint8_t> changed = data;
+      changed[data.size() / 2] ^= 1;
+      link_bus.Publish(channel, data);
+      link_bus.Publish(channel, changed);
+      for (const char* other : {"LINK_UP_1", "LINK_UP_2", "LINK_UP_3", "LINK_DOWN_1"}) {
+        if (channel != other) {
+          link_bus.Publish(other, data);
+        }
+      }
+      Run(0.005);
+    }
+  };
+  PublishKeyframes(5);
+  Run(3);
+  const int64_t accepted = counters.at("packets_1");
+  const auto sent = std::count_if(recorded.begin(), recorded.end(),
+                                  [](const auto& item) { return item.first == "LINK_UP_1"; });
+  EXPECT_LE(accepted, sent);
+  EXPECT_GT(accepted, sent / 2);
+  shout();
+  Run(2);
+  EXPECT_EQ(refused["packet of an agent without a key"], static_cast<int64_t>(recorded.size()));
+  EXPECT_GT(refused["repeated or too old"], 50);
+  EXPECT_GT(refused["not sealed for this session: forged, damaged, or of an earlier one"], 0);
+  EXPECT_GT(refused["packet before there is a session"], 50) << "agent 2 has a key, but no uplink";
+  EXPECT_GT(refused["hello is forged or damaged"], 0);
+  EXPECT_LE(counters.at("packets_1"), accepted + 10) << "the uplink's hellos alone";
+  EXPECT_EQ(counters.at("agents"), 1);
+  EXPECT_EQ(counters.at("agents_with_key"), 2);
+  KillHandler();
+  StartHandler();
+  shout();
+  KillUplink();
+  StartUplink();
+  shout();
+  EXPECT_EQ(poses, 0);
+  PublishKeyframes(5);
+  Run(5);
+  ExpectDelivered(10);
+}
+
+TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
+  PublishKeyframes(2);
+  Run(3);
+  ExpectDelivered(2);
+  std::filesystem::rename(KeyFile(1), folder / "away");
+  Run(2);
+  PublishKeyframes(2);
+  Run(5);
+  EXPECT_EQ(delivered.size(), 2u);
+  std::filesystem::rename(folder / "away", KeyFile(1));
+  Run(10);
+  ExpectDelivered(4);
+}
+
+TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothing) {
+  KillUplink();
+  std::filesystem::rename(KeyFile(1), folder / "server.key");
+  MakeKeyFile(KeyFile(1), 1);
+  StartUplink();
+  std::filesystem::remove(KeyFile(1));
+  std::filesystem::rename(folder / "server.key", KeyFile(1));
+  PublishKeyframes(2);
+  Run(10);
+  EXPECT_TRUE(delivered.empty());
+}
+
+// Noise, and every message with damaged bytes, on every channel that is listened to.
+TEST_F(LinkWorld, NothingOnABusCrashesAProcess) {
+  std::vector<std::vector<uint8_t>> link_messages;
+  link_bus.Subscribe("LINK_.*", [&](const std::string&, Bytes data) {
+    if (link_messages.size() < 50) {
+      link_messages.emplace_back(data.begin(), data.end());
+    }
+  });
+  PublishKeyframes(5);
+  Run(2);
+  std::vector<std::vector<uint8_t>> payloads = link_messages;
+  payloads.push_back(EncodeTestKeyframe({kMap, 6}));
+  payloads.push_back(EncodeMessage(pose_t{}));
+  payloads.push_back(EncodeMessage(ToMessage(Constraint{})));
+  payloads.push_back(EncodeMessage(ToMessage(PlaceMatch{})));
+  payloads.push_back(EncodeMessage(landmarks_t{}));
+  payloads.push_back(EncodeMessage(again_t{}));
+  std::mt19937_64 rng(8);
+  for (int i = 0; i < 3000; ++i) {
+    std::vector<uint8_t> data = payloads[rng() % payloads.size()];
+    for (int flips = static_cast<int>(rng() % 4); flips >= 0; --flips) {
+      data[rng() % std::min<size_t>(data.size(), 120)] ^= static_cast<uint8_t>(1 + rng() % 255);
+    }
+    data.resize(rng() % 5 == 0 ? rng() % data.size() : data.size());
+    for (const char* channel : {"KEYFRAME_1", "POSE_1", "AGAIN_uplink_1"}) {
+      agent_bus.Publish(channel, data);
+    }
+    for (const char* channel : {"LINK_UP_1", "LINK_UP_7", "LINK_DOWN_1"}) {
+      link_bus.Publish(channel, data);
+    }
+    for (const char* channel : {"PLACE_MATCH", "CONSTRAINT", "CORRECTION_1", "LANDMARKS_1",
+                                "RESEND_REQUEST", "AGAIN_agent_handler"}) {
+      server_bus.Publish(channel, data);
+    }
+    if (i % 100 == 0) {
+      Run(0.01);
+    }
+  }
+  PublishKeyframes(5);
+  Run(30);
+  EXPECT_GE(acknowledged, 9);
+}
+
+}  // namespace
+}  // namespace pangea
