@@ -159,35 +159,34 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   out->add_option("--g2o", arguments->g2o, "File for the pose graph, g2o format");
   out->add_option("--ply", arguments->ply, "File for the largest group's map points");
   out->callback([arguments] { Export(*arguments); });
-  CLI::App* import =
-      AddCommand(app, "import",
-                 "A pose graph that was exported and solved elsewhere, back into the "
-                 "log: its poses are the newest state of each group",
-                 arguments, 1);
-  import->add_option("--g2o", arguments->g2o, "g2o file; vertices numbered as exported")
+  CLI::App* back = AddCommand(app, "import",
+                              "A pose graph that was exported and solved elsewhere, back into the "
+                              "log: its poses are the newest state of each group",
+                              arguments, 1);
+  back->add_option("--g2o", arguments->g2o, "g2o file; vertices numbered as exported")
       ->required()
       ->check(CLI::ExistingFile);
-  import->add_option("--out", arguments->out, "The new log")->required();
-  import->callback([arguments] {
+  back->add_option("--out", arguments->out, "The new log")->required();
+  back->callback([arguments] {
     const int64_t placed = ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out);
-  std::cout << fmt::format("{}: {} keyframes as in {}\n", arguments->out, placed, arguments->g2o);
-});
-CLI::App* explain = AddCommand(
-    app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
-    arguments, 1);
-explain->add_option("--constraint", arguments->constraint, "Its id");
-explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
-explain->add_option("--recording", arguments->recordings,
-                    "ID=FOLDER: an agent's recording, for its images");
-explain->callback([arguments] { ExplainVerdict(*arguments); });
-CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
-cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
-cost->callback([arguments] {
-  const Graph graph = ReadG2o(arguments->g2o);
-  std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
-                           graph.vertices.size(), graph.edges.size(), Cost(graph));
-});
-}  // namespace pangea::session
+    std::cout << fmt::format("{}: {} keyframes as in {}\n", arguments->out, placed, arguments->g2o);
+  });
+  CLI::App* explain = AddCommand(
+      app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
+      arguments, 1);
+  explain->add_option("--constraint", arguments->constraint, "Its id");
+  explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
+  explain->add_option("--recording", arguments->recordings,
+                      "ID=FOLDER: an agent's recording, for its images");
+  explain->callback([arguments] { ExplainVerdict(*arguments); });
+  CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
+  cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
+  cost->callback([arguments] {
+    const Graph graph = ReadG2o(arguments->g2o);
+    std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
+                             graph.vertices.size(), graph.edges.size(), Cost(graph));
+  });
+}
 
 }  // namespace pangea::session
 
