@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <lcm/lcm-cpp.hpp>
-
+#include "common/bus/log_writer.h"
 #include "common/trajectory.h"
 #include "eval/metrics.h"
 #include "programs.h"
@@ -16,18 +15,12 @@ namespace fs = std::filesystem;
 
 // A log with all keyframes of the first agent, then all of the second.
 void WriteLog(const fs::path& path, const std::vector<int32_t>& agents) {
-  lcm::LogFile log(path.string(), "w");
-  ASSERT_TRUE(log.good());
+  LogFileWriter log(path.string());
   int64_t utime = 0;
   for (const int32_t agent : agents) {
-    for (session::LoggedKeyframe& keyframe : session::ReadKeyframeLogOf(
+    for (const session::LoggedKeyframe& keyframe : session::ReadKeyframeLogOf(
              fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm", agent)) {
-      lcm::LogEvent event{};
-      event.timestamp = utime++;
-      event.channel = keyframe.channel;
-      event.datalen = static_cast<int32_t>(keyframe.data.size());
-      event.data = keyframe.data.data();
-      ASSERT_EQ(log.writeEvent(&event), 0);
+      log.Write(utime++, keyframe.channel, keyframe.data);
     }
   }
 }

@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <lcm/lcm-cpp.hpp>
-
+#include "common/bus/log_writer.h"
 #include "common/link/wire.h"
 #include "common/trajectory.h"
 #include "programs.h"
@@ -18,22 +17,16 @@ namespace fs = std::filesystem;
 
 // Of the sample's keyframes every fourth is bare, the others have few untracked corners.
 void WriteThinLog(const fs::path& path) {
-  lcm::LogFile log(path.string(), "w");
-  ASSERT_TRUE(log.good());
+  LogFileWriter log(path.string());
   int64_t utime = 0;
   for (const session::LoggedKeyframe& logged : session::ReadKeyframeLog(
            fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm")) {
     keyframe_t message{};
     ASSERT_TRUE(DecodeMessage(logged.data, &message));
     const Keyframe keyframe = *Parse(message).value;
-    std::vector<uint8_t> bytes = EncodeMessage(
+    const std::vector<uint8_t> bytes = EncodeMessage(
         ToMessage(keyframe.id.seq % 4 == 3 ? Bare(keyframe) : Thinned(keyframe, 150)));
-    lcm::LogEvent event{};
-    event.timestamp = utime++;
-    event.channel = logged.channel;
-    event.datalen = static_cast<int32_t>(bytes.size());
-    event.data = bytes.data();
-    ASSERT_EQ(log.writeEvent(&event), 0);
+    log.Write(utime++, logged.channel, bytes);
   }
 }
 

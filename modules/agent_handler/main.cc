@@ -12,7 +12,7 @@ namespace {
 
 struct Arguments {
   std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
-  std::string server = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string server = pangea::kDefaultBusUrl;
   std::string journal;
   std::string keys;
   pangea::AgentHandlerOptions options;

@@ -163,18 +163,12 @@ void PlaceRecognitionProcess::AskForGaps(int64_t now_utime) {
       continue;
     }
     asked = {gap.from_seq, now_utime};
-    resend_request_t request{};
-    request.requester = node_.name();
-    request.map = ToMessage(gap.map);
-    request.from_seq = gap.from_seq;
-    request.to_seq = std::min(gap.to_seq, gap.from_seq + kMaxKeyframesPerRequest - 1);
+    const SeqGap part{gap.map, gap.from_seq,
+                      std::min(gap.to_seq, gap.from_seq + kMaxKeyframesPerRequest - 1)};
     if (catching_up_) {  // first, so that they are here when the keyframes come
-      request.channel = channels::kPlaceMatch;
-      node_.Publish(std::string(channels::kResendRequest), request);
+      AskAgain(node_, std::string(channels::kPlaceMatch), part);
     }
-    request.channel = channels::Keyframe(gap.map.agent_id);
-    node_.Publish(std::string(channels::kResendRequest), request);
-    node_.NoteResendAsked(request.to_seq - request.from_seq + 1);
+    AskAgain(node_, channels::Keyframe(gap.map.agent_id), part);
   }
 }
 

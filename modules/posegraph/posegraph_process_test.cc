@@ -252,9 +252,8 @@ TEST(PoseGraphProcess, AsksForGapsAndTakesTheAnswers) {
     const keyframe_t message = ToMessage(keyframes[seq]);
     again_t again{};
     again.channel = "KEYFRAME_1";
-    again.data.resize(message.getEncodedSize());
+    again.data = EncodeMessage(message);
     again.num_bytes = static_cast<decltype(again.num_bytes)>(again.data.size());
-    message.encode(again.data.data(), 0, static_cast<int>(again.data.size()));
     PublishMessage(server.bus, "AGAIN_posegraph", again);
   }
   server.bus.Drain();

@@ -12,6 +12,7 @@
 
 #include "session/explain.h"
 #include "session/log_diff.h"
+#include "session/recording_arguments.h"
 #include "session/replay.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
@@ -104,19 +105,10 @@ Remembered KnownOf(const LogArguments& arguments) {
   if (!arguments.expect.empty()) {
     known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
   }
-  for (const std::string& given : arguments.recordings) {
-    const size_t equals = given.find('=');
+  for (const auto& [id, folder] : RecordingsById(arguments.recordings)) {
     AgentRun run;
-    try {
-      run.id = std::stoi(given.substr(0, equals));
-    } catch (const std::logic_error&) {
-      run.id = 0;
-    }
-    if (equals == std::string::npos || run.id < 1) {
-      throw std::runtime_error(fmt::format(
-          "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", given));
-    }
-    run.recording = given.substr(equals + 1);
+    run.id = id;
+    run.recording = folder;
     std::erase_if(known.agents, [&](const AgentRun& other) { return other.id == run.id; });
     known.agents.push_back(run);
   }

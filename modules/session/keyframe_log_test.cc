@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <lcm/lcm-cpp.hpp>
 
+#include "common/bus/log_writer.h"
 #include "pangea/keyframe_t.hpp"
 
 namespace pangea::session {
@@ -18,21 +18,14 @@ std::filesystem::path WriteLog(const std::string& name, int32_t agent,
                                const std::vector<std::pair<int32_t, int64_t>>& keyframes) {
   std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
   std::filesystem::remove(path);
-  lcm::LogFile file(path.string(), "w");
+  LogFileWriter file(path.string());
   for (const auto& [seq, utime] : keyframes) {
     keyframe_t message{};
     message.id.map.agent_id = agent;
     message.id.map.opened_utime = 100;
     message.id.seq = seq;
     message.utime = utime;
-    std::vector<uint8_t> bytes(message.getEncodedSize());
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    lcm::LogEvent event{};
-    event.channel = "KEYFRAME_" + std::to_string(agent);
-    event.timestamp = utime;
-    event.data = bytes.data();
-    event.datalen = static_cast<int32_t>(bytes.size());
-    file.writeEvent(&event);
+    file.Write(utime, "KEYFRAME_" + std::to_string(agent), EncodeMessage(message));
   }
   return path;
 }

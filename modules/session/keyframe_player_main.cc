@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
   CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
                "pangea-keyframe-player");
   pangea::session::KeyframePlayerOptions options;
-  std::string bus_url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string bus_url = pangea::kDefaultBusUrl;
   std::string log, rate = "1";
   app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
       ->required()

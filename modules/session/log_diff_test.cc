@@ -1,10 +1,10 @@
 #include "session/log_diff.h"
+#include "common/bus/log_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <lcm/lcm-cpp.hpp>
 
 #include "pangea/correction_t.hpp"
 #include "pangea/status_t.hpp"
@@ -22,33 +22,19 @@ class LogDiffTest : public testing::Test {
     std::string path = testing::TempDir() + "log_diff_" + name + "_" +
                        testing::UnitTest::GetInstance()->current_test_info()->name() + ".lcm";
     std::filesystem::remove(path);
-    lcm::LogFile file(path, "w");
+    LogFileWriter file(path);
     int64_t utime = 1'000'000 * (1 + std::ssize(revisions));  // logs need not begin together
     status_t status{};
     status.utime = utime;
-    Write(&file, "STATUS_posegraph", utime, status);
+    file.Write(utime, "STATUS_posegraph", EncodeMessage(status));
     for (const int64_t revision : revisions) {
       correction_t correction{};
       correction.revision = revision;
       correction.covariance[7] = 0.5 * static_cast<double>(revision);
-      Write(&file, "CORRECTION_1", utime += 1'000'000, correction);
-      Write(&file, "CORRECTION_2", utime, correction_t{});
+      file.Write(utime += 1'000'000, "CORRECTION_1", EncodeMessage(correction));
+      file.Write(utime, "CORRECTION_2", EncodeMessage(correction_t{}));
     }
     return path;
-  }
-
- private:
-  template <typename Message>
-  static void Write(lcm::LogFile* file, const std::string& channel, int64_t utime,
-                    const Message& message) {
-    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    lcm::LogEvent event{};
-    event.timestamp = utime;
-    event.channel = channel;
-    event.data = bytes.data();
-    event.datalen = static_cast<int32_t>(bytes.size());
-    ASSERT_EQ(file->writeEvent(&event), 0);
   }
 };
 

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cstdlib>
 #include <deque>
+#include <filesystem>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <regex>
 #include <stdexcept>
 
 #include "common/bus/log_reader.h"
-#include "session/log_writer.h"
+#include "common/bus/log_writer.h"
 #include "session/message_fields.h"
 
 namespace pangea::session {
@@ -77,7 +78,8 @@ void ListJson(const LogEvent& event, std::ostream& out) {
   nlohmann::ordered_json json = {{"utime", event.utime}, {"channel", event.channel}};
   json["type"] = message ? nlohmann::ordered_json(message->type) : nullptr;
   json["message"] = message ? ToJson(*message) : nullptr;
-  out << json.dump() << "\n";
+  // Texts are whatever was on the bus.
+  out << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
 }
 
 // The place of an event in its log.
@@ -104,8 +106,16 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
   });
 }
 
+void CheckNew(const std::string& path) {
+  if (std::filesystem::exists(path)) {
+    throw std::runtime_error(
+        fmt::format("{}: exists; give another name, nothing is overwritten", path));
+  }
+}
+
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out) {
   Expression(cut.channels);  // before a file is made
+  CheckNew(out);
   LogFileWriter writer(out);
   ReadCut(log, cut, [&writer](const LogEvent& event, double) {
     writer.Write(event.utime, event.channel, event.data);
@@ -114,6 +124,7 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
 }
 
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out) {
+  CheckNew(out);
   LogFileWriter writer(out);
   std::vector<Place> places;
   for (size_t log = 0; log < logs.size(); ++log) {

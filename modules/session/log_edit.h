@@ -26,6 +26,9 @@ enum class ListAs : uint8_t {
 // The events of a cut, one a line.
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out);
 
+// Throws std::runtime_error when the file exists: nothing is overwritten.
+void CheckNew(const std::string& path);
+
 // Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
 // read, an output that exists or cannot be written, and an expression that is none.
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out);

@@ -6,10 +6,11 @@
 #include <stdexcept>
 
 #include "common/bus/log_reader.h"
+#include "common/bus/log_writer.h"
 #include "common/channels.h"
 #include "common/messages.h"
+#include "session/log_edit.h"
 #include "session/log_export.h"
-#include "session/log_writer.h"
 #include "session/report_groups.h"
 
 namespace pangea::session {
@@ -57,6 +58,7 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
   const Graph solved = ReadG2o(g2o);
   CheckVertices(GraphOf(log), solved, g2o);
   const CapturedSession session = ReadServerLog(log);
+  CheckNew(out);
   LogFileWriter writer(out);
   int64_t latest = 0;
   ReadLog(log, [&](const LogEvent& event) {
@@ -66,9 +68,7 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
   int next = 0;
   for (const FinalGroup& group : FinalGroups(session)) {
     for (const map_state_t& chunk : ToMessages(Solved(group, session, solved, &next))) {
-      std::vector<uint8_t> bytes(static_cast<size_t>(chunk.getEncodedSize()));
-      chunk.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-      writer.Write(++latest, std::string(channels::kMapState), bytes);
+      writer.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
     }
   }
   return next;

@@ -14,6 +14,7 @@
 #include "session/log_export.h"
 #include "session/log_import.h"
 #include "session/log_info.h"
+#include "session/recording_arguments.h"
 
 namespace pangea::session {
 namespace {
@@ -64,20 +65,6 @@ void Export(const Arguments& arguments) {
   }
 }
 
-std::map<int32_t, std::string> ById(const std::vector<std::string>& given) {
-  std::map<int32_t, std::string> folders;
-  for (const std::string& text : given) {
-    const size_t equals = text.find('=');
-    if (equals == 0 || equals == std::string::npos ||
-        text.find_first_not_of("0123456789") != equals) {
-      throw std::runtime_error(fmt::format(
-          "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", text));
-    }
-    folders[std::stoi(text.substr(0, equals))] = text.substr(equals + 1);
-  }
-  return folders;
-}
-
 void ExplainVerdict(const Arguments& arguments) {
   const std::string& log = arguments.logs.front();
   if (!arguments.constraint) {
@@ -87,7 +74,7 @@ void ExplainVerdict(const Arguments& arguments) {
   const Explanation explanation = Explain(log, *arguments.constraint);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
-    WriteExplanationPng(explanation, ById(arguments.recordings), arguments.out);
+    WriteExplanationPng(explanation, RecordingsById(arguments.recordings), arguments.out);
   }
 }
 

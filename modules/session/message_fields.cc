@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "common/bus/big_endian.h"
 #include "pangea_schemas.h"
 
 namespace pangea::session {
@@ -112,11 +113,8 @@ class Reader {
       at_ = data_.size();
       return 0;
     }
-    uint64_t value = 0;
-    for (size_t i = 0; i < bytes; ++i) {
-      value = value << 8 | data_[at_++];
-    }
-    return value;
+    at_ += bytes;
+    return GetBigEndian(data_.data() + at_ - bytes, bytes);
   }
   // Length, characters, and a zero.
   std::string String() {

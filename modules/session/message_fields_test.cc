@@ -14,13 +14,6 @@ namespace {
 
 using testing::Contains;
 
-template <typename Message>
-std::vector<uint8_t> Encode(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 std::vector<uint8_t> Match() {
   place_match_t match{};
   match.query.map.agent_id = 7;
@@ -36,7 +29,7 @@ std::vector<uint8_t> Match() {
   match.num_candidates = 2;
   match.rejected = {"far"};
   match.num_rejected = 1;
-  return Encode(match);
+  return EncodeMessage(match);
 }
 
 TEST(MessageFields, AreThoseOfTheType) {

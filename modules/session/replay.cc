@@ -10,6 +10,7 @@
 
 #include "common/bus/bus.h"
 #include "common/bus/log_reader.h"
+#include "common/bus/log_writer.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -26,29 +27,17 @@ namespace fs = std::filesystem;
 // the clock's.
 class Recorder {
  public:
-  Recorder(Bus& bus, const fs::path& log) : file_(log.string(), "w") {
-    if (!file_.good()) {
-      throw std::runtime_error(fmt::format("cannot write {}", log.string()));
-    }
-    bus.Subscribe(".*", [this](const std::string& channel, Bytes data) { Write(channel, data); });
+  Recorder(Bus& bus, const fs::path& log) : log_(log.string()) {
+    bus.Subscribe(".*", [this](const std::string& channel, Bytes data) {
+      log_.Write(utime_++, channel, data);
+    });
   }
 
   // Events never share a stamp, so that tools which sort by it keep their order.
   void SetTime(int64_t utime) { utime_ = std::max(utime, utime_); }
 
  private:
-  void Write(const std::string& channel, Bytes data) {
-    lcm::LogEvent event{};
-    event.timestamp = utime_++;
-    event.channel = channel;
-    event.datalen = static_cast<int32_t>(data.size());
-    event.data = const_cast<uint8_t*>(data.data());
-    if (file_.writeEvent(&event) != 0) {
-      throw std::runtime_error("cannot write the replay's log: is the disk full?");
-    }
-  }
-
-  lcm::LogFile file_;
+  LogFileWriter log_;
   int64_t utime_ = 0;
 };
 

@@ -103,8 +103,9 @@ TEST_F(ReportFilesTest, ASecondMapOfAnAgentHasFilesOfItsOwn) {
 
 TEST_F(ReportFilesTest, RubbishInTheLogIsCountedAndNamed) {
   LogBoth();
-  log_->WriteBytes("KEYFRAME_1", {1, 2, 3});
-  log_->WriteBytes("KEYFRAME_xyz", {1, 2, 3});
+  const std::vector<uint8_t> rubbish{1, 2, 3};
+  log_->WriteBytes("KEYFRAME_1", rubbish);
+  log_->WriteBytes("KEYFRAME_xyz", rubbish);
   const json report = Report();
   EXPECT_EQ(report["agents"].size(), 2U);
   EXPECT_THAT(markdown_, HasSubstr("1 messages on KEYFRAME_1 could not be read"));

@@ -16,13 +16,8 @@ namespace pangea::session {
 
 namespace fs = std::filesystem;
 
-void LogWriter::WriteBytes(const std::string& channel, std::vector<uint8_t> bytes) {
-  lcm::LogEvent event;
-  event.timestamp = utime_ += 100'000;
-  event.channel = channel;
-  event.data = bytes.data();
-  event.datalen = static_cast<int32_t>(bytes.size());
-  log_.writeEvent(&event);
+void LogWriter::WriteBytes(const std::string& channel, Bytes bytes) {
+  log_.Write(utime_ += 100'000, channel, bytes);
 }
 
 Rigid3 Truth(int32_t agent, double s) {

@@ -6,12 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <lcm/lcm-cpp.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "common/bus/log_writer.h"
 #include "common/keyframe.h"
 #include "common/rigid3.h"
 #include "common/server_messages.h"
@@ -25,18 +25,16 @@ constexpr int64_t kOpened = 1'700'000'000'000'000;  // when the maps were opened
 
 class LogWriter {
  public:
-  explicit LogWriter(const std::string& path) : log_(path, "w") {}
+  explicit LogWriter(const std::string& path) : log_(path) {}
 
   template <typename Message>
   void Write(const std::string& channel, const Message& message) {
-    std::vector<uint8_t> bytes(message.getEncodedSize());
-    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    WriteBytes(channel, bytes);
+    WriteBytes(channel, EncodeMessage(message));
   }
-  void WriteBytes(const std::string& channel, std::vector<uint8_t> bytes);
+  void WriteBytes(const std::string& channel, Bytes bytes);
 
  private:
-  lcm::LogFile log_;
+  LogFileWriter log_;
   int64_t utime_ = kOpened;
 };
 

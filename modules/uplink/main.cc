@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
                "pangea-uplink");
   int32_t agent_id = 0;
   std::string key;
-  std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string bus = pangea::kDefaultBusUrl;
   std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
   pangea::UplinkOptions options;
   std::string spool_folder;

@@ -7,13 +7,13 @@
 
 #include <cmath>
 #include <iostream>
-#include <lcm/lcm-cpp.hpp>
 #include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/bus/log_writer.h"
 #include "common/channels.h"
 #include "common/messages.h"
 #include "pangea/pose_t.hpp"
@@ -35,7 +35,7 @@ struct Plan {
 
 class BenchLog {
  public:
-  BenchLog(const std::string& path, const Plan& plan) : plan_(plan), file_(path, "w") {}
+  BenchLog(const std::string& path, const Plan& plan) : plan_(plan), file_(path) {}
 
   void Write() {
     for (int step = 0; step < 10 * plan_.keyframes; ++step) {
@@ -162,17 +162,11 @@ class BenchLog {
 
   template <typename Message>
   void Put(const std::string& channel, const Message& message) {
-    std::vector<uint8_t> bytes = EncodeMessage(message);
-    lcm::LogEvent event{};
-    event.timestamp = now_;
-    event.channel = channel;
-    event.datalen = static_cast<int32_t>(bytes.size());
-    event.data = bytes.data();
-    file_.writeEvent(&event);
+    file_.Write(now_, channel, EncodeMessage(message));
   }
 
   Plan plan_;
-  lcm::LogFile file_;
+  LogFileWriter file_;
   std::mt19937 random_{1};
   int64_t now_ = 0;
   int64_t revision_ = 0;

@@ -73,7 +73,7 @@ void ShowLog(const std::string& log, const WebOptions& options, const std::strin
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string url = pangea::kDefaultBusUrl;
   std::vector<std::string> agent_urls;
   std::string log;
   std::string page = DefaultPage().string();

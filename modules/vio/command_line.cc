@@ -19,7 +19,7 @@ namespace pangea::vio {
 namespace {
 
 struct Arguments {
-  std::string bus = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string bus = kDefaultBusUrl;
   std::string recording;
   bool live = false;
   std::string rate = "1";

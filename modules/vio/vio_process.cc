@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <functional>
-#include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
 #include "common/channels.h"
@@ -40,10 +39,7 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
   node_.Listen<landmarks_t>(channels::Landmarks(options_.agent_id),
                             std::bind_front(&VioProcess::OnLandmarks, this));
   if (!options_.out_keyframes.empty()) {
-    keyframe_log_ = std::make_unique<lcm::LogFile>(options_.out_keyframes, "w");
-    if (!keyframe_log_->good()) {
-      throw std::runtime_error(fmt::format("cannot write {}", options_.out_keyframes));
-    }
+    keyframe_log_.emplace(options_.out_keyframes);
   }
   if (!options_.out_tum.empty()) {
     tum_.open(options_.out_tum);
@@ -145,12 +141,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
 void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
   std::vector<uint8_t> bytes = EncodeMessage(pangea::ToMessage(keyframe));
   if (keyframe_log_) {
-    lcm::LogEvent event{};
-    event.timestamp = keyframe.utime;
-    event.channel = channels::Keyframe(options_.agent_id);
-    event.datalen = static_cast<int32_t>(bytes.size());
-    event.data = bytes.data();
-    keyframe_log_->writeEvent(&event);
+    keyframe_log_->Write(keyframe.utime, channels::Keyframe(options_.agent_id), bytes);
   }
   outlet_.Publish(keyframe.id, std::move(bytes));
 }

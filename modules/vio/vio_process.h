@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/bus/keyframe_outlet.h"
+#include "common/bus/log_writer.h"
 #include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/euroc.h"
@@ -90,7 +91,7 @@ class VioProcess : public Process {
   std::ofstream tum_;
   std::optional<MapId> tum_map_;
   int tum_files_ = 0;
-  std::unique_ptr<lcm::LogFile> keyframe_log_;
+  std::optional<LogFileWriter> keyframe_log_;
 };
 
 }  // namespace pangea::vio

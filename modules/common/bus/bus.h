@@ -42,7 +42,11 @@ class LocalBus : public Bus {
   std::unique_ptr<Impl> impl_;
 };
 
-// A bus by LCM URL, e.g. "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304", or
+// Where processes of one host meet unless they are told otherwise. A keyframe is 28 kB, and many
+// come at once: the kernel's own receive buffer would lose some.
+inline constexpr char kDefaultBusUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+
+// A bus by LCM URL, e.g. kDefaultBusUrl, or
 // "tcpq://host:7700" where multicast is blocked: LCM's relay, which may come and go, and stop; what
 // is published meanwhile is lost, as on multicast. Not for concurrent Handle calls; Publish may be
 // called from any thread.

@@ -3,8 +3,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
+
+#include "common/bus/big_endian.h"
 
 namespace pangea {
 namespace {
@@ -14,31 +15,15 @@ constexpr uint32_t kMagic = 0xEDA1DA01;
 constexpr uint32_t kMaxChannelName = 63;
 constexpr uint32_t kMaxData = 16 << 20;
 
-void PutBigEndian(uint64_t value, int num_bytes, uint8_t* out) {
-  for (int i = num_bytes - 1; i >= 0; --i, value >>= 8) {
-    out[i] = static_cast<uint8_t>(value & 0xFF);
-  }
-}
-
-uint64_t GetBigEndian(const uint8_t* in, int num_bytes) {
-  uint64_t value = 0;
-  for (int i = 0; i < num_bytes; ++i) {
-    value = value << 8 | in[i];
-  }
-  return value;
-}
-
 }  // namespace
 
 size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel, Bytes data,
                       std::vector<uint8_t>* out) {
-  std::array<uint8_t, LogEventHeader::kBytes> header{};
-  PutBigEndian(kMagic, 4, header.data());
-  PutBigEndian(static_cast<uint64_t>(number), 8, header.data() + 4);
-  PutBigEndian(static_cast<uint64_t>(utime), 8, header.data() + 12);
-  PutBigEndian(channel.size(), 4, header.data() + 20);
-  PutBigEndian(data.size(), 4, header.data() + 24);
-  out->insert(out->end(), header.begin(), header.end());
+  PutBigEndian(kMagic, 4, out);
+  PutBigEndian(static_cast<uint64_t>(number), 8, out);
+  PutBigEndian(static_cast<uint64_t>(utime), 8, out);
+  PutBigEndian(channel.size(), 4, out);
+  PutBigEndian(data.size(), 4, out);
   out->insert(out->end(), channel.begin(), channel.end());
   const size_t begin = out->size();
   out->insert(out->end(), data.begin(), data.end());

@@ -85,7 +85,7 @@ class Node {
   void Count(const std::string& counter, int64_t by = 1) { counters_[counter] += by; }
   void Set(const std::string& counter, int64_t value) { counters_[counter] = value; }
   void NoteDropped(int64_t count = 1) { dropped_ += count; }
-  void NoteResendAsked(int64_t count = 1) { resends_asked_ += count; }
+  void NoteResendAsked() { ++resends_asked_; }
 
   // `pending`: work waiting, 0 when idle. Measures process memory and CPU itself.
   status_t Status(int64_t now_utime, int64_t pending, const std::string& summary) const;

@@ -26,6 +26,12 @@ int64_t WallUtime() {
       .count();
 }
 
+int64_t SteadyMicros() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
 void InstallSignalHandlers() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
@@ -66,7 +72,7 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory) {
   CLI::App app(description.summary, description.name);
-  std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+  std::string url = kDefaultBusUrl;
   std::string options_file;
   bool print_options = false;
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();

@@ -24,6 +24,8 @@ class Process {
 
 // Wall clock, microseconds since 1970.
 int64_t WallUtime();
+// Monotonic clock, microseconds.
+int64_t SteadyMicros();
 
 // Set by SIGINT and SIGTERM once InstallSignalHandlers has run.
 void InstallSignalHandlers();

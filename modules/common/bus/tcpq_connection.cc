@@ -15,6 +15,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "common/bus/big_endian.h"
+#include "common/bus/process.h"
+
 namespace pangea {
 namespace {
 
@@ -28,15 +31,8 @@ constexpr size_t kReadBytes = 1 << 16;
 // A relay whose host has vanished, or that takes nothing for so long, is left.
 constexpr unsigned kUnansweredTimeout_ms = 10'000;
 
-int64_t Now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 uint32_t WordAt(Bytes bytes, size_t at) {
-  return static_cast<uint32_t>(bytes[at]) << 24 | static_cast<uint32_t>(bytes[at + 1]) << 16 |
-         static_cast<uint32_t>(bytes[at + 2]) << 8 | bytes[at + 3];
+  return static_cast<uint32_t>(GetBigEndian(bytes.data() + at, sizeof(uint32_t)));
 }
 
 sockaddr_in Resolve(const std::string& url) {
@@ -73,10 +69,10 @@ TcpqConnection::~TcpqConnection() {
 }
 
 void TcpqConnection::Connect() {
-  if (Now_us() < next_try_us_) {
+  if (SteadyMicros() < next_try_us_) {
     return;
   }
-  next_try_us_ = Now_us() + kRetry_us;
+  next_try_us_ = SteadyMicros() + kRetry_us;
   fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) {
     return;
@@ -125,11 +121,7 @@ int TcpqConnection::fd() {
   return fd_;
 }
 
-void TcpqConnection::PutWord(uint32_t value) {
-  for (const int shift : {24, 16, 8, 0}) {
-    unsent_.push_back(static_cast<uint8_t>(value >> shift));
-  }
-}
+void TcpqConnection::PutWord(uint32_t value) { PutBigEndian(value, sizeof(value), &unsent_); }
 
 void TcpqConnection::PutText(const std::string& text) {
   PutWord(static_cast<uint32_t>(text.size()));

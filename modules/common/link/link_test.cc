@@ -9,21 +9,10 @@
 
 #include "common/link/receiver.h"
 #include "common/link/sender.h"
+#include "common/link/test_content.h"
 
 namespace pangea {
 namespace {
-
-const MapId kMap{1, 1000};
-const MapId kLaterMap{1, 2000};
-
-std::vector<uint8_t> Content(const KeyframeId& id) {
-  std::mt19937_64 rng(StableHash(id, id, 0));
-  std::vector<uint8_t> bytes(5'000 + rng() % 35'000);
-  for (uint8_t& byte : bytes) {
-    byte = static_cast<uint8_t>(rng());
-  }
-  return bytes;
-}
 
 struct Channel {
   double loss = 0;
@@ -69,11 +58,6 @@ class World {
         receiver(std::make_unique<Receiver>(ReceiverOptions{}, CheckContent)),
         up_(channel, seed),
         down_(channel, seed + 1) {}
-
-  static std::string CheckContent(const KeyframeId& id, Bytes bytes) {
-    const auto expected = Content(id);
-    return std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end()) ? "" : "wrong";
-  }
 
   void Spool(const MapId& map, int count) {
     for (int seq = 0; seq < count; ++seq) {
@@ -291,7 +275,7 @@ TEST(Link, RestartedReceiverGoesOnFromItsJournal) {
     world.Step();
   }
   const int32_t journalled = world.taken.back().seq;
-  world.receiver = std::make_unique<Receiver>(ReceiverOptions{}, World::CheckContent);
+  world.receiver = std::make_unique<Receiver>(ReceiverOptions{}, CheckContent);
   world.receiver->Resume(kMap, journalled);
   world.Hello({kMap});
   world.RunUntilDelivered(600);
@@ -333,125 +317,6 @@ TEST(Sender, PacesToItsRate) {
   world.RunUntilDelivered(600);
   EXPECT_GE(static_cast<double>(world.now) * 1e-6, static_cast<double>(bytes) / 100'000 - 0.5);
   EXPECT_LE(static_cast<double>(world.now) * 1e-6, static_cast<double>(bytes) / 100'000 * 1.2);
-}
-
-int PiecesOf(const KeyframeId& id) {
-  return NumPieces(static_cast<int>(Content(id).size()), kFramePayloadBytes);
-}
-
-std::string AddPiece(Receiver* receiver, const KeyframeId& id, int index, bool spoiled = false) {
-  std::vector<uint8_t> content = Content(id);
-  content[static_cast<size_t>(index) * kFramePayloadBytes] ^= spoiled ? 1 : 0;
-  const Bytes data = Piece(content, kFramePayloadBytes, index);
-  return receiver->Add(id.map,
-                       {0, static_cast<uint8_t>(id.seq), index, index == PiecesOf(id) - 1, data});
-}
-
-void AddAll(Receiver* receiver, const KeyframeId& id) {
-  for (int i = 0; i < PiecesOf(id); ++i) {
-    AddPiece(receiver, id, i);
-  }
-}
-
-TEST(Receiver, RefusesWhatNobodyAnnounced) {
-  Receiver receiver({}, World::CheckContent);
-  EXPECT_NE(AddPiece(&receiver, {kMap, 0}, 0), "");
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  EXPECT_EQ(AddPiece(&receiver, {kMap, 0}, 0), "");
-  EXPECT_NE(AddPiece(&receiver, {kMap, 100}, 0), "");
-  receiver.OnNewUplink();
-  EXPECT_NE(AddPiece(&receiver, {kMap, 0}, 0), "");
-}
-
-TEST(Receiver, AnotherUplinkMayCutOtherwise) {
-  Receiver receiver({}, World::CheckContent);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  const auto content = Content({kMap, 0});
-  receiver.Add(kMap, {0, 0, 0, false, Piece(content, 1000, 0)});
-  EXPECT_EQ(receiver.cached_bytes(), 1000);
-  receiver.OnNewUplink();
-  EXPECT_EQ(receiver.cached_bytes(), 0);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  AddAll(&receiver, {kMap, 0});
-  const auto ready = receiver.TakeReady();
-  ASSERT_EQ(ready.size(), 1u);
-  EXPECT_EQ(ready[0].bytes, content);
-}
-
-TEST(Receiver, WhatDoesNotFitTogetherComesAgain) {
-  Receiver receiver({}, World::CheckContent);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  const std::vector<uint8_t> data(100);
-  AddPiece(&receiver, {kMap, 0}, 2);
-  EXPECT_NE(receiver.Add(kMap, {0, 0, 1, true, data}), "")
-      << "the last, though a later one is there";
-  receiver.Add(kMap, {0, 0, 1, true, data});
-  EXPECT_NE(AddPiece(&receiver, {kMap, 0}, 1 + 1), "") << "one after the last";
-  EXPECT_EQ(receiver.cached_bytes(), 0);
-  // A piece with another content spoils the keyframe, which then is taken when it comes again.
-  EXPECT_EQ(AddPiece(&receiver, {kMap, 0}, 0, true), "");
-  AddAll(&receiver, {kMap, 0});
-  EXPECT_TRUE(receiver.TakeReady().empty());
-  AddAll(&receiver, {kMap, 0});
-  EXPECT_EQ(receiver.TakeReady().size(), 1u);
-}
-
-TEST(Receiver, AKeyframeWithoutEndIsBounded) {
-  Receiver receiver({}, World::CheckContent);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  const std::vector<uint8_t> data(kMaxPayloadBytes);
-  EXPECT_EQ(receiver.Add(kMap, {0, 0, 0, false, data}), "");
-  EXPECT_EQ(receiver.Add(kMap, {0, 0, 1, false, data}), "");
-  EXPECT_NE(receiver.Add(kMap, {0, 0, 2, false, data}), "");
-  EXPECT_EQ(receiver.cached_bytes(), 0);
-}
-
-// Only the low byte of a seq travels.
-TEST(Receiver, SeqsGoOnBeyondAByte) {
-  Receiver receiver({}, World::CheckContent);
-  receiver.Resume(kMap, 254);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  for (const int seq : {257, 250, 256, 255}) {
-    AddAll(&receiver, {kMap, seq});
-  }
-  std::vector<int32_t> seqs;
-  for (const auto& keyframe : receiver.TakeReady()) {
-    seqs.push_back(keyframe.id.seq);
-  }
-  EXPECT_EQ(seqs, (std::vector<int32_t>{255, 256, 257}));
-}
-
-TEST(Receiver, EarlierKeyframesMakeRoomInAFullCache) {
-  Receiver receiver({100'000}, World::CheckContent);
-  receiver.OnHello({"", {{kMap, 0, 0}}});
-  for (int seq = 1; seq < 10; ++seq) {
-    AddAll(&receiver, {kMap, seq});
-  }
-  EXPECT_LE(receiver.cached_bytes(), 100'000);
-  EXPECT_TRUE(receiver.TakeReady().empty());
-  AddAll(&receiver, {kMap, 0});
-  EXPECT_LE(receiver.cached_bytes(), 100'000);
-  EXPECT_FALSE(receiver.TakeReady().empty());
-}
-
-TEST(Receiver, WhatTheUplinkCannotDeliverIsGivenUpAndCounted) {
-  Receiver receiver({}, World::CheckContent);
-  receiver.OnHello({"", {{kMap, 5, 0}}});
-  EXPECT_EQ(receiver.given_up(), 5);
-  AddAll(&receiver, {kMap, 5});
-  const auto ready = receiver.TakeReady();
-  ASSERT_EQ(ready.size(), 1u);
-  EXPECT_EQ(ready[0].id.seq, 5);
-}
-
-TEST(Receiver, AnnouncedMapsThatBringNothingAreForgotten) {
-  Receiver receiver({}, World::CheckContent);
-  for (int i = 1; i < 1000; ++i) {
-    receiver.OnHello({"", {{{1, i}, 0, 0}}});
-    AddPiece(&receiver, {{1, i}, 0}, 0);
-  }
-  EXPECT_EQ(receiver.num_maps(), 1u);
-  EXPECT_EQ(receiver.pending(), 1u);
 }
 
 }  // namespace

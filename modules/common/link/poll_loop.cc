@@ -2,8 +2,6 @@
 
 #include <poll.h>
 
-#include <chrono>
-
 namespace pangea {
 namespace {
 
@@ -19,12 +17,6 @@ void HandleWaiting(LcmBus& bus) {
 }
 
 }  // namespace
-
-int64_t SteadyMicros() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process) {
   InstallSignalHandlers();

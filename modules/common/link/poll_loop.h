@@ -16,9 +16,6 @@ class PolledProcess : public Process {
   virtual int Poll(int64_t steady_us) = 0;
 };
 
-// Monotonic clock, microseconds.
-int64_t SteadyMicros();
-
 // Handles messages, polls and ticks until a signal. Returns the exit code.
 int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process);
 

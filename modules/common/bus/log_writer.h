@@ -4,25 +4,24 @@
 
 #include <cstdint>
 #include <lcm/lcm-cpp.hpp>
-#include <optional>
 #include <string>
 
 #include "common/bus/bus.h"
 
-namespace pangea::session {
+namespace pangea {
 
 class LogFileWriter {
  public:
-  // Throws std::runtime_error when the file exists or cannot be written.
+  // Overwrites. Throws std::runtime_error when the file cannot be written.
   explicit LogFileWriter(const std::string& path);
 
-  void Write(int64_t utime, const std::string& channel, Bytes data);
+  void Write(int64_t utime, const std::string& channel, Bytes data);  // throws the same
   int64_t count() const { return count_; }
 
  private:
-  std::string path_;
-  std::optional<lcm::LogFile> file_;
+  const std::string path_;
+  lcm::LogFile file_;
   int64_t count_ = 0;
 };
 
-}  // namespace pangea::session
+}  // namespace pangea

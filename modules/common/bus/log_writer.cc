@@ -1,19 +1,13 @@
-#include "session/log_writer.h"
+#include "common/bus/log_writer.h"
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <stdexcept>
 
-namespace pangea::session {
+namespace pangea {
 
-LogFileWriter::LogFileWriter(const std::string& path) : path_(path) {
-  if (std::filesystem::exists(path)) {
-    throw std::runtime_error(
-        fmt::format("{}: exists; give another name, nothing is overwritten", path));
-  }
-  file_.emplace(path, "w");
-  if (!file_->good()) {
+LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(path, "w") {
+  if (!file_.good()) {
     throw std::runtime_error(fmt::format("{}: cannot be written", path));
   }
 }
@@ -25,9 +19,9 @@ void LogFileWriter::Write(int64_t utime, const std::string& channel, Bytes data)
   event.channel = channel;
   event.datalen = static_cast<int32_t>(data.size());
   event.data = const_cast<uint8_t*>(data.data());  // it is only read
-  if (file_->writeEvent(&event) != 0) {
+  if (file_.writeEvent(&event) != 0) {
     throw std::runtime_error(fmt::format("{}: cannot be written (disk full?)", path_));
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea
