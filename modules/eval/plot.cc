@@ -1,5 +1,6 @@
 #include "eval/plot.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -56,8 +57,7 @@ std::string NamedTics(const std::vector<std::string>& names) {
                        : fmt::format("set ytics ({})\nset yrange [0.4:{}.6]\n", tics, names.size());
 }
 
-// `terminal`: gnuplot's, without the size.
-std::string Script(const Plot& plot, const std::string& terminal, const std::string& output) {
+std::string Script(const Plot& plot, const std::string& path) {
   std::string script;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     script += fmt::format("$line{} << EOD\n", i);
@@ -68,14 +68,15 @@ std::string Script(const Plot& plot, const std::string& terminal, const std::str
   }
   const Eigen::Vector2i size = CanvasSize(plot);
   script += fmt::format(
-      "set terminal {} noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
+      "set terminal pngcairo noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
       "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
       "set grid linecolor '#dddddd' linewidth 1\n"
       "set key tmargin center horizontal samplen 2\n"
       "set lmargin 11\nset rmargin 5\n",
-      terminal, size.x(), size.y());
-  script += fmt::format("{}set title {} font ',17'\nset xlabel {}\nset ylabel {}\n", output,
-                        Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
+      size.x(), size.y());
+  script +=
+      fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
+                  Quoted(path), Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
   if (plot.equal_axes) {
     script += "set size ratio -1\n";
   }
@@ -144,17 +145,17 @@ class MemoryFile {
   int fd_;
 };
 
-// What gnuplot writes to its standard output; `what` is for the error.
-std::string RunGnuplot(const std::string& commands, const std::string& what) {
+// `what` is for the error.
+void RunGnuplot(const std::string& commands, const std::string& what) {
   const MemoryFile script("gnuplot script");
-  const MemoryFile written("gnuplot stdout");
   const MemoryFile complaints("gnuplot stderr");
   script.Write(commands);
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, written.fd(), STDOUT_FILENO);
+  // Where gnuplot may not write a file it complains, and writes the picture to its output.
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, complaints.fd(), STDERR_FILENO);
   std::array<char*, 2> argv = {const_cast<char*>("gnuplot"), nullptr};
   pid_t pid = 0;
@@ -171,7 +172,6 @@ std::string RunGnuplot(const std::string& commands, const std::string& what) {
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw std::runtime_error(fmt::format("{}: gnuplot failed: {}", what, complaints.Read()));
   }
-  return written.Read();
 }
 
 }  // namespace
@@ -182,12 +182,6 @@ std::string AgentColour(size_t index) {
   return kColours[index % kColours.size()];
 }
 
-void WritePng(const Plot& plot, const std::string& path) {
-  RunGnuplot(Script(plot, "pngcairo", fmt::format("set output {}\n", Quoted(path))), path);
-}
-
-std::string SvgOf(const Plot& plot) {
-  return RunGnuplot(Script(plot, "svg dynamic", ""), fmt::format("'{}'", plot.title));
-}
+void WritePng(const Plot& plot, const std::string& path) { RunGnuplot(Script(plot, path), path); }
 
 }  // namespace pangea

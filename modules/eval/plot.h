@@ -1,7 +1,7 @@
 #pragma once
 
-// Line plots as PNG files and as SVG, drawn by gnuplot (Debian package gnuplot-nox) as a child
-// process. The same lines give the same bytes.
+// Line plots, and their pictures as PNG files, drawn by gnuplot (Debian package gnuplot-nox) as a
+// child process. The same lines give the same bytes.
 
 #include <Eigen/Core>
 #include <limits>
@@ -16,6 +16,7 @@ inline const Eigen::Vector2d kPlotBreak =
 
 struct PlotLine {
   std::string label = {};  // in the legend; empty for none
+  std::string name = {};   // where a chart can be asked: what this line is; empty: its label
   std::string colour;      // "#rrggbb"
   double width = 2;
   bool dashed = false;
@@ -41,7 +42,5 @@ inline constexpr const char* kGroundTruthColour = "#999999";
 
 // Throws std::runtime_error when gnuplot is absent, naming the package, or when it fails.
 void WritePng(const Plot& plot, const std::string& path);
-// The same picture as text.
-std::string SvgOf(const Plot& plot);
 
 }  // namespace pangea

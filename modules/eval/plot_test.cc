@@ -55,17 +55,6 @@ TEST_F(PlotTest, NothingToDrawIsAPictureToo) {
   EXPECT_THAT(Bytes(), StartsWith("\x89PNG"));
 }
 
-TEST_F(PlotTest, TheSamePictureAsSvg) {
-  Plot plot = Circle();
-  plot.y_names = {"one", "two"};
-  const std::string svg = SvgOf(plot);
-  EXPECT_THAT(svg, HasSubstr("<svg "));
-  EXPECT_THAT(svg, HasSubstr("</svg>"));
-  EXPECT_THAT(svg, HasSubstr("circle_1"));
-  EXPECT_THAT(svg, HasSubstr(">two<"));
-  EXPECT_EQ(SvgOf(plot), svg);
-}
-
 TEST(TableTest, HtmlHoldsTextsAsTheyAre) {
   Table table({"a < b", "n"});
   EXPECT_TRUE(table.empty());

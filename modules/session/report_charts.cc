@@ -64,10 +64,14 @@ struct Bar {
   double from_s = 0;
   double to_s = 0;
   size_t colour = 0;
+  std::string name = {};
+  int32_t frame_agent = 0;  // in whose map frame it is
 };
 
 void AddBar(const Bar& bar, double to_s, Plot* plot) {
-  plot->lines.push_back({.colour = AgentColour(bar.colour),
+  plot->lines.push_back({.name = fmt::format("{}, {:.1f} to {:.1f} s: in agent {}'s map frame",
+                                             bar.name, bar.from_s, to_s, bar.frame_agent),
+                         .colour = AgentColour(bar.colour),
                          .width = 14,
                          .points = {{bar.from_s, bar.y}, {to_s, bar.y}}});
 }
@@ -95,10 +99,12 @@ Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
   plot.y_from_zero = false;
   std::map<MapId, Bar> bars = Bars(session, figures);
   std::map<int32_t, int> maps_of_agent;
-  for (const auto& [map, bar] : bars) {
+  for (auto& [map, bar] : bars) {
     const int nth = ++maps_of_agent[map.agent_id];
-    plot.y_names.push_back(nth == 1 ? fmt::format("agent {}", map.agent_id)
-                                    : fmt::format("agent {}, map {}", map.agent_id, nth));
+    bar.name = nth == 1 ? fmt::format("agent {}", map.agent_id)
+                        : fmt::format("agent {}, map {}", map.agent_id, nth);
+    bar.frame_agent = map.agent_id;
+    plot.y_names.push_back(bar.name);
   }
   std::ranges::reverse(plot.y_names);
   plot.height = std::min(300 + 40 * static_cast<int>(bars.size()), 1200);
@@ -115,6 +121,7 @@ Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
       bar->second.from_s = change.session_s;
       bar->second.to_s = std::max(bar->second.to_s, change.session_s);
       bar->second.colour = colour;
+      bar->second.frame_agent = change.frame.agent_id;
       joints.push_back(
           {.colour = "#555555",
            .width = 1.5,

@@ -1,6 +1,6 @@
 #pragma once
 
-// report.html: the whole report as one page that needs nothing else, no network and no scripts.
+// report.html: the whole report as one page that needs nothing else: no network, no further file.
 
 #include <string>
 
@@ -9,7 +9,6 @@
 
 namespace pangea::session {
 
-// Pictures are drawn by gnuplot; where it is missing the page says so in their place.
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
                        const ReportFigures& figures);
 

@@ -95,6 +95,7 @@ Picture AllWithGroundTruth(const ReportFigures& figures) {
   for (const AgentFigures& agent : figures.agents) {
     if (!agent.ground_truth.empty()) {
       picture.plot.lines.push_back({.label = picture.plot.lines.empty() ? "ground truth" : "",
+                                    .name = "ground truth",
                                     .colour = kGroundTruthColour,
                                     .width = 5,
                                     .points = TopView(agent.ground_truth, Alignment())});
