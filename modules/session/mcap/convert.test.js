@@ -1,17 +1,29 @@
-// The captured sample as MCAP, read again: nothing is lost, and what is drawn is what was said.
+// The captured sample as MCAP, read again: nothing is lost, what is drawn is what was said, and what Foxglove knows by its name
+// has Foxglove's own fields.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import test from "node:test";
 import { McapIndexedReader, TempBuffer } from "@mcap/core";
-import { convert } from "./convert.js";
+import Ajv from "ajv";
+import { convert, wellKnown } from "./convert.js";
+import { Drawn } from "./drawn.js";
 
 const [program, log] = process.env.PANGEA_LOG.split(" ");
 const events = execFileSync(program, ["list", log, "--json", "--channels", "(POSE_.*|CORRECTION_.*|MAP_STATE|CONSTRAINT|STATUS_.*)"],
   { encoding: "utf8", maxBuffer: 1 << 28 }).trim().split("\n").map((line) => JSON.parse(line));
 
+const kPly = `ply
+format ascii 1.0
+comment map frame: odom of map 1/5, metres, z up
+element vertex 2
+end_header
+1.5 -2.25 3 0 114 178
+4 5 6 213 94 0
+`;
+
 const buffer = new TempBuffer();
-await convert(events.map((event) => JSON.stringify(event)), buffer);
+await convert(events.map((event) => JSON.stringify(event)), buffer, [kPly]);
 const reader = await McapIndexedReader.Initialize({ readable: buffer });
 
 async function messagesOf(topic) {
@@ -59,4 +71,81 @@ test("verdicts say why", async () => {
   assert.equal(verdicts.length, events.filter(({ channel }) => channel === "CONSTRAINT").length);
   assert.ok(verdicts.some(({ message }) => message.level === 2 && message.message.endsWith("accepted")));
   assert.ok(verdicts.some(({ message }) => message.level === 3 && message.message.includes("the surroundings contradict")));
+});
+
+test("what Foxglove knows has the fields that its schemas want, and no others", async () => {
+  const ajv = new Ajv({ strict: false, validateFormats: false });
+  const seen = new Set();
+  for await (const { channelId, data } of reader.readMessages()) {
+    const { name, data: said } = reader.schemasById.get(reader.channelsById.get(channelId).schemaId);
+    if (!name.startsWith("foxglove.")) continue;
+    seen.add(name);
+    const message = JSON.parse(new TextDecoder().decode(data));
+    const schema = JSON.parse(new TextDecoder().decode(said));
+    assert.deepEqual(schema, wellKnown(name));
+    assert.ok(ajv.validate(schema, message), `${name}: ${ajv.errorsText()}`);
+    assert.deepEqual(Object.keys(message).sort(), Object.keys(schema.properties).sort(), name);
+  }
+  assert.deepEqual([...seen].sort(), ["FrameTransform", "Log", "PointCloud", "PoseInFrame", "PosesInFrame", "SceneUpdate"]
+    .map((name) => `foxglove.${name}`));
+});
+
+test("points are those of the PLY file", async () => {
+  const [{ utime, message }] = await messagesOf("/points/1/5");
+  assert.equal(utime, events[0].utime);
+  assert.equal(message.frame_id, "map 1/5");
+  const bytes = Buffer.from(message.data, "base64");
+  assert.equal(bytes.length, 2 * message.point_stride);
+  assert.deepEqual([0, 4, 8].map((offset) => bytes.readFloatLE(offset)), [1.5, -2.25, 3]);
+  assert.deepEqual([...bytes.subarray(16 + 12)], [213, 94, 0, 255]);
+});
+
+// What is to be seen after these messages of /scene, by id.
+function seenAfter(updates) {
+  const alive = new Map();
+  for (const { deletions, entities } of updates) {
+    deletions.forEach(({ id }) => alive.delete(id));
+    entities.forEach((entity) => alive.set(entity.id, entity));
+  }
+  return alive;
+}
+
+test("the scene has every trajectory and the constraints between them", async () => {
+  const alive = seenAfter((await messagesOf("/scene")).map(({ message }) => message));
+  const last = events.filter(({ channel }) => channel === "MAP_STATE").at(-1).message;
+  assert.equal(last.maps.length, 2);
+  const frame = `map ${last.group.agent_id}/${last.group.opened_utime}`;
+  assert.equal(alive.size, 4, [...alive.keys()].join());
+  assert.ok([...alive.values()].every(({ frame_id }) => frame_id === frame));
+  const points = (id) => alive.get(`${frame}: ${id}`).lines[0].points;
+  for (const { agent_id, opened_utime } of last.maps) {
+    const positions = last.keyframes.filter(({ id }) => id.map.agent_id === agent_id).map(({ T_map_body }) => T_map_body.translation);
+    assert.deepEqual(points(`trajectory ${agent_id}/${opened_utime}`), positions);
+  }
+  const accepted = events.filter(({ channel, message }) => channel === "CONSTRAINT" && message.accepted).length;
+  assert.ok(points("accepted").length > 0.8 * 2 * accepted && points("accepted").length <= 2 * accepted, points("accepted").length);
+  assert.ok(points("refused").length > 0);
+});
+
+test("a group that became part of another is not drawn any more", () => {
+  const [one, two] = [1, 2].map((agent_id) => ({ agent_id, opened_utime: 5 }));
+  const T_map_body = { translation: { x: 0, y: 0, z: 0 }, rotation: { x: 0, y: 0, z: 0, w: 1 } };
+  const state = (revision, group, maps) => ({ utime: 7, channel: "MAP_STATE", type: "map_state_t", message: {
+    group, revision, chunk: 0, num_chunks: 1, maps, keyframes: maps.map((map) => ({ id: { map, seq: 0 }, T_map_body })) } });
+  const drawn = new Drawn();
+  const updates = [state(1, one, [one]), state(2, two, [two]), state(3, one, [one, two])]
+    .flatMap((event) => drawn.of(event)).filter(([topic]) => topic === "/scene").map(([, , message]) => message);
+  assert.deepEqual([...seenAfter(updates.slice(0, 2)).keys()].filter((id) => id.includes("trajectory")),
+    ["map 1/5: trajectory 1/5", "map 2/5: trajectory 2/5"]);
+  assert.deepEqual([...seenAfter(updates).keys()].sort(), ["accepted", "refused", "trajectory 1/5", "trajectory 2/5"].map((id) => `map 1/5: ${id}`));
+});
+
+test("a fused map's own frame lies in its group's", async () => {
+  const transforms = await messagesOf("/tf");
+  assert.ok(transforms.length > 0);
+  const said = events.filter(({ channel, message }) => channel === "CORRECTION_2" && message.group.agent_id === 1).at(-1).message;
+  const { parent_frame_id, child_frame_id, translation } = transforms.at(-1).message;
+  assert.match(parent_frame_id, /^map 1\//);
+  assert.match(child_frame_id, /^map 2\//);
+  assert.deepEqual(translation, said.T_map_odom.translation);
 });
