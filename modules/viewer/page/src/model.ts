@@ -1,6 +1,6 @@
 // What the page knows of the scene, and where each keyframe is to be drawn.
 
-import { Matrix4, Quaternion, Vector3 } from "three";
+import { Box3, Matrix4, Quaternion, Vector3 } from "three";
 import type {
   AgentSaid, ConstraintSaid, FusionSaid, MapSaid, PoseNumbers, ProcessSaid, Update,
 } from "./protocol";
@@ -11,7 +11,17 @@ export class Pose {
     return new Pose(new Vector3(n[0], n[1], n[2]), new Quaternion(n[4], n[5], n[6], n[3]));
   }
   times(other: Pose): Pose {
-    return new Pose(this.apply(other.t), this.q.clone().multiply(other.q));
+    return new Pose().setProduct(this, other);
+  }
+  copy({ t, q }: Pose): this {
+    this.t.copy(t);
+    this.q.copy(q);
+    return this;
+  }
+  setProduct(a: Pose, b: Pose): this {
+    this.t.copy(b.t).applyQuaternion(a.q).add(a.t);
+    this.q.multiplyQuaternions(a.q, b.q);
+    return this;
   }
   inverse(): Pose {
     const q = this.q.clone().conjugate();
@@ -63,6 +73,8 @@ export class Model {
   constraints: ConstraintSaid[] = [];
   processes = new Map<string, ProcessSaid>();
   fusions: FusionSaid[] = [];
+  readonly box = new Box3(); // of where all keyframes belong
+  private readonly unsettled = new Set<number>(); // keyframes that are new, or not where they belong
 
   apply(update: Update) {
     if (update.start) {
@@ -108,7 +120,8 @@ export class Model {
     if (update.start || update.maps.length + update.keyframes.length + update.solved.length > 0) this.place();
     for (const { index } of update.keyframes) {
       const keyframe = this.keyframes[index];
-      keyframe.shown = new Pose(keyframe.target.t.clone(), keyframe.target.q.clone());
+      keyframe.shown.copy(keyframe.target);
+      this.unsettled.add(index);
     }
   }
 
@@ -160,52 +173,65 @@ export class Model {
 
   // Where every keyframe belongs: in its group's frame, the groups side by side.
   place() {
-    const boxes = new Map<number, { min: Vector3; max: Vector3; agent: number }>();
+    const boxes: Boxes = new Map();
     for (const keyframe of this.keyframes) {
       if (!keyframe?.arrived) continue;
       const map = this.maps[keyframe.map];
-      const cell = this.before ? keyframe.map : map.said.group;
-      keyframe.target = this.inGroup(keyframe, map);
-      const box = boxes.get(cell);
+      this.placeInGroup(keyframe, map);
+      const { t } = keyframe.target;
+      const box = boxes.get(this.cellOf(keyframe));
       if (box) {
-        box.min.min(keyframe.target.t);
-        box.max.max(keyframe.target.t);
+        box.min.min(t);
+        box.max.max(t);
         box.agent = Math.min(box.agent, map.said.agent);
       } else {
-        const t = keyframe.target.t;
-        boxes.set(cell, { min: t.clone(), max: t.clone(), agent: map.said.agent });
+        boxes.set(this.cellOf(keyframe), { min: t.clone(), max: t.clone(), agent: map.said.agent });
       }
     }
     const offsets = layOut(boxes);
-    for (const keyframe of this.keyframes) {
-      if (!keyframe?.arrived) continue;
-      const map = this.maps[keyframe.map];
-      keyframe.target.t.add(offsets.get(this.before ? keyframe.map : map.said.group)!);
-    }
-  }
-
-  private inGroup(keyframe: Keyframe, map: Map_): Pose {
-    const { T_odom_body, solved } = keyframe;
-    if (this.before) return new Pose(T_odom_body.t.clone(), T_odom_body.q.clone());
-    if (solved && solved.group === map.said.group) {
-      return new Pose(solved.T_map_body.t.clone(), solved.T_map_body.q.clone());
-    }
-    return map.T_map_odom.times(T_odom_body);
-  }
-
-  // Moves what is shown towards where it belongs; false once it is there.
-  settle(share: number): boolean {
-    let moving = false;
-    for (const keyframe of this.keyframes) {
-      if (!keyframe?.arrived) continue;
+    this.box.makeEmpty();
+    this.keyframes.forEach((keyframe, k) => {
+      if (!keyframe?.arrived) return;
       const { shown, target } = keyframe;
-      const far =
-        shown.t.distanceToSquared(target.t) > 1e-6 || shown.q.angleTo(target.q) > 1e-3;
-      shown.t.lerp(target.t, far ? share : 1);
-      shown.q.slerp(target.q, far ? share : 1);
-      moving ||= far;
+      target.t.add(offsets.get(this.cellOf(keyframe))!);
+      this.box.expandByPoint(target.t);
+      if (!shown.t.equals(target.t) || !shown.q.equals(target.q)) this.unsettled.add(k);
+    });
+  }
+
+  private cellOf(keyframe: Keyframe): number {
+    return this.before ? keyframe.map : this.maps[keyframe.map].said.group;
+  }
+
+  private placeInGroup({ T_odom_body, solved, target }: Keyframe, map: Map_) {
+    if (this.before) {
+      target.copy(T_odom_body);
+    } else if (solved && solved.group === map.said.group) {
+      target.copy(solved.T_map_body);
+    } else {
+      target.setProduct(map.T_map_odom, T_odom_body);
     }
-    return moving;
+  }
+
+  get moving(): boolean {
+    return this.unsettled.size > 0;
+  }
+
+  // Moves what is shown towards where it belongs; which keyframes it moved, or shows for the first time.
+  settle(share: number): number[] {
+    const moved = [...this.unsettled];
+    for (const k of moved) {
+      const { shown, target } = this.keyframes[k];
+      const far = shown.t.distanceToSquared(target.t) > 1e-6 || shown.q.angleTo(target.q) > 1e-3;
+      if (far) {
+        shown.t.lerp(target.t, share);
+        shown.q.slerp(target.q, share);
+      } else {
+        shown.copy(target);
+        this.unsettled.delete(k);
+      }
+    }
+    return moved;
   }
 }
 

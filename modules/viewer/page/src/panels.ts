@@ -140,6 +140,10 @@ export function drawHealth(model: Model) {
 
 export function drawLegend(gridCell_m: number, ellipseScale: number, leftOut: number) {
   const { accepted, refused } = colours();
+  const legend = byId("legend");
+  const told = [accepted, gridCell_m, ellipseScale, leftOut].join();
+  if (legend.dataset.told === told) return;
+  legend.dataset.told = told;
   const line = (colour: string, style: string, text: string) => {
     const entry = element("span", "entry");
     const sample = element("i", "sample");
@@ -147,7 +151,7 @@ export function drawLegend(gridCell_m: number, ellipseScale: number, leftOut: nu
     entry.append(sample, text);
     return entry;
   };
-  byId("legend").replaceChildren(
+  legend.replaceChildren(
     line("currentColor", "solid", `grid ${gridCell_m} m`),
     line(accepted, "solid", "accepted constraint"),
     line(refused, "dashed", "refused"),

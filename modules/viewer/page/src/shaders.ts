@@ -4,9 +4,10 @@
 
 import { DataTexture, FloatType, NearestFilter, RGBAFormat, ShaderMaterial } from "three";
 import type { Color, Vector2 } from "three";
-import type { Keyframe } from "./model";
+import type { Pose } from "./model";
 
 const kPerRow = 256; // keyframes in a row of the texture
+const kNumbers = 12; // of a keyframe: three texels
 
 const lookUp = /* glsl */ `
   uniform highp sampler2D poses;
@@ -25,36 +26,67 @@ const lookUp = /* glsl */ `
 export class PoseTexture {
   readonly uniform: { value: DataTexture };
   private data = new Float32Array(0);
+  private whole = true; // nothing of it is on the graphics card yet, or it is to be sent anew
+  private readonly changed = new Map<number, { start: number; count: number }>(); // what is to be sent, by row
 
   constructor() {
     this.uniform = { value: this.make(1) };
   }
 
   private make(rows: number): DataTexture {
-    const data = new Float32Array(kPerRow * 3 * 4 * rows);
+    const data = new Float32Array(kPerRow * kNumbers * rows);
     data.set(this.data);
     this.data = data;
+    this.whole = true;
+    this.changed.clear();
     const texture = new DataTexture(data, kPerRow * 3, rows, RGBAFormat, FloatType);
     texture.minFilter = texture.magFilter = NearestFilter;
     texture.needsUpdate = true;
+    texture.onUpdate = () => this.sent();
     return texture;
   }
 
-  write(keyframes: Keyframe[], colourOf: (keyframe: Keyframe) => Color) {
-    const rows = Math.max(1, Math.ceil(keyframes.length / kPerRow));
-    if (rows > this.uniform.value.image.height) {
+  private sent() {
+    this.whole = false;
+    this.changed.clear();
+  }
+
+  clear() {
+    this.data.fill(0);
+    this.whole = true;
+    this.changed.clear();
+    this.uniform.value.clearUpdateRanges();
+    this.uniform.value.needsUpdate = true;
+  }
+
+  set(keyframe: number, { t, q }: Pose, colour: Color) {
+    const row = Math.floor(keyframe / kPerRow);
+    if (row >= this.uniform.value.image.height) {
       this.uniform.value.dispose();
-      this.uniform.value = this.make(2 * rows);
+      this.uniform.value = this.make(2 * (row + 1));
     }
     const { data } = this;
-    data.fill(0);
-    keyframes.forEach((keyframe, k) => {
-      if (!keyframe.arrived) return;
-      const { t, q } = keyframe.shown;
-      const colour = colourOf(keyframe);
-      data.set([t.x, t.y, t.z, 1, q.x, q.y, q.z, q.w, colour.r, colour.g, colour.b, 0], 12 * k);
-    });
+    let at = kNumbers * keyframe;
+    data[at++] = t.x, data[at++] = t.y, data[at++] = t.z, data[at++] = 1;
+    data[at++] = q.x, data[at++] = q.y, data[at++] = q.z, data[at++] = q.w;
+    data[at++] = colour.r, data[at++] = colour.g, data[at++] = colour.b;
+    if (!this.whole) this.send(keyframe, row);
     this.uniform.value.needsUpdate = true;
+  }
+
+  // Of each row, from the first that changed to the last.
+  private send(keyframe: number, row: number) {
+    const start = kNumbers * keyframe;
+    const range = this.changed.get(row);
+    if (!range) {
+      const texture = this.uniform.value;
+      texture.addUpdateRange(start, kNumbers);
+      this.changed.set(row, texture.updateRanges.at(-1)!);
+      return;
+    }
+    const end = Math.max(range.start + range.count, start + kNumbers);
+    range.start = Math.min(range.start, start);
+    range.count = end - range.start;
   }
 }
 

@@ -1,31 +1,18 @@
-// The drawing: points, trajectories, constraints, and each agent's camera, tail and ellipse.
+// The drawing: points, trajectories, constraints, agents. A frame sends the graphics card what changed
+// since the last one and nothing else.
 
-import {
-  BufferAttribute, BufferGeometry, Box3, Color, GridHelper, Group, Line, LineBasicMaterial,
-  LineLoop, LineSegments, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer,
-} from "three";
+import { Box3, Color, GridHelper, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { AgentDrawing } from "./agents";
 import { Lines, PointCloud } from "./buffers";
-import { Model, Pose } from "./model";
+import { Model } from "./model";
 import type { AgentSaid, ConstraintSaid, Update } from "./protocol";
 import { agentColour, colours } from "./palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
-// 95 % of a two-dimensional Gaussian lie within this many standard deviations.
-const kEllipse95 = 2.4477;
-const kTail = 400; // poses of an agent since its newest keyframe
-const kFrustumDepth = 0.6; // metres
 const kHoverPixels = 8;
 
-interface AgentDrawing {
-  group: Group;
-  frustum: LineSegments;
-  ellipse: LineLoop;
-  tail: Line;
-  trail: { map: number; p_odom: Vector3 }[];
-  label: HTMLElement;
-  view: string; // what the frustum was made of
-}
+const wantsStill = matchMedia("(prefers-reduced-motion: reduce)");
 
 export class Stage {
   private readonly renderer: WebGLRenderer;
@@ -41,8 +28,10 @@ export class Stage {
   private readonly refused: Lines;
   private readonly hovered: Lines;
   private readonly agents = new Map<number, AgentDrawing>();
+  private readonly colourOf = new Map<number, Color>(); // of an agent
   private grid?: GridHelper;
-  private constraintsDrawn = -1;
+  private readonly drawnConstraints = new Set<number>();
+  private readonly waitingConstraints = new Set<number>(); // new, or an end has not come
   private userMoved = false;
   private fittedTo = new Box3();
   private dirty = true;
@@ -82,12 +71,12 @@ export class Stage {
     this.scene.background = new Color(colours().background);
     if (this.grid) this.scene.remove(this.grid);
     this.grid = undefined;
-    this.constraintsDrawn = -1;
-    for (const drawing of this.agents.values()) {
-      drawing.group.removeFromParent();
-      drawing.label.remove();
-    }
+    for (const drawing of this.agents.values()) drawing.remove();
     this.agents.clear();
+    for (const agent of this.model.agents.values()) this.drawing(agent).take(agent);
+    this.colourOf.clear();
+    this.model.keyframes.forEach((_, k) => this.writePose(k));
+    this.redrawConstraints();
     this.redraw();
   }
 
@@ -102,17 +91,20 @@ export class Stage {
 
   take(update: Update) {
     if (update.start) {
+      this.poses.clear();
       this.points.clear();
       this.trajectories.clear();
-      this.constraintsDrawn = -1;
-      for (const drawing of this.agents.values()) drawing.trail.length = 0;
+      this.waitingConstraints.clear();
+      this.redrawConstraints();
+      for (const drawing of this.agents.values()) drawing.forgetTrail();
     }
     for (const said of update.keyframes) {
       this.points.add(said.index, said.points);
       this.connect(said.map, said.seq, said.index);
     }
-    for (const agent of update.agents) this.extendTail(agent);
-    if (update.constraints.length + update.keyframes.length > 0) this.constraintsDrawn = -1;
+    for (const agent of update.agents) this.drawing(agent).take(agent);
+    for (const { index } of update.constraints) this.waitingConstraints.add(index);
+    if (update.constraints.some(({ index }) => this.drawnConstraints.has(index))) this.redrawConstraints();
     this.redraw();
   }
 
@@ -126,121 +118,53 @@ export class Stage {
     if (after !== undefined && after < index) this.trajectories.add(index, after, [-1, 0, 0, 0]);
   }
 
-  private extendTail(agent: AgentSaid) {
-    const drawing = this.drawing(agent);
-    if (agent.map < 0) return;
-    drawing.trail.push({ map: agent.map, p_odom: Pose.of(agent.T_odom_body).t });
-    if (drawing.trail.length > kTail) drawing.trail.shift();
-  }
-
   private drawing(agent: AgentSaid): AgentDrawing {
     const known = this.agents.get(agent.id);
     if (known) return known;
-    const material = new LineBasicMaterial({ color: agentColour(agent.id) });
-    const circle = new BufferGeometry().setFromPoints(
-      Array.from({ length: 48 }, (_, i) => {
-        const angle = (i / 24) * Math.PI;
-        return new Vector3(Math.cos(angle), Math.sin(angle), 0);
-      }),
-    );
-    const frustum = new LineSegments(frustumGeometry(agent), material);
-    const ellipse = new LineLoop(circle, material);
-    ellipse.matrixAutoUpdate = false;
-    const tailGeometry = new BufferGeometry();
-    tailGeometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * (kTail + 2)), 3));
-    const tail = new Line(tailGeometry, material);
-    for (const object of [frustum, ellipse, tail]) object.frustumCulled = false;
-    frustum.matrixAutoUpdate = false;
-    const group = new Group();
-    group.add(frustum, ellipse, tail);
-    this.scene.add(group);
-    const label = document.createElement("span");
-    label.textContent = String(agent.id);
-    label.style.background = agentColour(agent.id);
-    this.labels.append(label);
-    const drawing = { group, frustum, ellipse, tail, trail: [], label, view: String(agent.view) };
+    const drawing = new AgentDrawing(agent, this.labels);
+    this.scene.add(drawing.group);
     this.agents.set(agent.id, drawing);
     return drawing;
   }
 
   private drawAgents() {
-    const present = new Set<number>();
-    for (const agent of this.model.agents.values()) {
-      const pose = this.model.shownPose(agent);
-      const drawing = this.drawing(agent);
-      present.add(agent.id);
-      drawing.group.visible = pose !== undefined;
-      drawing.label.hidden = pose === undefined;
-      if (!pose) continue;
-      if (drawing.view !== String(agent.view)) {
-        drawing.view = String(agent.view);
-        drawing.frustum.geometry.dispose();
-        drawing.frustum.geometry = frustumGeometry(agent);
-      }
-      drawing.frustum.matrix.copy(pose.times(Pose.of(agent.T_body_cam)).matrix());
-      this.drawEllipse(agent, pose, drawing.ellipse);
-      this.drawTail(agent, pose, drawing);
-      const at = pose.t.clone().add(new Vector3(0, 0, 0.5)).project(this.camera);
-      const { clientWidth, clientHeight } = this.renderer.domElement;
-      drawing.label.style.transform =
-        `translate(-50%, -100%) translate(${((at.x + 1) / 2) * clientWidth}px, ${((1 - at.y) / 2) * clientHeight}px)`;
-      drawing.label.hidden = at.z > 1;
-    }
     for (const [id, drawing] of this.agents) {
-      if (!present.has(id)) {
-        drawing.group.visible = false;
-        drawing.label.hidden = true;
+      const agent = this.model.agents.get(id);
+      const pose = agent && this.model.shownPose(agent);
+      if (!pose) {
+        drawing.hide();
+        continue;
       }
+      const newest = this.model.keyframes[this.model.maps[agent.map].newest];
+      drawing.place(pose, newest, this.model.before ? 0 : this.ellipseScale);
+      drawing.placeLabel(pose, this.camera, this.renderer.domElement);
     }
   }
 
-  private drawEllipse(agent: AgentSaid, pose: Pose, ellipse: LineLoop) {
-    const c = agent.covariance_m2;
-    ellipse.visible = c !== undefined && this.ellipseScale > 0 && !this.model.before;
-    if (!c) return;
-    // Cholesky: [xx xy; xy yy] = L L^T, and L takes the unit circle to the ellipse.
-    const scale = kEllipse95 * this.ellipseScale;
-    const a = Math.sqrt(c[0]);
-    const b = c[1] / a;
-    const d = Math.sqrt(Math.max(0, c[2] - b * b));
-    ellipse.matrix.set(
-      scale * a, 0, 0, pose.t.x,
-      scale * b, scale * d, 0, pose.t.y,
-      0, 0, 1, pose.t.z,
-      0, 0, 0, 1,
-    );
+  private writePose(k: number) {
+    const keyframe = this.model.keyframes[k];
+    if (!keyframe?.arrived) return;
+    const agent = this.model.agentOf(keyframe);
+    const colour = this.colourOf.get(agent) ?? new Color(agentColour(agent));
+    this.colourOf.set(agent, colour);
+    this.poses.set(k, keyframe.shown, colour);
   }
 
-  // From the newest keyframe to where the agent is.
-  private drawTail(agent: AgentSaid, pose: Pose, drawing: AgentDrawing) {
-    const map = this.model.maps[agent.map];
-    const keyframe = this.model.keyframes[map.newest];
-    const shown_odom = keyframe.shown.times(keyframe.T_odom_body.inverse());
-    const trail = drawing.trail.filter((at) => at.map === agent.map);
-    // Where odometry passed the newest keyframe.
-    let from = 0;
-    let least = Infinity;
-    trail.forEach(({ p_odom }, i) => {
-      const distance = p_odom.distanceToSquared(keyframe.T_odom_body.t);
-      if (distance < least) [from, least] = [i, distance];
-    });
-    const positions = drawing.tail.geometry.getAttribute("position") as BufferAttribute;
-    let n = 0;
-    const add = (p: Vector3) => positions.setXYZ(n++, p.x, p.y, p.z);
-    add(keyframe.shown.t);
-    for (const { p_odom } of trail.slice(from)) add(shown_odom.apply(p_odom));
-    add(pose.t);
-    drawing.tail.geometry.setDrawRange(0, n);
-    positions.needsUpdate = true;
+  private redrawConstraints() {
+    this.accepted.clear();
+    this.refused.clear();
+    this.drawnConstraints.clear();
+    this.model.constraints.forEach((_, index) => this.waitingConstraints.add(index));
   }
 
   private drawConstraints() {
-    this.constraintsDrawn = this.model.constraints.length;
-    this.accepted.clear();
-    this.refused.clear();
-    for (const constraint of this.model.constraints) {
-      const ends = constraint && this.model.ends(constraint);
-      if (ends) (constraint.accepted ? this.accepted : this.refused).add(...ends, styleOf(constraint));
+    for (const index of this.waitingConstraints) {
+      const constraint = this.model.constraints[index];
+      const ends = this.model.ends(constraint);
+      if (!ends) continue;
+      (constraint.accepted ? this.accepted : this.refused).add(...ends, styleOf(constraint));
+      this.drawnConstraints.add(index);
+      this.waitingConstraints.delete(index);
     }
   }
 
@@ -276,14 +200,6 @@ export class Stage {
     return [pixel(a), pixel(b)];
   }
 
-  private bounds(): Box3 {
-    const box = new Box3();
-    for (const keyframe of this.model.keyframes) {
-      if (keyframe?.arrived) box.expandByPoint(keyframe.target.t);
-    }
-    return box.isEmpty() ? box : box.expandByScalar(1.5);
-  }
-
   fit() {
     this.userMoved = false;
     this.fittedTo.makeEmpty();
@@ -292,8 +208,8 @@ export class Stage {
 
   // Keeps everything in view until the user takes the camera.
   private followBounds(share: number): boolean {
-    const box = this.bounds();
-    if (box.isEmpty()) return false;
+    if (this.model.box.isEmpty()) return false;
+    const box = this.model.box.clone().expandByScalar(1.5);
     this.drawGrid(box);
     if (this.userMoved) return false;
     if (!this.fittedTo.containsBox(box) || tooLarge(this.fittedTo, box)) {
@@ -347,19 +263,12 @@ export class Stage {
   frame(now_ms: number, always = false): boolean {
     const share = 1 - Math.exp(-Math.min(now_ms - this.last_ms, 100) / 350);
     this.last_ms = now_ms;
-    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const step = wantsStill.matches ? 1 : share;
     if (this.posesDirty) {
-      if (this.constraintsDrawn < 0) this.drawConstraints();
-      const coloursOf = new Map<number, Color>();
-      const moving = this.model.settle(still ? 1 : share);
-      this.poses.write(this.model.keyframes, (keyframe) => {
-        const agent = this.model.agentOf(keyframe);
-        const known = coloursOf.get(agent) ?? new Color(agentColour(agent));
-        coloursOf.set(agent, known);
-        return known;
-      });
-      const following = this.followBounds(still ? 1 : share);
-      this.posesDirty = moving || following;
+      this.drawConstraints();
+      for (const k of this.model.settle(step)) this.writePose(k);
+      const following = this.followBounds(step);
+      this.posesDirty = this.model.moving || following;
       this.dirty = true;
     }
     this.controls.update();
@@ -375,16 +284,6 @@ function styleOf(constraint: ConstraintSaid): [number, number, number, number] {
   const { accepted, refused } = colours();
   const colour = new Color(constraint.accepted ? accepted : refused);
   return [colour.r, colour.g, colour.b, constraint.accepted ? 0 : 5];
-}
-
-function frustumGeometry(agent: AgentSaid): BufferGeometry {
-  const [left, top, right, bottom] = agent.view;
-  const corner = (x: number, y: number) => new Vector3(x, y, 1).multiplyScalar(kFrustumDepth);
-  const corners = [corner(left, top), corner(right, top), corner(right, bottom), corner(left, bottom)];
-  const eye = new Vector3();
-  return new BufferGeometry().setFromPoints(
-    corners.flatMap((c, i) => [eye, c, c, corners[(i + 1) % 4]]),
-  );
 }
 
 function distanceToSegment(p: Vector2, a: Vector2, b: Vector2): number {
