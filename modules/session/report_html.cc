@@ -37,7 +37,8 @@ h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--edge); }
 .chart svg { width: 100%; height: auto; touch-action: pan-y; }
 .chart text { fill: currentColor; font-size: 14px; }
 .grid { stroke: var(--edge); }
-.line { fill: none; stroke: var(--line); stroke-linejoin: round; filter: brightness(var(--bright)); }
+.line { fill: none; stroke: var(--line); stroke-linejoin: round; }
+.line, .legend span, .marks circle, .tip i { filter: brightness(var(--bright)); }
 .line circle { fill: var(--line); stroke: none; }
 .line.dashed { stroke-dasharray: 6 4; }
 .line.off { display: none; }
