@@ -51,6 +51,22 @@ endfunction()
 
 add_custom_target(programs)
 
+# A program's manual page, where help2man is at hand.
+find_program(HELP2MAN help2man)
+function(pangea_manual_page name)
+  if(NOT HELP2MAN OR PANGEA_SANITIZE)
+    return()
+  endif()
+  set(maker ${CMAKE_SOURCE_DIR}/packaging/manual_page)
+  set(page ${CMAKE_BINARY_DIR}/man/${name}.1.gz)
+  add_custom_command(OUTPUT ${page}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man
+    COMMAND ${maker} $<TARGET_FILE:${name}> ${PROJECT_VERSION} ${page}
+    DEPENDS ${name} ${maker} COMMENT "Manual page of ${name}")
+  add_custom_target(${name}_manual_page ALL DEPENDS ${page})
+  install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+endfunction()
+
 # pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
 function(pangea_program name)
   cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
@@ -64,6 +80,7 @@ function(pangea_program name)
     # Bash looks for a file of the program's name.
     install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME ${name} COMPONENT runtime
       DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+    pangea_manual_page(${name})
   endif()
   add_test(NAME ${name}.help COMMAND ${name} --help)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
