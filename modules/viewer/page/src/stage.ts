@@ -11,6 +11,7 @@ import { agentColour, colours } from "./palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
 const kHoverPixels = 8;
+const kSettle_ms = 350; // of what is left to where things belong, all but 1/e is gone in such a time
 
 const wantsStill = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -261,7 +262,7 @@ export class Stage {
 
   // Draws if anything moved. Returns whether it did.
   frame(now_ms: number, always = false): boolean {
-    const share = 1 - Math.exp(-Math.min(now_ms - this.last_ms, 100) / 350);
+    const share = 1 - Math.exp(-(now_ms - this.last_ms) / kSettle_ms);
     this.last_ms = now_ms;
     const step = wantsStill.matches ? 1 : share;
     if (this.posesDirty) {
