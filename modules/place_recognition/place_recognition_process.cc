@@ -22,8 +22,8 @@ constexpr int32_t kMaxKeyframesPerRequest = 50;
 constexpr size_t kMaxSentPerMap = 2000;
 constexpr size_t kMaxHeld = 2000;
 constexpr size_t kMaxKnownMatches = 100'000;
-// Nobody answers: what waits is worked off without what is missing.
-constexpr int kGiveUpCatchingUpTicks = 50;
+// Nobody answers: what waits is worked off without the keyframes that are missing.
+constexpr int kGiveUpKeyframesTicks = 50;
 
 }  // namespace
 
@@ -46,9 +46,8 @@ void PlaceRecognitionProcess::Tick(int64_t now_utime) {
   for (const MapId& map : missing_states_.Due(now_utime)) {
     AskForState(node_, map);
   }
-  if (catching_up_ && ++ticks_without_keyframe_ > kGiveUpCatchingUpTicks) {
-    ReleaseHeld();
-  }
+  ++ticks_without_keyframe_;
+  ReleaseHeldIfCaughtUp();
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
     PublishStatus(now_utime);
@@ -70,9 +69,7 @@ void PlaceRecognitionProcess::HandleAll(const std::vector<Keyframe>& ready) {
   for (const Keyframe& keyframe : ready) {
     Handle(keyframe);
   }
-  if (catching_up_ && (keyframes_.Gaps().empty() || held_.size() > kMaxHeld)) {
-    ReleaseHeld();
-  }
+  ReleaseHeldIfCaughtUp();
 }
 
 void PlaceRecognitionProcess::Handle(const Keyframe& keyframe) {
@@ -93,6 +90,14 @@ void PlaceRecognitionProcess::Recognise(const Keyframe& keyframe) {
   sent[keyframe.id.seq] = message;
   if (sent.size() > kMaxSentPerMap) {
     sent.erase(sent.begin());
+  }
+}
+
+void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
+  const bool keyframes_in =
+      keyframes_.Gaps().empty() || ticks_without_keyframe_ > kGiveUpKeyframesTicks;
+  if (catching_up_ && ((keyframes_in && missing_states_.empty()) || held_.size() > kMaxHeld)) {
+    ReleaseHeld();
   }
 }
 
@@ -139,6 +144,7 @@ void PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
 void PlaceRecognitionProcess::OnMapState(const MapState& state) {
   missing_states_.Note(state.maps);
   recognition_.SetGroup(state.group, state.revision, state.maps);
+  ReleaseHeldIfCaughtUp();
 }
 
 void PlaceRecognitionProcess::OnResendRequest(const ResendRequest& request) {

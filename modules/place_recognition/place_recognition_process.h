@@ -5,8 +5,9 @@
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks. After a
 // restart the journal's PLACE_MATCHes are asked for along with its keyframes: a keyframe that has
 // its match is only remembered, and those without one wait until all the others are in, so that no
-// pair of keyframes goes unseen. The groups are asked of the pose graph. It answers requests for
-// the newest PLACE_MATCHes itself.
+// pair of keyframes goes unseen, and until the pose graph, which is asked for the groups, has said
+// which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
+// PLACE_MATCHes itself.
 
 #include <deque>
 #include <map>
@@ -46,6 +47,7 @@ class PlaceRecognitionProcess : public Process {
   void HandleAll(const std::vector<Keyframe>& ready);
   void Handle(const Keyframe& keyframe);
   void Recognise(const Keyframe& keyframe);
+  void ReleaseHeldIfCaughtUp();
   void ReleaseHeld();
   void AskForGaps(int64_t now_utime);
   void PublishStatus(int64_t now_utime);

@@ -75,6 +75,17 @@ struct Server {
     PublishMessage(bus, "HAVE", have);
     bus.Drain();
   }
+  // The pose graph: these maps are one.
+  void Fused(const std::vector<MapId>& maps) {
+    MapState state;
+    state.group = maps.front();
+    state.revision = 1;
+    state.maps = maps;
+    for (const map_state_t& chunk : ToMessages(state)) {
+      PublishMessage(bus, "MAP_STATE", chunk);
+    }
+    bus.Drain();
+  }
   void Tick() {
     process.Tick(now += 1'000'000);
     bus.Drain();
@@ -127,13 +138,7 @@ TEST(PlaceRecognitionProcess, MatchesTwoMapsAndObeysTheGroups) {
   const place_match_t other = server.Match(kRound + 4);
   ASSERT_GT(other.num_candidates, 0);
   EXPECT_EQ(other.candidates[0].kind, place_candidate_t::KIND_INTER);
-  MapState fused;
-  fused.group = kMapA;
-  fused.revision = 1;
-  fused.maps = {kMapA, kMapB};
-  for (const map_state_t& chunk : ToMessages(fused)) {
-    PublishMessage(server.bus, "MAP_STATE", chunk);
-  }
+  server.Fused({kMapA, kMapB});
   server.Send(keyframes[kRound + 4]);
   const place_match_t in_group = server.Match(kRound + 5);
   ASSERT_GT(in_group.num_candidates, 0);
@@ -231,11 +236,50 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   for (const keyframe_t& keyframe : b) {
     after.Again("KEYFRAME_2", Encode(keyframe));
   }
+  EXPECT_TRUE(after.matches.empty());  // the groups are still to come
+  after.Fused({kMapA});
+  EXPECT_TRUE(after.matches.empty());
+  after.Fused({kMapB});
   ASSERT_EQ(after.matches.size(), 2u);
   EXPECT_EQ(after.Match(0).query.seq, 3);
   EXPECT_GT(after.Match(0).num_candidates, 0);
   EXPECT_EQ(after.Match(1).query.seq, 3);
   EXPECT_GT(after.Match(1).num_candidates, 0);
+}
+
+TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
+  test::TestWorld world(9);
+  const auto keyframes = Round(world, kMapA, kRound + 5);
+  Server before;
+  for (int i = 0; i < kRound + 4; ++i) {
+    before.Send(keyframes[i]);
+  }
+  const auto restarted = [&](Server& after) {
+    after.Have({{kMapA, kRound + 4}});
+    after.Tick();
+    for (const Payload& match : before.matches) {
+      after.Again("PLACE_MATCH", match);
+    }
+    for (const keyframe_t& keyframe : keyframes) {
+      after.Again("KEYFRAME_1", Encode(keyframe));
+    }
+    EXPECT_TRUE(after.matches.empty());
+  };
+  const auto kind = [](const Server& after) {
+    EXPECT_EQ(after.matches.size(), 1u);
+    EXPECT_GT(after.Match(0).num_candidates, 0);
+    return after.Match(0).candidates.at(0).kind;
+  };
+  Server told;
+  restarted(told);
+  told.Fused({kMapA, kMapB});
+  EXPECT_EQ(kind(told), place_candidate_t::KIND_INTER);
+  Server alone;  // nobody answers
+  restarted(alone);
+  for (int i = 0; i < 30; ++i) {
+    alone.Tick();
+  }
+  EXPECT_EQ(kind(alone), place_candidate_t::KIND_INTRA);
 }
 
 TEST(PlaceRecognitionProcess, SendsItsMatchesAgainAsTheyWere) {

@@ -210,7 +210,8 @@ TEST(MissingStates, AreAskedForUntilTheyAreSaidButNotForEver) {
   for (int64_t second = 2; second < 60; ++second) {
     asked += static_cast<int>(missing.Due(second * 1'000'000).size());
   }
-  EXPECT_EQ(asked, 4);
+  EXPECT_TRUE(missing.empty());
+  EXPECT_EQ(asked, 14);
 }
 
 }  // namespace

@@ -72,16 +72,19 @@ class MissingMessages {
 
 // Which of the maps that were there before this process no MAP_STATE has named since: whoever comes
 // late asks the pose graph for them, and it says them again to all. Bound: kMaxAsked maps are asked
-// for at once, each at most kMaxTimes (a pose graph that comes later says its states itself).
+// for at once, each at most kMaxTimes: half a minute, in which a pose graph that started with us
+// has caught up with the journal (one that comes later says its states itself).
 class MissingStates {
  public:
   void Announce(const MapId& map) { times_asked_.try_emplace(map, 0); }
   void Note(const std::vector<MapId>& maps);
   std::vector<MapId> Due(int64_t now_utime);
+  // None is missing, or none that anybody would still be asked for.
+  bool empty() const { return times_asked_.empty(); }
 
  private:
   static constexpr size_t kMaxAsked = 20;
-  static constexpr int kMaxTimes = 5;
+  static constexpr int kMaxTimes = 15;
 
   std::map<MapId, int> times_asked_;  // of those that are missing
   int64_t next_utime_ = 0;
