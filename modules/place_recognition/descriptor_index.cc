@@ -31,6 +31,23 @@ uint32_t DescriptorIndex::Table::Signature(const Descriptor& descriptor) const {
   return GatherBits(descriptor, signature_bits);
 }
 
+void DescriptorIndex::Table::Add(const Descriptor& descriptor, int keyframe) {
+  const uint32_t word = Word(descriptor);
+  std::unique_ptr<Page>& page = pages[word >> kPageBits];
+  if (!page) {
+    page = std::make_unique<Page>();
+  }
+  (*page)[word % page->size()].push_back({keyframe, Signature(descriptor)});
+}
+
+const std::vector<DescriptorIndex::Posting>& DescriptorIndex::Table::Postings(
+    const Descriptor& descriptor) const {
+  static const std::vector<Posting> none;
+  const uint32_t word = Word(descriptor);
+  const std::unique_ptr<Page>& page = pages[word >> kPageBits];
+  return page ? (*page)[word % page->size()] : none;
+}
+
 DescriptorIndex::DescriptorIndex() {
   std::mt19937_64 rng(20200513);
   std::array<uint8_t, kDescriptorBits> order{};
@@ -45,7 +62,7 @@ DescriptorIndex::DescriptorIndex() {
     for (int i = 0; i < kSignatureBits; ++i) {
       table.signature_bits[i] = order[kWordBits + i];
     }
-    table.postings.resize(size_t{1} << kWordBits);
+    table.pages.resize(size_t{1} << (kWordBits - kPageBits));
   }
 }
 
@@ -54,8 +71,7 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   num_corners_.push_back(static_cast<int>(corners.size()));
   for (Table& table : tables_) {
     for (const Corner& corner : corners) {
-      table.postings[table.Word(corner.descriptor)].push_back(
-          {keyframe, table.Signature(corner.descriptor)});
+      table.Add(corner.descriptor, keyframe);
     }
   }
   return keyframe;
@@ -65,7 +81,7 @@ template <typename Visit>
 void DescriptorIndex::Probe(const Descriptor& descriptor, size_t turn, Visit visit) const {
   for (const Table& table : tables_) {
     const uint32_t signature = table.Signature(descriptor);
-    const std::vector<Posting>& postings = table.postings[table.Word(descriptor)];
+    const std::vector<Posting>& postings = table.Postings(descriptor);
     const size_t stride = 1 + postings.size() / kMaxPostingsPerWord;
     for (size_t i = turn % stride; i < postings.size(); i += stride) {
       visit(postings[i], signature);

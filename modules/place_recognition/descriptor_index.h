@@ -9,10 +9,12 @@
 // weighted by log(keyframes / keyframes met), the idf of Sivic & Zisserman. The constants were
 // measured: docs/decisions/place_recognition_index.md.
 //
-// Deterministic; no result depends on time. Memory: kTables * 8 bytes a corner, plus the heads.
+// Deterministic; no result depends on time. Memory: kTables * 8 bytes a corner, plus the heads of
+// the words, which come in pages, each when the first of its words is met.
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/keyframe.h"
@@ -37,6 +39,7 @@ class DescriptorIndex {
  private:
   static constexpr int kTables = 6;
   static constexpr int kWordBits = 18;
+  static constexpr int kPageBits = 6;  // words of one page: 1.5 kB
   static constexpr int kSignatureBits = 32;
   static constexpr int kMaxSignatureDistance = 6;
   // Of a word met more often (a place seen thousands of times) a query compares an even sample of
@@ -47,13 +50,17 @@ class DescriptorIndex {
     int32_t keyframe = 0;
     uint32_t signature = 0;
   };
+  using Page = std::array<std::vector<Posting>, size_t{1} << kPageBits>;
   struct Table {
     std::array<uint8_t, kWordBits> word_bits{};
     std::array<uint8_t, kSignatureBits> signature_bits{};
-    std::vector<std::vector<Posting>> postings;  // by word
+    std::vector<std::unique_ptr<Page>> pages;  // by the word's upper bits; null: none was met
 
     uint32_t Word(const Descriptor& descriptor) const;
     uint32_t Signature(const Descriptor& descriptor) const;
+    void Add(const Descriptor& descriptor, int keyframe);
+    // Of the descriptor's word.
+    const std::vector<Posting>& Postings(const Descriptor& descriptor) const;
   };
   // Calls visit(posting, signature) for each posting a corner meets; `turn` rotates the sample.
   template <typename Visit>
