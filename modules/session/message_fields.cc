@@ -116,6 +116,7 @@ class Reader {
     at_ += bytes;
     return GetBigEndian(data_.data() + at_ - bytes, bytes);
   }
+  void Fail() { good_ = false; }
   // Length, characters, and a zero.
   std::string String() {
     const uint64_t length = Unsigned(4);
@@ -164,6 +165,9 @@ class Decoder {
                                const std::vector<int64_t>& sizes, size_t depth = 0) {
     if (depth == sizes.size()) {
       return Value(type, path);
+    }
+    if (sizes[depth] < 0) {
+      reader_.Fail();
     }
     for (int64_t i = 0; i < sizes[depth] && reader_.good(); ++i) {
       Array(type, fmt::format("{}[{}]", path, i), sizes, depth + 1);

@@ -74,6 +74,10 @@ TEST(MessageFields, WhatDoesNotFitIsNone) {
   other[0] ^= 1;
   EXPECT_FALSE(DecodeFields(other));
   EXPECT_FALSE(TypeOf(other));
+  place_match_t negative{};
+  negative.num_rejected = -1;
+  std::vector<uint8_t> bytes = EncodeMessage(negative);
+  EXPECT_FALSE(DecodeFields(bytes));
   // Absurd counts end with the bytes.
   for (size_t i = 8; i < good.size(); ++i) {
     std::vector<uint8_t> damaged = good;

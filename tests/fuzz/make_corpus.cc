@@ -8,10 +8,12 @@
 #include <exception>
 #include <fstream>
 #include <map>
+#include <set>
 
 #include "agent_handler/agent_handler.h"
 #include "agent_handler/journal.h"
 #include "common/alignment/alignment_yaml.h"
+#include "common/bus/big_endian.h"
 #include "common/bus/log_reader.h"
 #include "common/link/agent_key.h"
 #include "common/link/compression.h"
@@ -20,6 +22,7 @@
 #include "global_ba/global_ba_yaml.h"
 #include "link_channels.h"
 #include "map_points/map_points_yaml.h"
+#include "pangea_schemas.h"
 #include "posegraph/posegraph_yaml.h"
 #include "sensor_channels.h"
 #include "server_channels.h"
@@ -142,6 +145,24 @@ void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
     Payload bytes{static_cast<uint8_t>(i)};
     bytes.insert(bytes.end(), seeds[i].second.begin(), seeds[i].second.end());
     corpus.Add("messages", seeds[i].first, bytes);
+  }
+}
+
+// Of each type in the log one message, by its place in LcmSchemas.
+void Fields(const std::vector<Captured>& events, const Corpus& corpus) {
+  const std::vector<LcmSchema> schemas = LcmSchemas();
+  std::set<int64_t> taken;
+  for (const Captured& event : events) {
+    const auto fingerprint = static_cast<int64_t>(
+        GetBigEndian(event.data.data(), std::min<size_t>(8, event.data.size())));
+    const auto schema = std::find_if(schemas.begin(), schemas.end(), [&](const LcmSchema& known) {
+      return known.fingerprint == fingerprint;
+    });
+    if (schema != schemas.end() && taken.insert(fingerprint).second) {
+      Payload bytes{static_cast<uint8_t>(schema - schemas.begin())};
+      bytes.insert(bytes.end(), event.data.begin(), event.data.end());
+      corpus.Add("fields", event.channel, bytes);
+    }
   }
 }
 
@@ -335,6 +356,7 @@ int Make(const std::string& log, const Corpus& corpus) {
   corpus.Add("keyframe", "second", First(events, "KEYFRAME_2", 1));
   corpus.Add("keyframe", "bare", Small(First(events, "KEYFRAME_1", 1), 0));
   Messages(events, corpus);
+  Fields(events, corpus);
   Link(events, corpus);
   Journals(events, corpus);
   Spools(events, corpus);
