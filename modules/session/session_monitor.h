@@ -48,6 +48,7 @@ class SessionMonitor {
   int num_fused_groups() const;
   int constraints_accepted() const { return accepted_; }
   int constraints_refused() const { return refused_; }
+  int num_verdicts() const { return accepted_ + refused_; }
 
   // Every named process reported within the last 3 s that nothing is pending, and the server bus
   // has carried no work for `quiet_s`.

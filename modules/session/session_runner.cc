@@ -24,10 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxRestarts = 20;         // of one process; then the session gives it up
-constexpr double kStartTimeout_s = 20;   // for the server processes to report
-constexpr double kDrainTimeout_s = 300;  // for the server to work off what has come
-constexpr double kQuiet_s = 2.5;         // two HAVE intervals and a resend: a lost tail would show
+constexpr int kMaxRestarts = 20;        // of one process; then the session gives it up
+constexpr double kStartTimeout_s = 20;  // for the server processes to report
+constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
+constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
@@ -348,18 +348,25 @@ class Runner {
     progress_.Update(lines, monitor_, Now() - begin_);
   }
 
-  // Until every process has worked off what has come.
+  // Until every process has worked off what has come. A server that goes on judging is slow, not
+  // stuck: it is waited for.
   void Drain() {
     std::vector<std::string> names = server_names_;
     for (const Player& player : players_) {
       names.push_back(fmt::format("uplink_{}", player.script.id));
     }
-    const double deadline = Now() + (summary_.interrupted ? 2 * kQuiet_s : kDrainTimeout_s);
+    const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
+    double deadline = Now() + patience_s;
+    int verdicts = monitor_.num_verdicts();
     while (!monitor_.Idle(names, kQuiet_s)) {
+      if (!summary_.interrupted && monitor_.num_verdicts() > verdicts) {
+        verdicts = monitor_.num_verdicts();
+        deadline = Now() + patience_s;
+      }
       if (Now() > deadline) {
         if (!summary_.interrupted) {
           summary_.failures.push_back(
-              fmt::format("the server did not come to rest within {} s", kDrainTimeout_s));
+              fmt::format("the server is not at rest {} s after its last verdict", kStuckAfter_s));
         }
         return;
       }
