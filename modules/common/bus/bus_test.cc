@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <chrono>
 #include <limits>
+#include <thread>
 
 #include "common/bus/in_order.h"
 #include "common/bus/journal_first.h"
@@ -12,6 +14,7 @@
 #include "common/bus/node.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
+#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 namespace {
@@ -67,6 +70,41 @@ TEST(Node, CountsWhatDoesNotDecode) {
   ASSERT_EQ(status.num_refused, 1);
   EXPECT_EQ(status.refused[0].count, 1);
   EXPECT_EQ(status.messages_in, 2);
+}
+
+TEST(Node, TellsAtMostFiftyReasonsApart) {
+  LocalBus bus;
+  Node node(bus, "test");
+  for (int i = 0; i < 200; ++i) {
+    node.Refuse("reason " + std::to_string(i));
+  }
+  const status_t status = node.Status(0, 0, "");
+  int64_t refused = 0;
+  for (const counter_t& counter : status.refused) {
+    refused += counter.count;
+  }
+  EXPECT_EQ(refused, 200);
+  EXPECT_EQ(status.num_refused, 51);  // and "other reasons"
+}
+
+TEST(Node, TellsOfTheNewestThousandMessages) {
+  LocalBus bus;
+  Node node(bus, "test");
+  node.SubscribeBytes("SLOW", [](const std::string&, Bytes) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  });
+  node.SubscribeBytes("QUICK", [](const std::string&, Bytes) {});
+  const auto publish = [&](const std::string& channel, int times) {
+    for (int i = 0; i < times; ++i) {
+      bus.Publish(channel, {});
+    }
+    bus.Drain();
+  };
+  publish("SLOW", 30);
+  publish("QUICK", 970);
+  EXPECT_GE(node.Status(0, 0, "").handling_p99_ms, 5.0F);
+  publish("QUICK", 30);
+  EXPECT_LT(node.Status(0, 0, "").handling_p99_ms, 5.0F);
 }
 
 // Every truncation and every single corrupted byte must come back as an answer, not as a crash.
@@ -145,6 +183,7 @@ TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
   missing.Note(map, 0);
   missing.Announce(Have{{{map, 99}}, {}});
   EXPECT_TRUE(missing.Due(0).empty());  // it may be under way
+  EXPECT_TRUE(missing.Due(kSecond - 1).empty());
   const auto due = missing.Due(kSecond);
   ASSERT_EQ(due.size(), 1u);
   EXPECT_EQ(due[0].from_seq, 1);
@@ -157,6 +196,37 @@ TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
   EXPECT_TRUE(missing.Due(9 * kSecond).empty());
 }
 
+TEST(MissingMessages, TheLastOneIsMissedAndNoneBeyondIt) {
+  const MapId map{1, 100};
+  MissingMessages missing;
+  missing.Note(map, 0);
+  missing.Announce(Have{{{map, 1}}, {}});
+  EXPECT_TRUE(missing.Lacks(map, 1));
+  missing.Due(0);
+  const auto due = missing.Due(1'000'000);
+  ASSERT_EQ(due.size(), 1u);
+  EXPECT_EQ(due[0].from_seq, 1);
+  EXPECT_EQ(due[0].to_seq, 1);
+  missing.Note(map, 1);
+  EXPECT_FALSE(missing.Lacks(map, 1));
+  EXPECT_TRUE(missing.Due(9'000'000).empty());
+}
+
+TEST(AskAllAgain, AsksForEachOnce) {
+  LocalBus bus;
+  Node node(bus, "test");
+  std::vector<std::pair<int32_t, int32_t>> ranges;
+  bus.Subscribe("RESEND_REQUEST", [&](const std::string&, Bytes data) {
+    resend_request_t request{};
+    ASSERT_TRUE(DecodeMessage(data, &request));
+    ranges.emplace_back(request.from_seq, request.to_seq);
+  });
+  AskAllAgain(node, "CONSTRAINT", {1, 100}, 1000);
+  bus.Drain();
+  EXPECT_THAT(ranges, testing::ElementsAre(testing::Pair(0, 499), testing::Pair(500, 999),
+                                           testing::Pair(1000, 1000)));
+}
+
 TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
   const MapId map{1, 10};
   InOrder<int> stream;
@@ -166,6 +236,29 @@ TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
   EXPECT_THAT(stream.Skip({map, 1, 3}), testing::ElementsAre(104));
   EXPECT_EQ(stream.next(map), 5);
   EXPECT_TRUE(stream.Gaps().empty());
+}
+
+TEST(InOrder, WhatAGapPassesIsDropped) {
+  const MapId map{1, 10};
+  InOrder<int> stream;
+  stream.Add(map, 2, 102);
+  stream.Add(map, 5, 105);
+  EXPECT_THAT(stream.Skip({map, 0, 4}), testing::ElementsAre(105));
+  EXPECT_EQ(stream.parked(), 0u);
+}
+
+TEST(InOrder, ParksAThousandAndTakesTheNextOneAlways) {
+  const MapId map{1, 10};
+  InOrder<int> stream;
+  const auto parks = static_cast<int32_t>(InOrder<int>::kMaxParked);
+  for (int32_t seq = 1; seq <= parks + 500; ++seq) {
+    EXPECT_THAT(stream.Add(map, seq, seq), testing::IsEmpty());
+  }
+  EXPECT_EQ(stream.parked(), InOrder<int>::kMaxParked);
+  EXPECT_EQ(stream.Add(map, 0, 0).size(), InOrder<int>::kMaxParked + 1);
+  ASSERT_EQ(stream.Gaps().size(), 1u);
+  EXPECT_EQ(stream.Gaps()[0].from_seq, parks + 1);  // dropped, and known to exist
+  EXPECT_EQ(stream.Gaps()[0].to_seq, parks + 500);
 }
 
 TEST(JournalFirstBus, DeliversHaveBeforeWhatCameBeforeIt) {
