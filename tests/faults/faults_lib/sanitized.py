@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 from faults_lib.checks import Row, delivery, kills, print_rows
-from faults_lib.session import Session
+from faults_lib.session import SERVER, Session
 
 SUPPRESSIONS = Path(__file__).resolve().parents[2] / "tsan.supp"
 RUNTIMES = {b"__tsan_init": "thread", b"__asan_init": "address", b"__ubsan_handle": "undefined behaviour"}
@@ -14,9 +14,9 @@ LINK = "loss: 0.05, delay_ms: 20, jitter_ms: 10, reorder: 0.02, duplicate: 0.02"
 KILLED = ("agent_handler", "posegraph", "place_recognition")
 
 
-def sanitizers(bin):
-    program = (bin / "pangea-agent-handler").read_bytes()
-    return [name for symbol, name in RUNTIMES.items() if symbol in program]
+def sanitizers(bin, program):
+    code = (bin / f"pangea-{program.replace('_', '-')}").read_bytes()
+    return [name for symbol, name in RUNTIMES.items() if symbol in code]
 
 
 def environment(reports):
@@ -33,7 +33,7 @@ def what(report):
 
 
 def run(options):
-    built_with = sanitizers(options.bin)
+    built_with = sanitizers(options.bin, "agent_handler")
     if not built_with:
         print(f"\nsanitized: not run, the programs in {options.bin} are built without a sanitizer (--bin build/tsan/bin)")
         return None
@@ -46,7 +46,11 @@ def run(options):
     planned = [f"at: {6 + 3 * i}, kill: {name}" for i, name in enumerate(killed)]
     session = Session(folder, options.bin, agents, planned, options.seconds, environment=environment(reports)).run()
     found = Counter(line for report in sorted(reports.iterdir()) for line in what(report) or [f"unreadable: {report}"])
-    rows = [Row("the session's exit code", str(session.exit_code), session.exit_code == 0),
+    programs = [*SERVER, "uplink", "link_emulator"]
+    instrumented = [program for program in programs if sanitizers(options.bin, program) == built_with]
+    rows = [Row("programs built with it, of the server's and the link's", f"{len(instrumented)} of {len(programs)}",
+                instrumented == programs),
+            Row("the session's exit code", str(session.exit_code), session.exit_code == 0),
             Row("reports of the sanitizer", str(sum(found.values())), not found)]
     if session.exit_code == 0:
         rows += delivery(session, agents, options.seconds)
