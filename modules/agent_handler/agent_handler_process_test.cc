@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
 
 #include <algorithm>
 #include <filesystem>
@@ -97,6 +100,24 @@ TEST_F(LinkWorld, WithoutAHandlerEverythingWaits) {
   StartHandler();
   Run(10);
   ExpectDelivered(100);
+}
+
+// RLIMIT_FSIZE refuses writes as a full disk does.
+TEST_F(LinkWorld, WhatIsNotOnDiskIsNotAcknowledged) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  Run(2);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit full{std::filesystem::file_size(journal_path), limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &full);
+  PublishKeyframes(5);
+  Run(5);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_EQ(acknowledged, -1);
+  EXPECT_TRUE(delivered.empty());
+  Run(10);
+  EXPECT_EQ(acknowledged, 4);
+  ExpectDelivered(5);
 }
 
 TEST_F(LinkWorld, WhatNobodyHasIsGivenUpAndSaid) {

@@ -130,6 +130,29 @@ TEST_F(JournalTest, DamageThatIsNoTornTailIsNotThrownAway) {
   EXPECT_EQ(std::filesystem::file_size(path), size);
 }
 
+TEST_F(JournalTest, EventNumbersGoOnAfterItWasOpenedAgain) {
+  Write(3);
+  Write(2);
+  lcm::LogFile log(path, "r");
+  for (int i = 0; i < 5; ++i) {
+    const lcm::LogEvent* event = log.readNextEvent();
+    ASSERT_NE(event, nullptr);
+    EXPECT_EQ(event->eventnum, i);
+  }
+}
+
+TEST_F(JournalTest, SaysWhenItsQueueIsFull) {
+  const auto journal = Open();
+  const std::vector<uint8_t> payload(Journal::kMaxQueuedBytes / 4, 1);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_FALSE(journal->Full()) << i;
+    journal->Append(i, "A", payload);
+  }
+  EXPECT_TRUE(journal->Full());
+  EXPECT_TRUE(journal->Sync());
+  EXPECT_FALSE(journal->Full());
+}
+
 TEST_F(JournalTest, IsUsedByOneProcessAtATime) {
   const auto journal = Open();
   EXPECT_THROW(Open(), std::runtime_error);

@@ -121,6 +121,31 @@ TEST_F(SpoolTest, FullSaysNoAndHasRoomAgain) {
   EXPECT_FALSE(spool.refuses());
 }
 
+TEST_F(SpoolTest, WhatAnEarlierRunKeptCountsTowardsTheBound) {
+  const auto size = static_cast<int64_t>(EncodeTestKeyframe({kMap, 0}).size());
+  int seq = 0;
+  for (int run = 0; run < 3; ++run) {
+    Spool spool(folder, 1, 45 * size);
+    while (seq < 20 * (run + 1) && Add(&spool, seq)) {
+      ++seq;
+    }
+  }
+  EXPECT_NEAR(seq, 44, 1);
+}
+
+TEST_F(SpoolTest, BeginsANewSegmentWhenOneIsFull) {
+  Spool spool(folder, 1, kLarge);
+  int seq = 0;
+  while (spool.bytes() < Spool::kSegmentBytes) {
+    ASSERT_TRUE(Add(&spool, seq++));
+  }
+  EXPECT_EQ(Files().size(), 1u);
+  ASSERT_TRUE(Add(&spool, seq));
+  EXPECT_EQ(Files().size(), 2u);
+  spool.Release(kMap, seq - 1);
+  EXPECT_EQ(Files().size(), 1u);
+}
+
 TEST_F(SpoolTest, ADiskThatRefusesHeals) {
   std::signal(SIGXFSZ, SIG_IGN);
   Spool spool(folder, 1, kLarge);

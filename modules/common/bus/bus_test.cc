@@ -238,6 +238,13 @@ TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
   EXPECT_TRUE(stream.Gaps().empty());
 }
 
+TEST(InOrder, AGapOfOneIsPassed) {
+  const MapId map{1, 10};
+  InOrder<int> stream;
+  stream.Add(map, 1, 101);
+  EXPECT_THAT(stream.Skip({map, 0, 0}), testing::ElementsAre(101));
+}
+
 TEST(InOrder, WhatAGapPassesIsDropped) {
   const MapId map{1, 10};
   InOrder<int> stream;

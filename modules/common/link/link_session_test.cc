@@ -203,6 +203,19 @@ TEST_F(LinkSessionTest, ARestartedUplinkTakesTheSessionOver) {
 }
 
 // On a long way many hellos go out before the first is answered: one session comes of it.
+// A run names one session: a recorded hello cannot end the one that came after it.
+TEST_F(LinkSessionTest, ARunIsOfferedUntilItIsUsedAndNeverAgain) {
+  Connect();
+  const Packet recorded = Hello();  // names the handler's run, and never arrived
+  RestartUplink();
+  number = 0;
+  Connect();
+  const auto replayed = handler->Open(recorded);
+  EXPECT_FALSE(replayed.packet);
+  EXPECT_FALSE(replayed.new_uplink);
+  EXPECT_TRUE(handler->Open(Piece(1)).packet);
+}
+
 TEST_F(LinkSessionTest, ManyHellosUnderWayMakeOneSession) {
   std::vector<Packet> hellos;
   for (int i = 0; i < 16; ++i) {

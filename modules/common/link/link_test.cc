@@ -293,6 +293,78 @@ TEST(Sender, FullSpoolRefusesTheNewest) {
   EXPECT_TRUE(sender.Add({kMap, 1}, std::vector<uint8_t>(60'000)));
 }
 
+LinkAck AckOf(int64_t highest_number) {
+  LinkAck ack;
+  ack.highest_number = highest_number;
+  ack.cache_bytes = 1 << 20;
+  return ack;
+}
+
+TEST(Sender, KeepsToItsWindow) {
+  SenderOptions options;
+  options.max_in_flight_bytes = 10'000;
+  World world({0.05, 0, 100'000, 0}, 8, options);
+  world.Hello({kMap});
+  world.Spool(kMap, 5);
+  world.RunUntilDelivered(600);
+  EXPECT_EQ(world.taken, InOrderIds(kMap, 5));
+  EXPECT_LE(world.most_in_flight, 10'000);
+}
+
+TEST(Sender, HasFewKeyframesUnderWay) {
+  Sender sender({});
+  for (int seq = 0; seq < 100; ++seq) {
+    ASSERT_TRUE(sender.Add({kMap, seq}, std::vector<uint8_t>(100)));
+  }
+  sender.SetNext(kMap, 0);
+  sender.OnAck(AckOf(0), 1);
+  EXPECT_EQ(sender.Poll(2).size(), static_cast<size_t>(kMaxPartialKeyframes));
+}
+
+TEST(Sender, WhatNobodyAnswersIsSentEverMoreRarely) {
+  Sender sender({});
+  ASSERT_TRUE(sender.Add({kMap, 0}, std::vector<uint8_t>(100)));
+  sender.SetNext(kMap, 0);
+  size_t sent = 0;
+  for (int64_t ms = 0; ms < 60'000; ms += 10) {
+    sent += sender.Poll(1000 * ms).size();
+  }
+  EXPECT_GT(sent, 5u);
+  EXPECT_LE(sent, 12u);  // after 1, 2, 4, 8, 10, 10, ... s
+}
+
+// A packet that others have overtaken is not waited for, nor is it sent without end.
+TEST(Sender, WhatIsOvertakenIsSentAgainAtOnceButNotForEver) {
+  SenderOptions options;
+  options.payload_bytes = kMinPayloadBytes;
+  Sender sender(options);
+  const KeyframeId id{kMap, 0};
+  ASSERT_TRUE(sender.Add(id, std::vector<uint8_t>(60 * kMinPayloadBytes)));
+  sender.SetNext(kMap, 0);
+  sender.OnAck(AckOf(0), 1);
+  const auto first = sender.Poll(1'000);
+  ASSERT_EQ(first.size(), 60u);
+  int64_t now = 10'000;
+  LinkAck ack = AckOf(first.back().number);
+  ack.partial[id] = std::vector<uint8_t>(8, 0xFF);
+  ack.partial[id][0] = 0xFE;  // all but the first piece
+  sender.OnAck(ack, now);
+  const auto again = sender.Poll(now);
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].piece.index, 0);
+  // It arrives nowhere, while other packets do.
+  size_t sent = 0;
+  for (; now < 2'000'000; now += 10'000) {
+    for (int i = 0; i < 30; ++i) {
+      ack.highest_number = sender.NextNumber(now);
+    }
+    sender.OnAck(ack, now);
+    sent += sender.Poll(now).size();
+  }
+  EXPECT_GE(sent, 4u);
+  EXPECT_LE(sent, 10u);
+}
+
 TEST(Sender, WhatIsStoredTakesNoMemory) {
   constexpr int kKeyframes = 2000;
   constexpr size_t kBytes = 24'000;

@@ -106,6 +106,58 @@ TEST(Receiver, EarlierKeyframesMakeRoomInAFullCache) {
   EXPECT_FALSE(receiver.TakeReady().empty());
 }
 
+TEST(Receiver, LaterKeyframesFindNoRoomInAFullCache) {
+  Receiver receiver({100'000}, CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  for (int seq = 0; seq < 10; ++seq) {
+    AddAll(&receiver, {kMap, seq});
+  }
+  const auto ready = receiver.TakeReady();
+  ASSERT_FALSE(ready.empty());
+  EXPECT_EQ(ready.front().id.seq, 0);
+}
+
+TEST(Receiver, WhatIsNotYetOnDiskMakesNoRoom) {
+  Receiver receiver({60'000}, CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}, {kLaterMap, 0, 0}}});
+  for (int seq = 0; seq < 10; ++seq) {
+    AddAll(&receiver, {kLaterMap, seq});
+  }
+  const auto ready = receiver.TakeReady();
+  ASSERT_FALSE(ready.empty());
+  for (int seq = 0; seq < 10; ++seq) {
+    AddAll(&receiver, {kMap, seq});
+  }
+  int64_t taken_bytes = 0;
+  for (const auto& keyframe : ready) {
+    taken_bytes += static_cast<int64_t>(keyframe.bytes.size());
+  }
+  EXPECT_GE(receiver.cached_bytes(), taken_bytes);
+}
+
+// What is handed over but not on disk yet is not given up, whatever a hello says.
+TEST(Receiver, AHelloGivesUpNothingThatIsOnItsWayToTheDisk) {
+  Receiver receiver({}, CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  AddAll(&receiver, {kMap, 0});
+  ASSERT_EQ(receiver.TakeReady().size(), 1u);
+  receiver.OnHello({"", {{kMap, 5, 0}}});
+  EXPECT_EQ(receiver.given_up(), 0);
+  receiver.Journalled({kMap, 0});
+  receiver.OnHello({"", {{kMap, 5, 0}}});
+  EXPECT_EQ(receiver.given_up(), 4);
+}
+
+TEST(Receiver, AnAckNamesABoundedNumberOfMaps) {
+  Receiver receiver({}, CheckContent);
+  for (int i = 1; i < 3 * static_cast<int>(kMaxAckMaps); ++i) {
+    receiver.Resume({1, i}, 10);
+  }
+  LinkAck ack;
+  receiver.FillAck(true, &ack);
+  EXPECT_EQ(ack.journalled_seq.size(), static_cast<size_t>(kMaxAckMaps));
+}
+
 TEST(Receiver, WhatTheUplinkCannotDeliverIsGivenUpAndCounted) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 5, 0}}});

@@ -85,6 +85,28 @@ TEST(ReplayWindow, TakesEachNumberOnceInAnyOrder) {
   EXPECT_TRUE(window.IsFresh(9001));
 }
 
+TEST(ReplayWindow, TheOldestItCanTellIsAWindowBack) {
+  ReplayWindow window;
+  const int64_t highest = 9000;
+  window.Take(highest);
+  const int64_t oldest = highest - ReplayWindow::kSize + 1;
+  EXPECT_FALSE(window.IsFresh(oldest - 1));
+  EXPECT_TRUE(window.IsFresh(oldest));
+}
+
+TEST(ReplayWindow, AJumpForgetsWhatLiesBeforeTheWindowAlone) {
+  ReplayWindow window;
+  for (int64_t number = 1; number <= ReplayWindow::kSize; ++number) {
+    window.Take(number);
+  }
+  const int64_t far = 10 * ReplayWindow::kSize + 3;
+  window.Take(far);
+  EXPECT_FALSE(window.IsFresh(far));
+  for (int64_t number = far - ReplayWindow::kSize + 1; number < far; ++number) {
+    ASSERT_TRUE(window.IsFresh(number)) << number;
+  }
+}
+
 TEST(ReplayWindow, KnowsTheHighBitsOfANumber) {
   constexpr int64_t kRange = 1 << 24;
   for (const int64_t highest : {int64_t{0}, int64_t{77}, kRange - 1, 5 * kRange + 12}) {
