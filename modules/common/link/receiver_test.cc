@@ -107,14 +107,18 @@ TEST(Receiver, EarlierKeyframesMakeRoomInAFullCache) {
 }
 
 TEST(Receiver, LaterKeyframesFindNoRoomInAFullCache) {
-  Receiver receiver({100'000}, CheckContent);
+  constexpr int kCacheBytes = 100'000;
+  Receiver receiver({kCacheBytes}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});
+  size_t room = kCacheBytes, fit = 0;
   for (int seq = 0; seq < 10; ++seq) {
     AddAll(&receiver, {kMap, seq});
+    const size_t size = Content({kMap, seq}).size();
+    fit += fit == static_cast<size_t>(seq) && size <= room ? 1 : 0;
+    room -= std::min(room, size);
   }
-  const auto ready = receiver.TakeReady();
-  ASSERT_FALSE(ready.empty());
-  EXPECT_EQ(ready.front().id.seq, 0);
+  EXPECT_EQ(AddPiece(&receiver, {kMap, 10}, 0), "receive cache full");
+  EXPECT_EQ(receiver.TakeReady().size(), fit);
 }
 
 TEST(Receiver, WhatIsNotYetOnDiskMakesNoRoom) {
@@ -128,11 +132,20 @@ TEST(Receiver, WhatIsNotYetOnDiskMakesNoRoom) {
   for (int seq = 0; seq < 10; ++seq) {
     AddAll(&receiver, {kMap, seq});
   }
-  int64_t taken_bytes = 0;
+  LinkAck ack;
+  receiver.FillAck(true, &ack);
   for (const auto& keyframe : ready) {
-    taken_bytes += static_cast<int64_t>(keyframe.bytes.size());
+    EXPECT_TRUE(ack.partial.contains(keyframe.id)) << keyframe.id.seq;
   }
-  EXPECT_GE(receiver.cached_bytes(), taken_bytes);
+}
+
+TEST(Receiver, WhatIsAcknowledgedStaysAcknowledged) {
+  Receiver receiver({}, CheckContent);
+  receiver.Resume(kMap, 10);
+  receiver.Journalled({kMap, 3});
+  LinkAck ack;
+  receiver.FillAck(true, &ack);
+  EXPECT_EQ(ack.journalled_seq.at(kMap), 10);
 }
 
 // What is handed over but not on disk yet is not given up, whatever a hello says.
