@@ -10,6 +10,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+void RenderWalk(const fs::path& out, const std::string& arguments) {
+  const Outcome rendered =
+      RunCommand("pangea-sim --no-cache --shrink 2 --generate walk --duration 30 --out " +
+                 out.string() + " " + arguments);
+  ASSERT_EQ(rendered.exit_code, 0) << rendered.output;
+}
+
 void ExpectApart(const std::string& name, const std::string& first, const std::string& second) {
   const fs::path folder = FreshFolder(name);
   RenderWalk(folder / "a", first);
@@ -26,13 +33,12 @@ void ExpectApart(const std::string& name, const std::string& first, const std::s
 }
 
 TEST(NoWrongFusion, DifferentHalls) {
-  ExpectApart("halls", "--generate walk --path-seed 1 --scene-seed 1 --duration 30",
-              "--generate walk --path-seed 1 --scene-seed 2 --duration 30");
+  ExpectApart("halls", "--path-seed 1 --scene-seed 1", "--path-seed 1 --scene-seed 2");
 }
 
 TEST(NoWrongFusion, RoomsWithIdenticalObjects) {
-  ExpectApart("twins", "--generate walk --path-seed 1 --scene twin_objects_a --duration 30",
-              "--generate walk --path-seed 2 --scene twin_objects_b --duration 30");
+  ExpectApart("twins", "--path-seed 1 --scene twin_objects_a",
+              "--path-seed 2 --scene twin_objects_b");
 }
 
 }  // namespace

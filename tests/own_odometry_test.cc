@@ -33,22 +33,20 @@ Trajectory Drifting(const Trajectory& truth) {
 
 TEST(OwnOdometry, FusesWithAnAgentOfVio) {
   const fs::path folder = FreshFolder("own_odometry");
-  RenderWalk(folder / "walk_1", "--generate walk --path-seed 1 --seed 1 --duration 14");
-  RenderWalk(folder / "walk_2", "--generate walk --path-seed 2 --seed 2 --duration 14");
+  const std::string walk_1 = Walk(1).string(), walk_2 = Walk(2).string();
   std::vector<std::string> warnings;
-  WriteTum((folder / "poses.tum").string(),
-           Drifting(ReadEurocGroundTruthOf((folder / "walk_2").string(), &warnings)));
+  WriteTum((folder / "poses.tum").string(), Drifting(ReadEurocGroundTruthOf(walk_2, &warnings)));
   const auto path = [&folder](const char* name) { return (folder / name).string(); };
 
-  Outcome outcome = RunCommand("pangea-vio --agent 1 --bus none --rate max --recording " +
-                               path("walk_1") + " --out-keyframes " + path("one.lcm"));
+  Outcome outcome = RunCommand("pangea-vio --agent 1 --bus none --rate max --recording " + walk_1 +
+                               " --out-keyframes " + path("one.lcm"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + path("walk_2") +
-                       " --poses " + path("poses.tum") + " --out-keyframes " + path("two.lcm"));
+  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + walk_2 + " --poses " +
+                       path("poses.tum") + " --out-keyframes " + path("two.lcm"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  outcome = RunCommand("pangea-session replay " + path("one.lcm") + " " + path("two.lcm") +
-                       " --out " + path("out") + " --recording 1=" + path("walk_1") +
-                       " --recording 2=" + path("walk_2"));
+  outcome =
+      RunCommand("pangea-session replay " + path("one.lcm") + " " + path("two.lcm") + " --out " +
+                 path("out") + " --recording 1=" + walk_1 + " --recording 2=" + walk_2);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
 
   const auto report = ReadJson(folder / "out" / "report.json");
@@ -57,9 +55,8 @@ TEST(OwnOdometry, FusesWithAnAgentOfVio) {
   std::cout << "joint ATE " << report["ate_joint_m"] << " m\n";
   EXPECT_LT(report["ate_joint_m"].get<double>(), 0.1) << outcome.output;
 
-  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + path("walk_1") +
-                       " --poses " + path("out/agent_1.tum") + " --out-keyframes " +
-                       path("no/such/folder.lcm"));
+  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + walk_1 + " --poses " +
+                       path("out/agent_1.tum") + " --out-keyframes " + path("no/such/folder.lcm"));
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.output.find("--out-keyframes"), std::string::npos) << outcome.output;
   fs::remove_all(folder);

@@ -1,5 +1,6 @@
 #include "programs.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -71,10 +72,10 @@ double Distance_m(const fs::path& got_file, const fs::path& expected_file) {
   return std::sqrt(sum / static_cast<double>(expected.size()));
 }
 
-void RenderWalk(const fs::path& out, const std::string& arguments) {
-  const Outcome rendered =
-      RunCommand("pangea-sim --no-cache --shrink 2 --out " + out.string() + " " + arguments);
-  ASSERT_EQ(rendered.exit_code, 0) << rendered.output;
+fs::path Walk(int walk) {
+  fs::path folder = fs::path(PANGEA_BINARY_DIR) / "tests" / fmt::format("walk_{}", walk);
+  EXPECT_TRUE(fs::exists(folder)) << folder << " is missing: ctest -R tests.walk renders it";
+  return folder;
 }
 
 fs::path WriteSession(const fs::path& folder, const std::vector<std::string>& agents) {

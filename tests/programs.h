@@ -25,8 +25,9 @@ nlohmann::json ReadJson(const std::filesystem::path& path);
 // when the first does not exist or they are not the same keyframes.
 double Distance_m(const std::filesystem::path& got, const std::filesystem::path& expected);
 
-// Renders a short walk at half size: pangea-sim with these further arguments.
-void RenderWalk(const std::filesystem::path& out, const std::string& arguments);
+// The recording walk_1 or walk_2: two walks of 14 s through one hall at half size, which ctest has
+// rendered before (the fixture `walks` in CMakeLists.txt).
+std::filesystem::path Walk(int walk);
 
 // A session of agents 1, 2, ... with these recordings; returns the file.
 std::filesystem::path WriteSession(const std::filesystem::path& folder,

@@ -6,8 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <iostream>
 
-#include "vio/estimator.h"
-#include "vio/vio_test_world.h"
+#include "vio/test_ride.h"
 #include "vio/window_state.h"
 
 namespace pangea::vio {
@@ -15,41 +14,19 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Outcome {
-  std::vector<FinishedKeyframe> keyframes;
-  std::vector<ImuState> truth;  // in the estimate's odom: that of the first keyframe's yaw, origin
-};
-
-Outcome RideOnce(uint64_t seed) {
-  VioTestWorldOptions world_options;
-  world_options.seed = seed;
-  world_options.extrinsics_rotation_sigma = 0.002;
-  world_options.extrinsics_position_sigma = 0.002;
-  VioTestWorld world(world_options);
-  EstimatorOptions options;
-  options.pixel_sigma = world_options.pixel_noise;
-  Estimator estimator(options, world.camera(), ImuNoise{});
-  Outcome run;
-  for (int i = 0; i < 150; ++i) {
-    const VioTestWorld::Input input = world.Next();
-    const FrameResult result = estimator.AddFrame(input.frame, input.imu);
-    world.Drop(result.outlier_landmarks);
-    run.keyframes.insert(run.keyframes.end(), result.finished.begin(), result.finished.end());
-  }
-  if (run.keyframes.empty()) {
-    return run;
-  }
-  const FinishedKeyframe& first = run.keyframes.front();
-  const Rigid3 T_first = world.TruthAt(first.utime).T_odom_body;
+// The truth at the finished keyframes, in the estimate's odom: that of the first one's yaw, origin.
+std::vector<ImuState> TruthOf(const Ride& ride) {
+  const FinishedKeyframe& first = ride.finished.front();
+  const Rigid3 T_first = ride.world.TruthAt(first.utime).T_odom_body;
   const Eigen::Quaterniond turn = YawRotation(YawOf(first.T_odom_body.q * T_first.q.conjugate()));
-  for (const FinishedKeyframe& keyframe : run.keyframes) {
-    ImuState truth = world.TruthAt(keyframe.utime);
+  std::vector<ImuState> truths;
+  for (const FinishedKeyframe& keyframe : ride.finished) {
+    ImuState& truth = truths.emplace_back(ride.world.TruthAt(keyframe.utime));
     truth.T_odom_body = {turn * truth.T_odom_body.q,
                          turn * (truth.T_odom_body.t - T_first.t) + first.T_odom_body.t};
     truth.v_odom_body = turn * truth.v_odom_body;
-    run.truth.push_back(truth);
   }
-  return run;
+  return truths;
 }
 
 // In the window's coordinates (window_state.h).
@@ -85,17 +62,19 @@ Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& cov
 
 TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
   Mean position, yaw, tilt, velocity, gyro_bias, accel_bias;
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
-    const Outcome run = RideOnce(seed);
-    ASSERT_GT(run.keyframes.size(), 10u) << "seed " << seed;
+  for (const Ride& ride : TenRides()) {
+    const uint64_t seed = ride.world.options().seed;
+    ASSERT_GT(ride.finished.size(), 10u) << "seed " << seed;
+    const std::vector<ImuState> truth = TruthOf(ride);
     // The first keyframe is the start itself.
-    const Eigen::Matrix4d at_start = UnobservableInformation(run.keyframes.front().covariance);
-    for (size_t k = 0; k < run.keyframes.size(); ++k) {
-      const auto& P = run.keyframes[k].covariance;
-      const auto e = ErrorOf(run.keyframes[k], run.truth[k]);
+    const Eigen::Matrix4d at_start = UnobservableInformation(ride.finished.front().covariance);
+    for (size_t k = 0; k < ride.finished.size(); ++k) {
+      const FinishedKeyframe& keyframe = ride.finished[k];
+      const auto& P = keyframe.covariance;
+      const auto e = ErrorOf(keyframe, truth[k]);
       // The gauge: the start's prior holds origin and yaw there, and the truth is laid onto them.
       if (k > 0) {
-        const PositionError p = PositionErrorOf(run.keyframes[k], run.truth[k]);
+        const PositionError p = PositionErrorOf(keyframe, truth[k]);
         position.AddSquare(p.error, p.covariance);
         yaw.AddSquare(e.segment<1>(kTheta + 2), P.block<1, 1>(kTheta + 2, kTheta + 2));
       }

@@ -3,72 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
-#include <map>
 
 #include "common/preintegration.h"
-#include "vio/test_random.h"
-#include "vio/vio_test_world.h"
+#include "vio/test_ride.h"
 
 namespace pangea::vio {
 namespace {
 
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
-
-EstimatorOptions Options() {
-  EstimatorOptions options;
-  options.pixel_sigma = VioTestWorldOptions{}.pixel_noise;
-  return options;
-}
-
-// A ride's results beside the truth.
-struct Ride {
-  struct Frame {
-    int64_t utime;
-    FrameResult result;
-    ImuState truth;
-  };
-  VioTestWorld world;
-  Estimator estimator;
-  std::vector<Frame> tracked;
-  std::vector<FinishedKeyframe> finished;
-  FrameResult last;
-  int frames = 0;
-  double started_s = -1;
-
-  explicit Ride(const VioTestWorldOptions& options)
-      : world(options), estimator(Options(), world.camera(), ImuNoise{}) {}
-
-  void Feed(const VioTestWorld::Input& input) {
-    ++frames;
-    last = estimator.AddFrame(input.frame, input.imu);
-    world.Drop(last.outlier_landmarks);
-    finished.insert(finished.end(), last.finished.begin(), last.finished.end());
-    if (last.state == EstimatorState::kTracking) {
-      tracked.push_back({input.frame.utime, last, world.TruthAt(input.frame.utime)});
-      started_s =
-          started_s < 0 ? 1e-6 * static_cast<double>(input.frame.utime - 1'000'000) : started_s;
-    }
-  }
-  void Advance(int count) {
-    for (int i = 0; i < count; ++i) {
-      Feed(world.Next());
-    }
-  }
-  void Flush() {
-    const auto rest = estimator.Flush();
-    finished.insert(finished.end(), rest.begin(), rest.end());
-  }
-  // The truth in the estimate's odom frame: both share gravity, the yaw and origin of the start.
-  Rigid3 T_odom_truth() const {
-    const Frame& first = tracked.front();
-    const Rigid3 T = first.result.T_odom_body * first.truth.T_odom_body.Inverse();
-    const Eigen::Quaterniond q = YawRotation(YawOf(T.q));
-    return {q, first.result.T_odom_body.t - q * first.truth.T_odom_body.t};
-  }
-};
 
 // Root mean square position error after the best alignment in position and yaw.
 double Ate(const Ride& ride) {
@@ -166,7 +110,7 @@ TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {
     options.seed = seed;
     options.time_offset_sigma = 0.025;
     Ride ride(options);
-    ride.Advance(200);
+    ride.Advance(100);
     ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
     std::cout << "time offset " << ride.world.true_time_offset_s() << " s, found "
               << ride.estimator.camera().time_offset_s << " s after " << ride.started_s << " s\n";
@@ -244,14 +188,8 @@ TEST(Estimator, TheSameInputGivesTheSameOutput) {
 
 TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
   Mean edge, edge_position, edge_rotation, tilt, depth, preintegrated;
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
-    VioTestWorldOptions options;
-    options.seed = seed;
-    options.extrinsics_rotation_sigma = 0.002;
-    options.extrinsics_position_sigma = 0.002;
-    Ride ride(options);
-    ride.Advance(80);
-    ride.Flush();
+  for (const Ride& ride : TenRides()) {
+    const uint64_t seed = ride.world.options().seed;
     ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
 
     // Every announced keyframe comes, in order, once.

@@ -10,13 +10,14 @@
 namespace pangea::vio {
 namespace {
 
-const Eigen::Vector2f kAt(375.3F, 240.8F);
+constexpr int kWidth = 160, kHeight = 120;
+const Eigen::Vector2f kAt(80.3F, 60.8F);
 
 // A smooth texture without an image's own sampling: waves of 12 to 60 px in all directions. What is
 // at kAt is seen at kAt + shift, deformed by A.
 cv::Mat Waves(const Eigen::Matrix2f& a, const Eigen::Vector2f& shift) {
   const Eigen::Matrix2f a_inverse = a.inverse();
-  cv::Mat image(480, 752, CV_8U);
+  cv::Mat image(kHeight, kWidth, CV_8U);
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       const Eigen::Vector2f seen(static_cast<float>(x), static_cast<float>(y));
@@ -89,18 +90,18 @@ TEST(ReferencePatch, FollowsASlowGrowthUntilItIsWornOut) {
 }
 
 TEST(ReferencePatch, DoesNotFindItselfElsewhere) {
-  const cv::Mat image = RandomTexture(752, 480, 24);
+  const cv::Mat image = RandomTexture(kWidth, kHeight, 24);
   auto patch = ReferencePatch::Take(image, kAt);
   ASSERT_TRUE(patch);
-  EXPECT_FALSE(patch->Find(RandomTexture(752, 480, 25), kAt)) << "another image";
+  EXPECT_FALSE(patch->Find(RandomTexture(kWidth, kHeight, 25), kAt)) << "another image";
   EXPECT_FALSE(patch->Find(image, kAt + Eigen::Vector2f(15, 0))) << "15 px away";
   EXPECT_FALSE(patch->Find(image, {4, 4})) << "across the border";
   EXPECT_TRUE(patch->Find(image, kAt));
 }
 
 TEST(ReferencePatch, IsNotTakenFromABlankImageOrAtTheBorder) {
-  EXPECT_FALSE(ReferencePatch::Take(cv::Mat(480, 752, CV_8U, cv::Scalar(90)), kAt));
-  EXPECT_FALSE(ReferencePatch::Take(RandomTexture(752, 480, 26), {5, 200}));
+  EXPECT_FALSE(ReferencePatch::Take(cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(90)), kAt));
+  EXPECT_FALSE(ReferencePatch::Take(RandomTexture(kWidth, kHeight, 26), {5, 60}));
 }
 
 }  // namespace

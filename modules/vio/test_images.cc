@@ -25,10 +25,11 @@ CameraModel PlainCamera() { return PinholeTestCamera(752, 480, 460); }
 
 cv::Mat TurnedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q) {
   cv::Mat map_x(image.size(), CV_32F), map_y(image.size(), CV_32F), turned;
+  const Eigen::Matrix3d R_before_after = q.conjugate().toRotationMatrix();
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       const Eigen::Vector3d ray((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1);
-      const Eigen::Vector3d before = q.conjugate() * ray;
+      const Eigen::Vector3d before = R_before_after * ray;
       map_x.at<float>(y, x) = static_cast<float>(camera.fx * before.x() / before.z() + camera.cx);
       map_y.at<float>(y, x) = static_cast<float>(camera.fy * before.y() / before.z() + camera.cy);
     }

@@ -58,6 +58,7 @@ class VioTestWorld {
   // A tracker drops these.
   void Drop(std::span<const int32_t> landmark_ids);
 
+  const VioTestWorldOptions& options() const { return options_; }
   CameraModel camera() const { return camera_; }  // as the estimator is given it
   const Rigid3& true_T_body_cam() const { return true_T_body_cam_; }
   double true_time_offset_s() const { return true_time_offset_s_; }
