@@ -5,6 +5,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import sys
 import tempfile
 import time
@@ -174,6 +175,26 @@ class MeasuredTest(unittest.TestCase):
         measured = Measured(self.plan)
         self.assertEqual(measured.joint("seed1", "MH_01+MH_02"), Sample(None, ["no figure"]))
         self.assertEqual(measured.vio("seed1", "MH_01"), Sample(None, ["no figure"]))
+
+
+class PaperTest(unittest.TestCase):
+    """A session's report compares with the paper too, and has no Python: its figures are these."""
+
+    SOURCE = Path(__file__).resolve().parents[1] / "modules/session/report_paper.cc"
+
+    def rows(self, names):
+        pattern = r"\{" + r'"(MH_0\d)", ' * names + r"([\d., ]+)\}"
+        return [(row[:-1], tuple(map(float, row[-1].split(",")))) for row in re.findall(pattern, self.SOURCE.read_text())]
+
+    def test_single_agents_and_halves(self):
+        rows = self.rows(1)
+        self.assertEqual([name for (name,), _ in rows], anchors.SEQUENCES)
+        for (name,), (alone, server, _, *halves) in rows:
+            self.assertEqual((alone, server), (anchors.PAPER_ALONE[name], anchors.PAPER_SERVER[name]))
+            self.assertEqual(tuple(halves), anchors.PAPER_HALVES[name])
+
+    def test_pairs(self):
+        self.assertEqual(dict(self.rows(2)), anchors.PAPER_PAIRS)
 
 
 if __name__ == "__main__":

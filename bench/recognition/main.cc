@@ -2,32 +2,22 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <fstream>
-#include <stdexcept>
 #include <tuple>
 
 #include "bench/recognition/input.h"
 #include "bench/recognition/report.h"
+#include "common/text_file.h"
 
 namespace pangea::bench {
 namespace {
-
-void Write(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text;
-  file.close();
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path.string()));
-  }
-}
 
 void Measure(const std::vector<AgentInput>& agents, const std::filesystem::path& out) {
   std::filesystem::create_directories(out);
   const Input input = ReadInput(agents);
   const Outcome outcome = RunStages(input.keyframes, input.truth);
   const std::string table = Table(outcome);
-  Write(out / "recognition.md", table);
-  Write(out / "places.csv", Csv(outcome));
+  WriteTextFile(out / "recognition.md", table);
+  WriteTextFile(out / "places.csv", Csv(outcome));
   WriteCurves(outcome, out);
   fmt::print("{}", table);
 }

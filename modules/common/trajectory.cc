@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/csv.h"
+#include "common/text_file.h"
 
 namespace pangea {
 namespace {
@@ -142,12 +143,7 @@ std::string ToTum(const Trajectory& trajectory) {
 }
 
 void WriteTum(const std::string& path, const Trajectory& trajectory) {
-  std::ofstream file(path, std::ios::binary);
-  file << ToTum(trajectory);
-  file.close();
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
-  }
+  WriteTextFile(path, ToTum(trajectory));
 }
 
 std::optional<Rigid3> Interpolate(const Trajectory& trajectory, int64_t utime, int64_t max_gap_us) {

@@ -4,11 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "common/euroc.h"
+#include "common/text_file.h"
 
 namespace pangea {
 namespace {
@@ -33,12 +33,7 @@ Trajectory ReadReference(const std::string& path) {
 }
 
 void WriteJson(const nlohmann::ordered_json& json, const std::string& path) {
-  std::ofstream file(path);
-  file << json.dump(2) << '\n';
-  file.close();
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
-  }
+  WriteTextFile(path, json.dump(2) + "\n");
 }
 
 }  // namespace

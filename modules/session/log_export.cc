@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <stdexcept>
 
 #include "common/bus/log_reader.h"
 #include "common/messages.h"
+#include "common/text_file.h"
 #include "session/report_figures.h"
 #include "session/report_pictures.h"
 #include "session/report_text.h"
@@ -84,13 +83,8 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
 void ExportPly(const std::string& log, const std::string& file) {
   const CapturedSession session = ReadServerLog(log);
   const ReportFigures figures = ComputeFigures({.server_log = log}, session);
-  std::ofstream out(file, std::ios::binary);
-  out << MapPly(session, figures,
-                figures.groups.empty() ? FinalGroup() : figures.groups.front().group);
-  out.close();
-  if (!out) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", file));
-  }
+  WriteTextFile(file, MapPly(session, figures,
+                             figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
 }
 
 NamedGraph GraphOf(const std::string& log) {

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <optional>
 
+#include "common/text_file.h"
 #include "session/explain.h"
 #include "session/log_diff.h"
 #include "session/log_edit.h"
@@ -29,15 +29,6 @@ struct Arguments {
   int exit_code = 0;
 };
 
-void Write(const std::string& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", file));
-  }
-}
-
 void Export(const Arguments& arguments) {
   const std::string& log = arguments.logs.front();
   if (arguments.tum.empty() && arguments.g2o.empty() && arguments.ply.empty()) {
@@ -58,7 +49,7 @@ void Export(const Arguments& arguments) {
     for (size_t i = 0; i < named.keyframes.size(); ++i) {
       text += fmt::format("# {} is keyframe {}\n", i, ToString(named.keyframes[i]));
     }
-    Write(arguments.g2o, text);
+    WriteTextFile(arguments.g2o, text);
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments.g2o,
                              named.graph.vertices.size(), named.graph.edges.size(),
                              Cost(named.graph));

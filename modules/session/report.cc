@@ -2,24 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "common/text_file.h"
 #include "session/report_html.h"
+#include "session/report_json.h"
 #include "session/report_pictures.h"
 #include "session/report_text.h"
 
 namespace pangea::session {
 namespace {
 
-void WriteText(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
-  }
-}
+using nlohmann::ordered_json;
 
 void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures>& groups,
                        const std::string& folder) {
@@ -45,19 +40,19 @@ void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures
 
 }  // namespace
 
-std::string WriteReport(const ReportInput& input, const std::string& folder) {
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder) {
   const CapturedSession session = ReadServerLog(input.server_log);
   ReportFigures figures = ComputeFigures(input, session);
   for (const AgentFigures& agent : figures.agents) {
     WriteTrajectories(agent, figures.groups, folder);
   }
-  WriteText(folder + "/map.ply",
-            MapPly(session, figures,
-                   figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
+  WriteTextFile(folder + "/map.ply",
+                MapPly(session, figures,
+                       figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
   for (size_t i = 1; i < figures.groups.size(); ++i) {
     const FinalGroup& group = figures.groups[i].group;
-    WriteText(fmt::format("{}/map.{}.ply", folder, FileName(group.frame)),
-              MapPly(session, figures, group));
+    WriteTextFile(fmt::format("{}/map.{}.ply", folder, FileName(group.frame)),
+                  MapPly(session, figures, group));
   }
   try {
     for (const Picture& picture : Pictures(figures)) {
@@ -66,11 +61,22 @@ std::string WriteReport(const ReportInput& input, const std::string& folder) {
   } catch (const std::runtime_error& error) {
     figures.notes.emplace_back(error.what());
   }
-  WriteText(folder + "/report.json", ReportJson(input, session, figures));
+  ordered_json json = ReportJson(input, session, figures);
   std::string markdown = ReportMarkdown(input, session, figures);
-  WriteText(folder + "/report.md", markdown);
-  WriteText(folder + "/report.html", ReportHtml(input, session, figures));
-  return markdown;
+  std::string html = ReportHtml(input, session, figures);
+  std::vector<CheckedExpectation> checked = Check(input.expect, json);
+  if (!checked.empty()) {
+    const Table table = ToTable(checked);
+    json["expectations"] = ToJson(checked);
+    markdown += fmt::format("\n## Expectations\n\n{}", table.Text());
+    html = WithSection(std::move(html), "expectations", "Expectations", table);
+  }
+  // Texts of a log may be any bytes.
+  WriteTextFile(folder + "/report.json",
+                json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+  WriteTextFile(folder + "/report.md", markdown);
+  WriteTextFile(folder + "/report.html", html);
+  return {std::move(markdown), std::move(checked)};
 }
 
 }  // namespace pangea::session

@@ -22,6 +22,8 @@
 #include <string>
 #include <vector>
 
+#include "session/expectations.h"
+
 namespace pangea::session {
 
 // A bad link between an agent and the server, as the session made it.
@@ -60,10 +62,17 @@ struct ReportInput {
   std::map<std::string, int> restarts = {};
   // what else a reader must know, e.g. warnings about a recording
   std::vector<std::string> notes = {};
+  // bounds on the figures, checked at the end of the report
+  Expectations expect = {};
 };
 
-// Returns the text of report.md. Throws std::runtime_error when the server log cannot be read or
-// the folder not written; a picture that cannot be drawn is a note in the report.
-std::string WriteReport(const ReportInput& input, const std::string& folder);
+struct WrittenReport {
+  std::string text;                         // of report.md
+  std::vector<CheckedExpectation> checked;  // each of the input's
+};
+
+// Throws std::runtime_error when the server log cannot be read or the folder not written; a picture
+// that cannot be drawn is a note in the report.
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder);
 
 }  // namespace pangea::session

@@ -41,6 +41,19 @@ TEST_F(ReportFilesTest, SameLogsSameBytes) {
   }
 }
 
+TEST_F(ReportFilesTest, ExpectationsAreAtTheEndOfAllThreeReports) {
+  LogBoth();
+  LogState(State(1, {Map(1), Map(2)}, 20));
+  input_.expect = {{"groups", 1}, {"maps", 0}};
+  const json checked = Report()["expectations"];
+  ASSERT_EQ(checked.size(), 2U);
+  EXPECT_EQ(checked[0]["met"], true);
+  EXPECT_EQ(checked[1]["met"], false);
+  EXPECT_THAT(markdown_, HasSubstr("\n## Expectations\n\n"));
+  EXPECT_EQ(Text("report.md"), markdown_);
+  EXPECT_THAT(Text("report.html"), HasSubstr("id=\"expectations\""));
+}
+
 TEST_F(ReportFilesTest, WithoutGroundTruthTheErrorsAreNullAndTheFilesStillCome) {
   for (const int32_t agent : {1, 2}) {
     fs::remove_all(Recording(agent) + "/mav0/state_groundtruth_estimate0");
@@ -48,6 +61,7 @@ TEST_F(ReportFilesTest, WithoutGroundTruthTheErrorsAreNullAndTheFilesStillCome) 
   LogBoth();
   LogState(State(1, {Map(1)}, 10));
   const json report = Report();
+  EXPECT_FALSE(report.contains("expectations"));
   for (const json& agent : report["agents"]) {
     EXPECT_TRUE(agent["ate_vio_m"].is_null());
     EXPECT_TRUE(agent["ate_server_m"].is_null());

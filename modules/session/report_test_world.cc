@@ -183,7 +183,7 @@ void ReportWorld::LogConstraint(int seq, bool accepted, const std::string& reaso
 
 nlohmann::json ReportWorld::Report() {
   log_.reset();
-  markdown_ = WriteReport(input_, folder_ + "/out");
+  markdown_ = WriteReport(input_, folder_ + "/out").text;
   return nlohmann::json::parse(Text("report.json"));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// report.json and report.md.
+// report.md.
 
 #include <string>
 
@@ -11,8 +11,6 @@ namespace pangea::session {
 // "1_1700000000000000": a map's name in file names.
 std::string FileName(const MapId& map);
 
-std::string ReportJson(const ReportInput& input, const CapturedSession& session,
-                       const ReportFigures& figures);
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
                            const ReportFigures& figures);
 

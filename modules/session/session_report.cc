@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
 
-#include "session/report_html.h"
+#include "common/text_file.h"
 
 namespace pangea::session {
 namespace {
@@ -57,31 +56,11 @@ AgentRun RunOf(const AgentScript& script) {
   return run;
 }
 
-std::string TextOf(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-// The report, and at its end what was expected.
-ReportOutcome WriteChecked(const ReportInput& input, const Expectations& expect,
-                           const fs::path& out) {
-  ReportOutcome outcome{WriteReport(input, out.string()), {}};
-  if (expect.empty()) {
-    return outcome;
-  }
-  const fs::path file = out / "report.json";
-  std::ifstream stream(file);
-  nlohmann::ordered_json report = nlohmann::ordered_json::parse(stream);
-  const std::vector<CheckedExpectation> checked = Check(expect, report);
-  report["expectations"] = ToJson(checked);
-  std::ofstream(file) << report.dump(2) << "\n";
-  const Table table = ToTable(checked);
-  const std::string section = fmt::format("\n## Expectations\n\n{}", table.Text());
-  std::ofstream(out / "report.md", std::ios::app) << section;
-  const std::string page = TextOf(out / "report.html");
-  std::ofstream(out / "report.html") << WithSection(page, "expectations", "Expectations", table);
-  outcome.text += section;
-  for (const CheckedExpectation& one : checked) {
+// Its report, and in words what it missed.
+ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out) {
+  WrittenReport report = WriteReport(input, out.string());
+  ReportOutcome outcome{std::move(report.text), {}};
+  for (const CheckedExpectation& one : report.checked) {
     if (!one.met) {
       outcome.missed.push_back(
           fmt::format("expected {} {}, got {}", one.name, one.text, one.figure));
@@ -127,18 +106,20 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
   if (summary.interrupted) {
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
-  return WriteChecked(input, script.expect, out);
+  input.expect = script.expect;
+  return OutcomeOf(input, out);
 }
 
 ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::path& out) {
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
+  input.expect = known.expect;
   for (AgentRun& run : input.agents) {  // a session's own log has its agents' beside it
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }
-  return WriteChecked(input, known.expect, out);
+  return OutcomeOf(input, out);
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
@@ -150,8 +131,8 @@ void WriteRecordings(const SessionScript& script, const fs::path& out) {
                       {"start", agent.start_s},
                       {"duration", agent.duration_s}});
   }
-  std::ofstream(out / "recordings.json")
-      << json{{"agents", agents}, {"expect", script.expect}}.dump(2) << "\n";
+  WriteTextFile(out / "recordings.json",
+                json{{"agents", agents}, {"expect", script.expect}}.dump(2) + "\n");
 }
 
 Remembered ReadRecordings(const std::vector<fs::path>& logs) {

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+
+#include "common/text_file.h"
 
 namespace pangea::sim {
 namespace {
@@ -47,13 +48,7 @@ EurocWriter EurocWriter::Existing(const std::string& folder) {
 }
 
 void EurocWriter::WriteText(const std::string& file, const std::string& text) const {
-  const std::string path = mav0_ + "/" + file;
-  std::ofstream stream(path, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
-  }
+  WriteTextFile(mav0_ + "/" + file, text);
 }
 
 void EurocWriter::WriteBody(const std::string& comment) const {
