@@ -7,15 +7,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
 #include <stdexcept>
 
 #include "common/bus/process.h"
 #include "common/link/agent_key.h"
+#include "common/text_file.h"
 #include "link_emulator/link_conditions_yaml.h"
 #include "session/buses.h"
 #include "session/child_process.h"
+#include "session/kept_processes.h"
 #include "session/session_monitor.h"
 #include "session/session_progress.h"
 
@@ -31,14 +32,6 @@ constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lo
 constexpr double kStopGrace_s = 5;
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
-
-// A process the session keeps alive.
-struct Kept {
-  std::vector<std::string> argv;
-  ChildProcess child;
-  int restarts = 0;      // not counting planned ones
-  bool planned = false;  // its end is a fault of the session file
-};
 
 // One agent's vio, or the player of its stored keyframes: ends by itself when its recording is
 // over.
@@ -60,7 +53,8 @@ class Runner {
         faults_(script.faults),
         buses_(ChooseBuses(Ids(script, false), Ids(script, true), options.first_port)),
         monitor_(buses_),
-        progress_(isatty(STDOUT_FILENO) != 0) {
+        progress_(isatty(STDOUT_FILENO) != 0),
+        kept_(options.out / "logs") {
     for (const AgentScript& agent : script.agents) {
       players_.emplace_back().script = agent;
     }
@@ -77,7 +71,8 @@ class Runner {
     StartLinks();
     Play();
     Drain();
-    StopAll();
+    progress_.Finish();
+    kept_.StopAll(kStopGrace_s);
     summary_.wall_s = Now() - begin_;
     summary_.status = monitor_.statuses();
     for (const Player& player : players_) {
@@ -107,11 +102,6 @@ class Runner {
     return path.string();
   }
 
-  void Keep(const std::string& name, std::vector<std::string> argv) {
-    ChildProcess child(name, argv, options_.out / "logs" / (name + ".txt"));
-    kept_.push_back({std::move(argv), std::move(child)});
-  }
-
   fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
 
   // Only this session's processes know them.
@@ -129,19 +119,19 @@ class Runner {
     if (!logger) {
       throw std::runtime_error("lcm-logger is not on PATH: install liblcm-bin");
     }
-    Keep(name, {logger->string(), "--append", "--lcm-url=" + url, file.string()});
+    kept_.Start(name, {logger->string(), "--append", "--lcm-url=" + url, file.string()});
   }
 
   void StartServer() {
     KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
-    Keep("agent_handler",
-         {Program("pangea-agent-handler"), "--link", buses_.link, "--server", buses_.server,
-          "--journal", options_.journal.string(), "--keys", (options_.out / "keys").string()});
+    kept_.Start("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link,
+                                  "--server", buses_.server, "--journal", options_.journal.string(),
+                                  "--keys", (options_.out / "keys").string()});
     for (const std::string name : kServerProcesses) {
       if (name != "agent_handler") {
         std::string program = "pangea-" + name;
         std::ranges::replace(program, '_', '-');
-        Keep(name, {Program(program), "--bus", buses_.server});
+        kept_.Start(name, {Program(program), "--bus", buses_.server});
       }
       server_names_.push_back(name);
     }
@@ -166,11 +156,11 @@ class Runner {
       if (player.script.link) {
         StartLinkEmulator(id, *player.script.link);
       }
-      Keep(fmt::format("uplink_{}", id),
-           {Program("pangea-uplink"), "--agent", std::to_string(id), "--key", KeyFile(id).string(),
-            "--bus", bus, "--link", buses_.LinkOf(id), "--budget",
-            fmt::format("{}", player.script.budget_kb_per_s), "--spool",
-            (options_.out / fmt::format("spool_{}", id)).string()});
+      kept_.Start(fmt::format("uplink_{}", id),
+                  {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
+                   KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--budget",
+                   fmt::format("{}", player.script.budget_kb_per_s), "--spool",
+                   (options_.out / fmt::format("spool_{}", id)).string()});
     }
   }
 
@@ -179,10 +169,10 @@ class Runner {
     const fs::path file = options_.out / "logs" / (name + ".yaml");
     YamlOptions yaml;
     Bind(yaml, conditions);
-    std::ofstream(file) << yaml.Print();
-    Keep(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id), "--agent-link",
-                buses_.LinkOf(id), "--server-link", buses_.link, "--bus", buses_.agents.at(id),
-                "--options", file.string()});
+    WriteTextFile(file, yaml.Print());
+    kept_.Start(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id),
+                       "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
+                       buses_.agents.at(id), "--options", file.string()});
   }
 
   // A killed player of stored keyframes begins again: what the uplink has is a repeat.
@@ -282,35 +272,19 @@ class Runner {
   }
 
   void Revive() {
-    for (Kept& kept : kept_) {
-      const auto exit = kept.child.Poll();
-      if (!exit || kept.restarts >= kMaxRestarts) {
-        continue;
-      }
-      const std::string name = kept.child.name();
-      progress_.Say(fmt::format("{} ended ({}): {}; starting it again", name,
-                                exit->signal != 0 ? fmt::format("signal {}", exit->signal)
-                                                  : fmt::format("exit code {}", exit->code),
-                                kept.child.LastLine()));
-      summary_.restarted.push_back(name);
-      const int restarts = kept.restarts + (kept.planned ? 0 : 1);
-      std::vector<std::string> argv = kept.argv;
-      std::destroy_at(&kept);
-      std::construct_at(
-          &kept, Kept{argv, ChildProcess(name, argv, options_.out / "logs" / (name + ".txt")),
-                      restarts, false});
-      if (restarts == kMaxRestarts) {
+    for (const KeptProcesses::Revived& revived : kept_.Revive()) {
+      progress_.Say(fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
+      summary_.restarted.push_back(revived.name);
+      if (revived.last) {
         summary_.failures.push_back(
-            fmt::format("{} ended {} times and was given up", name, restarts));
+            fmt::format("{} ended {} times and was given up", revived.name, revived.unexpected));
       }
     }
   }
 
   ChildProcess* Find(const std::string& name) {
-    for (Kept& kept : kept_) {
-      if (kept.child.name() == name) {
-        return &kept.child;
-      }
+    if (ChildProcess* kept = kept_.Find(name)) {
+      return kept;
     }
     for (Player& player : players_) {
       if (player.child && player.child->name() == name && !player.done()) {
@@ -325,9 +299,7 @@ class Runner {
       if (ChildProcess* child = Find(name)) {
         child->Signal(SIGKILL);
       }
-      for (Kept& kept : kept_) {
-        kept.planned |= kept.child.name() == name;
-      }
+      kept_.ExpectEnd(name);
     }
     const std::set<std::string> full = faults_.DisksFull(SessionTime());
     for (const std::string& name : faults_.DisksEverFull()) {
@@ -374,24 +346,12 @@ class Runner {
     }
   }
 
-  // Sources first, loggers last, so that nothing said is missed.
-  void StopAll() {
-    progress_.Finish();
-    for (const bool loggers : {false, true}) {
-      for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) {
-        if (kept->child.name().starts_with("logger") == loggers) {
-          kept->child.Stop(kStopGrace_s);
-        }
-      }
-    }
-  }
-
   RunOptions options_;
   FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;
   SessionProgress progress_;
-  std::vector<Kept> kept_;
+  KeptProcesses kept_;
   std::vector<Player> players_;
   std::vector<std::string> server_names_;
   RunSummary summary_;

@@ -1,0 +1,51 @@
+#pragma once
+
+// The processes a session keeps alive: what ends is started again, until it has done so too often.
+
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "session/child_process.h"
+
+namespace pangea::session {
+
+class KeptProcesses {
+ public:
+  // What each says goes to <name>.txt there.
+  explicit KeptProcesses(std::filesystem::path logs);
+
+  void Start(const std::string& name, std::vector<std::string> argv);
+  // Null where there is none of that name.
+  ChildProcess* Find(const std::string& name);
+  // Its next end is one that the session wants, and counts for nothing.
+  void ExpectEnd(const std::string& name);
+
+  struct Revived {
+    std::string name;
+    std::string why;     // how it ended, for people
+    bool last = false;   // it will not be started once more
+    int unexpected = 0;  // how often it ended and was not meant to
+  };
+  // Starts those again that have ended.
+  std::vector<Revived> Revive();
+
+  // Sources first, loggers last, so that nothing said is missed.
+  void StopAll(double grace_s);
+
+ private:
+  struct Kept {
+    std::vector<std::string> argv;
+    std::optional<ChildProcess> child;
+    int unexpected = 0;
+    bool expects_end = false;
+  };
+  std::filesystem::path LogOf(const std::string& name) const;
+
+  std::filesystem::path logs_;
+  std::deque<Kept> kept_;
+};
+
+}  // namespace pangea::session
