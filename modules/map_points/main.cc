@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "common/bus/process.h"
+#include "common/bus/process_main.h"
 #include "map_points/map_points_process.h"
 #include "map_points/map_points_yaml.h"
 
@@ -9,14 +9,9 @@ int main(int argc, char** argv) {
   pangea::MapPointsOptions options;
   pangea::YamlOptions yaml;
   pangea::Bind(yaml, options);
-  const pangea::ProcessDescription description{
-      "pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
-      yaml.Print()};
-  return pangea::ProcessMain(argc, argv, description,
-                             [&](pangea::Bus& bus, const std::string& options_file) {
-                               if (!options_file.empty()) {
-                                 yaml.ReadFile(options_file);
-                               }
-                               return std::make_unique<pangea::MapPointsProcess>(bus, options);
-                             });
+  return pangea::ProcessMain(
+      argc, argv,
+      {"pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
+       &yaml},
+      [&](pangea::Bus& bus) { return std::make_unique<pangea::MapPointsProcess>(bus, options); });
 }

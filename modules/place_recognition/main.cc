@@ -2,15 +2,15 @@
 
 #include <memory>
 
-#include "common/bus/process.h"
+#include "common/bus/process_main.h"
 #include "place_recognition/place_recognition_process.h"
 
 int main(int argc, char** argv) {
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-place-recognition",
-       "Finds, for each keyframe, the older keyframes of all maps that show the same place.", ""},
-      [](pangea::Bus& bus, const std::string&) {
+       "Finds, for each keyframe, the older keyframes of all maps that show the same place."},
+      [](pangea::Bus& bus) {
         return std::make_unique<pangea::PlaceRecognitionProcess>(bus,
                                                                  pangea::PlaceRecognitionOptions{});
       });

@@ -1,12 +1,9 @@
 #include "common/bus/process.h"
 
 #include <dlfcn.h>
-#include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <csignal>
-#include <iostream>
 
 #include "common/bus/journal_first.h"
 
@@ -67,34 +64,6 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
     }
   }
   return 0;
-}
-
-int ProcessMain(int argc, char** argv, const ProcessDescription& description,
-                const ProcessFactory& factory) {
-  CLI::App app(description.summary, description.name);
-  std::string url = kDefaultBusUrl;
-  std::string options_file;
-  bool print_options = false;
-  app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
-  if (!description.default_options_yaml.empty()) {
-    app.add_option("--options", options_file, "YAML file with options");
-    app.add_flag("--print-options", print_options, "print the default options and exit");
-  }
-  CLI11_PARSE(app, argc, argv);
-  if (print_options) {
-    std::cout << description.default_options_yaml;
-    return 0;
-  }
-  try {
-    UseOneThread();
-    LcmBus bus(url);
-    JournalFirstBus journal_first(bus, WallUtime());
-    const std::unique_ptr<Process> process = factory(journal_first, options_file);
-    return RunProcess(bus, *process, &journal_first);
-  } catch (const std::exception& error) {
-    std::cerr << fmt::format("{}: {}\n", description.name, error.what());
-    return 1;
-  }
 }
 
 }  // namespace pangea

@@ -1,13 +1,8 @@
 #pragma once
 
-// The loop around a process class: bus, ticks, status, signals. A server main.cc is
-//   ProcessMain(argc, argv, {"fusion", "what it does"}, [](Bus& bus, const std::string&
-//   options_file) { ... });
+// The loop around a process class: bus, ticks, signals.
 
 #include <cstdint>
-#include <functional>
-#include <memory>
-#include <string>
 
 #include "common/bus/bus.h"
 
@@ -39,19 +34,5 @@ class JournalFirstBus;
 
 // Handles messages and ticks until a signal. Returns the exit code.
 int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first = nullptr);
-
-struct ProcessDescription {
-  std::string name;                  // "pangea-fusion"
-  std::string summary;               // for --help
-  std::string default_options_yaml;  // printed by --print-options; empty if it has none
-};
-
-// A server process: command line (--bus URL, --options FILE.yaml, --print-options), then messages,
-// the journal's HAVE first (journal_first.h), and ticks until a signal. Errors become one line and
-// exit code 1.
-using ProcessFactory =
-    std::function<std::unique_ptr<Process>(Bus& bus, const std::string& options_file)>;
-int ProcessMain(int argc, char** argv, const ProcessDescription& description,
-                const ProcessFactory& factory);
 
 }  // namespace pangea
