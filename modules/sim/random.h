@@ -34,7 +34,6 @@ class Rng {
   Rng(uint64_t seed, std::string_view stream)
       : engine_(Mix(seed) ^ HashBytes(stream.data(), stream.size())) {}
 
-  uint64_t Bits() { return engine_(); }
   double Uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
   double Uniform(double low, double high) { return low + (high - low) * Uniform(); }
   // 0 .. count - 1
