@@ -179,6 +179,11 @@ std::string ToText(const Explanation& e) {
     text += fmt::format("               worst {:.3f} m without the landmark that says most\n",
                         report.sigma_without_one_m);
   }
+  if (report.sigma_of_sure_m > 0) {
+    text += fmt::format(
+        "               worst {:.3f} m by surely alike landmarks alone (at most {:.3f})\n",
+        report.sigma_of_sure_m, limits.max_sigma_m);
+  }
   if (report.supported_share > 0) {
     text += fmt::format("on the way     in {:.0f} % of the view (at least {:.0f})\n",
                         100 * report.supported_share, 100 * limits.min_supported_share);

@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -13,7 +12,6 @@
 
 #include "common/alignment/epipolar_filter.h"
 #include "common/alignment/match_sets.h"
-#include "common/median.h"
 
 namespace pangea {
 namespace {
@@ -208,7 +206,10 @@ class Alignment {
         LargestSigma(ba_->covariance.bottomRightCorner<3, 3>()) > options_.max_sigma_rad) {
       return "too uncertain";
     }
-    return SaysMostAlone() ? "hangs on one landmark" : "";
+    if (SaysMostAlone()) {
+      return "hangs on one landmark";
+    }
+    return HangsOnVagueMatches() ? "hangs on vague matches" : "";
   }
 
   // The left and the right half of what both see, each solved alone. A turn of the view and a step
@@ -217,19 +218,13 @@ class Alignment {
   // to half. What both halves take from the odometries counts twice: the test lets pass too much
   // rather than too little.
   std::string CheckHalves() {
-    std::vector<double> sides;
     std::vector<PointMatch> inliers;
     for (size_t i = 0; i < matches_.size(); ++i) {
       if (ba_->inlier[i]) {
         inliers.push_back(matches_[i]);
-        sides.push_back(Side(matches_[i]));
       }
     }
-    const double middle = Median(sides);
-    std::array<std::vector<PointMatch>, 2> halves;
-    for (size_t i = 0; i < inliers.size(); ++i) {
-      halves[sides[i] < middle ? 0 : 1].push_back(inliers[i]);
-    }
+    const auto halves = HalvesOfView(window_m_, window_c_, inliers, ba_->T_m_c);
     const auto left = SolveJointBa(window_m_, window_c_, halves[0], ba_->T_m_c, options_.ba);
     const auto right = SolveJointBa(window_m_, window_c_, halves[1], ba_->T_m_c, options_.ba);
     if (!left || !right) {
@@ -295,18 +290,19 @@ class Alignment {
     return without_m * without_m > 2 * sigma_m * sigma_m;
   }
 
-  double InlierRatio() const {
-    return static_cast<double>(ba_->num_inlier_observations) / static_cast<double>(matches_.size());
+  // One wrong match can be found out; two or three together, all near, agree. They are looked for
+  // where the guess has them, so they fit, but they look alike only vaguely: what is surely the
+  // same must keep the promise without them.
+  bool HangsOnVagueMatches() {
+    constexpr double kNotFixed_m = 1e3;
+    report_.sigma_of_sure_m = ba_->covariance_of_sure
+                                  ? LargestSigma(ba_->covariance_of_sure->topLeftCorner<3, 3>())
+                                  : kNotFixed_m;
+    return report_.sigma_of_sure_m > options_.max_sigma_m;
   }
 
-  // Where the match's point is in the newest view of m, across the line of sight and level.
-  double Side(const PointMatch& match) const {
-    const bool forward = match.direction == Direction::kForward;
-    const Eigen::Vector3d& p_w = (forward ? window_m_ : window_c_).landmarks[match.landmark].p_w;
-    const Rigid3& T_w_cam = window_m_.T_w_cam.back();
-    const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(ba_->T_m_c * p_w)) - T_w_cam.t;
-    const Eigen::Vector3d sight = T_w_cam.q * Eigen::Vector3d::UnitZ();
-    return ray.dot(sight.cross(Eigen::Vector3d::UnitZ())) / ray.dot(sight);
+  double InlierRatio() const {
+    return static_cast<double>(ba_->num_inlier_observations) / static_cast<double>(matches_.size());
   }
 
   std::vector<RayPair> RayPairs(const PlaceCandidate& candidate) const {

@@ -71,6 +71,7 @@ struct AlignmentOptions {
   int min_occupied_cells = 6;     // of 6 x 4, in one of the two keyframes
   // Accepted means: nearer to the truth than 0.5 m and 5 degrees. Five standard deviations of the
   // worst direction, as images with few points err more often than a normal distribution says.
+  // Sure landmarks alone must keep it in position: vague matches that fit may be wrong ones.
   double max_sigma_m = 0.1;
   double max_sigma_rad = 0.0175;
   // Between the poses of the view's two halves: 99 % of 6 degrees of freedom.
@@ -89,6 +90,7 @@ struct AlignmentReport {
   double tilt = 0;             // radians
   double tilt_chi2 = 0;
   double sigma_without_one_m = 0;  // worst, were the landmark that says most not there
+  double sigma_of_sure_m = 0;      // worst, were there none but sure landmarks
   double halves_chi2 = 0;          // 0 when it was not looked at
   std::vector<ShownMatch> first;   // the candidate's and the nearest descriptors'; inliers of PnP
   std::vector<ShownMatch> found;   // by projection, in the two keyframes; inliers of the BA

@@ -247,6 +247,39 @@ TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
   }
 }
 
+// Several near points before the wall, the same in both walks or only vaguely alike: these may be
+// wrong together.
+TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
+  const auto point_at = [&](double x, double y, double z) {
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
+                     {random(), random(), random(), random()}};
+  };
+  std::vector<TestPoint> points;
+  constexpr int kNear = 8;
+  for (int i = 0; i < kNear; ++i) {
+    points.push_back(point_at(4 + 0.1 * i, -0.8 + 0.2 * i, 1.3 + 0.1 * i));
+  }
+  for (int i = 0; i < 60; ++i) {
+    points.push_back(point_at(ahead(random), across(random), 1.7 + up(random)));
+  }
+  for (const bool vague : {false, true}) {
+    std::vector<TestPoint> points_c = points;
+    for (int i = 0; vague && i < kNear; ++i) {
+      points_c[i].descriptor[0] = ~points_c[i].descriptor[0];  // noise makes it 75 bits and more
+    }
+    TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
+    walk_m.relative_depth_sigma = walk_c.relative_depth_sigma = 0.005;
+    walk_m.radius = 0.6;
+    walk_c.radius = 0.8;
+    const TestAgent m = RunTestAgent(points, walk_m), c = RunTestAgent(points_c, walk_c);
+    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    EXPECT_EQ(constraint.reason, vague ? "hangs on vague matches" : "");
+    EXPECT_LT(std::sqrt(constraint.covariance(0, 0)), 0.1);
+  }
+}
+
 // Corners a little off, one half of the image up and the other down: each is an inlier, and
 // together they give a pose.
 TEST(AlignerTest, RefusesHalvesThatDisagree) {

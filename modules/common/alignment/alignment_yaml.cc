@@ -25,6 +25,7 @@ void Bind(YamlOptions& yaml, AlignmentOptions& options) {
   ba.Add("scale_sigma", &options.ba.scale_sigma);
   ba.Add("max_chi2", &options.ba.max_chi2);
   ba.Add("max_depth_chi2", &options.ba.max_depth_chi2);
+  ba.Add("sure_hamming", &options.ba.sure_hamming);
   ba.Add("iterations", &options.ba.iterations);
   yaml.Add("first_max_hamming", &options.first_max_hamming);
   yaml.Add("first_max_ratio", &options.first_max_ratio);

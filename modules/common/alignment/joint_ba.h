@@ -27,6 +27,7 @@ struct JointBaOptions {
   double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says
   double max_chi2 = 9.2;         // of an inlier: 99 % of 2 degrees of freedom
   double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
+  int sure_hamming = 64;         // a landmark is sure that is so alike in one match (of 256 bits)
   int iterations = 8;            // each of the two rounds
 };
 
@@ -36,6 +37,8 @@ struct JointBaResult {
   Matrix6d covariance = Matrix6d::Identity();  // of T_Km_Kc, in Km's body frame
   // The same if the landmark that says most were not there.
   Matrix6d covariance_without_one = Matrix6d::Identity();
+  // The same if there were none but sure landmarks; nothing when they do not fix the pose.
+  std::optional<Matrix6d> covariance_of_sure;
   std::vector<bool> inlier;  // by match
   int num_inlier_observations = 0;
   double rms_px = 0;  // of the inliers, in pixels of octave 0

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "common/alignment/alignment_test_world.h"
 #include "common/alignment/projection_search.h"
@@ -32,56 +35,101 @@ Joined Partners(const Window& m, const Window& c, const std::vector<PointMatch>&
   return partners;
 }
 
-// What the optimisation says of its covariance without the landmark that says most is what an
-// optimisation without that landmark says.
-TEST(JointBaTest, CovarianceWithoutOneLandmark) {
-  const auto room = MakeTestRoom({.seed = 3, .num_points = 400});
-  TestAgentOptions walk_m, walk_c;
-  walk_m.num_keyframes = walk_c.num_keyframes = 6;
-  walk_m.pixel_sigma = walk_c.pixel_sigma = 0.3;  // all are inliers
-  walk_c.map = {2, 2000};
-  walk_c.radius = 2.3;
-  const TestAgent agent_m = RunTestAgent(room, walk_m), agent_c = RunTestAgent(room, walk_c);
-  SubmapStore store;
-  for (const TestAgent* agent : {&agent_m, &agent_c}) {
-    for (const Keyframe& keyframe : agent->keyframes) {
-      store.Add(keyframe);
-    }
-  }
-  const Window m = MakeWindow(store.WindowUpTo({walk_m.map, 5}, 5), {});
-  const Window c = MakeWindow(store.WindowUpTo({walk_c.map, 5}, 5), {});
-  const Rigid3 T_m_c = m.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
-                       agent_c.T_room_body[5] * c.T_w_body.back().Inverse();
-  std::vector<PointMatch> matches;
-  for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
-    for (int frame = 0; frame < 5; ++frame) {
-      const SearchResult found =
-          SearchByProjection(m, c, direction, frame, {T_m_c, 1e-6 * Matrix6d::Identity()}, {});
-      matches.insert(matches.end(), found.matches.begin(), found.matches.end());
-    }
-  }
-  JointBaOptions options;
-  options.max_chi2 = options.max_depth_chi2 = 1e3;
-  const auto all = SolveJointBa(m, c, matches, T_m_c, options);
-  ASSERT_TRUE(all);
-
-  double worst = 0;
-  const Joined partners = Partners(m, c, matches);
-  for (const auto& [landmark, joined] : partners) {
-    std::vector<PointMatch> others;
-    for (const PointMatch& match : matches) {
-      if (!joined.contains({match.direction, match.landmark})) {
-        others.push_back(match);
+// Two walks through one room, and what matches from the true alignment; all are inliers.
+class JointBaTest : public testing::Test {
+ protected:
+  JointBaTest() {
+    const auto room = MakeTestRoom({.seed = 3, .num_points = 400});
+    TestAgentOptions walk_m, walk_c;
+    walk_m.num_keyframes = walk_c.num_keyframes = 6;
+    walk_m.pixel_sigma = walk_c.pixel_sigma = 0.3;
+    walk_c.map = {2, 2000};
+    walk_c.radius = 2.3;
+    const TestAgent agent_m = RunTestAgent(room, walk_m), agent_c = RunTestAgent(room, walk_c);
+    for (const TestAgent* agent : {&agent_m, &agent_c}) {
+      for (const Keyframe& keyframe : agent->keyframes) {
+        store_.Add(keyframe);
       }
     }
-    const auto without = SolveJointBa(m, c, others, T_m_c, options);
-    ASSERT_TRUE(without);
-    worst = std::max(worst, without->covariance.topLeftCorner<3, 3>().trace());
+    m_ = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
+    c_ = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
+    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() * agent_c.T_room_body[5] *
+             c_.T_w_body.back().Inverse();
+    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+      for (int frame = 0; frame < 5; ++frame) {
+        const SearchResult found =
+            SearchByProjection(m_, c_, direction, frame, {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
+        matches_.insert(matches_.end(), found.matches.begin(), found.matches.end());
+      }
+    }
+    options_.max_chi2 = options_.max_depth_chi2 = 1e3;
+  }
+
+  // Trace of the position's covariance from the matches whose landmarks `keep` lets pass.
+  template <typename Keep>
+  double PositionTrace(const Keep& keep) const {
+    std::vector<PointMatch> kept;
+    for (const PointMatch& match : matches_) {
+      if (keep(std::pair{match.direction, match.landmark})) {
+        kept.push_back(match);
+      }
+    }
+    const auto result = SolveJointBa(m_, c_, kept, T_m_c_, options_);
+    return result ? result->covariance.topLeftCorner<3, 3>().trace() : 0;
+  }
+
+  SubmapStore store_;
+  Window m_, c_;
+  Rigid3 T_m_c_;
+  std::vector<PointMatch> matches_;
+  JointBaOptions options_;
+};
+
+// What the optimisation says of its covariance without the landmark that says most is what an
+// optimisation without that landmark says.
+TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
+  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(all);
+  double worst = 0;
+  for (const auto& [landmark, joined] : Partners(m_, c_, matches_)) {
+    const double without =
+        PositionTrace([&joined = joined](const auto& own) { return !joined.contains(own); });
+    ASSERT_GT(without, 0);
+    worst = std::max(worst, without);
   }
   const double said = all->covariance_without_one.topLeftCorner<3, 3>().trace();
   const double with_all = all->covariance.topLeftCorner<3, 3>().trace();
   EXPECT_GT(said / with_all, 1.03);
   EXPECT_NEAR(said / worst, 1, 0.03);
+}
+
+// So with the landmarks that are alike in one match at least: as if there were no others.
+TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
+  std::vector<int> distances;
+  for (const PointMatch& match : matches_) {
+    distances.push_back(match.distance);
+  }
+  std::sort(distances.begin(), distances.end());
+  options_.sure_hamming = distances[distances.size() / 8];
+  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(all && all->covariance_of_sure);
+  std::set<std::pair<Direction, int>> sure;
+  const Joined partners = Partners(m_, c_, matches_);
+  for (const PointMatch& match : matches_) {
+    if (match.distance <= options_.sure_hamming) {
+      sure.merge(std::set(partners.at({match.direction, match.landmark})));
+    }
+  }
+  const double of_sure = PositionTrace([&](const auto& own) { return sure.contains(own); });
+  const double said = all->covariance_of_sure->topLeftCorner<3, 3>().trace();
+  const double with_all = all->covariance.topLeftCorner<3, 3>().trace();
+  EXPECT_GT(said / with_all, 1.1);
+  EXPECT_NEAR(said / of_sure, 1, 0.05);
+
+  options_.sure_hamming = -1;
+  const auto none = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(none);
+  EXPECT_FALSE(none->covariance_of_sure);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "common/median.h"
+
 namespace pangea {
 
 std::vector<PointMatch> CandidateMatches(const Window& window_m, const Window& window_c,
@@ -94,6 +96,27 @@ std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
                      miss(T_m_c_after)});
   }
   return shown;
+}
+
+std::array<std::vector<PointMatch>, 2> HalvesOfView(const Window& window_m, const Window& window_c,
+                                                    const std::vector<PointMatch>& matches,
+                                                    const Rigid3& T_m_c) {
+  const Rigid3& T_w_cam = window_m.T_w_cam.back();
+  const Eigen::Vector3d sight = T_w_cam.q * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d across = sight.cross(Eigen::Vector3d::UnitZ());
+  std::vector<double> sides;
+  for (const PointMatch& match : matches) {
+    const bool forward = match.direction == Direction::kForward;
+    const Eigen::Vector3d& p_w = (forward ? window_m : window_c).landmarks[match.landmark].p_w;
+    const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(T_m_c * p_w)) - T_w_cam.t;
+    sides.push_back(ray.dot(across) / ray.dot(sight));
+  }
+  const double middle = Median(sides);
+  std::array<std::vector<PointMatch>, 2> halves;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    halves[sides[i] < middle ? 0 : 1].push_back(matches[i]);
+  }
+  return halves;
 }
 
 }  // namespace pangea

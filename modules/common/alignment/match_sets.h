@@ -1,7 +1,8 @@
 #pragma once
 
-// Sets of point matches between two windows, before any geometry.
+// Sets of point matches between two windows.
 
+#include <array>
 #include <vector>
 
 #include "common/alignment/point_observation.h"
@@ -36,5 +37,10 @@ std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches);
 // corners that are no landmark vote for nothing and stay.
 std::vector<PointMatch> Agreeing(const Window& window_m, const Window& window_c,
                                  const std::vector<PointMatch>& matches);
+
+// Those left and right of the middle one, across m's line of sight and level; T_m_c: windows.
+std::array<std::vector<PointMatch>, 2> HalvesOfView(const Window& window_m, const Window& window_c,
+                                                    const std::vector<PointMatch>& matches,
+                                                    const Rigid3& T_m_c);
 
 }  // namespace pangea
