@@ -77,4 +77,7 @@ export async function convert(lines, writable, plys = []) {
   return count;
 }
 
-export const linesOf = (stream) => createInterface({ input: stream, crlfDelay: Infinity });
+/** The stream's lines. A generator: readline reads from the moment it is made, and drops what nobody asked for yet. */
+export async function* linesOf(stream) {
+  yield* createInterface({ input: stream, crlfDelay: Infinity });
+}

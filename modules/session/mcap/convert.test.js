@@ -3,10 +3,12 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
+import { Readable } from "node:stream";
 import test from "node:test";
+import { setTimeout } from "node:timers/promises";
 import { McapIndexedReader, TempBuffer } from "@mcap/core";
 import Ajv from "ajv";
-import { convert, wellKnown } from "./convert.js";
+import { convert, linesOf, wellKnown } from "./convert.js";
 import { Drawn } from "./drawn.js";
 
 const [program, log] = process.env.PANGEA_LOG.split(" ");
@@ -26,6 +28,14 @@ const buffer = new TempBuffer();
 await convert(events.map((event) => JSON.stringify(event)), buffer, [kPly]);
 const reader = await McapIndexedReader.Initialize({ readable: buffer });
 
+async function collected(iterable) {
+  const all = [];
+  for await (const one of iterable) {
+    all.push(one);
+  }
+  return all;
+}
+
 async function messagesOf(topic) {
   const messages = [];
   for await (const { logTime, data } of reader.readMessages({ topics: [topic] })) {
@@ -33,6 +43,12 @@ async function messagesOf(topic) {
   }
   return messages;
 }
+
+test("lines wait for whoever reads them later", async () => {
+  const lines = linesOf(Readable.from(["first\nsecond\n", "third\n"]));
+  await setTimeout(20);
+  assert.deepEqual(await collected(lines), ["first", "second", "third"]);
+});
 
 test("every channel is a topic with its messages", async () => {
   const channels = new Set(events.map((event) => event.channel));
