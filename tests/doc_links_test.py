@@ -16,15 +16,28 @@ def without_code(text):
     return re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.S)
 
 
+def anchors_of(page):
+    """Of its headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 class DocLinks(unittest.TestCase):
     def test_links(self):
-        count = 0
+        count, anchors = 0, 0
         for page in PAGES:
-            for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", without_code(page.read_text())):
-                if not re.match(r"\w+:", link):
-                    self.assertTrue((page.parent / link).exists(), f"{page.relative_to(ROOT)}: {link}")
-                    count += 1
+            for file, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)[^)]*\)", without_code(page.read_text())):
+                target = page.parent / file if file else page
+                link = f"{page.relative_to(ROOT)}: {file}#{anchor}"
+                if re.match(r"\w+:", file):
+                    continue
+                self.assertTrue(target.exists(), link)
+                if anchor:
+                    self.assertIn(anchor, anchors_of(target), link)
+                count += 1
+                anchors += bool(anchor)
         self.assertGreater(count, 30)
+        self.assertGreater(anchors, 10)
 
     def test_sources_named_in_the_mathematics(self):
         for page in (ROOT / "docs").glob("maths*.md"):

@@ -4,7 +4,7 @@
 //
 // In: keyframes of all maps; candidates of which both keyframes are of one map. Out: a Constraint
 // between the two bodies with its covariance, or the reason it was refused. PnP, then bundle
-// adjustment of the window around both keyframes, as in fusion; besides, the drift the loop would
+// adjustment of the windows before both keyframes, as in fusion; besides, the drift the loop would
 // mean must be one that odometry can make over that path.
 
 #include "common/alignment/pair_judge.h"
