@@ -86,6 +86,7 @@ class LinkTest(unittest.TestCase):
     def test_a_status_of_an_uplink(self):
         data = status("uplink_1", {"a reason": 9}, {"rung": 3, "bytes_up": 70_000})
         self.assertEqual(decode_status(data)["counters"], {"rung": 3, "bytes_up": 70_000})
+        self.assertEqual(decode_status(data)["summary"], "all is well")
         self.assertEqual(rungs([(0, {"counters": {"rung": 3}}), (1, {"counters": {"rung": 4}}), (2, {"counters": {}})]), (3.5, 4))
 
     def test_a_budget_costs_accuracy_but_no_keyframe(self):

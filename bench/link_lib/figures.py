@@ -34,7 +34,7 @@ def keyframes(log):
 
 
 def decode_status(data):
-    """An encoded status_t: pending, memory_mb, cpu_s, and the counts of what was refused and done."""
+    """An encoded status_t: its line for people, pending, memory_mb, cpu_s, and the counts of what was refused and done."""
     at = 8  # behind the type's fingerprint
 
     def take(form):
@@ -52,9 +52,9 @@ def decode_status(data):
 
     text()
     take("qqi")
-    text()
+    summary = text()
     _, _, pending, _, _, _, _, memory_mb, cpu_s = take("5q4f")
-    return {"pending": pending, "memory_mb": memory_mb, "cpu_s": cpu_s, "refused": counts(), "counters": counts()}
+    return {"summary": summary, "pending": pending, "memory_mb": memory_mb, "cpu_s": cpu_s, "refused": counts(), "counters": counts()}
 
 
 def statuses(log, process):

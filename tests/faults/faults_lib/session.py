@@ -3,11 +3,12 @@
 import json
 import os
 import random
+import struct
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from link_lib.figures import events, keyframes
+from link_lib.figures import events, statuses
 
 SERVER = ("agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba", "map_points")
 SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
@@ -71,14 +72,9 @@ class Session:
     def restarts(self):
         return {name: process.get("restarts", 0) for name, process in self.report()["processes"].items()}
 
-    def statuses(self, process, log=None):
-        """Lines for people of a process, each when it changed."""
-        lines = []
-        for _, channel, data in events(log or self.out / "session.lcm"):
-            if channel == f"STATUS_{process}":
-                text = data.decode(errors="replace")
-                lines += [text] if not lines or text != lines[-1] else []
-        return lines
+    def summaries(self, process):
+        """What a server process said of itself, for people."""
+        return [said["summary"] for _, said in statuses(self.out / "session.lcm", process)]
 
     def replay(self, name):
         folder = self.folder / name
@@ -98,7 +94,7 @@ def played(agents, seconds=None):
 
 
 def whole_keyframes(log):
-    import struct
+    """(agent, map, seq), its own time, encoded bytes: of every keyframe in the log."""
     for _, channel, data in events(log):
         if channel.startswith("KEYFRAME_"):
             agent, opened, seq, own = struct.unpack_from(">8xiqiq", data)
@@ -124,7 +120,3 @@ def same_files(folder, other):
     names = sorted(os.listdir(folder))
     return names == sorted(os.listdir(other)) and all(
         (folder / name).read_bytes() == (other / name).read_bytes() for name in names)
-
-
-__all__ = ["Agent", "Session", "keyframes", "played", "positions", "random_kills", "rms_m", "same_files",
-           "session_yaml", "whole_keyframes"]
