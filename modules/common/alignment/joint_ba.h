@@ -23,7 +23,7 @@ struct JointBaOptions {
   // What all corners of a view share and no number of them averages out: calibration, blur, the
   // correlated errors of one odometry's depths. A turn by so many pixels, and the sideways step
   // that looks the same at the points' median distance.
-  double systematic_px = 0.4;
+  double systematic_px = 0.2;
   double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says
   double max_chi2 = 9.2;         // of an inlier: 99 % of 2 degrees of freedom
   double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
