@@ -18,6 +18,7 @@
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"
+#include "pangea/verdict_request_t.hpp"
 
 namespace pangea {
 namespace {
@@ -37,6 +38,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);
   EXPECT_EQ(static_cast<uint64_t>(resend_request_t::getHash()), 0x3f967c69b75046f2u);
   EXPECT_EQ(static_cast<uint64_t>(status_t::getHash()), 0xc86ad2441b54de87u);
+  EXPECT_EQ(static_cast<uint64_t>(verdict_request_t::getHash()), 0x2c0625dca65827feu);
 }
 
 }  // namespace

@@ -158,18 +158,23 @@ TEST(JournalIndex, KnowsWhatIsOwed) {
   EXPECT_EQ(gap->to_seq, 3);
   EXPECT_FALSE(index.MissingMatches(kMap, 1));
   EXPECT_EQ(index.num_missing_verdicts(), 2);
-  gap = index.MissingVerdicts(kMap, 5);
-  ASSERT_TRUE(gap);
-  EXPECT_EQ(gap->from_seq, 1);
   Constraint verdict;
   verdict.from = {{2, 9}, 0};
   verdict.to = {kMap, 1};
+  const VerdictNames owed = index.MissingVerdicts(kMap, 5);
+  ASSERT_EQ(owed.verdicts.size(), 2u);
+  EXPECT_THAT(owed.verdicts, testing::Contains(std::pair(1, verdict.Id())));
+  EXPECT_TRUE(index.MissingVerdicts(kMap, 0).verdicts.empty());
+  EXPECT_TRUE(index.Find(owed).empty());
   EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kNew);
   index.Add(verdict, {200, 1});
   EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kRepeat);
+  EXPECT_EQ(index.MissingVerdicts(kMap, 5).verdicts.size(), 1u);
+  ASSERT_EQ(index.Find(owed).size(), 1u);
+  EXPECT_EQ(index.Find(owed)[0].offset, 200);
   verdict.from.seq = 1;
   index.Add(verdict, {201, 1});
-  EXPECT_FALSE(index.MissingVerdicts(kMap, 5));
+  EXPECT_TRUE(index.MissingVerdicts(kMap, 5).verdicts.empty());
   EXPECT_EQ(index.Find(JournalChannel::kConstraint, {kMap, 1}).size(), 2u);
 }
 
@@ -182,16 +187,18 @@ TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
   }
   index.Add(MatchOf(140, 1), {1000, 1});
   OwedQuestions owed;
-  EXPECT_TRUE(owed.Due(index, kSecond).empty());
+  const OwedQuestions::Questions at_first = owed.Due(index, kSecond);
+  EXPECT_TRUE(at_first.matches.empty() && at_first.verdicts.empty());
   index.AddKeyframe({kMap, 150}, {150, 1});
-  std::vector<int64_t> asked_at;
+  std::vector<int64_t> asked_at, verdict_asked_at;
   for (int64_t s = 2; s <= 200; ++s) {
-    for (const auto& [channel, gap] : owed.Due(index, s * kSecond)) {
-      if (channel == JournalChannel::kConstraint) {
-        EXPECT_EQ(gap.from_seq, 140);
-        EXPECT_EQ(gap.to_seq, 140);
-        continue;
-      }
+    const OwedQuestions::Questions questions = owed.Due(index, s * kSecond);
+    for (const VerdictNames& names : questions.verdicts) {
+      ASSERT_EQ(names.verdicts.size(), 1u);
+      EXPECT_EQ(names.verdicts[0].first, 140);
+      verdict_asked_at.push_back(s);
+    }
+    for (const SeqGap& gap : questions.matches) {
       EXPECT_EQ(gap.map, kMap);
       EXPECT_EQ(gap.from_seq, 0);
       EXPECT_EQ(gap.to_seq, 99) << "no more than so many at once";
@@ -199,15 +206,14 @@ TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
     }
   }
   EXPECT_THAT(asked_at, testing::ElementsAre(4, 7, 13, 25, 49, 97, 157));
+  EXPECT_EQ(verdict_asked_at, asked_at);
   for (int seq = 0; seq < 140; ++seq) {
     index.Add(MatchOf(seq, 0), {2000 + seq, 1});
   }
   std::vector<int32_t> from;
   for (int64_t s = 201; s <= 230; ++s) {
-    for (const auto& [channel, gap] : owed.Due(index, s * kSecond)) {
-      if (channel == JournalChannel::kPlaceMatch) {
-        from.push_back(gap.from_seq);
-      }
+    for (const SeqGap& gap : owed.Due(index, s * kSecond).matches) {
+      from.push_back(gap.from_seq);
     }
   }
   EXPECT_THAT(from, testing::Each(141)) << "as soon as something came, it is asked anew";
@@ -254,6 +260,34 @@ TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
               testing::ElementsAre(testing::Pair("fusion", 1), testing::Pair("fusion", 2),
                                    testing::Pair("fusion", 3), testing::Pair("fusion", 4),
                                    testing::Pair("fusion", 5), testing::Pair("posegraph", 5)));
+}
+
+// Of the verdicts that are asked for by name those that are there, and nothing else.
+TEST(ResendQueue, AnswersForTheVerdictsThatAreThere) {
+  JournalIndex index;
+  index.AddKeyframe({kMap, 0}, {});
+  VerdictRequest request{"posegraph", {kMap, {}}};
+  for (int seq = 0; seq < 4; ++seq) {
+    Constraint verdict;
+    verdict.from = {{2, 9}, seq};
+    verdict.to = {kMap, 0};
+    if (seq < 3) {
+      index.Add(verdict, {100 + seq, 1});
+    }
+    if (seq > 1) {
+      request.names.verdicts.emplace_back(0, verdict.Id());
+    }
+  }
+  ResendQueue queue;
+  EXPECT_TRUE(queue.Add(request, index));
+  const auto answer = queue.Next(index);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->channel, "CONSTRAINT");
+  ASSERT_EQ(answer->places.size(), 1u);
+  EXPECT_EQ(answer->places[0].offset, 102);
+  request.names.verdicts.erase(request.names.verdicts.begin());
+  EXPECT_TRUE(queue.Add(request, index));
+  EXPECT_EQ(queue.waiting(), 0u) << "what is still to be judged needs no answer";
 }
 
 TEST(ResendQueue, RefusesTheAbsurdAndStaysBounded) {

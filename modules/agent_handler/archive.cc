@@ -70,6 +70,8 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
   node_.Subscribe<resend_request_t>(
       std::string(channels::kResendRequest),
       [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<verdict_request_t>(channels::kVerdictRequest,
+                                  std::bind_front(&Archive::OnVerdictRequest, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
@@ -82,6 +84,12 @@ void Archive::OnResendRequest(const resend_request_t& message) {
   const std::string reason = resend_queue_.Add(message, index_);
   if (!reason.empty()) {
     node_.Refuse(reason);
+  }
+}
+
+void Archive::OnVerdictRequest(const VerdictRequest& request) {
+  if (request.requester != node_.name() && !resend_queue_.Add(request, index_)) {
+    node_.Refuse("too many resend requests are waiting");
   }
 }
 
@@ -224,9 +232,12 @@ void Archive::PublishHave() {
 }
 
 void Archive::AskForOwed() {
-  for (const auto& [channel, gap] : owed_.Due(index_, now_utime_)) {
-    const bool match = channel == JournalChannel::kPlaceMatch;
-    AskAgain(node_, std::string(match ? channels::kPlaceMatch : channels::kConstraint), gap);
+  const OwedQuestions::Questions questions = owed_.Due(index_, now_utime_);
+  for (const SeqGap& gap : questions.matches) {
+    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  }
+  for (const VerdictNames& names : questions.verdicts) {
+    AskForVerdicts(node_, names);
   }
 }
 

@@ -2,8 +2,9 @@
 
 // What the server has on its disk, towards the server bus: keyframes, place matches and verdicts,
 // each journalled once, told about (HAVE) and sent again to whoever lacks them.
-//   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST out;
-//               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, AGAIN_<node's name> in
+//   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
+//               VERDICT_REQUEST out;
+//               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name> in
 
 #include <cstdint>
 #include <deque>
@@ -65,6 +66,7 @@ class Archive {
   };
 
   void OnResendRequest(const resend_request_t& message);
+  void OnVerdictRequest(const VerdictRequest& request);
   void OnAgain(const again_t& message);
   void NoteJournalled(const KeyframeId& id);
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);

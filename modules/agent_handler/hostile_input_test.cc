@@ -198,7 +198,7 @@ TEST_F(LinkWorld, NothingOnABusCrashesAProcess) {
       link_bus.Publish(channel, data);
     }
     for (const char* channel : {"PLACE_MATCH", "CONSTRAINT", "CORRECTION_1", "LANDMARKS_1",
-                                "RESEND_REQUEST", "AGAIN_agent_handler"}) {
+                                "RESEND_REQUEST", "VERDICT_REQUEST", "AGAIN_agent_handler"}) {
       server_bus.Publish(channel, data);
     }
     if (i % 100 == 0) {

@@ -94,6 +94,25 @@ std::vector<JournalPlace> JournalIndex::Find(JournalChannel channel, const Keyfr
   return places;
 }
 
+std::vector<JournalPlace> JournalIndex::Find(const VerdictNames& names) const {
+  std::vector<JournalPlace> places;
+  const Map* map = FindMap(names.map);
+  if (map == nullptr) {
+    return places;
+  }
+  for (const auto& [seq, constraint_id] : names.verdicts) {
+    const auto of_keyframe = map->verdicts.find(seq);
+    if (of_keyframe == map->verdicts.end()) {
+      continue;
+    }
+    const auto verdict = of_keyframe->second.find(constraint_id);
+    if (verdict != of_keyframe->second.end()) {
+      places.push_back(verdict->second);
+    }
+  }
+  return places;
+}
+
 int32_t JournalIndex::Highest(const MapId& id) const {
   const Map* map = FindMap(id);
   return map == nullptr || map->keyframes.empty() ? -1 : map->keyframes.rbegin()->first;
@@ -139,14 +158,21 @@ std::optional<SeqGap> JournalIndex::MissingMatches(const MapId& id, int32_t up_t
   return std::nullopt;
 }
 
-std::optional<SeqGap> JournalIndex::MissingVerdicts(const MapId& id, int32_t up_to) const {
+VerdictNames JournalIndex::MissingVerdicts(const MapId& id, int32_t up_to) const {
+  VerdictNames names{id, {}};
   const Map* map = FindMap(id);
-  if (map == nullptr || map->missing_verdicts.empty() ||
-      map->missing_verdicts.begin()->first > up_to) {
-    return std::nullopt;
+  if (map == nullptr) {
+    return names;
   }
-  const int32_t last = std::min(up_to, map->missing_verdicts.rbegin()->first);
-  return SeqGap{id, map->missing_verdicts.begin()->first, last};
+  for (const auto& [seq, constraint_ids] : map->missing_verdicts) {
+    for (const int64_t constraint_id : constraint_ids) {
+      if (seq > up_to || names.verdicts.size() == VerdictNames::kMax) {
+        return names;
+      }
+      names.verdicts.emplace_back(seq, constraint_id);
+    }
+  }
+  return names;
 }
 
 }  // namespace pangea

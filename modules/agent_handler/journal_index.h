@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/bus/in_order.h"
+#include "common/catch_up_messages.h"
 #include "common/server_messages.h"
 
 namespace pangea {
@@ -45,9 +46,13 @@ class JournalIndex {
   // Keyframes below a map's highest that are not there.
   std::vector<SeqGap> Gaps(const MapId& map) const;
 
-  // Keyframes up to `up_to` whose match, or a verdict, is not there: the first gap of the map.
+  // Of these verdicts, those that are there.
+  std::vector<JournalPlace> Find(const VerdictNames& names) const;
+
+  // Keyframes up to `up_to` whose match is not there: the first gap of the map.
   std::optional<SeqGap> MissingMatches(const MapId& map, int32_t up_to) const;
-  std::optional<SeqGap> MissingVerdicts(const MapId& map, int32_t up_to) const;
+  // Verdicts on candidates of keyframes up to `up_to` that are not there: the first of the map.
+  VerdictNames MissingVerdicts(const MapId& map, int32_t up_to) const;
   int64_t num_keyframes() const { return num_keyframes_; }
   int64_t num_matches() const { return num_matches_; }
   int64_t num_constraints() const { return num_constraints_; }

@@ -1,6 +1,8 @@
 #include "agent_handler/owed_questions.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 namespace pangea {
 namespace {
@@ -11,26 +13,33 @@ constexpr int64_t kMaxAsk_us = 60'000'000;
 
 }  // namespace
 
-std::vector<OwedQuestions::Question> OwedQuestions::Due(const JournalIndex& index, int64_t now_us) {
-  std::vector<Question> questions;
-  const auto ask = [&](Owed* owed, const MapId& map, JournalChannel channel, auto missing) {
-    if (now_us < owed->next_ask_us) {
-      return;
-    }
-    std::optional<SeqGap> gap = (index.*missing)(map, owed->seen_before);
-    const bool stuck = gap && gap->from_seq == owed->asked_from;
-    owed->wait_us = stuck ? std::min(2 * owed->wait_us, kMaxAsk_us) : kFirstAsk_us;
-    owed->next_ask_us = now_us + owed->wait_us;
-    owed->asked_from = gap ? gap->from_seq : -1;
-    owed->seen_before = index.Highest(map);
-    if (gap) {
-      gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
-      questions.push_back({channel, *gap});
-    }
-  };
+void OwedQuestions::Owed::NoteAsked(int32_t first_seq, int32_t highest_seq, int64_t now_us) {
+  const bool stuck = first_seq >= 0 && first_seq == asked_from;
+  wait_us = stuck ? std::min(2 * wait_us, kMaxAsk_us) : kFirstAsk_us;
+  next_ask_us = now_us + wait_us;
+  asked_from = first_seq;
+  seen_before = highest_seq;
+}
+
+OwedQuestions::Questions OwedQuestions::Due(const JournalIndex& index, int64_t now_us) {
+  Questions questions;
   for (const MapId& map : index.Maps()) {
-    ask(&matches_[map], map, JournalChannel::kPlaceMatch, &JournalIndex::MissingMatches);
-    ask(&verdicts_[map], map, JournalChannel::kConstraint, &JournalIndex::MissingVerdicts);
+    if (Owed& owed = matches_[map]; now_us >= owed.next_ask_us) {
+      std::optional<SeqGap> gap = index.MissingMatches(map, owed.seen_before);
+      owed.NoteAsked(gap ? gap->from_seq : -1, index.Highest(map), now_us);
+      if (gap) {
+        gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
+        questions.matches.push_back(*gap);
+      }
+    }
+    if (Owed& owed = verdicts_[map]; now_us >= owed.next_ask_us) {
+      VerdictNames names = index.MissingVerdicts(map, owed.seen_before);
+      owed.NoteAsked(names.verdicts.empty() ? -1 : names.verdicts.front().first, index.Highest(map),
+                     now_us);
+      if (!names.verdicts.empty()) {
+        questions.verdicts.push_back(std::move(names));
+      }
+    }
   }
   return questions;
 }

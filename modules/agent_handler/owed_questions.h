@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <vector>
 
 #include "agent_handler/journal_index.h"
@@ -15,14 +14,14 @@ namespace pangea {
 
 class OwedQuestions {
  public:
-  struct Question {
-    JournalChannel channel;
-    SeqGap gap;  // keyframes whose match or verdicts are missing, at most kMaxAsked
+  struct Questions {
+    std::vector<SeqGap> matches;  // keyframes whose matches are missing, at most kMaxAsked each
+    std::vector<VerdictNames> verdicts;
   };
   static constexpr int32_t kMaxAsked = 100;
 
   // The questions to ask now.
-  std::vector<Question> Due(const JournalIndex& index, int64_t now_us);
+  Questions Due(const JournalIndex& index, int64_t now_us);
 
  private:
   struct Owed {
@@ -30,6 +29,9 @@ class OwedQuestions {
     int32_t asked_from = -1;
     int64_t next_ask_us = 0;
     int64_t wait_us = 0;
+
+    // The first keyframe that lacks something; -1 for none.
+    void NoteAsked(int32_t first_seq, int32_t highest_seq, int64_t now_us);
   };
 
   std::map<MapId, Owed> matches_;

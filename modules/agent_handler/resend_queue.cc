@@ -1,6 +1,7 @@
 #include "agent_handler/resend_queue.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/catch_up_messages.h"
 #include "common/channels.h"
@@ -36,14 +37,30 @@ std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex
   if (covered || request.to_seq < request.next_seq) {
     return "";
   }
-  if (requests_.size() >= kMaxRequests) {
+  if (waiting() >= kMaxRequests) {
     return "too many resend requests are waiting";
   }
   requests_.push_back(std::move(request));
   return "";
 }
 
+bool ResendQueue::Add(const VerdictRequest& request, const JournalIndex& index) {
+  std::vector<JournalPlace> places = index.Find(request.names);
+  if (!places.empty() && waiting() >= kMaxRequests) {
+    return false;
+  }
+  if (!places.empty()) {
+    named_.push_back({request.requester, std::string(channels::kConstraint), std::move(places)});
+  }
+  return true;
+}
+
 std::optional<ResendQueue::Answer> ResendQueue::Next(const JournalIndex& index) {
+  if (!named_.empty()) {
+    Answer answer = std::move(named_.front());
+    named_.pop_front();
+    return answer;
+  }
   if (requests_.empty()) {
     return std::nullopt;
   }

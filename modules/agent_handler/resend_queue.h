@@ -21,14 +21,16 @@ class ResendQueue {
 
   // Why it was refused, or an empty string.
   std::string Add(const resend_request_t& request, const JournalIndex& index);
+  // For the verdicts that are journalled; the others will come. False when too many requests wait.
+  bool Add(const VerdictRequest& request, const JournalIndex& index);
 
   struct Answer {
     std::string requester;
     std::string channel;
-    std::vector<JournalPlace> places;  // of one keyframe; may be empty
+    std::vector<JournalPlace> places;  // of one keyframe, or asked for by name; may be empty
   };
   std::optional<Answer> Next(const JournalIndex& index);
-  size_t waiting() const { return requests_.size(); }
+  size_t waiting() const { return requests_.size() + named_.size(); }
 
  private:
   struct Request {
@@ -40,6 +42,7 @@ class ResendQueue {
     int32_t to_seq;
   };
   std::deque<Request> requests_;
+  std::deque<Answer> named_;  // answers to requests that name verdicts
 };
 
 }  // namespace pangea

@@ -63,4 +63,19 @@ Parsed<ResendRequest> Parse(const resend_request_t& m) {
       ""};
 }
 
+Parsed<VerdictRequest> Parse(const verdict_request_t& m) {
+  const auto map = Parse(m.map);
+  if (!IsProcessName(m.requester) || !map.value || m.num_verdicts > int{VerdictNames::kMax}) {
+    return Refused<VerdictRequest>("verdict request: requester, map or count is invalid");
+  }
+  VerdictRequest request{m.requester, {*map.value, {}}};
+  for (int i = 0; i < m.num_verdicts; ++i) {
+    if (m.seq[i] < 0 || m.seq[i] > kMaxSeq) {
+      return Refused<VerdictRequest>("verdict request: seq out of range");
+    }
+    request.names.verdicts.emplace_back(m.seq[i], m.constraint_id[i]);
+  }
+  return {std::move(request), ""};
+}
+
 }  // namespace pangea

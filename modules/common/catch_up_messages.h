@@ -1,7 +1,8 @@
 #pragma once
 
 // The border for what processes tell each other to catch up: what exists (have_t), and what is to
-// be sent again (resend_request_t). As in messages.h, past Parse every field is bounded.
+// be sent again (resend_request_t, verdict_request_t). As in messages.h, past Parse every field is
+// bounded.
 
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "common/messages.h"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"
+#include "pangea/verdict_request_t.hpp"
 
 namespace pangea {
 
@@ -25,7 +27,21 @@ struct ResendRequest {
   SeqGap range;
 };
 
+// Verdicts on candidates of one map's keyframes: the keyframe's seq, the constraint's id.
+struct VerdictNames {
+  static constexpr size_t kMax = 500;
+
+  MapId map;
+  std::vector<std::pair<int32_t, int64_t>> verdicts;  // at most kMax
+};
+
+struct VerdictRequest {
+  std::string requester;
+  VerdictNames names;
+};
+
 Parsed<Have> Parse(const have_t& message);
 Parsed<ResendRequest> Parse(const resend_request_t& message);
+Parsed<VerdictRequest> Parse(const verdict_request_t& message);
 
 }  // namespace pangea

@@ -230,6 +230,36 @@ TEST(Messages, HaveAndResendRequestAreBounded) {
   }
 }
 
+TEST(Messages, VerdictRequestIsBounded) {
+  verdict_request_t request{};
+  request.requester = "posegraph";
+  request.map = ToMessage(MapId{1, 100});
+  request.num_verdicts = 2;
+  request.seq = {7, 8};
+  request.constraint_id = {-5, 6};
+  const auto parsed = Parse(ThroughBytes(request));
+  ASSERT_TRUE(parsed.value) << parsed.refused;
+  EXPECT_EQ(parsed.value->requester, "posegraph");
+  EXPECT_EQ(parsed.value->names.map, (MapId{1, 100}));
+  EXPECT_EQ(parsed.value->names.verdicts.at(0), std::pair(7, int64_t{-5}));
+  const std::vector<std::function<void(verdict_request_t*)>> damages = {
+      [](verdict_request_t* m) { m->requester = "a b"; },
+      [](verdict_request_t* m) { m->map.agent_id = 0; },
+      [](verdict_request_t* m) { m->seq[1] = -1; },
+      [](verdict_request_t* m) { m->seq[1] = std::numeric_limits<int32_t>::max(); },
+      [](verdict_request_t* m) {
+        m->num_verdicts = 501;
+        m->seq.resize(501);
+        m->constraint_id.resize(501);
+      },
+  };
+  for (size_t i = 0; i < damages.size(); ++i) {
+    verdict_request_t bad = request;
+    damages[i](&bad);
+    EXPECT_FALSE(Parse(bad).refused.empty()) << "damage " << i;
+  }
+}
+
 TEST(Messages, CorrectionRoundTrip) {
   Correction in;
   in.map = {2, 200};

@@ -78,6 +78,43 @@ TEST_F(VerdictProcesses, OneVerdictFromTheProcessOfItsKind) {
   EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
 }
 
+// The journal's owner is told again what it names, once it was said; of what is still to be judged
+// nothing is said.
+TEST_F(VerdictProcesses, SaysAVerdictAgainThatTheJournalLacks) {
+  std::vector<Constraint> again;
+  listener_.Subscribe<again_t>(
+      "AGAIN_agent_handler", [&](const std::string&, const again_t& message) {
+        EXPECT_EQ(message.channel, "CONSTRAINT");
+        TakeAgain<constraint_t>(listener_, message,
+                                [&](const Constraint& verdict) { again.push_back(verdict); });
+      });
+  Constraint wanted;
+  wanted.from = agent_m_.keyframes[10].id;
+  wanted.to = agent_c_.keyframes[9].id;
+  wanted.kind = PlaceKind::kInter;
+  const auto ask = [&](const std::string& requester, int64_t id) {
+    verdict_request_t request{};
+    request.requester = requester;
+    request.map = ToMessage(wanted.to.map);
+    request.num_verdicts = 1;
+    request.seq = {wanted.to.seq};
+    request.constraint_id = {id};
+    PublishMessage(bus_, "VERDICT_REQUEST", request);
+    bus_.Drain();
+  };
+  SendKeyframes(agent_m_, 0, 12);
+  SendMatch(PlaceKind::kInter);
+  ask("agent_handler", wanted.Id());
+  EXPECT_TRUE(again.empty()) << "still to be judged";
+  SendKeyframes(agent_c_, 0, 12);
+  ask("agent_handler", wanted.Id() + 1);
+  ask("posegraph", wanted.Id());  // whom the journal's owner answers
+  EXPECT_TRUE(again.empty());
+  ask("agent_handler", wanted.Id());
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].Id(), wanted.Id());
+}
+
 TEST_F(VerdictProcesses, IntraOfTwoMapsIsRefusedByInterMapBa) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
@@ -190,6 +227,53 @@ TEST_F(VerdictProcesses, WhatIsLostIsNotWaitedFor) {
   bus_.Drain();
   ASSERT_EQ(constraints_.size(), 1u);
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
+}
+
+// Live: all that came is known, and told as pending, before it is judged; verdicts come in the
+// order in which the candidates came, and what comes meanwhile is heard between two of them.
+TEST(FusionProcess, LiveItHearsBeforeItJudges) {
+  const auto room = MakeTestRoom({.seed = 5});
+  TestAgentOptions first, second;
+  first.num_keyframes = second.num_keyframes = 12;
+  second.map = {2, 2000};
+  second.radius = 2.3;
+  const TestAgent agent_m = RunTestAgent(room, first);
+  const TestAgent agent_c = RunTestAgent(room, second);
+  LcmBus bus("memq://");
+  FusionProcess fusion(bus, FusionOptions{});
+  Node listener(bus, "listener");
+  status_t status{};
+  std::vector<int32_t> judged;
+  listener.Subscribe<status_t>("STATUS_fusion",
+                               [&](const std::string&, const status_t& said) { status = said; });
+  listener.Subscribe<constraint_t>(
+      "CONSTRAINT",
+      [&](const std::string&, const constraint_t& verdict) { judged.push_back(verdict.to.seq); });
+  for (const TestAgent* agent : {&agent_m, &agent_c}) {
+    for (const Keyframe& keyframe : agent->keyframes) {
+      PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
+    }
+  }
+  for (const int seq : {11, 9, 10}) {
+    const PlaceMatch match{
+        agent_c.keyframes[seq].id, {MakeTestCandidate(agent_c, seq, agent_m, 10, 40, 10)}, {}};
+    PublishMessage(bus, "PLACE_MATCH", ToMessage(match));
+  }
+  while (bus.MoreWaits()) {
+    bus.Handle(0);
+  }
+  EXPECT_TRUE(judged.empty());
+  fusion.Tick(kSecond);
+  bus.Handle(0);
+  EXPECT_EQ(status.pending, 3);
+  bus.Handle(0);  // one verdict
+  fusion.Tick(2 * kSecond);
+  bus.Handle(0);
+  bus.Handle(0);
+  EXPECT_EQ(status.pending, 2);
+  while (bus.Handle(0)) {
+  }
+  EXPECT_EQ(judged, (std::vector<int32_t>{11, 9, 10}));
 }
 
 TEST_F(VerdictProcesses, ACornerThatDoesNotExistIsRefused) {

@@ -21,7 +21,6 @@ constexpr int64_t kMaxVerdictAfter_us = 60 * kSecond;
 constexpr int64_t kGiveUpCatchingUp_us = 5 * kSecond;
 // One request's answers must fit the receive buffer: a keyframe is about 28 kB.
 constexpr int32_t kMaxKeyframesAsked = 50;
-constexpr int32_t kMaxVerdictsAsked = 500;  // keyframes' verdicts
 // A gap that nobody fills after so many requests is bridged.
 constexpr int kMaxTimesAsked = 15;
 
@@ -205,7 +204,7 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : matches_.Due(now_utime)) {
     AskAgain(node_, std::string(channels::kPlaceMatch), gap);
   }
-  AskForVerdicts(now_utime);
+  AskForDueVerdicts(now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
     last_change_utime_ = now_utime;
@@ -237,21 +236,25 @@ void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
   }
 }
 
-void PoseGraphProcess::AskForVerdicts(int64_t now_utime) {
-  std::map<MapId, std::pair<int32_t, int32_t>> overdue;
+void PoseGraphProcess::AskForDueVerdicts(int64_t now_utime) {
+  if (now_utime < next_verdicts_utime_) {
+    return;
+  }
+  next_verdicts_utime_ = now_utime + kSecond;
+  std::map<MapId, VerdictNames> overdue;
   for (auto& [id, due] : due_) {
-    if (now_utime >= due.next_ask_utime) {
+    VerdictNames& names =
+        overdue.try_emplace(due.query.map, VerdictNames{due.query.map, {}}).first->second;
+    if (now_utime >= due.next_ask_utime && names.verdicts.size() < VerdictNames::kMax) {
       due.wait_us = std::min(2 * due.wait_us, kMaxVerdictAfter_us);
       due.next_ask_utime = now_utime + due.wait_us;
-      auto& [first, last] =
-          overdue.try_emplace(due.query.map, due.query.seq, due.query.seq).first->second;
-      first = std::min(first, due.query.seq);
-      last = std::max(last, due.query.seq);
+      names.verdicts.emplace_back(due.query.seq, id);
     }
   }
-  for (const auto& [map, range] : overdue) {
-    AskAgain(node_, std::string(channels::kConstraint),
-             {map, range.first, std::min(range.second, range.first + kMaxVerdictsAsked - 1)});
+  for (const auto& [map, names] : overdue) {
+    if (!names.verdicts.empty()) {
+      AskForVerdicts(node_, names);
+    }
   }
 }
 

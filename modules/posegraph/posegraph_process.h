@@ -4,9 +4,10 @@
 // out.
 //
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
-// (RESEND_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of, verdicts that a
-// PLACE_MATCH promised and that did not come in two seconds (then ever more rarely: a candidate of
-// a match that the journal does not have may never be judged), and after a restart all of them.
+// (RESEND_REQUEST, VERDICT_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of,
+// verdicts that a PLACE_MATCH promised and that did not come in two seconds (then ever more rarely:
+// it may only take its time, and a candidate of a match that the journal does not have may never be
+// judged), and after a restart all of them.
 // Live, when nothing has come for a second, and at the end of a replay (Finish) every group is
 // solved from the beginning and published in full.
 //
@@ -80,7 +81,7 @@ class PoseGraphProcess : public Process {
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
   void AskForKeyframes(int64_t now_utime);
-  void AskForVerdicts(int64_t now_utime);
+  void AskForDueVerdicts(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
@@ -103,6 +104,7 @@ class PoseGraphProcess : public Process {
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish
+  int64_t next_verdicts_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

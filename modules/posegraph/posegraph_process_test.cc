@@ -56,6 +56,8 @@ struct Server {
         EXPECT_EQ(channel, channels::Correction(corrections.back().map.agent_id));
       } else if (channel == "RESEND_REQUEST") {
         DecodeMessage(data, &requests.emplace_back());
+      } else if (channel == "VERDICT_REQUEST") {
+        DecodeMessage(data, &verdict_requests.emplace_back());
       } else if (channel == "STATUS_posegraph") {
         DecodeMessage(data, &status);
       }
@@ -95,6 +97,7 @@ struct Server {
   std::vector<map_state_t> states;
   std::vector<correction_t> corrections;
   std::vector<resend_request_t> requests;
+  std::vector<verdict_request_t> verdict_requests;
   std::vector<uint8_t> said;
   status_t status{};
   int64_t now = 0;
@@ -288,18 +291,21 @@ TEST(PoseGraphProcess, AsksForVerdictsThatWerePromised) {
   PublishMessage(server.bus, "PLACE_MATCH", ToMessage(match));
   server.bus.Drain();
   server.Tick(15);
-  EXPECT_TRUE(server.requests.empty());
-  server.Tick(10);
-  ASSERT_EQ(server.requests.size(), 1u);
-  EXPECT_EQ(server.requests[0].channel, "CONSTRAINT");
-  EXPECT_EQ(server.requests[0].from_seq, 3);
+  EXPECT_TRUE(server.verdict_requests.empty());
   Constraint refused;
   refused.from = match.candidates[0].match;
   refused.to = match.query;
   refused.reason = "too few inliers";
+  server.Tick(10);
+  ASSERT_EQ(server.verdict_requests.size(), 1u);
+  EXPECT_EQ(server.verdict_requests[0].seq, std::vector<int32_t>{3});
+  EXPECT_EQ(server.verdict_requests[0].constraint_id, std::vector<int64_t>{refused.Id()});
+  server.Tick(650);  // it may take its time: asked for ever more rarely
+  EXPECT_EQ(server.verdict_requests.size(), 5u);
   server.Send(refused);
-  server.Tick(50);
-  EXPECT_EQ(server.requests.size(), 1u);
+  server.Tick(700);
+  EXPECT_EQ(server.verdict_requests.size(), 5u);
+  EXPECT_TRUE(server.requests.empty());
 }
 
 TEST(PoseGraphProcess, AfterARestartItAsksForWhatTheJournalHas) {

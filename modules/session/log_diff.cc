@@ -20,7 +20,7 @@ using Channels = std::map<std::string, std::vector<Message>>;
 
 bool TellsOfTheRun(const std::string& channel) {
   return channel.starts_with("STATUS_") || channel.starts_with("AGAIN_") || channel == "HAVE" ||
-         channel == "RESEND_REQUEST" || channel == "LCM_SELF_TEST";
+         channel == "RESEND_REQUEST" || channel == "VERDICT_REQUEST" || channel == "LCM_SELF_TEST";
 }
 
 Channels ReadChannels(const std::string& log, double until_s) {

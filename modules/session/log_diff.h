@@ -30,9 +30,9 @@ struct LogDiff {
 };
 
 // The n-th message of a channel is compared with the n-th of the other's, as bytes; capture times
-// are not. STATUS_*, HAVE, RESEND_REQUEST and AGAIN_*, which tell of the run and not of its
-// outcome, are left out. Of both logs the first `until_s` seconds. Throws std::runtime_error for a
-// log that cannot be read.
+// are not. STATUS_*, HAVE, RESEND_REQUEST, VERDICT_REQUEST and AGAIN_*, which tell of the run and
+// not of its outcome, are left out. Of both logs the first `until_s` seconds. Throws
+// std::runtime_error for a log that cannot be read.
 LogDiff DiffLogs(const std::string& a, const std::string& b,
                  double until_s = std::numeric_limits<double>::infinity());
 

@@ -100,6 +100,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       ParsePoseBody,
       DecompressAndParse,
       ParseBytes<landmarks_t>,
+      ParseOnly<verdict_request_t>,
   };
   if (size > 0) {
     targets[data[0] % std::size(targets)]({data + 1, data + size});

@@ -16,6 +16,7 @@
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
+#include "pangea/verdict_request_t.hpp"
 
 namespace pangea::fuzz {
 
@@ -37,6 +38,7 @@ inline const std::vector<Channel>& HandlerChannels() {
       ChannelOf<resend_request_t>("RESEND_REQUEST"),
       ChannelOf<again_t>("AGAIN_agent_handler"),
       ChannelOf<landmarks_t>("LANDMARKS_1"),
+      ChannelOf<verdict_request_t>("VERDICT_REQUEST"),
   };
   return channels;
 }

@@ -109,6 +109,16 @@ Payload Landmarks(const MapId& map) {
   return EncodeMessage(ToMessage(landmarks));
 }
 
+Payload Verdicts(const MapId& map) {
+  verdict_request_t request{};
+  request.requester = "posegraph";
+  request.map = ToMessage(map);
+  request.num_verdicts = 1;
+  request.seq = {1};
+  request.constraint_id = {7};
+  return EncodeMessage(request);
+}
+
 MapId MapOf(const Payload& keyframe_bytes) {
   keyframe_t message{};
   DecodeMessage(keyframe_bytes, &message);
@@ -140,6 +150,7 @@ void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
       {"pose", EncodePose(pose)},
       {"compressed", Compress(first)},
       {"landmarks", Landmarks(map)},
+      {"verdict_request", Verdicts(map)},
   };
   for (size_t i = 0; i < seeds.size(); ++i) {
     Payload bytes{static_cast<uint8_t>(i)};

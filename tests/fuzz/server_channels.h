@@ -13,6 +13,7 @@
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
+#include "pangea/verdict_request_t.hpp"
 
 namespace pangea::fuzz {
 
@@ -32,6 +33,7 @@ inline const std::vector<Channel>& ServerChannels() {
       ChannelOf<again_t>("AGAIN_global_ba"),
       ChannelOf<again_t>("AGAIN_map_points"),
       ChannelOf<pose_t>("POSE_1"),
+      ChannelOf<verdict_request_t>("VERDICT_REQUEST"),
   };
   return channels;
 }

@@ -26,19 +26,19 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
   node_.Subscribe<again_t>(
       channels::Again(name),
       [this](const std::string&, const again_t& message) { OnAgain(message); });
-  node_.Listen<resend_request_t>(channels::kResendRequest,
-                                 std::bind_front(&CandidateProcess::OnResendRequest, this));
+  node_.Listen<verdict_request_t>(channels::kVerdictRequest,
+                                  std::bind_front(&CandidateProcess::OnVerdictRequest, this));
 }
 
 void CandidateProcess::OnKeyframe(Keyframe keyframe) {
   keyframes_.Note(keyframe.id.map, keyframe.id.seq);
   judge_->Add(std::move(keyframe));
-  JudgeReady();
+  CollectReady();
 }
 
 void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
-  if (waiting_.size() + match.candidates.size() > kMaxWaiting) {
-    node_.Refuse("too many candidates wait for keyframes");
+  if (num_pending() + match.candidates.size() > kMaxWaiting) {
+    node_.Refuse("too many candidates wait");
     return;
   }
   matches_.Note(match.query.map, match.query.seq);
@@ -51,7 +51,7 @@ void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }
-  JudgeReady();
+  CollectReady();
 }
 
 void CandidateProcess::OnHave(const Have& have) {
@@ -67,7 +67,7 @@ void CandidateProcess::OnHave(const Have& have) {
     judge_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
   }
   if (!have.gaps.empty()) {
-    JudgeReady();
+    CollectReady();
   }
 }
 
@@ -83,58 +83,81 @@ void CandidateProcess::OnAgain(const again_t& message) {
   }
 }
 
-void CandidateProcess::OnResendRequest(const ResendRequest& request) {
-  if (request.channel != channels::kConstraint || request.requester != kJournalOwner) {
+void CandidateProcess::OnVerdictRequest(const VerdictRequest& request) {
+  if (request.requester != kJournalOwner) {
     return;
   }
-  const auto& [map, from_seq, to_seq] = request.range;
+  std::set<int64_t> asked;
+  for (const auto& [seq, constraint_id] : request.names.verdicts) {
+    asked.insert(constraint_id);
+  }
   for (const Constraint& constraint : sent_) {
-    if (constraint.to.map == map && constraint.to.seq >= from_seq && constraint.to.seq <= to_seq) {
-      TellAgain(node_, request.requester, request.channel, ToMessage(constraint));
+    if (asked.contains(constraint.Id())) {
+      TellAgain(node_, request.requester, std::string(channels::kConstraint),
+                ToMessage(constraint));
+      node_.Count("said_again");
     }
   }
 }
 
-void CandidateProcess::JudgeReady() {
+void CandidateProcess::CollectReady() {
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     const KeyframeId& query = it->first.first;
-    if (!judge_->Ready(query, it->second)) {
+    if (judge_->Ready(query, it->second)) {
+      ready_.emplace_back(query, std::move(it->second));
+      it = waiting_.erase(it);
+    } else {
       ++it;
-      continue;
     }
-    const Constraint constraint = judge_->Judge(query, it->second);
-    if (judged_.insert(constraint.Id()).second) {
-      node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
-      sent_.push_back(constraint);
-      if (sent_.size() > kMaxSent) {
-        sent_.pop_front();
-      }
-      if (constraint.accepted) {
-        node_.Count("accepted");
-        ++num_accepted_;
-      } else {
-        node_.Refuse(constraint.reason);
-      }
-    }
-    it = waiting_.erase(it);
   }
+  if (!ready_.empty()) {
+    node_.WorkWhenIdle([this] { return JudgeNext(); });
+  }
+}
+
+bool CandidateProcess::JudgeNext() {
+  const auto [query, candidate] = std::move(ready_.front());
+  ready_.pop_front();
+  // A match may come twice, and a verdict of a former run after its match.
+  if (!judged_.contains(RefusedConstraint(query, candidate, "").Id())) {
+    const Constraint constraint = judge_->Judge(query, candidate);
+    judged_.insert(constraint.Id());
+    node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
+    sent_.push_back(constraint);
+    if (sent_.size() > kMaxSent) {
+      sent_.pop_front();
+    }
+    if (constraint.accepted) {
+      node_.Count("accepted");
+      ++num_accepted_;
+    } else {
+      node_.Refuse(constraint.reason);
+    }
+  }
+  return !ready_.empty();
 }
 
 void CandidateProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
     AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
-  for (const SeqGap& gap : matches_.Due(now_utime)) {
-    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  if (num_pending() <= kMaxWaiting / 2) {
+    for (const SeqGap& gap : matches_.Due(now_utime)) {
+      AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+    }
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
-    const auto waiting = static_cast<int64_t>(waiting_.size());
-    node_.PublishStatus(
-        now_utime, waiting,
-        fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes",
-                    num_accepted_, judged_.size(), waiting));
+    PublishStatus(now_utime);
   }
+}
+
+void CandidateProcess::PublishStatus(int64_t now_utime) {
+  node_.PublishStatus(
+      now_utime, static_cast<int64_t>(num_pending()),
+      fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes, {} for their "
+                  "turn",
+                  num_accepted_, judged_.size(), waiting_.size(), ready_.size()));
 }
 
 }  // namespace pangea

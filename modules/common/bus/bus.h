@@ -26,6 +26,14 @@ class Bus {
   // Whether more messages wait already, so that work which they share may wait for them. A bus that
   // has each message handled to completion says no.
   virtual bool MoreWaits() { return false; }
+  // Work that messages brought and that is to wait until no message does, so that whoever works
+  // long still hears and answers: `piece` does a little of it, and says whether some is left. A bus
+  // that has each message handled to completion has all of it done at once. One work for each bus:
+  // what is given while some is left replaces it.
+  virtual void WorkWhenIdle(const std::function<bool()>& piece) {
+    while (piece()) {
+    }
+  }
 };
 
 // Publish queues; Drain delivers, including what the handlers publish, until nothing is left.
@@ -57,19 +65,25 @@ class LcmBus : public Bus {
   ~LcmBus() override;
   void Publish(const std::string& channel, Bytes data) override;
   void Subscribe(const std::string& channel_regex, Handler handler) override;
-  // Delivers what is waiting, at most for `timeout_ms`; returns whether anything came.
+  // Delivers what is waiting, at most for `timeout_ms`, or does a piece of work if nothing is
+  // (after kMaxBeforeWork messages in a row one anyway); returns whether there was anything to do.
   // An exception from a handler is rethrown here, not through LCM's C frames.
   bool Handle(int timeout_ms);
   bool MoreWaits() override;
+  void WorkWhenIdle(const std::function<bool()>& piece) override;
   // File descriptor to poll on; -1 while there is no connection to a relay, and Handle looks for
   // one.
   int fd();
 
  private:
+  static constexpr int kMaxBeforeWork = 200;
+
   struct Impl;
   struct Library;
   struct Relayed;
   std::unique_ptr<Impl> impl_;
+  std::function<bool()> work_;  // empty when none is left
+  int handled_since_work_ = 0;
 };
 
 // Encodes an lcm-gen type.

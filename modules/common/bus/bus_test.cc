@@ -56,6 +56,49 @@ TEST(LcmBus, KnowsWhetherMoreWaits) {
   EXPECT_THAT(more, testing::ElementsAre(true, false));
 }
 
+TEST(LocalBus, DoesAllWorkAtOnce) {
+  LocalBus bus;
+  int left = 3;
+  bus.WorkWhenIdle([&] { return --left > 0; });
+  EXPECT_EQ(left, 0);
+}
+
+// What a piece says is heard before the next piece.
+TEST(LcmBus, WorksWhileNoMessageWaits) {
+  LcmBus bus("memq://");
+  std::string done;
+  int pieces = 3;
+  bus.Subscribe("WORK", [&](const std::string&, Bytes) {
+    done += 'w';
+    bus.WorkWhenIdle([&] {
+      done += 'p';
+      bus.Publish("OTHER", {});
+      return --pieces > 0;
+    });
+  });
+  bus.Subscribe("OTHER", [&](const std::string&, Bytes) { done += 'o'; });
+  bus.Publish("WORK", {});
+  bus.Publish("OTHER", {});
+  while (bus.Handle(0)) {
+  }
+  EXPECT_EQ(done, "wopopopo");
+}
+
+TEST(LcmBus, AFloodDoesNotKeepItFromItsWork) {
+  LcmBus bus("memq://");
+  bool worked = false;
+  bus.Subscribe("FLOOD", [&](const std::string&, Bytes) { bus.Publish("FLOOD", {}); });
+  bus.Publish("FLOOD", {});
+  bus.WorkWhenIdle([&] {
+    worked = true;
+    return false;
+  });
+  for (int i = 0; i < 1000; ++i) {
+    bus.Handle(0);
+  }
+  EXPECT_TRUE(worked);
+}
+
 TEST(Node, CountsWhatDoesNotDecode) {
   LocalBus bus;
   Node node(bus, "test");

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@ class JournalFirstBus : public Bus {
   void Publish(const std::string& channel, Bytes data) override { bus_.Publish(channel, data); }
   void Subscribe(const std::string& channel_regex, Handler handler) override;
   bool MoreWaits() override { return bus_.MoreWaits(); }
+  void WorkWhenIdle(const std::function<bool()>& piece) override { bus_.WorkWhenIdle(piece); }
   // Delivers what waits if it is time to. Call it between the bus' messages.
   void Poll(int64_t now_utime);
 

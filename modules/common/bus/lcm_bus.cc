@@ -132,6 +132,18 @@ int LcmBus::fd() { return impl_->fd(); }
 
 bool LcmBus::MoreWaits() { return impl_->MoreWaits(); }
 
-bool LcmBus::Handle(int timeout_ms) { return impl_->Handle(timeout_ms); }
+void LcmBus::WorkWhenIdle(const std::function<bool()>& piece) { work_ = piece; }
+
+bool LcmBus::Handle(int timeout_ms) {
+  const bool handled = impl_->Handle(work_ ? 0 : timeout_ms);
+  if (!work_ || (handled && ++handled_since_work_ < kMaxBeforeWork)) {
+    return handled;
+  }
+  handled_since_work_ = 0;
+  if (!work_()) {
+    work_ = nullptr;
+  }
+  return true;
+}
 
 }  // namespace pangea

@@ -32,6 +32,19 @@ void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32
   }
 }
 
+void AskForVerdicts(Node& node, const VerdictNames& names) {
+  verdict_request_t request{};
+  request.requester = node.name();
+  request.map = ToMessage(names.map);
+  for (const auto& [seq, constraint_id] : names.verdicts) {
+    request.seq.push_back(seq);
+    request.constraint_id.push_back(constraint_id);
+  }
+  request.num_verdicts = static_cast<int16_t>(request.seq.size());
+  node.Publish(std::string(channels::kVerdictRequest), request);
+  node.NoteResendAsked();
+}
+
 void AskForState(Node& node, const MapId& map) {
   AskAgain(node, std::string(channels::kMapState), {map, 0, 0});
 }

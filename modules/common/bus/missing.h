@@ -22,6 +22,9 @@ void AskAgain(Node& node, const std::string& channel, const SeqGap& gap);
 // requests; for small messages.
 void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq);
 
+// VERDICT_REQUEST for the verdicts of these names (at most VerdictNames::kMax).
+void AskForVerdicts(Node& node, const VerdictNames& names);
+
 // The answer to such a request.
 template <typename Message>
 void TellAgain(Node& node, const std::string& requester, const std::string& channel,

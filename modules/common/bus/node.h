@@ -74,6 +74,17 @@ class Node {
                    });
   }
 
+  // Bus::WorkWhenIdle; each piece is counted among the handling times.
+  template <typename Piece>
+  void WorkWhenIdle(Piece piece) {
+    bus_.WorkWhenIdle([this, piece = std::move(piece)] {
+      const int64_t begin_ns = MonotonicNs();
+      const bool more = piece();
+      NoteHandling(MonotonicNs() - begin_ns);
+      return more;
+    });
+  }
+
   template <typename Message>
   void Publish(const std::string& channel, const Message& message) {
     ++messages_out_;
@@ -104,7 +115,7 @@ class Node {
   int64_t resends_asked_ = 0;
   std::map<std::string, int64_t> refused_;
   std::map<std::string, int64_t> counters_;
-  std::deque<float> handling_ms_;  // of the newest 1000 messages
+  std::deque<float> handling_ms_;  // of the newest 1000 messages and pieces of work
 };
 
 }  // namespace pangea
