@@ -40,28 +40,6 @@ void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
   }
 }
 
-// Sorts by utime, keeps the first of equal stamps, and says what it did.
-template <typename T>
-void SortUnique(std::vector<T>* items, const std::string& path,
-                std::vector<std::string>* warnings) {
-  int out_of_order = 0;
-  for (size_t i = 1; i < items->size(); ++i) {
-    out_of_order += (*items)[i].utime < (*items)[i - 1].utime ? 1 : 0;
-  }
-  std::ranges::stable_sort(*items, {}, &T::utime);
-  const auto repeated = std::unique(items->begin(), items->end(),
-                                    [](const T& a, const T& b) { return a.utime == b.utime; });
-  const auto duplicates = items->end() - repeated;
-  items->erase(repeated, items->end());
-  if (out_of_order > 0) {
-    warnings->push_back(fmt::format("{}: {} rows out of order; sorted", path, out_of_order));
-  }
-  if (duplicates > 0) {
-    warnings->push_back(
-        fmt::format("{}: {} rows with a stamp already seen; dropped", path, duplicates));
-  }
-}
-
 // Names the gaps that are well above the median period.
 template <typename T>
 void NameGaps(const std::vector<T>& items, double factor, const std::string& path,
@@ -166,7 +144,7 @@ void EurocRecording::ReadImages() {
     throw std::runtime_error(
         fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
   }
-  SortUnique(&images_, csv, &warnings_);
+  Warn(SortByTime(&images_), csv, &warnings_);
   NameGaps(images_, 3.5, csv, &warnings_);
 }
 
@@ -195,7 +173,7 @@ void EurocRecording::ReadImu() {
   if (imu_.empty()) {
     throw std::runtime_error(fmt::format("{}: holds no sample; expected rows: {}", csv, expected));
   }
-  SortUnique(&imu_, csv, &warnings_);
+  Warn(SortByTime(&imu_), csv, &warnings_);
   NameGaps(imu_, 2.5, csv, &warnings_);
 }
 

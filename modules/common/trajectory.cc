@@ -43,7 +43,15 @@ Trajectory Finished(Trajectory trajectory, const std::string& path, const RowCom
   for (const std::string& line : complaints.Lines()) {
     warnings->push_back(line + "; row dropped");
   }
-  const SortOutcome outcome = SortByTime(&trajectory);
+  Warn(SortByTime(&trajectory), path, warnings);
+  return trajectory;
+}
+
+}  // namespace
+
+int64_t UtimeFromNs(int64_t ns) { return ns >= 0 ? ns / 1000 : -((-ns + 999) / 1000); }
+
+void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings) {
   if (outcome.out_of_order > 0) {
     warnings->push_back(
         fmt::format("{}: {} rows out of order; sorted", path, outcome.out_of_order));
@@ -52,25 +60,6 @@ Trajectory Finished(Trajectory trajectory, const std::string& path, const RowCom
     warnings->push_back(
         fmt::format("{}: {} rows with a stamp already seen; dropped", path, outcome.duplicates));
   }
-  return trajectory;
-}
-
-}  // namespace
-
-int64_t UtimeFromNs(int64_t ns) { return ns >= 0 ? ns / 1000 : -((-ns + 999) / 1000); }
-
-SortOutcome SortByTime(Trajectory* trajectory) {
-  SortOutcome outcome;
-  for (size_t i = 1; i < trajectory->size(); ++i) {
-    outcome.out_of_order += (*trajectory)[i].utime < (*trajectory)[i - 1].utime ? 1 : 0;
-  }
-  std::ranges::stable_sort(*trajectory, {}, &StampedPose::utime);
-  const auto repeated =
-      std::unique(trajectory->begin(), trajectory->end(),
-                  [](const StampedPose& a, const StampedPose& b) { return a.utime == b.utime; });
-  outcome.duplicates = static_cast<int>(trajectory->end() - repeated);
-  trajectory->erase(repeated, trajectory->end());
-  return outcome;
 }
 
 Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings) {

@@ -4,6 +4,7 @@
 // EuRoC's ground-truth csv ("nanoseconds, p (3), q w x y z" and, in 17 columns, velocity and
 // biases). Readers sort by time, drop duplicates and malformed rows, and say so.
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -24,13 +25,28 @@ using Trajectory = std::vector<StampedPose>;
 // Nanoseconds to microseconds, rounded down (also below zero).
 int64_t UtimeFromNs(int64_t ns);
 
-// Sorts by time and keeps the first of equal stamps; returns how many rows were out of order and
+// Sorts by `utime` and keeps the first of equal stamps; returns how many rows were out of order and
 // how many dropped.
 struct SortOutcome {
   int out_of_order = 0;
   int duplicates = 0;
 };
-SortOutcome SortByTime(Trajectory* trajectory);
+template <typename Stamped>
+SortOutcome SortByTime(std::vector<Stamped>* rows) {
+  SortOutcome outcome;
+  for (size_t i = 1; i < rows->size(); ++i) {
+    outcome.out_of_order += (*rows)[i].utime < (*rows)[i - 1].utime ? 1 : 0;
+  }
+  std::ranges::stable_sort(*rows, {}, &Stamped::utime);
+  const auto repeated =
+      std::unique(rows->begin(), rows->end(),
+                  [](const Stamped& a, const Stamped& b) { return a.utime == b.utime; });
+  outcome.duplicates = static_cast<int>(rows->end() - repeated);
+  rows->erase(repeated, rows->end());
+  return outcome;
+}
+// The same for the rows of a file; what it mended is added to `warnings`.
+void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings);
 
 // The readers throw std::runtime_error when nothing usable is in the file; what they mended is
 // added to `warnings`.

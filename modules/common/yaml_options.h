@@ -12,8 +12,8 @@
 //   FusionOptions options;
 //   YamlOptions yaml;
 //   Bind(yaml, options);
-//   yaml.ReadFile(path);            // throws std::runtime_error; keys not in the file keep
-//   defaults std::string text = yaml.Print();  // the effective options, readable by ReadFile
+//   yaml.ReadFile(path);              // throws std::runtime_error; other keys keep their defaults
+//   std::string text = yaml.Print();  // the effective options, readable by ReadFile
 //
 // The bound struct must outlive the YamlOptions.
 

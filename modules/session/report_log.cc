@@ -125,10 +125,7 @@ void Finish(const Frames& frames, PoseTrack* track) {
   for (auto& [map, odometry] : track->odometry) {
     SortByTime(&odometry);
   }
-  std::ranges::stable_sort(track->live, {}, &LivePose::utime);
-  const auto same_time = [](const LivePose& a, const LivePose& b) { return a.utime == b.utime; };
-  track->live.erase(std::unique(track->live.begin(), track->live.end(), same_time),
-                    track->live.end());
+  SortByTime(&track->live);
   for (LivePose& pose : track->live) {
     const auto of_map = frames.find(pose.map);
     if (of_map != frames.end()) {
