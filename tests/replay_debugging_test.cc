@@ -61,6 +61,15 @@ TEST_F(ReplayDebugging, EachProcessAloneRepeatsItself) {
   }
 }
 
+// What it would not do is refused, not left out in silence.
+TEST_F(ReplayDebugging, OneProcessAloneHasNoReport) {
+  for (const char* option : {"--explain 1", "--expect demo", "--recording 1=folder"}) {
+    const Outcome outcome = Replay(kSample, "refused", std::string("--only fusion ") + option);
+    EXPECT_GT(outcome.exit_code, 100) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr(" excludes --"));
+  }
+}
+
 TEST_F(ReplayDebugging, APartOfTheLog) {
   const Outcome part = Replay(kSample, "part", "--until 6 --diff " + Log("whole"));
   const Outcome info = RunCommand("pangea-log info " + Log("part"));

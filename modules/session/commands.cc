@@ -286,6 +286,9 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
       "--explain", arguments->explain,
       "A constraint's id: why it was accepted or refused, as text, and as a picture in "
       "the folder");
+  for (const char* of_the_report : {"--recording", "--expect", "--explain"}) {
+    replay->get_option("--only")->excludes(replay->get_option(of_the_report));
+  }
   replay->callback([arguments, exit_code] { *exit_code = RunReplay(*arguments); });
 }
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "common/bus/log_reader.h"
+#include "common/channels.h"
 #include "common/median.h"
 #include "common/messages.h"
 #include "fusion/fusion.h"
@@ -27,7 +28,7 @@ auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
 Constraint FindVerdict(const std::string& log, int64_t id) {
   std::optional<Constraint> found;
   ReadLog(log, [&](const LogEvent& event) {
-    if (event.channel == "CONSTRAINT") {
+    if (event.channel == channels::kConstraint) {
       if (auto constraint = ParseEvent<constraint_t>(event); constraint && constraint->Id() == id) {
         found = std::move(constraint);
       }
@@ -44,7 +45,7 @@ PlaceCandidate FindCandidate(const std::string& log, const Constraint& constrain
   std::optional<PlaceCandidate> found;
   ReadLog(log, [&](const LogEvent& event) {
     const auto match =
-        event.channel == "PLACE_MATCH" ? ParseEvent<place_match_t>(event) : std::nullopt;
+        event.channel == channels::kPlaceMatch ? ParseEvent<place_match_t>(event) : std::nullopt;
     if (!match || match->query != constraint.to) {
       return;
     }
@@ -62,14 +63,15 @@ PlaceCandidate FindCandidate(const std::string& log, const Constraint& constrain
   return *found;
 }
 
-std::vector<double> Misses(const std::vector<ShownMatch>& matches, double ShownMatch::*miss) {
+// Median over the inliers, for people.
+std::string MissOf(const std::vector<ShownMatch>& matches, double ShownMatch::*miss) {
   std::vector<double> values;
   for (const ShownMatch& match : matches) {
     if (match.inlier) {
       values.push_back(match.*miss);
     }
   }
-  return values;
+  return values.empty() ? "-" : fmt::format("{:.1f}", Median(std::move(values)));
 }
 
 std::string CountOf(const std::vector<ShownMatch>& matches) {
@@ -84,7 +86,7 @@ double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 std::string ListVerdicts(const std::string& log) {
   std::string text;
   ReadLog(log, [&text](const LogEvent& event) {
-    if (event.channel != "CONSTRAINT") {
+    if (event.channel != channels::kConstraint) {
       return;
     }
     if (const auto constraint = ParseEvent<constraint_t>(event)) {
@@ -158,10 +160,10 @@ std::string ToText(const Explanation& e) {
   const Vector6d sigma = c.covariance.diagonal().cwiseSqrt();
   text += fmt::format(
       "window BA      {} in the two keyframes; {} observations, {:.0f} % of all (at least {:.0f})\n"
-      "               inliers miss by {:.1f} px at PnP's pose, {:.1f} px after (median)\n",
+      "               inliers miss by {} px at PnP's pose, {} px after (median)\n",
       CountOf(report.found), c.num_inliers, 100 * c.inlier_ratio, 100 * limits.min_inlier_ratio,
-      Median(Misses(report.found, &ShownMatch::miss_before_px)),
-      Median(Misses(report.found, &ShownMatch::miss_after_px)));
+      MissOf(report.found, &ShownMatch::miss_before_px),
+      MissOf(report.found, &ShownMatch::miss_after_px));
   text += fmt::format(
       "tilt           {:.2f} degrees between the two gravities, chi-squared {:.1f} (at most "
       "{:.1f})\n",

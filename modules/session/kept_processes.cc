@@ -6,12 +6,6 @@
 #include <utility>
 
 namespace pangea::session {
-namespace {
-
-constexpr int kMaxRestarts = 20;  // of one process; then it is given up
-
-}  // namespace
-
 KeptProcesses::KeptProcesses(std::filesystem::path logs) : logs_(std::move(logs)) {}
 
 std::filesystem::path KeptProcesses::LogOf(const std::string& name) const {

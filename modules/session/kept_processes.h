@@ -14,6 +14,8 @@ namespace pangea::session {
 
 class KeptProcesses {
  public:
+  static constexpr int kMaxRestarts = 20;  // of one process; then it is given up
+
   // What each says goes to <name>.txt there.
   explicit KeptProcesses(std::filesystem::path logs);
 

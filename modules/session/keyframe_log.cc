@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <lcm/lcm-cpp.hpp>
 #include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>
 
-#include "common/bus/bus.h"
+#include "common/bus/log_reader.h"
 #include "common/messages.h"
 
 namespace pangea::session {
@@ -39,30 +38,27 @@ void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<
 }  // namespace
 
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
-  lcm::LogFile file(log.string(), "r");
-  if (!file.good()) {
-    throw std::runtime_error(fmt::format("{}: cannot be read as an LCM log", log.string()));
-  }
   std::vector<LoggedKeyframe> keyframes;
   std::map<MapId, std::set<int32_t>> seqs;
   std::optional<int64_t> begin;
   int64_t latest = std::numeric_limits<int64_t>::min();
-  while (const lcm::LogEvent* event = file.readNextEvent()) {
-    begin = begin.value_or(event->timestamp);
-    latest = std::max(latest, event->timestamp);
-    if (!event->channel.starts_with("KEYFRAME_")) {
-      continue;
+  int64_t number = -1;
+  ReadLog(log.string(), [&](const LogEvent& event) {
+    ++number;
+    begin = begin.value_or(event.utime);
+    latest = std::max(latest, event.utime);
+    if (!event.channel.starts_with("KEYFRAME_")) {
+      return;
     }
-    const auto* bytes = static_cast<const uint8_t*>(event->data);
     LoggedKeyframe keyframe;
-    keyframe.channel = event->channel;
-    keyframe.data.assign(bytes, bytes + event->datalen);
+    keyframe.channel = event.channel;
+    keyframe.data.assign(event.data.begin(), event.data.end());
     keyframe_t message;
-    const bool decoded = DecodeMessage(keyframe.data, &message);
+    const bool decoded = DecodeMessage(event.data, &message);
     const auto id = decoded ? Parse(message.id) : Parsed<KeyframeId>{};
     if (!id.value) {
       throw std::runtime_error(fmt::format("{}: event {} on {} is not a keyframe of this version",
-                                           log.string(), event->eventnum, event->channel));
+                                           log.string(), number, event.channel));
     }
     keyframe.id = *id.value;
     keyframe.utime = message.utime;
@@ -71,7 +67,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
     if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
       keyframes.push_back(std::move(keyframe));
     }
-  }
+  });
   if (keyframes.empty()) {
     throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
   }

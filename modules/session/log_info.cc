@@ -7,14 +7,13 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/bus/log_event.h"
 #include "common/bus/log_reader.h"
+#include "common/channels.h"
 #include "common/messages.h"
 
 namespace pangea::session {
 namespace {
-
-// LCM's event header: sync word, event number, time, lengths of channel and data.
-constexpr int64_t kEventHeaderBytes = 28;
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
@@ -77,7 +76,7 @@ LogSummary Summarise(const std::string& log) {
     }
     ++summary.events;
     summary.bytes +=
-        kEventHeaderBytes + static_cast<int64_t>(event.channel.size() + event.data.size());
+        static_cast<int64_t>(LogEventHeader::kBytes + event.channel.size() + event.data.size());
     summary.last_utime = std::max(summary.last_utime, event.utime);
     ChannelSummary& channel = summary.channels[event.channel];
     if (channel.events++ == 0) {
@@ -87,7 +86,7 @@ LogSummary Summarise(const std::string& log) {
     channel.last_utime = std::max(channel.last_utime, event.utime);
     if (event.channel.starts_with("KEYFRAME_")) {
       AddKeyframe(event.data, &summary);
-    } else if (event.channel == "CONSTRAINT") {
+    } else if (event.channel == channels::kConstraint) {
       AddVerdict(event.data, &summary);
     }
   });

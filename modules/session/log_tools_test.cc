@@ -239,5 +239,15 @@ TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedVerdicts) {
   EXPECT_THROW(Explain(kSample, 42), std::runtime_error);
 }
 
+// The window BA may drop every match that is in the two keyframes themselves.
+TEST(Explanation, IsToldWithoutAnInlier) {
+  Explanation explanation;
+  explanation.again.reason = "too few inliers";
+  explanation.report.found.resize(2);
+  const std::string text = ToText(explanation);
+  EXPECT_NE(text.find("0 of 2 inliers in the two keyframes"), std::string::npos) << text;
+  EXPECT_NE(text.find("inliers miss by - px"), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace pangea::session

@@ -11,6 +11,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/log_reader.h"
 #include "common/bus/log_writer.h"
+#include "common/channels.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -102,22 +103,23 @@ struct LoggedWord {
 };
 
 bool IsNews(const std::string& channel) {
-  return channel.starts_with("KEYFRAME_") || channel == "PLACE_MATCH" || channel == "CONSTRAINT";
+  return channel.starts_with("KEYFRAME_") || channel == channels::kPlaceMatch ||
+         channel == channels::kConstraint;
 }
 
 // Who says so; empty for agents.
 std::string Speaker(const LogEvent& event) {
-  if (event.channel == "PLACE_MATCH") {
+  if (event.channel == channels::kPlaceMatch) {
     return "place_recognition";
   }
-  if (event.channel == "MAP_STATE" || event.channel.starts_with("CORRECTION_")) {
+  if (event.channel == channels::kMapState || event.channel.starts_with("CORRECTION_")) {
     return "posegraph";
   }
-  if (event.channel == "REFINEMENT") {
+  if (event.channel == channels::kRefinement) {
     return "global_ba";
   }
   constraint_t message{};
-  if (event.channel == "CONSTRAINT" && DecodeMessage(event.data, &message)) {
+  if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message)) {
     return message.kind == place_candidate_t::KIND_INTRA ? "inter_map_ba" : "fusion";
   }
   return "";

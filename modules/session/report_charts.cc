@@ -20,11 +20,6 @@ Plot Chart(const std::string& title, const std::string& y_label) {
           .height = kChartHeight};
 }
 
-size_t AgentIndex(const ReportFigures& figures, int32_t agent_id) {
-  const auto found = std::ranges::find(figures.agents, agent_id, &AgentFigures::id);
-  return static_cast<size_t>(found - figures.agents.begin());
-}
-
 double SessionSeconds(const CapturedSession& session, int64_t utime) {
   return 1e-6 * static_cast<double>(utime - session.begin_utime);
 }
@@ -80,8 +75,7 @@ std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportFigures& f
   std::map<MapId, Bar> bars;
   for (const auto& [id, keyframe] : session.keyframes) {
     const auto [bar, is_new] = bars.try_emplace(
-        id.map,
-        Bar{0, keyframe.session_s, keyframe.session_s, AgentIndex(figures, id.map.agent_id)});
+        id.map, Bar{0, keyframe.session_s, keyframe.session_s, figures.IndexOf(id.map.agent_id)});
     bar->second.from_s = std::min(bar->second.from_s, keyframe.session_s);
     bar->second.to_s = std::max(bar->second.to_s, keyframe.session_s);
   }
@@ -113,7 +107,7 @@ Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
     const auto frame = bars.find(change.frame);
     for (const MapId& map : change.maps) {
       const auto bar = bars.find(map);
-      const size_t colour = AgentIndex(figures, change.frame.agent_id);
+      const size_t colour = figures.IndexOf(change.frame.agent_id);
       if (bar == bars.end() || frame == bars.end() || bar->second.colour == colour) {
         continue;
       }

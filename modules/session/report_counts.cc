@@ -6,18 +6,28 @@
 namespace pangea::session {
 namespace {
 
-// Recording time played: of its link bytes, what a second of it costs.
-std::optional<double> PlayedSeconds(const AgentFigures& agent) {
-  int64_t begin = 0;
-  int64_t end = 0;
+struct Span {
+  int64_t begin = 0, end = 0;
+};
+
+// From the first pose of its odometry to the last, sensor clock.
+std::optional<Span> OdometrySpan(const AgentFigures& agent) {
+  std::optional<Span> span;
   for (const auto& [map, odometry] : agent.odometry) {
     if (!odometry.empty()) {
-      begin = begin == 0 ? odometry.front().utime : std::min(begin, odometry.front().utime);
-      end = std::max(end, odometry.back().utime);
+      const Span of_map{odometry.front().utime, odometry.back().utime};
+      span = span ? Span{std::min(span->begin, of_map.begin), std::max(span->end, of_map.end)}
+                  : of_map;
     }
   }
-  const double seconds =
-      1e-6 * static_cast<double>(end - begin) + std::max(0.0, agent.initialised_s.value_or(0));
+  return span;
+}
+
+// Recording time played: of its link bytes, what a second of it costs.
+std::optional<double> PlayedSeconds(const AgentFigures& agent) {
+  const Span span = OdometrySpan(agent).value_or(Span());
+  const double seconds = 1e-6 * static_cast<double>(span.end - span.begin) +
+                         std::max(0.0, agent.initialised_s.value_or(0));
   return seconds > 0 ? std::optional(seconds) : std::nullopt;
 }
 
@@ -65,14 +75,8 @@ std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
 
 double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t utime) {
   for (const AgentFigures& agent : figures.agents) {
-    std::optional<int64_t> first;
-    for (const auto& [map, odometry] : agent.odometry) {
-      if (agent.id == agent_id && !odometry.empty()) {
-        first = std::min(first.value_or(odometry.front().utime), odometry.front().utime);
-      }
-    }
-    if (first) {
-      return 1e-6 * static_cast<double>(utime - *first) + agent.initialised_s.value_or(0);
+    if (const auto span = agent.id == agent_id ? OdometrySpan(agent) : std::nullopt) {
+      return 1e-6 * static_cast<double>(utime - span->begin) + agent.initialised_s.value_or(0);
     }
   }
   return 0;

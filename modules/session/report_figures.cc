@@ -203,6 +203,11 @@ bool AgentFigures::AteCounts() const {
   return server && coverage && *coverage >= 0.95 && maps.size() == 1;
 }
 
+size_t ReportFigures::IndexOf(int32_t agent_id) const {
+  return static_cast<size_t>(std::ranges::find(agents, agent_id, &AgentFigures::id) -
+                             agents.begin());
+}
+
 ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session) {
   ReportFigures figures;
   figures.notes = input.notes;

@@ -50,6 +50,9 @@ struct ReportFigures {
   ConstraintsTruth inter_constraints;
   ConstraintsTruth intra_constraints;
   std::vector<std::string> notes;
+
+  // The agent's place in `agents`, which gives it its colour.
+  size_t IndexOf(int32_t agent_id) const;
 };
 
 ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session);

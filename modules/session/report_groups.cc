@@ -52,6 +52,18 @@ FinalGroup Solved(const CapturedSession& session, const MapState& state, std::ve
   return {state.group, std::move(maps), Values(poses), state.num_switched_off};
 }
 
+template <typename Wanted>
+Trajectory TrajectoryOfThose(const std::vector<FinalKeyframe>& keyframes, Wanted wanted) {
+  Trajectory trajectory;
+  for (const FinalKeyframe& keyframe : keyframes) {
+    if (wanted(keyframe.id.map)) {
+      trajectory.push_back({keyframe.utime, keyframe.T_map_body});
+    }
+  }
+  SortByTime(&trajectory);
+  return trajectory;
+}
+
 FinalGroup Alone(const CapturedSession& session, const MapId& map) {
   Poses poses;
   for (auto it = session.keyframes.lower_bound({map, 0});
@@ -77,25 +89,11 @@ size_t FinalGroup::CountOf(int32_t agent_id) const {
 }
 
 Trajectory FinalGroup::TrajectoryOf(int32_t agent_id) const {
-  Trajectory trajectory;
-  for (const FinalKeyframe& keyframe : keyframes) {
-    if (keyframe.id.map.agent_id == agent_id) {
-      trajectory.push_back({keyframe.utime, keyframe.T_map_body});
-    }
-  }
-  SortByTime(&trajectory);
-  return trajectory;
+  return TrajectoryOfThose(keyframes, [&](const MapId& of) { return of.agent_id == agent_id; });
 }
 
 Trajectory FinalGroup::TrajectoryOf(const MapId& map) const {
-  Trajectory trajectory;
-  for (const FinalKeyframe& keyframe : keyframes) {
-    if (keyframe.id.map == map) {
-      trajectory.push_back({keyframe.utime, keyframe.T_map_body});
-    }
-  }
-  SortByTime(&trajectory);
-  return trajectory;
+  return TrajectoryOfThose(keyframes, [&](const MapId& of) { return of == map; });
 }
 
 std::vector<FinalGroup> FinalGroups(const CapturedSession& session) {

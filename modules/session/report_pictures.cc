@@ -15,11 +15,6 @@ namespace {
 // A point whose depth is less certain than this is a ray, not a point.
 constexpr double kMaxRelativeSigma = 0.3;
 
-size_t IndexOf(const ReportFigures& figures, int32_t agent_id) {
-  const auto found = std::ranges::find(figures.agents, agent_id, &AgentFigures::id);
-  return static_cast<size_t>(found - figures.agents.begin());
-}
-
 struct PlyPoint {
   Eigen::Vector3d p_map;
   double relative_sigma = 0;
@@ -64,7 +59,7 @@ std::array<int, 3> Rgb(const std::string& colour) {
 void AddGroup(const ReportFigures& figures, const GroupFigures& group, Plot* plot) {
   const Alignment alignment = group.joint ? group.joint->alignment : Alignment();
   for (const int32_t agent_id : group.group.Agents()) {
-    const size_t index = IndexOf(figures, agent_id);
+    const size_t index = figures.IndexOf(agent_id);
     const Trajectory keyframes = group.group.TrajectoryOf(agent_id);
     std::string label = fmt::format("agent {}", agent_id);
     const auto with_truth = std::ranges::find(group.joint_agents, agent_id);
@@ -154,7 +149,7 @@ std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
   std::string body;
   size_t count = 0;
   for (const MapId& map : group.maps) {
-    const auto [red, green, blue] = Rgb(AgentColour(IndexOf(figures, map.agent_id)));
+    const auto [red, green, blue] = Rgb(AgentColour(figures.IndexOf(map.agent_id)));
     for (const Eigen::Vector3d& p : PointsOf(session, group, map)) {
       body += fmt::format("{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), red, green, blue);
       ++count;

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -41,6 +42,9 @@ std::optional<fs::path> FindRecording(const fs::path& wanted) {
   return found;
 }
 
+// A session waits for it: neither "not a number" nor for ever.
+bool IsTime(double seconds) { return seconds >= 0 && std::isfinite(seconds); }
+
 void CheckAgents(const SessionScript& script, const std::string& file) {
   if (script.agents.empty()) {
     throw std::runtime_error(fmt::format("{}: 'agents' is empty: list at least one agent", file));
@@ -55,9 +59,9 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(
           fmt::format("{}: agent id {} is given twice: every agent needs its own", file, agent.id));
     }
-    if (agent.delay_s < 0 || agent.start_s < 0 || agent.duration_s < 0) {
+    if (!IsTime(agent.delay_s) || !IsTime(agent.start_s) || !IsTime(agent.duration_s)) {
       throw std::runtime_error(fmt::format(
-          "{}: agent {}: delay, start and duration must not be negative", file, agent.id));
+          "{}: agent {}: delay, start and duration must be seconds, from 0 up", file, agent.id));
     }
     if (agent.recording.empty() && agent.keyframes.empty()) {
       throw std::runtime_error(
@@ -106,9 +110,9 @@ void CheckProcess(const std::set<std::string>& names, const std::string& process
 void CheckFaults(const SessionScript& script, const std::string& file) {
   const std::set<std::string> names = ProcessNames(script);
   for (const Fault& fault : script.faults) {
-    if (fault.at_s < 0 || fault.seconds < 0) {
+    if (!IsTime(fault.at_s) || !IsTime(fault.seconds)) {
       throw std::runtime_error(
-          fmt::format("{}: faults: 'at' and 'seconds' must not be negative", file));
+          fmt::format("{}: faults: 'at' and 'seconds' must be seconds, from 0 up", file));
     }
     if (!fault.kill.empty() + !fault.disk_full.empty() + (fault.disconnect != 0) != 1) {
       throw std::runtime_error(fmt::format(

@@ -152,8 +152,11 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
   EXPECT_THAT(ErrorOf("agents: []\n"), HasSubstr("empty"));
   EXPECT_THAT(ErrorOf("agents: [{id: 6}]\n"),
               testing::AllOf(HasSubstr("agent 6"), HasSubstr("'recording'")));
-  EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, start: -3}]\n"),
-              HasSubstr("negative"));
+  for (const char* start : {"-3", ".nan", ".inf"}) {  // an agent that never starts, never ends
+    EXPECT_THAT(ErrorOf(std::string("agents: [{id: 1, recording: ../recordings/MH_02, start: ") +
+                        start + "}]\n"),
+                HasSubstr("agent 1: delay, start and duration must be seconds, from 0 up"));
+  }
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, link: {los: 0.1}}]\n"),
               HasSubstr("'agents[0].link.loss'"));
   EXPECT_THAT(ErrorOf("agents: [{id: 4, recording: ../recordings/MH_02, link: {loss: 5}}]\n"),
@@ -168,7 +171,7 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
               HasSubstr("one of 'kill' or 'disk_full'"));
   EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, disconnect: 2}]\n"),
               HasSubstr("there is no agent 2"));
-  EXPECT_THAT(ErrorOf(agent + "faults: [{at: -3, kill: vio_1}]\n"), HasSubstr("negative"));
+  EXPECT_THAT(ErrorOf(agent + "faults: [{at: -3, kill: vio_1}]\n"), HasSubstr("from 0 up"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, keyframes: no.lcm}]\n"),
               testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));
 }

@@ -25,7 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxRestarts = 20;        // of one process; then the session gives it up
 constexpr double kStartTimeout_s = 20;  // for the server processes to report
 constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
 constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
@@ -257,7 +256,7 @@ class Runner {
     }
     if (exit->code == 0 || StopRequested()) {
       player.ended = Now();
-    } else if (exit->signal != 0 && player.restarts < kMaxRestarts) {
+    } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
       // Killed: the same agent goes on where it was, in a new map.
       ++player.restarts;
       summary_.restarted.push_back(player.child->name());
