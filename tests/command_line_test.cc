@@ -1,4 +1,4 @@
-// What a shell sees of the programs: completion, and the list of sessions.
+// What a shell sees of the programs: completion, the list of sessions, what is no argument.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,6 +89,14 @@ TEST(SessionList, FindsTheInstalledSessions) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, HasSubstr("did you mean 'demo'?"));
   fs::remove_all(folder);
+}
+
+TEST(Eval, StretchesHaveALength) {
+  for (const char* option : {"--distances 1,0", "--durations -1", "--max-gap 0"}) {
+    const Outcome outcome = RunCommand(std::string("pangea-eval rpe a.tum b.tum ") + option);
+    EXPECT_GT(outcome.exit_code, 100) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr("not in range"));
+  }
 }
 
 }  // namespace

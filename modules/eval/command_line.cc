@@ -60,14 +60,21 @@ EvalCommandLine::EvalCommandLine(CLI::App& app) {
                         "write PREFIX.trajectory.png and PREFIX.error.png (SE(3) alignment)");
     command->callback([this] { chosen_ = [this] { RunAbsolute(); }; });
   }
-  rpe->add_option("--distances", distances_m_, "metres of path")->delimiter(',');
-  rpe->add_option("--durations", durations_s_, "seconds")->delimiter(',');
+  rpe->add_option("--distances", distances_m_, "metres of path")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
+  rpe->add_option("--durations", durations_s_, "seconds")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
   rpe->callback([this] { chosen_ = [this] { RunRelative(); }; });
 }
 
 void EvalCommandLine::AddCommon(CLI::App& command) {
-  command.add_option("--max-gap", max_gap_s_,
-                     "seconds between reference poses across which it is still interpolated");
+  command
+      .add_option("--max-gap", max_gap_s_,
+                  "seconds between reference poses across which it is still interpolated")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command.add_option("--json", json_path_, "write the figures to this file");
 }
 

@@ -40,6 +40,19 @@ std::vector<std::string> Cells(const std::string& alignment, const std::string& 
           coverage};
 }
 
+// Throws std::runtime_error when no pose has ground truth.
+std::vector<PosePair> PairsOf(const EvaluationInput& input, double max_gap_s) {
+  std::vector<PosePair> pairs =
+      Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s));
+  if (pairs.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: none of its {} poses lies within the reference's time ({:.3f} .. {:.3f} s)",
+        input.name, input.estimate.size(), 1e-6 * input.reference.front().utime,
+        1e-6 * input.reference.back().utime));
+  }
+  return pairs;
+}
+
 void AddRows(const std::vector<RelativeRow>& rows, const std::string& unit, Table* table) {
   for (const auto& [length, rpe] : rows) {
     if (!rpe) {
@@ -76,13 +89,7 @@ AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, 
   for (const EvaluationInput& input : inputs) {
     evaluation.names.push_back(input.name);
     evaluation.coverage.push_back(Coverage(input.estimate, input.reference));
-    pairs.push_back(Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s)));
-    if (pairs.back().empty()) {
-      throw std::runtime_error(fmt::format(
-          "{}: none of its {} poses lies within the reference's time ({:.3f} .. {:.3f} s)",
-          input.name, input.estimate.size(), 1e-6 * input.reference.front().utime,
-          1e-6 * input.reference.back().utime));
-    }
+    pairs.push_back(PairsOf(input, max_gap_s));
   }
   for (const AlignmentKind kind :
        {AlignmentKind::kSe3, AlignmentKind::kYaw, AlignmentKind::kSim3}) {
@@ -141,8 +148,7 @@ ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s) {
-  const std::vector<PosePair> pairs =
-      Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s));
+  const std::vector<PosePair> pairs = PairsOf(input, max_gap_s);
   RelativeEvaluation evaluation;
   for (const double distance_m : distances_m) {
     evaluation.over_distance_m.push_back(

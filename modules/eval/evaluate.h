@@ -38,6 +38,7 @@ struct RelativeEvaluation {
   std::vector<RelativeRow> over_distance_m;
   std::vector<RelativeRow> over_time_s;
 };
+// Throws std::runtime_error when no pose has ground truth.
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s);
