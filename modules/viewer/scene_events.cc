@@ -1,6 +1,6 @@
 #include "viewer/scene_events.h"
 
-#include <string_view>
+#include <cmath>
 
 #include "common/channels.h"
 #include "common/messages.h"

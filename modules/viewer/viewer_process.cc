@@ -24,17 +24,16 @@ ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
     : node_(bus, "viewer"), source_(std::move(source)), start_utime_(start_utime) {
   for (const std::string_view channel :
        {channels::kAllKeyframes, channels::kAllPoses, channels::kAllCorrections,
-        channels::kConstraint, channels::kMapState, channels::kAllStatus, kAllImages,
-        std::string_view("AGAIN_viewer")}) {
-    node_.SubscribeBytes(std::string(channel),
-                         [this](const std::string& name, Bytes data) { OnMessage(name, data); });
+        channels::kConstraint, channels::kMapState, channels::kAllStatus, kAllImages}) {
+    node_.SubscribeBytes(std::string(channel), std::bind_front(&ViewerProcess::OnMessage, this));
   }
+  node_.SubscribeBytes(channels::Again(node_.name()),
+                       std::bind_front(&ViewerProcess::OnMessage, this));
   node_.Listen<have_t>(channels::kHave, std::bind_front(&ViewerProcess::OnHave, this));
 }
 
 void ViewerProcess::WatchAgent(Bus& agent_bus) {
-  agent_bus.Subscribe(std::string(kAllImages),
-                      [this](const std::string& name, Bytes data) { OnMessage(name, data); });
+  agent_bus.Subscribe(std::string(kAllImages), std::bind_front(&ViewerProcess::OnMessage, this));
 }
 
 void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
