@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
-#include <lcm/lcm-cpp.hpp>
 #include <optional>
 
 #include "common/bus/keyframe_outlet.h"
+#include "common/bus/log_writer.h"
 #include "common/bus/node.h"
 #include "common/bus/playback_pace.h"
 #include "common/bus/process.h"
@@ -24,13 +24,6 @@ struct Arguments {
   int32_t agent_id = 0;
   std::string recording, poses, bus, out_keyframes;
 };
-
-std::vector<uint8_t> Encode(const Keyframe& keyframe) {
-  const keyframe_t message = ToMessage(keyframe);
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
 
 // Keyframes on the agent's bus, where an uplink takes them to the server.
 class Agent : public Process {
@@ -57,38 +50,19 @@ class Agent : public Process {
   int64_t next_status_utime_ = 0;
 };
 
-// The same keyframes as a log, for `keyframes:` in a session file and for pangea-session replay.
-class KeyframeLog {
- public:
-  explicit KeyframeLog(const std::string& path) : file_(path, "w") {
-    if (!file_.good()) {
-      throw std::runtime_error(fmt::format("--out-keyframes {}: cannot be written", path));
-    }
-  }
-  void Write(const std::string& channel, int64_t utime, std::vector<uint8_t>* bytes) {
-    lcm::LogEvent event;
-    event.eventnum = count_++;
-    event.timestamp = utime;
-    event.channel = channel;
-    event.datalen = static_cast<int32_t>(bytes->size());
-    event.data = bytes->data();
-    file_.writeEvent(&event);
-  }
-
- private:
-  lcm::LogFile file_;
-  int64_t count_ = 0;
-};
-
 // As fast as the server keeps up; a live odometry calls Add from its camera's callback instead.
 void Play(const Arguments& arguments) {
   const EurocRecording recording(arguments.recording);
-  const Trajectory poses = ReadTrajectory(arguments.poses, nullptr);
+  std::vector<std::string> warnings;
+  const Trajectory poses = ReadTrajectory(arguments.poses, &warnings);
+  for (const std::string& warning : warnings) {
+    std::cerr << fmt::format("warning: {}\n", warning);
+  }
   KeyframeMaker maker({arguments.agent_id, WallUtime()}, recording.camera(), {});
   std::optional<LcmBus> bus;
   std::optional<Agent> agent;
   std::optional<PlaybackPace> pace;
-  std::optional<KeyframeLog> log;
+  std::optional<LogFileWriter> log;  // for `keyframes:` in a session file, and for a replay
   if (!arguments.bus.empty()) {
     bus.emplace(arguments.bus);
     agent.emplace(*bus, arguments.agent_id);
@@ -109,9 +83,9 @@ void Play(const Arguments& arguments) {
     }
     if (const auto keyframe = maker.Add(utime, image, *T_odom_body)) {
       ++keyframes;
-      std::vector<uint8_t> bytes = Encode(*keyframe);
+      std::vector<uint8_t> bytes = EncodeMessage(ToMessage(*keyframe));
       if (log) {
-        log->Write(channels::Keyframe(arguments.agent_id), utime, &bytes);
+        log->Write(utime, channels::Keyframe(arguments.agent_id), bytes);
       }
       if (agent) {
         agent->Publish(keyframe->id, std::move(bytes));
