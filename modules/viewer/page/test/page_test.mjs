@@ -38,11 +38,12 @@ async function testLog(browser) {
     pangea.model.now_s > pangea.model.start.end_s - 0.3 && pangea.model.numKeyframes === 63);
   check("one map there", (await page.evaluate(numGroups)) === 1);
   check("points of both", (await page.evaluate(() => pangea.model.numPoints)) > 1000);
-  check("the fusion has its mark", (await page.locator(".mark").count()) >= 1);
-  check("health of the five processes", (await page.locator(".process").count()) === 5);
-  const text = await page.locator("#agents").innerText();
-  check("drift is told", /drift [\d.]+ (mm|cm|m)/.test(text), text.replaceAll("\n", " | "));
-  check("who is fused with whom is told", text.includes("one map with 2") && text.includes("one map with 1"));
+  // The panels follow the model a moment later.
+  await becomes(page, "the fusion has its mark", () => document.querySelectorAll(".mark").length >= 1);
+  await becomes(page, "health of the five processes", () => document.querySelectorAll(".process").length === 5);
+  await becomes(page, "drift is told", () => /drift [\d.]+ (mm|cm|m)/.test(document.getElementById("agents").innerText));
+  await becomes(page, "who is fused with whom is told", () =>
+    ["one map with 2", "one map with 1"].every((said) => document.getElementById("agents").innerText.includes(said)));
 
   await page.locator("#show_refused").check();
   await settled(page);
