@@ -88,6 +88,10 @@ function(pangea_program name)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
 endfunction()
 
+# Where tests leave what they write: of this build tree, so that those of two trees do not meet.
+set(test_files ${CMAKE_BINARY_DIR}/tmp)
+file(MAKE_DIRECTORY ${test_files})
+
 # pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one GoogleTest binary.
 function(pangea_test name)
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
@@ -108,5 +112,6 @@ function(pangea_test name)
   target_compile_definitions(${name} PRIVATE PANGEA_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
     PANGEA_BINARY_DIR="${CMAKE_BINARY_DIR}")
   add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
+    ENVIRONMENT TMPDIR=${test_files})
 endfunction()

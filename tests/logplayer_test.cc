@@ -19,7 +19,8 @@ constexpr double kTolerance_m = 0.005;
 constexpr int kTries = 60;  // one a second, until the processes have worked everything off
 
 std::string LoopbackUrl() {
-  return "udpm://239.255.76.67:" + std::to_string(30000 + getpid() % 20000) +
+  // Below the ports that the kernel gives to sockets without one, as every LCM sender's is.
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) +
          "?ttl=0&recv_buf_size=4194304";
 }
 
