@@ -30,7 +30,6 @@ class RowComplaints {
  public:
   explicit RowComplaints(std::string path) : path_(std::move(path)) {}
   void Add(int line, const std::string& what);
-  int count() const { return count_; }
   // One line of text per kept complaint, and "... and n more".
   std::vector<std::string> Lines() const;
   // Throws when more than one row and a tenth of all are malformed: then it is another format, and

@@ -187,16 +187,6 @@ void SessionMonitor::Handle(int timeout_ms) {
 
 const AgentProgress& SessionMonitor::agent(int32_t id) const { return agents_.at(id); }
 
-int SessionMonitor::num_fused_groups() const {
-  std::set<std::vector<MapId>> fused;
-  for (const auto& [map, group] : groups_) {
-    if (group.second.size() > 1) {
-      fused.insert(group.second);
-    }
-  }
-  return static_cast<int>(fused.size());
-}
-
 double SessionMonitor::QuietSeconds() const {
   return 1e-6 * static_cast<double>(WallUtime() - last_work_);
 }

@@ -45,7 +45,6 @@ class SessionMonitor {
   const AgentProgress& agent(int32_t id) const;
   // Newest status of each process by name, whichever bus it came on.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
-  int num_fused_groups() const;
   int constraints_accepted() const { return accepted_; }
   int constraints_refused() const { return refused_; }
   int num_verdicts() const { return accepted_ + refused_; }
