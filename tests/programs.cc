@@ -36,7 +36,7 @@ Outcome RunCommand(const std::string& command) {
 }
 
 fs::path FreshFolder(const std::string& name) {
-  const fs::path folder = fs::path(PANGEA_BINARY_DIR) / "test_output" / name;
+  fs::path folder = fs::path(testing::TempDir()) / ("pangea_tests_" + name);
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
