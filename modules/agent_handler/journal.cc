@@ -52,7 +52,7 @@ void Journal::Load(const Visitor& visitor) {
       break;
     }
     const auto header = ParseLogEventHeader(start);
-    if (!header || synced_bytes_ + header->event_bytes() > file_bytes) {
+    if (!header) {
       break;
     }
     const int64_t body_offset = synced_bytes_ + static_cast<int64_t>(LogEventHeader::kBytes);

@@ -114,6 +114,23 @@ TEST_F(JournalTest, DamagedContentInTheTailIsCutToo) {
   EXPECT_EQ(seen.size(), 1u);
 }
 
+// It cannot be a torn tail: what comes after it is not thrown away with it.
+TEST_F(JournalTest, DamagedContentFarFromTheTailIsPassedOver) {
+  constexpr int kAfter = 50;
+  {
+    const auto journal = Open();
+    journal->Append(1, "A", Payload(99));
+    for (int i = 0; i < kAfter; ++i) {
+      journal->Append(1, "A", std::vector<uint8_t>(Journal::kMaxTornBytes / kAfter, 1));
+      journal->Sync();
+    }
+  }
+  const auto size = std::filesystem::file_size(path);
+  EXPECT_EQ(Open()->cut_bytes(), 0);
+  EXPECT_EQ(seen.size(), 1u + kAfter);
+  EXPECT_EQ(std::filesystem::file_size(path), size);
+}
+
 TEST_F(JournalTest, DamageThatIsNoTornTailIsNotThrownAway) {
   {
     const auto journal = Open();

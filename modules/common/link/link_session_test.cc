@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 namespace pangea {
@@ -106,6 +107,23 @@ TEST_F(LinkSessionTest, AFlippedBitAnywhereIsRefused) {
     EXPECT_FALSE(uplink->Open(Bytes(ack).first(i)).packet);
   }
   EXPECT_TRUE(uplink->Open(ack).packet);
+}
+
+// Near the end of the numbers' range a window could not count on.
+TEST_F(LinkSessionTest, AHelloWithANumberThatNoUplinkReachesIsRefused) {
+  const auto open = [&](int64_t hello) {
+    return handler->Open(uplink->Seal({LinkKind::kHello, hello, {1, 2}}));
+  };
+  constexpr int64_t kFirstTooLarge = int64_t{1} << 48;
+  for (const int64_t absurd : {std::numeric_limits<int64_t>::min(), int64_t{0}, kFirstTooLarge,
+                               std::numeric_limits<int64_t>::max()}) {
+    const auto opened = open(absurd);
+    EXPECT_TRUE(opened.welcome.empty()) << absurd;
+    EXPECT_NE(opened.refused, "") << absurd;
+  }
+  for (const int64_t good : {int64_t{1}, kFirstTooLarge - 1}) {
+    EXPECT_FALSE(open(good).welcome.empty()) << good;
+  }
 }
 
 TEST_F(LinkSessionTest, APacketTurnedBackIsRefused) {
