@@ -37,6 +37,20 @@ CameraModel PhoneCamera() {
   return camera;
 }
 
+CameraModel WideCamera() {
+  CameraModel camera;
+  camera.kind = CameraModel::Kind::kEquidistant;
+  camera.width = 512;
+  camera.height = 512;
+  camera.fx = 190.978;
+  camera.fy = 190.973;
+  camera.cx = 254.932;
+  camera.cy = 256.897;
+  camera.distortion << 0.0034824, 0.00071503, -0.0020532, 0.00020294;
+  camera.T_body_cam = PhoneCamera().T_body_cam;
+  return camera;
+}
+
 CameraModel Shrunk(const CameraModel& camera, double factor) {
   CameraModel shrunk = camera;
   shrunk.width = static_cast<int>(camera.width / factor);

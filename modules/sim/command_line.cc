@@ -21,6 +21,13 @@ SceneKind KindOf(const std::string& name) {
   return name == "twin_objects_a" ? SceneKind::kTwinObjectsA : SceneKind::kTwinObjectsB;
 }
 
+CameraModel CameraOf(const std::string& name) {
+  if (name == "euroc") {
+    return EurocCamera();
+  }
+  return name == "phone" ? PhoneCamera() : WideCamera();
+}
+
 }  // namespace
 
 CommandLine::CommandLine(CLI::App& app) {
@@ -94,8 +101,9 @@ void CommandLine::AddScene(CLI::App& app) {
 
 void CommandLine::AddSensors(CLI::App& app) {
   const std::string group = "Sensors";
-  app.add_option("--camera", camera_, "EuRoC's cam0, or a phone (fisheye lens, rolling shutter)")
-      ->check(CLI::IsMember({"euroc", "phone"}))
+  app.add_option("--camera", camera_,
+                 "EuRoC's cam0, a phone (fisheye lens, rolling shutter), or TUM-VI's wide fisheye")
+      ->check(CLI::IsMember({"euroc", "phone", "wide"}))
       ->capture_default_str()
       ->group(group);
   app.add_option("--shrink", shrink_, "divide the image's size by this")
@@ -141,7 +149,7 @@ void CommandLine::Apply() {
     options_.generated.duration_s = options_.start_s + duration + kMargins;
   }
   options_.scene.kind = KindOf(scene_);
-  options_.camera = camera_ == "euroc" ? EurocCamera() : PhoneCamera();
+  options_.camera = CameraOf(camera_);
   if (shrink_ > 1) {
     options_.camera = Shrunk(options_.camera, shrink_);
   }

@@ -96,7 +96,7 @@ TEST(Texture, FarAwayAFineCheckerboardIsEvenGrey) {
 
 TEST(Renderer, AKnownPointAppearsWhereTheCameraModelSays) {
   const Scene scene = RoomWithDisc(60, 200);
-  for (const CameraModel& camera : {EurocCamera(), PhoneCamera()}) {
+  for (const CameraModel& camera : {EurocCamera(), PhoneCamera(), WideCamera()}) {
     const Renderer renderer(scene, camera);
     Rng rng(4, "poses");
     for (int i = 0; i < 4; ++i) {
