@@ -27,7 +27,7 @@ struct JointBaOptions {
   double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says
   double max_chi2 = 9.2;         // of an inlier: 99 % of 2 degrees of freedom
   double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
-  int sure_hamming = 64;         // a landmark is sure that is so alike in one match (of 256 bits)
+  int sure_hamming = 56;         // a landmark is sure that is so alike in one match (of 256 bits)
   int iterations = 8;            // each of the two rounds
 };
 
