@@ -254,7 +254,7 @@ TEST(FusionProcess, LiveItHearsBeforeItJudges) {
       PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
     }
   }
-  for (const int seq : {11, 9, 10}) {
+  for (const int seq : {11, 11, 9, 10}) {  // one comes twice
     const PlaceMatch match{
         agent_c.keyframes[seq].id, {MakeTestCandidate(agent_c, seq, agent_m, 10, 40, 10)}, {}};
     PublishMessage(bus, "PLACE_MATCH", ToMessage(match));

@@ -18,7 +18,7 @@ constexpr int64_t kStatusInterval_us = 1'000'000;
 // At 28 kB a keyframe a request's answers fit the receive buffer.
 constexpr int32_t kMaxKeyframesPerRequest = 50;
 // Bounds: of matches kept to be sent again (then the oldest go), and of what waits in a catch-up
-// (then it is worked off at once).
+// or for its turn (then the first is worked off at once).
 constexpr size_t kMaxSentPerMap = 2000;
 constexpr size_t kMaxHeld = 2000;
 constexpr size_t kMaxKnownMatches = 100'000;
@@ -76,11 +76,30 @@ void PlaceRecognitionProcess::Handle(const Keyframe& keyframe) {
   if (const auto known = known_matches_.extract(keyframe.id)) {
     recognition_.Remember(keyframe, known.mapped());
     node_.Count("matches_of_the_journal");
-  } else if (catching_up_) {
-    held_.push_back(keyframe);
   } else {
-    Recognise(keyframe);
+    held_.push_back(keyframe);
+    if (!catching_up_) {
+      RecogniseHeld();
+    }
   }
+}
+
+void PlaceRecognitionProcess::RecogniseHeld() {
+  while (held_.size() > kMaxHeld) {
+    RecogniseNext();
+  }
+  if (!held_.empty()) {
+    node_.WorkWhenIdle([this] { return RecogniseNext(); });
+  }
+}
+
+bool PlaceRecognitionProcess::RecogniseNext() {
+  if (held_.empty() || catching_up_) {
+    return false;
+  }
+  Recognise(held_.front());
+  held_.pop_front();
+  return !held_.empty();
 }
 
 void PlaceRecognitionProcess::Recognise(const Keyframe& keyframe) {
@@ -104,9 +123,7 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
 void PlaceRecognitionProcess::ReleaseHeld() {
   catching_up_ = false;
   known_matches_.clear();
-  for (; !held_.empty(); held_.pop_front()) {
-    Recognise(held_.front());
-  }
+  RecogniseHeld();
 }
 
 void PlaceRecognitionProcess::OnHave(const Have& have) {

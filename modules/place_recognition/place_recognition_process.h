@@ -8,6 +8,9 @@
 // pair of keyframes goes unseen, and until the pose graph, which is asked for the groups, has said
 // which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
 // PLACE_MATCHes itself.
+//
+// Live, keyframes are recognised one at a time, when no message waits: after a catch-up there may
+// be many, and meanwhile groups are to be heard and requests answered.
 
 #include <deque>
 #include <map>
@@ -49,6 +52,9 @@ class PlaceRecognitionProcess : public Process {
   void Recognise(const Keyframe& keyframe);
   void ReleaseHeldIfCaughtUp();
   void ReleaseHeld();
+  void RecogniseHeld();
+  // The first that is held; whether more may follow.
+  bool RecogniseNext();
   void AskForGaps(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
@@ -60,7 +66,7 @@ class PlaceRecognitionProcess : public Process {
   bool catching_up_ = false;
   int ticks_without_keyframe_ = 0;
   std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
-  std::deque<Keyframe> held_;                       // without a match
+  std::deque<Keyframe> held_;                       // without a match, in order
   std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again
   MissingStates missing_states_;
   int64_t next_status_utime_ = 0;

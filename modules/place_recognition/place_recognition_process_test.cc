@@ -305,6 +305,35 @@ TEST(PlaceRecognitionProcess, SendsItsMatchesAgainAsTheyWere) {
   EXPECT_EQ(Payload(answers[0].data.begin(), answers[0].data.end()), server.matches[1]);
 }
 
+// Live: what comes meanwhile is heard between two keyframes.
+TEST(PlaceRecognitionProcess, LiveItHearsBeforeItRecognises) {
+  test::TestWorld world(8);
+  LcmBus bus("memq://");
+  PlaceRecognitionProcess process(bus, {});
+  Node listener(bus, "listener");
+  status_t status{};
+  std::vector<int32_t> recognised;
+  listener.Subscribe<status_t>("STATUS_place_recognition",
+                               [&](const std::string&, const status_t& said) { status = said; });
+  listener.Subscribe<place_match_t>("PLACE_MATCH",
+                                    [&](const std::string&, const place_match_t& match) {
+                                      recognised.push_back(match.query.seq);
+                                    });
+  for (const keyframe_t& keyframe : Round(world, kMapA, 4)) {
+    PublishMessage(bus, "KEYFRAME_1", keyframe);
+  }
+  while (bus.MoreWaits()) {
+    bus.Handle(0);
+  }
+  EXPECT_TRUE(recognised.empty());
+  process.Tick(1'000'000);
+  bus.Handle(0);
+  EXPECT_EQ(status.pending, 4);
+  while (bus.Handle(0)) {
+  }
+  EXPECT_EQ(recognised, (std::vector<int32_t>{0, 1, 2, 3}));
+}
+
 TEST(PlaceRecognitionProcess, GarbageIsCountedNotObeyed) {
   test::TestWorld world(7);
   Server server;

@@ -134,7 +134,9 @@ int64_t PoseGraphProcess::NumToCatchUp() const {
   }
   for (const auto& [id, due] : due_) {
     const auto goal = catching_up_to_.find(due.query.map);
-    count += goal != catching_up_to_.end() && due.query.seq <= goal->second ? 1 : 0;
+    const bool of_journal = goal != catching_up_to_.end() && due.query.seq <= goal->second;
+    // Asked for twice by its name: the journal does not have it, it is still to be judged.
+    count += of_journal && due.wait_us < 4 * kVerdictAfter_us ? 1 : 0;
   }
   return count;
 }

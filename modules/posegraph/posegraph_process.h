@@ -12,8 +12,9 @@
 // solved from the beginning and published in full.
 //
 // After a restart nothing is told until the journal's keyframes and verdicts are in, or for five
-// seconds none of them came: half a map would be taken for what became of the whole. Whoever comes
-// late asks for MAP_STATE, and the group is told again.
+// seconds none of them came: half a map would be taken for what became of the whole. A verdict that
+// the journal does not have either is not waited for: fusion may be behind by minutes. Whoever
+// comes late asks for MAP_STATE, and the group is told again.
 //
 // What already waits on the bus is taken before anything is solved (at most kMaxUnsettled of it): a
 // solve costs the same after one verdict as after ten, and verdicts that come faster than solves

@@ -356,6 +356,38 @@ TEST(PoseGraphProcess, DoesNotWaitForWhatNobodyHas) {
   EXPECT_FALSE(server.states.empty());
 }
 
+// Fusion is behind: its verdicts come slowly, one by one, and the journal does not have them.
+TEST(PoseGraphProcess, DoesNotWaitForWhatIsStillToBeJudged) {
+  const SyntheticWorld world = MakeWorld();
+  Server server;
+  server.Have(world);
+  std::vector<Constraint> owed;
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      PlaceMatch match;
+      match.query = keyframe.id;
+      if (&agent == &world.agents[1]) {
+        Constraint& refused = owed.emplace_back();
+        refused.from = world.agents[0].keyframes[0].id;
+        refused.to = keyframe.id;
+        refused.kind = PlaceKind::kInter;
+        refused.reason = "too few inliers";
+        match.candidates.push_back({refused.from, refused.kind, 0.5f, {}});
+      }
+      PublishMessage(server.bus, "PLACE_MATCH", ToMessage(match));
+      server.Send(keyframe);
+    }
+  }
+  ASSERT_GT(owed.size(), 12u);
+  int seconds = 0;
+  for (; seconds < 12 && server.states.empty(); ++seconds) {
+    server.Send(owed[static_cast<size_t>(seconds)]);
+    server.Tick(10);
+  }
+  EXPECT_GT(seconds, 4) << "the journal has time to answer";
+  EXPECT_LT(seconds, 9);
+}
+
 TEST(PoseGraphProcess, WhoComesLateIsToldTheStateAgain) {
   const SyntheticWorld world = MakeWorld();
   Server server;

@@ -37,6 +37,9 @@ void CandidateProcess::OnKeyframe(Keyframe keyframe) {
 }
 
 void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
+  if (matches_.Has(match.query.map, match.query.seq)) {
+    return;
+  }
   if (num_pending() + match.candidates.size() > kMaxWaiting) {
     node_.Refuse("too many candidates wait");
     return;
@@ -118,7 +121,7 @@ void CandidateProcess::CollectReady() {
 bool CandidateProcess::JudgeNext() {
   const auto [query, candidate] = std::move(ready_.front());
   ready_.pop_front();
-  // A match may come twice, and a verdict of a former run after its match.
+  // A verdict of a former run may come after its match.
   if (!judged_.contains(RefusedConstraint(query, candidate, "").Id())) {
     const Constraint constraint = judge_->Judge(query, candidate);
     judged_.insert(constraint.Id());

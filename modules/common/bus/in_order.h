@@ -72,6 +72,11 @@ class InOrder {
     return gaps;
   }
 
+  // Whether it came already, or nobody has it any more.
+  bool Has(const MapId& map, int32_t seq) const {
+    const auto it = streams_.find(map);
+    return it != streams_.end() && (seq < it->second.next || it->second.parked.contains(seq));
+  }
   int32_t next(const MapId& map) const {
     const auto it = streams_.find(map);
     return it == streams_.end() ? 0 : it->second.next;

@@ -56,6 +56,7 @@ class MissingMessages {
   void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
   // What exists, and what nobody has any more.
   void Announce(const Have& have);
+  bool Has(const MapId& map, int32_t seq) const { return stream_.Has(map, seq); }
   // Up to the map's `highest_seq`.
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;
