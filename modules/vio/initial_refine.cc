@@ -25,6 +25,8 @@ constexpr double kGyroBiasPrior = 0.02;   // rad/s, about the epipolar solution
 constexpr double kAccelBiasPrior = 0.15;  // m/s^2, about zero
 constexpr double kHuberSigmas = 2.0;
 constexpr double kInlierSigmas = 4.0;
+constexpr double kMaxDistance = 200;  // m, of a point: beyond it the start's baseline says nothing
+constexpr double kPointPrior = 10;    // times its distance, about the closed-form solution
 
 template <typename T>
 using Vec3 = Eigen::Matrix<T, 3, 1>;
@@ -132,10 +134,13 @@ class StartProblem {
           {Eigen::Map<Quaterniond>(q), Eigen::Map<Vector3d>(p), Eigen::Map<Vector3d>(v)});
     }
     for (const auto& [id, p] : start.p_first) {
-      points_.emplace(id, Eigen::Map<Vector3d>(NewBlock(q_odom_first * p)));
+      if (p.norm() < kMaxDistance) {
+        points_.emplace(id, Eigen::Map<Vector3d>(NewBlock(q_odom_first * p)));
+      }
     }
     AddImu(noise);
     AddRays();
+    HoldPoints();
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<PriorCost, 3, 3>(new PriorCost{gyro_bias, kGyroBiasPrior}),
         nullptr, gyro_bias_.data());
@@ -152,7 +157,10 @@ class StartProblem {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.linear_solver_ordering = Ordering();
-    options.max_num_iterations = 20;
+    // The closed form is too small where noise is large beside the motion's changes, and scale is a
+    // long flat valley: fewer iterations end half way up it, where the covariance is smaller.
+    options.max_num_iterations = 100;
+    options.function_tolerance = 1e-8;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
@@ -232,6 +240,18 @@ class StartProblem {
                                     new ceres::HuberLoss(kHuberSigmas), poses_[k].q.coeffs().data(),
                                     poses_[k].p.data(), point->second.data());
         }
+      }
+    }
+  }
+
+  // A point straight ahead may be anywhere along its ray, and one such leaves all unknowns without
+  // a covariance. So each is held, by next to nothing.
+  void HoldPoints() {
+    for (auto& [id, point] : points_) {
+      if (problem_.HasParameterBlock(point.data())) {
+        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost, 3, 3>(
+                                      new PriorCost{point, kPointPrior * (1 + point.norm())}),
+                                  nullptr, point.data());
       }
     }
   }

@@ -32,7 +32,8 @@ constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
 constexpr double kRestGyro = 0.03;   // rad/s
 
 // A moving start must be at least this certain and explain this much.
-constexpr double kMaxVelocitySigma = 0.05;  // m/s
+constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
+constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMinInlierShare = 0.8;
 constexpr double kMaxRmsSigmas = 1.8;
@@ -179,7 +180,11 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
                     .eigenvalues()[2]);
   const double tilt_sigma =
       std::sqrt(std::max(refined->covariance(0, 0), refined->covariance(1, 1)));
-  if (velocity_sigma > kMaxVelocitySigma || tilt_sigma > kMaxTiltSigma) {
+  // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
+  // certain, if certainty were asked for in metres per second.
+  const double speed = refined->states.back().v_odom_body.norm();
+  const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
+  if (velocity_sigma > max_velocity_sigma || tilt_sigma > kMaxTiltSigma) {
     return {
         std::nullopt,
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",

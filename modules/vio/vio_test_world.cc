@@ -17,6 +17,8 @@ constexpr double kDifference_s = 1e-4;  // for derivatives of the path
 constexpr size_t kTracks = 100;
 constexpr double kLossPerFrame = 0.02;
 const Vector3d kHall(16, 12, 4);
+const Vector3d kLongHall(200, 12, 4);
+constexpr double kSight_m = 30;
 
 double Seconds(int64_t utime) { return 1e-6 * static_cast<double>(utime); }
 
@@ -50,10 +52,11 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   gyro_bias_ = RandomVector(rng_, 0.02);
   accel_bias_ = RandomVector(rng_, 0.05);
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  const Vector3d& hall = options.drive_mps > 0 ? kLongHall : kHall;
   for (int i = 0; i < 1500; ++i) {
     Vector3d p(uniform(rng_), uniform(rng_), uniform(rng_));
     p[i % 3] = p[i % 3] < 0 ? -0.5 : 0.5;
-    points_.push_back(p.cwiseProduct(kHall) + Vector3d(0, 0, 0.5 * kHall.z()));
+    points_.push_back(p.cwiseProduct(hall) + Vector3d(0, 0, 0.5 * hall.z()));
   }
 }
 
@@ -63,6 +66,10 @@ Rigid3 VioTestWorld::PoseAt(double t) const {
                       1.6 + 0.25 * std::sin(0.8 * s + phase_.z()));
   const Vector3d hand(0.02 * std::sin(9.1 * s), 0.02 * std::sin(7.7 * s + 1),
                       0.03 * std::sin(11.3 * s + 2));
+  if (options_.drive_mps > 0) {
+    const Vector3d ahead(options_.drive_mps * s, 0.2 * std::sin(0.5 * s), 1.6);
+    return {ExpSo3(0.2 * hand), ahead + 0.3 * hand};
+  }
   const Vector3d turn(0.08 * std::sin(1.3 * s + phase_.y()), 0.12 * std::sin(1.1 * s + phase_.z()),
                       0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
   const Eigen::Quaterniond q =
@@ -92,7 +99,7 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
 
 std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& T_odom_cam) const {
   const Vector3d p_cam = T_odom_cam.Inverse() * point;
-  if (p_cam.z() < 0.3) {
+  if (p_cam.z() < 0.3 || p_cam.z() > kSight_m) {
     return std::nullopt;
   }
   const auto pixel = camera_.Project(p_cam);

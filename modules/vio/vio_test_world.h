@@ -38,6 +38,8 @@ struct VioTestWorldOptions {
   double frame_rate_hz = 10;
   double pixel_noise = 0.7;
   double outlier_share = 0.03;  // of the tracks: they slide off their point
+  // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
+  double drive_mps = 0;
   // The body stands still in between, seconds.
   double rest_begin_s = -10, rest_end_s = -10;
   // Errors of the calibration the estimator is given.
