@@ -1,5 +1,6 @@
 // What a shell sees of the programs: completion, the list of sessions, what is no argument.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -89,6 +90,24 @@ TEST(SessionList, FindsTheInstalledSessions) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, HasSubstr("did you mean 'demo'?"));
   fs::remove_all(folder);
+}
+
+TEST(Log, WhatIsNoLogIsNoEmptyLog) {
+  for (const char* command : {"info", "explain", "export --tum out"}) {
+    const Outcome outcome =
+        RunCommand(fmt::format("pangea-log {} " PANGEA_SOURCE_DIR "/README.md", command));
+    EXPECT_GT(outcome.exit_code, 100) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr("README.md: holds no event; is it an LCM log?"));
+  }
+}
+
+// Not a report without ground truth, as if the recording had none.
+TEST(Session, ARecordingThatIsGivenIsThere) {
+  const Outcome outcome =
+      RunCommand("pangea-session replay " PANGEA_SOURCE_DIR
+                 "/logs/two_walks/session.lcm --out nowhere/out --recording 1=nowhere");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("--recording 1=nowhere: there is no such folder"));
 }
 
 TEST(Eval, StretchesHaveALength) {

@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
-#include <map>
 #include <memory>
 #include <stdexcept>
 
 #include "session/explain.h"
 #include "session/log_diff.h"
 #include "session/recording_arguments.h"
+#include "session/remembered.h"
 #include "session/replay.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
@@ -101,7 +101,7 @@ struct LogArguments {
 
 // What is given on the command line goes before what the capture remembers.
 Remembered KnownOf(const LogArguments& arguments) {
-  Remembered known = ReadRecordings({arguments.logs.begin(), arguments.logs.end()});
+  Remembered known = ReadRemembered({arguments.logs.begin(), arguments.logs.end()});
   if (!arguments.expect.empty()) {
     known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
   }
@@ -143,12 +143,8 @@ int RunReplayOnly(const ReplayArguments& arguments) {
 
 void ExplainInto(const fs::path& out, int64_t constraint, const Remembered& known) {
   const Explanation explanation = Explain(out / "session.lcm", constraint);
-  std::map<int32_t, std::string> recordings;
-  for (const AgentRun& agent : known.agents) {
-    recordings.emplace(agent.id, agent.recording);
-  }
   const fs::path picture = out / fmt::format("constraint_{}.png", constraint);
-  WriteExplanationPng(explanation, recordings, picture);
+  WriteExplanationPng(explanation, RecordingsAtHand(known), picture);
   std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
 }
 

@@ -141,7 +141,7 @@ std::string ToText(const Explanation& e) {
   std::string text = fmt::format(
       "{} (query) in {} (match), {}\nverdict in the log: {}\nmade again:         {}\n\n",
       ToString(e.said.to), ToString(e.said.from),
-      e.said.kind == PlaceKind::kIntra ? "one map" : "two maps", verdict(e.said), verdict(e.again));
+      e.said.from.map == e.said.to.map ? "one map" : "two maps", verdict(e.said), verdict(e.again));
   text += fmt::format("candidate      {} corners matched, score {:.4f}\n",
                       e.candidate.corner_matches.size(), e.candidate.score);
   text += fmt::format("PnP            {}, {} landmarks (at least {})\n", CountOf(report.first),

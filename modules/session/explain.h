@@ -26,8 +26,9 @@ std::string ListVerdicts(const std::string& log);
 Explanation Explain(const std::string& log, int64_t constraint_id);
 
 std::string ToText(const Explanation& explanation);
-// Three rows of the match on the left and the query on the right: the candidate's corners, PnP,
-// window BA. `recordings`: folders by agent; where there is none, corners on a dark ground.
+// Rows of the match on the left and the query on the right: the candidate's corners, PnP, and where
+// it got so far the window BA; below them the verdict. `recordings`: folders by agent; where there
+// is none, corners on a dark ground.
 void WriteExplanationPng(const Explanation& explanation,
                          const std::map<int32_t, std::string>& recordings, const std::string& path);
 

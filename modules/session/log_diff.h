@@ -29,10 +29,11 @@ struct LogDiff {
   const ChannelDiff* First() const;
 };
 
-// The n-th message of a channel is compared with the n-th of the other's, as bytes; capture times
-// are not. STATUS_*, HAVE, RESEND_REQUEST, VERDICT_REQUEST and AGAIN_*, which tell of the run and
-// not of its outcome, are left out. Of both logs the first `until_s` seconds. Throws
-// std::runtime_error for a log that cannot be read.
+// The n-th message of a channel is compared with the n-th of the other's, field by field but for
+// revisions, which each run counts in its own way; capture times are not compared. STATUS_*, HAVE,
+// RESEND_REQUEST, VERDICT_REQUEST and AGAIN_*, which tell of the run and not of its outcome, are
+// left out. Of both logs the first `until_s` seconds. Throws std::runtime_error for a log that
+// cannot be read.
 LogDiff DiffLogs(const std::string& a, const std::string& b,
                  double until_s = std::numeric_limits<double>::infinity());
 

@@ -17,8 +17,9 @@ using testing::HasSubstr;
 
 class LogDiffTest : public testing::Test {
  protected:
-  // Corrections of agent 1 with these revisions, one a second.
-  std::string Log(const std::string& name, const std::vector<int64_t>& revisions) {
+  // Corrections of agent 1 with these revisions, counted from the first, one a second.
+  std::string Log(const std::string& name, const std::vector<int64_t>& revisions,
+                  int64_t first_revision = 0) {
     std::string path = testing::TempDir() + "log_diff_" + name + "_" +
                        testing::UnitTest::GetInstance()->current_test_info()->name() + ".lcm";
     std::filesystem::remove(path);
@@ -29,7 +30,7 @@ class LogDiffTest : public testing::Test {
     file.Write(utime, "STATUS_posegraph", EncodeMessage(status));
     for (const int64_t revision : revisions) {
       correction_t correction{};
-      correction.revision = revision;
+      correction.revision = revision + first_revision;
       correction.covariance[7] = 0.5 * static_cast<double>(revision);
       file.Write(utime += 1'000'000, "CORRECTION_1", EncodeMessage(correction));
       file.Write(utime, "CORRECTION_2", EncodeMessage(correction_t{}));
@@ -52,9 +53,16 @@ TEST_F(LogDiffTest, NamesTheFirstFieldOfTheFirstMessage) {
   EXPECT_EQ(diff.First()->channel, "CORRECTION_1");
   EXPECT_EQ(diff.First()->first, 2);
   EXPECT_EQ(diff.First()->seconds, 3);
-  EXPECT_EQ(diff.First()->how, "revision: 3 | 5, and 1 more");
+  EXPECT_EQ(diff.First()->how, "covariance[7]: 1.5 | 2.5");
   EXPECT_THAT(ToText(diff), AllOf(HasSubstr("CORRECTION_2        4        4        4"),
                                   HasSubstr("part at 3.000 s, with message 2 on CORRECTION_1")));
+}
+
+// A live pose graph counts from the clock, a replayed one from 1.
+TEST_F(LogDiffTest, RevisionsAreNotCompared) {
+  const std::string live = Log("live", {1, 2, 3}, 1'795'000'000'000'000);
+  EXPECT_EQ(DiffLogs(live, Log("replay", {1, 2, 3})).First(), nullptr);
+  EXPECT_EQ(DiffLogs(live, Log("other", {1, 2, 4})).First()->first, 2);
 }
 
 TEST_F(LogDiffTest, OneThatEndsFirst) {

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <optional>
 
@@ -15,6 +16,7 @@
 #include "session/log_import.h"
 #include "session/log_info.h"
 #include "session/recording_arguments.h"
+#include "session/remembered.h"
 
 namespace pangea::session {
 namespace {
@@ -65,8 +67,17 @@ void ExplainVerdict(const Arguments& arguments) {
   const Explanation explanation = Explain(log, *arguments.constraint);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
-    WriteExplanationPng(explanation, RecordingsById(arguments.recordings), arguments.out);
+    std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
+    recordings.merge(RecordingsAtHand(ReadRemembered({log})));
+    WriteExplanationPng(explanation, recordings, arguments.out);
   }
+}
+
+// Of any file the LCM library reads nothing, and says nothing.
+std::string HoldsEvents(const std::string& path) {
+  lcm::LogFile log(path, "r");
+  const bool any = log.good() && log.readNextEvent() != nullptr;
+  return any ? "" : fmt::format("{}: holds no event; is it an LCM log?", path);
 }
 
 CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Arguments* arguments,
@@ -75,7 +86,8 @@ CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Argument
   command->add_option("log", arguments->logs, "LCM log")
       ->required()
       ->expected(num_logs)
-      ->check(CLI::ExistingFile);
+      ->check(CLI::ExistingFile)
+      ->check(HoldsEvents);
   return command;
 }
 
@@ -155,7 +167,8 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   explain->add_option("--constraint", arguments->constraint, "Its id");
   explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
   explain->add_option("--recording", arguments->recordings,
-                      "ID=FOLDER: an agent's recording, for its images");
+                      "ID=FOLDER: an agent's recording, for its images (default: as the session "
+                      "remembers it beside its log)");
   explain->callback([arguments] { ExplainVerdict(*arguments); });
   CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);

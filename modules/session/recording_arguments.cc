@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <filesystem>
 #include <stdexcept>
 
 namespace pangea::session {
@@ -18,6 +19,9 @@ std::map<int32_t, std::string> RecordingsById(const std::vector<std::string>& ar
           "--recording {}: give it as ID=FOLDER, for example 1=recordings/MH_01", argument));
     }
     folders[id] = std::string(equals + 1, end);
+    if (!std::filesystem::is_directory(folders[id])) {
+      throw std::runtime_error(fmt::format("--recording {}: there is no such folder", argument));
+    }
   }
   return folders;
 }

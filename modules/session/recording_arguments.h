@@ -10,7 +10,7 @@
 namespace pangea::session {
 
 // Folders by agent; of an agent given twice the last. Throws std::runtime_error about what is not
-// ID=FOLDER.
+// ID=FOLDER, and a folder that is not there.
 std::map<int32_t, std::string> RecordingsById(const std::vector<std::string>& arguments);
 
 }  // namespace pangea::session

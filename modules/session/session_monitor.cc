@@ -16,15 +16,6 @@ namespace {
 
 constexpr int64_t kStatusFresh_us = 3'000'000;
 
-int64_t CounterOf(const status_t& status, const std::string& name) {
-  for (const counter_t& counter : status.counters) {
-    if (counter.name == name) {
-      return counter.count;
-    }
-  }
-  return 0;
-}
-
 void NoteTime(int64_t utime, AgentProgress* progress) {
   if (progress->first_utime == 0) {
     progress->first_utime = utime;
@@ -33,6 +24,15 @@ void NoteTime(int64_t utime, AgentProgress* progress) {
 }
 
 }  // namespace
+
+std::optional<int64_t> CounterOf(const status_t& status, const std::string& name) {
+  for (const counter_t& counter : status.counters) {
+    if (counter.name == name) {
+      return counter.count;
+    }
+  }
+  return std::nullopt;
+}
 
 SessionMonitor::SessionMonitor(const Buses& buses) : last_work_(WallUtime()) {
   buses_.push_back(std::make_unique<LcmBus>(buses.server));
@@ -163,7 +163,7 @@ void SessionMonitor::OnStatus(Bytes data) {
   for (auto& [id, progress] : agents_) {
     if (message.process == "vio_" + std::to_string(id) ||
         message.process == "keyframes_" + std::to_string(id)) {
-      progress.keyframes = CounterOf(message, "keyframes");
+      progress.keyframes = CounterOf(message, "keyframes").value_or(0);
     }
   }
   status_heard_[message.process] = WallUtime();

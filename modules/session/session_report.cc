@@ -2,30 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <set>
-#include <stdexcept>
-
-#include "common/text_file.h"
+#include "session/session_monitor.h"
 
 namespace pangea::session {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
 std::optional<int64_t> Counter(const RunSummary& summary, const std::string& process,
                                const std::string& name) {
   const auto status = summary.status.find(process);
-  if (status != summary.status.end()) {
-    for (const counter_t& counter : status->second.counters) {
-      if (counter.name == name) {
-        return counter.count;
-      }
-    }
-  }
-  return std::nullopt;
+  return status == summary.status.end() ? std::nullopt : CounterOf(status->second, name);
 }
 
 // The counters "up_taken", "up_delivered", ... of the agent's link emulator.
@@ -123,44 +110,11 @@ ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
-  json agents = json::array();
+  Remembered session{{}, script.expect};
   for (const AgentScript& agent : script.agents) {
-    agents.push_back({{"id", agent.id},
-                      {"recording", agent.resolved.empty() ? std::string()
-                                                           : fs::absolute(agent.resolved).string()},
-                      {"start", agent.start_s},
-                      {"duration", agent.duration_s}});
+    session.agents.push_back(RunOf(agent));
   }
-  WriteTextFile(out / "recordings.json",
-                json{{"agents", agents}, {"expect", script.expect}}.dump(2) + "\n");
-}
-
-Remembered ReadRecordings(const std::vector<fs::path>& logs) {
-  Remembered known;
-  std::set<fs::path> seen;
-  for (const fs::path& log : logs) {
-    const fs::path file = fs::absolute(log).parent_path() / "recordings.json";
-    if (!fs::exists(file) || !seen.insert(file).second) {
-      continue;
-    }
-    try {
-      std::ifstream stream(file);
-      const json recordings = json::parse(stream);
-      for (const json& agent : recordings.at("agents")) {
-        AgentScript script;
-        script.id = agent.at("id").get<int32_t>();
-        script.resolved = agent.at("recording").get<std::string>();
-        script.start_s = agent.at("start").get<double>();
-        script.duration_s = agent.at("duration").get<double>();
-        known.agents.push_back(RunOf(script));
-      }
-      // Of several sessions together nothing was expected.
-      known.expect = seen.size() == 1 ? recordings.value("expect", Expectations()) : Expectations();
-    } catch (const json::exception& error) {
-      throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
-    }
-  }
-  return known;
+  WriteRemembered(session, out);
 }
 
 }  // namespace pangea::session

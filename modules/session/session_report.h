@@ -1,27 +1,18 @@
 #pragma once
 
-// Joins what a run or a replay knows with the captured logs into the report, checks what was
-// expected of it, and remembers beside a capture which recordings it came from, so that a later
-// replay finds their ground truth.
+// Joins what a run or a replay knows with the captured logs into the report, and checks what was
+// expected of it.
 
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
-#include "session/replay.h"
+#include "session/remembered.h"
 #include "session/report.h"
 #include "session/session_file.h"
 #include "session/session_runner.h"
 
 namespace pangea::session {
-
-// What a session of its own folder remembers beside its log (recordings.json): what each agent
-// played, and what was expected of it.
-struct Remembered {
-  std::vector<AgentRun> agents;
-  Expectations expect;
-};
 
 struct ReportOutcome {
   std::string text;                 // report.md's
@@ -36,9 +27,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
 ReportOutcome ReportLog(const std::filesystem::path& log, const Remembered& known,
                         const std::filesystem::path& out);
 
+// What is remembered of the session beside its log.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);
-// Of the folders that hold `logs`; empty where there is none. Throws std::runtime_error when one
-// cannot be read.
-Remembered ReadRecordings(const std::vector<std::filesystem::path>& logs);
 
 }  // namespace pangea::session
