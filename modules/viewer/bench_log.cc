@@ -99,7 +99,7 @@ class BenchLog {
     for (int i = 0; i < plan_.points; ++i) {
       Corner corner;
       corner.pixel = {u(random_), v(random_)};
-      corner.landmark_id = 20 * seq + i;  // 20 new ones in each keyframe
+      corner.landmark_id = plan_.points * seq + i;  // new ones: each is drawn once
       keyframe.corners.push_back(corner);
       const float inverse_depth = 1 / depth(random_);
       keyframe.points.push_back({i, inverse_depth, std::pow(0.05F * inverse_depth, 2.0F)});

@@ -85,6 +85,21 @@ void Scene::WorksIn(SceneAgent& agent, int map, const Rigid3& T_odom_body) {
   }
 }
 
+// A landmark is one point, and stays with the keyframe that told it first: drawn once for each
+// keyframe that saw it, it would be a smear along the views.
+void Scene::AddPoints(SceneKeyframe& keyframe) {
+  std::vector<ShownPoint>& points = keyframe.shown.points;
+  std::unordered_set<int32_t>& landmarks = maps_[static_cast<size_t>(keyframe.map)].landmarks;
+  std::erase_if(points, [&landmarks](const ShownPoint& point) {
+    return point.landmark_id != kNoLandmark && !landmarks.insert(point.landmark_id).second;
+  });
+  if (num_points_ + points.size() > kMaxPoints) {
+    points.clear();
+    ++num_left_out_;
+  }
+  num_points_ += points.size();
+}
+
 void Scene::Take(const ShownKeyframe& keyframe) {
   const int index = KeyframeOf(keyframe.id);
   if (index < 0 || keyframes_[static_cast<size_t>(index)].arrived) {
@@ -94,11 +109,7 @@ void Scene::Take(const ShownKeyframe& keyframe) {
   known.arrived = true;
   known.shown = keyframe;
   known.shown.corners = {};
-  if (num_points_ + keyframe.p_body.size() > kMaxPoints) {
-    known.shown.p_body.clear();
-    ++num_left_out_;
-  }
-  num_points_ += known.shown.p_body.size();
+  AddPoints(known);
   ++maps_[static_cast<size_t>(known.map)].num_keyframes;
   changes_.Touch({ItemKind::kKeyframe, index});
 

@@ -12,16 +12,23 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "common/drift.h"
 #include "common/ids.h"
+#include "common/keyframe.h"
 #include "common/server_messages.h"
 #include "viewer/agent_view.h"
 #include "viewer/changes.h"
 
 namespace pangea::viewer {
+
+struct ShownPoint {
+  Eigen::Vector3f p_body;  // metres
+  int32_t landmark_id = kNoLandmark;
+};
 
 // The part of a keyframe that is drawn.
 struct ShownKeyframe {
@@ -31,7 +38,7 @@ struct ShownKeyframe {
   Rigid3 T_body_cam;
   // The image's edges on the camera's plane z = 1: left, top, right, bottom.
   Eigen::Vector4d view = Eigen::Vector4d::Zero();
-  std::vector<Eigen::Vector3f> p_body;  // map points, metres
+  std::vector<ShownPoint> points;
   ShownCorners corners;
 };
 
@@ -67,12 +74,13 @@ struct SceneMap {
   int64_t revision = 0;  // of what told the group
   Rigid3 T_map_odom;     // for keyframes that are not solved
   int num_keyframes = 0;
+  std::unordered_set<int32_t> landmarks;  // of the keyframes' points
   Drift drift;
 };
 
 struct SceneKeyframe {
   ShownKeyframe shown;
-  bool arrived = false;  // a solved pose may come first
+  bool arrived = false;  // a solved pose may come first; of its points, those no other has
   int map = 0;           // index into maps()
   // Solved, in the odom frame of `group`.
   std::optional<Rigid3> T_map_body;
@@ -145,6 +153,7 @@ class Scene {
   int MapOf(const MapId& id);
   int KeyframeOf(const KeyframeId& id);
   SceneAgent* AgentOf(int32_t id);  // null where the bound is reached
+  void AddPoints(SceneKeyframe& keyframe);
   void WorksIn(SceneAgent& agent, int map, const Rigid3& T_odom_body);
   void Place(const KeyframePose& pose, const MapState& state);
   void JoinGroup(const MapId& map, const MapId& group, int64_t revision);

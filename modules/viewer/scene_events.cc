@@ -14,7 +14,7 @@ namespace {
 using Outcome = SceneEvents::Outcome;
 
 // A point whose depth is less certain than this says little about where anything is.
-constexpr double kMaxRelativeSigma = 0.3;
+constexpr double kMaxRelativeSigma = 0.1;
 constexpr size_t kMaxText = 500;
 
 std::string Bounded(const std::string& text) { return text.substr(0, kMaxText); }
@@ -53,7 +53,9 @@ ShownKeyframe Shown(const Keyframe& keyframe) {
       continue;
     }
     if (const auto p_cam = PointInCamera(keyframe, point)) {
-      shown.p_body.emplace_back((keyframe.camera.T_body_cam * *p_cam).cast<float>());
+      const Eigen::Vector3f p_body = (keyframe.camera.T_body_cam * *p_cam).cast<float>();
+      shown.points.push_back(
+          {p_body, keyframe.corners[static_cast<size_t>(point.corner)].landmark_id});
     }
   }
   return shown;

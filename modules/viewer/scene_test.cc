@@ -34,6 +34,28 @@ TEST(Scene, AKeyframeComesOnce) {
   EXPECT_EQ(scene.maps()[0].num_keyframes, 1);
 }
 
+// Of the same landmark in another keyframe nothing is drawn; points that are none are kept, and
+// another map has landmarks of its own.
+TEST(Scene, ALandmarkIsDrawnOnce) {
+  Scene scene;
+  const auto take = [&scene](const MapId& map, int32_t seq, const std::vector<int32_t>& landmarks) {
+    ShownKeyframe keyframe = TestKeyframe(map, seq);
+    keyframe.points.clear();
+    for (const int32_t id : landmarks) {
+      keyframe.points.push_back({{0, 0, 2}, id});
+    }
+    scene.Take(keyframe);
+    std::vector<int32_t> shown;
+    for (const ShownPoint& point : scene.keyframes().back().shown.points) {
+      shown.push_back(point.landmark_id);
+    }
+    return shown;
+  };
+  EXPECT_THAT(take(kOne, 0, {4, 5, kNoLandmark}), ElementsAre(4, 5, kNoLandmark));
+  EXPECT_THAT(take(kOne, 1, {5, 6, kNoLandmark}), ElementsAre(6, kNoLandmark));
+  EXPECT_THAT(take(kTwo, 0, {5}), ElementsAre(5));
+}
+
 TEST(Scene, ASolvedPoseMayComeBeforeItsKeyframe) {
   Scene scene;
   scene.Take(TestState({kOne}, 0, 1));

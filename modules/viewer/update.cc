@@ -183,12 +183,12 @@ class Update {
     keyframes_.AddIndex(index);
     keyframes_.AddIndex(keyframe.map);
     keyframes_.AddIndex(keyframe.shown.id.seq);
-    keyframes_.AddIndex(static_cast<int64_t>(keyframe.shown.p_body.size()));
+    keyframes_.AddIndex(static_cast<int64_t>(keyframe.shown.points.size()));
     keyframes_.Add(keyframe.shown.T_odom_body);
-    for (const Eigen::Vector3f& p : keyframe.shown.p_body) {
-      keyframes_.Add(p.x());
-      keyframes_.Add(p.y());
-      keyframes_.Add(p.z());
+    for (const ShownPoint& point : keyframe.shown.points) {
+      keyframes_.Add(point.p_body.x());
+      keyframes_.Add(point.p_body.y());
+      keyframes_.Add(point.p_body.z());
     }
   }
 

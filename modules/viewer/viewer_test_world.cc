@@ -10,7 +10,7 @@ ShownKeyframe TestKeyframe(const MapId& map, int32_t seq) {
   keyframe.utime = 1'000'000 * seq;
   keyframe.T_odom_body.t = Eigen::Vector3d(seq, 0, 0);
   keyframe.view = {-1, -0.75, 1, 0.75};
-  keyframe.p_body = {{0, 0, 2}};
+  keyframe.points = {{{0, 0, 2}, kNoLandmark}};
   return keyframe;
 }
 

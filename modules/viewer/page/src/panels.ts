@@ -165,7 +165,7 @@ export function tipOf(constraint: ConstraintSaid, model: Model): string {
     `agent ${model.maps[map]?.said.agent ?? "?"}, keyframe ${seq}`;
   return [
     constraint.accepted ? "Accepted" : `Refused: ${constraint.reason || "no reason given"}`,
-    constraint.inter ? "between two maps" : "within one map",
+    constraint.from[0] === constraint.to[0] ? "within one map" : "between two maps",
     `${end(constraint.from)} ↔ ${end(constraint.to)}`,
     constraint.inliers > 0
       ? `${constraint.inliers} inliers (${(100 * constraint.inlier_ratio).toFixed(0)} %), ${constraint.rms_px.toFixed(2)} px rms`

@@ -104,12 +104,14 @@ export const pointMaterial = (poses: Poses, size: { value: number }) =>
         colour = texel(keyframe, 2).rgb;
         vec4 eye = viewMatrix * vec4(place(keyframe, position), 1.0);
         gl_Position = projectionMatrix * eye;
-        gl_PointSize = clamp(size * 12.0 / -eye.z, 0.6 * size, 2.0 * size);
+        gl_PointSize = clamp(size * 20.0 / -eye.z, 0.9 * size, 2.5 * size);
       }`,
     fragmentShader: /* glsl */ `
       precision mediump float;
       in vec3 colour;
       void main() {
+        vec2 off = gl_PointCoord - 0.5;
+        if (dot(off, off) > 0.25) discard;
         gl_FragColor = vec4(colour, 1.0);
         #include <colorspace_fragment>
       }`,

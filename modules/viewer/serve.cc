@@ -1,0 +1,63 @@
+#include "viewer/serve.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <memory>
+
+#include "common/bus/process.h"
+#include "viewer/log_show.h"
+#include "viewer/viewer_process.h"
+
+namespace pangea::viewer {
+namespace {
+
+constexpr int kServe_ms = 20;
+constexpr int kMaxMessagesAtOnce = 500;
+
+void Announce(const WebServer& server, const WebOptions& options) {
+  std::cout << fmt::format("http://{}:{}/\n", options.listen, server.port()) << std::flush;
+}
+
+void HandleWaiting(LcmBus& bus) {
+  for (int n = 0; n < kMaxMessagesAtOnce && bus.Handle(0); ++n) {
+  }
+}
+
+}  // namespace
+
+void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls,
+              const WebOptions& options, const std::string& page) {
+  LcmBus bus(url);
+  ViewerProcess process(bus, url, WallUtime());
+  std::vector<std::unique_ptr<LcmBus>> agent_buses;
+  for (const std::string& agent_url : agent_urls) {
+    agent_buses.push_back(std::make_unique<LcmBus>(agent_url));
+    process.WatchAgent(*agent_buses.back());
+  }
+  WebServer server(options, ReadPage(page), process);
+  Announce(server, options);
+  while (!StopRequested()) {
+    HandleWaiting(bus);
+    for (const auto& agent_bus : agent_buses) {
+      HandleWaiting(*agent_bus);
+    }
+    process.Tick(WallUtime());
+    server.Serve(kServe_ms);
+  }
+}
+
+void ServeLog(const std::string& log, const WebOptions& options, const std::string& page) {
+  LogShow show(log);
+  WebServer server(options, ReadPage(page), show);
+  Announce(server, options);
+  int64_t now = WallUtime();
+  while (!StopRequested()) {
+    const int64_t before = now;
+    now = WallUtime();
+    show.Advance(1e-6 * static_cast<double>(now - before));
+    server.Serve(kServe_ms);
+  }
+}
+
+}  // namespace pangea::viewer

@@ -1,0 +1,18 @@
+#pragma once
+
+// From a bus or a log to the browsers, until a signal to stop. Throws std::runtime_error for a bus
+// that cannot be opened, a log or a page that cannot be read, and a port that is taken.
+
+#include <string>
+#include <vector>
+
+#include "viewer/web_server.h"
+
+namespace pangea::viewer {
+
+// `agent_urls`: buses of agents, for their images. `page`: folder of the built page.
+void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls,
+              const WebOptions& options, const std::string& page);
+void ServeLog(const std::string& log, const WebOptions& options, const std::string& page);
+
+}  // namespace pangea::viewer
