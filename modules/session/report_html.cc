@@ -64,6 +64,11 @@ td.n { text-align: right; font-variant-numeric: tabular-nums; }
 .tiles li { background: var(--soft); border: 1px solid var(--edge); border-radius: 6px; padding: 0.5rem 1rem; }
 .tiles b { display: block; font-size: 1.4rem; }
 .aside { opacity: 0.75; font-size: 0.9rem; }
+@media (max-width: 40rem) {
+  .chart text { font-size: 22px; }
+  .tiles { gap: 0.5rem; }
+  .tiles li { flex: 1 1 auto; }
+}
 @media print { body { max-width: none; } h2 { break-after: avoid; } .chart { break-inside: avoid; } }
 </style>
 </head>
@@ -145,7 +150,7 @@ std::string Trajectories(const std::vector<Picture>& pictures) {
   for (size_t i = 0; i + 1 < pictures.size(); ++i) {  // the last is the error
     html += ChartHtml(pictures[i].plot, "Top view: " + pictures[i].plot.title);
   }
-  return html + Aside("Top view; a dot is where an agent begins. Grey: ground truth.");
+  return html + Aside("Top view; a dot is where an agent begins.");
 }
 
 std::string Fusions(const CapturedSession& session, const ReportFigures& figures) {
