@@ -1,6 +1,6 @@
 #include <limits>
 
-#include "posegraph/posegraph_test_server.h"
+#include "posegraph/test_server.h"
 
 // What has not come: asked for, waited for, or given up.
 

@@ -2,7 +2,7 @@
 
 #include <atomic>
 
-#include "posegraph/posegraph_test_server.h"
+#include "posegraph/test_server.h"
 
 namespace pangea {
 namespace {
