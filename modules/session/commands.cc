@@ -117,6 +117,7 @@ Remembered KnownOf(const LogArguments& arguments) {
 
 struct ReplayArguments : LogArguments {
   double until_s = std::numeric_limits<double>::infinity();
+  std::optional<double> checkpoint_s;
   std::vector<std::string> only;
   std::string diff;
   std::optional<int64_t> explain;
@@ -128,15 +129,32 @@ int TellDiff(const std::string& a, const std::string& b, double until_s) {
   return diff.First() == nullptr ? 0 : kMissed;
 }
 
+// With --only or --from-checkpoint: what is not run, or not yet, is taken from the log.
+void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log) {
+  if (arguments.logs.size() != 1) {
+    throw std::runtime_error(
+        fmt::format("{}: takes one log, which has what is not to be said again",
+                    arguments.only.empty() ? "--from-checkpoint" : "--only"));
+  }
+  const std::string& log = arguments.logs.front();
+  ReplayedPart part;
+  part.until_s = arguments.until_s;
+  if (!arguments.only.empty()) {
+    part.processes = {arguments.only.begin(), arguments.only.end()};
+  }
+  part.checkpoint_s = arguments.checkpoint_s;
+  const int64_t taken_over = ReplayPart(log, part, out_log);
+  if (arguments.checkpoint_s) {
+    std::cout << fmt::format("{} matches and verdicts of the first {:g} s: taken from {}\n",
+                             taken_over, *arguments.checkpoint_s, log);
+  }
+}
+
 // Some processes alone, and where what they say now parts from what they said.
 int RunReplayOnly(const ReplayArguments& arguments) {
-  if (arguments.logs.size() != 1) {
-    throw std::runtime_error("--only: takes one log, in which the other processes' words are");
-  }
   const std::string log = fs::path(arguments.out) / "session.lcm";
   PrepareOut(arguments.out);
-  ReplayOnly({arguments.only.begin(), arguments.only.end()}, arguments.logs.front(),
-             arguments.until_s, log);
+  RunReplayPart(arguments, log);
   return TellDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
                   arguments.until_s);
 }
@@ -161,10 +179,14 @@ int RunReplay(const ReplayArguments& arguments) {
   }
   const Remembered known = KnownOf(arguments);
   PrepareOut(out);
-  const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()},
-                                       arguments.until_s, out / "session.lcm");
-  std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
-                           summary.agent_ids.size());
+  if (arguments.checkpoint_s) {
+    RunReplayPart(arguments, out / "session.lcm");
+  } else {
+    const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()},
+                                         arguments.until_s, out / "session.lcm");
+    std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
+                             summary.agent_ids.size());
+  }
   int exit_code = Tell(ReportLog(out / "session.lcm", known, out));
   if (arguments.explain) {
     ExplainInto(out, *arguments.explain, known);
@@ -266,6 +288,11 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
   replay
       ->add_option("--until", arguments->until_s,
                    "Only the first so many seconds of the log (default: all of it)")
+      ->check(CLI::PositiveNumber);
+  replay
+      ->add_option("--from-checkpoint", arguments->checkpoint_s,
+                   "The matches and verdicts of the first so many seconds are taken from the log, "
+                   "not made again")
       ->check(CLI::PositiveNumber);
   replay
       ->add_option("--only", arguments->only,

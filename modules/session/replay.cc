@@ -6,6 +6,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include "common/bus/bus.h"
@@ -15,6 +16,7 @@
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "pangea/again_t.hpp"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"
 #include "session/keyframe_log.h"
@@ -97,14 +99,21 @@ void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
 // A message of a log that is replayed for some processes.
 struct LoggedWord {
   int64_t utime = 0;
+  double elapsed_s = 0;  // since the log's first event
   std::string channel;
   std::vector<uint8_t> data;
   bool own = false;  // one of them said it
 };
 
-bool IsNews(const std::string& channel) {
-  return channel.starts_with("KEYFRAME_") || channel == channels::kPlaceMatch ||
-         channel == channels::kConstraint;
+bool IsKeyframe(const std::string& channel) { return channel.starts_with("KEYFRAME_"); }
+
+// What place_recognition, inter_map_ba and fusion say, once each.
+bool IsJudgement(const std::string& channel) {
+  return channel == channels::kPlaceMatch || channel == channels::kConstraint;
+}
+
+bool IsNews(const LoggedWord& word) {
+  return !word.own && (IsKeyframe(word.channel) || IsJudgement(word.channel));
 }
 
 // Who says so; empty for agents.
@@ -132,16 +141,55 @@ std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const 
   std::optional<int64_t> begin;
   ReadLog(log.string(), [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
+    const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
     const std::string speaker = Speaker(event);
-    const bool counts = !speaker.empty() || event.channel.starts_with("KEYFRAME_");
-    if (counts && 1e-6 * static_cast<double>(event.utime - *begin) <= until_s) {
+    if ((!speaker.empty() || IsKeyframe(event.channel)) && elapsed_s <= until_s) {
       words.push_back({event.utime,
+                       elapsed_s,
                        event.channel,
                        {event.data.begin(), event.data.end()},
                        processes.contains(speaker)});
     }
   });
   return words;
+}
+
+// What comes before the first keyframe that is later than `checkpoint_s`: so of each keyframe all
+// that was said is taken over, or nothing.
+std::span<LoggedWord> Past(std::vector<LoggedWord>& words, double checkpoint_s) {
+  const auto end = std::ranges::find_if(words, [checkpoint_s](const LoggedWord& word) {
+    return IsKeyframe(word.channel) && word.elapsed_s > checkpoint_s;
+  });
+  if (end == words.end()) {
+    throw std::runtime_error(fmt::format(
+        "--from-checkpoint {:g}: no keyframe comes after it, nothing is to be run", checkpoint_s));
+  }
+  return {words.begin(), end};
+}
+
+// Those who judge learn what they said, as a process that was started again learns it from the
+// journal; the log says it in their place. Returns how much that is.
+int64_t TakeOver(std::span<LoggedWord> past, LocalBus& bus) {
+  int64_t count = 0;
+  for (LoggedWord& word : past) {
+    if (!IsJudgement(word.channel)) {
+      continue;
+    }
+    again_t again{};
+    again.channel = word.channel;
+    again.num_bytes = static_cast<int32_t>(word.data.size());
+    again.data = word.data;
+    if (word.channel == channels::kPlaceMatch) {
+      PublishMessage(bus, channels::Again("place_recognition"), again);
+    } else {
+      PublishMessage(bus, channels::Again("inter_map_ba"), again);
+      PublishMessage(bus, channels::Again("fusion"), again);
+    }
+    word.own = false;
+    ++count;
+  }
+  bus.Drain();
+  return count;
 }
 
 }  // namespace
@@ -175,19 +223,28 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs
   return summary;
 }
 
-void ReplayOnly(const std::set<std::string>& processes, const fs::path& log, double until_s,
-                const fs::path& out_log) {
+int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log) {
   UseOneThread();
   ReadKeyframeLog(log);  // throws if keyframes are missing
-  const std::vector<LoggedWord> words = ReadWords(processes, log, until_s);
-  size_t after_news = words.size();
-  while (after_news > 0 && (!IsNews(words[after_news - 1].channel) || words[after_news - 1].own)) {
-    --after_news;
+  std::vector<LoggedWord> words = ReadWords(part.processes, log, part.until_s);
+  LocalBus bus;
+  Server server(bus, part.processes);
+  int64_t taken_over = 0;
+  if (part.checkpoint_s) {
+    taken_over = TakeOver(Past(words, *part.checkpoint_s), bus);
+    if (taken_over == 0) {
+      throw std::runtime_error(fmt::format(
+          "{}: no match and no verdict before the checkpoint; --from-checkpoint goes on from a log "
+          "that has them: a replay's or a session's session.lcm, or a journal.lcm",
+          log.string()));
+    }
   }
 
-  LocalBus bus;
+  size_t after_news = words.size();
+  while (after_news > 0 && !IsNews(words[after_news - 1])) {
+    --after_news;
+  }
   Recorder recorder(bus, out_log);
-  Server server(bus, processes);
   bool finished = false;
   for (size_t i = 0; i < words.size(); ++i) {
     recorder.SetTime(words[i].utime);
@@ -203,6 +260,7 @@ void ReplayOnly(const std::set<std::string>& processes, const fs::path& log, dou
   if (!finished) {
     server.Finish();
   }
+  return taken_over;
 }
 
 }  // namespace pangea::session

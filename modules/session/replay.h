@@ -5,6 +5,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
+#include <limits>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -28,12 +31,21 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, double unti
 inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
                                             "posegraph", "global_ba"};
 
-// Some of these processes alone, fed with what the others said in the log in its order: keyframes,
-// matches, verdicts, states. Writes that and their own words, which stand in the log where they
+struct ReplayedPart {
+  std::set<std::string> processes{std::begin(kReplayed), std::end(kReplayed)};
+  // Up to here, seconds since the log's first event, matches and verdicts are the log's.
+  std::optional<double> checkpoint_s;
+  double until_s = std::numeric_limits<double>::infinity();
+};
+
+// Some of these processes alone, or all of them from a checkpoint on, fed with what was said in the
+// log in its order by the others, and up to the checkpoint by those who judge: keyframes, matches,
+// verdicts, states. Writes that and their own words, which stand in the log where they
 // said them now. A log of a replay gives the same words again. In a live session some of them
 // depend on what came while the process was busy: there, matches and states may differ for no fault
-// of anyone's.
-void ReplayOnly(const std::set<std::string>& processes, const std::filesystem::path& log,
-                double until_s, const std::filesystem::path& out_log);
+// of anyone's. Returns how many matches and verdicts are the log's instead of their own. Throws as
+// Replay does.
+int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
+                   const std::filesystem::path& out_log);
 
 }  // namespace pangea::session
