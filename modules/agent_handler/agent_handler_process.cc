@@ -33,7 +33,7 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
   for (const MapId& map : archive_.maps()) {
     missing_corrections_.Announce(map);
   }
-  link_bus.Subscribe("LINK_UP_[0-9]+",
+  link_bus.Subscribe(std::string(channels::kAllLinkUps),
                      [this](const std::string& channel, Bytes data) { OnLinkUp(channel, data); });
   node_.Listen<correction_t>(channels::kAllCorrections,
                              std::bind_front(&AgentHandlerProcess::OnCorrection, this));
@@ -111,7 +111,7 @@ void AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes packet)
 }
 
 void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
-  const auto found = agents_.find(channels::LinkUpAgent(channel).value_or(0));
+  const auto found = agents_.find(channels::AgentOf(channel, channels::kLinkUpPrefix));
   if (found == agents_.end()) {
     return node_.Refuse("packet of an agent without a key");
   }
@@ -198,6 +198,17 @@ void AgentHandlerProcess::LookForKeys() {
   }
 }
 
+std::string AgentHandlerProcess::OtherSoftware() const {
+  std::string others;
+  for (const auto& [agent_id, agent] : agents_) {
+    if (agent.handler && agent.handler->software() != OurSoftware()) {
+      others += fmt::format("; agent {} runs {}, not {}", agent_id, agent.handler->software(),
+                            OurSoftware());
+    }
+  }
+  return others;
+}
+
 void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   int64_t pending = 0, given_up = 0, keyframes = 0, connected = 0;
   for (const auto& [agent_id, agent] : agents_) {
@@ -220,8 +231,8 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   archive_.SetCounters();
   node_.PublishStatus(
       now_utime, pending,
-      fmt::format("{} agents, {} keyframes in the journal{}", connected, archive_.num_keyframes(),
-                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : ""));
+      fmt::format("{} agents, {} keyframes in the journal{}{}", connected, archive_.num_keyframes(),
+                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", OtherSoftware()));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {

@@ -56,6 +56,8 @@ class AgentHandlerProcess : public PolledProcess {
   void OnLandmarks(const MapLandmarks& landmarks, const landmarks_t& message);
   void JournalReady();
   void SendAcks();
+  // For people: agents whose software is not of this version.
+  std::string OtherSoftware() const;
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;

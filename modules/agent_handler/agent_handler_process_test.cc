@@ -342,11 +342,7 @@ TEST_F(LinkWorld, UnderABudgetKeyframesAreThinnedAndAllArrive) {
   }
   EXPECT_LT(static_cast<double>(bytes), 20e3 * 40 * 1.2) << "the first ones were full";
   EXPECT_GE(with_corners, 20u);
-  const auto counter = [&](const std::string& name) {
-    const auto it = std::find_if(status.counters.begin(), status.counters.end(),
-                                 [&](const counter_t& c) { return c.name == name; });
-    return it == status.counters.end() ? -1 : it->count;
-  };
+  const auto counter = [&](const char* name) { return CounterOf(status, name).value_or(-1); };
   EXPECT_EQ(counter("budget_bytes_per_s"), 20'000);
   EXPECT_GE(counter("rung"), 1);
   EXPECT_GT(counter("keyframes_thinned"), 20);

@@ -110,7 +110,7 @@ void Archive::NoteJournalled(const KeyframeId& id) {
 }
 
 bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
-  if (channel.starts_with("KEYFRAME_")) {
+  if (channel.starts_with(channels::kKeyframePrefix)) {
     if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {
       const KeyframeId& id = keyframe.value->id;
       index_.AddKeyframe(id, place);

@@ -40,19 +40,20 @@ void LinkWorld::SetUp() {
   MakeKeyFile(KeyFile(1), 1);
   journal_path = folder / "journal.lcm";
   // The odometry keeps its keyframes and answers requests.
-  agent_bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
-    resend_request_t request{};
-    ASSERT_TRUE(DecodeMessage(data, &request));
-    for (int32_t seq = std::max(request.from_seq, oldest_kept);
-         seq <= request.to_seq && seq < published; ++seq) {
-      again_t again{};
-      again.channel = request.channel;
-      again.data = EncodeTestKeyframe({kMap, seq});
-      again.num_bytes = static_cast<int32_t>(again.data.size());
-      PublishMessage(agent_bus, channels::Again(request.requester), again);
-    }
-  });
-  agent_bus.Subscribe("HAVE", [this](const std::string&, Bytes data) {
+  agent_bus.Subscribe(std::string(channels::kResendRequest),
+                      [this](const std::string&, Bytes data) {
+                        resend_request_t request{};
+                        ASSERT_TRUE(DecodeMessage(data, &request));
+                        for (int32_t seq = std::max(request.from_seq, oldest_kept);
+                             seq <= request.to_seq && seq < published; ++seq) {
+                          again_t again{};
+                          again.channel = request.channel;
+                          again.data = EncodeTestKeyframe({kMap, seq});
+                          again.num_bytes = static_cast<int32_t>(again.data.size());
+                          PublishMessage(agent_bus, channels::Again(request.requester), again);
+                        }
+                      });
+  agent_bus.Subscribe(std::string(channels::kHave), [this](const std::string&, Bytes data) {
     have_t have{};
     ASSERT_TRUE(DecodeMessage(data, &have));
     acknowledged = have.num_maps > 0 ? have.highest_seq[0] : -1;

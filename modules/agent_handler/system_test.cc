@@ -71,14 +71,14 @@ struct Agent {
   static constexpr int kMaxAhead = 30;
 
   Agent(int32_t agent_id, const std::string& url) : id(agent_id), map{id, 1000}, bus(url) {
-    bus.Subscribe("HAVE", [this](const std::string&, Bytes data) {
+    bus.Subscribe(std::string(channels::kHave), [this](const std::string&, Bytes data) {
       have_t have{};
       uplink_listens = true;
       if (DecodeMessage(data, &have) && have.num_maps == 1) {
         acknowledged = have.highest_seq[0];
       }
     });
-    bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
+    bus.Subscribe(std::string(channels::kResendRequest), [this](const std::string&, Bytes data) {
       resend_request_t request{};
       ASSERT_TRUE(DecodeMessage(data, &request));
       for (int32_t seq = request.from_seq; seq <= request.to_seq && seq < published; ++seq) {

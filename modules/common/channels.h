@@ -4,12 +4,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 namespace pangea::channels {
 
@@ -26,29 +23,42 @@ inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";
 inline constexpr std::string_view kAllCorrections = "CORRECTION_[0-9]+";
 inline constexpr std::string_view kAllLandmarks = "LANDMARKS_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
+inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
+inline constexpr std::string_view kAllLinkUps = "LINK_UP_[0-9]+";
 inline constexpr std::string_view kAllStatus = "STATUS_.*";
 
-inline std::string Imu(int32_t agent_id) { return fmt::format("IMU_{}", agent_id); }
-inline std::string Image(int32_t agent_id) { return fmt::format("IMAGE_{}", agent_id); }
-inline std::string Camera(int32_t agent_id) { return fmt::format("CAMERA_{}", agent_id); }
-inline std::string Pose(int32_t agent_id) { return fmt::format("POSE_{}", agent_id); }
-inline std::string Keyframe(int32_t agent_id) { return fmt::format("KEYFRAME_{}", agent_id); }
-inline std::string Correction(int32_t agent_id) { return fmt::format("CORRECTION_{}", agent_id); }
-inline std::string Landmarks(int32_t agent_id) { return fmt::format("LANDMARKS_{}", agent_id); }
-inline std::string LinkUp(int32_t agent_id) { return fmt::format("LINK_UP_{}", agent_id); }
-inline std::string LinkDown(int32_t agent_id) { return fmt::format("LINK_DOWN_{}", agent_id); }
-// Whose LINK_UP_k it is.
-inline std::optional<int32_t> LinkUpAgent(std::string_view channel) {
-  constexpr std::string_view kPrefix = "LINK_UP_";
-  int32_t agent_id = 0;
-  const char* const end = channel.data() + channel.size();
-  const bool named = channel.starts_with(kPrefix);
-  const auto read = named ? std::from_chars(channel.data() + kPrefix.size(), end, agent_id)
-                          : std::from_chars_result{nullptr, std::errc::invalid_argument};
-  return read.ec == std::errc() && read.ptr == end ? std::optional(agent_id) : std::nullopt;
+// Each agent has a channel of its own: the prefix and its id.
+inline constexpr std::string_view kImuPrefix = "IMU_";
+inline constexpr std::string_view kImagePrefix = "IMAGE_";
+inline constexpr std::string_view kCameraPrefix = "CAMERA_";
+inline constexpr std::string_view kPosePrefix = "POSE_";
+inline constexpr std::string_view kKeyframePrefix = "KEYFRAME_";
+inline constexpr std::string_view kCorrectionPrefix = "CORRECTION_";
+inline constexpr std::string_view kLandmarksPrefix = "LANDMARKS_";
+inline constexpr std::string_view kLinkUpPrefix = "LINK_UP_";
+inline constexpr std::string_view kLinkDownPrefix = "LINK_DOWN_";
+// And each process.
+inline constexpr std::string_view kStatusPrefix = "STATUS_";
+inline constexpr std::string_view kAgainPrefix = "AGAIN_";
+
+inline std::string OfAgent(std::string_view prefix, int32_t agent_id) {
+  return fmt::format("{}{}", prefix, agent_id);
 }
-inline std::string Status(std::string_view process) { return fmt::format("STATUS_{}", process); }
-inline std::string Again(std::string_view process) { return fmt::format("AGAIN_{}", process); }
+inline std::string Imu(int32_t agent_id) { return OfAgent(kImuPrefix, agent_id); }
+inline std::string Image(int32_t agent_id) { return OfAgent(kImagePrefix, agent_id); }
+inline std::string Camera(int32_t agent_id) { return OfAgent(kCameraPrefix, agent_id); }
+inline std::string Pose(int32_t agent_id) { return OfAgent(kPosePrefix, agent_id); }
+inline std::string Keyframe(int32_t agent_id) { return OfAgent(kKeyframePrefix, agent_id); }
+inline std::string Correction(int32_t agent_id) { return OfAgent(kCorrectionPrefix, agent_id); }
+inline std::string Landmarks(int32_t agent_id) { return OfAgent(kLandmarksPrefix, agent_id); }
+inline std::string LinkUp(int32_t agent_id) { return OfAgent(kLinkUpPrefix, agent_id); }
+inline std::string LinkDown(int32_t agent_id) { return OfAgent(kLinkDownPrefix, agent_id); }
+inline std::string Status(std::string_view process) {
+  return fmt::format("{}{}", kStatusPrefix, process);
+}
+inline std::string Again(std::string_view process) {
+  return fmt::format("{}{}", kAgainPrefix, process);
+}
 
 // The agent of "KEYFRAME_7" and its like, by the digits after `prefix`; 0 if there is anything
 // else.

@@ -110,8 +110,9 @@ Explanation Explain(const std::string& log, int64_t constraint_id) {
   }
   bool from = false, to = false;
   ReadLog(log, [&](const LogEvent& event) {
-    auto keyframe =
-        event.channel.starts_with("KEYFRAME_") ? ParseEvent<keyframe_t>(event) : std::nullopt;
+    auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
+                        ? ParseEvent<keyframe_t>(event)
+                        : std::nullopt;
     if (!keyframe) {
       return;
     }

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "common/bus/log_reader.h"
+#include "common/channels.h"
 #include "common/messages.h"
 
 namespace pangea::session {
@@ -47,7 +48,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
     ++number;
     begin = begin.value_or(event.utime);
     latest = std::max(latest, event.utime);
-    if (!event.channel.starts_with("KEYFRAME_")) {
+    if (!event.channel.starts_with(channels::kKeyframePrefix)) {
       return;
     }
     LoggedKeyframe keyframe;

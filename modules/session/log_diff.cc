@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/bus/log_reader.h"
+#include "common/channels.h"
 #include "session/message_fields.h"
 
 namespace pangea::session {
@@ -19,8 +20,10 @@ struct Message {
 using Channels = std::map<std::string, std::vector<Message>>;
 
 bool TellsOfTheRun(const std::string& channel) {
-  return channel.starts_with("STATUS_") || channel.starts_with("AGAIN_") || channel == "HAVE" ||
-         channel == "RESEND_REQUEST" || channel == "VERDICT_REQUEST" || channel == "LCM_SELF_TEST";
+  return channel.starts_with(channels::kStatusPrefix) ||
+         channel.starts_with(channels::kAgainPrefix) || channel == channels::kHave ||
+         channel == channels::kResendRequest || channel == channels::kVerdictRequest ||
+         channel == "LCM_SELF_TEST";
 }
 
 Channels ReadChannels(const std::string& log, double until_s) {

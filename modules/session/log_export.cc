@@ -6,6 +6,7 @@
 #include <map>
 
 #include "common/bus/log_reader.h"
+#include "common/channels.h"
 #include "common/messages.h"
 #include "common/text_file.h"
 #include "session/report_figures.h"
@@ -20,7 +21,8 @@ std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log) {
   std::map<KeyframeId, OdometryEdge> edges;
   ReadLog(log, [&edges](const LogEvent& event) {
     keyframe_t message{};
-    if (event.channel.starts_with("KEYFRAME_") && DecodeMessage(event.data, &message)) {
+    if (event.channel.starts_with(channels::kKeyframePrefix) &&
+        DecodeMessage(event.data, &message)) {
       if (const auto keyframe = Parse(message); keyframe.value && keyframe.value->edge) {
         edges.emplace(keyframe.value->id, *keyframe.value->edge);
       }

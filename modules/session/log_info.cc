@@ -84,7 +84,7 @@ LogSummary Summarise(const std::string& log) {
     }
     channel.bytes += static_cast<int64_t>(event.data.size());
     channel.last_utime = std::max(channel.last_utime, event.utime);
-    if (event.channel.starts_with("KEYFRAME_")) {
+    if (event.channel.starts_with(channels::kKeyframePrefix)) {
       AddKeyframe(event.data, &summary);
     } else if (event.channel == channels::kConstraint) {
       AddVerdict(event.data, &summary);

@@ -105,7 +105,9 @@ struct LoggedWord {
   bool own = false;  // one of them said it
 };
 
-bool IsKeyframe(const std::string& channel) { return channel.starts_with("KEYFRAME_"); }
+bool IsKeyframe(const std::string& channel) {
+  return channel.starts_with(channels::kKeyframePrefix);
+}
 
 // What place_recognition, inter_map_ba and fusion say, once each.
 bool IsJudgement(const std::string& channel) {
@@ -121,7 +123,8 @@ std::string Speaker(const LogEvent& event) {
   if (event.channel == channels::kPlaceMatch) {
     return "place_recognition";
   }
-  if (event.channel == channels::kMapState || event.channel.starts_with("CORRECTION_")) {
+  if (event.channel == channels::kMapState ||
+      event.channel.starts_with(channels::kCorrectionPrefix)) {
     return "posegraph";
   }
   if (event.channel == channels::kRefinement) {

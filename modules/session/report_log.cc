@@ -5,6 +5,7 @@
 #include <set>
 
 #include "common/bus/log_reader.h"
+#include "common/bus/node.h"
 #include "common/channels.h"
 #include "common/keyframe.h"
 #include "common/messages.h"
@@ -172,15 +173,8 @@ bool AddState(Bytes data, double session_s, States* states) {
 }
 
 void AddSample(const status_t& status, int64_t utime, ProcessSamples* samples) {
-  ProcessSample sample{utime, status.cpu_s, std::nullopt, std::nullopt};
-  for (const counter_t& counter : status.counters) {
-    if (counter.name == "bytes_up") {
-      sample.bytes_up = counter.count;
-    } else if (counter.name == "bytes_down") {
-      sample.bytes_down = counter.count;
-    }
-  }
-  (*samples)[status.process].push_back(sample);
+  (*samples)[status.process].push_back(
+      {utime, status.cpu_s, CounterOf(status, "bytes_up"), CounterOf(status, "bytes_down")});
 }
 
 bool AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
@@ -204,13 +198,13 @@ CapturedSession ReadServerLog(const std::string& path) {
     session.begin_utime = *begin;
     const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
     bool good = true;
-    if (channels::AgentOf(event.channel, "KEYFRAME_") > 0) {
+    if (channels::AgentOf(event.channel, channels::kKeyframePrefix) > 0) {
       good = AddKeyframe(event.data, session_s, &session);
     } else if (event.channel == channels::kConstraint) {
       good = AddConstraint(event.data, &session);
     } else if (event.channel == channels::kMapState) {
       good = AddState(event.data, session_s, &states);
-    } else if (event.channel.starts_with("STATUS_")) {
+    } else if (event.channel.starts_with(channels::kStatusPrefix)) {
       good = AddStatus(event.data, event.utime, &session);
     }
     if (!good) {
@@ -231,7 +225,7 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
       AddPose(event.data, &track);
     } else if (event.channel == corrections) {
       AddFrame(event.data, &frames);
-    } else if (event.channel.starts_with("STATUS_")) {
+    } else if (event.channel.starts_with(channels::kStatusPrefix)) {
       status_t status{};
       if (DecodeMessage(event.data, &status)) {
         AddSample(status, event.utime, &track.samples);

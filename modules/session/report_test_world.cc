@@ -167,7 +167,7 @@ MapState ReportWorld::State(int64_t revision, const std::vector<MapId>& maps, in
 
 void ReportWorld::LogState(const MapState& state) {
   for (const map_state_t& chunk : ToMessages(state)) {
-    log_->Write("MAP_STATE", chunk);
+    log_->Write(std::string(channels::kMapState), chunk);
   }
 }
 
@@ -178,7 +178,7 @@ void ReportWorld::LogConstraint(int seq, bool accepted, const std::string& reaso
   constraint.accepted = accepted;
   constraint.reason = reason;
   constraint.T_from_to = Truth(1, Seconds(seq)).Inverse() * Truth(2, Seconds(seq));
-  log_->Write("CONSTRAINT", ToMessage(constraint));
+  log_->Write(std::string(channels::kConstraint), ToMessage(constraint));
 }
 
 nlohmann::json ReportWorld::Report() {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "common/bus/node.h"
 #include "common/bus/process.h"
 #include "common/channels.h"
 #include "common/messages.h"
@@ -24,15 +25,6 @@ void NoteTime(int64_t utime, AgentProgress* progress) {
 }
 
 }  // namespace
-
-std::optional<int64_t> CounterOf(const status_t& status, const std::string& name) {
-  for (const counter_t& counter : status.counters) {
-    if (counter.name == name) {
-      return counter.count;
-    }
-  }
-  return std::nullopt;
-}
 
 SessionMonitor::SessionMonitor(const Buses& buses) : last_work_(WallUtime()) {
   buses_.push_back(std::make_unique<LcmBus>(buses.server));

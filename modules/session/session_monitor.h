@@ -18,9 +18,6 @@
 
 namespace pangea::session {
 
-// The count that a process tells under this name; nothing where it tells none.
-std::optional<int64_t> CounterOf(const status_t& status, const std::string& name);
-
 struct AgentProgress {
   // Of its first image, sensor clock; 0 while there is none. Where stored keyframes are played: of
   // the first of these.

@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   int32_t agent_id = 0;
   std::string key;
   std::string bus = pangea::kDefaultBusUrl;
-  std::string link = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
+  std::string link = pangea::kDefaultLinkUrl;
   pangea::UplinkOptions options;
   std::string spool_folder;
   int64_t spool_disk_bytes = 4'000'000'000;  // 40 hours of walking

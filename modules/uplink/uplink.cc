@@ -44,10 +44,8 @@ UplinkOptions WithinBudget(UplinkOptions options) {
   return options;
 }
 
-Uplink::Uplink(std::string software, const UplinkOptions& options, Sender::Load load)
-    : software_(std::move(software)),
-      options_(WithinBudget(options)),
-      sender_(options_.sender, std::move(load)) {}
+Uplink::Uplink(const UplinkOptions& options, Sender::Load load)
+    : options_(WithinBudget(options)), sender_(options_.sender, std::move(load)) {}
 
 void Uplink::SetStored(const KeyframeId& id) {
   Map& map = FindOrAdd(id.map);
@@ -139,7 +137,7 @@ bool Uplink::Connected(int64_t now_us) const {
 
 std::vector<uint8_t> Uplink::Hello() const {
   LinkHello hello;
-  hello.software = software_;
+  hello.software = OurSoftware();
   const auto announce = [&](const MapId& id, const Map& map) {
     hello.maps.push_back(
         {id, map.given_up, map.correction ? map.correction->revision : 0, map.slot});

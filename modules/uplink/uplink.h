@@ -33,9 +33,8 @@ UplinkOptions WithinBudget(UplinkOptions options);
 
 class Uplink {
  public:
-  // `software`: for people.
   // `load` gives what SetStored was told of.
-  Uplink(std::string software, const UplinkOptions& options, Sender::Load load = nullptr);
+  explicit Uplink(const UplinkOptions& options, Sender::Load load = nullptr);
 
   // The agent has published it; whether it is still to be taken.
   bool Hear(const KeyframeId& id, int64_t now_us);
@@ -92,7 +91,6 @@ class Uplink {
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
   std::vector<uint8_t> Hello() const;
 
-  const std::string software_;
   const UplinkOptions options_;
   Sender sender_;
   std::map<MapId, Map> maps_;

@@ -17,7 +17,6 @@
 namespace pangea {
 namespace {
 
-constexpr char kSoftware[] = "pangea 0.1.0";
 constexpr int64_t kHaveInterval_us = 400'000;
 constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int kBusy_ms = 4;
@@ -36,7 +35,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
       spool_(spool),
-      uplink_(kSoftware, options, [this](const KeyframeId& id) { return Load(id); }) {
+      uplink_(options, [this](const KeyframeId& id) { return Load(id); }) {
   if (options.budget_bytes_per_s > 0) {
     ladder_.emplace(options.budget_bytes_per_s);
   }

@@ -42,7 +42,7 @@ class UplinkTest : public testing::Test {
   void Add(int32_t seq, int64_t now = 0) {
     uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(500), now);
   }
-  Uplink uplink{"test", {}};
+  Uplink uplink{UplinkOptions{}};
 };
 
 TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {
@@ -177,7 +177,7 @@ TEST(UplinkSpool, WhatIsStoredLeavesMemoryAndIsLoadedWhenItsTurnComes) {
   constexpr int kKeyframes = 400;
   constexpr size_t kBytes = 50'000;
   std::vector<int> loaded;
-  Uplink uplink("test", {}, [&](const KeyframeId& id) {
+  Uplink uplink({}, [&](const KeyframeId& id) {
     loaded.push_back(id.seq);
     return id.seq == 250 ? std::vector<uint8_t>() : std::vector<uint8_t>(kBytes);
   });
@@ -201,7 +201,7 @@ TEST(UplinkSpool, WhatIsStoredLeavesMemoryAndIsLoadedWhenItsTurnComes) {
 }
 
 TEST(UplinkSpool, AnEarlierRunsKeyframesAreAnnouncedAndSent) {
-  Uplink uplink("test", {}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
+  Uplink uplink({}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
   uplink.SetStored({kMap, 7});
   uplink.SetStored({kMap, 8});
   EXPECT_EQ(HelloIn(uplink.Poll(kSecond)).maps.size(), 1u);

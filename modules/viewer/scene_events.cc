@@ -138,14 +138,14 @@ Outcome Parsable(Bytes data) {
 }  // namespace
 
 Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
-  if (channels::AgentOf(channel, "KEYFRAME_") > 0) {
+  if (channels::AgentOf(channel, channels::kKeyframePrefix) > 0) {
     return Decoded<keyframe_t>(data, [](const keyframe_t& message) -> Outcome {
       const Parsed<Keyframe> keyframe = pangea::Parse(message);
       return keyframe.value ? Outcome{Shown(*keyframe.value), ""}
                             : Outcome{std::nullopt, keyframe.refused};
     });
   }
-  if (const int32_t agent_id = channels::AgentOf(channel, "POSE_"); agent_id > 0) {
+  if (const int32_t agent_id = channels::AgentOf(channel, channels::kPosePrefix); agent_id > 0) {
     return Decoded<pose_t>(data, [agent_id](const pose_t& message) {
       Outcome outcome = FromPose(message);
       if (outcome.event) {
@@ -154,7 +154,7 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
       return outcome;
     });
   }
-  if (const int32_t agent_id = channels::AgentOf(channel, "IMAGE_"); agent_id > 0) {
+  if (const int32_t agent_id = channels::AgentOf(channel, channels::kImagePrefix); agent_id > 0) {
     return Decoded<image_t>(data, [this, agent_id](const image_t& message) -> Outcome {
       std::string refused;
       auto whole = images_.Add(agent_id, message, &refused);
@@ -162,7 +162,7 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
                    : Outcome{std::nullopt, refused};
     });
   }
-  if (channels::AgentOf(channel, "CORRECTION_") > 0) {
+  if (channels::AgentOf(channel, channels::kCorrectionPrefix) > 0) {
     return Parsable<correction_t>(data);
   }
   if (channel == channels::kConstraint) {
@@ -178,13 +178,13 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
       return whole ? Outcome{std::move(*whole), ""} : Outcome{};
     });
   }
-  if (channel.starts_with("STATUS_")) {
+  if (channel.starts_with(channels::kStatusPrefix)) {
     return Decoded<status_t>(data, FromStatus);
   }
-  if (channel.starts_with("AGAIN_")) {
+  if (channel.starts_with(channels::kAgainPrefix)) {
     // A message sent again to whoever missed it is as good as the first.
     return Decoded<again_t>(data, [this](const again_t& message) {
-      const bool nested = message.channel.starts_with("AGAIN_");
+      const bool nested = message.channel.starts_with(channels::kAgainPrefix);
       return nested ? Outcome{std::nullopt, "again: within another"}
                     : Parse(message.channel, {message.data.data(), message.data.size()});
     });

@@ -14,7 +14,6 @@ namespace pangea::viewer {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
-constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 // What is beyond would not be shown anyway.
 constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
 
@@ -24,7 +23,7 @@ ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
     : node_(bus, "viewer"), source_(std::move(source)), start_utime_(start_utime) {
   for (const std::string_view channel :
        {channels::kAllKeyframes, channels::kAllPoses, channels::kAllCorrections,
-        channels::kConstraint, channels::kMapState, channels::kAllStatus, kAllImages}) {
+        channels::kConstraint, channels::kMapState, channels::kAllStatus, channels::kAllImages}) {
     node_.SubscribeBytes(std::string(channel), std::bind_front(&ViewerProcess::OnMessage, this));
   }
   node_.SubscribeBytes(channels::Again(node_.name()),
@@ -33,7 +32,8 @@ ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
 }
 
 void ViewerProcess::WatchAgent(Bus& agent_bus) {
-  agent_bus.Subscribe(std::string(kAllImages), std::bind_front(&ViewerProcess::OnMessage, this));
+  agent_bus.Subscribe(std::string(channels::kAllImages),
+                      std::bind_front(&ViewerProcess::OnMessage, this));
 }
 
 void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {

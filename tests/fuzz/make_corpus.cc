@@ -179,7 +179,7 @@ void Fields(const std::vector<Captured>& events, const Corpus& corpus) {
 
 // Both ends of a link that works, as each end heard it.
 void Link(const std::vector<Captured>& events, const Corpus& corpus) {
-  Uplink uplink("software", UplinkOptions{});
+  Uplink uplink{UplinkOptions{}};
   AgentHandler handler(1, ReceiverOptions{});
   Payload to_uplink, to_handler;
   const auto to = [](const std::vector<Channel>& table, const std::string& channel, Bytes data,

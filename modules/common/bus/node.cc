@@ -33,6 +33,11 @@ float CpuSeconds() {
 
 }  // namespace
 
+std::optional<int64_t> CounterOf(const status_t& status, std::string_view name) {
+  const auto found = std::ranges::find(status.counters, name, &counter_t::name);
+  return found == status.counters.end() ? std::nullopt : std::optional(found->count);
+}
+
 int64_t Node::MonotonicNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())

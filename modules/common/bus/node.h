@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -16,6 +17,9 @@
 #include "pangea/status_t.hpp"
 
 namespace pangea {
+
+// A counter of what a process said of itself; nothing if it has none of this name.
+std::optional<int64_t> CounterOf(const status_t& status, std::string_view name);
 
 class Node {
  public:

@@ -14,6 +14,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "common/bus/big_endian.h"
 #include "common/bus/process.h"
@@ -58,7 +59,11 @@ sockaddr_in Resolve(const std::string& url) {
 
 }  // namespace
 
-TcpqConnection::TcpqConnection(const std::string& url) : url_(url), address_(Resolve(url)) {
+TcpqConnection::TcpqConnection(const std::string& url)
+    : url_(url),
+      address_(Resolve(url)),
+      tried_us_(SteadyMicros() - kRetry_us),
+      waits_since_us_(SteadyMicros()) {
   Handle(0);
 }
 
@@ -69,10 +74,10 @@ TcpqConnection::~TcpqConnection() {
 }
 
 void TcpqConnection::Connect() {
-  if (SteadyMicros() < next_try_us_) {
+  if (SteadyMicros() < tried_us_ + kRetry_us) {
     return;
   }
-  next_try_us_ = SteadyMicros() + kRetry_us;
+  tried_us_ = SteadyMicros();
   fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) {
     return;
@@ -93,7 +98,6 @@ void TcpqConnection::Connect() {
 
 void TcpqConnection::OnConnected() {
   state_ = State::kConnected;
-  greeted_ = false;
   received_.clear();
   taken_ = 0;
   unsent_.clear();
@@ -105,9 +109,38 @@ void TcpqConnection::OnConnected() {
   }
 }
 
+void TcpqConnection::OnGreeted() {
+  greeted_ = true;
+  last_error_ = "no answer";
+  if (std::exchange(complained_, false)) {
+    std::cerr << fmt::format("{}: the relay is there\n", url_);
+  }
+}
+
+void TcpqConnection::Complain(const std::string& of) {
+  if (!std::exchange(complained_, true)) {
+    std::cerr << fmt::format("{}: {}; trying again\n", url_, of);
+  }
+}
+
+void TcpqConnection::CheckPatience() {
+  const int64_t now_us = SteadyMicros();
+  if (state_ == State::kConnecting && now_us > tried_us_ + kConnecting_us) {
+    Disconnect("no answer");
+  }
+  if (!greeted_ && now_us > waits_since_us_ + kPatience_us) {
+    Complain(
+        fmt::format("no relay there ({}): is the address right, and does it run (java -cp "
+                    "/usr/share/java/lcm.jar lcm.lcm.TCPService {})?",
+                    last_error_, ntohs(address_.sin_port)));
+  }
+}
+
 void TcpqConnection::Disconnect(const char* why) {
-  if (state_ == State::kConnected) {
-    std::cerr << fmt::format("{}: the relay is gone ({}); trying again\n", url_, why);
+  last_error_ = why;
+  if (std::exchange(greeted_, false)) {
+    waits_since_us_ = SteadyMicros();
+    Complain(fmt::format("the relay is gone ({})", why));
   }
   close(fd_);
   fd_ = -1;
@@ -188,7 +221,7 @@ std::optional<TcpqConnection::Frame> TcpqConnection::FirstFrame() {
       Disconnect("what answers there is no LCM relay");
       return std::nullopt;
     }
-    greeted_ = true;
+    OnGreeted();
     taken_ += 2 * kWord;
     return FirstFrame();
   }
@@ -232,6 +265,7 @@ bool TcpqConnection::DeliverOne() {
 
 void TcpqConnection::Wait(int timeout_ms) {
   std::unique_lock<std::mutex> lock(mutex_);
+  CheckPatience();
   if (state_ == State::kAway) {
     Connect();
   }

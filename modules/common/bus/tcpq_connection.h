@@ -27,6 +27,11 @@ class TcpqConnection {
   static constexpr size_t kMaxUnsent = 4 << 20;
   static constexpr size_t kMaxMessage = 1 << 20;  // a larger one is no message of ours
   static constexpr int64_t kRetry_us = 500'000;
+  // A relay that does not answer for so long is complained of: in one line, on stderr, and in
+  // another one when it is there.
+  static constexpr int64_t kPatience_us = 2'000'000;
+  // A connection that is not made in this time is tried anew; the kernel would wait ever longer.
+  static constexpr int64_t kConnecting_us = 5'000'000;
 
   // Throws std::runtime_error if the address makes no sense. The relay need not be there yet.
   explicit TcpqConnection(const std::string& url);
@@ -59,7 +64,10 @@ class TcpqConnection {
 
   void Connect();
   void OnConnected();
+  void OnGreeted();
   void Disconnect(const char* why);
+  void CheckPatience();
+  void Complain(const std::string& of);
   void Wait(int timeout_ms);
   void Flush();
   void Receive();
@@ -73,11 +81,14 @@ class TcpqConnection {
   std::mutex mutex_;  // fd_, state_, unsent_
   int fd_ = -1;
   State state_ = State::kAway;
-  int64_t next_try_us_ = 0;
+  int64_t tried_us_ = 0;
   std::vector<uint8_t> unsent_;
   std::vector<uint8_t> received_;
   size_t taken_ = 0;  // of received_
   bool greeted_ = false;
+  int64_t waits_since_us_ = 0;  // for a greeting
+  std::string last_error_ = "no answer";
+  bool complained_ = false;
   std::deque<Subscription> subscriptions_;
 };
 

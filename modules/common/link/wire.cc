@@ -9,7 +9,6 @@
 namespace pangea {
 namespace {
 
-constexpr size_t kMaxSoftwareName = 100;
 constexpr size_t kMaxReason = 300;
 constexpr uint64_t kMaxSeq = 10'000'000;
 constexpr uint64_t kMaxInt32 = std::numeric_limits<int32_t>::max();
@@ -59,6 +58,8 @@ rigid3_t ReadRigid3(ByteReader* reader) {
 
 }  // namespace
 
+std::string OurSoftware() { return "pangea " PANGEA_VERSION; }
+
 int NumPieces(int total_bytes, int payload_bytes) {
   return (total_bytes + payload_bytes - 1) / payload_bytes;
 }
@@ -86,6 +87,9 @@ Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body) {
   ByteReader reader(body);
   LinkHello hello;
   hello.software = reader.Text(kMaxSoftwareName);
+  if (!std::ranges::all_of(hello.software, [](char c) { return c >= ' ' && c <= '~'; })) {
+    return Refused<LinkHello>("hello: software is no printable name");
+  }
   const uint64_t num_maps = reader.Varint(kMaxLinkMaps);
   std::set<uint8_t> slots;
   for (uint64_t i = 0; i < num_maps && reader.ok(); ++i) {

@@ -26,6 +26,9 @@
 
 namespace pangea {
 
+// Where agents and server meet unless they are told otherwise.
+inline constexpr char kDefaultLinkUrl[] = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
+
 // A keyframe has to fit one LCM datagram; compressed it may come out a little larger.
 inline constexpr int kMaxKeyframeBytes = 60'000;
 inline constexpr int kMaxCompressedBytes = kMaxKeyframeBytes + kMaxKeyframeBytes / 128;
@@ -37,6 +40,7 @@ static_assert(kMaxPieces <= 256);
 // so that both fit one Ethernet frame.
 inline constexpr int kMaxPartialKeyframes = 16;
 inline constexpr int kMaxLinkMaps = 20;
+inline constexpr size_t kMaxSoftwareName = 40;
 inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
 // An encoded landmarks_t: fits one Ethernet frame.
@@ -67,8 +71,11 @@ struct LinkMap {
   uint8_t slot = 0;  // pieces name the map by it; each in the hello has another
 };
 
+// This program's name and version, as a hello says it.
+std::string OurSoftware();
+
 struct LinkHello {
-  std::string software;
+  std::string software;  // of the uplink: printable, at most kMaxSoftwareName characters
   std::vector<LinkMap> maps;
 };
 

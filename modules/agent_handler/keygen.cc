@@ -1,0 +1,32 @@
+#include "agent_handler/keygen.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "common/link/agent_key.h"
+
+namespace pangea {
+
+CLI::App* AddKeygen(CLI::App& app, KeygenArguments* arguments) {
+  CLI::App* keygen = app.add_subcommand("keygen", "Make the key that lets an agent in, and exit");
+  keygen->add_option("--agent", arguments->agent_id, "agent id")
+      ->required()
+      ->check(CLI::Range(1, 65535));
+  keygen->add_option("--out", arguments->file,
+                     "file to make; never written over (default: agent_ID.key here)");
+  return keygen;
+}
+
+int Keygen(const KeygenArguments& arguments) {
+  const std::string file =
+      arguments.file.empty() ? KeyFileName(arguments.agent_id) : arguments.file;
+  MakeKeyFile(file, arguments.agent_id);
+  std::cout << fmt::format(
+      "{}: for agent {} (pangea-uplink --key); the server needs a copy in its folder of keys "
+      "(--keys)\n",
+      file, arguments.agent_id);
+  return 0;
+}
+
+}  // namespace pangea

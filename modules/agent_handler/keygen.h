@@ -1,0 +1,22 @@
+#pragma once
+
+// `pangea-agent-handler keygen`: makes the key that lets an agent in.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+namespace pangea {
+
+struct KeygenArguments {
+  int32_t agent_id = 0;
+  std::string file;  // empty: agent_ID.key here
+};
+
+// The subcommand, which fills in the arguments.
+CLI::App* AddKeygen(CLI::App& app, KeygenArguments* arguments);
+
+// Returns the exit code; throws std::runtime_error if the file exists or cannot be written.
+int Keygen(const KeygenArguments& arguments);
+
+}  // namespace pangea
