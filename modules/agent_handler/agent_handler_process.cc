@@ -194,7 +194,9 @@ void AgentHandlerProcess::LookForKeys() {
       ReadKeys();
     }
   } catch (const std::exception& error) {
-    node_.Refuse(error.what());  // the keys stay as they were
+    node_.Refuse(error.what());
+    // The keys stay as they were, but none keeps in whose own file was taken away.
+    std::erase_if(agents_, [&](const auto& item) { return key_folder_.IsGone(item.first); });
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <random>
@@ -153,6 +154,44 @@ TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
   std::filesystem::rename(folder / "away", KeyFile(1));
   Run(10);
   ExpectDelivered(4);
+}
+
+// A key that is half written, or another that others may read, must not keep one in.
+TEST_F(LinkWorld, AnAgentIsShutOutThoughAnotherKeyIsBad) {
+  PublishKeyframes(2);
+  Run(3);
+  std::ofstream(KeyFile(2)) << "agent: 2\nkey: 12";
+  Run(2);
+  PublishKeyframes(2);
+  Run(3);
+  ExpectDelivered(4);
+  std::filesystem::remove(KeyFile(1));
+  Run(2);
+  PublishKeyframes(2);
+  Run(5);
+  EXPECT_EQ(delivered.size(), 4u);
+}
+
+TEST_F(LinkWorld, AnotherVersionIsSaid) {
+  MakeKeyFile(KeyFile(2), 2);
+  std::string summary;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    summary = status.summary;
+  });
+  UplinkSession session(2, ReadKeyFileOf(KeyFile(2), 2));
+  link_bus.Subscribe("LINK_DOWN_2", [&](const std::string&, Bytes data) { session.Open(data); });
+  PublishKeyframes(1);
+  Run(3);
+  EXPECT_EQ(summary, "1 agents, 1 keyframes in the journal");
+  for (int64_t number = 1; number < 4; ++number) {
+    link_bus.Publish("LINK_UP_2", session.Seal({LinkKind::kHello, number,
+                                                Encode(LinkHello{"pangea 0.0.1", {}})}));
+    Run(1);
+  }
+  EXPECT_EQ(summary, "2 agents, 1 keyframes in the journal; agent 2 runs pangea 0.0.1, not " +
+                         OurSoftware());
 }
 
 TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothing) {

@@ -1,6 +1,7 @@
 #include "uplink/uplink.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 namespace pangea {
@@ -18,7 +19,7 @@ constexpr int32_t kMaxAsked = 50;
 // A gap the odometry has not filled after so many asks is lost for good.
 constexpr int kMaxUnanswered = 30;
 // An agent opens a map each time its odometry starts anew; the oldest that are done are
-// forgotten. Fewer than there are slots.
+// forgotten.
 constexpr size_t kMaxMaps = 200;
 
 // A pose's packet on the wire, and what poses may take of a budget.
@@ -57,9 +58,8 @@ Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);
   if (added) {
     hello_due_ = true;
-    it->second.slot = next_slot_++;
     for (auto old = maps_.begin(); maps_.size() > kMaxMaps && old != maps_.end();) {
-      const bool done = old != it && !sender_.FirstSeqFrom(old->first, 0);
+      const bool done = old != it && sender_.spooled(old->first) == 0;
       if (done) {
         sender_.Forget(old->first);
       }
@@ -93,8 +93,10 @@ void Uplink::AddPose(const MapId& map_id, int64_t group_revision, std::vector<ui
 void Uplink::SetNext(const MapId& id, Map* map, int32_t next) {
   map->next = std::max(next, map->given_up);
   map->highest = std::max(map->highest, map->next - 1);
-  if (map->listed) {
+  if (map->listed && map->slot) {
     sender_.SetNext(id, map->next);
+  } else if (map->listed) {
+    sender_.Release(id, map->next - 1);
   }
 }
 
@@ -135,26 +137,62 @@ bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-std::vector<uint8_t> Uplink::Hello() const {
-  LinkHello hello;
-  hello.software = OurSoftware();
-  const auto announce = [&](const MapId& id, const Map& map) {
-    hello.maps.push_back(
-        {id, map.given_up, map.correction ? map.correction->revision : 0, map.slot});
-  };
-  // The newest, and of the others those with something to send, newest first.
-  for (auto it = maps_.rbegin(); it != maps_.rend() && hello.maps.size() < kMaxLinkMaps; ++it) {
-    if (it == maps_.rbegin() || sender_.FirstSeqFrom(it->first, 0)) {
-      announce(it->first, it->second);
+// The newest, and of the others the newest with something to send.
+std::vector<MapId> Uplink::Announced() const {
+  std::vector<MapId> announced;
+  for (auto it = maps_.rbegin(); it != maps_.rend() && announced.size() < kMaxLinkMaps; ++it) {
+    if (it == maps_.rbegin() || sender_.spooled(it->first) > 0) {
+      announced.push_back(it->first);
     }
   }
-  std::ranges::reverse(hello.maps);
+  std::ranges::reverse(announced);
+  return announced;
+}
+
+void Uplink::GiveSlots(const std::vector<MapId>& announced) {
+  std::set<uint8_t> taken;
+  std::vector<MapId> without;
+  for (const MapId& id : announced) {
+    const std::optional<uint8_t>& slot = maps_.at(id).slot;
+    if (!slot || !taken.insert(*slot).second) {
+      without.push_back(id);
+    }
+  }
+  for (const MapId& id : without) {
+    while (!taken.insert(next_slot_).second) {
+      ++next_slot_;
+    }
+    Map& map = maps_.at(id);
+    map.slot = next_slot_++;
+    SetNext(id, &map, map.next);
+  }
+}
+
+// The journal knew the map before a hello of this run named it.
+bool Uplink::LacksSlot() const {
+  const std::vector<MapId> announced = Announced();
+  return std::ranges::any_of(announced, [&](const MapId& id) {
+    const Map& map = maps_.at(id);
+    return map.listed && !map.slot;
+  });
+}
+
+std::vector<uint8_t> Uplink::Hello() {
+  LinkHello hello;
+  hello.software = OurSoftware();
+  const std::vector<MapId> announced = Announced();
+  GiveSlots(announced);
+  for (const MapId& id : announced) {
+    const Map& map = maps_.at(id);
+    hello.maps.push_back(
+        {id, map.given_up, map.correction ? map.correction->revision : 0, *map.slot});
+  }
   return Encode(hello);
 }
 
 bool Uplink::HelloIsUrgent(int64_t now_us) const {
   const auto waits_for_listing = [&](const auto& item) {
-    return !item.second.listed && sender_.FirstSeqFrom(item.first, 0);
+    return !item.second.listed && sender_.spooled(item.first) > 0;
   };
   return !Connected(now_us) || hello_due_ ||
          std::any_of(maps_.begin(), maps_.end(), waits_for_listing);
@@ -163,7 +201,7 @@ bool Uplink::HelloIsUrgent(int64_t now_us) const {
 std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   std::vector<LinkPacket> packets;
   const int64_t since_hello = last_hello_us_ ? now_us - *last_hello_us_ : kHelloInterval_us;
-  if (since_hello >= (HelloIsUrgent(now_us) ? kHelloUrgent_us : kHelloInterval_us)) {
+  if (since_hello >= (HelloIsUrgent(now_us) ? kHelloUrgent_us : kHelloInterval_us) || LacksSlot()) {
     packets.push_back({LinkKind::kHello, sender_.NextNumber(now_us), Hello()});
     last_hello_us_ = now_us;
     hello_due_ = false;
@@ -178,7 +216,7 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
     last_pose_us_ = now_us;
   }
   for (Sender::Sent& sent : sender_.Poll(now_us)) {
-    sent.piece.slot = maps_.at(sent.keyframe.map).slot;
+    sent.piece.slot = *maps_.at(sent.keyframe.map).slot;
     packets.push_back({sent.piece.last ? LinkKind::kLastPiece : LinkKind::kPiece, sent.number,
                        Encode(sent.piece)});
   }
@@ -187,10 +225,10 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
 
 // The first seqs of a map that were published but are neither acknowledged nor in the spool.
 std::optional<SeqGap> Uplink::Missing(const MapId& id, const Map& map) const {
-  int32_t from = map.next;
-  while (sender_.Has({id, from})) {
-    ++from;
+  if (sender_.spooled(id) == map.highest + 1 - map.next) {
+    return std::nullopt;  // none is lost: all that are spooled lie between these two
   }
+  const int32_t from = sender_.FirstMissingFrom(id, map.next);
   if (from > map.highest) {
     return std::nullopt;
   }

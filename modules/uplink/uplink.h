@@ -70,11 +70,11 @@ class Uplink {
 
  private:
   struct Map {
-    int32_t next = 0;      // the first that is not journalled (or given up)
-    int32_t given_up = 0;  // those before are lost for good, unless they are journalled
-    int32_t highest = -1;  // the highest the agent is known to have published
-    bool listed = false;   // the handler knows the map
-    uint8_t slot = 0;      // in hellos and pieces
+    int32_t next = 0;             // the first that is not journalled (or given up)
+    int32_t given_up = 0;         // those before are lost for good, unless they are journalled
+    int32_t highest = -1;         // the highest the agent is known to have published
+    bool listed = false;          // the handler knows the map
+    std::optional<uint8_t> slot;  // in hellos and pieces, since it was first in a hello
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
@@ -89,7 +89,13 @@ class Uplink {
   std::optional<SeqGap> Missing(const MapId& id, const Map& map) const;
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
-  std::vector<uint8_t> Hello() const;
+  // The maps of the next hello, the newest last.
+  std::vector<MapId> Announced() const;
+  // Those that have no slot yet, or one that another of them has, get one.
+  void GiveSlots(const std::vector<MapId>& announced);
+  // The handler knows a map, but has still to be told its slot.
+  bool LacksSlot() const;
+  std::vector<uint8_t> Hello();
 
   const UplinkOptions options_;
   Sender sender_;

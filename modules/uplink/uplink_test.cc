@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <chrono>
+#include <set>
+
 namespace pangea {
 namespace {
 
@@ -240,6 +244,64 @@ TEST_F(UplinkTest, ManyMapsStayBounded) {
   }
   EXPECT_LE(uplink.Acknowledged().size(), 201u);
   EXPECT_LE(HelloIn(uplink.Poll(kSecond)).maps.size(), 20u);
+}
+
+// More maps than there are slots wait to be sent: a hello with a slot twice would be refused.
+TEST(UplinkSpool, HundredsOfUnsentMapsAreAnnouncedAFewAtATime) {
+  constexpr int kMaps = 400;
+  Uplink uplink({}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
+  for (int i = 1; i <= kMaps; ++i) {
+    uplink.SetStored({{1, i}, 0});
+  }
+  std::array<MapId, 256> of_slot;  // as the handler understands it
+  std::set<MapId> sent;
+  for (int round = 1; round < kMaps && !uplink.Idle(); ++round) {
+    LinkAck ack = Ack(round, -1);
+    ack.journalled_seq.clear();
+    for (const LinkPacket& packet : uplink.Poll(round * kSecond)) {
+      if (packet.kind == LinkKind::kHello) {
+        const auto hello = ParseHello(1, packet.body);
+        ASSERT_TRUE(hello.value) << hello.refused << " in round " << round;
+        for (const LinkMap& map : hello.value->maps) {
+          of_slot[map.slot] = map.map;
+          ack.journalled_seq[map.map] = sent.contains(map.map) ? 0 : -1;
+        }
+      } else {
+        sent.insert(of_slot[ParsePiece(packet).value->slot]);
+      }
+    }
+    uplink.OnAck(ack, round * kSecond);
+  }
+  EXPECT_TRUE(uplink.Idle());
+  EXPECT_EQ(sent.size(), size_t{kMaps});
+}
+
+// ... and an old one that the journal knows is not sent before a hello has named it.
+TEST(UplinkSpool, AMapOfTheJournalWaitsForItsSlot) {
+  Uplink uplink({}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
+  for (int i = 1; i <= 100; ++i) {
+    uplink.SetStored({{1, i}, 0});
+    uplink.SetStored({{1, i}, 1});
+  }
+  LinkAck ack = Ack(1, -1);
+  ack.journalled_seq = {{{1, 5}, 0}};
+  uplink.OnAck(ack, kSecond);
+  EXPECT_EQ(uplink.keyframes_acked(), 1);
+  EXPECT_THAT(SentSeqs(uplink.Poll(kSecond)), testing::IsEmpty());
+}
+
+// Looking through all of it at each poll, four milliseconds apart, would take a whole core.
+TEST(UplinkSpool, HoursOfKeyframesCostAPollNothing) {
+  Uplink uplink({}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
+  for (int seq = 0; seq < 50'000; ++seq) {
+    uplink.SetStored({kMap, seq});
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  for (int64_t now = 1; now <= 250; ++now) {
+    uplink.Poll(now * 4000);
+    EXPECT_TRUE(uplink.Asks(now * 4000).empty());
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(200));
 }
 
 }  // namespace

@@ -6,10 +6,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -19,15 +20,29 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kHexBytes = 2 * SecretKey::kBytes;
-constexpr size_t kMaxLine = 200;
+constexpr size_t kMaxFileBytes = 4096;
 
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
 }
 
-void CheckMode(const fs::path& file) {
+struct OpenFile {
+  explicit OpenFile(const fs::path& file)
+      : fd(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}  // waits not even on a FIFO
+  ~OpenFile() {
+    if (fd >= 0) {
+      close(fd);
+    }
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  const int fd;
+};
+
+// Of an open file, so that what is checked is what is read.
+void Check(const fs::path& file, int fd) {
   struct stat info {};
-  if (stat(file.c_str(), &info) != 0) {
+  if (fd < 0 || fstat(fd, &info) != 0) {
     Fail(file, fmt::format("{}; make one with pangea-agent-handler keygen", std::strerror(errno)));
   }
   if (!S_ISREG(info.st_mode)) {
@@ -36,6 +51,29 @@ void CheckMode(const fs::path& file) {
   if ((info.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     Fail(file, fmt::format("others may read or write it: chmod 600 {}", file.string()));
   }
+  if (info.st_size > static_cast<off_t>(kMaxFileBytes)) {
+    Fail(file, "is no key file: it is too long");
+  }
+}
+
+// A text that is wiped when it goes.
+struct SecretText {
+  ~SecretText() { sodium_memzero(bytes.data(), bytes.size()); }
+  std::string_view view() const { return {bytes.data(), size}; }
+  std::array<char, kMaxFileBytes> bytes{};
+  size_t size = 0;
+};
+
+SecretText ReadSecret(const fs::path& file) {
+  const OpenFile opened(file);
+  Check(file, opened.fd);
+  SecretText text;
+  const ssize_t n = read(opened.fd, text.bytes.data(), text.bytes.size());
+  if (n < 0) {
+    Fail(file, std::strerror(errno));
+  }
+  text.size = static_cast<size_t>(n);
+  return text;
 }
 
 std::optional<SecretKey> FromHex(std::string_view text) {
@@ -82,19 +120,18 @@ void MakeKeyFile(const fs::path& file, int32_t agent_id) {
   const bool closed = close(fd) == 0;
   sodium_memzero(hex, sizeof(hex));
   if (!written || !closed) {
+    unlink(file.c_str());
     Fail(file, "cannot be written");
   }
 }
 
 AgentKey ReadKeyFile(const fs::path& file) {
-  CheckMode(file);
-  std::ifstream stream(file);
+  const SecretText text = ReadSecret(file);
   std::optional<int32_t> agent_id;
   std::optional<SecretKey> key;
-  for (std::string line; std::getline(stream, line);) {
-    if (line.size() > kMaxLine) {
-      Fail(file, "is no key file: a line is too long");
-    }
+  for (std::string_view rest = text.view(); !rest.empty();) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
     if (const auto id = ValueOf(line, "agent")) {
       int32_t value = 0;
       const auto [end, error] = std::from_chars(id->data(), id->data() + id->size(), value);
@@ -110,7 +147,6 @@ AgentKey ReadKeyFile(const fs::path& file) {
     } else if (!line.empty() && line[0] != '#') {
       Fail(file, "is no key file: it has lines agent: and key: only");
     }
-    sodium_memzero(line.data(), line.size());
   }
   if (!agent_id || !key) {
     Fail(file, "is no key file: it needs the lines agent: and key:");
@@ -146,6 +182,12 @@ bool KeyFolder::Changed() const {
   }
 }
 
+bool KeyFolder::IsGone(int32_t agent_id) const {
+  const auto file = files_.find(agent_id);
+  std::error_code error;
+  return file == files_.end() || !fs::exists(file->second, error);
+}
+
 std::map<int32_t, SecretKey> KeyFolder::Read() {
   std::error_code error;
   if (!fs::is_directory(folder_, error)) {
@@ -156,13 +198,16 @@ std::map<int32_t, SecretKey> KeyFolder::Read() {
   }
   const Stamps stamps = Look();
   std::map<int32_t, SecretKey> keys;
+  std::map<int32_t, fs::path> files;
   for (const auto& [file, stamp] : stamps) {
     const AgentKey read = ReadKeyFile(file);
     if (!keys.emplace(read.agent_id, read.key).second) {
       Fail(file, fmt::format("is a second key of agent {}: take one of them out", read.agent_id));
     }
+    files[read.agent_id] = file;
   }
   seen_ = stamps;
+  files_ = std::move(files);
   return keys;
 }
 

@@ -41,6 +41,8 @@ class KeyFolder {
   std::map<int32_t, SecretKey> Read();
   // Whether files have come, gone or changed since the last Read.
   bool Changed() const;
+  // Whether the file is gone that the last successful Read had the agent's key from.
+  bool IsGone(int32_t agent_id) const;
 
  private:
   using Stamps = std::map<std::filesystem::path, std::filesystem::file_time_type>;
@@ -48,6 +50,7 @@ class KeyFolder {
 
   std::filesystem::path folder_;
   Stamps seen_;
+  std::map<int32_t, std::filesystem::path> files_;
 };
 
 }  // namespace pangea

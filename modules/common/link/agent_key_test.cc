@@ -72,6 +72,9 @@ TEST_F(AgentKeyTest, MistakesGetAnAnswerWithoutTheSecret) {
     EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", text)); }),
                 testing::AllOf(HasSubstr("bad.key"), HasSubstr(said)));
   }
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("long.key", std::string(5000, '#'))); }),
+              HasSubstr("too long"));
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(folder); }), HasSubstr("is not a file"));
   const std::string secret(63, 'b');
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", "agent: 4\nkey: " + secret + "\n")); }),
               testing::Not(HasSubstr("bbbb")));

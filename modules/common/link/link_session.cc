@@ -12,6 +12,7 @@ constexpr size_t kSessionClearBytes = 4;
 constexpr size_t kHandshakeClearBytes = 1 + kSealNonceBytes;
 constexpr int64_t kMaxNumber = int64_t{1} << 48;
 constexpr char kNotOurs[] = "not sealed for this session: forged, damaged, or of an earlier one";
+constexpr char kTooLarge[] = "larger than any packet";
 constexpr char kRepeated[] = "repeated or too old";
 
 LinkKind KindOf(Bytes bytes) { return bytes.empty() ? LinkKind{} : LinkKind{bytes[0]}; }
@@ -100,6 +101,10 @@ std::vector<uint8_t> UplinkSession::Seal(const LinkPacket& packet) {
 
 UplinkSession::Opened UplinkSession::Open(Bytes bytes) {
   Opened opened;
+  if (bytes.size() > kMaxLinkPacketBytes) {
+    opened.refused = kTooLarge;
+    return opened;
+  }
   if (KindOf(bytes) == LinkKind::kWelcome) {
     return OnWelcome(bytes);
   }
@@ -142,6 +147,10 @@ HandlerSession::HandlerSession(int32_t agent_id, const SecretKey& agent_key)
 
 HandlerSession::Opened HandlerSession::Open(Bytes bytes) {
   Opened opened;
+  if (bytes.size() > kMaxLinkPacketBytes) {
+    opened.refused = kTooLarge;
+    return opened;
+  }
   if (KindOf(bytes) == LinkKind::kHello) {
     return OnHello(bytes);
   }

@@ -41,6 +41,9 @@ struct LinkPacket {
 // Of a packet in a session: kind, low bits of the number, tag.
 inline constexpr int kSessionOverheadBytes = 1 + 3 + kSealTagBytes;
 
+// What is larger is none of ours, and is not even opened.
+inline constexpr size_t kMaxLinkPacketBytes = 40'000;
+
 // One direction of a session.
 struct SessionKey {
   SecretKey key;

@@ -126,6 +126,16 @@ TEST_F(LinkSessionTest, AHelloWithANumberThatNoUplinkReachesIsRefused) {
   }
 }
 
+// Whatever a stranger sends, it costs no more than a packet of ours.
+TEST_F(LinkSessionTest, WhatIsLargerThanAnyPacketIsNotEvenOpened) {
+  for (const LinkKind kind : {LinkKind::kHello, LinkKind::kPiece, LinkKind::kWelcome}) {
+    std::vector<uint8_t> large(1 << 20);
+    large[0] = static_cast<uint8_t>(kind);
+    EXPECT_EQ(handler->Open(large).refused, "larger than any packet");
+    EXPECT_EQ(uplink->Open(large).refused, "larger than any packet");
+  }
+}
+
 TEST_F(LinkSessionTest, APacketTurnedBackIsRefused) {
   Connect();
   const Packet up = Piece(1), down = handler->Seal(LinkKind::kAck, {1});

@@ -8,16 +8,17 @@ Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
 
 void Receiver::Resume(const MapId& map, int32_t journalled_seq) {
-  maps_[map] = {journalled_seq + 1, journalled_seq, false};
+  maps_[map] = {journalled_seq + 1, journalled_seq, false, false, true};
 }
 
 void Receiver::OnHello(const LinkHello& hello) {
   // A map that brought nothing and is not named any more is forgotten: the number stays bounded.
-  std::erase_if(maps_, [&](const auto& item) {
-    return item.second.next == 0 &&
-           std::none_of(hello.maps.begin(), hello.maps.end(),
-                        [&](const auto& m) { return m.map == item.first; });
-  });
+  for (auto it = maps_.begin(); it != maps_.end();) {
+    const auto& [id, map] = *it;
+    const bool named = std::ranges::find(hello.maps, id, &LinkMap::map) != hello.maps.end();
+    given_up_ -= map.brought || named ? 0 : map.next;
+    it = map.brought || named ? std::next(it) : maps_.erase(it);
+  }
   for (auto& [id, map] : maps_) {
     map.in_hello = false;
   }
@@ -142,13 +143,13 @@ std::vector<uint8_t> Receiver::Joined(const Entry& entry) {
 
 std::vector<Receiver::Keyframe> Receiver::TakeReady() {
   std::vector<Keyframe> ready;
-  for (auto& [map_id, map] : maps_) {
-    auto it = cache_.find({map_id, map.next});
-    while (it != cache_.end() && it->first == KeyframeId{map_id, map.next} && it->second.whole()) {
-      it->second.taken = true;
-      ready.push_back({it->first, Joined(it->second)});
+  for (auto& [id, entry] : cache_) {
+    Map& map = maps_.at(id.map);
+    if (id.seq == map.next && entry.whole()) {
+      entry.taken = true;
+      ready.push_back({id, Joined(entry)});
       ++map.next;
-      ++it;
+      map.brought = true;
     }
   }
   return ready;

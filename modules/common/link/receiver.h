@@ -62,6 +62,7 @@ class Receiver {
     int32_t journalled = -1;
     bool announced = false;  // by this run of the uplink
     bool in_hello = false;   // the newest one
+    bool brought = false;    // a keyframe, ever
   };
   struct Entry {
     std::vector<std::vector<uint8_t>> pieces;

@@ -191,5 +191,15 @@ TEST(Receiver, AnnouncedMapsThatBringNothingAreForgotten) {
   EXPECT_EQ(receiver.pending(), 1u);
 }
 
+// ... although they say that they had something once.
+TEST(Receiver, AnnouncedMapsThatGaveUpAllTheyHadAreForgottenToo) {
+  Receiver receiver({}, CheckContent);
+  for (int i = 1; i < 1000; ++i) {
+    receiver.OnHello({"", {{{1, i}, 5, 0}}});
+  }
+  EXPECT_EQ(receiver.num_maps(), 1u);
+  EXPECT_EQ(receiver.given_up(), 5) << "of the one that is still named";
+}
+
 }  // namespace
 }  // namespace pangea

@@ -36,21 +36,26 @@ std::optional<std::string> SenderOptions::Invalid() const {
 Sender::Sender(const SenderOptions& options, Load load)
     : options_(options), load_(std::move(load)), pacer_(options.rate_bytes_per_s, kBurstBytes) {}
 
+Sender::Item& Sender::FindOrAdd(const KeyframeId& id) {
+  const auto [it, added] = spool_.try_emplace(id);
+  spooled_of_[id.map] += added ? 1 : 0;
+  return it->second;
+}
+
 bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
   const auto size = static_cast<int64_t>(bytes.size());
   if (spooled_bytes_ + size > options_.max_spool_bytes) {
     return false;
   }
-  Item item;
-  item.bytes = std::move(bytes);
-  if (spool_.emplace(id, std::move(item)).second) {
+  if (!Has(id)) {
+    FindOrAdd(id).bytes = std::move(bytes);
     spooled_bytes_ += size;
   }
   return true;
 }
 
 void Sender::SetStored(const KeyframeId& id) {
-  Item& item = spool_[id];
+  Item& item = FindOrAdd(id);
   item.stored = true;
   if (item.pieces.empty() && spooled_bytes_ > kMaxStoredInMemory) {
     spooled_bytes_ -= static_cast<int64_t>(item.bytes.size());
@@ -72,6 +77,19 @@ std::optional<int32_t> Sender::FirstSeqFrom(const MapId& map, int32_t seq) const
     return std::nullopt;
   }
   return it->first.seq;
+}
+
+int32_t Sender::FirstMissingFrom(const MapId& map, int32_t seq) const {
+  for (auto it = spool_.find({map, seq}); it != spool_.end() && it->first == KeyframeId{map, seq};
+       ++it) {
+    ++seq;
+  }
+  return seq;
+}
+
+int Sender::spooled(const MapId& map) const {
+  const auto it = spooled_of_.find(map);
+  return it == spooled_of_.end() ? 0 : it->second;
 }
 
 void Sender::SetNext(const MapId& map, int32_t next_seq) {
@@ -105,6 +123,10 @@ std::map<KeyframeId, Sender::Item>::iterator Sender::Erase(
   }
   spooled_bytes_ -= static_cast<int64_t>(it->second.bytes.size());
   started_.erase(it->first);
+  const auto of_map = spooled_of_.find(it->first.map);
+  if (--of_map->second == 0) {
+    spooled_of_.erase(of_map);
+  }
   return spool_.erase(it);
 }
 

@@ -56,10 +56,12 @@ class Sender {
   bool Has(const KeyframeId& id) const { return spool_.contains(id); }
   // It is stored from now on, and can be loaded; also one that an earlier run has stored.
   void SetStored(const KeyframeId& id);
-  // The first spooled keyframe of the map at or after `seq`.
+  // The first spooled keyframe of the map at or after `seq`; the first seq that is none.
   std::optional<int32_t> FirstSeqFrom(const MapId& map, int32_t seq) const;
+  int32_t FirstMissingFrom(const MapId& map, int32_t seq) const;
   // Only maps that the other side knows are sent, from this seq on; before it all is acknowledged.
   void SetNext(const MapId& map, int32_t next_seq);
+  void Release(const MapId& map, int32_t journalled_seq);  // acknowledged up to this seq
   // The map is done with; nothing of it may be in the spool.
   void Forget(const MapId& map) { next_.erase(map); }
 
@@ -76,6 +78,7 @@ class Sender {
   int64_t NextNumber(int64_t now_us);
 
   size_t spooled() const { return spool_.size(); }
+  int spooled(const MapId& map) const;
   // In memory.
   int64_t spooled_bytes() const { return spooled_bytes_; }
   bool Full() const { return spooled_bytes_ + kMaxCompressedBytes > options_.max_spool_bytes; }
@@ -100,7 +103,7 @@ class Sender {
     int64_t sent_us;
   };
 
-  void Release(const MapId& map, int32_t journalled_seq);
+  Item& FindOrAdd(const KeyframeId& id);
   std::map<KeyframeId, Item>::iterator Erase(std::map<KeyframeId, Item>::iterator it);
   bool LoadBytes(const KeyframeId& id, Item* item);
   void Settle(const Item& item, Piece* piece);  // no longer in flight
@@ -115,7 +118,8 @@ class Sender {
   const Load load_;
   Pacer pacer_;
   std::map<KeyframeId, Item> spool_;
-  std::set<KeyframeId> started_;  // those with pieces
+  std::map<MapId, int> spooled_of_;  // keyframes of each map that has any
+  std::set<KeyframeId> started_;     // those with pieces
   std::map<MapId, int32_t> next_;
   int64_t spooled_bytes_ = 0;
   int in_flight_bytes_ = 0;

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "common/link/bytes_io.h"
+#include "common/messages_checks.h"
 
 namespace pangea {
 namespace {
@@ -14,10 +15,15 @@ constexpr uint64_t kMaxSeq = 10'000'000;
 constexpr uint64_t kMaxInt32 = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxInt64 = std::numeric_limits<int64_t>::max();
 constexpr uint64_t kMaxEncodedCorrection = 1000;
+constexpr int64_t kMaxUtime = int64_t{1} << 60;
+constexpr double kMaxSpeed = 1000;  // m/s
 
-template <typename T>
-Parsed<T> Refused(std::string reason) {
-  return {std::nullopt, std::move(reason)};
+using messages_checks::Refused;
+
+// For people: nothing that moves a terminal's cursor.
+bool Printable(const std::string& text) {
+  return std::ranges::all_of(text,
+                             [](char c) { return static_cast<uint8_t>(c) >= ' ' && c != 0x7F; });
 }
 
 int32_t ReadInt32(ByteReader* reader, uint64_t max = kMaxInt32) {
@@ -87,8 +93,8 @@ Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body) {
   ByteReader reader(body);
   LinkHello hello;
   hello.software = reader.Text(kMaxSoftwareName);
-  if (!std::ranges::all_of(hello.software, [](char c) { return c >= ' ' && c <= '~'; })) {
-    return Refused<LinkHello>("hello: software is no printable name");
+  if (!Printable(hello.software)) {
+    return Refused<LinkHello>("hello: software is not printable");
   }
   const uint64_t num_maps = reader.Varint(kMaxLinkMaps);
   std::set<uint8_t> slots;
@@ -160,13 +166,29 @@ Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
   if (!reader.AtEnd() || !Parse(pose.map).value) {
     return Refused<pose_t>("pose does not decode");
   }
+  if (pose.utime < 0 || pose.utime > kMaxUtime) {
+    return Refused<pose_t>("pose: time out of range");
+  }
+  if (pose.state < pose_t::STATE_INVALID || pose.state > pose_t::STATE_LOST) {
+    return Refused<pose_t>("pose: no such state");
+  }
+  if (!Printable(pose.reason)) {
+    return Refused<pose_t>("pose: reason is not printable");
+  }
+  if (pose.state != pose_t::STATE_TRACKING) {  // it is nowhere
+    pose.T_odom_body = pose.T_map_body = {};
+    pose.v_odom_body = {};
+    return {std::move(pose), ""};
+  }
   const auto T_odom_body = Parse(pose.T_odom_body), T_map_body = Parse(pose.T_map_body);
-  if (T_odom_body.value && T_map_body.value) {
-    pose.T_odom_body = ToMessage(*T_odom_body.value);  // of unit norm in double precision again
-    pose.T_map_body = ToMessage(*T_map_body.value);
-  } else if (pose.state == pose_t::STATE_TRACKING) {
+  if (!T_odom_body.value || !T_map_body.value) {
     return Refused<pose_t>("pose is no rigid transform");
   }
+  if (!messages_checks::Bounded(messages_checks::ToVector(pose.v_odom_body), kMaxSpeed)) {
+    return Refused<pose_t>("pose: velocity out of range");
+  }
+  pose.T_odom_body = ToMessage(*T_odom_body.value);  // of unit norm in double precision again
+  pose.T_map_body = ToMessage(*T_map_body.value);
   return {std::move(pose), ""};
 }
 

@@ -36,6 +36,7 @@ inline constexpr int kMinPayloadBytes = 256;
 inline constexpr int kMaxPayloadBytes = 30'000;
 inline constexpr int kMaxPieces = kMaxCompressedBytes / kMinPayloadBytes + 1;
 static_assert(kMaxPieces <= 256);
+static_assert(kMaxPayloadBytes + 1000 < kMaxLinkPacketBytes);
 // Keyframes one agent may have in the receive cache, and maps a hello or an acknowledgement names:
 // so that both fit one Ethernet frame.
 inline constexpr int kMaxPartialKeyframes = 16;

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+#include <limits>
 #include <random>
 
 namespace pangea {
@@ -78,6 +81,9 @@ TEST(Wire, AbsurdHellosAreRefused) {
   LinkHello many;
   many.maps.resize(kMaxLinkMaps + 1);
   EXPECT_FALSE(ParseHello(2, Encode(many)).value);
+  LinkHello clears_the_screen = SomeHello();
+  clears_the_screen.software = "\x1b[2J";
+  EXPECT_THAT(ParseHello(2, Encode(clears_the_screen)).refused, HasSubstr("printable"));
   LinkHello far = SomeHello();
   far.maps[0].first_seq = 20'000'000;
   EXPECT_FALSE(ParseHello(2, Encode(far)).value);
@@ -135,6 +141,32 @@ TEST(Wire, APoseThatIsNoTransformIsRefusedWhileTracking) {
   const auto parsed = ParsePose(2, EncodePose(pose));
   ASSERT_TRUE(parsed.value) << parsed.refused;
   EXPECT_EQ(parsed.value->reason, pose.reason);
+}
+
+TEST(Wire, AbsurdPosesAreRefused) {
+  const auto refused = [](const std::function<void(pose_t*)>& damage) {
+    pose_t pose = SomePose();
+    damage(&pose);
+    return ParsePose(2, EncodePose(pose)).refused;
+  };
+  EXPECT_EQ(refused([](pose_t*) {}), "");
+  EXPECT_THAT(refused([](pose_t* p) { p->v_odom_body.y = std::nan(""); }), HasSubstr("velocity"));
+  EXPECT_THAT(refused([](pose_t* p) { p->v_odom_body.y = 1e6; }), HasSubstr("velocity"));
+  EXPECT_THAT(refused([](pose_t* p) { p->utime = -1; }), HasSubstr("time"));
+  EXPECT_THAT(refused([](pose_t* p) { p->utime = std::numeric_limits<int64_t>::max(); }),
+              HasSubstr("time"));
+  EXPECT_THAT(refused([](pose_t* p) { p->state = 77; }), HasSubstr("state"));
+  EXPECT_THAT(refused([](pose_t* p) { p->reason = "\x1b[2J"; }), HasSubstr("printable"));
+}
+
+TEST(Wire, APoseBeforeTrackingIsNowhere) {
+  pose_t pose = SomePose();
+  pose.state = pose_t::STATE_INITIALISING;
+  pose.T_odom_body.translation.x = std::nan("");
+  const auto parsed = ParsePose(2, EncodePose(pose));
+  ASSERT_TRUE(parsed.value) << parsed.refused;
+  EXPECT_EQ(parsed.value->T_odom_body.translation.x, 0);
+  EXPECT_EQ(parsed.value->T_map_body.translation.x, 0);
 }
 
 TEST(Wire, AckRoundTripAndRefusal) {
