@@ -107,7 +107,7 @@ class BusDoc(unittest.TestCase):
 
     def test_default_urls_are_the_programs(self):
         described = set(quoted(" ".join(row[2] for row in table("Three buses"))))
-        sources = [ROOT / "modules" / name for name in ("agent_handler/main.cc", "uplink/main.cc", "common/bus/bus.h")]
+        sources = [ROOT / "modules" / name for name in ("common/link/wire.h", "common/bus/bus.h")]
         in_code = {url for path in sources for url in re.findall(r'"(udpm://[^"]+)"', path.read_text())}
         self.assertEqual(in_code, {url for url in described if url.startswith("udpm")})
 
