@@ -104,7 +104,7 @@ export const pointMaterial = (poses: Poses, size: { value: number }) =>
         colour = texel(keyframe, 2).rgb;
         vec4 eye = viewMatrix * vec4(place(keyframe, position), 1.0);
         gl_Position = projectionMatrix * eye;
-        gl_PointSize = clamp(size * 20.0 / -eye.z, 0.9 * size, 2.5 * size);
+        gl_PointSize = clamp(size * 28.0 / -eye.z, 0.9 * size, 2.5 * size);
       }`,
     fragmentShader: /* glsl */ `
       precision mediump float;
