@@ -13,7 +13,7 @@
 
 namespace pangea::viewer {
 
-LogShow::LogShow(const std::string& path)
+LogShow::LogShow(const std::string& path, size_t max_solved_poses)
     : source_(std::filesystem::path(path).filename().string()) {
   Read(path);
   if (events_.empty()) {
@@ -28,7 +28,7 @@ LogShow::LogShow(const std::string& path)
   RunTo(clock_.end_s);
   all_fusions_ = scene_->fusions();
   DropUnseenImages();
-  ThinStates();
+  ThinStates(max_solved_poses);
   Reset();
 }
 
@@ -67,34 +67,41 @@ void LogShow::DropUnseenImages() {
   });
 }
 
-void LogShow::ThinStates() {
-  const auto poses_of = [](const Timed& timed) {
-    const auto* state = std::get_if<MapState>(&timed.event);
-    return state == nullptr ? size_t{0} : state->keyframes.size();
-  };
-  const auto changes_groups = [&](const Timed& timed) {
-    return std::ranges::any_of(all_fusions_,
-                               [&](const Fusion& f) { return f.time_s == timed.time_s; });
-  };
-  for (;;) {
-    size_t poses = 0;
-    for (const Timed& timed : events_) {
-      poses += poses_of(timed);
-    }
-    if (poses <= kMaxSolvedPoses) {
-      return;
-    }
-    bool drop = false;
-    const size_t before = events_.size();
-    std::erase_if(events_, [&](const Timed& timed) {
-      const bool may_go = poses_of(timed) > 0 && &timed != &events_.back();
-      drop = may_go ? !drop : drop;
-      return may_go && drop && !changes_groups(timed);
-    });
-    if (events_.size() == before) {
-      return;
+void LogShow::ThinStates(size_t max_poses) {
+  std::map<MapId, int64_t> newest;  // revision of each group
+  for (const Timed& timed : events_) {
+    if (const auto* state = std::get_if<MapState>(&timed.event)) {
+      newest[state->group] = std::max(newest[state->group], state->revision);
     }
   }
+  const auto may_go = [&](const Timed& timed, const MapState& state) {
+    return state.revision != newest[state.group] &&
+           std::ranges::none_of(all_fusions_,
+                                [&](const Fusion& f) { return f.time_s == timed.time_s; });
+  };
+  bool less = true;
+  while (less && NumSolvedPoses() > max_poses) {
+    std::map<MapId, std::pair<int64_t, bool>> solves;  // of each group the one at hand: does it go?
+    less = std::erase_if(events_, [&](const Timed& timed) {
+             const auto* state = std::get_if<MapState>(&timed.event);
+             if (state == nullptr || !may_go(timed, *state)) {
+               return false;
+             }
+             auto& [revision, goes] = solves[state->group];  // all chunks of a state alike
+             goes = state->revision == revision ? goes : !goes;
+             revision = state->revision;
+             return goes;
+           }) > 0;
+  }
+}
+
+size_t LogShow::NumSolvedPoses() const {
+  size_t poses = 0;
+  for (const Timed& timed : events_) {
+    const auto* state = std::get_if<MapState>(&timed.event);
+    poses += state == nullptr ? 0 : state->keyframes.size();
+  }
+  return poses;
 }
 
 void LogShow::Reset() {

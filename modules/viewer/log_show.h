@@ -14,12 +14,12 @@ namespace pangea::viewer {
 
 class LogShow : public Show {
  public:
-  // Poses in solved states that are kept; of more, every second solve that changes no group is
-  // left out until they fit (a pose is about 100 bytes).
+  // Poses in solved states that are kept; of more, every second solve that changes no group and is
+  // not its group's last is left out until they fit (a pose is about 100 bytes).
   static constexpr size_t kMaxSolvedPoses = 4'000'000;
 
   // Throws std::runtime_error naming the log when it cannot be read or shows nothing.
-  explicit LogShow(const std::string& path);
+  explicit LogShow(const std::string& path, size_t max_solved_poses = kMaxSolvedPoses);
 
   // The player's clock goes on by this much, if it plays.
   void Advance(double wall_s);
@@ -35,6 +35,7 @@ class LogShow : public Show {
 
   // Messages that were refused while reading.
   int64_t num_refused() const { return num_refused_; }
+  size_t NumSolvedPoses() const;
 
  private:
   struct Timed {
@@ -44,7 +45,7 @@ class LogShow : public Show {
 
   void Read(const std::string& path);
   void DropUnseenImages();
-  void ThinStates();
+  void ThinStates(size_t max_poses);
   void Reset();
   void RunTo(double time_s);
 

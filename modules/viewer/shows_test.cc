@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "common/bus/log_reader.h"
+#include "common/bus/log_writer.h"
 #include "common/channels.h"
 #include "common/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
+#include "pangea/image_t.hpp"
+#include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "viewer/log_show.h"
@@ -74,6 +77,60 @@ TEST_F(LogShowTest, SeekingBackShowsWhatPlayingShowed) {
   EXPECT_EQ(show_.clock().now_s, 0);
   show_.Seek(1e9);
   EXPECT_EQ(show_.clock().now_s, show_.clock().end_s);
+}
+
+// A log of many solves: fewer are kept, the last is, and what became one when.
+TEST_F(LogShowTest, OfManySolvesTheLastAndTheFusionsAreKept) {
+  LogShow thinned(kLog, 500);
+  EXPECT_LT(thinned.NumSolvedPoses(), 500U);
+  EXPECT_GT(show_.NumSolvedPoses(), 1000U);
+  EXPECT_THAT(thinned.all_fusions(), SizeIs(1));
+  show_.Seek(1e9);
+  thinned.Seek(1e9);
+  EXPECT_THAT(thinned.scene().fusions(), SizeIs(1));
+  const auto& whole = show_.scene().keyframes();
+  ASSERT_EQ(thinned.scene().keyframes().size(), whole.size());
+  for (const SceneKeyframe& keyframe : thinned.scene().keyframes()) {
+    const auto same = std::ranges::find(whole, keyframe.shown.id,
+                                        [](const SceneKeyframe& other) { return other.shown.id; });
+    ASSERT_TRUE(keyframe.T_map_body);
+    EXPECT_LT((keyframe.T_map_body->t - same->T_map_body->t).norm(), 1e-3);
+  }
+}
+
+// Of an agent's images in a log, those of keyframes; the others would fill the memory.
+TEST(LogShow, KeepsTheImagesOfKeyframes) {
+  const std::string path = testing::TempDir() + "viewer_images.lcm";
+  keyframe_t keyframe{};
+  ReadLog(kLog, [&keyframe](const LogEvent& event) {
+    if (event.channel == "KEYFRAME_1" && keyframe.utime == 0) {
+      EXPECT_TRUE(DecodeMessage(event.data, &keyframe));
+    }
+  });
+  {
+    LogFileWriter log(path);
+    const auto write_image = [&log](int64_t log_utime, int64_t utime) {
+      image_t image{};
+      image.utime = utime;
+      image.encoding = image_t::ENCODING_RAW8;
+      image.width = image.height = 1;
+      image.num_chunks = 1;
+      image.total_bytes = image.num_bytes = 1;
+      image.data = {7};
+      log.Write(log_utime, "IMAGE_1", EncodeMessage(image));
+    };
+    log.Write(kStart, "POSE_1", EncodeMessage(pose_t{}));
+    write_image(kStart + 1'000'000, keyframe.utime - 500'000);
+    write_image(kStart + 2'000'000, keyframe.utime + 10'000);
+    log.Write(kStart + 3'000'000, "KEYFRAME_1", EncodeMessage(keyframe));
+  }
+  LogShow show(path);
+  show.Seek(1.5);
+  EXPECT_TRUE(show.scene().agents().empty());
+  show.Seek(3);
+  const auto image = show.scene().agents().at(1).camera.image();
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->utime, keyframe.utime + 10'000);
 }
 
 TEST(LogShow, SaysWhatIsWrongWithAFile) {
