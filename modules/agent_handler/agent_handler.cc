@@ -1,10 +1,8 @@
 #include "agent_handler/agent_handler.h"
 
 #include <algorithm>
-#include <memory>
 
 #include "common/link/compression.h"
-#include "common/link/map_continuity.h"
 
 namespace pangea {
 namespace {
@@ -38,13 +36,16 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity*
 
 AgentHandler::AgentHandler(int32_t agent_id, const ReceiverOptions& options)
     : agent_id_(agent_id),
-      receiver_(options, [continuity = std::make_shared<MapContinuity>()](const KeyframeId& id,
-                                                                          Bytes bytes) {
+      receiver_(options, [continuity = continuity_](const KeyframeId& id, Bytes bytes) {
         return CheckKeyframe(id, bytes, continuity.get());
       }) {}
 
-void AgentHandler::Resume(const MapId& map, int32_t journalled_seq) {
+void AgentHandler::Resume(const MapId& map, int32_t journalled_seq,
+                          const std::optional<Keyframe>& newest) {
   receiver_.Resume(map, journalled_seq);
+  if (newest) {
+    continuity_->Check(*newest, 0);
+  }
 }
 
 void AgentHandler::OnNewUplink() {

@@ -9,10 +9,12 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/link/map_continuity.h"
 #include "common/link/receiver.h"
 
 namespace pangea {
@@ -21,8 +23,10 @@ class AgentHandler {
  public:
   AgentHandler(int32_t agent_id, const ReceiverOptions& options);
 
-  // The journal already has this submap up to `journalled_seq`.
-  void Resume(const MapId& map, int32_t journalled_seq);
+  // The journal already has this submap up to `journalled_seq`. What follows has to go on from
+  // `newest`, which may be left out of an old one.
+  void Resume(const MapId& map, int32_t journalled_seq,
+              const std::optional<Keyframe>& newest = std::nullopt);
 
   // The packets that follow are another run's of the uplink.
   void OnNewUplink();
@@ -53,7 +57,8 @@ class AgentHandler {
   const Correction* Unconfirmed() const;
 
   const int32_t agent_id_;
-  Receiver receiver_;
+  std::shared_ptr<MapContinuity> continuity_ = std::make_shared<MapContinuity>();
+  Receiver receiver_;  // asks it
   std::string software_;
   bool has_uplink_ = false;
   int64_t highest_number_ = 0;

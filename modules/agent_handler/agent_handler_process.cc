@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <utility>
 
 #include "common/channels.h"
@@ -91,10 +92,12 @@ void AgentHandlerProcess::ReadKeys() {
 
 AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
   AgentHandler handler(agent_id, options_.receiver);
+  // The newest maps first: only those that a hello may name are looked into.
   const auto& on_disk = archive_.have();
-  for (auto have = on_disk.lower_bound({agent_id, 0});
-       have != on_disk.end() && have->first.agent_id == agent_id; ++have) {
-    handler.Resume(have->first, have->second);
+  auto have = std::make_reverse_iterator(on_disk.lower_bound({agent_id + 1, 0}));
+  for (int i = 0; have != on_disk.rend() && have->first.agent_id == agent_id; ++have, ++i) {
+    handler.Resume(have->first, have->second,
+                   i < kMaxLinkMaps ? archive_.Newest(have->first) : std::nullopt);
   }
   for (const auto& [map, correction] : corrections_) {
     if (map.agent_id == agent_id) {

@@ -109,6 +109,12 @@ void Archive::NoteJournalled(const KeyframeId& id) {
   }
 }
 
+std::optional<Keyframe> Archive::Newest(const MapId& map) const {
+  const auto places = index_.Find(JournalChannel::kKeyframe, {map, have_.at(map)});
+  return places.empty() ? std::nullopt
+                        : DecodeAndParse<keyframe_t>(journal_->Read(places.front())).value;
+}
+
 bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
   if (channel.starts_with(channels::kKeyframePrefix)) {
     if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {

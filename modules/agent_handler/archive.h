@@ -10,6 +10,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ class Archive {
   // The highest seq on the disk of each map; the maps in the journal's order.
   const std::map<MapId, int32_t>& have() const { return have_; }
   const std::vector<MapId>& maps() const { return by_age_; }
+  // The keyframe with that seq, read from the disk.
+  std::optional<Keyframe> Newest(const MapId& map) const;
   bool busy() const { return journal_->HasUnsynced() || resend_queue_.waiting() > 0; }
   bool disk_refuses() const { return disk_refuses_; }
   int64_t num_keyframes() const { return index_.num_keyframes(); }

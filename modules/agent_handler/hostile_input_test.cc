@@ -74,6 +74,31 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
   ExpectDelivered(2);
 }
 
+// What a map is made of is known of its journalled keyframes too.
+TEST_F(LinkWorld, AMapGoesOnFromItsJournalledKeyframes) {
+  PublishKeyframes(3);
+  Run(3);
+  KillUplink();
+  KillHandler();
+  StartHandler();
+  StartUplink();
+  std::set<std::string> refused;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    for (const counter_t& reason : status.refused) {
+      refused.insert(reason.name);
+    }
+  });
+  Run(2);
+  keyframe_t early = ToMessage(TestKeyframe({kMap, 3}));
+  early.utime = 1;
+  PublishMessage(agent_bus, "KEYFRAME_1", early);
+  Run(3);
+  EXPECT_THAT(refused, testing::Contains("keyframe's time does not go forward with its seq"));
+  ExpectDelivered(3);
+}
+
 // Everything that ever crossed the link again: as it was, changed, to another agent, turned back,
 // after either side has restarted.
 TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
