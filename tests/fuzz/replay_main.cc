@@ -1,26 +1,113 @@
-// Feeds a fuzz target every file of the folders named: what once was found stays mended.
+// Feeds a fuzz target every file of the folders named, so that what once was found stays mended,
+// and then mutants of them for a second: the bounded run of every build. They are the same ones in
+// each run, as far as it comes. libFuzzer, which learns from what it covers, goes further
+// (scripts/fuzz).
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <vector>
 
 #include "fuzz.h"
 
-int main(int argc, char** argv) {
-  int inputs = 0;
-  for (int i = 1; i < argc; ++i) {
-    for (const auto& entry : std::filesystem::directory_iterator(argv[i])) {
-      std::ifstream file(entry.path(), std::ios::binary);
-      const std::vector<char> bytes{std::istreambuf_iterator<char>(file),
-                                    std::istreambuf_iterator<char>()};
-      std::printf("%s\n", entry.path().filename().c_str());  // the last one named is the culprit
-      std::fflush(stdout);
-      LLVMFuzzerTestOneInput(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size());
-      ++inputs;
+namespace {
+
+namespace fs = std::filesystem;
+using Input = std::vector<uint8_t>;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kMutantsFor = std::chrono::seconds(1);
+constexpr int kMaxMutants = 5000;
+
+std::vector<fs::path> FilesOf(int count, char** folders) {
+  std::vector<fs::path> files;
+  for (int i = 0; i < count; ++i) {
+    for (const auto& entry : fs::directory_iterator(folders[i])) {
+      files.push_back(entry.path());
     }
   }
-  std::printf("%d inputs\n", inputs);
-  return inputs > 0 ? 0 : 1;
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+Input Read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// One of the corpus with some bytes turned, filled, cut out, doubled, or taken from another one.
+Input Mutant(const std::vector<Input>& corpus, std::mt19937_64& rng) {
+  constexpr uint8_t kExtremes[] = {0x00, 0x7F, 0x80, 0xFF};
+  Input input = corpus[rng() % corpus.size()];
+  const Input& other = corpus[rng() % corpus.size()];
+  for (uint64_t changes = 1 + rng() % 4; changes > 0 && !input.empty(); --changes) {
+    const size_t begin = rng() % input.size();
+    const size_t size = 1 + rng() % std::min<size_t>(64, input.size() - begin);
+    const auto from = input.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto to = from + static_cast<std::ptrdiff_t>(size);
+    switch (rng() % 5) {
+      case 0:
+        *from ^= static_cast<uint8_t>(1 << (rng() % 8));
+        break;
+      case 1:
+        std::fill(from, to, kExtremes[rng() % std::size(kExtremes)]);
+        break;
+      case 2:
+        input.erase(from, to);
+        break;
+      case 3: {
+        const Input part(from, to);
+        input.insert(from, part.begin(), part.end());
+        break;
+      }
+      default:
+        std::copy_n(other.begin(), std::min(size, other.size()), from);
+    }
+  }
+  return input;
+}
+
+// The file's content from now on; it stays open, or the disk would be waited for each time.
+void Keep(int file, const Input& input) {
+  pangea::fuzz::Require(
+      pwrite(file, input.data(), input.size(), 0) == static_cast<ssize_t>(input.size()) &&
+          ftruncate(file, static_cast<off_t>(input.size())) == 0,
+      "the folder can be written");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<Input> corpus;
+  for (const fs::path& file : FilesOf(argc - 1, argv + 1)) {
+    std::printf("%s\n", file.filename().c_str());  // the last one named is the culprit
+    std::fflush(stdout);
+    corpus.push_back(Read(file));
+    LLVMFuzzerTestOneInput(corpus.back().data(), corpus.back().size());
+  }
+  if (corpus.empty()) {
+    return 1;
+  }
+  // Left behind where one ends the process: it belongs into the corpus.
+  const fs::path culprit = fs::path(argv[0]).filename().string() + ".culprit";
+  const int file = open(culprit.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
+  std::mt19937_64 rng(1);
+  int mutants = 0;
+  for (const auto end = Clock::now() + kMutantsFor; mutants < kMaxMutants && Clock::now() < end;
+       ++mutants) {
+    const Input mutant = Mutant(corpus, rng);
+    Keep(file, mutant);
+    LLVMFuzzerTestOneInput(mutant.data(), mutant.size());
+  }
+  close(file);
+  fs::remove(culprit);
+  std::printf("%zu inputs, %d mutants\n", corpus.size(), mutants);
+  return 0;
 }
