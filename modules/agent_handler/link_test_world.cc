@@ -44,8 +44,9 @@ void LinkWorld::SetUp() {
                       [this](const std::string&, Bytes data) {
                         resend_request_t request{};
                         ASSERT_TRUE(DecodeMessage(data, &request));
+                        const int32_t kept = Parse(request.map).value == kMap ? published : 0;
                         for (int32_t seq = std::max(request.from_seq, oldest_kept);
-                             seq <= request.to_seq && seq < published; ++seq) {
+                             seq <= request.to_seq && seq < kept; ++seq) {
                           again_t again{};
                           again.channel = request.channel;
                           again.data = EncodeTestKeyframe({kMap, seq});

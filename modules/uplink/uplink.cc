@@ -16,6 +16,9 @@ constexpr int64_t kHelloUrgent_us = kSecond_us / 4;
 constexpr int64_t kAskInterval_us = 3 * kSecond_us / 10;
 constexpr int64_t kProbeInterval_us = kSecond_us;
 constexpr int32_t kMaxAsked = 50;
+// An odometry that opened a new map while nobody listened answers the first time; it may be away.
+constexpr int kMaxProbes = 3;
+constexpr int64_t kProbeOlderInterval_us = kSecond_us / 5;
 // A gap the odometry has not filled after so many asks is lost for good.
 constexpr int kMaxUnanswered = 30;
 // An agent opens a map each time its odometry starts anew; the oldest that are done are
@@ -72,6 +75,7 @@ Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
 bool Uplink::Hear(const KeyframeId& id, int64_t now_us) {
   Map& map = FindOrAdd(id.map);
   map.heard_us = now_us;
+  map.probes = id.seq > map.highest ? 0 : map.probes;
   map.highest = std::max(map.highest, id.seq);
   return id.seq >= map.next && !sender_.Has(id);
 }
@@ -278,7 +282,33 @@ std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
     gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
     asks.push_back({*gap, true});
   }
+  if (const auto gap = full ? std::nullopt : ProbeOlder(now_us)) {
+    asks.push_back({*gap, false});
+  }
   return asks;
+}
+
+std::optional<SeqGap> Uplink::ProbeOlder(int64_t now_us) {
+  if (maps_.empty() || now_us - probed_older_us_ < kProbeOlderInterval_us) {
+    return std::nullopt;
+  }
+  const auto probe = [&](const MapId& id, int32_t from_seq, int* probes) {
+    ++*probes;
+    probed_older_us_ = now_us;
+    return SeqGap{id, from_seq, from_seq + kMaxAsked - 1};
+  };
+  for (auto it = std::next(maps_.rbegin()); it != maps_.rend(); ++it) {
+    auto& [id, map] = *it;
+    const bool due = now_us - std::max(map.heard_us, map.asked_us) > kProbeInterval_us;
+    if (map.probes < kMaxProbes && due && !Missing(id, map)) {
+      map.asked_us = now_us;
+      return probe(id, map.highest + 1, &map.probes);
+    }
+  }
+  if (probes_of_start_ < kMaxProbes && now_us - probed_older_us_ > kProbeInterval_us) {
+    return probe({maps_.begin()->first.agent_id, 0}, 0, &probes_of_start_);
+  }
+  return std::nullopt;
 }
 
 std::vector<Correction> Uplink::TakeCorrections(int64_t now_us) {

@@ -78,6 +78,7 @@ class Uplink {
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
+    int probes = 0;        // since it was last heard of, while there is a newer one
     int64_t heard_us = 0;  // when the newest keyframe came
     std::optional<Correction> correction;
     int64_t applied_revision = 0;  // as the agent's poses say
@@ -87,6 +88,9 @@ class Uplink {
   Map& FindOrAdd(const MapId& id);
   void SetNext(const MapId& id, Map* map, int32_t next);
   std::optional<SeqGap> Missing(const MapId& id, const Map& map) const;
+  // What may have come after the last known keyframe of a map that is not the newest, or before the
+  // first known map; now and then, a few times.
+  std::optional<SeqGap> ProbeOlder(int64_t now_us);
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
   // The maps of the next hello, the newest last.
@@ -101,6 +105,8 @@ class Uplink {
   Sender sender_;
   std::map<MapId, Map> maps_;
   uint8_t next_slot_ = 0;
+  int probes_of_start_ = 0;
+  int64_t probed_older_us_ = 0;
   int64_t newest_ack_ = 0;
   std::optional<int64_t> last_ack_us_;
   std::optional<int64_t> last_hello_us_;

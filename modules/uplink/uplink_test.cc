@@ -5,6 +5,7 @@
 
 #include <array>
 #include <chrono>
+#include <map>
 #include <set>
 
 namespace pangea {
@@ -84,7 +85,7 @@ TEST_F(UplinkTest, AsksTheOdometryForWhatItMissed) {
   uplink.OnAck(Ack(1, 4), kSecond);
   EXPECT_TRUE(SentSeqs(uplink.Poll(kSecond)).empty()) << "never out of order";
   asks = uplink.Asks(2 * kSecond);
-  ASSERT_EQ(asks.size(), 1u);
+  ASSERT_GE(asks.size(), 1u);
   EXPECT_EQ(asks[0].gap.from_seq, 5);
   Add(5);
   Add(6);
@@ -95,9 +96,38 @@ TEST_F(UplinkTest, AsksTheOdometryForWhatItMissed) {
 TEST_F(UplinkTest, ProbesForALostTail) {
   uplink.AddPose(kMap, 0, {1});
   const auto asks = uplink.Asks(3 * kSecond);
-  ASSERT_EQ(asks.size(), 1u);
+  ASSERT_GE(asks.size(), 1u);
+  EXPECT_EQ(asks[0].gap.map, kMap);
   EXPECT_EQ(asks[0].gap.from_seq, 0);
   EXPECT_TRUE(uplink.Asks(3 * kSecond + 500'000).empty());
+}
+
+// What it may have missed of maps before the newest is asked for too, but not for ever.
+TEST_F(UplinkTest, LooksAFewTimesWhatCameBeforeTheNewestMap) {
+  Add(4);
+  uplink.AddKeyframe({{1, 5000}, 0}, std::vector<uint8_t>(500), 0);
+  for (int seq = 0; seq < 4; ++seq) {
+    Add(seq);
+  }
+  std::map<MapId, int> probes;
+  for (int64_t now = kSecond; now < 60 * kSecond; now += 10'000) {
+    for (const Uplink::Ask& ask : uplink.Asks(now)) {
+      EXPECT_FALSE(ask.known);
+      EXPECT_EQ(ask.gap.from_seq, ask.gap.map == kMap ? 5 : ask.gap.map.opened_utime == 0 ? 0 : 1);
+      ++probes[ask.gap.map];
+    }
+  }
+  EXPECT_EQ(probes[kMap], 3);
+  EXPECT_EQ((probes[{1, 0}]), 3);
+  EXPECT_GT((probes[{1, 5000}]), 50);
+  Add(5, 60 * kSecond);
+  int again = 0;
+  for (int64_t now = 60 * kSecond; now < 70 * kSecond; now += 10'000) {
+    for (const Uplink::Ask& ask : uplink.Asks(now)) {
+      again += ask.gap.map == kMap ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(again, 3);
 }
 
 TEST_F(UplinkTest, GivesUpWhatNobodyHas) {
@@ -124,7 +154,7 @@ TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
   uplink.OnNewSession();
   uplink.OnAck(Ack(1, -1), 2 * kSecond);
   const auto asks = uplink.Asks(3 * kSecond);
-  ASSERT_EQ(asks.size(), 1u);
+  ASSERT_GE(asks.size(), 1u);
   EXPECT_EQ(asks[0].gap.from_seq, 0);
   EXPECT_EQ(asks[0].gap.to_seq, 2);
   EXPECT_EQ(HelloIn(uplink.Poll(3 * kSecond)).maps[0].first_seq, 0);
@@ -199,7 +229,7 @@ TEST(UplinkSpool, WhatIsStoredLeavesMemoryAndIsLoadedWhenItsTurnComes) {
   uplink.OnAck(Ack(2, 249), 2 * kSecond);
   uplink.Poll(2 * kSecond);
   const auto asks = uplink.Asks(3 * kSecond);
-  ASSERT_EQ(asks.size(), 1u);
+  ASSERT_GE(asks.size(), 1u);
   EXPECT_EQ(asks[0].gap.from_seq, 250);
   EXPECT_EQ(asks[0].gap.to_seq, 250);
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <string>
 
 #include "common/catch_up_messages.h"
 #include "common/channels.h"
@@ -69,13 +68,26 @@ void KeyframeOutlet::OnResendRequest(const ResendRequest& request) {
     if (++answers > kMaxAnswers) {
       break;
     }
-    again_t again{};
-    again.channel = request.channel;
-    again.data = keyframe.bytes;
-    again.num_bytes = static_cast<int32_t>(again.data.size());
-    node_.Publish(channels::Again(request.requester), again);
-    node_.Count("resent");
+    Answer(request.requester, keyframe);
   }
+  const auto published = published_.find(range.map);
+  if (published != published_.end() && range.from_seq < published->second) {
+    return;
+  }
+  const auto later = std::ranges::find_if(
+      kept_, [&](const KeptKeyframe& keyframe) { return range.map < keyframe.id.map; });
+  if (later != kept_.end()) {
+    Answer(request.requester, *later);
+  }
+}
+
+void KeyframeOutlet::Answer(const std::string& requester, const KeptKeyframe& keyframe) {
+  again_t again{};
+  again.channel = channels::Keyframe(agent_id_);
+  again.data = keyframe.bytes;
+  again.num_bytes = static_cast<int32_t>(again.data.size());
+  node_.Publish(channels::Again(requester), again);
+  node_.Count("resent");
 }
 
 }  // namespace pangea

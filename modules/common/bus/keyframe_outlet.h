@@ -3,11 +3,14 @@
 // Where an agent's keyframes come onto its bus: each is published once, and those of the newest
 // that somebody missed again.
 //   KEYFRAME_k out; HAVE (what the server has acknowledged) in; RESEND_REQUEST in, answered on
-//   AGAIN_<requester> from the newest `kept` keyframes; older ones are gone and not answered.
+//   AGAIN_<requester> from the newest `kept` keyframes; older ones are gone and not answered. Who
+//   asks for what comes after a map's last keyframe is told the first one of a later map, so that
+//   an asker who was away learns of maps that came and went meanwhile.
 
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "common/bus/node.h"
@@ -42,6 +45,7 @@ class KeyframeOutlet {
 
   void OnHave(const Have& have);
   void OnResendRequest(const ResendRequest& request);
+  void Answer(const std::string& requester, const KeptKeyframe& keyframe);
 
   Node& node_;
   const int32_t agent_id_;
