@@ -91,18 +91,24 @@ test("verdicts say why", async () => {
 
 test("what Foxglove knows has the fields that its schemas want, and no others", async () => {
   const ajv = new Ajv({ strict: false, validateFormats: false });
-  const seen = new Set();
-  for await (const { channelId, data } of reader.readMessages()) {
-    const { name, data: said } = reader.schemasById.get(reader.channelsById.get(channelId).schemaId);
+  const checks = new Map();
+  for (const { name, data } of reader.schemasById.values()) {
     if (!name.startsWith("foxglove.")) continue;
-    seen.add(name);
-    const message = JSON.parse(new TextDecoder().decode(data));
-    const schema = JSON.parse(new TextDecoder().decode(said));
+    const schema = JSON.parse(new TextDecoder().decode(data));
     assert.deepEqual(schema, wellKnown(name));
-    assert.ok(ajv.validate(schema, message), `${name}: ${ajv.errorsText()}`);
-    assert.deepEqual(Object.keys(message).sort(), Object.keys(schema.properties).sort(), name);
+    checks.set(name, { fields: Object.keys(schema.properties).sort(), valid: ajv.compile(schema), seen: 0 });
   }
-  assert.deepEqual([...seen].sort(), ["FrameTransform", "Log", "PointCloud", "PoseInFrame", "PosesInFrame", "SceneUpdate"]
+  for await (const { channelId, data } of reader.readMessages()) {
+    const { name } = reader.schemasById.get(reader.channelsById.get(channelId).schemaId);
+    const check = checks.get(name);
+    if (!check) continue;
+    ++check.seen;
+    const message = JSON.parse(new TextDecoder().decode(data));
+    assert.ok(check.valid(message), `${name}: ${ajv.errorsText(check.valid.errors)}`);
+    assert.deepEqual(Object.keys(message).sort(), check.fields, name);
+  }
+  assert.ok([...checks.values()].every(({ seen }) => seen > 0));
+  assert.deepEqual([...checks.keys()].sort(), ["FrameTransform", "Log", "PointCloud", "PoseInFrame", "PosesInFrame", "SceneUpdate"]
     .map((name) => `foxglove.${name}`));
 });
 
@@ -157,11 +163,22 @@ test("a group that became part of another is not drawn any more", () => {
 });
 
 test("a fused map's own frame lies in its group's", async () => {
-  const transforms = await messagesOf("/tf");
+  const transforms = (await messagesOf("/tf")).filter(({ message }) => message.child_frame_id.startsWith("map"));
   assert.ok(transforms.length > 0);
   const said = events.filter(({ channel, message }) => channel === "CORRECTION_2" && message.group.agent_id === 1).at(-1).message;
   const { parent_frame_id, child_frame_id, translation } = transforms.at(-1).message;
   assert.match(parent_frame_id, /^map 1\//);
   assert.match(child_frame_id, /^map 2\//);
   assert.deepEqual(translation, said.T_map_odom.translation);
+});
+
+test("an agent's body is a frame, to be followed", async () => {
+  const of = (await messagesOf("/tf")).filter(({ message }) => message.child_frame_id === "body 2");
+  const poses = await messagesOf("/pose/2");
+  assert.equal(of.length, poses.length);
+  of.forEach(({ utime, message: { parent_frame_id, translation, rotation } }, i) => {
+    assert.equal(utime, poses[i].utime);
+    assert.equal(parent_frame_id, poses[i].message.frame_id);
+    assert.deepEqual({ position: translation, orientation: rotation }, poses[i].message.pose);
+  });
 });

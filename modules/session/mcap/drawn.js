@@ -3,9 +3,9 @@
 //   /map/<agent>    foxglove.PosesInFrame    its keyframes in the newest complete state of their group
 //   /scene          foxglove.SceneUpdate     of each group: its agents' trajectories, its constraints
 //   /points/<map>   foxglove.PointCloud      the map points in the end, from the log's beginning on
-//   /tf             foxglove.FrameTransform  where a fused map's own frame lies in its group's
+//   /tf             foxglove.FrameTransform  where a fused map's own frame lies in its group's; each agent's body, to follow it
 //   /verdicts       foxglove.Log             every constraint, accepted or why it was refused
-// A frame is a map's or its group's: "map 1/1700000000000000", after the map whose odom frame it is.
+// A frame is a map's or its group's, "map 1/1700000000000000" after the map whose odom frame it is, or an agent's: "body 1".
 
 const TRACKING = 2; // pose_t.STATE_TRACKING
 const INTRA = 1; // place_candidate_t.KIND_INTRA
@@ -58,6 +58,9 @@ function grouped(values, keyOfValue) {
   return groups;
 }
 
+const transform = (timestamp, parent_frame_id, child_frame_id, { translation, rotation }) =>
+  ["/tf", "foxglove.FrameTransform", { timestamp, parent_frame_id, child_frame_id, translation, rotation }];
+
 /** Everything that can be drawn of a log, message by message. */
 export class Drawn {
   #states = new States();
@@ -79,17 +82,16 @@ export class Drawn {
 
   #correction(timestamp, { map, group, revision, T_map_odom }) {
     this.#frames.set(`${nameOf(map)} ${revision}`, frameOf(group));
-    return nameOf(map) === nameOf(group) ? [] : [["/tf", "foxglove.FrameTransform", {
-      timestamp, parent_frame_id: frameOf(group), child_frame_id: frameOf(map),
-      translation: T_map_odom.translation, rotation: T_map_odom.rotation,
-    }]];
+    return nameOf(map) === nameOf(group) ? [] : [transform(timestamp, frameOf(group), frameOf(map), T_map_odom)];
   }
 
   // In whose frame a corrected pose is: the group of the correction it has applied, or its own map.
   #pose(timestamp, { map, group_revision, state, T_map_body }, agent) {
     const frame_id = this.#frames.get(`${nameOf(map)} ${group_revision}`) ?? frameOf(map);
-    return state !== TRACKING ? [] :
-      [[`/pose/${agent}`, "foxglove.PoseInFrame", { timestamp, frame_id, pose: poseOf(T_map_body) }]];
+    return state !== TRACKING ? [] : [
+      [`/pose/${agent}`, "foxglove.PoseInFrame", { timestamp, frame_id, pose: poseOf(T_map_body) }],
+      transform(timestamp, frame_id, `body ${agent}`, T_map_body),
+    ];
   }
 
   #state(timestamp, message) {
