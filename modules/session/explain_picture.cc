@@ -111,11 +111,18 @@ cv::Mat MatchesRow(const std::vector<ShownMatch>& matches, const Pair& images) {
   return row.canvas();
 }
 
+// With what most verdicts hang on.
 std::string VerdictOf(const Explanation& explanation) {
   const Constraint& verdict = explanation.again;
-  return fmt::format("{}   ({:.0f} % of {} points that ought to be seen were found)",
-                     verdict.accepted ? "ACCEPTED" : "REFUSED: " + verdict.reason,
-                     100 * explanation.report.found_share, explanation.report.comparable);
+  const AlignmentReport& report = explanation.report;
+  std::string text = fmt::format("{}   ({:.0f} % found of {} points that ought to be seen",
+                                 verdict.accepted ? "ACCEPTED" : "REFUSED: " + verdict.reason,
+                                 100 * report.found_share, report.comparable);
+  if (report.landmarks > 0) {
+    text +=
+        fmt::format("; {} landmarks in {} of the image's 24 cells", report.landmarks, report.cells);
+  }
+  return text + ")";
 }
 
 }  // namespace
