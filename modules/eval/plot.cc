@@ -32,7 +32,8 @@ std::string Quoted(const std::string& text) {
 // Pixels: with equal axes the picture has the shape of what is drawn.
 Eigen::Vector2i CanvasSize(const Plot& plot) {
   constexpr int kWidth = 1400;
-  constexpr int kMargins = 170;  // title, legend, axis labels
+  constexpr int kMargins = 150;  // title, legend, axis labels
+  constexpr int kSides = 165;    // the y axis' figures and label, a margin
   Eigen::AlignedBox2d box;
   for (const PlotLine& line : plot.lines) {
     for (const Eigen::Vector2d& p : line.points) {
@@ -44,7 +45,7 @@ Eigen::Vector2i CanvasSize(const Plot& plot) {
   if (!plot.equal_axes || box.isEmpty() || box.sizes().x() <= 0) {
     return {kWidth, plot.height};
   }
-  const double height = kWidth * std::min(box.sizes().y() / box.sizes().x(), 10.0);
+  const double height = (kWidth - kSides) * std::min(box.sizes().y() / box.sizes().x(), 10.0);
   return {kWidth, std::clamp(static_cast<int>(height), 400, 1200) + kMargins};
 }
 
@@ -70,7 +71,7 @@ std::string Script(const Plot& plot, const std::string& path) {
   script += fmt::format(
       "set terminal pngcairo noenhanced size {},{} font 'sans,14' background '#ffffff'\n"
       "set border 3 linecolor '#555555'\nset tics nomirror textcolor '#333333'\n"
-      "set grid linecolor '#dddddd' linewidth 1\n"
+      "set grid linetype 1 linecolor '#e4e4e4' linewidth 1\n"
       "set key tmargin center horizontal samplen 2\n"
       "set lmargin 11\nset rmargin 5\n",
       size.x(), size.y());
@@ -78,7 +79,9 @@ std::string Script(const Plot& plot, const std::string& path) {
       fmt::format("set output {}\nset title {} font ',17'\nset xlabel {}\nset ylabel {}\n",
                   Quoted(path), Quoted(plot.title), Quoted(plot.x_label), Quoted(plot.y_label));
   if (plot.equal_axes) {
-    script += "set size ratio -1\n";
+    script +=
+        "set size ratio -1\nset autoscale fix\n"
+        "set offsets graph 0.03, graph 0.03, graph 0.03, graph 0.03\n";
   }
   if (plot.y_from_zero) {
     script += "set yrange [0:*]\n";
