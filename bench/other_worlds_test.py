@@ -12,7 +12,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from ablation_lib.recording import numbers  # noqa: E402
-from other_worlds_lib import paths  # noqa: E402
+from other_worlds_lib import paths, pictures  # noqa: E402
 from other_worlds_lib.plan import PAIRS, WORLDS, Plan  # noqa: E402
 from other_worlds_lib.spoil import NS, PHONE, SPOILERS, Recording  # noqa: E402
 from other_worlds_lib.tables import Tables  # noqa: E402
@@ -90,6 +90,39 @@ class SpoilTest(unittest.TestCase):
         self.assertAlmostEqual(self.longest_gap_s(self.spoiled("imu_gaps").imu), 0.055)
         self.assertAlmostEqual(len(self.spoiled("lone_images").images), 360, delta=20)
         self.assertAlmostEqual(self.longest_gap_s(self.spoiled("half_rate").images), 0.1)
+
+    def test_a_covered_lens_and_exposure(self):
+        covered, steps = Recording(self.mav0), Recording(self.mav0)
+        rows = covered.images
+        for i, row in enumerate(rows):
+            row[1] = f"{i}.png"
+        steps.images = rows
+        SPOILERS["covered"](covered)
+        SPOILERS["exposure_steps"](steps)
+        self.assertEqual(set(covered.painted), {f"{i}.png" for i in range(200, 220)})
+        dark = covered.painted["200.png"](bytes(range(200)))
+        self.assertEqual(len(dark), 200)
+        self.assertLess(max(dark), 20)
+        self.assertNotIn("0.png", steps.painted)
+        self.assertEqual(steps.painted["60.png"](bytes([100, 250])), bytes([40, 100]))
+        self.assertEqual(steps.painted["120.png"](bytes([100, 250])), bytes([180, 255]))
+
+    def test_images_that_stay_are_links(self):
+        folder = self.mav0.parent / "images"
+        folder.mkdir()
+        for name in ("a.png", "b.png"):
+            pictures.write(folder / name, 3, bytes(range(6)))
+        recording = Recording(self.mav0)
+        recording.images = [["0", "a.png"], ["1", "b.png"]]
+        recording.painted = {"b.png": lambda pixels: pixels[::-1]}
+        recording.write_images(folder, self.mav0.parent / "painted")
+        self.assertTrue((self.mav0.parent / "painted/a.png").is_symlink())
+        self.assertEqual(pictures.read(self.mav0.parent / "painted/b.png"), (3, bytes([5, 4, 3, 2, 1, 0])))
+
+    def test_rows_of_a_png_are_unfiltered(self):
+        row, above = bytes([10, 20, 250]), bytes([1, 2, 3])
+        for kind, stored in ((0, [10, 20, 250]), (1, [10, 10, 230]), (2, [9, 18, 247]), (3, [10, 14, 239]), (4, [9, 10, 230])):
+            self.assertEqual(pictures.unfiltered(kind, bytes(stored), above), row, kind)
 
     def test_disorder_loses_nothing(self):
         spoiled, exact = self.spoiled("disorder"), Recording(self.mav0)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes a recording out of another one, with what goes wrong between a sensor and a folder. The images are links to the other's."""
+"""Makes a recording out of another one, with what goes wrong between a sensor and a folder. Images that stay are links to the other's."""
 
 import argparse
 import math
@@ -10,6 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from ablation_lib.recording import direction, numbers, put, turned  # noqa: E402
+from other_worlds_lib import pictures  # noqa: E402
 
 NS = 1_000_000_000
 # A phone's IMU: white noise and walks several times EuRoC's, 100 Hz (densities of the order of the BMI160's).
@@ -18,9 +19,10 @@ PHONE = {"gyroscope_noise_density": 5e-4, "gyroscope_random_walk": 5e-5, "accele
 
 
 class Recording:
-    """Rows of the two tables, as text, and the two sensor.yaml."""
+    """Rows of the two tables, as text, the two sensor.yaml, and images to be painted over: file -> what its pixels become."""
 
     def __init__(self, mav0):
+        self.painted = {}
         self.images = self._rows(mav0 / "cam0/data.csv")
         self.imu = self._rows(mav0 / "imu0/data.csv")
         self.camera_yaml = (mav0 / "cam0/sensor.yaml").read_text()
@@ -38,6 +40,20 @@ class Recording:
             (mav0 / name).mkdir(parents=True)
             (mav0 / name / "sensor.yaml").write_text(yaml)
             (mav0 / name / "data.csv").write_text("#\n" + "\n".join(",".join(row) for row in rows) + "\n")
+
+
+    def write_images(self, source, folder):
+        """Those that are painted over, and links to the others."""
+        if not self.painted:
+            folder.symlink_to(source.resolve())
+            return
+        folder.mkdir()
+        for name in {row[1] for row in self.images}:
+            if name in self.painted:
+                width, pixels = pictures.read(source / name)
+                pictures.write(folder / name, width, self.painted[name](pixels))
+            else:
+                (folder / name).symlink_to((source / name).resolve())
 
 
 def in_gap(ns, every_s, gap_s):
@@ -122,8 +138,36 @@ def accel_bias(recording):
         row[4] = f"{float(row[4]) + 0.3:.10f}"
 
 
+def cover(recording, *spans):
+    """Nothing but noise from one second to another one."""
+    rng = random.Random("cover")
+    noise = bytes(max(0, min(255, round(6 + rng.gauss(0, 2)))) for _ in range(256))
+    for row in recording.images:
+        if any(begin <= recording.stamp(row) / NS < end for begin, end in spans):
+            recording.painted[row[1]] = lambda pixels: rng.randbytes(len(pixels)).translate(noise)
+
+
+def covered(recording):
+    """A hand over the lens, for 1 s and for 2 s."""
+    cover(recording, (10, 11), (25, 27))
+
+
+def pocket(recording):
+    """Nothing to be seen for 8 s."""
+    cover(recording, (15, 23))
+
+
+def exposure_steps(recording):
+    """Every 3 s the exposure jumps, to 0.4 times, to 1.8 times, and back."""
+    for row in recording.images:
+        gain = (1, 0.4, 1.8)[recording.stamp(row) // (3 * NS) % 3]
+        table = bytes(min(255, round(gain * grey)) for grey in range(256))
+        if gain != 1:
+            recording.painted[row[1]] = lambda pixels, table=table: pixels.translate(table)
+
+
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
-                                    jitter, accel_bias, phone_imu)}
+                                    jitter, accel_bias, phone_imu, covered, pocket, exposure_steps)}
 
 
 def main():
@@ -137,7 +181,7 @@ def main():
     for what in options.what:
         SPOILERS[what](recording)
     recording.write(out)
-    (out / "cam0/data").symlink_to((source / "cam0/data").resolve())
+    recording.write_images(source / "cam0/data", out / "cam0/data")
     shutil.copytree(source / "state_groundtruth_estimate0", out / "state_groundtruth_estimate0")
 
 

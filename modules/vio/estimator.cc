@@ -22,8 +22,11 @@ using Eigen::MatrixXd;
 
 constexpr double kMaxFrameGap_s = 1.0;
 constexpr int64_t kStartSpan_us = 4'000'000;  // samples a start may ask for
-constexpr int kMaxBlindFrames = 20;           // images in a row with next to nothing to go by: lost
-constexpr int kMinUsed = 4;
+constexpr double kMaxBlind_s = 5;             // with nothing to go by but inertial samples: lost
+// An image is a sight when this many tracks, and this share of those before, go on in it. In the
+// mere noise of a covered lens a tenth does.
+constexpr size_t kMinTracks = 4;
+constexpr double kMinTrackShare = 0.3;
 constexpr double kMaxSpeed = 50;     // m/s
 constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
@@ -85,6 +88,7 @@ struct Estimator::Impl {
   void Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
+  bool TracksGoOn() const;
   std::vector<int32_t> Solve();
   void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
@@ -114,7 +118,7 @@ struct Estimator::Impl {
   FrameChoice choice;
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
-  int blind_frames = 0;
+  int64_t last_sight = 0;                           // utime of the newest image that is one
   bool lost = false;
 };
 
@@ -185,7 +189,17 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
   const InertialLink link = Link(Newest(), imu_utime);
   Append(frame.utime, Predict(link.measured, Newest().imu), link);
   Newest().at_rest = at_rest;
+  Newest().is_sight = TracksGoOn();
   return std::nullopt;
+}
+
+// From the frame before.
+bool Estimator::Impl::TracksGoOn() const {
+  const auto& frames = problem.state.frames;
+  const int64_t before = frames[frames.size() - 2].utime;
+  const size_t go_on = history.Shared(before, frames.back().utime);
+  const auto all = static_cast<double>(history.Frame(before).size());
+  return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 
 // Optimises the window; the tracks that turned out to be outliers.
@@ -193,14 +207,12 @@ std::vector<int32_t> Estimator::Impl::Solve() {
   problem.landmarks = landmarks.Gather(problem.state, history);
   Optimise(problem, kMaxIterations);
   std::vector<int32_t> outliers;
-  size_t seen_now = 0;
   const int newest = problem.state.Newest();
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
     const bool is_seen = IsSeenIn(newest, landmark);
     const auto [sum, worst] = ErrorOf(problem.state, landmark);
     const double rms = std::sqrt(sum / (2.0 * static_cast<double>(landmark.rays.size())));
     if (rms < kMaxLandmarkRms && worst < kMaxRayError) {
-      seen_now += is_seen ? 1 : 0;
       return false;
     }
     history.RemoveLandmark(landmark.id);
@@ -210,9 +222,7 @@ std::vector<int32_t> Estimator::Impl::Solve() {
     return true;
   });
   landmarks.Keep(problem);
-  const size_t tracked = history.Frame(Newest().utime).size();
-  const bool seeing = seen_now >= kMinUsed || rest.images_stand() || tracked > 3 * kMinUsed;
-  blind_frames = seeing ? 0 : blind_frames + 1;
+  last_sight = Newest().is_sight ? Newest().utime : last_sight;
   return outliers;
 }
 
@@ -307,8 +317,9 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
   if (imu.gyro_bias.norm() > kMaxGyroBias || imu.accel_bias.norm() > kMaxAccelBias) {
     return "the estimated biases are implausible";
   }
-  if (blind_frames > kMaxBlindFrames) {
-    return fmt::format("nothing trackable in {} images", blind_frames);
+  const double blind_s = Seconds(problem.state.frames.back().utime - last_sight);
+  if (blind_s > kMaxBlind_s) {
+    return fmt::format("nothing trackable for {:.1f} s", blind_s);
   }
   return std::nullopt;
 }

@@ -45,7 +45,7 @@ void FrameChoice::Choose(const TrackHistory& history, WindowState* state) {
   const double elapsed_s = 1e-6 * static_cast<double>(newest.utime - last_keyframe_utime_);
   newest.is_keyframe =
       last_keyframe_utime_ == 0 || elapsed_s >= options_.keyframe_interval_s ||
-      (elapsed_s >= options_.keyframe_min_interval_s && !newest.at_rest &&
+      (elapsed_s >= options_.keyframe_min_interval_s && !newest.at_rest && newest.is_sight &&
        HasMoved(*state, history, last_keyframe_utime_, options_.keyframe_parallax_px * pixel_angle_,
                 options_.keyframe_track_share));
   if (newest.is_keyframe) {

@@ -26,7 +26,7 @@ std::deque<Ride> MakeTenRides() {
 }  // namespace
 
 Ride::Ride(const VioTestWorldOptions& options)
-    : world(options), estimator(Options(), world.camera(), ImuNoise{}) {}
+    : world(options), estimator(Options(), world.camera(), options.imu_noise) {}
 
 void Ride::Feed(const VioTestWorld::Input& input) {
   last = estimator.AddFrame(input.frame, input.imu);

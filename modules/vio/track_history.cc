@@ -45,7 +45,8 @@ std::vector<FrameRay> TrackHistory::RaysOf(int32_t landmark_id, const WindowStat
   for (int i = 0; i <= state.Newest(); ++i) {
     const WindowFrame& in_window = state.frames[i];
     const auto frame = frames_.find(in_window.utime);
-    if (in_window.pose_only || in_window.utime < from_utime || frame == frames_.end()) {
+    if (in_window.pose_only || !in_window.is_sight || in_window.utime < from_utime ||
+        frame == frames_.end()) {
       continue;
     }
     const auto seen = frame->second.find(landmark_id);
@@ -66,6 +67,15 @@ const std::map<int32_t, FrameRay>& TrackHistory::Frame(int64_t utime) const {
   static const std::map<int32_t, FrameRay> kNothing;
   const auto frame = frames_.find(utime);
   return frame == frames_.end() ? kNothing : frame->second;
+}
+
+size_t TrackHistory::Shared(int64_t a_utime, int64_t b_utime) const {
+  const auto& seen = Frame(b_utime);
+  size_t shared = 0;
+  for (const auto& [id, ray] : Frame(a_utime)) {
+    shared += seen.contains(id) ? 1 : 0;
+  }
+  return shared;
 }
 
 TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_utime,

@@ -21,11 +21,13 @@ class TrackHistory {
   void RemoveFrame(int64_t utime) { frames_.erase(utime); }
   void RemoveLandmark(int32_t landmark_id);
 
-  // All of one landmark's rays in the window's full frames from `from_utime` on, oldest first.
+  // All of one landmark's rays in the window's full frames from `from_utime` on that are a sight,
+  // oldest first.
   std::vector<FrameRay> RaysOf(int32_t landmark_id, const WindowState& state,
                                int64_t from_utime) const;
   bool Sees(int64_t utime, int32_t landmark_id) const;
   const std::map<int32_t, FrameRay>& Frame(int64_t utime) const;  // FrameRay::frame is not set
+  size_t Shared(int64_t a_utime, int64_t b_utime) const;          // landmarks that both frames saw
   // Every landmark some frame saw, in order.
   std::vector<int32_t> Landmarks() const;
 

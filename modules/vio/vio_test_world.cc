@@ -87,7 +87,7 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
                after = PoseAt(t + kDifference_s);
   const Vector3d omega = LogSo3(before.q.conjugate() * after.q) / (2 * kDifference_s);
   const Vector3d accel = (after.t - 2 * now.t + before.t) / (kDifference_s * kDifference_s);
-  const ImuNoise noise;
+  const ImuNoise& noise = options_.imu_noise;
   const double dt = Seconds(kImuStep_us);
   gyro_bias_ += RandomVector(rng_, noise.gyro_random_walk * std::sqrt(dt));
   accel_bias_ += RandomVector(rng_, noise.accel_random_walk * std::sqrt(dt));

@@ -38,6 +38,7 @@ struct VioTestWorldOptions {
   double frame_rate_hz = 10;
   double pixel_noise = 0.7;
   double outlier_share = 0.03;  // of the tracks: they slide off their point
+  ImuNoise imu_noise;           // by default EuRoC's
   // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
   double drive_mps = 0;
   // The body stands still in between, seconds.

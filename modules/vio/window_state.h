@@ -38,6 +38,7 @@ struct WindowFrame {
   bool is_published = false;
   bool pose_only = false;  // only its pose is left: the end of the next odometry edge
   bool at_rest = false;
+  bool is_sight = true;  // its rays count: they are not mere noise
 
   int size() const { return pose_only ? kPoseSize : kFrameSize; }
 };
