@@ -6,6 +6,8 @@ import { agentColour, colours } from "./palette";
 
 // A process that was not heard for this long, or an agent, is marked. Processes speak once a second.
 const kSilent_s = 3.5;
+const kNamed = 5; // of an agent's company; more are counted
+const kFullCards = 6; // of more agents a card says less, so that twelve have room
 
 export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
@@ -58,6 +60,11 @@ function radius95(covariance: [number, number, number, number]): number {
   return 2.4477 * Math.sqrt(largest);
 }
 
+function companyOf(fused: number[]): string {
+  if (fused.length === 0) return "a map of its own";
+  return fused.length > kNamed ? `one map with ${fused.length} others` : `one map with ${fused.join(", ")}`;
+}
+
 export function drawAgents(model: Model) {
   const keyframes = new Map<number, number>();
   for (const map of model.maps) {
@@ -74,6 +81,7 @@ export function drawAgents(model: Model) {
     card.append(element("span", "badge", id), what);
     return card;
   });
+  byId("agents").classList.toggle("many", agents.length > kFullCards);
   agents.forEach((agent, i) => {
     const card = cards[i];
     const fused = model.fusedWith(agent);
@@ -81,19 +89,17 @@ export function drawAgents(model: Model) {
     (card.firstChild as HTMLElement).style.background = agentColour(agent.id);
     tell(card, ".state", state);
     card.querySelector(".state")!.classList.toggle("bad", state !== "" && state !== "tracking");
-    tell(card, ".fused", fused.length ? `one map with ${fused.join(", ")}` : "a map of its own");
-    tell(
-      card, ".seen",
-      `${keyframes.get(agent.id) ?? 0} keyframes` +
-        (agent.num_tracked === undefined ? "" : ` · ${agent.num_tracked} tracks`),
-    );
+    const seen = `${keyframes.get(agent.id) ?? 0} keyframes` +
+      (agent.num_tracked === undefined ? "" : ` · ${agent.num_tracked} tracks`);
+    tell(card, ".fused", companyOf(fused));
+    tell(card, ".seen", seen);
     tell(
       card, ".drift",
       `drift ${metres(agent.drift_m)}` +
         (agent.covariance_m2 ? ` · ± ${metres(radius95(agent.covariance_m2))}` : ""),
     );
     card.title =
-      (agent.reason ? `${agent.reason}\n` : "") +
+      (agent.reason ? `${agent.reason}\n` : "") + `${companyOf(fused)}, ${seen}\n` +
       "Click: through its camera\ndrift: how far corrections have moved the agent since it joined its map; ±: longer half axis of the 95 % ellipse";
   });
 }

@@ -118,19 +118,19 @@ export const pointMaterial = (poses: Poses, size: { value: number }) =>
   });
 
 // Lines of a width in pixels between two keyframes; dashed where `dash` is not 0. A negative red takes the
-// first keyframe's colour.
+// first keyframe's colour. No point hides a line: in a cloud of 100 000 nothing would be left of it.
 export const lineMaterial = (
-  poses: Poses, screen: { value: Vector2 }, width: number, lift: number, opacity: number,
+  poses: Poses, screen: { value: Vector2 }, width: number, opacity: number,
 ) =>
   new ShaderMaterial({
-    uniforms: { poses, screen, width: { value: width }, lift: { value: lift }, opacity: { value: opacity } },
+    uniforms: { poses, screen, width: { value: width }, opacity: { value: opacity } },
     transparent: true,
+    depthTest: false,
     depthWrite: false,
     vertexShader: /* glsl */ `
       ${lookUp}
       uniform vec2 screen;
       uniform float width;
-      uniform float lift;
       in vec2 ends;
       in vec4 style;  // colour, dash length in pixels
       out vec3 colour;
@@ -152,7 +152,6 @@ export const lineMaterial = (
         vec2 side = vec2(-along2.y, along2.x) / length2;
         vec4 end = position.x < 0.5 ? a : b;
         end.xy += side * position.y * width / screen * end.w;
-        end.z -= lift * end.w;
         gl_Position = end;
         colour = style.r < 0.0 ? texel(ends.x, 2).rgb : style.rgb;
         along = position.x * length2;

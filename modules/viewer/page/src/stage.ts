@@ -55,10 +55,10 @@ export class Stage {
     this.controls.addEventListener("change", () => (this.dirty = true));
     this.controls.addEventListener("start", () => (this.userMoved = true));
     this.points = new PointCloud(pointMaterial(this.poses.uniform, this.pointSize));
-    this.trajectories = new Lines(lineMaterial(this.poses.uniform, this.screen, 3, 0, 0.95));
-    this.accepted = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.2, 1e-4, 0.35));
-    this.refused = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.3, 1e-4, 0.7));
-    this.hovered = new Lines(lineMaterial(this.poses.uniform, this.screen, 5, 2e-4, 1));
+    this.trajectories = new Lines(lineMaterial(this.poses.uniform, this.screen, 3, 0.95));
+    this.accepted = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.2, 0.35));
+    this.refused = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.3, 0.7));
+    this.hovered = new Lines(lineMaterial(this.poses.uniform, this.screen, 5, 1));
     for (const drawn of [this.points, this.trajectories, this.accepted, this.refused, this.hovered]) {
       this.scene.add(drawn.object);
     }

@@ -1,6 +1,7 @@
 // The page in headless Chromium: on a captured log, and on a live bus into which the log is played.
 // Writes screenshots to --out; `scripts/viewer --screenshots` puts them into docs/.
 
+import { execFileSync } from "node:child_process";
 import { becomes, check, launch, openPage, options, run, start, startViewer } from "./harness.mjs";
 
 const screenshot = (page, name) => page.screenshot({ path: `${options.out}/viewer_${name}.png` });
@@ -164,9 +165,29 @@ async function testLive(browser) {
   check("live: no time slider", await page.locator("#player").isHidden());
 }
 
+// Nothing of a card is cut off, and none is to be scrolled to.
+const allCardsInSight = () => {
+  const list = document.getElementById("agents");
+  return document.querySelectorAll(".agent").length === 12 &&
+    list.scrollHeight <= list.clientHeight && list.scrollWidth <= list.clientWidth;
+};
+
+async function testTwelve(browser) {
+  const log = `${options.out}/twelve_agents.lcm`;
+  execFileSync(`${options.bin}/pangea-viewer-bench-log`, [log, "12", "20", "5"]);
+  const { url } = await startViewer("--log", log);
+  const page = await openPage(browser, url);
+  await page.locator("#slider").waitFor();
+  await seek(page, 1);
+  await becomes(page, "twelve agents: their keyframes come", () => pangea.model.numKeyframes === 240);
+  check("twelve agents: it is one", (await page.evaluate(numGroups)) === 1);
+  await becomes(page, "twelve agents: all their cards are in sight", allCardsInSight);
+}
+
 await run(async () => {
   const browser = await launch();
   await testLog(browser);
   await testLive(browser);
+  await testTwelve(browser);
   await browser.close();
 });
