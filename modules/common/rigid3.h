@@ -57,7 +57,5 @@ struct Rigid3 {
 // Covariance of T_a_b * T_b_c from those of its independent factors, first order.
 Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const Rigid3& T_b_c,
                            const Matrix6d& cov_b_c);
-// Covariance of T_a_b.Inverse(), first order.
-Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b);
 
 }  // namespace pangea
