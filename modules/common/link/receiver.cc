@@ -3,6 +3,14 @@
 #include <algorithm>
 
 namespace pangea {
+namespace {
+
+// In the order in which the sender has them under way (Sender::UnderWay).
+bool GoesBefore(const KeyframeId& a, const KeyframeId& b) {
+  return a.map == b.map ? a.seq < b.seq : b.map < a.map;
+}
+
+}  // namespace
 
 Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
@@ -68,13 +76,23 @@ bool Receiver::MakeRoom(const KeyframeId& id, size_t bytes) {
            (!cache_.contains(id) && cache_.size() >= kMaxPartialKeyframes);
   };
   while (full()) {
-    if (cache_.empty() || !(id < std::prev(cache_.end())->first) ||
-        std::prev(cache_.end())->second.taken) {
+    const auto last = Last();
+    if (last == cache_.end() || !GoesBefore(id, last->first)) {
       return false;
     }
-    Erase(std::prev(cache_.end()));
+    Erase(last);
   }
   return true;
+}
+
+std::map<KeyframeId, Receiver::Entry>::iterator Receiver::Last() {
+  auto last = cache_.end();
+  for (auto it = cache_.begin(); it != cache_.end(); ++it) {
+    if (!it->second.taken && (last == cache_.end() || GoesBefore(last->first, it->first))) {
+      last = it;
+    }
+  }
+  return last;
 }
 
 std::string Receiver::Add(const MapId& map_id, const LinkPiece& piece) {

@@ -4,8 +4,9 @@
 // receive cache (paper, IV.A: 210 KiB), checks them, hands them over in seq order per map, and says
 // what it has. A state machine: no clock, no bus, one thread.
 //
-// A keyframe stays in the cache's account until it is journalled. Full cache: a piece of a later
-// keyframe is dropped (it will be sent again); for an earlier one the latest make room.
+// A keyframe stays in the cache's account until it is journalled. Full cache: what the uplink sends
+// first, of the newest map the lowest seqs, takes the room of what it sends last; a piece for which
+// there is none is dropped. Both will be sent again.
 
 #include <cstdint>
 #include <functional>
@@ -74,6 +75,8 @@ class Receiver {
   };
 
   bool MakeRoom(const KeyframeId& id, size_t bytes);
+  // Of those that are not on their way to the disk, the one the uplink sends last; end() for none.
+  std::map<KeyframeId, Entry>::iterator Last();
   std::string Store(const KeyframeId& id, const LinkPiece& piece);
   static std::vector<uint8_t> Joined(const Entry& entry);
   void Erase(std::map<KeyframeId, Entry>::iterator it);

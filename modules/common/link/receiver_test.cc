@@ -121,6 +121,20 @@ TEST(Receiver, LaterKeyframesFindNoRoomInAFullCache) {
   EXPECT_EQ(receiver.TakeReady().size(), fit);
 }
 
+// The uplink sends the newest map first, and what it does not send now must not be in the way.
+TEST(Receiver, OlderMapsMakeRoomForTheNewestInAFullCache) {
+  Receiver receiver({100'000}, CheckContent);
+  receiver.OnHello({"", {{kMap, 0, 0}, {kLaterMap, 0, 0, 1}}});
+  for (int seq = 1; seq < 10; ++seq) {
+    AddAll(&receiver, {kMap, seq});
+  }
+  EXPECT_EQ(AddPiece(&receiver, {kMap, 12}, 0), "receive cache full");
+  for (int seq = 0; seq < 3; ++seq) {
+    EXPECT_EQ(AddPiece(&receiver, {kLaterMap, seq}, 0), "") << seq;
+  }
+  EXPECT_LE(receiver.cached_bytes(), 100'000);
+}
+
 TEST(Receiver, WhatIsNotYetOnDiskMakesNoRoom) {
   Receiver receiver({60'000}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}, {kLaterMap, 0, 0}}});
