@@ -122,7 +122,9 @@ struct Estimator::Impl {
   bool lost = false;
 };
 
-// The window takes over the frames the start was found from: they go on being refined.
+// The window takes over the frames the start was found from: they go on being refined. All of them,
+// and what is too much is marginalised: of somebody who turns on the spot hardly two are apart
+// enough to be worth a place, and those two know neither speed nor tilt.
 void Estimator::Impl::Start(const InitialState& initial) {
   const int64_t offset_us = ImuTime(0);  // as it was when the initialiser got the frames
   problem.state.time_offset_s += initial.time_offset_change_s;
@@ -132,14 +134,12 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      Newest().stays = true;
       problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance)
                                       : MovingStartPrior(problem.state);
-      continue;
+    } else {
+      Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
     }
-    DropPassing();
-    Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
-    Newest().stays = choice.IsWorthAPlace(problem.state, history);
+    Newest().stays = true;
   }
   started = true;
 }

@@ -77,6 +77,30 @@ TEST(Estimator, ADrivesStartIsNotTooSmall) {
   }
 }
 
+// Hardly two images are apart enough for a place in the window; what the start found must stay.
+TEST(Estimator, StartsTurningOnTheSpot) {
+  double squares = 0;
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.spin_rps = 0.8;
+    options.pixel_noise = 0.3;
+    Ride ride(options);
+    ride.Advance(60);
+    ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+    const Ride::Frame& first = ride.tracked.front();
+    double furthest = 0;
+    for (const Ride::Frame& frame : ride.tracked) {
+      const Vector3d went = (first.result.T_odom_body.Inverse() * frame.result.T_odom_body).t;
+      const Vector3d truth = (first.truth.T_odom_body.Inverse() * frame.truth.T_odom_body).t;
+      furthest = std::max(furthest, (went - truth).norm());
+    }
+    std::cout << "started after " << ride.started_s << " s, at most " << furthest << " m off\n";
+    squares += furthest * furthest / 4;
+  }
+  EXPECT_LT(std::sqrt(squares), 0.055);
+}
+
 TEST(Estimator, StartsAtRest) {
   VioTestWorldOptions options;
   options.pixel_noise = 0.2;  // a standing image is tracked better than a moving one

@@ -70,6 +70,9 @@ Rigid3 VioTestWorld::PoseAt(double t) const {
     const Vector3d ahead(options_.drive_mps * s, 0.2 * std::sin(0.5 * s), 1.6);
     return {ExpSo3(0.2 * hand), ahead + 0.3 * hand};
   }
+  if (options_.spin_rps > 0) {
+    return {YawRotation(options_.spin_rps * s) * ExpSo3(2 * hand), Vector3d(1, 1, 1.6) + hand};
+  }
   const Vector3d turn(0.08 * std::sin(1.3 * s + phase_.y()), 0.12 * std::sin(1.1 * s + phase_.z()),
                       0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
   const Eigen::Quaterniond q =

@@ -41,6 +41,7 @@ struct VioTestWorldOptions {
   ImuNoise imu_noise;           // by default EuRoC's
   // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
   double drive_mps = 0;
+  double spin_rps = 0;  // above 0: it turns about on the spot, rad/s
   // The body stands still in between, seconds.
   double rest_begin_s = -10, rest_end_s = -10;
   // Errors of the calibration the estimator is given.
