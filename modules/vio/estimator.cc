@@ -88,7 +88,7 @@ struct Estimator::Impl {
   void Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
-  bool TracksGoOn() const;
+  bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve();
   void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
@@ -185,20 +185,18 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
           ? std::optional(history.MedianShiftSigmas(LastStaying().utime, frame.utime))
           : std::nullopt;
   const bool at_rest = rest.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
+  const bool is_sight = TracksGoOn(Newest().utime, frame.utime);
   DropPassing();
   const InertialLink link = Link(Newest(), imu_utime);
   Append(frame.utime, Predict(link.measured, Newest().imu), link);
   Newest().at_rest = at_rest;
-  Newest().is_sight = TracksGoOn();
+  Newest().is_sight = is_sight;
   return std::nullopt;
 }
 
-// From the frame before.
-bool Estimator::Impl::TracksGoOn() const {
-  const auto& frames = problem.state.frames;
-  const int64_t before = frames[frames.size() - 2].utime;
-  const size_t go_on = history.Shared(before, frames.back().utime);
-  const auto all = static_cast<double>(history.Frame(before).size());
+bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
+  const size_t go_on = history.Shared(from_utime, to_utime);
+  const auto all = static_cast<double>(history.Frame(from_utime).size());
   return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 

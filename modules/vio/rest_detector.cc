@@ -34,10 +34,11 @@ bool RestDetector::AddFrame(const TrackedFrame& frame, std::optional<double> shi
     recent_utimes_.pop_front();
   }
   const int64_t first = recent_utimes_.front();
-  images_stand_ = shift_sigmas ? *shift_sigmas < kStillSigmas
-                               : Seconds(frame.utime - first) >= kSpan_s &&
-                                     recent_.MedianShiftSigmas(first, frame.utime) < kStillSigmas;
-  return images_stand_ && IsQuiet(imu.Latest(kSamples), gyro_bias);
+  const bool images_stand = shift_sigmas
+                                ? *shift_sigmas < kStillSigmas
+                                : Seconds(frame.utime - first) >= kSpan_s &&
+                                      recent_.MedianShiftSigmas(first, frame.utime) < kStillSigmas;
+  return images_stand && IsQuiet(imu.Latest(kSamples), gyro_bias);
 }
 
 }  // namespace pangea::vio

@@ -25,15 +25,12 @@ class RestDetector {
   // moved since a frame of the present rest, if there is one (TrackHistory::MedianShiftSigmas).
   bool AddFrame(const TrackedFrame& frame, std::optional<double> shift_sigmas, const ImuBuffer& imu,
                 const Eigen::Vector3d& gyro_bias);
-  // Whether the images stand, whatever the IMU says.
-  bool images_stand() const { return images_stand_; }
 
  private:
   CameraModel camera_;
   double ray_sigma_;
   TrackHistory recent_;
   std::deque<int64_t> recent_utimes_;
-  bool images_stand_ = false;
 };
 
 }  // namespace pangea::vio
