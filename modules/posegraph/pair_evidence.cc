@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace pangea {
 namespace {
@@ -165,7 +166,9 @@ int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
       const int k = agreeing[j];
       const Innovation innovation = Compare(candidates_[k], candidates_[l], options_);
       const Matrix4d covariance = innovation.measurement + innovation.odometry;
-      sum += innovation.error.dot(covariance.ldlt().solve(innovation.error));
+      // A likelihood, not a distance alone: a vague member is far from none.
+      sum += innovation.error.dot(covariance.ldlt().solve(innovation.error)) +
+             std::log(covariance.determinant());
     }
     if (sum < best_sum) {
       best = l;
@@ -226,17 +229,17 @@ void PairEvidence::Judge() {
 }
 
 std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {
-  std::vector<Innovation> innovations;
-  if (agreeing_.empty()) {
-    return innovations;
-  }
   MergeOptions as_claimed = options_;
   as_claimed.min_drift_per_m = as_claimed.min_yaw_drift_per_m = 0;
-  const int best = BestMember(agreeing_);
-  for (const int k : agreeing_) {
-    if (k != best) {
-      innovations.push_back(Compare(candidates_[k], candidates_[best], as_claimed));
-    }
+  std::vector<int> along = agreeing_;
+  std::ranges::sort(along, {}, [this](int k) {
+    const Candidate& candidate = candidates_[k];
+    return std::tuple(candidate.node_a, candidate.node_b, candidate.id);
+  });
+  std::vector<Innovation> innovations;
+  const size_t half = along.size() / 2;
+  for (size_t i = 0; i < half; ++i) {
+    innovations.push_back(Compare(candidates_[along[i]], candidates_[along[i + half]], as_claimed));
   }
   return innovations;
 }

@@ -65,8 +65,9 @@ class PairEvidence {
   // Averaged over the agreeing candidates; only after a verdict to merge.
   Pose4 Alignment() const;
 
-  // Of every agreeing candidate: the error against the one that agrees best with all, and the
-  // covariances it is made of (measurements, odometry).
+  // What the agreeing candidates say of the odometry: the error of each against the one half of
+  // them further along map a, and the covariances it is made of (measurements, odometry). No
+  // candidate is in two, so that one that is off does not speak for all.
   struct Innovation {
     Vector4d error;
     Matrix4d measurement;

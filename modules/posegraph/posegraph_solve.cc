@@ -12,9 +12,7 @@
 namespace pangea {
 namespace {
 
-// Chi-squared with four degrees of freedom: median, and quantile 0.95.
-constexpr double kMedianChi2 = 3.357;
-constexpr double kUnlikelyChi2 = 9.488;
+constexpr double kMeanChi2 = 4;  // chi-squared with four degrees of freedom
 constexpr double kMaxVarianceFactor = 1e4;
 constexpr size_t kMaxInnovations = 200;
 
@@ -70,16 +68,16 @@ std::vector<PairEvidence::Innovation> PoseGraph::Innovations(
 
 double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const {
   const auto innovations = Innovations(group, loops);
-  // Loops at one place share one drift, so the median counts as a single sample: only an unlikely
-  // one speaks against the odometry.
-  if (innovations.empty() || MedianDistance(innovations, 1) < kUnlikelyChi2) {
+  // Loops at one place share one drift, so their median counts as a single sample: the likeliest
+  // factor brings it to its mean. Nowhere a jump, which would let the shape hang on one verdict.
+  if (innovations.empty() || MedianDistance(innovations, 1) < kMeanChi2) {
     return 1;
   }
   double low = 0, high = std::log(kMaxVarianceFactor);
   constexpr int kBisections = 20;
   for (int i = 0; i < kBisections; ++i) {
     const double middle = 0.5 * (low + high);
-    (MedianDistance(innovations, std::exp(middle)) > kMedianChi2 ? low : high) = middle;
+    (MedianDistance(innovations, std::exp(middle)) > kMeanChi2 ? low : high) = middle;
   }
   return std::exp(high);
 }

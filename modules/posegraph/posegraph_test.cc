@@ -284,6 +284,32 @@ TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.5 * OdometryAte(world, 0));
 }
 
+// Odometry drifts four times what it claims. Whether one more link is among the verdicts, right but
+// vague, decides neither what the odometry is worth nor which links are believed.
+TEST(PoseGraph, OneVagueLinkDecidesNothing) {
+  SyntheticWorldOptions options = PosesOnly(2, 150);
+  options.edge_sigma_m = 0.02;
+  options.edge_sigma_yaw = 0.003;
+  options.claimed_sigma_scale = 0.25;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  std::vector<Constraint> constraints = BetweenMaps(MakeConstraints(world, 60, 0));
+  double scale[2] = {};
+  for (const int vague : {0, 1}) {
+    if (vague == 1) {
+      Constraint& middle = constraints[constraints.size() / 2];
+      middle.covariance *= 1000;
+    }
+    PoseGraph graph({});
+    const PoseGraphUpdate update = Solve(world, constraints, &graph);
+    ASSERT_EQ(graph.counters().groups, 1);
+    EXPECT_LE(update.states[0].num_switched_off, 3);
+    scale[vague] = graph.counters().odometry_scale;
+  }
+  EXPECT_GT(scale[0], 1.5);
+  EXPECT_LT(scale[0], 6);
+  EXPECT_NEAR(scale[1] / scale[0], 1, 0.1);
+}
+
 TEST(PoseGraph, TheOrderOfArrivalDoesNotChangeTheShape) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 80));
   std::vector<Constraint> constraints = MakeConstraints(world, 80, 0.2);
