@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/preintegration.h"
@@ -34,25 +35,52 @@ Preintegration IntegrateBetween(std::span<const StartFrame> frames, size_t from,
 }
 
 // Two images, their shared bearings (in body orientation), and how their rotation follows the gyro
-// bias.
+// bias. The bearings a, b are needed only as sums, so a cost takes as long for many as for few
+// (Kneip & Lynen, ICCV 2013).
 struct RotationPair {
   int64_t from_utime = 0, to_utime = 0;
-  std::vector<std::pair<Vector3d, Vector3d>> bearings;
+  size_t num_bearings = 0;
+  std::array<std::array<Matrix3d, 3>, 3> moments;  // [i][j]: sum a_i a_j b b^T
   Quaterniond delta_q;
   Matrix3d J_bias;
+
+  RotationPair() {
+    for (auto& row : moments) {
+      row.fill(Matrix3d::Zero());
+    }
+  }
+  void Add(const Vector3d& a, const Vector3d& b) {
+    const Matrix3d bb = b * b.transpose();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        moments[i][j] += a[i] * a[j] * bb;
+      }
+    }
+    ++num_bearings;
+  }
 };
 
-// Smallest eigenvalue of sum n n^T, n = b_i x R b_j: zero when R makes the pair epipolar.
+// Smallest eigenvalue of M = sum n n^T, n = a x R b: zero when R makes the pair epipolar.
 double EpipolarCost(const RotationPair& pair, const Vector3d& bias_change) {
-  const Quaterniond q = pair.delta_q * ExpSo3(pair.J_bias * bias_change);
-  Matrix3d M = Matrix3d::Zero();
-  for (const auto& [a, b] : pair.bearings) {
-    const Vector3d n = a.cross(q * b);
-    M += n * n.transpose();
+  const Matrix3d R = (pair.delta_q * ExpSo3(pair.J_bias * bias_change)).toRotationMatrix();
+  std::array<std::array<Matrix3d, 3>, 3> T;  // sum a_i a_j (R b)(R b)^T
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) {
+      T[i][j] = R * pair.moments[i][j] * R.transpose();
+      T[j][i] = T[i][j];
+    }
+  }
+  Matrix3d M;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      // n_i = a_i1 (R b)_i2 - a_i2 (R b)_i1
+      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      M(i, j) = T[i1][j1](i2, j2) - T[i1][j2](i2, j1) - T[i2][j1](i1, j2) + T[i2][j2](i1, j1);
+    }
   }
   Eigen::SelfAdjointEigenSolver<Matrix3d> eigen;
   eigen.computeDirect(M, Eigen::EigenvaluesOnly);
-  return std::max(0.0, eigen.eigenvalues()[0]) / static_cast<double>(pair.bearings.size());
+  return std::max(0.0, eigen.eigenvalues()[0]) / static_cast<double>(pair.num_bearings);
 }
 
 std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
@@ -68,11 +96,10 @@ std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Ri
     for (const auto& [id, ray] : a.rays) {
       const auto other = b.rays.find(id);
       if (other != b.rays.end()) {
-        pair.bearings.emplace_back(T_body_cam.q * Bearing(ray),
-                                   T_body_cam.q * Bearing(other->second));
+        pair.Add(T_body_cam.q * Bearing(ray), T_body_cam.q * Bearing(other->second));
       }
     }
-    if (pair.bearings.size() >= kMinShared) {
+    if (pair.num_bearings >= kMinShared) {
       const Preintegration p = IntegrateBetween(frames, i, i + kSpan, noise, Vector3d::Zero());
       pair.delta_q = p.delta_q;
       pair.J_bias = p.bias_jacobian.topLeftCorner<3, 3>();
@@ -210,8 +237,10 @@ std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const
                                        const ImuNoise& noise, const Vector3d& gyro_bias) {
   LinearStart out;
   std::vector<Preintegration> from_first;
-  for (size_t k = 0; k < frames.size(); ++k) {
-    from_first.push_back(IntegrateBetween(frames, 0, k, noise, gyro_bias));
+  Preintegrator integrator(noise, gyro_bias, Vector3d::Zero());
+  for (const StartFrame& frame : frames) {
+    integrator.Add(frame.imu);
+    from_first.push_back(integrator.result());
   }
   // Observations by landmark: frame and bearing in the first body frame's orientation.
   std::map<int32_t, std::vector<std::pair<size_t, Vector3d>>> seen;

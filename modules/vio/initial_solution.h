@@ -47,11 +47,14 @@ std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const
 // body.
 struct RefinedStart {
   std::vector<ImuState> states;  // of every frame, with one pair of biases
-  // Of the last: (dtheta left, dp, dv, gyro bias, accel bias).
-  Eigen::Matrix<double, 15, 15> covariance;
-  double rms_sigma = 0;  // reprojection residual of the inliers, in sigmas
+  double velocity_sigma = 0;     // m/s, of the last one's, in its least certain direction
+  double tilt_sigma = 0;         // rad
+  double rms_sigma = 0;          // reprojection residual of the inliers, in sigmas
   double inlier_share = 0;
 };
+// A start is good for nothing when fewer of the rays fit. When fewer are even before the camera in
+// the closed-form solution, Refine tells that share and nothing else.
+inline constexpr double kMinInlierShare = 0.8;
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
                                    const LinearStart& start, double ray_sigma);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -15,7 +14,6 @@
 namespace pangea::vio {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
@@ -35,7 +33,6 @@ constexpr double kRestGyro = 0.03;   // rad/s
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
 constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
 constexpr double kMaxTiltSigma = 0.035;     // rad
-constexpr double kMinInlierShare = 0.8;
 constexpr double kMaxRmsSigmas = 1.8;
 constexpr double kMaxAccelBias = 0.8;  // m/s^2
 
@@ -174,21 +171,15 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
                         100 * refined->inlier_share, refined->rms_sigma),
             true};
   }
-  const double velocity_sigma =
-      std::sqrt(Eigen::SelfAdjointEigenSolver<Matrix3d>(
-                    Matrix3d(refined->covariance.block<3, 3>(kVelocity, kVelocity)))
-                    .eigenvalues()[2]);
-  const double tilt_sigma =
-      std::sqrt(std::max(refined->covariance(0, 0), refined->covariance(1, 1)));
   // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
   // certain, if certainty were asked for in metres per second.
   const double speed = refined->states.back().v_odom_body.norm();
   const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
-  if (velocity_sigma > max_velocity_sigma || tilt_sigma > kMaxTiltSigma) {
+  if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {
     return {
         std::nullopt,
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
-                    velocity_sigma, tilt_sigma * 57.3)};
+                    refined->velocity_sigma, refined->tilt_sigma * 57.3)};
   }
   if (refined->states.back().accel_bias.norm() > kMaxAccelBias) {
     return {std::nullopt, "the start needs an implausible accelerometer bias"};
@@ -198,7 +189,6 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   for (size_t i = 0; i < frames_.size(); ++i) {
     state.frames.push_back({frames_[i], refined->states[i]});
   }
-  state.covariance = refined->covariance;
   return {state, ""};
 }
 

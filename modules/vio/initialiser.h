@@ -31,9 +31,9 @@ struct InitialState {
     ImuState imu;
   };
   std::vector<Frame> frames;
-  // Of the newest: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
-  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   bool at_rest = false;
+  // Of the one at rest: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   double time_offset_change_s = 0;  // the images were taken this much later than their utime says
 };
 
