@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <map>
 #include <stdexcept>
 
 #include "sim/frame_cache.h"
@@ -11,15 +12,15 @@
 namespace pangea::sim {
 namespace {
 
-SceneKind KindOf(const std::string& name) {
-  if (name == "hall") {
-    return SceneKind::kHall;
-  }
-  if (name == "room") {
-    return SceneKind::kRoom;
-  }
-  return name == "twin_objects_a" ? SceneKind::kTwinObjectsA : SceneKind::kTwinObjectsB;
-}
+const std::map<std::string, SceneKind> kScenes = {
+    {"hall", SceneKind::kHall},
+    {"room", SceneKind::kRoom},
+    {"twin_objects_a", SceneKind::kTwinObjectsA},
+    {"twin_objects_b", SceneKind::kTwinObjectsB},
+    {"bare", SceneKind::kBareHall},
+    {"rows_a", SceneKind::kRowsA},
+    {"rows_b", SceneKind::kRowsB},
+};
 
 CameraModel CameraOf(const std::string& name) {
   if (name == "euroc") {
@@ -85,8 +86,9 @@ void CommandLine::AddPath(CLI::App& app) {
 void CommandLine::AddScene(CLI::App& app) {
   const std::string group = "Scene";
   app.add_option("--scene", scene_,
-                 "hall, room, or one of two rooms that share a dozen identical objects")
-      ->check(CLI::IsMember({"hall", "room", "twin_objects_a", "twin_objects_b"}))
+                 "hall, room, one of two rooms that share a dozen identical objects, a hall with "
+                 "hardly a mark in it, or one of two with the same machines in rows")
+      ->check(CLI::IsMember(kScenes))
       ->capture_default_str()
       ->group(group);
   app.add_option("--scene-seed", options_.scene.seed, "changes everything in the scene")
@@ -148,7 +150,7 @@ void CommandLine::Apply() {
     constexpr double kMargins = 0.21;
     options_.generated.duration_s = options_.start_s + duration + kMargins;
   }
-  options_.scene.kind = KindOf(scene_);
+  options_.scene.kind = kScenes.at(scene_);
   options_.camera = CameraOf(camera_);
   if (shrink_ > 1) {
     options_.camera = Shrunk(options_.camera, shrink_);

@@ -195,7 +195,8 @@ std::vector<Part> Placed(const Piece& piece, const Eigen::Vector3d& at, double y
   return placed;
 }
 
-int SceneClad::AddSheet(const std::string& paint, double width_m, double height_m, double texel_m) {
+int SceneClad::AddSheet(const std::string& paint, const Eigen::Vector2d& size_m, double texel_m,
+                        Marks marks) {
   Rng rng(seed_, paint + " style");
   SheetStyle style;
   // From bare sheets to crowded ones.
@@ -203,21 +204,28 @@ int SceneClad::AddSheet(const std::string& paint, double width_m, double height_
   style.tone = rng.Uniform(40, 180);
   style.panel_m = rng.Uniform(0.6, 2.5);
   style.shapes_per_m2 = 0.5 + 6 * crowd * crowd;
-  orders_.push_back({paint, width_m, height_m, coarseness_ * texel_m, style});
+  if (marks == Marks::kFew) {
+    constexpr double kShareLeft = 0.08;
+    style.shapes_per_m2 *= kShareLeft;
+    style.panel_m *= 3;
+    style.noise = 3;
+    style.stain = 10;
+  }
+  orders_.push_back({paint, size_m.x(), size_m.y(), coarseness_ * texel_m, style, marks});
   return static_cast<int>(orders_.size()) - 1;
 }
 
-void SceneClad::AddRoom(Scene* scene) {
+void SceneClad::AddRoom(Marks marks, Scene* scene) {
   const Vector3d size = (scene->room_max - scene->room_min).cast<double>();
   constexpr int kAxes[3][2] = {{1, 2}, {0, 2}, {0, 1}};
   for (int face = 0; face < 6; ++face) {
     scene->room_surfaces[static_cast<size_t>(face)] =
-        AddSheet(fmt::format("{} wall {}", stream_, face), size[kAxes[face / 2][0]],
-                 size[kAxes[face / 2][1]], 0.01);
+        AddSheet(fmt::format("{} wall {}", stream_, face),
+                 {size[kAxes[face / 2][0]], size[kAxes[face / 2][1]]}, 0.01, marks);
   }
 }
 
-void SceneClad::AddPart(const Part& part, Scene* scene) {
+void SceneClad::AddPart(const Part& part, Marks marks, Scene* scene) {
   const std::string paint = part.paint.empty()
                                 ? fmt::format("{} part {}", stream_, scene->primitives.size())
                                 : part.paint;
@@ -228,7 +236,7 @@ void SceneClad::AddPart(const Part& part, Scene* scene) {
     }
     const Eigen::Vector2d size = SheetSize(primitive, face);
     primitive.surfaces[static_cast<size_t>(face)] =
-        AddSheet(fmt::format("{} face {}", paint, face), size.x(), size.y(), 0.006);
+        AddSheet(fmt::format("{} face {}", paint, face), size, 0.006, marks);
   }
   scene->primitives.push_back(primitive);
 }
@@ -251,6 +259,9 @@ void SceneClad::Paint(int detail_size, Scene* scene) {
       surface.detail_u = static_cast<float>(rng.Uniform(0, detail_m));
       surface.detail_v = static_cast<float>(rng.Uniform(0, detail_m));
       surface.detail_gain = static_cast<float>(rng.Uniform(0.15, 0.6));
+      if (order.marks == Marks::kFew) {
+        surface.detail_gain *= 0.1f;
+      }
     }
   };
   std::thread helper(work);

@@ -28,14 +28,16 @@ Piece RandomCeilingPiece(Rng* rng);  // ducts and beams along x
 // The piece turned about z and moved.
 std::vector<Part> Placed(const Piece& piece, const Eigen::Vector3d& at, double yaw);
 
+enum class Marks { kMany, kFew };  // few: bare walls, whitewashed
+
 // Gives every face its sheet: sizes and streams first, then painted in parallel.
 class SceneClad {
  public:
   SceneClad(uint64_t seed, std::string stream, double coarseness)
       : seed_(seed), stream_(std::move(stream)), coarseness_(coarseness) {}
 
-  void AddRoom(Scene* scene);
-  void AddPart(const Part& part, Scene* scene);
+  void AddRoom(Marks marks, Scene* scene);
+  void AddPart(const Part& part, Marks marks, Scene* scene);
   void Paint(int detail_size, Scene* scene);
 
  private:
@@ -43,8 +45,10 @@ class SceneClad {
     std::string paint;
     double width_m, height_m, texel_m;
     SheetStyle style;
+    Marks marks;
   };
-  int AddSheet(const std::string& paint, double width_m, double height_m, double texel_m);
+  int AddSheet(const std::string& paint, const Eigen::Vector2d& size_m, double texel_m,
+               Marks marks);
 
   uint64_t seed_;
   std::string stream_;

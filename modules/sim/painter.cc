@@ -48,7 +48,7 @@ cv::Mat SmoothNoise(cv::Size size, double cell, Rng* rng) {
 
 cv::Mat BaseCoat(cv::Size size, const SheetStyle& style, double texel_m, Rng* rng) {
   cv::Mat coat(size, CV_32F, cv::Scalar(style.tone));
-  double amplitude = 24;
+  double amplitude = style.noise;
   for (double cell_m = 2.5; cell_m > 1.5 * texel_m; cell_m *= 0.4) {
     coat += amplitude * SmoothNoise(size, cell_m / texel_m, rng);
     amplitude *= 0.68;
@@ -56,7 +56,7 @@ cv::Mat BaseCoat(cv::Size size, const SheetStyle& style, double texel_m, Rng* rn
   cv::Mat stain = SmoothNoise(size, 0.7 / texel_m, rng);
   stain += 0.6 * SmoothNoise(size, 0.2 / texel_m, rng);
   cv::max(stain - 0.45, 0.0, stain);
-  coat -= 70 * stain;
+  coat -= style.stain * stain;
   cv::Mat image;
   coat.convertTo(image, CV_8U);
   return image;

@@ -14,6 +14,8 @@ struct SheetStyle {
   double tone = 110;         // mean grey
   double panel_m = 1.0;      // typical size of a panel
   double shapes_per_m2 = 6;  // marks, at the scale of half a metre; smaller ones are more
+  double noise = 24;         // grey values, of the largest scale
+  double stain = 70;
 };
 
 // 8-bit grey.

@@ -49,7 +49,7 @@ class Traveller {
   // Advances by dt; `go` in 0 .. 1 scales everything that moves.
   void Step(double dt, double go) {
     time_ += go * dt;
-    const double hall = options_.scene == SceneKind::kHall ? 1.0 : 0.45;
+    const double hall = IsHall(options_.scene) ? 1.0 : 0.45;
     const double cruise = hall * (options_.motion == Motion::kWalk ? 1.1 : 1.8);
     const double speed = cruise * (1 + 0.35 * speed_.At(time_));
     const Eigen::Vector2d tangent = (route_.At(phase_ + 1e-4) - route_.At(phase_ - 1e-4)) / 2e-4;

@@ -241,26 +241,62 @@ TEST(Scene, ASeedChangesEverything) {
   EXPECT_LT(same, 3);
 }
 
+float GreyOf(const Scene& scene, const Primitive& p, float u) {
+  const Footprint f{.u = u, .v = 0.1f, .major = 0.05f, .minor = 0.05f};
+  return scene.surfaces[static_cast<size_t>(p.surfaces[0])].texture.Sample(f);
+}
+
 TEST(Scene, TwinRoomsShareADozenObjectsAtDifferentPlaces) {
   const Scene a = BuildScene(CoarseScene(SceneKind::kTwinObjectsA, 1));
   const Scene b = BuildScene(CoarseScene(SceneKind::kTwinObjectsB, 1));
   EXPECT_NE(a.room_max, b.room_max);
-  const auto grey = [](const Scene& scene, const Primitive& p, float u) {
-    const Footprint f{.u = u, .v = 0.1f, .major = 0.05f, .minor = 0.05f};
-    return scene.surfaces[static_cast<size_t>(p.surfaces[0])].texture.Sample(f);
-  };
   int shared = 0;
   for (const Primitive& p : a.primitives) {
     for (const Primitive& q : b.primitives) {
       if (p.half == q.half) {
         ++shared;
         EXPECT_GT((p.p_ref - q.p_ref).norm(), 0.05);
-        EXPECT_EQ(grey(a, p, 0.05f), grey(b, q, 0.05f));
-        EXPECT_EQ(grey(a, p, 0.15f), grey(b, q, 0.15f));
+        EXPECT_EQ(GreyOf(a, p, 0.05f), GreyOf(b, q, 0.05f));
+        EXPECT_EQ(GreyOf(a, p, 0.15f), GreyOf(b, q, 0.15f));
       }
     }
   }
   EXPECT_GE(shared, 20);  // two parts each; one of the dozen may find no room
+}
+
+TEST(Scene, HallsWithRowsRepeatTheSameMachinesWithinAndAcross) {
+  const Scene a = BuildScene(CoarseScene(SceneKind::kRowsA, 1));
+  const Scene b = BuildScene(CoarseScene(SceneKind::kRowsB, 1));
+  EXPECT_NE(a.room_max, b.room_max);
+  const auto copies = [&](const Primitive& p, const Scene& scene) {
+    return std::ranges::count_if(scene.primitives, [&](const Primitive& q) {
+      return p.half == q.half && GreyOf(a, p, 0.05f) == GreyOf(scene, q, 0.05f);
+    });
+  };
+  const auto repeated = std::ranges::count_if(
+      a.primitives, [&](const Primitive& p) { return copies(p, a) >= 4 && copies(p, b) >= 4; });
+  EXPECT_GT(2 * static_cast<size_t>(repeated), a.primitives.size());
+}
+
+TEST(Scene, ABareHallHasAFractionOfTheMarks) {
+  // The mean step of grey over 3 cm of the room's own sheets.
+  const auto roughness = [](SceneKind kind) {
+    const Scene scene = BuildScene(CoarseScene(kind, 1));
+    double sum = 0;
+    constexpr int kSamples = 300;
+    for (const int surface : scene.room_surfaces) {
+      Footprint f{.v = 1, .major = 0.02f, .minor = 0.02f};
+      float before = 0;
+      for (int i = 0; i <= kSamples; ++i) {
+        f.u = 1 + 0.03f * static_cast<float>(i);
+        const float grey = scene.surfaces[static_cast<size_t>(surface)].texture.Sample(f);
+        sum += i > 0 ? std::abs(grey - before) / (6 * kSamples) : 0;
+        before = grey;
+      }
+    }
+    return sum;
+  };
+  EXPECT_LT(roughness(SceneKind::kBareHall), 0.4 * roughness(SceneKind::kHall));
 }
 
 TEST(Tracks, ArePersistentVisibleAndWhereTheCameraSeesThem) {

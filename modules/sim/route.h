@@ -23,8 +23,7 @@ struct Route {
 };
 
 inline Route RouteOf(SceneKind kind) {
-  return kind == SceneKind::kHall ? Route{7.0, 3.8, 0.5, 3.0, 0.5}
-                                  : Route{1.5, 0.8, 0.8, 1.7, 0.15};
+  return IsHall(kind) ? Route{7.0, 3.8, 0.5, 3.0, 0.5} : Route{1.5, 0.8, 0.8, 1.7, 0.15};
 }
 
 }  // namespace pangea::sim

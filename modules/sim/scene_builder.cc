@@ -58,8 +58,6 @@ class Layout {
   std::vector<Part> parts_;
 };
 
-bool IsHall(SceneKind kind) { return kind == SceneKind::kHall; }
-
 // What the generated paths may reach.
 std::vector<Vector3d> RoutePoints(SceneKind kind) {
   const Route route = RouteOf(kind);
@@ -145,15 +143,20 @@ void FurnishCeiling(Layout* layout, double per_m2, Rng* rng) {
   }
 }
 
-// The dozen objects both twin rooms have; their paint has a stream of its own.
+// Its paint has a stream of its own: the same wherever it stands.
+Piece Shared(Piece piece, int number) {
+  for (Part& part : piece) {
+    part.paint = fmt::format("shared {} {}", number, &part - piece.data());
+  }
+  return piece;
+}
+
+// The dozen objects both twin rooms have.
 void PlaceSharedObjects(Layout* layout, const SceneOptions& options, Rng* rng) {
   Rng shared(options.seed, "shared objects");
   constexpr int kObjects = 12;
   for (int i = 0; i < kObjects; ++i) {
-    Piece piece = RandomSmallPiece(&shared);
-    for (Part& part : piece) {
-      part.paint = fmt::format("shared {} {}", i, &part - piece.data());
-    }
+    const Piece piece = Shared(RandomSmallPiece(&shared), i);
     for (int attempt = 0; attempt < 400; ++attempt) {
       const Vector3d at(rng->Uniform(layout->min().x() + 0.3, layout->max().x() - 0.3),
                         rng->Uniform(layout->min().y() + 0.3, layout->max().y() - 0.3),
@@ -164,6 +167,39 @@ void PlaceSharedObjects(Layout* layout, const SceneOptions& options, Rng* rng) {
     }
   }
 }
+
+// Two kinds of machine by turns over all the floor, and one thing all along the walls, wherever the
+// paths leave room for it.
+void PlaceRows(Layout* layout, const SceneOptions& options) {
+  constexpr double kEvery_m = 4;
+  constexpr double kInset_m = 1.5;
+  constexpr double kWallHeight_m = 2;
+  Rng shared(options.seed, "rows");
+  const std::array machines = {Shared(RandomFloorPiece(&shared), 0),
+                               Shared(RandomFloorPiece(&shared), 1)};
+  const Piece on_wall = Shared(RandomWallPiece(&shared), 2);
+  const Vector3d low = layout->min() + Vector3d(kInset_m, kInset_m, 0);
+  const Vector3d size = layout->max() - low;
+  const int columns = static_cast<int>(size.x() / kEvery_m) + 1;
+  const int rows = static_cast<int>(size.y() / kEvery_m) + 1;
+  for (int i = 0; i < columns; ++i) {
+    const double x = low.x() + i * kEvery_m;
+    for (int j = 0; j < rows; ++j) {
+      const Piece& machine = machines[static_cast<size_t>((i + j) % 2)];
+      layout->Place(machine, {x, low.y() + j * kEvery_m, low.z()}, 0);
+    }
+    for (const double y : {layout->min().y() + 0.2, layout->max().y() - 0.2}) {
+      layout->Place(on_wall, {x, y, low.z() + kWallHeight_m}, 0);
+    }
+  }
+  for (int j = 0; j < rows; ++j) {
+    for (const double x : {layout->min().x() + 0.2, layout->max().x() - 0.2}) {
+      layout->Place(on_wall, {x, low.y() + j * kEvery_m, low.z() + kWallHeight_m}, M_PI / 2);
+    }
+  }
+}
+
+bool HasRows(SceneKind kind) { return kind == SceneKind::kRowsA || kind == SceneKind::kRowsB; }
 
 Layout MakeLayout(const SceneOptions& options, const std::string& stream) {
   Rng rng(options.seed, stream);
@@ -189,6 +225,11 @@ Layout MakeLayout(const SceneOptions& options, const std::string& stream) {
   if (options.kind == SceneKind::kTwinObjectsA || options.kind == SceneKind::kTwinObjectsB) {
     PlaceSharedObjects(&layout, options, &rng);
   }
+  if (HasRows(options.kind)) {
+    PlaceRows(&layout, options);
+    FurnishFloor(&layout, 0.03, &rng);
+    return layout;
+  }
   FurnishAlongWalls(&layout, hall ? 0.5 : 0.6, false, &rng);
   FurnishAlongWalls(&layout, hall ? 0.6 : 0.9, true, &rng);
   FurnishFloor(&layout, hall ? 0.09 : 0.1, &rng);
@@ -204,8 +245,14 @@ std::string StreamOf(SceneKind kind) {
       return "room";
     case SceneKind::kTwinObjectsA:
       return "twin room a";
-    default:
+    case SceneKind::kTwinObjectsB:
       return "twin room b";
+    case SceneKind::kBareHall:
+      return "bare hall";
+    case SceneKind::kRowsA:
+      return "rows a";
+    default:
+      return "rows b";
   }
 }
 
@@ -223,9 +270,10 @@ Scene BuildScene(const SceneOptions& options) {
       Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0.8).normalized().cast<float>();
 
   SceneClad clad(options.seed, stream, options.coarseness);
-  clad.AddRoom(&scene);
+  const bool bare = options.kind == SceneKind::kBareHall;
+  clad.AddRoom(bare || HasRows(options.kind) ? Marks::kFew : Marks::kMany, &scene);
   for (const Part& part : layout.parts()) {
-    clad.AddPart(part, &scene);
+    clad.AddPart(part, bare ? Marks::kFew : Marks::kMany, &scene);
   }
   clad.Paint(IsHall(options.kind) ? 4096 : 2048, &scene);
   return scene;

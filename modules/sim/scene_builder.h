@@ -1,7 +1,9 @@
 #pragma once
 
-// Builds the scenes: a machine hall, small rooms, and two rooms that differ in everything but a
-// dozen identical objects, which stand at different places in each.
+// Builds the scenes: a machine hall, a hall with hardly a mark in it, small rooms; and pairs that
+// are easily mistaken for one another: two rooms that differ in everything but a dozen identical
+// objects, which stand at different places in each, and two halls with the same machines in rows
+// and the same things along the walls, every few metres.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -12,7 +14,12 @@
 
 namespace pangea::sim {
 
-enum class SceneKind { kHall, kRoom, kTwinObjectsA, kTwinObjectsB };
+enum class SceneKind { kHall, kRoom, kTwinObjectsA, kTwinObjectsB, kBareHall, kRowsA, kRowsB };
+
+constexpr bool IsHall(SceneKind kind) {
+  return kind == SceneKind::kHall || kind == SceneKind::kBareHall || kind == SceneKind::kRowsA ||
+         kind == SceneKind::kRowsB;
+}
 
 struct SceneOptions {
   SceneKind kind = SceneKind::kHall;
