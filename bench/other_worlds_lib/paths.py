@@ -10,10 +10,11 @@ from typing import Callable
 
 RATE_HZ = 40
 SUBSTEPS = 25  # of the speed's integral, between two poses
-# EuRoC's cam0: rows of the rotation of T_body_cam, and its translation.
+# EuRoC's cam0, as all mounts: rows of the rotation of T_body_cam, and its translation.
 R_BODY_CAM = ((0.0148655429818, -0.999880929698, 0.00414029679422), (0.999557249008, 0.0149672133247, 0.025715529948),
               (-0.0257744366974, 0.00375618835797, 0.999660727178))
 P_BODY_CAM = (-0.0216401454975, -0.064676986768, 0.00981073058949)
+EUROC = (R_BODY_CAM, P_BODY_CAM)
 
 
 def smooth(x):
@@ -61,13 +62,14 @@ def product(a, b):
     return [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
 
 
-def body_pose(position, yaw, pitch, roll):
+def body_pose(position, yaw, pitch, roll, mount=EUROC):
     """Rotation and position of the body whose camera is there and looks along yaw and pitch."""
+    R_body_cam, p_body_cam = mount
     (cy, sy), (cp, sp), (cr, sr) = ((math.cos(a), math.sin(a)) for a in (yaw, pitch, roll))
     level = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]  # looks along x
     R = product([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]], product([[1, 0, 0], [0, cr, -sr], [0, sr, cr]], level))
-    R = product(product([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], R), [list(column) for column in zip(*R_BODY_CAM)])
-    return R, [p - sum(r * c for r, c in zip(row, P_BODY_CAM)) for p, row in zip(position, R)]
+    R = product(product([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], R), [list(column) for column in zip(*R_body_cam)])
+    return R, [p - sum(r * c for r, c in zip(row, p_body_cam)) for p, row in zip(position, R)]
 
 
 def quaternion(R):

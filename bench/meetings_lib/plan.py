@@ -1,0 +1,56 @@
+"""Which jobs the table takes: render each recording, VIO on it, the server on it alone and on each meeting in both orders."""
+
+import sys
+
+from accuracy_lib import plan as accuracy
+from accuracy_lib.jobs import OUT, Command
+from meetings_lib import ways
+from meetings_lib.worlds import MEETINGS, WORLDS
+from other_worlds_lib.plan import SPOIL, Spoiling
+
+
+class Plan(accuracy.Plan):
+    """Worlds and meetings as accuracy_lib's plan has recordings and pairs; `where` is always WHERE."""
+
+    WHERE = "worlds"
+
+    def meetings(self):
+        return [m for m in MEETINGS if not self.options.meetings or m.name in self.options.meetings]
+
+    def worlds(self):
+        wanted = {name for meeting in self.meetings() for name in meeting.names}
+        return [world for world in WORLDS if world.name in wanted]
+
+    def make(self):
+        for world in self.worlds():
+            recording = self._recording(world)
+            agent = self._vio(self.WHERE, world.name, 1 + WORLDS.index(world), recording, recording.folder)
+            self._server(self.WHERE, world.name, [agent])
+        for meeting in self.meetings():
+            agents = [self.agents[self.WHERE, name] for name in meeting.names]
+            self._server(self.WHERE, meeting.name, agents)
+            self._server(self.WHERE, meeting.name + " back", agents[::-1])
+        return self.jobs
+
+    def _recording(self, world):
+        render = self._rendering(world)
+        if world.lens != "phone":
+            return render
+        argv = [sys.executable, str(SPOIL), str(render.folder), "--out", OUT, "--what", "phone_imu"]
+        job = Spoiling("recording", world.name, self.work / "recordings" / world.name, [Command(argv)], needs=[render], outside=[SPOIL])
+        job.render = render
+        self.jobs.append(job)
+        return job
+
+    def _rendering(self, world):
+        kind, seed = world.scene
+        argv = [str(self.bin / "pangea-sim"), "--scene", kind, "--scene-seed", str(seed), "--path", f"{OUT}/{world.name}.tum"]
+        together = [other for other in WORLDS if other.scene == world.scene]
+        argv += ["--keep-clear", *(f"{OUT}/{other.name}.tum" for other in together)]
+        argv += ["--duration", f"{world.seconds:g}", "--camera", world.lens, "--image-rate", str(world.rate), *world.options]
+        argv += ["--out", OUT, "--seed", str(seed), "--threads", "1", "--no-cache"]
+        job = accuracy.RenderJob("render", world.name, self.work / "rendered" / world.name, [Command(argv)])
+        # A second more, of which the simulator takes what its exposure needs.
+        job.files = {f"{other.name}.tum": ways.tum(other.way, other.seconds + 1, other.lens) for other in together}
+        self.jobs.append(job)
+        return job
