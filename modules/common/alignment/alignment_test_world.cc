@@ -124,7 +124,8 @@ class AgentWalk {
       noise[3 + i] = Normal(random_, sigmas_odom[i]);
     }
     noise.tail<3>() = (R_from_odom * noise.tail<3>()).eval();
-    edge.T_from_this = T_from_this.Plus(noise);
+    edge.T_from_this =
+        Rigid3(T_from_this.q, std::exp(-options_.log_scale) * T_from_this.t).Plus(noise);
     return edge;
   }
 
@@ -149,7 +150,7 @@ class AgentWalk {
       if (tracked_[i]) {
         corner.landmark_id = static_cast<int32_t>(i);
         if (keyframe->points.size() < kMaxPoints) {
-          const double rho = 1.0 / p_cam.z();
+          const double rho = std::exp(options_.log_scale) / p_cam.z();
           const double sigma = options_.relative_depth_sigma * rho;
           const double measured = std::max(0.2 * rho, rho + Normal(random_, sigma));
           keyframe->points.push_back({static_cast<int>(keyframe->corners.size()),

@@ -41,6 +41,7 @@ struct TestAgentOptions {
   double edge_sigma_m = 0.003;
   double edge_sigma_rad = 0.0004;  // yaw; roll and pitch a quarter of it
   double odom_tilt = 0;            // radians: an odometry whose gravity is wrong
+  double log_scale = 0;            // the room is exp of it as large as the odometry says
   double detect_probability = 0.75;
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <utility>
@@ -130,6 +131,36 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   const auto none = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
   ASSERT_TRUE(none);
   EXPECT_FALSE(none->covariance_of_sure);
+}
+
+// What no number of corners averages out: a turn, and the step that looks the same at the points'
+// distance, the same in every direction.
+TEST_F(JointBaTest, SystematicErrorsAreAdded) {
+  options_.systematic_px = 0;
+  const auto without = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  options_.systematic_px = 0.5;
+  const auto with = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(without && with);
+  const Matrix6d added = with->covariance - without->covariance;
+  const double turn = 0.5 * c_.keyframe(c_.newest()).camera.PixelAngle();
+  EXPECT_LT((added.bottomRightCorner<3, 3>() - turn * turn * Eigen::Matrix3d::Identity()).norm(),
+            1e-6 * turn * turn);
+  const double step = std::sqrt(added(0, 0));
+  EXPECT_GT(step / turn, 2);  // the room is 4 to 6 m wide
+  EXPECT_LT(step / turn, 6);
+  EXPECT_LT((added.topLeftCorner<3, 3>() - step * step * Eigen::Matrix3d::Identity()).norm(),
+            1e-6 * step * step);
+}
+
+// Corners that find each other both ways count half each, and yet are as far off as they are: with
+// noise as it is claimed between one sigma an observation, where the point follows its corners, and
+// both dimensions' full ones.
+TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
+  options_.pixel_sigma = 0.3;
+  const auto result = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(result);
+  EXPECT_GT(result->rms_px, 0.3);
+  EXPECT_LT(result->rms_px, std::sqrt(2.0) * 0.3);
 }
 
 }  // namespace
