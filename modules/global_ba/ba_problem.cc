@@ -14,6 +14,10 @@ namespace {
 constexpr size_t kPoseSize = 7, kMotionSize = 9, kLandmarkSize = 3;
 constexpr int kMinObservations = 2;
 
+ceres::LossFunction* Weight(double weight) {
+  return new ceres::ScaledLoss(nullptr, weight, ceres::TAKE_OWNERSHIP);
+}
+
 }  // namespace
 
 void DropLonelyLandmarks(BaWorld* world) {
@@ -52,6 +56,7 @@ struct BaProblem::Solver {
   }
 
   void AddInertial(const BaWorld& world, const BaOptions& options);
+  void AddEdges(const BaWorld& world, const BaOptions& options);
   void AddCameras(const BaWorld& world, const BaOptions& options);
   void AddLandmarks(const BaWorld& world, ceres::LossFunction* loss);
 
@@ -59,6 +64,7 @@ struct BaProblem::Solver {
   // last digit, is the same in every run.
   std::vector<double> blocks;
   size_t motion_offset = 0, camera_offset = 0, landmark_offset = 0;
+  double edge_log_scale = 0;  // constant: an edge's length is taken as it is
   ceres::Problem problem;
   ceres::Solver::Options options;
 };
@@ -70,6 +76,7 @@ BaProblem::Solver::Solver(const BaWorld& world, const BaOptions& ba, ceres::Loss
   blocks.resize(landmark_offset + kLandmarkSize * world.landmarks.size());
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   AddInertial(world, ba);
+  AddEdges(world, ba);
   AddCameras(world, ba);
   AddLandmarks(world, loss);
   options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -90,12 +97,27 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
     options.linear_solver_ordering->AddElementToGroup(Pose(i), 1);
     options.linear_solver_ordering->AddElementToGroup(Motion(i), 1);
     if (keyframe.previous >= 0 && keyframe.preintegration) {
-      problem.AddResidualBlock(new InertialFactor(*keyframe.preintegration, ba.imu), nullptr,
+      problem.AddResidualBlock(new InertialFactor(*keyframe.preintegration, ba.imu),
+                               Weight(keyframe.edge ? 1 - ba.edge_weight : 1),
                                Pose(keyframe.previous), Motion(keyframe.previous), Pose(i),
                                Motion(i));
     } else {
       problem.AddResidualBlock(new BiasPriorFactor(ba.gyro_bias_sigma, ba.accel_bias_sigma),
                                nullptr, Motion(i));
+    }
+  }
+}
+
+void BaProblem::Solver::AddEdges(const BaWorld& world, const BaOptions& ba) {
+  problem.AddParameterBlock(&edge_log_scale, 1);
+  problem.SetParameterBlockConstant(&edge_log_scale);
+  options.linear_solver_ordering->AddElementToGroup(&edge_log_scale, 1);
+  for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
+    const BaKeyframe& keyframe = world.keyframes[i];
+    if (keyframe.previous >= 0 && keyframe.edge) {
+      problem.AddResidualBlock(
+          new EdgeFactor(keyframe.edge->T_previous_this, keyframe.edge->covariance),
+          Weight(ba.edge_weight), Pose(keyframe.previous), Pose(i), &edge_log_scale);
     }
   }
 }

@@ -2,15 +2,21 @@
 
 // The visual-inertial bundle adjustment of one group:
 //
-//   min  sum_seen rho(|r_landmark|^2) + sum_keyframes |r_inertial|^2
+//   min  sum_seen rho(|r_landmark|^2) + sum_keyframes ((1 - w) |r_inertial|^2 + w |r_edge|^2)
 //        + sum_maps |r_bias|^2 + |r_camera|^2
 //
 // over every keyframe's pose, velocity and biases, every landmark, and where each map's camera sits
 // on its IMU (ba_factors.h): an odometry finds that on its way, so early keyframes were made with a
-// poorer estimate than late ones. Landmarks are
-// eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with Cauchy's loss what
-// does not fit shows and is dropped, with Huber's the rest is estimated. Position and yaw of the
-// whole are free: damping leaves them where they began.
+// poorer estimate than late ones.
+//
+// An odometry edge was made of the same samples and rays, and of many images more between the
+// keyframes: without it the adjustment knows less of a map than its odometry did. How much of their
+// errors the two share is not known, so they are weighted as covariance intersection does (Julier
+// and Uhlmann, 1997), which holds whatever they share.
+//
+// Landmarks are eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with
+// Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated. Position
+// and yaw of the whole are free: damping leaves them where they began.
 //
 // In pieces of a few iterations, so that whoever runs it may look up in between and drop it. One
 // thread, no clock: the same world gives the same bytes.
@@ -24,14 +30,21 @@
 
 namespace pangea {
 
+struct BaEdge {
+  Rigid3 T_previous_this;
+  Matrix6d covariance = Matrix6d::Identity();
+};
+
 struct BaKeyframe {
   KeyframeId id;
   int64_t utime = 0;
   int camera = 0;  // of the world's
   ImuState imu;    // odom is the group's map frame here
-  // The IMU since keyframe `previous` of the world; none where a map or a piece of it begins.
+  // The IMU and the odometry since keyframe `previous` of the world; none where a map or a piece
+  // of it begins.
   int previous = -1;
   std::optional<Preintegration> preintegration;
+  std::optional<BaEdge> edge;
 };
 
 struct BaObservation {
@@ -62,6 +75,7 @@ struct BaOptions {
   double camera_position_sigma = 0.005;  // m
   double camera_rotation_sigma = 0.005;  // rad
   double loss_scale = 2.0;               // sigmas
+  double edge_weight = 0.5;              // w above; the inertial factor beside an edge has the rest
   double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
   int iterations_a_piece = 2;
   int max_iterations = 10;  // of each of the two rounds

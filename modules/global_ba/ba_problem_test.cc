@@ -45,6 +45,27 @@ TEST(BaProblem, FindsTheScaleThatTheStartHasWrong) {
   }
 }
 
+// Few and coarse rays: what an odometry made of many images more is not lost.
+TEST(BaProblem, KnowsNoLessThanItsOdometry) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    BaTestWorld world =
+        MakeBaTestWorld({.seed = seed, .landmarks = 25, .pixel_sigma = 3, .edge_sigma_m = 0.001});
+    const double with = WorstError(Solved(world.start), world.truth);
+    for (BaKeyframe& keyframe : world.start.keyframes) {
+      keyframe.edge.reset();
+    }
+    EXPECT_LT(with, 0.6 * WorstError(Solved(world.start), world.truth));
+  }
+}
+
+// Coarse edges take half the weight of the IMU, no more.
+TEST(BaProblem, CoarseEdgesDoNoHarm) {
+  const BaTestWorld without = MakeBaTestWorld({});
+  const BaTestWorld coarse = MakeBaTestWorld({.edge_sigma_m = 0.1});
+  EXPECT_LT(WorstError(Solved(coarse.start), coarse.truth),
+            1.5 * WorstError(Solved(without.start), without.truth));
+}
+
 TEST(BaProblem, OutliersDoNotMoveIt) {
   const BaTestWorld clean = MakeBaTestWorld({});
   const BaTestWorld dirty = MakeBaTestWorld({.outlier_share = 0.1});

@@ -81,9 +81,22 @@ class Maker {
       if (k > 0) {
         keyframe.previous = static_cast<int>(world_.keyframes.size()) - 2;
         keyframe.preintegration = Integrate(flight, t - options_.step_s, &gyro_bias, &accel_bias);
+        keyframe.edge = Edge(flight.Pose(t - options_.step_s).Inverse() * flight.Pose(t));
       }
       keyframe.imu = {flight.Pose(t), flight.Velocity(t), gyro_bias, accel_bias};
     }
+  }
+
+  std::optional<BaEdge> Edge(const Rigid3& T_previous_this) {
+    const double sigma = options_.edge_sigma_m;
+    if (sigma == 0) {
+      return std::nullopt;
+    }
+    Vector6d error, variance;
+    error << RandomVector(rng_, options_.noise * sigma),
+        RandomVector(rng_, 0.1 * options_.noise * sigma);
+    variance << Vector3d::Constant(sigma * sigma), Vector3d::Constant(0.01 * sigma * sigma);
+    return BaEdge{T_previous_this.Plus(error), variance.asDiagonal()};
   }
 
   // Integrated at zero bias; the biases wander meanwhile.
@@ -171,7 +184,7 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
     if (start.previous >= 0) {
       const Rigid3& T_previous = world.start.keyframes[start.previous].imu.T_odom_body;
       keyframe.edge = {start.id.seq - 1, T_previous.Inverse() * keyframe.T_odom_body,
-                       1e-4 * Matrix6d::Identity()};
+                       1e-3 * Matrix6d::Identity()};  // what the start errs from one to the next
       keyframe.preintegration = start.preintegration;
     } else {
       state.maps.push_back(start.id.map);

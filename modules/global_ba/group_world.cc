@@ -45,6 +45,7 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
       if (previous != index.end()) {
         start.previous = previous->second;
         start.preintegration = keyframe.preintegration;
+        start.edge = {keyframe.edge->T_from_this, keyframe.edge->covariance};
       }
     }
     index[id] = static_cast<int>(views.size());

@@ -81,6 +81,11 @@ class Culling {
     const BaKeyframe& keyframe = world_.keyframes[i];
     BaKeyframe& next = world_.keyframes[next_[i]];
     next.preintegration = Compose(*keyframe.preintegration, *next.preintegration);
+    if (keyframe.edge && next.edge) {
+      next.edge = {keyframe.edge->T_previous_this * next.edge->T_previous_this,
+                   ComposeCovariance(keyframe.edge->T_previous_this, keyframe.edge->covariance,
+                                     next.edge->T_previous_this, next.edge->covariance)};
+    }
     next.previous = keyframe.previous;
     next_[keyframe.previous] = next_[i];
   }

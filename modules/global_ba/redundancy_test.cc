@@ -49,6 +49,24 @@ TEST(Redundancy, WhatIsLeftIsOneChainWithoutLongGaps) {
   }
 }
 
+TEST(Redundancy, EdgesReachOverWhatWasCulled) {
+  const BaWorld world =
+      MakeBaTestWorld({.step_s = 0.2, .landmarks = 60, .edge_sigma_m = 0.01, .noise = 0}).truth;
+  const BaWorld culled = WithoutRedundant(world, None(world), {});
+  ASSERT_LT(culled.keyframes.size(), world.keyframes.size());
+  for (const BaKeyframe& keyframe : culled.keyframes) {
+    if (keyframe.previous < 0) {
+      continue;
+    }
+    const BaKeyframe& before = culled.keyframes[keyframe.previous];
+    const Rigid3 T_true = before.imu.T_odom_body.Inverse() * keyframe.imu.T_odom_body;
+    ASSERT_TRUE(keyframe.edge);
+    EXPECT_LT(keyframe.edge->T_previous_this.Minus(T_true).norm(), 1e-9);
+    const int steps = keyframe.id.seq - before.id.seq;
+    EXPECT_GE(keyframe.edge->covariance(0, 0), 0.99e-4 * steps);
+  }
+}
+
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
   std::vector<bool> needed = None(world);
