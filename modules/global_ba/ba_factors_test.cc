@@ -137,6 +137,33 @@ TEST(InertialFactor, DerivativesMatchDifferencesInEveryBlock) {
   }
 }
 
+// Noisy samples, wandering biases: at the truth the whitened residual is what it claims, 15 degrees
+// of freedom a span. In long spans most of it is what the biases wander within them.
+TEST(InertialFactor, IsChiSquaredAtTheTruth) {
+  for (const double step_s : {0.5, 2.0}) {
+    double sum = 0, degrees = 0;
+    for (uint64_t seed = 1; seed <= 5; ++seed) {
+      const BaWorld truth =
+          MakeBaTestWorld({.seed = seed, .keyframes = 30, .step_s = step_s, .landmarks = 1}).truth;
+      for (const BaKeyframe& to : truth.keyframes) {
+        if (to.previous < 0) {
+          continue;
+        }
+        double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
+        Blocks(truth.keyframes[to.previous].imu).Write(VectorXd::Zero(15), pose_a, motion_a);
+        Blocks(to.imu).Write(VectorXd::Zero(15), pose_b, motion_b);
+        const double* const blocks[] = {pose_a, motion_a, pose_b, motion_b};
+        VectorXd r(15);
+        EXPECT_TRUE(
+            InertialFactor(*to.preintegration, ImuNoise{}).Evaluate(blocks, r.data(), nullptr));
+        sum += r.squaredNorm();
+        degrees += 15;
+      }
+    }
+    EXPECT_NEAR(sum / degrees, 1, 0.1) << step_s;  // the floors of integration take a little
+  }
+}
+
 TEST(BiasPriorFactor, IsOneAtOneSigmaAndItsDerivativeMatches) {
   const BiasPriorFactor factor(0.05, 0.15);
   const auto evaluate = [&](const VectorXd& motion, double** jacobians) {

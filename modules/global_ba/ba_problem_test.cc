@@ -107,6 +107,20 @@ TEST(BaProblem, TheSameStartGivesTheSameBytes) {
   }
 }
 
+// By their rotation; of their position these flights say less than the prior does.
+TEST(BaProblem, FindsHowTheCamerasAreTurned) {
+  BaTestWorld world = MakeBaTestWorld({});
+  const Eigen::Quaterniond off = ExpSo3({0.004, -0.003, 0.003});
+  for (Rigid3& T_body_cam : world.start.T_body_cam) {
+    T_body_cam.q = off * T_body_cam.q;
+  }
+  const BaWorld solved = Solved(world.start);
+  for (size_t i = 0; i < solved.T_body_cam.size(); ++i) {
+    const Vector6d error = solved.T_body_cam[i].Minus(world.truth.T_body_cam[i]);
+    EXPECT_LT(error.tail<3>().norm(), 0.25 * LogSo3(off).norm());
+  }
+}
+
 // Dropping the work in the middle leaves a world that is no worse than the start.
 TEST(BaProblem, CanBeLeftAfterAnyPiece) {
   const BaTestWorld world = MakeBaTestWorld({});

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <map>
+#include <utility>
 
 #include "global_ba/ba_test_world.h"
 #include "global_ba/group_world.h"
@@ -108,6 +111,38 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
   }
 }
 
+// Where both corners are tracked, each track is seen at the other's: one measurement, half the
+// weight each.
+TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
+  const BaWorld world = Group().World();
+  std::map<int, int> owner;  // agent of each landmark: its own track comes first
+  std::map<std::pair<int, double>, double> own;
+  int matched = 0;
+  for (const BaObservation& seen : world.observations) {
+    if (owner.try_emplace(seen.landmark, seen.keyframe / kKeyframes).first->second ==
+        seen.keyframe / kKeyframes) {
+      own[{seen.keyframe, seen.ray.x()}] = seen.sqrt_info.norm();
+    }
+  }
+  const LandmarkOptions options;
+  const double ratio = std::sqrt(0.5) * options.track_sigma_px / options.match_sigma_px;
+  for (const BaObservation& seen : world.observations) {
+    const auto same_corner = own.find({seen.keyframe, seen.ray.x()});
+    if (owner.at(seen.landmark) != seen.keyframe / kKeyframes && same_corner != own.end()) {
+      EXPECT_NEAR(seen.sqrt_info.norm() / same_corner->second, ratio, 1e-6);
+      ++matched;
+    }
+  }
+  EXPECT_GT(matched, 10);
+}
+
+TEST(Landmarks, ATrackThatIsNotOnePointIsLeftOut) {
+  Group group;
+  const size_t all = group.World().landmarks.size();
+  group.messages.keyframes[2].corners.front().pixel += Eigen::Vector2f(60, 40);
+  EXPECT_EQ(group.World().landmarks.size(), all - 1);
+}
+
 TEST(Landmarks, AWrongMatchIsLeftOut) {
   Group group;
   const size_t right = group.World().observations.size();
@@ -148,6 +183,20 @@ TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
     const ImuState& odometry = group.truth.start.keyframes[i].imu;
     EXPECT_LT((got.v_odom_body - turned.q * odometry.v_odom_body).norm(), 1e-9);
     EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframes != 0);
+  }
+}
+
+// An odometry finds where its camera sits on its way: each map has what its last keyframe says.
+TEST(GroupWorld, EachMapHasItsLastCamera) {
+  Group group;
+  for (Keyframe& keyframe : group.messages.keyframes) {
+    keyframe.camera.T_body_cam.t.x() = 0.1 * keyframe.id.map.agent_id + 1e-6 * keyframe.id.seq;
+  }
+  const BaWorld world = group.World();
+  ASSERT_EQ(world.T_body_cam.size(), 2u);
+  for (int agent = 0; agent < 2; ++agent) {
+    EXPECT_DOUBLE_EQ(world.T_body_cam[agent].t.x(), 0.1 * (agent + 1) + 1e-6 * (kKeyframes - 1));
+    EXPECT_EQ(world.keyframes[agent * kKeyframes].camera, agent);
   }
 }
 

@@ -297,18 +297,26 @@ TEST(AlignerTest, RefusesHalvesThatDisagree) {
   EXPECT_EQ(Align(off, 9, m, 10, candidate).reason, "the halves of the view disagree");
 }
 
-TEST(AlignerTest, RefusesViewsThatDoNotOverlap) {
+// Each bar, set out of reach, refuses with its own reason what is accepted otherwise.
+TEST(AlignerTest, EachBarIsObeyed) {
   const auto room = MakeTestRoom({.seed = 4});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
   const TestAgent c = RunTestAgent(room, SecondAgent(0));
   const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
   ASSERT_TRUE(Align(c, 9, m, 10, candidate).accepted);
-  AlignmentOptions narrow, near;
-  narrow.max_view_angle = 0.05;
-  near.max_distance_m = 0.1;
-  for (const AlignmentOptions& options : {narrow, near}) {
-    EXPECT_EQ(Align(c, 9, m, 10, candidate, options).reason, "views do not overlap");
-  }
+  const auto reason = [&](const auto& set) {
+    AlignmentOptions options;
+    set(&options);
+    return Align(c, 9, m, 10, candidate, options).reason;
+  };
+  using Options = AlignmentOptions;
+  EXPECT_EQ(reason([](Options* o) { o->max_view_angle = 0.05; }), "views do not overlap");
+  EXPECT_EQ(reason([](Options* o) { o->max_distance_m = 0.1; }), "views do not overlap");
+  EXPECT_EQ(reason([](Options* o) { o->min_inlier_ratio = 1.1; }), "too many outliers");
+  EXPECT_EQ(reason([](Options* o) { o->min_occupied_cells = 25; }), "inliers too close together");
+  EXPECT_EQ(reason([](Options* o) { o->max_sigma_rad = 1e-6; }), "too uncertain");
+  EXPECT_EQ(reason([](Options* o) { o->max_tilt = 1e-9; }), "roll or pitch contradicts gravity");
+  EXPECT_EQ(reason([](Options* o) { o->min_found = 1000; }), "too few points found by projection");
 }
 
 TEST(AlignerTest, TheGateOfTheKindIsObeyed) {

@@ -163,5 +163,16 @@ TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
   EXPECT_LT(result->rms_px, std::sqrt(2.0) * 0.3);
 }
 
+// Pixels that claim six times too much are found out by their residuals.
+TEST_F(JointBaTest, TheCovarianceIsNeverSmallerThanTheResidualsSay) {
+  options_.systematic_px = 0;
+  options_.pixel_sigma = 0.3;
+  const auto honest = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  options_.pixel_sigma = 0.05;
+  const auto bold = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(honest && bold);
+  EXPECT_GT(bold->covariance.trace(), 0.5 * honest->covariance.trace());
+}
+
 }  // namespace
 }  // namespace pangea
