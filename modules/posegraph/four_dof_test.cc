@@ -134,6 +134,31 @@ TEST(MakeRelative4, CovarianceMatchesTheScatter) {
   EXPECT_NEAR(sum_inverse / kTrials, 4, 0.2);
 }
 
+// So does what the first keyframe's own tilt adds: the step is known in its body, and goes where
+// that is thought to point.
+TEST(MakeRelative4, TheTiltOfTheFirstMovesTheStep) {
+  Random random(5);
+  const Rigid3 T_from_to(ExpSo3({0.2, -0.1, 0.5}), {1, -2, 0.4});
+  const Matrix6d little = 1e-12 * Matrix6d::Identity();
+  const Eigen::Quaterniond q_odom_from = YawRotation(0.7) * ExpSo3({0.3, -0.2, 0});
+  const Eigen::Quaterniond q_odom_to = YawRotation(-1.1) * q_odom_from * T_from_to.q;
+  Eigen::Matrix2d tilt;
+  tilt << 4e-6, 1e-6, 1e-6, 2e-6;
+  const Eigen::Matrix2d L = tilt.llt().matrixL();
+  const Relative4 truth = MakeRelative4(T_from_to, little, q_odom_from, tilt, q_odom_to);
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  constexpr int kTrials = 5000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Eigen::Vector2d error = L * NormalVector(random, 1).head<2>();
+    const Eigen::Quaterniond q_believed = ExpSo3({error.x(), error.y(), 0}) * q_odom_from;
+    const Eigen::Vector3d moved =
+        MakeRelative4(T_from_to, little, q_believed, tilt, q_odom_to).t - truth.t;
+    scatter += moved * moved.transpose() / kTrials;
+  }
+  const Eigen::Matrix3d claimed = truth.covariance.topLeftCorner<3, 3>();
+  EXPECT_LT((scatter - claimed).norm(), 0.1 * claimed.norm());
+}
+
 TEST(Pose4, ComposesLikeATransform) {
   Random random(5);
   const Pose4 a = RandomPose(random), b = RandomPose(random);
