@@ -15,8 +15,8 @@
 // and Uhlmann, 1997), which holds whatever they share.
 //
 // Landmarks are eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with
-// Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated. Position
-// and yaw of the whole are free: damping leaves them where they began.
+// Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated.
+// Position and yaw of the whole are free: damping leaves them where they began.
 //
 // In pieces of a few iterations, so that whoever runs it may look up in between and drop it. One
 // thread, no clock: the same world gives the same bytes.
