@@ -51,6 +51,8 @@ struct BaProblem::Solver {
   double* Camera(int camera) {
     return &blocks[camera_offset + kPoseSize * static_cast<size_t>(camera)];
   }
+  // How much longer a map's edges are than they should be, as a logarithm; a map has one camera.
+  double* EdgeLogScale(int camera) { return &blocks[scale_offset + static_cast<size_t>(camera)]; }
   double* Landmark(int landmark) {
     return &blocks[landmark_offset + kLandmarkSize * static_cast<size_t>(landmark)];
   }
@@ -63,8 +65,7 @@ struct BaProblem::Solver {
   // All parameters in one piece: Ceres orders blocks by address, and so the order, and with it the
   // last digit, is the same in every run.
   std::vector<double> blocks;
-  size_t motion_offset = 0, camera_offset = 0, landmark_offset = 0;
-  double edge_log_scale = 0;  // constant: an edge's length is taken as it is
+  size_t motion_offset = 0, camera_offset = 0, scale_offset = 0, landmark_offset = 0;
   ceres::Problem problem;
   ceres::Solver::Options options;
 };
@@ -72,7 +73,8 @@ struct BaProblem::Solver {
 BaProblem::Solver::Solver(const BaWorld& world, const BaOptions& ba, ceres::LossFunction* loss) {
   motion_offset = kPoseSize * world.keyframes.size();
   camera_offset = motion_offset + kMotionSize * world.keyframes.size();
-  landmark_offset = camera_offset + kPoseSize * world.T_body_cam.size();
+  scale_offset = camera_offset + kPoseSize * world.T_body_cam.size();
+  landmark_offset = scale_offset + world.T_body_cam.size();
   blocks.resize(landmark_offset + kLandmarkSize * world.landmarks.size());
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   AddInertial(world, ba);
@@ -109,16 +111,17 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
 }
 
 void BaProblem::Solver::AddEdges(const BaWorld& world, const BaOptions& ba) {
-  problem.AddParameterBlock(&edge_log_scale, 1);
-  problem.SetParameterBlockConstant(&edge_log_scale);
-  options.linear_solver_ordering->AddElementToGroup(&edge_log_scale, 1);
   for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
     const BaKeyframe& keyframe = world.keyframes[i];
     if (keyframe.previous >= 0 && keyframe.edge) {
       problem.AddResidualBlock(
           new EdgeFactor(keyframe.edge->T_previous_this, keyframe.edge->covariance),
-          Weight(ba.edge_weight), Pose(keyframe.previous), Pose(i), &edge_log_scale);
+          Weight(ba.edge_weight), Pose(keyframe.previous), Pose(i), EdgeLogScale(keyframe.camera));
     }
+  }
+  for (int i = 0; i < static_cast<int>(world.T_body_cam.size()); ++i) {
+    problem.AddResidualBlock(new ScalePriorFactor(ba.edge_scale_sigma), nullptr, EdgeLogScale(i));
+    options.linear_solver_ordering->AddElementToGroup(EdgeLogScale(i), 1);
   }
 }
 

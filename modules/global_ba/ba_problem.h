@@ -3,7 +3,7 @@
 // The visual-inertial bundle adjustment of one group:
 //
 //   min  sum_seen rho(|r_landmark|^2) + sum_keyframes ((1 - w) |r_inertial|^2 + w |r_edge|^2)
-//        + sum_maps |r_bias|^2 + |r_camera|^2
+//        + sum_maps |r_bias|^2 + |r_camera|^2 + |r_scale|^2
 //
 // over every keyframe's pose, velocity and biases, every landmark, and where each map's camera sits
 // on its IMU (ba_factors.h): an odometry finds that on its way, so early keyframes were made with a
@@ -12,7 +12,8 @@
 // An odometry edge was made of the same samples and rays, and of many images more between the
 // keyframes: without it the adjustment knows less of a map than its odometry did. How much of their
 // errors the two share is not known, so they are weighted as covariance intersection does (Julier
-// and Uhlmann, 1997), which holds whatever they share.
+// and Uhlmann, 1997), which holds whatever they share. The edges of a map have their scale's error
+// in common, as none of their covariances can say: it is one unknown a map (ScalePriorFactor).
 //
 // Landmarks are eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with
 // Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated.
@@ -76,6 +77,7 @@ struct BaOptions {
   double camera_rotation_sigma = 0.005;  // rad
   double loss_scale = 2.0;               // sigmas
   double edge_weight = 0.5;              // w above; the inertial factor beside an edge has the rest
+  double edge_scale_sigma = 0.01;        // share by which all edges of a map may be too long
   double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
   int iterations_a_piece = 2;
   int max_iterations = 10;  // of each of the two rounds

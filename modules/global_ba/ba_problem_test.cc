@@ -58,6 +58,16 @@ TEST(BaProblem, KnowsNoLessThanItsOdometry) {
   }
 }
 
+// An odometry with its scale off has it off in every edge, whatever each of them claims.
+TEST(BaProblem, EdgesThatAreAllTooLongLeaveItsScaleAlone) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const BaTestWorld world =
+        MakeBaTestWorld({.seed = seed, .edge_sigma_m = 0.001, .edge_scale_error = 0.02});
+    const double true_length = PathLength(world.truth);
+    EXPECT_NEAR(PathLength(Solved(world.start)) / true_length, 1, 4e-3);
+  }
+}
+
 // Coarse edges take half the weight of the IMU, no more.
 TEST(BaProblem, CoarseEdgesDoNoHarm) {
   const BaTestWorld without = MakeBaTestWorld({});
@@ -100,7 +110,7 @@ TEST(BaProblem, ResidualsAreWhatTheyClaim) {
 }
 
 TEST(BaProblem, TheSameStartGivesTheSameBytes) {
-  const BaTestWorld world = MakeBaTestWorld({});
+  const BaTestWorld world = MakeBaTestWorld({.edge_sigma_m = 0.01});
   const BaWorld a = Solved(world.start), b = Solved(world.start);
   for (size_t i = 0; i < a.keyframes.size(); ++i) {
     EXPECT_EQ(a.keyframes[i].imu.T_odom_body.t, b.keyframes[i].imu.T_odom_body.t);

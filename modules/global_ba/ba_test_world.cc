@@ -96,7 +96,9 @@ class Maker {
     error << RandomVector(rng_, options_.noise * sigma),
         RandomVector(rng_, 0.1 * options_.noise * sigma);
     variance << Vector3d::Constant(sigma * sigma), Vector3d::Constant(0.01 * sigma * sigma);
-    return BaEdge{T_previous_this.Plus(error), variance.asDiagonal()};
+    Rigid3 T_measured = T_previous_this.Plus(error);
+    T_measured.t *= 1 + options_.edge_scale_error;
+    return BaEdge{T_measured, variance.asDiagonal()};
   }
 
   // Integrated at zero bias; the biases wander meanwhile.

@@ -22,8 +22,9 @@ struct BaTestOptions {
   double pixel_sigma = 0.5;  // of the rays, what they claim
   double outlier_share = 0;  // rays of somewhere else
   double edge_sigma_m = 0;   // of odometry edges, what they claim (rad: a tenth); 0: there are none
-  double noise = 1;          // 0: exact rays and samples
-  double scale_error = 0.02;  // of the start
+  double edge_scale_error = 0;  // of all edges
+  double noise = 1;             // 0: exact rays and samples
+  double scale_error = 0.02;    // of the start
   double start_sigma_m = 0.02;
 };
 

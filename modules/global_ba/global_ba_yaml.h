@@ -26,6 +26,7 @@ inline void Bind(YamlOptions& yaml, GlobalBaOptions& options) {
   ba.Add("camera_position_sigma", &options.ba.camera_position_sigma);
   ba.Add("camera_rotation_sigma", &options.ba.camera_rotation_sigma);
   ba.Add("edge_weight", &options.ba.edge_weight);
+  ba.Add("edge_scale_sigma", &options.ba.edge_scale_sigma);
   ba.Add("loss_scale", &options.ba.loss_scale);
   ba.Add("max_chi2", &options.ba.max_chi2);
   ba.Add("iterations_a_piece", &options.ba.iterations_a_piece);
