@@ -48,7 +48,7 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
     m->T_odom_body.translation.z = std::numeric_limits<double>::infinity();
   });
   publish(2, [](keyframe_t* m) { m->camera.height = 1 << 30; });
-  publish(2, [](keyframe_t* m) { m->camera.fx += 1; });
+  publish(2, [](keyframe_t* m) { m->camera.fx += 100; });
   publish(2, [](keyframe_t* m) { m->utime = 1; });
   publish(1, [](keyframe_t* m) { m->v_odom_body.x += 1; });
   PublishMessage(server_bus, "RESEND_REQUEST", resend_request_t{});

@@ -16,7 +16,7 @@ inline Keyframe TestKeyframe(const KeyframeId& id, int num_corners = 600) {
   keyframe.utime = 1'000'000 + 250'000 * static_cast<int64_t>(id.seq);
   keyframe.camera.width = 752;
   keyframe.camera.height = 480;
-  keyframe.camera.fx = keyframe.camera.fy = 458;
+  keyframe.camera.fx = keyframe.camera.fy = 458 + 0.001 * id.seq;  // a lens that focuses
   keyframe.camera.cx = 367;
   keyframe.camera.cy = 248;
   if (id.seq > 0) {

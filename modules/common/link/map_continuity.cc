@@ -5,10 +5,16 @@
 namespace pangea {
 namespace {
 
-// Extrinsics and time offset are refined as the agent walks; these are not.
+// Each keyframe carries the camera of its moment. Odometries refine mounting, time offset, focal
+// length and centre as they go, and a focusing lens moves the latter two: from infinity to 10 cm, a
+// phone's 7 mm lens by 7 per cent. Another lens, another size of image or a zoom is another camera.
+constexpr double kMaxChange = 0.1;  // of the focal length
+
 bool SameCamera(const CameraModel& a, const CameraModel& b) {
-  return a.kind == b.kind && a.width == b.width && a.height == b.height && a.fx == b.fx &&
-         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion &&
+  const Eigen::Array4d changes{(b.fx - a.fx) / a.fx, (b.fy - a.fy) / a.fy, (b.cx - a.cx) / a.fx,
+                               (b.cy - a.cy) / a.fy};
+  return a.kind == b.kind && a.width == b.width && a.height == b.height &&
+         (changes.abs() <= kMaxChange).all() && a.distortion == b.distortion &&
          a.readout_s == b.readout_s;
 }
 

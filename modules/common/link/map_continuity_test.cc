@@ -13,6 +13,7 @@ Keyframe At(int32_t seq, int64_t utime) {
   keyframe.id = {{1, 1000}, seq};
   keyframe.utime = utime;
   keyframe.camera.width = 640;
+  keyframe.camera.fx = keyframe.camera.fy = 500;
   return keyframe;
 }
 
@@ -36,16 +37,43 @@ TEST(MapContinuity, TimeGoesForwardWithSeq) {
   EXPECT_EQ(continuity.Check(other, 5), "") << "another map has its own time";
 }
 
-TEST(MapContinuity, OneCameraAMapButItsMountingMayBeRefined) {
+// An odometry that refines its calibration, and a lens that focuses.
+TEST(MapContinuity, AMapsCameraMayMoveALittle) {
   MapContinuity continuity;
   continuity.Check(At(0, 100), 5);
   Keyframe keyframe = At(1, 200);
   keyframe.camera.T_body_cam.t.x() += 0.01;
   keyframe.camera.time_offset_s = 0.001;
   EXPECT_EQ(continuity.Check(keyframe, 5), "");
-  keyframe = At(2, 300);
-  keyframe.camera.fx += 1;
-  EXPECT_THAT(continuity.Check(keyframe, 5), HasSubstr("another camera"));
+  int32_t seq = 2;
+  for (double CameraModel::*const moves :
+       {&CameraModel::fx, &CameraModel::fy, &CameraModel::cx, &CameraModel::cy}) {
+    for (const double pixels : {-40.0, 0.01, 40.0}) {
+      keyframe = At(seq, 100 * seq + 100);
+      keyframe.camera.*moves += pixels;
+      EXPECT_EQ(continuity.Check(keyframe, 5), "") << seq;
+      ++seq;
+    }
+  }
+}
+
+TEST(MapContinuity, AnotherCameraIsRefused) {
+  MapContinuity continuity;
+  continuity.Check(At(0, 100), 5);
+  const auto refuses = [&](auto&& change) {
+    Keyframe keyframe = At(1, 200);
+    change(&keyframe.camera);
+    EXPECT_THAT(continuity.Check(keyframe, 5), HasSubstr("another camera"));
+  };
+  refuses([](CameraModel* camera) { camera->kind = CameraModel::Kind::kEquidistant; });
+  refuses([](CameraModel* camera) { camera->width = 752; });
+  refuses([](CameraModel* camera) { camera->height = 480; });
+  refuses([](CameraModel* camera) { camera->fx += 60; });
+  refuses([](CameraModel* camera) { camera->fy -= 60; });
+  refuses([](CameraModel* camera) { camera->cx += 60; });
+  refuses([](CameraModel* camera) { camera->cy -= 60; });
+  refuses([](CameraModel* camera) { camera->distortion[3] = 0.01; });
+  refuses([](CameraModel* camera) { camera->readout_s = 0.02; });
 }
 
 TEST(MapContinuity, ASeqIsUsedOnce) {
