@@ -32,6 +32,8 @@ constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
 constexpr int kMaxIterations = 4;
+// A start has no solution of the image before: where it knows little, four end half way.
+constexpr int kStartIterations = 20;
 // A landmark is an outlier when its newest ray is this far off, or all of them together.
 constexpr double kMaxRayError = 5.0;     // sigmas
 constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
@@ -89,7 +91,7 @@ struct Estimator::Impl {
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropPassing();
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
-  std::vector<int32_t> Solve();
+  std::vector<int32_t> Solve(int max_iterations);
   void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
@@ -201,9 +203,9 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
 }
 
 // Optimises the window; the tracks that turned out to be outliers.
-std::vector<int32_t> Estimator::Impl::Solve() {
+std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   problem.landmarks = landmarks.Gather(problem.state, history);
-  Optimise(problem, kMaxIterations);
+  Optimise(problem, max_iterations);
   std::vector<int32_t> outliers;
   const int newest = problem.state.Newest();
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
@@ -344,7 +346,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
       return result;
     }
     Start(*initial.state);
-    Solve();
+    Solve(kStartIterations);
   } else {
     const double gap_s = Seconds(frame.utime - Newest().utime);
     if (gap_s > kMaxFrameGap_s) {
@@ -353,7 +355,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
     if (const auto wrong = AddToWindow(frame)) {
       return fail(*wrong);
     }
-    result.outlier_landmarks = Solve();
+    result.outlier_landmarks = Solve(kMaxIterations);
   }
   if (const auto wrong = Implausible()) {
     return fail(*wrong);
@@ -393,6 +395,11 @@ CameraModel Estimator::camera() const {
   CameraModel camera = impl_->camera;
   camera.T_body_cam = impl_->problem.state.T_body_cam;
   camera.time_offset_s = impl_->problem.state.time_offset_s;
+  const Eigen::Vector3d& intrinsics = impl_->problem.state.intrinsics;
+  camera.cx += camera.fx * intrinsics.y();
+  camera.cy += camera.fy * intrinsics.z();
+  camera.fx *= 1 + intrinsics.x();
+  camera.fy *= 1 + intrinsics.x();
   return camera;
 }
 

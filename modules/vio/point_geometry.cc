@@ -57,7 +57,8 @@ std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const Frame
   Vector3d b = Vector3d::Zero();
   for (const FrameRay& seen : rays) {
     const Rigid3 T_odom_cam = CameraPose(state, seen);
-    const Vector3d d = (T_odom_cam.q * Vector3d(seen.ray.x(), seen.ray.y(), 1)).normalized();
+    const Vector2d ray = seen.RayBy(state);
+    const Vector3d d = (T_odom_cam.q * Vector3d(ray.x(), ray.y(), 1)).normalized();
     const Matrix3d across = Matrix3d::Identity() - d * d.transpose();
     A += across;
     b += across * T_odom_cam.t;
@@ -77,7 +78,7 @@ std::optional<Vector2d> PredictRayOnly(const WindowState& state, const AnchoredP
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
   }
-  return Vector2d(y.head<2>() / y.z());
+  return seen.AsGiven(state, y.head<2>() / y.z());
 }
 
 std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredPoint& point,
@@ -97,11 +98,12 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredP
   }
   const Matrix3d R_cam_odom = R_cam_body * T_c.R().transpose();
   const Matrix3d R_body_anchor = (T_c.q.conjugate() * T_a.q).toRotationMatrix();
-  const Eigen::Matrix<double, 2, 3> J = RayJacobian(y);
+  const Eigen::Matrix<double, 2, 3> J = (1 + state.intrinsics.x()) * RayJacobian(y);
   const Eigen::Matrix<double, 2, 3> J_odom = J * R_cam_odom;
 
   PredictedRay out;
-  out.ray = y.head<2>() / y.z();
+  const Vector2d ray = y.head<2>() / y.z();
+  out.ray = seen.AsGiven(state, ray);
   out.J_frame << J_odom * Hat(p_odom), -J_odom;
   out.J_anchor = -out.J_frame;
   out.J_calibration.leftCols<3>() =
@@ -109,6 +111,8 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredP
   out.J_calibration.middleCols<3>(3) = J * R_cam_body * (R_body_anchor - Matrix3d::Identity());
   out.J_calibration.col(kTimeOffset) =
       out.J_frame * Motion(frame, T_c) + out.J_anchor * Motion(anchor, T_a);
+  out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;
+  out.J_calibration.col(kIntrinsics) += ray - seen.ray;
   out.J_point = J * R_cam_body * R_body_anchor * T_bc.R() * PointJacobian(point.ray_rho);
   return out;
 }
@@ -138,7 +142,7 @@ std::optional<Triangulated> Triangulate(const WindowState& state, std::span<cons
       if (!(y.z() > kMinDepth)) {
         return std::nullopt;
       }
-      const Vector2d r = (seen.ray - y.head<2>() / y.z()) / seen.sigma;
+      const Vector2d r = (seen.RayBy(state) - y.head<2>() / y.z()) / seen.sigma;
       const Eigen::Matrix<double, 2, 3> J =
           RayJacobian(y) * CameraPose(state, seen).R().transpose() * R_odom_anchor *
           PointJacobian(out.point.ray_rho) / seen.sigma;

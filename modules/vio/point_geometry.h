@@ -14,10 +14,22 @@ namespace pangea::vio {
 
 // An observation of one point in one frame of the window.
 struct FrameRay {
-  int frame = 0;  // index into WindowState::frames
-  Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+  int frame = 0;                                  // index into WindowState::frames
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // by the given intrinsics
   double sigma = 0;
   double row_s = 0;  // the row's exposure after the image's time (rolling shutter)
+  // d(ray)/d(WindowState::intrinsics), which are small: what the pixel's ray is by other ones.
+  Eigen::Matrix<double, 2, 3> J_intrinsics = Eigen::Matrix<double, 2, 3>::Zero();
+
+  Eigen::Vector2d RayBy(const WindowState& state) const {
+    return ray + J_intrinsics * state.intrinsics / (1 + state.intrinsics.x());
+  }
+  // The other way, of a ray near this one: what it is by the given intrinsics. The focal length
+  // acts on that ray, not on the measured one: with this one's noise in its derivative a longer
+  // focal length would make noise smaller, and be found (regression dilution).
+  Eigen::Vector2d AsGiven(const WindowState& state, const Eigen::Vector2d& predicted) const {
+    return predicted - J_intrinsics * state.intrinsics + state.intrinsics.x() * (predicted - ray);
+  }
 };
 
 // A point by its ray (alpha, beta, 1) and inverse depth rho in the camera that took its anchor's
@@ -31,8 +43,9 @@ struct AnchoredPoint {
   }
 };
 
-// Where a point should be seen, and d(ray) by the errors of the anchor's pose, the seeing frame's
-// pose, the calibration, and (alpha, beta, rho). In its own anchor the two pose blocks cancel.
+// Where a point should be seen by the given intrinsics, and d(ray) by the errors of the anchor's
+// pose, the seeing frame's pose, the calibration, and (alpha, beta, rho). In its own anchor the two
+// pose blocks cancel.
 struct PredictedRay {
   Eigen::Vector2d ray;
   Eigen::Matrix<double, 2, kPoseSize> J_anchor, J_frame;

@@ -16,6 +16,8 @@ std::deque<Ride> MakeTenRides() {
     options.seed = seed;
     options.extrinsics_rotation_sigma = 0.002;
     options.extrinsics_position_sigma = 0.002;
+    options.focal_sigma = 0.001;
+    options.centre_sigma = 0.001;
     Ride& ride = rides.emplace_back(options);
     ride.Advance(150);
     ride.Flush();

@@ -1,5 +1,6 @@
 #include "vio/track_history.h"
 
+#include <Eigen/LU>
 #include <limits>
 #include <set>
 #include <utility>
@@ -11,6 +12,20 @@ namespace {
 
 constexpr size_t kMinShared = 15;  // landmarks that tell whether an image stands still
 
+// Another focal length or centre is as good as another pixel: (pixel - c) e + f d further in.
+Eigen::Matrix<double, 2, 3> ByIntrinsics(const Observation& observation,
+                                         const CameraModel& camera) {
+  Eigen::Matrix<double, 2, 3> J_pixel;  // d(pixel)/d(ray, 1)
+  const Eigen::Vector3d ray(observation.ray.x(), observation.ray.y(), 1);
+  const auto pixel = camera.Project(ray, &J_pixel);
+  if (!pixel) {
+    return Eigen::Matrix<double, 2, 3>::Zero();
+  }
+  Eigen::Matrix<double, 2, 3> further;
+  further << pixel->x() - camera.cx, camera.fx, 0, pixel->y() - camera.cy, 0, camera.fy;
+  return -J_pixel.leftCols<2>().inverse() * further;
+}
+
 }  // namespace
 
 void TrackHistory::AddFrame(const TrackedFrame& frame, const CameraModel& camera,
@@ -19,7 +34,8 @@ void TrackHistory::AddFrame(const TrackedFrame& frame, const CameraModel& camera
   const double row_s = camera.height > 1 ? camera.readout_s / (camera.height - 1) : 0;
   for (const Observation& observation : frame.observations) {
     seen[observation.landmark_id] = {-1, observation.ray, ray_sigma * observation.sigma_px,
-                                     row_s * static_cast<double>(observation.pixel.y())};
+                                     row_s * static_cast<double>(observation.pixel.y()),
+                                     ByIntrinsics(observation, camera)};
   }
 }
 

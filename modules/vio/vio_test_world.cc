@@ -48,6 +48,14 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
       ExpSo3(RandomVector(rng_, options.extrinsics_rotation_sigma)) * camera_.T_body_cam.q;
   true_T_body_cam_.t = camera_.T_body_cam.t + RandomVector(rng_, options.extrinsics_position_sigma);
   true_time_offset_s_ = RandomVector(rng_, options.time_offset_sigma).x();
+  true_intrinsics_ = camera_;
+  std::mt19937_64 intrinsics_rng(options.seed);  // of its own: the world stays as it is
+  const double longer = 1 + RandomVector(intrinsics_rng, options.focal_sigma).x();
+  const Vector3d centre = RandomVector(intrinsics_rng, options.centre_sigma);
+  true_intrinsics_.cx += camera_.fx * centre.x();
+  true_intrinsics_.cy += camera_.fy * centre.y();
+  true_intrinsics_.fx *= longer;
+  true_intrinsics_.fy *= longer;
   phase_ = RandomVector(rng_, 2);
   gyro_bias_ = RandomVector(rng_, 0.02);
   accel_bias_ = RandomVector(rng_, 0.05);
@@ -105,7 +113,7 @@ std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& 
   if (p_cam.z() < 0.3 || p_cam.z() > kSight_m) {
     return std::nullopt;
   }
-  const auto pixel = camera_.Project(p_cam);
+  const auto pixel = true_intrinsics_.Project(p_cam);
   return pixel && camera_.Contains(*pixel, 5) ? pixel : std::nullopt;
 }
 

@@ -48,6 +48,8 @@ struct VioTestWorldOptions {
   double extrinsics_rotation_sigma = 0;  // rad
   double extrinsics_position_sigma = 0;  // m
   double time_offset_sigma = 0;          // s
+  double focal_sigma = 0;                // of the focal length
+  double centre_sigma = 0;               // of the focal length
 };
 
 class VioTestWorld {
@@ -64,6 +66,7 @@ class VioTestWorld {
 
   const VioTestWorldOptions& options() const { return options_; }
   CameraModel camera() const { return camera_; }  // as the estimator is given it
+  const CameraModel& true_intrinsics() const { return true_intrinsics_; }
   const Rigid3& true_T_body_cam() const { return true_T_body_cam_; }
   double true_time_offset_s() const { return true_time_offset_s_; }
   // The body when an image of the past was taken.
@@ -87,6 +90,7 @@ class VioTestWorld {
   VioTestWorldOptions options_;
   std::mt19937_64 rng_;
   CameraModel camera_;
+  CameraModel true_intrinsics_;
   Rigid3 true_T_body_cam_;
   double true_time_offset_s_ = 0;
   Eigen::Vector3d phase_ = Eigen::Vector3d::Zero();

@@ -48,10 +48,13 @@ void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int 
   const Eigen::Matrix<double, 2, 3> J_point = scale * predicted.J_point;
   out->V += J_point.transpose() * J_point;
   out->g_point += J_point.transpose() * r;
+  const Eigen::Matrix<double, 2, kCalibrationSize> J_c = scale * predicted.J_calibration;
+  out->H.topLeftCorner<kCalibrationSize, kCalibrationSize>() += J_c.transpose() * J_c;
+  out->W.leftCols<kCalibrationSize>() += J_point.transpose() * J_c;
+  out->g.head<kCalibrationSize>() += J_c.transpose() * r;
   if (at_anchor == at_frame) {
     return;  // in its own anchor a point is where its ray is, wherever the frames are
   }
-  const Eigen::Matrix<double, 2, kCalibrationSize> J_c = scale * predicted.J_calibration;
   const Eigen::Matrix<double, 2, kPoseSize> J_a =
       scale * predicted.J_anchor;  // the frame's is -J_a
   const Eigen::Matrix<double, kPoseSize, kPoseSize> A = J_a.transpose() * J_a;
@@ -59,7 +62,6 @@ void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int 
   const Eigen::Matrix<double, 3, kPoseSize> W_a = J_point.transpose() * J_a;
   const Eigen::Matrix<double, kPoseSize, 1> g_a = J_a.transpose() * r;
   MatrixXd& H = out->H;
-  H.topLeftCorner<kCalibrationSize, kCalibrationSize>() += J_c.transpose() * J_c;
   H.block<kCalibrationSize, kPoseSize>(0, at_anchor) += C;
   H.block<kPoseSize, kCalibrationSize>(at_anchor, 0) += C.transpose();
   H.block<kCalibrationSize, kPoseSize>(0, at_frame) -= C;
@@ -68,10 +70,8 @@ void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int 
   H.block<kPoseSize, kPoseSize>(at_anchor, at_frame) -= A;
   H.block<kPoseSize, kPoseSize>(at_frame, at_anchor) -= A;
   H.block<kPoseSize, kPoseSize>(at_frame, at_frame) += A;
-  out->W.leftCols<kCalibrationSize>() += J_point.transpose() * J_c;
   out->W.middleCols<kPoseSize>(at_anchor) += W_a;
   out->W.middleCols<kPoseSize>(at_frame) -= W_a;
-  out->g.head<kCalibrationSize>() += J_c.transpose() * r;
   out->g.segment<kPoseSize>(at_anchor) += g_a;
   out->g.segment<kPoseSize>(at_frame) -= g_a;
 }

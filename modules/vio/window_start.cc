@@ -13,6 +13,8 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 constexpr double kExtrinsicsRotationSigma = 0.005;  // rad
 constexpr double kExtrinsicsPositionSigma = 0.005;  // m
 constexpr double kTimeOffsetSigma = 0.005;          // s
+constexpr double kFocalSigma = 0.001;               // of the focal length
+constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
 
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
 constexpr double kTiltSigma = 0.5;        // rad
@@ -35,7 +37,8 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance) {
   MatrixXd P = MatrixXd::Zero(n, n);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
-      Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma;
+      Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
+      kCentreSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
   P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
   // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix

@@ -33,6 +33,7 @@ void WindowState::Retract(const VectorXd& error) {
   T_body_cam.q = (ExpSo3(error.segment<3>(kExtrinsics)) * T_body_cam.q).normalized();
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
+  intrinsics += error.segment<3>(kIntrinsics);
   int at = kCalibrationSize;
   for (WindowFrame& frame : frames) {
     const Quaterniond turn = ExpSo3(error.segment<3>(at + kTheta));
@@ -52,6 +53,7 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
   e.segment<3>(kExtrinsics) = LogSo3(a.T_body_cam.q * b.T_body_cam.q.conjugate());
   e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
   e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
+  e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
   int at = kCalibrationSize;
   for (size_t i = 0; i < b.frames.size(); ++i) {
     const ImuState& x = a.frames[i].imu;

@@ -22,9 +22,10 @@ namespace pangea::vio {
 
 // One frame's error is laid out as in common/inertial_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
-// The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset.
-inline constexpr int kExtrinsics = 0, kTimeOffset = 6;
-inline constexpr int kCalibrationSize = 7;
+// The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
+// intrinsics.
+inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
+inline constexpr int kCalibrationSize = 10;
 
 // A frame of the window: the body at the image's time as the time offset stood when it came.
 struct WindowFrame {
@@ -45,7 +46,10 @@ struct WindowFrame {
 
 struct WindowState {
   Rigid3 T_body_cam;
-  double time_offset_s = 0;         // t_imu = t_image + time_offset_s
+  double time_offset_s = 0;  // t_imu = t_image + time_offset_s
+  // Of the given camera: how much longer its focal length is, as a share of it, and where its
+  // centre is, in focal lengths (x, y).
+  Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
   std::vector<WindowFrame> frames;  // oldest first
 
   int Offset(int frame) const;

@@ -46,8 +46,13 @@ Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions&
     seen.frame = i;
     seen.sigma = kRaySigma;
     seen.row_s = i == anchor ? landmark.point.anchor_row_s : row(rng);
+    seen.J_intrinsics << RandomVector(rng, 1).transpose(), RandomVector(rng, 1).transpose();
     const Vector3d noise = RandomVector(rng, options.ray_noise * kRaySigma);
-    seen.ray = PredictRayOnly(state, landmark.point, seen).value() + noise.head<2>();
+    // Where the prediction is the ray itself.
+    for (int k = 0; k < 20; ++k) {
+      seen.ray = PredictRayOnly(state, landmark.point, seen).value();
+    }
+    seen.ray += noise.head<2>();
     landmark.rays.push_back(seen);
   }
   return landmark;
@@ -80,6 +85,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   // A little askew.
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
+  state.intrinsics = RandomVector(rng, 0.01);
   state.frames = {FirstFrame(0.002, rng)};
   problem.links.resize(1);
   for (int i = 0; i < options.frames; ++i) {
