@@ -187,6 +187,46 @@ TEST(AlignerTest, RefusesWhatContradictsGravity) {
   }
 }
 
+// The images' tilt is weighed by how well they know it about that axis: about the line of sight
+// they know a turn less well than about the others.
+TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
+  const auto room = MakeTestRoom({.seed = 6});
+  const TestAgent m = RunTestAgent(room, FirstAgent(0));
+  AlignmentOptions options;
+  options.gravity_floor = 0;
+  options.max_tilt_chi2 = 1e9;
+  TestAgentOptions tilted = SecondAgent(0);
+  tilted.odom_tilt = 0.018;
+  const TestAgent c = RunTestAgent(room, tilted);
+  SubmapStore store;
+  for (const TestAgent* agent : {&m, &c}) {
+    for (Keyframe keyframe : agent->keyframes) {
+      keyframe.roll_pitch_covariance.setZero();
+      store.Add(keyframe);
+    }
+  }
+  const auto frames_m = store.WindowUpTo(m.keyframes[10].id, options.surroundings_keyframes);
+  const auto frames_c = store.WindowUpTo(c.keyframes[9].id, options.surroundings_keyframes);
+  AlignmentReport report;
+  const Constraint constraint = Aligner(options).Align(
+      frames_m, frames_c, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);
+  ASSERT_TRUE(constraint.accepted) << constraint.reason;
+
+  const Eigen::Quaterniond q_m = m.keyframes[10].T_odom_body.q, q_c = c.keyframes[9].T_odom_body.q;
+  const Eigen::Quaterniond q_m_c = q_m * constraint.T_from_to.q * q_c.conjugate();
+  const Eigen::Vector3d up = q_m_c * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d turn =
+      LogSo3(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up));
+  const Eigen::Matrix3d of_turn =
+      q_m * constraint.covariance.bottomRightCorner<3, 3>() * q_m.conjugate();
+  const Eigen::Matrix2d information = of_turn.topLeftCorner<2, 2>().inverse();
+  const double chi2 = turn.head<2>().dot(information * turn.head<2>());
+  EXPECT_NEAR(report.tilt, turn.norm(), 1e-4);
+  EXPECT_NEAR(report.tilt_chi2 / chi2, 1, 0.01);
+  const Eigen::Vector2d across(-turn.y(), turn.x());
+  EXPECT_GT(std::abs(across.dot(information * across) / chi2 - 1), 0.1) << "then axes would matter";
+}
+
 TEST(AlignerTest, RefusesTooFewPoints) {
   const auto room = MakeTestRoom({.seed = 7, .num_points = 150});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));

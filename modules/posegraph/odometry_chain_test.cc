@@ -1,0 +1,59 @@
+#include "posegraph/odometry_chain.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace pangea {
+namespace {
+
+constexpr double kSigma_m = 0.02, kSigmaYaw = 0.01;  // of each step
+const Eigen::Vector3d kStep(0.3, 0.4, 0);            // metres, the same in body and odom
+
+Keyframe Along(int seq) {
+  Keyframe keyframe;
+  keyframe.id = {{1, 1000}, seq};
+  keyframe.T_odom_body.t = seq * kStep;
+  keyframe.roll_pitch_covariance.setZero();
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(kSigma_m * kSigma_m), 1e-12, 1e-12, kSigmaYaw * kSigmaYaw;
+  keyframe.edge =
+      OdometryEdge{seq - 1, {Eigen::Quaterniond::Identity(), kStep}, variances.asDiagonal()};
+  return keyframe;
+}
+
+// As far off as the steps that nobody has: each one's own error, and its turn of all that follows.
+TEST(OdometryChain, AGapIsAsUncertainAsItsSteps) {
+  constexpr int kFrom = 60, kSteps = 9;
+  OdometryChain chain;
+  for (int seq = 0; seq <= kFrom; ++seq) {
+    ASSERT_TRUE(chain.Add(Along(seq)));
+  }
+  EXPECT_EQ(chain.num_bridged(), 0);
+  ASSERT_TRUE(chain.Add(Along(kFrom + kSteps)));
+  EXPECT_EQ(chain.num_bridged(), 1);
+  const OdometryChain::Node& node = chain[chain.size() - 1];
+  EXPECT_EQ(node.edge_from, kFrom);
+  EXPECT_LT((node.edge.t - kSteps * kStep).norm(), 1e-9);
+  EXPECT_EQ(node.edge.yaw, 0);
+
+  Matrix4d steps = Matrix4d::Zero();
+  for (int after = 0; after < kSteps; ++after) {  // steps that follow
+    Matrix4d J = Matrix4d::Identity();            // d(t, yaw)/d(this step's)
+    J.topRightCorner<3, 1>() = after * Eigen::Vector3d(-kStep.y(), kStep.x(), 0);
+    Vector4d variances = Vector4d::Constant(kSigma_m * kSigma_m);
+    variances[3] = kSigmaYaw * kSigmaYaw;
+    steps += J * variances.asDiagonal() * J.transpose();
+  }
+  // Each turn is taken at the middle of the gap, not where it was.
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      EXPECT_NEAR(node.edge.covariance(i, j), steps(i, j),
+                  0.15 * std::sqrt(steps(i, i) * steps(j, j)))
+          << i << ", " << j;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pangea
