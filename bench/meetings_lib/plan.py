@@ -1,12 +1,10 @@
 """Which jobs the table takes: render each recording, VIO on it, the server on it alone and on each meeting in both orders."""
 
-import sys
-
 from accuracy_lib import plan as accuracy
 from accuracy_lib.jobs import OUT, Command
 from meetings_lib import ways
 from meetings_lib.worlds import MEETINGS, WORLDS
-from other_worlds_lib.plan import SPOIL, Spoiling
+from other_worlds_lib.plan import Spoiling
 
 
 class Plan(accuracy.Plan):
@@ -34,13 +32,7 @@ class Plan(accuracy.Plan):
 
     def _recording(self, world):
         render = self._rendering(world)
-        if world.lens != "phone":
-            return render
-        argv = [sys.executable, str(SPOIL), str(render.folder), "--out", OUT, "--what", "phone_imu"]
-        job = Spoiling("recording", world.name, self.work / "recordings" / world.name, [Command(argv)], needs=[render], outside=[SPOIL])
-        job.render = render
-        self.jobs.append(job)
-        return job
+        return Spoiling.added(self, world.name, render, ["phone_imu"]) if world.lens == "phone" else render
 
     def _rendering(self, world):
         kind, seed = world.scene

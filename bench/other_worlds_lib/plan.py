@@ -89,13 +89,7 @@ class Plan(accuracy.Plan):
     def _recording(self, world):
         source = next(w for w in WORLDS if w.name == world.source) if world.source else world
         render = self.renders.get(source.name) or self._rendering(source)
-        if not world.spoiled:
-            return render
-        argv = [sys.executable, str(SPOIL), str(render.folder), "--out", OUT, "--what", *world.spoiled]
-        job = Spoiling("recording", world.name, self.work / "recordings" / world.name, [Command(argv)], needs=[render], outside=[SPOIL])
-        job.render = render
-        self.jobs.append(job)
-        return job
+        return Spoiling.added(self, world.name, render, world.spoiled) if world.spoiled else render
 
     def _rendering(self, world):
         kind, seed = world.scene
@@ -125,6 +119,14 @@ class Plan(accuracy.Plan):
 
 class Spoiling(Job):
     """Its images are those of the rendering it is made of, so who uses it uses that."""
+
+    @classmethod
+    def added(cls, plan, name, render, spoilers):
+        argv = [sys.executable, str(SPOIL), str(render.folder), "--out", OUT, "--what", *spoilers]
+        job = cls("recording", name, plan.work / "recordings" / name, [Command(argv)], needs=[render], outside=[SPOIL])
+        job.render = render
+        plan.jobs.append(job)
+        return job
 
     @property
     def users(self):
