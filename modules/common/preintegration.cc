@@ -13,11 +13,10 @@ Preintegrator::Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_
   result_.accel_bias = accel_bias;
 }
 
-Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
-  Step out;
+void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   const double dt = 1e-6 * static_cast<double>(b.utime - a.utime);
   if (dt <= 0) {
-    return out;
+    return;
   }
   Preintegration& p = result_;
   const Eigen::Vector3d omega = 0.5 * (a.gyro + b.gyro) - p.gyro_bias;
@@ -31,14 +30,14 @@ Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
 
   // Error transition, order (rotation, velocity, position): Forster et al., appendix, with the
   // force taken at the middle.
-  Eigen::Matrix<double, 9, 9>& A = out.A;
+  Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
   const Eigen::Matrix3d dv_dtheta = -R_hat * half_R.transpose() * dt;
   A.block<3, 3>(0, 0) = step.toRotationMatrix().transpose();
   A.block<3, 3>(3, 0) = dv_dtheta;
   A.block<3, 3>(6, 0) = 0.5 * dt * dv_dtheta;
   A.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
 
-  Eigen::Matrix<double, 9, 6>& B = out.B;  // wrt (gyro, accel)
+  Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();  // wrt (gyro, accel)
   const Eigen::Matrix3d dtheta_dgyro = RightJacobian(dt * omega) * dt;
   const Eigen::Matrix3d dv_dgyro = -R_hat * RightJacobian(0.5 * dt * omega) * 0.5 * dt * dt;
   B.block<3, 3>(0, 0) = dtheta_dgyro;
@@ -58,7 +57,6 @@ Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   p.delta_v += dv;
   p.delta_q = (p.delta_q * step).normalized();
   p.duration_s += dt;
-  return out;
 }
 
 void Preintegrator::Add(std::span<const ImuSample> samples) {

@@ -94,13 +94,9 @@ void EurocWriter::WriteImuCalibration(const ImuNoise& noise) const {
                       "accelerometer_noise_density: {:.4e} # [ m / s^2 / sqrt(Hz) ]   ( accel "
                       "\"white noise\" )\n"
                       "accelerometer_random_walk: {:.4e}   # [ m / s^3 / sqrt(Hz) ].  ( accel bias "
-                      "diffusion )\n"
-                      "# not in EuRoC: what scales (a share) and axes (rad) may be off\n"
-                      "gyroscope_scale_sigma: {:g}\naccelerometer_scale_sigma: {:g}\n"
-                      "axes_sigma: {:g}\n",
+                      "diffusion )\n",
                       noise.rate_hz, noise.gyro_noise_density, noise.gyro_random_walk,
-                      noise.accel_noise_density, noise.accel_random_walk, noise.gyro_scale_sigma,
-                      noise.accel_scale_sigma, noise.axes_sigma));
+                      noise.accel_noise_density, noise.accel_random_walk));
 }
 
 void EurocWriter::WriteImu(const SimulatedImu& imu) const {

@@ -258,11 +258,7 @@ void Recorder::WriteInertial() {
   const EurocWriter writer(options_.out);
   writer.WriteBody("rendered by pangea-sim");
   writer.WriteCamera(options_.camera, options_.image_rate_hz, "rendered by pangea-sim");
-  ImuNoise noise = options_.imu;
-  if (!recorded_imu_) {  // the simulated one has noise and biases, no wrong scales or axes
-    noise.gyro_scale_sigma = noise.accel_scale_sigma = noise.axes_sigma = 0;
-  }
-  writer.WriteImuCalibration(noise);
+  writer.WriteImuCalibration(options_.imu);
   writer.WriteImageList(schedule_.images_ns);
   if (!recorded_imu_) {
     const SimulatedImu imu = SimulateImu(*path_, schedule_.imu.begin_ns, schedule_.imu.end_ns,

@@ -48,12 +48,13 @@ std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) 
   return std::nullopt;
 }
 
-ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
-                                          const ImuScales& scales, const Eigen::Vector3d& gyro_bias,
-                                          const Eigen::Vector3d& accel_bias) const {
+Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
+                                    const Eigen::Vector3d& gyro_bias,
+                                    const Eigen::Vector3d& accel_bias) const {
+  Preintegrator integrator(NoiseAround(from_utime, to_utime), gyro_bias, accel_bias);
   // The time offset may want a little more than has come: the last sample holds.
-  return IntegrateScaled(SamplesBetween(samples_, from_utime, to_utime),
-                         NoiseAround(from_utime, to_utime), scales, gyro_bias, accel_bias);
+  integrator.Add(SamplesBetween(samples_, from_utime, to_utime));
+  return integrator.result();
 }
 
 // Measured on the span, or on as much before its end as tells the noise.

@@ -23,7 +23,7 @@ struct Landmark {
 };
 
 struct InertialLink {
-  ScaledPreintegration span;
+  Preintegration measured;
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };
 

@@ -16,22 +16,11 @@ constexpr double kTimeOffsetSigma = 0.005;          // s
 constexpr double kFocalSigma = 0.001;               // of the focal length
 constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
 
-constexpr double kExactScale = 1e-6;  // what an exact IMU's scales and axes may still be off
-
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
 constexpr double kTiltSigma = 0.5;        // rad
 constexpr double kVelocitySigma = 5;      // m/s
 constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
-
-Eigen::Matrix<double, kScalesSize, 1> ScalesVariance(const ImuNoise& noise) {
-  ImuScales sigma;
-  sigma.gyro.setConstant(noise.axes_sigma);
-  sigma.gyro.diagonal().setConstant(noise.gyro_scale_sigma);
-  sigma.accel.setConstant(noise.axes_sigma);
-  sigma.accel.diagonal().setConstant(noise.accel_scale_sigma);
-  return sigma.Stacked().cwiseAbs2().array() + kExactScale * kExactScale;
-}
 
 // From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
 Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
@@ -43,20 +32,18 @@ Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
 
 }  // namespace
 
-WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
-                       const ImuNoise& noise) {
-  const int n = kSharedSize + kFrameSize;
+WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance) {
+  const int n = kCalibrationSize + kFrameSize;
   MatrixXd P = MatrixXd::Zero(n, n);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
       Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
       kCentreSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
-  P.diagonal().segment<kScalesSize>(kImuScales) = ScalesVariance(noise);
   P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
   // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
   // invertible.
-  P.diagonal().segment<kPoseSize>(kSharedSize).array() += 1e-8;
+  P.diagonal().segment<kPoseSize>(kCalibrationSize).array() += 1e-8;
   WindowPrior prior;
   prior.at = start;
   prior.H = P.llt().solve(MatrixXd::Identity(n, n));
@@ -64,12 +51,12 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   return prior;
 }
 
-WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise) {
+WindowPrior MovingStartPrior(const WindowState& start) {
   Eigen::Matrix<double, 15, 1> sigma;
   sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
       Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
       Vector3d::Constant(kAccelBiasSigma);
-  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), noise);
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal());
   prior.at.frames[0].imu.accel_bias.setZero();
   return prior;
 }

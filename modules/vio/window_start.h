@@ -1,7 +1,6 @@
 #pragma once
 
-// What is known of the window when it starts: the initialiser's state, the given calibration, and
-// what the IMU's may be off.
+// What is known of the window when it starts: the initialiser's state and the given calibration.
 
 #include <Eigen/Core>
 
@@ -11,11 +10,10 @@ namespace pangea::vio {
 
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
-WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise);
+WindowPrior MovingStartPrior(const WindowState& start);
 
 // `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
 // the left, all differences plain (InitialState).
-WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
-                       const ImuNoise& noise);
+WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance);
 
 }  // namespace pangea::vio
