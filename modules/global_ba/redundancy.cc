@@ -85,6 +85,8 @@ class Culling {
       next.edge = {keyframe.edge->T_previous_this * next.edge->T_previous_this,
                    ComposeCovariance(keyframe.edge->T_previous_this, keyframe.edge->covariance,
                                      next.edge->T_previous_this, next.edge->covariance)};
+    } else {
+      next.edge.reset();
     }
     next.previous = keyframe.previous;
     next_[keyframe.previous] = next_[i];

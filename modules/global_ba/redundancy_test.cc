@@ -67,6 +67,32 @@ TEST(Redundancy, EdgesReachOverWhatWasCulled) {
   }
 }
 
+TEST(Redundancy, AMissingEdgeIsNotBridged) {
+  BaWorld world = MakeBaTestWorld({.step_s = 0.2, .landmarks = 60, .edge_sigma_m = 0.01}).truth;
+  std::set<KeyframeId> without;  // every fifth keyframe has no edge to the one before
+  for (BaKeyframe& keyframe : world.keyframes) {
+    if (keyframe.id.seq % 5 == 0) {
+      keyframe.edge.reset();
+      without.insert(keyframe.id);
+    }
+  }
+  int checked = 0;
+  const BaWorld culled = WithoutRedundant(world, None(world), {});
+  for (const BaKeyframe& keyframe : culled.keyframes) {
+    if (keyframe.previous < 0) {
+      continue;
+    }
+    bool complete = true;
+    for (KeyframeId id = keyframe.id; id.seq > culled.keyframes[keyframe.previous].id.seq;
+         --id.seq) {
+      complete = complete && !without.contains(id);
+    }
+    EXPECT_EQ(keyframe.edge.has_value(), complete);
+    checked += complete ? 0 : 1;
+  }
+  EXPECT_GT(checked, 0);
+}
+
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
   std::vector<bool> needed = None(world);

@@ -391,17 +391,7 @@ FrameResult Estimator::AddFrame(const TrackedFrame& frame, std::span<const ImuSa
 
 std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
 
-CameraModel Estimator::camera() const {
-  CameraModel camera = impl_->camera;
-  camera.T_body_cam = impl_->problem.state.T_body_cam;
-  camera.time_offset_s = impl_->problem.state.time_offset_s;
-  const Eigen::Vector3d& intrinsics = impl_->problem.state.intrinsics;
-  camera.cx += camera.fx * intrinsics.y();
-  camera.cy += camera.fy * intrinsics.z();
-  camera.fx *= 1 + intrinsics.x();
-  camera.fy *= 1 + intrinsics.x();
-  return camera;
-}
+CameraModel Estimator::camera() const { return impl_->problem.state.Calibrated(impl_->camera); }
 
 WindowPoses Estimator::Poses() const {
   const WindowState& state = impl_->problem.state;

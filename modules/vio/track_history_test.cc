@@ -12,16 +12,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The estimator's camera, by another focal length and another centre.
-CameraModel Changed(const CameraModel& camera, const Vector3d& intrinsics) {
-  CameraModel changed = camera;
-  changed.cx += camera.fx * intrinsics.y();
-  changed.cy += camera.fy * intrinsics.z();
-  changed.fx *= 1 + intrinsics.x();
-  changed.fy *= 1 + intrinsics.x();
-  return changed;
-}
-
 TEST(TrackHistory, RaysFollowTheIntrinsics) {
   CameraModel fisheye = EurocTestCamera();
   fisheye.kind = CameraModel::Kind::kEquidistant;
@@ -33,13 +23,15 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
                        1e-3);
       const FrameRay& seen = history.Frame(1).at(5);
       const MatrixXd numeric = NumericJacobian(3, 1e-6, [&](const Vector3d& intrinsics) {
-        return Changed(camera, intrinsics).Unproject(pixel).value();
+        WindowState changed;
+        changed.intrinsics = intrinsics;
+        return changed.Calibrated(camera).Unproject(pixel).value();
       });
       EXPECT_LT((seen.J_intrinsics - numeric).cwiseAbs().maxCoeff(), 1e-6);
       // Half a per cent is still small, also in a distorted corner.
       WindowState state;
       state.intrinsics = {0.005, -0.0025, 0.0025};
-      const Vector2d exact = Changed(camera, state.intrinsics).Unproject(pixel).value();
+      const Vector2d exact = state.Calibrated(camera).Unproject(pixel).value();
       EXPECT_LT((seen.RayBy(state) - exact).norm() * camera.fx, 0.1);
     }
   }

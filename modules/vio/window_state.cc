@@ -23,6 +23,16 @@ std::optional<int> WindowState::Find(int64_t utime) const {
   return std::nullopt;
 }
 
+CameraModel WindowState::Calibrated(CameraModel given) const {
+  given.T_body_cam = T_body_cam;
+  given.time_offset_s = time_offset_s;
+  given.cx += given.fx * intrinsics.y();
+  given.cy += given.fy * intrinsics.z();
+  given.fx *= 1 + intrinsics.x();
+  given.fy *= 1 + intrinsics.x();
+  return given;
+}
+
 Rigid3 WindowState::PoseAhead(int frame, double ahead_s) const {
   const WindowFrame& f = frames[frame];
   return {f.imu.T_odom_body.q * ExpSo3(ahead_s * f.omega_body),

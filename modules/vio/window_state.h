@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/camera_model.h"
 #include "common/inertial_factor.h"
 #include "common/preintegration.h"
 #include "common/rigid3.h"
@@ -56,6 +57,8 @@ struct WindowState {
   int size() const { return Offset(static_cast<int>(frames.size())); }
   int Newest() const { return static_cast<int>(frames.size()) - 1; }
   std::optional<int> Find(int64_t utime) const;
+  // The given camera as it is thought to be: mount, time offset, focal length and centre.
+  CameraModel Calibrated(CameraModel given) const;
 
   // The body when a row of a frame's image was exposed, that much after the image's time: the
   // frame's pose, moved on at its velocity and turn rate.
