@@ -145,6 +145,14 @@ EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
       Throw(sensor_yaml, fmt::format("field '{}' must be above 0, not {}", key, *value));
     }
   }
+  for (const auto& [key, value] : {std::pair("gyroscope_scale_sigma", &noise.gyro_scale_sigma),
+                                   std::pair("accelerometer_scale_sigma", &noise.accel_scale_sigma),
+                                   std::pair("axes_sigma", &noise.axes_sigma)}) {
+    *value = OptionalNumber(root, sensor_yaml, key, *value);
+    if (*value < 0) {
+      Throw(sensor_yaml, fmt::format("field '{}' must be 0 (exact) or above, not {}", key, *value));
+    }
+  }
   return calibration;
 }
 

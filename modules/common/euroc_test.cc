@@ -97,6 +97,7 @@ TEST_F(EurocTest, ReadsASoundRecordingWithoutWarnings) {
   EXPECT_EQ(recording.imu()[0].accel, Eigen::Vector3d(0, 0, 9.81));
   EXPECT_EQ(recording.imu_noise().gyro_noise_density, 1e-4);
   EXPECT_EQ(recording.imu_noise().accel_random_walk, 4e-3);
+  EXPECT_EQ(recording.imu_noise().gyro_scale_sigma, ImuNoise{}.gyro_scale_sigma);  // not given
   EXPECT_EQ(recording.camera().kind, CameraModel::Kind::kRadtan);
   EXPECT_EQ(recording.camera().fy, 31);
   EXPECT_EQ(recording.ground_truth().size(), 2U);
@@ -156,6 +157,8 @@ TEST_F(EurocTest, CalibrationMistakesNameTheField) {
   std::string imu = Text("imu0/sensor.yaml");
   Write("imu0/sensor.yaml", imu.substr(0, imu.find("accelerometer_random_walk")));
   EXPECT_THAT(Complaint(), HasSubstr("'accelerometer_random_walk' is missing"));
+  Write("imu0/sensor.yaml", imu + "axes_sigma: -0.01\n");
+  EXPECT_THAT(Complaint(), HasSubstr("'axes_sigma' must be 0 (exact) or above, not -0.01"));
   imu.replace(imu.find("data: [1,0"), 10, "data: [2,0");
   Write("imu0/sensor.yaml", imu);
   EXPECT_THAT(Complaint(), HasSubstr("the rotation in 'T_BS' is not one"));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Inertial samples and the sensor's noise, as in EuRoC's sensor.yaml.
+// Inertial samples and the sensor's errors, as in EuRoC's sensor.yaml.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -23,6 +23,10 @@ struct ImuNoise {
   double accel_noise_density = 2.0000e-3;  // m/s^2/sqrt(Hz)
   double accel_random_walk = 3.0000e-3;    // m/s^3/sqrt(Hz)
   double rate_hz = 200;
+  // What calibration leaves of scales (a share) and axes (rad), standard deviations. 0: it is exact.
+  double gyro_scale_sigma = 0.002;
+  double accel_scale_sigma = 0.001;
+  double axes_sigma = 0.002;
 };
 
 }  // namespace pangea

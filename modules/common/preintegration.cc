@@ -13,10 +13,11 @@ Preintegrator::Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_
   result_.accel_bias = accel_bias;
 }
 
-void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
+Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
+  Step out;
   const double dt = 1e-6 * static_cast<double>(b.utime - a.utime);
   if (dt <= 0) {
-    return;
+    return out;
   }
   Preintegration& p = result_;
   const Eigen::Vector3d omega = 0.5 * (a.gyro + b.gyro) - p.gyro_bias;
@@ -30,14 +31,14 @@ void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
 
   // Error transition, order (rotation, velocity, position): Forster et al., appendix, with the
   // force taken at the middle.
-  Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
+  Eigen::Matrix<double, 9, 9>& A = out.A;
   const Eigen::Matrix3d dv_dtheta = -R_hat * half_R.transpose() * dt;
   A.block<3, 3>(0, 0) = step.toRotationMatrix().transpose();
   A.block<3, 3>(3, 0) = dv_dtheta;
   A.block<3, 3>(6, 0) = 0.5 * dt * dv_dtheta;
   A.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
 
-  Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();  // wrt (gyro, accel)
+  Eigen::Matrix<double, 9, 6>& B = out.B;  // wrt (gyro, accel)
   const Eigen::Matrix3d dtheta_dgyro = RightJacobian(dt * omega) * dt;
   const Eigen::Matrix3d dv_dgyro = -R_hat * RightJacobian(0.5 * dt * omega) * 0.5 * dt * dt;
   B.block<3, 3>(0, 0) = dtheta_dgyro;
@@ -57,6 +58,7 @@ void Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   p.delta_v += dv;
   p.delta_q = (p.delta_q * step).normalized();
   p.duration_s += dt;
+  return out;
 }
 
 void Preintegrator::Add(std::span<const ImuSample> samples) {

@@ -30,8 +30,13 @@ class Preintegrator {
  public:
   Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
                 const Eigen::Vector3d& accel_bias);
+  // What a step does to the errors before it, and what errors of gyro and accelerometer in it do.
+  struct Step {
+    Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
+    Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();
+  };
   // Motion from `a` to `b`: the mean of the two samples holds in between. Samples must be in order.
-  void Add(const ImuSample& a, const ImuSample& b);
+  Step Add(const ImuSample& a, const ImuSample& b);
   // Motion from the first of them to the last.
   void Add(std::span<const ImuSample> samples);
   const Preintegration& result() const { return result_; }

@@ -136,8 +136,8 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance)
-                                      : MovingStartPrior(problem.state);
+      problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance, noise)
+                                      : MovingStartPrior(problem.state, noise);
     } else {
       Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
     }
@@ -148,9 +148,9 @@ void Estimator::Impl::Start(const InitialState& initial) {
 
 InertialLink Estimator::Impl::Link(const WindowFrame& from, int64_t to_imu_utime) const {
   InertialLink link;
-  link.measured =
-      imu_samples.Integrate(from.imu_utime, to_imu_utime, from.imu.gyro_bias, from.imu.accel_bias);
-  link.information = InertialInformation(link.measured, noise);
+  link.span = imu_samples.Integrate(from.imu_utime, to_imu_utime, problem.state.imu_scales,
+                                    from.imu.gyro_bias, from.imu.accel_bias);
+  link.information = InertialInformation(link.span.measured, noise);
   return link;
 }
 
@@ -160,7 +160,8 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   frame.imu_utime = ImuTime(utime);
   frame.time_offset_s = problem.state.time_offset_s;
   frame.imu = imu;
-  frame.omega_body = imu_samples.At(frame.imu_utime).gyro - imu.gyro_bias;
+  frame.omega_body =
+      problem.state.imu_scales.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
   problem.state.frames.push_back(frame);
   problem.links.push_back(std::move(link));
 }
@@ -190,7 +191,7 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
   const bool is_sight = TracksGoOn(Newest().utime, frame.utime);
   DropPassing();
   const InertialLink link = Link(Newest(), imu_utime);
-  Append(frame.utime, Predict(link.measured, Newest().imu), link);
+  Append(frame.utime, Predict(link.span.measured, Newest().imu), link);
   Newest().at_rest = at_rest;
   Newest().is_sight = is_sight;
   return std::nullopt;
@@ -238,11 +239,12 @@ FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
     keyframe.edge->covariance +=
         CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
                              previous->T_odom_body, keyframe.T_odom_body);
-    Preintegration span = imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime),
-                                                previous->gyro_bias, previous->accel_bias);
-    if (span.duration_s > 0) {
-      span.covariance.diagonal().array() += 1e-14;
-      keyframe.preintegration = span;
+    ScaledPreintegration span =
+        imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime), state.imu_scales,
+                              previous->gyro_bias, previous->accel_bias);
+    if (span.measured.duration_s > 0) {
+      span.measured.covariance.diagonal().array() += 1e-14;
+      keyframe.preintegration = span.measured;
     }
   }
   state.frames[index].is_published = true;

@@ -39,6 +39,10 @@ Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const Imu
   return e;
 }
 
+Vector6d EdgeErrorOf(const FinishedKeyframe& keyframe, const ImuState& from, const ImuState& to) {
+  return (from.T_odom_body.Inverse() * to.T_odom_body).Minus(keyframe.edge->T_previous_this);
+}
+
 // Of the position itself, p - p^ = xi_p + theta x p^, not of what is left of it after the turn.
 struct PositionError {
   Eigen::Vector3d error;
@@ -95,6 +99,31 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
   for (const Mean* mean : {&position, &yaw, &tilt, &velocity, &gyro_bias, &accel_bias}) {
     EXPECT_GT(mean->value(), 0.3);
     EXPECT_LT(mean->value(), 3.0);
+  }
+}
+
+// Believed to be exact, these IMUs have tilt at 3.5, velocity at 1.5 and edges at 2.
+TEST(EstimatorConsistency, AnImuWithWrongScalesAndAxesIsBelievedNoMore) {
+  Mean tilt, velocity, edges;
+  for (const Ride& ride : RidesOfAWrongImu()) {
+    ASSERT_GT(ride.finished.size(), 10u) << "seed " << ride.world.options().seed;
+    const std::vector<ImuState> truth = TruthOf(ride);
+    for (size_t k = 0; k < ride.finished.size(); ++k) {
+      const FinishedKeyframe& keyframe = ride.finished[k];
+      const auto& P = keyframe.covariance;
+      const auto e = ErrorOf(keyframe, truth[k]);
+      tilt.AddSquare(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+      velocity.AddSquare(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+      if (keyframe.edge) {
+        edges.AddSquare(EdgeErrorOf(keyframe, truth[k - 1], truth[k]), keyframe.edge->covariance);
+      }
+    }
+  }
+  std::cout << "normalised squares with a wrong IMU: tilt " << tilt.value() << ", velocity "
+            << velocity.value() << ", edges " << edges.value() << "\n";
+  for (const Mean* mean : {&tilt, &velocity, &edges}) {
+    EXPECT_GT(mean->value(), 0.5);
+    EXPECT_LT(mean->value(), 2.0);
   }
 }
 

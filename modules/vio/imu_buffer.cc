@@ -48,13 +48,12 @@ std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) 
   return std::nullopt;
 }
 
-Preintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
-                                    const Eigen::Vector3d& gyro_bias,
-                                    const Eigen::Vector3d& accel_bias) const {
-  Preintegrator integrator(NoiseAround(from_utime, to_utime), gyro_bias, accel_bias);
+ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
+                                          const ImuScales& scales, const Eigen::Vector3d& gyro_bias,
+                                          const Eigen::Vector3d& accel_bias) const {
   // The time offset may want a little more than has come: the last sample holds.
-  integrator.Add(SamplesBetween(samples_, from_utime, to_utime));
-  return integrator.result();
+  return IntegrateScaled(SamplesBetween(samples_, from_utime, to_utime),
+                         NoiseAround(from_utime, to_utime), scales, gyro_bias, accel_bias);
 }
 
 // Measured on the span, or on as much before its end as tells the noise.

@@ -10,6 +10,7 @@
 
 #include "common/imu.h"
 #include "common/preintegration.h"
+#include "vio/imu_scales.h"
 
 namespace pangea::vio {
 
@@ -24,8 +25,9 @@ class ImuBuffer {
   // What is missing for a span of time, in words; nothing when it is covered.
   std::optional<std::string> Gap(int64_t from_utime, int64_t to_utime) const;
   // With the noise that the samples show, not less than the data sheet's (imu_noise.h).
-  Preintegration Integrate(int64_t from_utime, int64_t to_utime, const Eigen::Vector3d& gyro_bias,
-                           const Eigen::Vector3d& accel_bias) const;
+  ScaledPreintegration Integrate(int64_t from_utime, int64_t to_utime, const ImuScales& scales,
+                                 const Eigen::Vector3d& gyro_bias,
+                                 const Eigen::Vector3d& accel_bias) const;
   // The first at or after this time, else the last of all. There must be one.
   const ImuSample& At(int64_t utime) const;
   // The newest of them, `count` or as many as there are.

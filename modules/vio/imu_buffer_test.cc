@@ -22,11 +22,14 @@ ImuBuffer Filled(int count) {
 TEST(ImuBuffer, IntegratesExactlyTheSpan) {
   const ImuBuffer buffer = Filled(100);
   const Vector3d bg(0.01, 0, 0), ba(0, 0.1, 0);
-  const Preintegration whole = buffer.Integrate(kFirst_us + 12'000, kFirst_us + 93'000, bg, ba);
+  const Preintegration whole =
+      buffer.Integrate(kFirst_us + 12'000, kFirst_us + 93'000, {}, bg, ba).measured;
   EXPECT_NEAR(whole.duration_s, 0.081, 1e-12);
   // Two parts make the whole.
-  const Preintegration a = buffer.Integrate(kFirst_us + 12'000, kFirst_us + 50'000, bg, ba);
-  const Preintegration b = buffer.Integrate(kFirst_us + 50'000, kFirst_us + 93'000, bg, ba);
+  const Preintegration a =
+      buffer.Integrate(kFirst_us + 12'000, kFirst_us + 50'000, {}, bg, ba).measured;
+  const Preintegration b =
+      buffer.Integrate(kFirst_us + 50'000, kFirst_us + 93'000, {}, bg, ba).measured;
   EXPECT_LT((a.delta_v + a.delta_q * b.delta_v - whole.delta_v).norm(), 1e-9);
   EXPECT_LT(LogSo3((a.delta_q * b.delta_q).conjugate() * whole.delta_q).norm(), 1e-9);
 }
@@ -35,7 +38,8 @@ TEST(ImuBuffer, TheLastSampleHoldsALittleLonger) {
   const ImuBuffer buffer = Filled(100);
   const int64_t last = kFirst_us + 99 * 5'000;
   const Preintegration span =
-      buffer.Integrate(last - 10'000, last + 3'000, Vector3d::Zero(), Vector3d::Zero());
+      buffer.Integrate(last - 10'000, last + 3'000, {}, Vector3d::Zero(), Vector3d::Zero())
+          .measured;
   EXPECT_NEAR(span.duration_s, 0.013, 1e-12);
   EXPECT_EQ(buffer.At(last + 3'000).utime, last);
   EXPECT_EQ(buffer.At(last - 7'000).utime, last - 5'000);

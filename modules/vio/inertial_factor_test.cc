@@ -24,7 +24,7 @@ WindowProblem TwoFrames(uint64_t seed) {
 }
 
 InertialResidual ResidualOf(const WindowProblem& problem, const WindowState& state) {
-  return ComputeInertialResidual(problem.links[1]->measured, state.frames[0].imu,
+  return ComputeInertialResidual(At(problem.links[1]->span, state.imu_scales), state.frames[0].imu,
                                  state.frames[1].imu);
 }
 
@@ -58,6 +58,9 @@ TEST(InertialFactor, DerivativesMatchDifferencesInEveryColumn) {
     MatrixXd J = MatrixXd::Zero(15, state.size());
     J.middleCols<15>(state.Offset(0)) = residual.J_from;
     J.middleCols<15>(state.Offset(1)) = residual.J_to;
+    J.middleCols<kScalesSize>(kImuScales) =
+        ScalesJacobian(problem.links[1]->span, state.imu_scales, state.frames[0].imu.gyro_bias,
+                       residual.r.head<3>());
     const MatrixXd numeric = NumericJacobian(
         state, [&](const WindowState& s) -> VectorXd { return ResidualOf(problem, s).r; });
     EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-7) << "seed " << seed;

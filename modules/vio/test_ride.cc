@@ -9,11 +9,12 @@ EstimatorOptions Options() {
   return options;
 }
 
-std::deque<Ride> MakeTenRides() {
+std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise) {
   std::deque<Ride> rides;
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
+  for (uint64_t seed = 1; seed <= count; ++seed) {
     VioTestWorldOptions options;
     options.seed = seed;
+    options.imu_noise = noise;
     options.extrinsics_rotation_sigma = 0.002;
     options.extrinsics_position_sigma = 0.002;
     options.focal_sigma = 0.001;
@@ -61,7 +62,12 @@ Rigid3 Ride::T_odom_truth() const {
 }
 
 const std::deque<Ride>& TenRides() {
-  static const std::deque<Ride> rides = MakeTenRides();
+  static const std::deque<Ride> rides = MakeRides(10, ExactScales());
+  return rides;
+}
+
+const std::deque<Ride>& RidesOfAWrongImu() {
+  static const std::deque<Ride> rides = MakeRides(5, ImuNoise{});
   return rides;
 }
 

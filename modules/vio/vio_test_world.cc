@@ -1,5 +1,6 @@
 #include "vio/vio_test_world.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +10,7 @@
 namespace pangea::vio {
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
@@ -37,6 +39,23 @@ double PathTime(double t, double begin, double end) {
   return s;
 }
 
+// The gyro's axes are the body's: only the accelerometer is turned. Their own generator: a world is
+// the same with an exact IMU and with another.
+ImuScales RandomScales(const ImuNoise& noise, uint64_t seed) {
+  std::mt19937_64 rng(seed);
+  ImuScales scales;
+  for (int k = 0; k < 3; ++k) {
+    scales.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
+    scales.accel.col(k) = RandomVector(rng, noise.axes_sigma);
+  }
+  scales.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
+  scales.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
+  const Matrix3d turn = 0.5 * (scales.gyro - scales.gyro.transpose());
+  scales.gyro -= turn;
+  scales.accel -= turn;
+  return scales;
+}
+
 }  // namespace
 
 VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
@@ -56,6 +75,7 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   true_intrinsics_.cy += camera_.fy * centre.y();
   true_intrinsics_.fx *= longer;
   true_intrinsics_.fy *= longer;
+  true_imu_scales_ = RandomScales(options.imu_noise, options.seed + 1000);
   phase_ = RandomVector(rng_, 2);
   gyro_bias_ = RandomVector(rng_, 0.02);
   accel_bias_ = RandomVector(rng_, 0.05);
@@ -103,9 +123,13 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
   gyro_bias_ += RandomVector(rng_, noise.gyro_random_walk * std::sqrt(dt));
   accel_bias_ += RandomVector(rng_, noise.accel_random_walk * std::sqrt(dt));
   biases_[utime] = {gyro_bias_, accel_bias_};
-  return {utime, omega + gyro_bias_ + RandomVector(rng_, noise.gyro_noise_density / std::sqrt(dt)),
-          now.q.conjugate() * (accel + Vector3d(0, 0, kGravity)) + accel_bias_ +
-              RandomVector(rng_, noise.accel_noise_density / std::sqrt(dt))};
+  const Vector3d gyro =
+      omega + gyro_bias_ + RandomVector(rng_, noise.gyro_noise_density / std::sqrt(dt));
+  const Vector3d force = now.q.conjugate() * (accel + Vector3d(0, 0, kGravity)) + accel_bias_ +
+                         RandomVector(rng_, noise.accel_noise_density / std::sqrt(dt));
+  const Matrix3d I = Matrix3d::Identity();
+  return {utime, (I + true_imu_scales_.gyro).inverse() * gyro,
+          (I + true_imu_scales_.accel).inverse() * force};
 }
 
 std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& T_odom_cam) const {

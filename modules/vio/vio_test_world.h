@@ -33,12 +33,18 @@ struct Mean {
   double value() const { return sum / count; }
 };
 
+inline ImuNoise ExactScales() {
+  ImuNoise noise;
+  noise.gyro_scale_sigma = noise.accel_scale_sigma = noise.axes_sigma = 0;
+  return noise;
+}
+
 struct VioTestWorldOptions {
   uint64_t seed = 1;
   double frame_rate_hz = 10;
   double pixel_noise = 0.7;
-  double outlier_share = 0.03;  // of the tracks: they slide off their point
-  ImuNoise imu_noise;           // by default EuRoC's
+  double outlier_share = 0.03;         // of the tracks: they slide off their point
+  ImuNoise imu_noise = ExactScales();  // EuRoC's white noise and walk
   // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
   double drive_mps = 0;
   double spin_rps = 0;  // above 0: it turns about on the spot, rad/s
@@ -93,6 +99,7 @@ class VioTestWorld {
   CameraModel true_intrinsics_;
   Rigid3 true_T_body_cam_;
   double true_time_offset_s_ = 0;
+  ImuScales true_imu_scales_;
   Eigen::Vector3d phase_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> points_;
   std::map<int32_t, Track> tracks_;  // those in sight

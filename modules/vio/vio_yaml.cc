@@ -49,6 +49,9 @@ void BindImu(YamlOptions& yaml, ImuNoise& o) {
   yaml.Add("accel_noise_density", &o.accel_noise_density);
   yaml.Add("accel_random_walk", &o.accel_random_walk);
   yaml.Add("rate_hz", &o.rate_hz);
+  yaml.Add("gyro_scale_sigma", &o.gyro_scale_sigma);
+  yaml.Add("accel_scale_sigma", &o.accel_scale_sigma);
+  yaml.Add("axes_sigma", &o.axes_sigma);
 }
 
 }  // namespace

@@ -154,14 +154,23 @@ void AddLandmark(const WindowState& state, const Landmark& landmark, double damp
 }
 
 void AddLink(const WindowState& state, const InertialLink& link, int to, NormalEquations* out) {
+  const ImuState& from = state.frames[to - 1].imu;
   const InertialResidual residual =
-      ComputeInertialResidual(link.measured, state.frames[to - 1].imu, state.frames[to].imu);
+      ComputeInertialResidual(At(link.span, state.imu_scales), from, state.frames[to].imu);
   Eigen::Matrix<double, 15, 30> J;
   J << residual.J_from, residual.J_to;
   const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * link.information;
   const int at = state.Offset(to - 1);  // the two frames are neighbours
   out->H.block<30, 30>(at, at) += JtL * J;
   out->g.segment<30>(at) += JtL * residual.r;
+  const Eigen::Matrix<double, 15, kScalesSize> J_scales =
+      ScalesJacobian(link.span, state.imu_scales, from.gyro_bias, residual.r.head<3>());
+  const Eigen::Matrix<double, kScalesSize, 15> JtL_scales = J_scales.transpose() * link.information;
+  const Eigen::Matrix<double, 30, kScalesSize> cross = JtL * J_scales;
+  out->H.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) += JtL_scales * J_scales;
+  out->H.block<30, kScalesSize>(at, kImuScales) += cross;
+  out->H.block<kScalesSize, 30>(kImuScales, at) += cross.transpose();
+  out->g.segment<kScalesSize>(kImuScales) += JtL_scales * residual.r;
   out->cost += 0.5 * residual.r.dot(link.information * residual.r);
 }
 
@@ -225,8 +234,8 @@ double Cost(const WindowProblem& problem) {
   for (int i = 1; i <= state.Newest(); ++i) {
     if (problem.links[i]) {
       const InertialLink& link = *problem.links[i];
-      const auto residual =
-          ComputeInertialResidual(link.measured, state.frames[i - 1].imu, state.frames[i].imu);
+      const auto residual = ComputeInertialResidual(At(link.span, state.imu_scales),
+                                                    state.frames[i - 1].imu, state.frames[i].imu);
       cost += 0.5 * residual.r.dot(link.information * residual.r);
     }
     if (RestTogether(problem, i)) {

@@ -23,7 +23,8 @@ constexpr double kSpread = 0.01;     // of every error of the window, each time 
 constexpr double kRaySigma = 0.002;  // 0.8 px
 
 // A ride as one long window at its true state: inertial samples between its images, rays with
-// noise, and a prior that says nothing.
+// noise, and a prior that says nothing but of the IMU's axes: turned together with body and camera
+// they are another body.
 WindowProblem Ride(uint64_t seed) {
   VioTestWorldOptions options;
   options.seed = seed;
@@ -44,8 +45,8 @@ WindowProblem Ride(uint64_t seed) {
       const ImuState& from = problem.state.frames.back().imu;
       input.imu.insert(input.imu.begin(), last_sample);
       link.emplace();
-      link->measured = Integrate(input.imu, ImuNoise{}, from.gyro_bias, from.accel_bias);
-      link->information = InertialInformation(link->measured, ImuNoise{});
+      link->span = IntegrateScaled(input.imu, ImuNoise{}, {}, from.gyro_bias, from.accel_bias);
+      link->information = InertialInformation(link->span.measured, ImuNoise{});
     }
     last_sample = input.imu.back();
     problem.state.frames.push_back(frame);
@@ -71,6 +72,7 @@ WindowProblem Ride(uint64_t seed) {
   problem.prior.at = problem.state;
   problem.prior.H.setZero(problem.state.size(), problem.state.size());
   problem.prior.g.setZero(problem.state.size());
+  problem.prior.H.diagonal().segment<kScalesSize>(kImuScales).setConstant(1e4);
   return problem;
 }
 

@@ -158,7 +158,7 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
   const int at_oldest = state.Offset(oldest);
   const bool drops_kept = oldest == 1 && what.drop_kept_pose;
   for (int i = 0; i < state.size(); ++i) {
-    const bool of_kept = oldest == 1 && i >= kCalibrationSize && i < at_oldest;
+    const bool of_kept = oldest == 1 && i >= kSharedSize && i < at_oldest;
     const bool of_oldest = i >= at_oldest && i < at_oldest + kFrameSize;
     const bool goes =
         of_kept ? drops_kept : of_oldest && !(what.keep_pose && i < at_oldest + kPoseSize);

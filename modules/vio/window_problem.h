@@ -23,7 +23,7 @@ struct Landmark {
 };
 
 struct InertialLink {
-  Preintegration measured;
+  ScaledPreintegration span;
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };
 

@@ -16,11 +16,36 @@ constexpr double kTimeOffsetSigma = 0.005;          // s
 constexpr double kFocalSigma = 0.001;               // of the focal length
 constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
 
+constexpr double kExactScale = 1e-5;  // what an exact IMU's scales and axes may still be off
+
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
 constexpr double kTiltSigma = 0.5;        // rad
 constexpr double kVelocitySigma = 5;      // m/s
 constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
+
+// Each sensor has gains and axes of its own. A turn of the gyro is none: its axes are the body's,
+// and what they are off turns camera and accelerometer against them.
+Eigen::Matrix<double, kScalesSize, kScalesSize> ScalesCovariance(const ImuNoise& noise) {
+  ImuScales sigma;
+  sigma.gyro.setConstant(noise.axes_sigma);
+  sigma.gyro.diagonal().setConstant(noise.gyro_scale_sigma);
+  sigma.accel.setConstant(noise.axes_sigma);
+  sigma.accel.diagonal().setConstant(noise.accel_scale_sigma);
+  Eigen::Matrix<double, kScalesSize, kScalesSize> P = sigma.Stacked().cwiseAbs2().asDiagonal();
+  // The turn t of a gyro's S = ... + [t]x, taken out of it and out of the accelerometer's.
+  Eigen::Matrix<double, kScalesSize, kScalesSize> as_body =
+      Eigen::Matrix<double, kScalesSize, kScalesSize>::Identity();
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Matrix3d turn = Hat(Vector3d::Unit(k));
+    const Eigen::Matrix<double, 9, 1> column = turn.reshaped();
+    as_body.topLeftCorner<9, 9>() -= 0.5 * column * column.transpose();
+    as_body.bottomLeftCorner<9, 9>() -= 0.5 * column * column.transpose();
+  }
+  P = as_body * P * as_body.transpose();
+  P.diagonal().array() += kExactScale * kExactScale;
+  return P;
+}
 
 // From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
 Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
@@ -32,18 +57,20 @@ Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
 
 }  // namespace
 
-WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance) {
-  const int n = kCalibrationSize + kFrameSize;
+WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
+                       const ImuNoise& noise) {
+  const int n = kSharedSize + kFrameSize;
   MatrixXd P = MatrixXd::Zero(n, n);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
       Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
       kCentreSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
+  P.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) = ScalesCovariance(noise);
   P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
   // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
   // invertible.
-  P.diagonal().segment<kPoseSize>(kCalibrationSize).array() += 1e-8;
+  P.diagonal().segment<kPoseSize>(kSharedSize).array() += 1e-8;
   WindowPrior prior;
   prior.at = start;
   prior.H = P.llt().solve(MatrixXd::Identity(n, n));
@@ -51,12 +78,12 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance) {
   return prior;
 }
 
-WindowPrior MovingStartPrior(const WindowState& start) {
+WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise) {
   Eigen::Matrix<double, 15, 1> sigma;
   sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
       Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
       Vector3d::Constant(kAccelBiasSigma);
-  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal());
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), noise);
   prior.at.frames[0].imu.accel_bias.setZero();
   return prior;
 }

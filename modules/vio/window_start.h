@@ -1,6 +1,7 @@
 #pragma once
 
-// What is known of the window when it starts: the initialiser's state and the given calibration.
+// What is known of the window when it starts: the initialiser's state, the given calibration, and
+// what the IMU's may be off.
 
 #include <Eigen/Core>
 
@@ -10,10 +11,11 @@ namespace pangea::vio {
 
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
-WindowPrior MovingStartPrior(const WindowState& start);
+WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise);
 
 // `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
 // the left, all differences plain (InitialState).
-WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance);
+WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
+                       const ImuNoise& noise);
 
 }  // namespace pangea::vio

@@ -7,7 +7,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 int WindowState::Offset(int frame) const {
-  int offset = kCalibrationSize;
+  int offset = kSharedSize;
   for (int i = 0; i < frame; ++i) {
     offset += frames[i].size();
   }
@@ -44,7 +44,8 @@ void WindowState::Retract(const VectorXd& error) {
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
   intrinsics += error.segment<3>(kIntrinsics);
-  int at = kCalibrationSize;
+  imu_scales.Add(error.segment<kScalesSize>(kImuScales));
+  int at = kSharedSize;
   for (WindowFrame& frame : frames) {
     const Quaterniond turn = ExpSo3(error.segment<3>(at + kTheta));
     Rigid3& T = frame.imu.T_odom_body;
@@ -64,7 +65,8 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
   e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
   e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
   e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
-  int at = kCalibrationSize;
+  e.segment<kScalesSize>(kImuScales) = a.imu_scales.Stacked() - b.imu_scales.Stacked();
+  int at = kSharedSize;
   for (size_t i = 0; i < b.frames.size(); ++i) {
     const ImuState& x = a.frames[i].imu;
     const ImuState& y = b.frames[i].imu;

@@ -18,6 +18,7 @@
 #include "common/inertial_factor.h"
 #include "common/preintegration.h"
 #include "common/rigid3.h"
+#include "vio/imu_scales.h"
 
 namespace pangea::vio {
 
@@ -27,6 +28,9 @@ inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 // intrinsics.
 inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
 inline constexpr int kCalibrationSize = 10;
+// Then the scales of the IMU, and then the frames.
+inline constexpr int kImuScales = kCalibrationSize;
+inline constexpr int kSharedSize = kCalibrationSize + kScalesSize;
 
 // A frame of the window: the body at the image's time as the time offset stood when it came.
 struct WindowFrame {
@@ -51,6 +55,7 @@ struct WindowState {
   // Of the given camera: how much longer its focal length is, as a share of it, and where its
   // centre is, in focal lengths (x, y).
   Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
+  ImuScales imu_scales;
   std::vector<WindowFrame> frames;  // oldest first
 
   int Offset(int frame) const;

@@ -27,6 +27,15 @@ WindowFrame FirstFrame(double time_offset_s, std::mt19937_64& rng) {
   return frame;
 }
 
+Eigen::Matrix<double, kScalesSize, 1> RandomScales(double sigma, std::mt19937_64& rng) {
+  std::normal_distribution<double> normal(0, sigma);
+  Eigen::Matrix<double, kScalesSize, 1> scales;
+  for (double& value : scales) {
+    value = normal(rng);
+  }
+  return scales;
+}
+
 Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions& options,
                       std::mt19937_64& rng) {
   std::uniform_real_distribution<double> row(0, options.row_s);
@@ -86,6 +95,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
   state.intrinsics = RandomVector(rng, 0.01);
+  state.imu_scales.Add(RandomScales(0.01, rng));
   state.frames = {FirstFrame(0.002, rng)};
   problem.links.resize(1);
   for (int i = 0; i < options.frames; ++i) {
@@ -93,11 +103,14 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
       const WindowFrame& last = state.frames.back();
       const auto samples = TestSamples(kSamplesPerLink + 1, last.imu_utime, rng());
       InertialLink link;
-      link.measured = Integrate(samples, ImuNoise{}, last.imu.gyro_bias + RandomVector(rng, 1e-3),
-                                last.imu.accel_bias + RandomVector(rng, 1e-2));
-      link.information = InertialInformation(link.measured, ImuNoise{});
+      ImuScales scales = state.imu_scales;
+      scales.Add(RandomScales(1e-3, rng));
+      link.span =
+          IntegrateScaled(samples, ImuNoise{}, scales, last.imu.gyro_bias + RandomVector(rng, 1e-3),
+                          last.imu.accel_bias + RandomVector(rng, 1e-2));
+      link.information = InertialInformation(link.span.measured, ImuNoise{});
       WindowFrame next = last;
-      next.imu = Predict(link.measured, last.imu);
+      next.imu = Predict(At(link.span, state.imu_scales), last.imu);
       state.frames.push_back(next);
       problem.links.emplace_back(link);
     }
@@ -117,7 +130,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
 }
 
 void HoldStart(WindowProblem* problem, double sigma) {
-  problem->prior.H.diagonal().head(kCalibrationSize + kFrameSize).array() += 1 / (sigma * sigma);
+  problem->prior.H.diagonal().head(kSharedSize + kFrameSize).array() += 1 / (sigma * sigma);
 }
 
 VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed) {
