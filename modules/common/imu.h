@@ -23,7 +23,8 @@ struct ImuNoise {
   double accel_noise_density = 2.0000e-3;  // m/s^2/sqrt(Hz)
   double accel_random_walk = 3.0000e-3;    // m/s^3/sqrt(Hz)
   double rate_hz = 200;
-  // What calibration leaves of scales (a share) and axes (rad), standard deviations. 0: it is exact.
+  // What calibration leaves of scales (a share) and axes (rad), standard deviations. 0: it is
+  // exact.
   double gyro_scale_sigma = 0.002;
   double accel_scale_sigma = 0.001;
   double axes_sigma = 0.002;
