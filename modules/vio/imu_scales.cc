@@ -31,6 +31,11 @@ void ImuScales::Add(const ScalesVector& error) {
   accel += error.tail<9>().reshaped(3, 3);
 }
 
+ImuScales ImuScales::OfGyroAxes() const {
+  const Matrix3d turn = 0.5 * (gyro - gyro.transpose());
+  return {gyro - turn, accel - turn};
+}
+
 ScaledPreintegration IntegrateScaled(std::span<const ImuSample> samples, const ImuNoise& noise,
                                      const ImuScales& scales, const Vector3d& gyro_bias,
                                      const Vector3d& accel_bias) {

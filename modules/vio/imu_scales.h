@@ -22,6 +22,9 @@ struct ImuScales {
   ImuSample Corrected(const ImuSample& sample) const;
   Eigen::Matrix<double, kScalesSize, 1> Stacked() const;
   void Add(const Eigen::Matrix<double, kScalesSize, 1>& error);
+  // Of the body whose axes are the gyro's: what turned the gyro turns the accelerometer (to first
+  // order; docs/decisions/imu_scales.md).
+  ImuScales OfGyroAxes() const;
 };
 
 // A preintegration, and what the scales do to it (to first order, about those it was made with).

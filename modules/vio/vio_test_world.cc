@@ -39,8 +39,7 @@ double PathTime(double t, double begin, double end) {
   return s;
 }
 
-// The gyro's axes are the body's: only the accelerometer is turned. Their own generator: a world is
-// the same with an exact IMU and with another.
+// Their own generator: a world is the same with an exact IMU and with another.
 ImuScales RandomScales(const ImuNoise& noise, uint64_t seed) {
   std::mt19937_64 rng(seed);
   ImuScales scales;
@@ -50,10 +49,7 @@ ImuScales RandomScales(const ImuNoise& noise, uint64_t seed) {
   }
   scales.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
   scales.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
-  const Matrix3d turn = 0.5 * (scales.gyro - scales.gyro.transpose());
-  scales.gyro -= turn;
-  scales.accel -= turn;
-  return scales;
+  return scales.OfGyroAxes();
 }
 
 }  // namespace

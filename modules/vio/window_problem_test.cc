@@ -285,7 +285,7 @@ WindowProblem FullStep(const WindowProblem& problem) {
 
 // Points that start ten times too far, and no inertial measurement that would hold the frames.
 TEST(Optimise, DampsWhenTheFullStepIsWorse) {
-  int worse = 0, found = 0;
+  int worse = 0;
   for (uint64_t seed = 1; seed <= 50; ++seed) {
     Perturbed window = Perturb(seed, 0.1, 0.1);
     std::fill(window.problem.links.begin(), window.problem.links.end(), std::nullopt);
@@ -299,10 +299,9 @@ TEST(Optimise, DampsWhenTheFullStepIsWorse) {
     WindowProblem once = window.problem;
     Optimise(once, 1);
     EXPECT_LT(Cost(once), start) << "seed " << seed;
-    found += Optimise(window.problem, 50) < 0.02 ? 1 : 0;  // the truth costs nothing
+    EXPECT_LT(Optimise(window.problem, 50), 0.02) << "seed " << seed;  // the truth costs nothing
   }
   EXPECT_GT(worse, 0);
-  EXPECT_GE(found, 48);  // from so far away another minimum may be nearer
 }
 
 TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
@@ -338,6 +337,7 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   EXPECT_NEAR(P(kImuScales + 1, kImuScales + 3), 0.5 * variance, 1e-9);
   EXPECT_NEAR(P(kImuScales + 10, kImuScales + 10), 1.5 * variance, 1e-9);
   EXPECT_NEAR(P(kImuScales + 10, kImuScales + 12), -0.5 * variance, 1e-9);
+  EXPECT_NEAR(std::sqrt(P(kExtrinsics, kExtrinsics)), 0.001, 1e-9);
   EXPECT_NEAR(std::sqrt(P(kTimeOffset, kTimeOffset)), 0.005, 1e-9);
 }
 

@@ -24,25 +24,21 @@ constexpr double kVelocitySigma = 5;      // m/s
 constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
 
-// Each sensor has gains and axes of its own. A turn of the gyro is none: its axes are the body's,
-// and what they are off turns camera and accelerometer against them.
+// Each sensor has gains and axes of its own, the gyro's are the body's.
 Eigen::Matrix<double, kScalesSize, kScalesSize> ScalesCovariance(const ImuNoise& noise) {
   ImuScales sigma;
   sigma.gyro.setConstant(noise.axes_sigma);
   sigma.gyro.diagonal().setConstant(noise.gyro_scale_sigma);
   sigma.accel.setConstant(noise.axes_sigma);
   sigma.accel.diagonal().setConstant(noise.accel_scale_sigma);
-  Eigen::Matrix<double, kScalesSize, kScalesSize> P = sigma.Stacked().cwiseAbs2().asDiagonal();
-  // The turn t of a gyro's S = ... + [t]x, taken out of it and out of the accelerometer's.
-  Eigen::Matrix<double, kScalesSize, kScalesSize> as_body =
-      Eigen::Matrix<double, kScalesSize, kScalesSize>::Identity();
-  for (int k = 0; k < 3; ++k) {
-    const Eigen::Matrix3d turn = Hat(Vector3d::Unit(k));
-    const Eigen::Matrix<double, 9, 1> column = turn.reshaped();
-    as_body.topLeftCorner<9, 9>() -= 0.5 * column * column.transpose();
-    as_body.bottomLeftCorner<9, 9>() -= 0.5 * column * column.transpose();
+  Eigen::Matrix<double, kScalesSize, kScalesSize> J;
+  for (int i = 0; i < kScalesSize; ++i) {
+    ImuScales one;
+    one.Add(Eigen::Matrix<double, kScalesSize, 1>::Unit(i));
+    J.col(i) = one.OfGyroAxes().Stacked();
   }
-  P = as_body * P * as_body.transpose();
+  Eigen::Matrix<double, kScalesSize, kScalesSize> P =
+      J * sigma.Stacked().cwiseAbs2().asDiagonal() * J.transpose();
   P.diagonal().array() += kExactScale * kExactScale;
   return P;
 }
