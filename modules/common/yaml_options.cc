@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -99,6 +100,20 @@ void YamlOptions::AddScalar(const std::string& key, const std::string& type, T* 
   entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
 }
 
+void YamlOptions::AddWithin(const std::string& key, const std::string& type,
+                            const std::function<bool(double)>& is_within, double* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value, type, is_within](const YAML::Node& node, const std::string& file,
+                                        const std::string& path) {
+    const double read = ScalarValue<double>(node, file, path, type);
+    if (!std::isfinite(read) || !is_within(read)) {
+      ThrowType(node, file, path, type);
+    }
+    *value = read;
+  };
+  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
 void YamlOptions::Add(const std::string& key, std::optional<double>* value) {
   Entry& entry = NewEntry(key);
   entry.read = [value](const YAML::Node& node, const std::string& file, const std::string& path) {
@@ -150,6 +165,14 @@ void YamlOptions::Add(const std::string& key, uint64_t* value) {
 }
 void YamlOptions::Add(const std::string& key, float* value) { AddScalar(key, "a number", value); }
 void YamlOptions::Add(const std::string& key, double* value) { AddScalar(key, "a number", value); }
+void YamlOptions::AddPositive(const std::string& key, double* value) {
+  AddWithin(
+      key, "a number above 0", [](double x) { return x > 0; }, value);
+}
+void YamlOptions::AddNotNegative(const std::string& key, double* value) {
+  AddWithin(
+      key, "a number, 0 or above", [](double x) { return x >= 0; }, value);
+}
 void YamlOptions::Add(const std::string& key, std::string* value) {
   AddScalar(key, "a text", value);
 }

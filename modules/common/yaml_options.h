@@ -46,6 +46,8 @@ class YamlOptions {
   void Add(const std::string& key, double* value);
   void Add(const std::string& key, std::string* value);
   void Add(const std::string& key, std::optional<double>* value);  // "~": none
+  void AddPositive(const std::string& key, double* value);         // and finite
+  void AddNotNegative(const std::string& key, double* value);      // and finite
   void Add(const std::string& key, std::vector<double>* value);
   void Add(const std::string& key, std::vector<std::string>* value);
 
@@ -125,6 +127,8 @@ class YamlOptions {
     return bound;
   }
 
+  void AddWithin(const std::string& key, const std::string& type,
+                 const std::function<bool(double)>& is_within, double* value);
   void AddNamed(const std::string& key, const std::vector<std::string>& names,
                 const std::function<void(size_t)>& set, const std::function<size_t()>& get);
   void AddSequence(const std::string& key, std::function<std::vector<YamlOptions>(size_t)> resize,

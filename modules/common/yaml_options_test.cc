@@ -161,6 +161,31 @@ TEST(YamlOptions, WrongTypeNamesKeyAndExpectation) {
   EXPECT_THAT(Complaint("- 1"), HasSubstr("section of keys"));
 }
 
+TEST(YamlOptions, ANumberOutOfItsRangeIsRefused) {
+  double density = 1, sigma = 1;
+  YamlOptions yaml;
+  yaml.AddPositive("density", &density);
+  yaml.AddNotNegative("sigma", &sigma);
+  yaml.ReadText("density: 0.5\nsigma: 0", "test.yaml");
+  EXPECT_EQ(density, 0.5);
+  EXPECT_EQ(sigma, 0);
+  const auto complaint = [&yaml](const std::string& text) -> std::string {
+    try {
+      yaml.ReadText(text, "test.yaml");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const char* text : {"density: 0", "density: -1", "density: .nan", "density: .inf"}) {
+    EXPECT_THAT(complaint(text), HasSubstr("'density' must be a number above 0")) << text;
+  }
+  for (const char* text : {"sigma: -0.1", "sigma: .nan"}) {
+    EXPECT_THAT(complaint(text), HasSubstr("'sigma' must be a number, 0 or above")) << text;
+  }
+  EXPECT_EQ(density, 0.5);
+}
+
 TEST(YamlOptions, MissingDoubledAndBroken) {
   EXPECT_THAT(Complaint("items: [{name: x}]"), HasSubstr("key 'items[0].id' is missing"));
   EXPECT_THAT(Complaint("count: 1\ncount: 2"), HasSubstr("'count' stands twice"));

@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "common/alignment/point_observation.h"
 
@@ -100,7 +102,9 @@ class Builder {
 
   void AddMatch(const TrackId& track, int keyframe, int corner, double share) {
     const auto known = tracks_.find(track);
-    if (track.second != kNoLandmark && known != tracks_.end()) {
+    // A corner that several keyframes of one track are matched with is one measurement of it.
+    if (track.second != kNoLandmark && known != tracks_.end() &&
+        matched_.insert({track, keyframe, corner}).second) {
       const double sigma = CornerSigma(CornerAt(keyframe, corner), options_.match_sigma_px);
       known->second.matched.push_back(Observe(keyframe, corner, sigma / share));
     }
@@ -146,6 +150,7 @@ class Builder {
   std::vector<Rigid3> T_map_cam_;
   std::map<TrackId, Track> tracks_;
   std::set<std::pair<TrackId, TrackId>> met_;
+  std::set<std::tuple<TrackId, int, int>> matched_;  // and the keyframe and corner that saw it
 };
 
 }  // namespace

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "global_ba/ba_test_world.h"
 #include "global_ba/group_world.h"
@@ -134,6 +138,43 @@ TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
     }
   }
   EXPECT_GT(matched, 10);
+}
+
+// Neighbours that follow one track, matched with the same corner of a keyframe that follows
+// nothing.
+TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
+  Group group;
+  std::vector<Keyframe>& keyframes = group.messages.keyframes;
+  std::vector<MatchedPlaces> beside;
+  size_t offered_again = 0;
+  for (const MatchedPlaces& place : group.places) {
+    const int neighbour = place.match.seq > 0 ? place.match.seq - 1 : 1;
+    MatchedPlaces& other = beside.emplace_back(place);
+    other.match = keyframes[neighbour].id;
+    other.corners.clear();
+    for (const auto& [corner, unused] : place.corners) {
+      const int32_t id = keyframes[kKeyframes + place.query.seq].corners[corner].landmark_id;
+      const auto& there = keyframes[neighbour].corners;
+      const auto same = std::ranges::find(there, id, &Corner::landmark_id);
+      if (same != there.end()) {
+        other.corners.emplace_back(corner, static_cast<int>(same - there.begin()));
+      }
+    }
+    offered_again += other.corners.size();
+  }
+  ASSERT_GT(offered_again, 10u);
+  for (Keyframe& keyframe : keyframes) {
+    for (Corner& corner : keyframe.corners) {
+      corner.landmark_id = keyframe.id.map.agent_id == 1 ? corner.landmark_id : kNoLandmark;
+    }
+  }
+  group.places.insert(group.places.end(), beside.begin(), beside.end());
+  const BaWorld world = group.World();
+  std::set<std::tuple<int, int, double, double>> seen_once;
+  for (const BaObservation& seen : world.observations) {
+    EXPECT_TRUE(
+        seen_once.insert({seen.landmark, seen.keyframe, seen.ray.x(), seen.ray.y()}).second);
+  }
 }
 
 TEST(Landmarks, ATrackThatIsNotOnePointIsLeftOut) {

@@ -401,7 +401,7 @@ WindowPoses Estimator::Poses() const {
   std::vector<int> rows;
   for (int i = 0; i <= state.Newest(); ++i) {
     poses.utimes.push_back(state.frames[i].utime);
-    poses.T_odom_body.push_back(state.frames[i].imu.T_odom_body);
+    poses.T_odom_body.push_back(state.PoseAhead(i, state.Ahead(i, 0)));
     for (int row = 0; row < kPoseSize; ++row) {
       rows.push_back(state.Offset(i) + row);
     }

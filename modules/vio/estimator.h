@@ -49,7 +49,7 @@ struct LandmarkDepth {
   double inverse_depth_var = 0;  // 1/m^2
 };
 
-// A keyframe that left the window: all of it is final.
+// A keyframe that left the window, or has waited long enough: all of it is final.
 struct FinishedKeyframe {
   int64_t utime = 0;  // of its TrackedFrame
   Rigid3 T_odom_body;

@@ -124,7 +124,7 @@ TEST(Estimator, StartsAtRest) {
 TEST(Estimator, FollowsThePathForHalfAMinute) {
   VioTestWorldOptions options;
   options.seed = 3;
-  // The calibration is as good as the estimator supposes.
+  // A mount that is further off than the estimator supposes, by three times.
   options.extrinsics_rotation_sigma = 0.003;
   options.extrinsics_position_sigma = 0.003;
   options.time_offset_sigma = 0.002;

@@ -7,7 +7,6 @@
 #include <span>
 
 #include "common/imu.h"
-#include "common/inertial_factor.h"
 #include "common/preintegration.h"
 
 namespace pangea::vio {
@@ -37,7 +36,7 @@ ScaledPreintegration IntegrateScaled(std::span<const ImuSample> samples, const I
                                      const ImuScales& scales, const Eigen::Vector3d& gyro_bias,
                                      const Eigen::Vector3d& accel_bias);
 
-// As in common/inertial_factor.h, with the scales as they are now.
+// What is measured at these scales; with the biases that it was made with.
 Preintegration At(const ScaledPreintegration& span, const ImuScales& scales);
 // The derivative of the residual `r` at those scales by the scales.
 Eigen::Matrix<double, 15, kScalesSize> ScalesJacobian(const ScaledPreintegration& span,

@@ -107,7 +107,8 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   const WindowFrame& frame = state.frames[index];
   FinishedKeyframe keyframe;
   keyframe.utime = frame.utime;
-  keyframe.T_odom_body = frame.imu.T_odom_body;
+  // The state is where the body was by the time offset as the frame came.
+  keyframe.T_odom_body = state.PoseAhead(index, state.Ahead(index, 0));
   keyframe.v_odom_body = frame.imu.v_odom_body;
   keyframe.omega_body = frame.omega_body;
   keyframe.gyro_bias = frame.imu.gyro_bias;

@@ -44,14 +44,14 @@ void BindEstimator(YamlOptions& yaml, EstimatorOptions& o) {
 }
 
 void BindImu(YamlOptions& yaml, ImuNoise& o) {
-  yaml.Add("gyro_noise_density", &o.gyro_noise_density);
-  yaml.Add("gyro_random_walk", &o.gyro_random_walk);
-  yaml.Add("accel_noise_density", &o.accel_noise_density);
-  yaml.Add("accel_random_walk", &o.accel_random_walk);
-  yaml.Add("rate_hz", &o.rate_hz);
-  yaml.Add("gyro_scale_sigma", &o.gyro_scale_sigma);
-  yaml.Add("accel_scale_sigma", &o.accel_scale_sigma);
-  yaml.Add("axes_sigma", &o.axes_sigma);
+  yaml.AddPositive("gyro_noise_density", &o.gyro_noise_density);
+  yaml.AddPositive("gyro_random_walk", &o.gyro_random_walk);
+  yaml.AddPositive("accel_noise_density", &o.accel_noise_density);
+  yaml.AddPositive("accel_random_walk", &o.accel_random_walk);
+  yaml.AddPositive("rate_hz", &o.rate_hz);
+  yaml.AddNotNegative("gyro_scale_sigma", &o.gyro_scale_sigma);
+  yaml.AddNotNegative("accel_scale_sigma", &o.accel_scale_sigma);
+  yaml.AddNotNegative("axes_sigma", &o.axes_sigma);
 }
 
 }  // namespace

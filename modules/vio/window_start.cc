@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 // Prior uncertainty of the given calibration.
-constexpr double kExtrinsicsRotationSigma = 0.001;  // rad
+constexpr double kExtrinsicsRotationSigma = 0.001;  // rad; walks' links need it (imu_scales.md)
 constexpr double kExtrinsicsPositionSigma = 0.005;  // m
 constexpr double kTimeOffsetSigma = 0.005;          // s
 constexpr double kFocalSigma = 0.001;               // of the focal length
