@@ -89,9 +89,15 @@ void UdpmReceiver::ReadSome(std::vector<uint8_t>* buffer) {
 }
 
 void UdpmReceiver::Take(Bytes datagram, uint64_t sender) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (const std::optional<UdpmAssembler::Message> message = assembler_.Take(datagram, sender)) {
-    Enqueue(*message);
+  std::unique_lock<std::mutex> lock(mutex_);
+  const std::optional<UdpmAssembler::Message> message = assembler_.Take(datagram, sender);
+  const bool was_empty = queue_.empty();
+  if (!message || !Enqueue(*message)) {
+    return;
+  }
+  lock.unlock();  // or who is woken would wait for it
+  if (was_empty) {
+    eventfd_write(waits_fd_, 1);
   }
 }
 
@@ -105,30 +111,34 @@ std::vector<size_t> UdpmReceiver::WithRoom(const std::vector<size_t>& subscripti
   return with_room;
 }
 
-void UdpmReceiver::Enqueue(const UdpmAssembler::Message& message) {
+bool UdpmReceiver::Enqueue(const UdpmAssembler::Message& message) {
   const std::vector<size_t>& wanted = subscriptions_.Matching(message.channel);
   if (wanted.empty()) {
-    return;
+    return false;
   }
   std::vector<size_t> to = WithRoom(wanted);
   const size_t bytes = message.data.size() + kMessageOverhead;
   if (to.empty() || queue_bytes_ + bytes > kMaxWaitingBytes) {
     ++no_room_;
-    return;
+    return false;
   }
   for (const size_t subscription : to) {
     ++waiting_[subscription];
   }
   queue_bytes_ += bytes;
   queue_.push_back({message.channel, {message.data.begin(), message.data.end()}, std::move(to)});
-  if (queue_.size() == 1) {
-    eventfd_write(waits_fd_, 1);
-  }
+  return true;
+}
+
+void UdpmReceiver::ClearFd() const {
+  eventfd_t ignored = 0;
+  eventfd_read(waits_fd_, &ignored);
 }
 
 bool UdpmReceiver::DeliverOne() {
   std::unique_lock<std::mutex> lock(mutex_);
   if (queue_.empty()) {
+    ClearFd();  // it was written late
     return false;
   }
   const Message message = std::move(queue_.front());
@@ -138,8 +148,7 @@ bool UdpmReceiver::DeliverOne() {
     --waiting_[subscription];
   }
   if (queue_.empty()) {
-    eventfd_t ignored = 0;
-    eventfd_read(waits_fd_, &ignored);
+    ClearFd();
   }
   lock.unlock();
   // Only this thread adds subscriptions, and none is ever moved.

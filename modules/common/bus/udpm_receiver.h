@@ -42,7 +42,7 @@ class UdpmReceiver {
   // Delivers one message, waiting for it at most so long; less if a signal comes.
   bool Handle(int timeout_ms);
   bool MoreWaits();
-  // Readable while a message waits.
+  // Readable while a message waits; Handle makes it unreadable when none does.
   int fd() const { return waits_fd_; }
   Bus::Undelivered undelivered();
 
@@ -58,7 +58,8 @@ class UdpmReceiver {
   void ReadSome(std::vector<uint8_t>* buffer);
   void Take(Bytes datagram, uint64_t sender);
   std::vector<size_t> WithRoom(const std::vector<size_t>& subscriptions);
-  void Enqueue(const UdpmAssembler::Message& message);
+  bool Enqueue(const UdpmAssembler::Message& message);
+  void ClearFd() const;
   bool DeliverOne();
   int64_t DroppedByKernel() const;
 
