@@ -30,6 +30,7 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
       options_(options),
       node_(server_bus, "agent_handler"),
       archive_(node_, journal_path, now_utime, options.archive) {
+  node_.Watch(link_bus);
   ReadKeys();
   for (const MapId& map : archive_.maps()) {
     missing_corrections_.Announce(map);

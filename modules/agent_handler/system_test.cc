@@ -1,10 +1,7 @@
 // The real programs over UDP multicast on loopback: two agents, handler and uplink killed in
 // between.
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -15,8 +12,10 @@
 #include "agent_handler/journal.h"
 #include "agent_handler/test_keyframes.h"
 #include "common/bus/process.h"
+#include "common/bus/test_datagrams.h"
 #include "common/channels.h"
 #include "common/link/agent_key.h"
+#include "common/testing/program.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -25,44 +24,6 @@ namespace pangea {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-class Program {
- public:
-  explicit Program(std::vector<std::string> args) {
-    pid_ = fork();
-    if (pid_ == 0) {
-      std::vector<char*> argv;
-      argv.reserve(args.size() + 1);
-      for (std::string& arg : args) {
-        argv.push_back(arg.data());
-      }
-      argv.push_back(nullptr);
-      execv(argv[0], argv.data());
-      _exit(127);
-    }
-  }
-  ~Program() { End(SIGTERM); }
-  int End(int signal) {
-    if (pid_ <= 0) {
-      return 0;
-    }
-    kill(pid_, signal);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return status;
-  }
-
- private:
-  pid_t pid_ = -1;
-};
-
-// A multicast group and port of its own for each bus of this run; below those that the kernel gives
-// to sockets without a port, as every LCM sender's is.
-std::string RandomUrl(std::random_device& device) {
-  return fmt::format("udpm://239.{}.{}.{}:{}?ttl=0&recv_buf_size=4194304", 192 + device() % 60,
-                     device() % 256, 1 + device() % 250, 20000 + device() % 12000);
-}
 
 // An odometry at full speed: it waits until its uplink listens (nobody would tell that one of the
 // keyframes before, as a real odometry's next one does), and while 30 keyframes are not
@@ -118,9 +79,9 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   std::random_device device;  // only for the addresses, which must not meet another run's
   const int relay_port = GetParam() ? static_cast<int>(20000 + device() % 12000) : 0;
   const std::string link =
-      relay_port != 0 ? fmt::format("tcpq://127.0.0.1:{}", relay_port) : RandomUrl(device);
-  const std::string server = RandomUrl(device);
-  const std::string agent_urls[] = {RandomUrl(device), RandomUrl(device)};
+      relay_port != 0 ? fmt::format("tcpq://127.0.0.1:{}", relay_port) : OwnBusUrl();
+  const std::string server = OwnBusUrl();
+  const std::string agent_urls[] = {OwnBusUrl(), OwnBusUrl()};
   const std::string journal = testing::TempDir() + fmt::format("pangea_system_{}.lcm", getpid());
   std::filesystem::remove(journal);
   const std::filesystem::path keys = testing::TempDir() + fmt::format("pangea_system_{}", getpid());

@@ -26,6 +26,8 @@ LinkEmulatorProcess::LinkEmulatorProcess(Bus& agent_link, Bus& server_link, Bus&
             channels::LinkDown(agent_id),
             "down",
             {}} {
+  node_.Watch(agent_link);
+  node_.Watch(server_link);
   Relay(agent_link, &up_);
   Relay(server_link, &down_);
 }

@@ -31,7 +31,9 @@ int main(int argc, char** argv) {
       throw std::runtime_error(fmt::format("{}: {}", file, *invalid));
     }
     std::cout << yaml.Print() << std::flush;
-    pangea::LcmBus agent_bus(agent_link), server_bus(server_link), status(status_bus);
+    constexpr auto kNoFragments = pangea::LcmBus::Fragments::kRefused;
+    pangea::LcmBus agent_bus(agent_link, kNoFragments), server_bus(server_link, kNoFragments);
+    pangea::LcmBus status(status_bus);
     pangea::LinkEmulatorProcess process(agent_bus, server_bus, status, agent_id, conditions,
                                         pangea::SteadyMicros());
     return pangea::RunPolledProcess(agent_bus, server_bus, process);

@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
       spool.emplace(spool_folder, agent_id, spool_disk_bytes);
     }
     pangea::LcmBus agent_bus(bus);
-    pangea::LcmBus link_bus(link);
+    pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::UplinkProcess process(agent_bus, link_bus, agent_id,
                                   pangea::ReadKeyFileOf(key, agent_id), options,
                                   spool ? &*spool : nullptr);

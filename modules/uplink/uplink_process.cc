@@ -36,6 +36,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       session_(agent_id, key),
       spool_(spool),
       uplink_(options, [this](const KeyframeId& id) { return Load(id); }) {
+  node_.Watch(link_bus);
   if (options.budget_bytes_per_s > 0) {
     ladder_.emplace(options.budget_bytes_per_s);
   }

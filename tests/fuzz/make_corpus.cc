@@ -15,6 +15,7 @@
 #include "common/alignment/alignment_yaml.h"
 #include "common/bus/big_endian.h"
 #include "common/bus/log_reader.h"
+#include "common/bus/test_datagrams.h"
 #include "common/link/agent_key.h"
 #include "common/link/compression.h"
 #include "common/messages.h"
@@ -123,6 +124,25 @@ MapId MapOf(const Payload& keyframe_bytes) {
   keyframe_t message{};
   DecodeMessage(keyframe_bytes, &message);
   return Parse(message.id).value->map;
+}
+
+// By two senders in turn, and what no receiver may obey.
+void Datagrams(const Corpus& corpus) {
+  const std::string name = "A" + std::string(1, '\0'), data(50, 'x');
+  Payload whole, malformed;
+  AppendStep(0, ShortDatagram(name + data), &whole);
+  for (const uint16_t number : {0, 2, 1}) {
+    const FragmentHeader header{7, 150, 50U * number, number, 3};
+    for (const int sender : {1, 2}) {
+      AppendStep(sender, FragmentDatagram(header, (number == 0 ? name : "") + data), &whole);
+    }
+  }
+  for (Datagram& datagram : MalformedDatagrams("A")) {
+    datagram.resize(std::min<size_t>(datagram.size(), 100));
+    AppendStep(0, datagram, &malformed);
+  }
+  corpus.Add("datagram", "whole", whole);
+  corpus.Add("datagram", "malformed", malformed);
 }
 
 // In the order of fuzz_messages.cc.
@@ -366,6 +386,7 @@ int Make(const std::string& log, const Corpus& corpus) {
   corpus.Add("keyframe", "first", First(events, "KEYFRAME_1"));
   corpus.Add("keyframe", "second", First(events, "KEYFRAME_2", 1));
   corpus.Add("keyframe", "bare", Small(First(events, "KEYFRAME_1", 1), 0));
+  Datagrams(corpus);
   Messages(events, corpus);
   Fields(events, corpus);
   Link(events, corpus);

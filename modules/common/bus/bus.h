@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -23,6 +24,13 @@ class Bus {
   virtual void Publish(const std::string& channel, Bytes data) = 0;
   // `channel_regex` is anchored at both ends (LCM's rule). Lasts as long as the bus.
   virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
+  // What came and reached nobody who wants it, since the bus was opened.
+  struct Undelivered {
+    std::map<std::string, int64_t> refused;  // was no message of LCM's, by reason
+    int64_t no_room = 0;                     // messages that came while too many waited
+    int64_t by_kernel = 0;  // datagrams: there was no room, or the bus' filter kept them out
+  };
+  virtual Undelivered undelivered() { return {}; }
   // Whether more messages wait already, so that work which they share may wait for them. A bus that
   // has each message handled to completion says no.
   virtual bool MoreWaits() { return false; }
@@ -56,20 +64,26 @@ inline constexpr char kDefaultBusUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_b
 
 // A bus by LCM URL, e.g. kDefaultBusUrl, or
 // "tcpq://host:7700" where multicast is blocked: LCM's relay, which may come and go, and stop; what
-// is published meanwhile is lost, as on multicast. Not for concurrent Handle calls; Publish may be
-// called from any thread.
+// is published meanwhile is lost, as on multicast. Subscribe and Handle are for one thread; Publish
+// may be called from any.
 class LcmBus : public Bus {
  public:
-  // Throws std::runtime_error naming the URL and the likely mend when it cannot be opened.
-  explicit LcmBus(const std::string& url);
+  // What becomes of a message in several datagrams (above 65 kB) on multicast. Where strangers can
+  // speak and nobody of ours sends such a one, as on the link, the kernel drops its fragments.
+  enum class Fragments : uint8_t { kJoined, kRefused };
+
+  // Throws std::runtime_error naming the URL and the likely mend when it cannot be opened. No URL:
+  // LCM_DEFAULT_URL of the environment, or LCM's own default, as with all of LCM.
+  explicit LcmBus(const std::string& url, Fragments fragments = Fragments::kJoined);
   ~LcmBus() override;
   void Publish(const std::string& channel, Bytes data) override;
   void Subscribe(const std::string& channel_regex, Handler handler) override;
   // Delivers what is waiting, at most for `timeout_ms`, or does a piece of work if nothing is
   // (after kMaxBeforeWork messages in a row one anyway); returns whether there was anything to do.
-  // An exception from a handler is rethrown here, not through LCM's C frames.
+  // An exception from a handler comes out here.
   bool Handle(int timeout_ms);
   bool MoreWaits() override;
+  Undelivered undelivered() override;
   void WorkWhenIdle(const std::function<bool()>& piece) override;
   // File descriptor to poll on; -1 while there is no connection to a relay, and Handle looks for
   // one.
@@ -80,7 +94,9 @@ class LcmBus : public Bus {
 
   struct Impl;
   struct Library;
+  struct Multicast;
   struct Relayed;
+  static std::unique_ptr<Impl> Open(const std::string& url, Fragments fragments);
   std::unique_ptr<Impl> impl_;
   std::function<bool()> work_;  // empty when none is left
   int handled_since_work_ = 0;

@@ -1,4 +1,4 @@
-#include "common/bus/host_only.h"
+// A bus of this host takes nothing from other hosts (udpm_socket.h).
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -15,7 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "common/bus/bus.h"
+#include "common/bus/test_datagrams.h"
 
 namespace pangea {
 namespace {
@@ -28,15 +28,6 @@ constexpr char kThisHost[] = "10.77.1.1";
 void Append(const void* data, size_t size, std::vector<uint8_t>* bytes) {
   const auto* begin = static_cast<const uint8_t*>(data);
   bytes->insert(bytes->end(), begin, begin + size);
-}
-
-// LCM's short message: magic, number, channel, 0; nothing in it.
-std::vector<uint8_t> LcmMessage(const std::string& channel) {
-  const uint32_t header[] = {htonl(0x4c433032), 0};
-  std::vector<uint8_t> bytes;
-  Append(header, sizeof(header), &bytes);
-  Append(channel.c_str(), channel.size() + 1, &bytes);
-  return bytes;
 }
 
 uint16_t Checksum(const iphdr& header) {
@@ -91,7 +82,7 @@ class Outside {
                "ip route add 224.0.0.0/4 dev cable") == 0;
   }
   void Send(const std::string& to, const std::string& channel) const {
-    const std::vector<uint8_t> packet = IpPacket(to, LcmMessage(channel));
+    const std::vector<uint8_t> packet = IpPacket(to, ShortDatagram(channel + std::string(1, '\0')));
     ASSERT_EQ(write(fd_, packet.data(), packet.size()), static_cast<ssize_t>(packet.size()));
   }
 
@@ -103,20 +94,6 @@ std::vector<std::string> Heard(LcmBus& bus, std::vector<std::string>* heard) {
   while (bus.Handle(200)) {
   }
   return std::exchange(*heard, {});
-}
-
-TEST(HostOnly, WhichBusesStayOnThisHost) {
-  EXPECT_EQ(HostOnlyPort("udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"), 7667);
-  EXPECT_EQ(HostOnlyPort("udpm://239.255.76.67:24600?recv_buf_size=1"), 24600);
-  EXPECT_EQ(HostOnlyPort("udpm://"), 7667);
-  EXPECT_EQ(HostOnlyPort("udpm://239.255.76.67:7667?ttl=1"), std::nullopt);
-  EXPECT_EQ(HostOnlyPort("udpm://239.255.76.67:7667?recv_buf_size=1&ttl=10"), std::nullopt);
-  EXPECT_EQ(HostOnlyPort("tcpq://localhost:7700"), std::nullopt);
-  EXPECT_EQ(HostOnlyPort("memq://"), std::nullopt);
-}
-
-TEST(HostOnly, SaysWhenThereIsNoSuchSocket) {
-  EXPECT_THROW(TakeOnlyFromThisHost(9), std::runtime_error);
 }
 
 TEST(HostOnly, TakesNothingFromOutside) {
@@ -139,7 +116,7 @@ TEST(HostOnly, TakesNothingFromOutside) {
   outside.Send(kThisHost, "STRAIGHT");
   outside.Send(kGroup, "MULTICAST");
   EXPECT_THAT(Heard(own_bus, &heard), testing::IsEmpty());
-  const std::vector<uint8_t> large(50'000);  // several fragments
+  const std::vector<uint8_t> large(50'000);  // several frames
   own_bus.Publish("OWN", {});
   own_bus.Publish("LARGE", large);
   EXPECT_THAT(Heard(own_bus, &heard), testing::ElementsAre("OWN", "LARGE"));

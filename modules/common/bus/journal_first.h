@@ -28,6 +28,7 @@ class JournalFirstBus : public Bus {
   void Publish(const std::string& channel, Bytes data) override { bus_.Publish(channel, data); }
   void Subscribe(const std::string& channel_regex, Handler handler) override;
   bool MoreWaits() override { return bus_.MoreWaits(); }
+  Undelivered undelivered() override { return bus_.undelivered(); }
   void WorkWhenIdle(const std::function<bool()>& piece) override { bus_.WorkWhenIdle(piece); }
   // Delivers what waits if it is time to. Call it between the bus' messages.
   void Poll(int64_t now_utime);

@@ -1,44 +1,55 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include <cstdlib>
 #include <deque>
 #include <exception>
 #include <lcm/lcm-cpp.hpp>
-#include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "common/bus/bus.h"
-#include "common/bus/host_only.h"
 #include "common/bus/tcpq_connection.h"
+#include "common/bus/udpm_receiver.h"
 
 namespace pangea {
 namespace {
 
-// LCM drops the newest messages of a subscription beyond this many unhandled ones. Keyframes are
-// the largest (28 kB), so at most 56 MB wait per subscription; what is lost beyond that is asked
-// for again.
-constexpr int kQueueCapacity = 2000;
+[[noreturn]] void ThrowNotOpened(const std::string& url, const std::string& why) {
+  throw std::runtime_error(fmt::format(
+      "cannot open the bus '{}'{}: check the URL, and that the machine has a multicast route "
+      "(ip route add 224.0.0.0/4 dev lo)",
+      url, why));
+}
+
+// As LCM itself finds it.
+std::string GivenOrDefault(const std::string& url) {
+  const char* const environment = std::getenv("LCM_DEFAULT_URL");
+  if (!url.empty() || environment == nullptr || *environment == 0) {
+    return url.empty() ? "udpm://" : url;
+  }
+  return environment;
+}
 
 }  // namespace
 
-// Two kinds: LCM itself, and for tcpq:// our own, which cannot block (tcpq_connection.h).
+// Three kinds: LCM itself for what comes from this process or a file; multicast, which LCM sends
+// and we receive (udpm_receiver.h); and the relay, with a client of our own (tcpq_connection.h).
 struct LcmBus::Impl {
   virtual ~Impl() = default;
   virtual void Publish(const std::string& channel, Bytes data) = 0;
   virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
   virtual bool Handle(int timeout_ms) = 0;
   virtual bool MoreWaits() = 0;
+  virtual Undelivered undelivered() { return {}; }
   virtual int fd() = 0;
 };
 
 struct LcmBus::Library : LcmBus::Impl {
-  explicit Library(const std::string& url) : lcm(url), host_only_port(HostOnlyPort(url)) {
+  explicit Library(const std::string& url) : lcm(url) {
     if (!lcm.good()) {
-      throw std::runtime_error(fmt::format(
-          "cannot open the bus '{}': check the URL, and that the machine has a multicast route "
-          "(ip route add 224.0.0.0/4 dev lo)",
-          url));
+      ThrowNotOpened(url, "");
     }
   }
 
@@ -60,24 +71,12 @@ struct LcmBus::Library : LcmBus::Impl {
   void Publish(const std::string& channel, Bytes data) override {
     lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
   }
-  // LCM opens its socket with the first subscription. So the first one is to nothing, and others'
-  // messages are kept out before anybody listens.
-  void KeepOthersOut(uint16_t port) {
-    lcm_t* const c_lcm = lcm.getUnderlyingLCM();
-    lcm_unsubscribe(
-        c_lcm, lcm_subscribe(
-                   c_lcm, "nothing", [](const lcm_recv_buf_t*, const char*, void*) {}, nullptr));
-    TakeOnlyFromThisHost(port);
-  }
   void Subscribe(const std::string& channel_regex, Handler handler) override {
-    if (host_only_port && subscriptions.empty()) {
-      KeepOthersOut(*host_only_port);
-    }
     subscriptions.push_back({this, std::move(handler)});
     lcm_subscription_t* subscription =
         lcm_subscribe(lcm.getUnderlyingLCM(), channel_regex.c_str(), &Subscription::OnMessage,
                       &subscriptions.back());
-    lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
+    lcm_subscription_set_queue_capacity(subscription, UdpmReceiver::kMaxWaiting);
   }
   bool Handle(int timeout_ms) override {
     const bool handled = lcm.handleTimeout(timeout_ms) > 0;
@@ -93,9 +92,35 @@ struct LcmBus::Library : LcmBus::Impl {
   int fd() override { return lcm.getFileno(); }
 
   lcm::LCM lcm;
-  const std::optional<uint16_t> host_only_port;
   std::deque<Subscription> subscriptions;
   std::exception_ptr failure;
+};
+
+struct LcmBus::Multicast : LcmBus::Impl {
+  Multicast(const std::string& url, Fragments fragments)
+      : bus_url(url), receiver(ParseUdpmUrl(url), fragments), lcm(url) {
+    if (!lcm.good()) {
+      ThrowNotOpened(url, "");
+    }
+  }
+  void Publish(const std::string& channel, Bytes data) override {
+    lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));
+  }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    try {
+      receiver.Subscribe(channel_regex, std::move(handler));
+    } catch (const std::system_error& error) {
+      ThrowNotOpened(bus_url, fmt::format(" ({})", error.what()));
+    }
+  }
+  bool Handle(int timeout_ms) override { return receiver.Handle(timeout_ms); }
+  bool MoreWaits() override { return receiver.MoreWaits(); }
+  Undelivered undelivered() override { return receiver.undelivered(); }
+  int fd() override { return receiver.fd(); }
+
+  const std::string bus_url;
+  UdpmReceiver receiver;
+  lcm::LCM lcm;  // sends; it opens no receiving socket unless it is asked for messages
 };
 
 struct LcmBus::Relayed : LcmBus::Impl {
@@ -113,13 +138,22 @@ struct LcmBus::Relayed : LcmBus::Impl {
   TcpqConnection connection;
 };
 
-LcmBus::LcmBus(const std::string& url) {
+std::unique_ptr<LcmBus::Impl> LcmBus::Open(const std::string& url, Fragments fragments) {
   if (url.starts_with("tcpq://")) {
-    impl_ = std::make_unique<Relayed>(url);
-  } else {
-    impl_ = std::make_unique<Library>(url);
+    return std::make_unique<Relayed>(url);
   }
+  if (url.starts_with("udpm://")) {
+    return std::make_unique<Multicast>(url, fragments);
+  }
+  if (url.starts_with("memq://") || url.starts_with("file://")) {
+    return std::make_unique<Library>(url);
+  }
+  throw std::runtime_error(
+      fmt::format("cannot open the bus '{}': give udpm://, tcpq://, memq:// or file://", url));
 }
+
+LcmBus::LcmBus(const std::string& url, Fragments fragments)
+    : impl_(Open(GivenOrDefault(url), fragments)) {}
 LcmBus::~LcmBus() = default;
 
 void LcmBus::Publish(const std::string& channel, Bytes data) { impl_->Publish(channel, data); }
@@ -131,6 +165,8 @@ void LcmBus::Subscribe(const std::string& channel_regex, Handler handler) {
 int LcmBus::fd() { return impl_->fd(); }
 
 bool LcmBus::MoreWaits() { return impl_->MoreWaits(); }
+
+Bus::Undelivered LcmBus::undelivered() { return impl_->undelivered(); }
 
 void LcmBus::WorkWhenIdle(const std::function<bool()>& piece) { work_ = piece; }
 

@@ -1,21 +1,16 @@
 #include <deque>
-#include <regex>
 
 #include "common/bus/bus.h"
+#include "common/bus/subscriptions.h"
 
 namespace pangea {
 
 struct LocalBus::Impl {
-  struct Subscription {
-    std::regex channel;
-    Handler handler;
-  };
   struct Event {
     std::string channel;
     std::vector<uint8_t> data;
   };
-  // A deque: handlers may subscribe while one of them runs.
-  std::deque<Subscription> subscriptions;
+  Subscriptions subscriptions;
   std::deque<Event> events;
 };
 
@@ -27,17 +22,17 @@ void LocalBus::Publish(const std::string& channel, Bytes data) {
 }
 
 void LocalBus::Subscribe(const std::string& channel_regex, Handler handler) {
-  impl_->subscriptions.push_back({std::regex(channel_regex), std::move(handler)});
+  impl_->subscriptions.Add(channel_regex, std::move(handler));
 }
 
 void LocalBus::Drain() {
   while (!impl_->events.empty()) {
     const Impl::Event event = std::move(impl_->events.front());
     impl_->events.pop_front();
-    for (size_t i = 0; i < impl_->subscriptions.size(); ++i) {
-      if (std::regex_match(event.channel, impl_->subscriptions[i].channel)) {
-        impl_->subscriptions[i].handler(event.channel, event.data);
-      }
+    // A copy: handlers may subscribe while one of them runs.
+    const std::vector<size_t> wanting = impl_->subscriptions.Matching(event.channel);
+    for (const size_t subscription : wanting) {
+      impl_->subscriptions.handler(subscription)(event.channel, event.data);
     }
   }
 }

@@ -31,6 +31,36 @@ float CpuSeconds() {
   return static_cast<float>(seconds(usage.ru_utime) + seconds(usage.ru_stime));
 }
 
+std::vector<counter_t> ToCounters(const std::map<std::string, int64_t>& from) {
+  std::vector<counter_t> to;
+  for (const auto& [name, count] : from) {
+    counter_t counter{};
+    counter.name = name;
+    counter.count = count;
+    to.push_back(counter);
+  }
+  return to;
+}
+
+// What did not reach the handlers: malformed datagrams among the refused, losses among the
+// counters.
+void AddUndelivered(const std::vector<Bus*>& buses, std::map<std::string, int64_t>* refused,
+                    std::map<std::string, int64_t>* counters) {
+  const auto add = [counters](const char* counter, int64_t count) {
+    if (count != 0) {
+      (*counters)[counter] += count;
+    }
+  };
+  for (Bus* const bus : buses) {
+    const Bus::Undelivered undelivered = bus->undelivered();
+    for (const auto& [reason, count] : undelivered.refused) {
+      (*refused)[reason] += count;
+    }
+    add("lost_in_queue", undelivered.no_room);
+    add("lost_in_kernel", undelivered.by_kernel);
+  }
+}
+
 }  // namespace
 
 std::optional<int64_t> CounterOf(const status_t& status, std::string_view name) {
@@ -76,19 +106,11 @@ status_t Node::Status(int64_t now_utime, int64_t pending, const std::string& sum
   }
   status.memory_mb = ResidentMegabytes();
   status.cpu_s = CpuSeconds();
-  const auto to_counters = [](const std::map<std::string, int64_t>& from) {
-    std::vector<counter_t> to;
-    for (const auto& [name, count] : from) {
-      counter_t counter{};
-      counter.name = name;
-      counter.count = count;
-      to.push_back(counter);
-    }
-    return to;
-  };
-  status.refused = to_counters(refused_);
+  std::map<std::string, int64_t> refused = refused_, counters = counters_;
+  AddUndelivered(heard_, &refused, &counters);
+  status.refused = ToCounters(refused);
   status.num_refused = static_cast<int16_t>(status.refused.size());
-  status.counters = to_counters(counters_);
+  status.counters = ToCounters(counters);
   status.num_counters = static_cast<int16_t>(status.counters.size());
   return status;
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "common/bus/bus.h"
 #include "pangea/status_t.hpp"
@@ -24,7 +25,7 @@ std::optional<int64_t> CounterOf(const status_t& status, std::string_view name);
 class Node {
  public:
   // `name` is the process' name in STATUS_<name> and AGAIN_<name>, e.g. "fusion" or "vio_2".
-  Node(Bus& bus, std::string name) : bus_(bus), name_(std::move(name)) {}
+  Node(Bus& bus, std::string name) : bus_(bus), name_(std::move(name)), heard_{&bus} {}
 
   const std::string& name() const { return name_; }
   Bus& bus() { return bus_; }
@@ -95,6 +96,8 @@ class Node {
     PublishMessage(bus_, channel, message);
   }
 
+  // What another bus of this process keeps from it is told in the status too.
+  void Watch(Bus& bus) { heard_.push_back(&bus); }
   // Counts a refused message by its reason; at most 50 distinct reasons are told apart.
   void Refuse(const std::string& reason);
   void Count(const std::string& counter, int64_t by = 1) { counters_[counter] += by; }
@@ -112,6 +115,7 @@ class Node {
 
   Bus& bus_;
   std::string name_;
+  std::vector<Bus*> heard_;
   int64_t started_utime_ = 0;
   int64_t messages_in_ = 0;
   int64_t messages_out_ = 0;

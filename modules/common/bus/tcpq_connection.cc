@@ -103,9 +103,9 @@ void TcpqConnection::OnConnected() {
   unsent_.clear();
   PutWord(kClientMagic);
   PutWord(kProtocolVersion);
-  for (const Subscription& subscription : subscriptions_) {
+  for (size_t i = 0; i < subscriptions_.size(); ++i) {
     PutWord(kSubscribe);
-    PutText(subscription.text);
+    PutText(subscriptions_.text(i));
   }
 }
 
@@ -175,7 +175,7 @@ void TcpqConnection::Publish(const std::string& channel, Bytes data) {
 
 void TcpqConnection::Subscribe(const std::string& channel_regex, Bus::Handler handler) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  subscriptions_.push_back({channel_regex, std::regex(channel_regex), std::move(handler)});
+  subscriptions_.Add(channel_regex, std::move(handler));
   if (state_ == State::kConnected) {
     PutWord(kSubscribe);
     PutText(channel_regex);
@@ -254,11 +254,10 @@ bool TcpqConnection::DeliverOne() {
     return false;
   }
   taken_ = frame->end;
+  const std::vector<size_t> wanting = subscriptions_.Matching(frame->channel);
   lock.unlock();
-  for (size_t i = 0; i < subscriptions_.size(); ++i) {
-    if (std::regex_match(frame->channel, subscriptions_[i].regex)) {
-      subscriptions_[i].handler(frame->channel, frame->data);
-    }
+  for (const size_t subscription : wanting) {
+    subscriptions_.handler(subscription)(frame->channel, frame->data);
   }
   return true;
 }

@@ -11,14 +11,13 @@
 #include <netinet/in.h>
 
 #include <cstdint>
-#include <deque>
 #include <mutex>
 #include <optional>
-#include <regex>
 #include <string>
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/bus/subscriptions.h"
 
 namespace pangea {
 
@@ -50,11 +49,6 @@ class TcpqConnection {
 
  private:
   enum class State : uint8_t { kAway, kConnecting, kConnected };
-  struct Subscription {
-    std::string text;
-    std::regex regex;
-    Bus::Handler handler;
-  };
   // Where the first whole message lies in received_.
   struct Frame {
     std::string channel;
@@ -89,7 +83,7 @@ class TcpqConnection {
   int64_t waits_since_us_ = 0;  // for a greeting
   std::string last_error_ = "no answer";
   bool complained_ = false;
-  std::deque<Subscription> subscriptions_;
+  Subscriptions subscriptions_;
 };
 
 }  // namespace pangea

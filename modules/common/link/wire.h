@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/bus/udpm_assembler.h"
 #include "common/link/link_session.h"
 #include "common/messages.h"
 #include "pangea/pose_t.hpp"
@@ -37,6 +38,8 @@ inline constexpr int kMaxPayloadBytes = 30'000;
 inline constexpr int kMaxPieces = kMaxCompressedBytes / kMinPayloadBytes + 1;
 static_assert(kMaxPieces <= 256);
 static_assert(kMaxPayloadBytes + 1000 < kMaxLinkPacketBytes);
+// Nothing of ours on the link comes in fragments, so that its buses refuse them.
+static_assert(kMaxLinkPacketBytes + UdpmAssembler::kMaxChannel + 1 <= kMaxUdpmShortBytes);
 // Keyframes one agent may have in the receive cache, and maps a hello or an acknowledgement names:
 // so that both fit one Ethernet frame.
 inline constexpr int kMaxPartialKeyframes = 16;
