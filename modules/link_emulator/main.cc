@@ -27,9 +27,6 @@ int main(int argc, char** argv) {
     if (!file.empty()) {
       yaml.ReadFile(file);
     }
-    if (const auto invalid = conditions.Invalid()) {
-      throw std::runtime_error(fmt::format("{}: {}", file, *invalid));
-    }
     std::cout << yaml.Print() << std::flush;
     pangea::LcmBus agent_bus(agent_link), server_bus(server_link), status(status_bus);
     pangea::LinkEmulatorProcess process(agent_bus, server_bus, status, agent_id, conditions,
