@@ -15,7 +15,7 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
-constexpr size_t kMaxCorrections = 1000;
+constexpr size_t kMaxCorrections = 16 * AgentHandlerProcess::kMaxAgents;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -26,6 +26,7 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
                                          const std::string& key_folder, int64_t now_utime,
                                          const AgentHandlerOptions& options)
     : link_bus_(link_bus),
+      key_folder_name_(key_folder),
       key_folder_(key_folder),
       options_(options),
       node_(server_bus, "agent_handler"),
@@ -78,7 +79,9 @@ void AgentHandlerProcess::ReadKeys() {
   const std::map<int32_t, SecretKey> keys = key_folder_.Read();
   if (keys.size() > kMaxAgents) {
     throw std::runtime_error(
-        fmt::format("{} keys: one server takes {} agents at most", keys.size(), kMaxAgents));
+        fmt::format("folder of keys {}: it has {}, and one server takes {} agents at most: take "
+                    "some out",
+                    key_folder_name_, keys.size(), kMaxAgents));
   }
   std::erase_if(agents_, [&](const auto& item) { return !keys.contains(item.first); });
   for (const auto& [agent_id, key] : keys) {
@@ -146,20 +149,15 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   if (const auto pose = agent.handler->TakePose()) {
     node_.Publish(channels::Pose(agent_id), *pose);
   }
-  JournalReady();
+  JournalReady(&agent);
 }
 
-void AgentHandlerProcess::JournalReady() {
-  for (auto& [agent_id, agent] : agents_) {
-    if (archive_.Full()) {
-      return;  // it stays in the receive cache
-    }
-    if (!agent.handler) {
-      continue;
-    }
-    for (Receiver::Keyframe& keyframe : agent.handler->TakeReady()) {
-      archive_.Append(keyframe.id, std::move(keyframe.bytes));
-    }
+void AgentHandlerProcess::JournalReady(Agent* agent) {
+  if (archive_.Full() || !agent->handler) {
+    return;  // what is ready stays in the receive cache
+  }
+  for (Receiver::Keyframe& keyframe : agent->handler->TakeReady()) {
+    archive_.Append(keyframe.id, std::move(keyframe.bytes));
   }
 }
 
@@ -175,7 +173,9 @@ void AgentHandlerProcess::SendAcks() {
 int AgentHandlerProcess::Poll(int64_t steady_us) {
   now_us_ = steady_us;
   archive_.set_now_us(steady_us);
-  JournalReady();
+  for (auto& [agent_id, agent] : agents_) {
+    JournalReady(&agent);
+  }
   for (const KeyframeId& id : archive_.Sync()) {
     const auto agent = agents_.find(id.map.agent_id);
     if (agent != agents_.end() && agent->second.handler) {

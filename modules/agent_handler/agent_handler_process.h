@@ -28,7 +28,8 @@ struct AgentHandlerOptions {
 
 class AgentHandlerProcess : public PolledProcess {
  public:
-  static constexpr size_t kMaxAgents = 64;  // beyond it, keys are refused
+  // Beyond it, keys are refused: 210 MB of receive caches when all are full.
+  static constexpr size_t kMaxAgents = 1000;
 
   // `now_utime`: wall clock. Throws if the journal or a key cannot be used.
   AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path,
@@ -54,19 +55,20 @@ class AgentHandlerProcess : public PolledProcess {
   AgentHandler MakeHandler(int32_t agent_id) const;
   void OnCorrection(const Correction& correction);
   void OnLandmarks(const MapLandmarks& landmarks, const landmarks_t& message);
-  void JournalReady();
+  void JournalReady(Agent* agent);
   void SendAcks();
   // For people: agents whose software is not of this version.
   std::string OtherSoftware() const;
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;
+  const std::string key_folder_name_;
   KeyFolder key_folder_;
   const AgentHandlerOptions options_;
   Node node_;
   Archive archive_;
   std::map<int32_t, Agent> agents_;          // those with a key
-  std::map<MapId, Correction> corrections_;  // the newest of each map, at most 1000
+  std::map<MapId, Correction> corrections_;  // the newest of each map, at most 16,000
   MissingStates missing_corrections_;        // of the maps that were in the journal at the start
   int64_t now_us_ = 0;
   int64_t next_have_utime_ = 0;

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 
@@ -79,6 +80,12 @@ bool ParseNumber(std::string_view field, double* value) {
 }
 
 bool ParseNumber(std::string_view field, int64_t* value) { return ParseWhole(field, value); }
+
+bool IsNotFinite(const std::string& field) {
+  char* end = nullptr;
+  const double value = std::strtod(field.c_str(), &end);
+  return end != field.c_str() && *end == '\0' && !std::isfinite(value);
+}
 
 void RowComplaints::Add(int line, const std::string& what) {
   if (++count_ <= kKept) {

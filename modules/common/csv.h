@@ -23,6 +23,8 @@ std::vector<CsvRow> ReadCsv(const std::string& path);
 // Whole-field conversions; false on anything left over, on overflow, and on NaN or infinity.
 bool ParseNumber(std::string_view field, double* value);
 bool ParseNumber(std::string_view field, int64_t* value);
+// "nan", "-inf", "1e400": a number to its writer, and none to reckon with.
+bool IsNotFinite(const std::string& field);
 
 // Gathers what was wrong with the rows of one file without flooding: the first few in full, then a
 // count.

@@ -13,6 +13,30 @@
 namespace pangea {
 namespace {
 
+constexpr double kMaxPosition_m = 1e9;
+constexpr double kMaxStamp_s = 4e12;  // so that differences of stamps fit 64 bits
+
+[[noreturn]] void Refuse(const std::string& path, const CsvRow& row, size_t column,
+                         const std::string& why) {
+  throw std::runtime_error(fmt::format("{}:{}: column {} '{}' is {}", path, row.line, column + 1,
+                                       row.fields[column], why));
+}
+
+// Of the stamp and the pose.
+void CheckFinite(const std::string& path, const CsvRow& row) {
+  constexpr size_t kColumns = 8;
+  for (size_t i = 0; i < std::min(row.fields.size(), kColumns); ++i) {
+    if (IsNotFinite(row.fields[i])) {
+      Refuse(path, row, i, "not a finite number");
+    }
+    double metres = 0;
+    if (i >= 1 && i <= 3 && ParseNumber(row.fields[i], &metres) &&
+        std::abs(metres) > kMaxPosition_m) {
+      Refuse(path, row, i, fmt::format("not from {} to {} m", -kMaxPosition_m, kMaxPosition_m));
+    }
+  }
+}
+
 // Seven numbers from fields[1] on; quaternion order by the format. False with a reason.
 bool ParsePose(const CsvRow& row, bool quaternion_w_first, Rigid3* pose, std::string* why) {
   double v[7];
@@ -71,9 +95,10 @@ Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings) 
     StampedPose pose;
     double seconds = 0;
     std::string why;
+    CheckFinite(path, row);
     if (row.fields.size() != 8) {
       complaints.Add(row.line, fmt::format("{} columns instead of 8", row.fields.size()));
-    } else if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > 9e12) {
+    } else if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > kMaxStamp_s) {
       complaints.Add(row.line, fmt::format("'{}' is no stamp in seconds", row.fields[0]));
     } else if (!ParsePose(row, false, &pose.T, &why)) {
       complaints.Add(row.line, why);
@@ -94,6 +119,7 @@ Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string
     StampedPose pose;
     int64_t ns = 0;
     std::string why;
+    CheckFinite(path, row);
     if (row.fields.size() != 8 && row.fields.size() != 17) {
       complaints.Add(row.line, fmt::format("{} columns instead of 8 or 17", row.fields.size()));
     } else if (!ParseNumber(row.fields[0], &ns)) {

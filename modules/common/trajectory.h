@@ -48,8 +48,9 @@ SortOutcome SortByTime(std::vector<Stamped>* rows) {
 // The same for the rows of a file; what it mended is added to `warnings`.
 void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings);
 
-// The readers throw std::runtime_error when nothing usable is in the file; what they mended is
-// added to `warnings`.
+// The readers throw std::runtime_error when nothing usable is in the file, and, by line, at a stamp
+// or pose that is not finite or further away than 1e9 m: what wrote it had failed, and an error
+// without that row would hide it. What they mended is added to `warnings`.
 Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings);
 Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string>* warnings);
 // Either format, told apart by the first row: EuRoC's has commas.

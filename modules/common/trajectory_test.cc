@@ -90,6 +90,31 @@ TEST_F(TrajectoryTest, RefusesAnotherFormatAndNothing) {
   EXPECT_THROW(ReadTum(Write("0 0 0 0 0 0 0 0.2\n"), &warnings_), std::runtime_error);
 }
 
+// One such row of many, which would be dropped if it were only malformed.
+TEST_F(TrajectoryTest, RefusesWhatIsNotFinite) {
+  std::string rows;
+  for (int i = 0; i < 30; ++i) {
+    rows += std::to_string(i) + " 0 0 0 0 0 0 1\n";
+  }
+  const auto error_of = [&](const std::string& row) -> std::string {
+    try {
+      ReadTrajectory(Write(rows + row + "\n"), &warnings_);
+    } catch (const std::runtime_error& error) {
+      return std::filesystem::path(error.what()).filename();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_of("30 0 nan 0 0 0 0 1"), "file:31: column 3 'nan' is not a finite number");
+  EXPECT_EQ(error_of("30 0 0 -inf 0 0 0 1"), "file:31: column 4 '-inf' is not a finite number");
+  EXPECT_EQ(error_of("30 0 0 0 0 0 0 1e400"), "file:31: column 8 '1e400' is not a finite number");
+  EXPECT_EQ(error_of("inf 0 0 0 0 0 0 1"), "file:31: column 1 'inf' is not a finite number");
+  EXPECT_THAT(error_of("30 1e300 0 0 0 0 0 1"), HasSubstr("file:31: column 2 '1e300' is not from"));
+  EXPECT_EQ(error_of("30 0 x 0 0 0 0 1"), "no error");  // dropped, with a warning
+  EXPECT_THROW(
+      ReadTrajectory(Write("1000,1,nan,3,0.5,0.5,0.5,0.5\n2000,1,2,3,1,0,0,0\n"), &warnings_),
+      std::runtime_error);
+}
+
 TEST_F(TrajectoryTest, InterpolatesHalfwayInPositionAndRotation) {
   const Trajectory trajectory = {{0, Rigid3()},
                                  {100, Rigid3(YawRotation(0.8), {2, 0, -4})},

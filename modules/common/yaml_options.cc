@@ -74,6 +74,24 @@ T ScalarValue(const YAML::Node& node, const std::string& file, const std::string
   return value;
 }
 
+template <typename T>
+T ValueWithin(const YAML::Node& node, const std::string& file, const std::string& path,
+              const std::string& type, const std::function<bool(double)>& is_within) {
+  const T value = ScalarValue<T>(node, file, path, type);
+  if (!std::isfinite(static_cast<double>(value)) || !is_within(static_cast<double>(value))) {
+    ThrowType(node, file, path, type);
+  }
+  return value;
+}
+
+std::string RangeText(const std::string& of, double low, double high) {
+  return fmt::format("{} from {} to {}", of, low, high);
+}
+
+std::function<bool(double)> Between(double low, double high) {
+  return [low, high](double value) { return value >= low && value <= high; };
+}
+
 }  // namespace
 
 YamlOptions::YamlOptions() = default;
@@ -105,13 +123,35 @@ void YamlOptions::AddWithin(const std::string& key, const std::string& type,
   Entry& entry = NewEntry(key);
   entry.read = [value, type, is_within](const YAML::Node& node, const std::string& file,
                                         const std::string& path) {
-    const double read = ScalarValue<double>(node, file, path, type);
-    if (!std::isfinite(read) || !is_within(read)) {
-      ThrowType(node, file, path, type);
-    }
-    *value = read;
+    *value = ValueWithin<double>(node, file, path, type, is_within);
   };
   entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddBetween(const std::string& key, double low, double high, double* value) {
+  AddWithin(key, RangeText("a number", low, high), Between(low, high), value);
+}
+
+void YamlOptions::AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [=](const YAML::Node& node, const std::string& file, const std::string& path) {
+    *value = ValueWithin<int32_t>(node, file, path, RangeText("a whole number", low, high),
+                                  Between(low, high));
+  };
+  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddBetween(const std::string& key, double low, double high,
+                             std::optional<double>* value) {
+  Add(key, value);
+  entries_.back()->read = [=](const YAML::Node& node, const std::string& file,
+                              const std::string& path) {
+    value->reset();
+    if (!node.IsNull()) {
+      *value = ValueWithin<double>(node, file, path, RangeText("a number", low, high),
+                                   Between(low, high));
+    }
+  };
 }
 
 void YamlOptions::Add(const std::string& key, std::optional<double>* value) {

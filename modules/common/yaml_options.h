@@ -48,6 +48,14 @@ class YamlOptions {
   void Add(const std::string& key, std::optional<double>* value);  // "~": none
   void AddPositive(const std::string& key, double* value);         // and finite
   void AddNotNegative(const std::string& key, double* value);      // and finite
+  // From `low` to `high`, both taken.
+  void AddBetween(const std::string& key, double low, double high, double* value);
+  void AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value);
+  void AddBetween(const std::string& key, double low, double high,
+                  std::optional<double>* value);  // "~": none
+  // Where `is_within` says so, and finite; `type` tells people what that is: "a number above 0".
+  void AddWithin(const std::string& key, const std::string& type,
+                 const std::function<bool(double)>& is_within, double* value);
   void Add(const std::string& key, std::vector<double>* value);
   void Add(const std::string& key, std::vector<std::string>* value);
 
@@ -127,8 +135,6 @@ class YamlOptions {
     return bound;
   }
 
-  void AddWithin(const std::string& key, const std::string& type,
-                 const std::function<bool(double)>& is_within, double* value);
   void AddNamed(const std::string& key, const std::vector<std::string>& names,
                 const std::function<void(size_t)>& set, const std::function<size_t()>& get);
   void AddSequence(const std::string& key, std::function<std::vector<YamlOptions>(size_t)> resize,

@@ -186,6 +186,36 @@ TEST(YamlOptions, ANumberOutOfItsRangeIsRefused) {
   EXPECT_EQ(density, 0.5);
 }
 
+TEST(YamlOptions, ARangeTakesItsEndsAndIsNamed) {
+  double delay = 1;
+  int32_t id = 1;
+  std::optional<double> bound;
+  YamlOptions yaml;
+  yaml.AddBetween("delay", 0, 1e6, &delay);
+  yaml.AddBetween("id", 1, 65535, &id);
+  yaml.AddBetween("bound", 0, 1, &bound);
+  yaml.ReadText("delay: 1e6\nid: 65535\nbound: 1", "test.yaml");
+  EXPECT_EQ(delay, 1e6);
+  EXPECT_EQ(id, 65535);
+  EXPECT_EQ(bound, 1);
+  yaml.ReadText("bound: ~", "test.yaml");
+  EXPECT_FALSE(bound);
+  const auto complaint = [&yaml](const std::string& text) -> std::string {
+    try {
+      yaml.ReadText(text, "test.yaml");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint("\ndelay: 1e300"),
+            "test.yaml:2: key 'delay' must be a number from 0 to 1000000, not '1e300'");
+  EXPECT_EQ(complaint("id: 65536"),
+            "test.yaml:1: key 'id' must be a whole number from 1 to 65535, not '65536'");
+  EXPECT_THAT(complaint("id: 1.5"), HasSubstr("'id' must be a whole number from 1 to 65535"));
+  EXPECT_THAT(complaint("bound: .nan"), HasSubstr("'bound' must be a number from 0 to 1, not"));
+}
+
 TEST(YamlOptions, MissingDoubledAndBroken) {
   EXPECT_THAT(Complaint("items: [{name: x}]"), HasSubstr("key 'items[0].id' is missing"));
   EXPECT_THAT(Complaint("count: 1\ncount: 2"), HasSubstr("'count' stands twice"));

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "common/csv.h"
 #include "common/euroc.h"
 #include "common/text_file.h"
 
@@ -31,6 +32,16 @@ Trajectory ReadReference(const std::string& path) {
   }
   return reference;
 }
+
+// CLI11's ranges take "nan".
+const CLI::Validator kLength(
+    [](const std::string& text) -> std::string {
+      double value = 0;
+      return ParseNumber(text, &value) && value > 0 && value <= 1e9
+                 ? ""
+                 : fmt::format("'{}' is no number above 0, at most 1e9", text);
+    },
+    "POSITIVE");
 
 void WriteJson(const nlohmann::ordered_json& json, const std::string& path) {
   WriteTextFile(path, json.dump(2) + "\n");
@@ -60,12 +71,8 @@ EvalCommandLine::EvalCommandLine(CLI::App& app) {
                         "write PREFIX.trajectory.png and PREFIX.error.png (SE(3) alignment)");
     command->callback([this] { chosen_ = [this] { RunAbsolute(); }; });
   }
-  rpe->add_option("--distances", distances_m_, "metres of path")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber);
-  rpe->add_option("--durations", durations_s_, "seconds")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+  rpe->add_option("--distances", distances_m_, "metres of path")->delimiter(',')->check(kLength);
+  rpe->add_option("--durations", durations_s_, "seconds")->delimiter(',')->check(kLength);
   rpe->callback([this] { chosen_ = [this] { RunRelative(); }; });
 }
 
@@ -73,7 +80,7 @@ void EvalCommandLine::AddCommon(CLI::App& command) {
   command
       .add_option("--max-gap", max_gap_s_,
                   "seconds between reference poses across which it is still interpolated")
-      ->check(CLI::PositiveNumber)
+      ->check(kLength)
       ->capture_default_str();
   command.add_option("--json", json_path_, "write the figures to this file");
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -53,6 +54,23 @@ std::vector<PosePair> PairsOf(const EvaluationInput& input, double max_gap_s) {
   return pairs;
 }
 
+void CheckFinite(const Statistics& s, const std::string& of) {
+  for (const double value : {s.rmse, s.mean, s.median, s.max}) {
+    if (!std::isfinite(value)) {
+      throw std::runtime_error(fmt::format("{}: its error cannot be told: it is no number", of));
+    }
+  }
+}
+
+void CheckFinite(const std::vector<RelativeRow>& rows, const std::string& of) {
+  for (const auto& [length, rpe] : rows) {
+    if (rpe) {
+      CheckFinite(rpe->position_m, of);
+      CheckFinite(rpe->rotation_rad, of);
+    }
+  }
+}
+
 void AddRows(const std::vector<RelativeRow>& rows, const std::string& unit, Table* table) {
   for (const auto& [length, rpe] : rows) {
     if (!rpe) {
@@ -97,6 +115,10 @@ AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, 
     if (!joint) {
       throw std::runtime_error(
           fmt::format("fewer than {} poses have a reference: no error can be told", kMinPairs));
+    }
+    for (size_t i = 0; i < inputs.size(); ++i) {
+      CheckFinite(joint->agents[i].position_m, inputs[i].name);
+      CheckFinite(joint->agents[i].rotation_rad, inputs[i].name);
     }
     evaluation.by_alignment.emplace_back(kind, std::move(*joint));
   }
@@ -156,6 +178,15 @@ RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
   }
   for (const double duration_s : durations_s) {
     evaluation.over_time_s.push_back({duration_s, RelativeErrorOverTime(pairs, duration_s)});
+  }
+  CheckFinite(evaluation.over_distance_m, input.name);
+  CheckFinite(evaluation.over_time_s, input.name);
+  const auto is_there = [](const RelativeRow& row) { return row.rpe.has_value(); };
+  if (std::ranges::none_of(evaluation.over_distance_m, is_there) &&
+      std::ranges::none_of(evaluation.over_time_s, is_there)) {
+    throw std::runtime_error(
+        fmt::format("{}: it has no stretch as long as any of those asked for: no error can be told",
+                    input.name));
   }
   return evaluation;
 }

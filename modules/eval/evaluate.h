@@ -25,7 +25,7 @@ struct AbsoluteEvaluation {
   std::vector<std::optional<double>> coverage;
   std::vector<std::pair<AlignmentKind, JointAte>> by_alignment;
 };
-// Throws std::runtime_error when too few poses have ground truth.
+// Throws std::runtime_error when too few poses have ground truth, or an error is no number.
 AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s);
 std::string ToText(const AbsoluteEvaluation& evaluation);
 nlohmann::ordered_json ToJson(const AbsoluteEvaluation& evaluation);
@@ -38,7 +38,8 @@ struct RelativeEvaluation {
   std::vector<RelativeRow> over_distance_m;
   std::vector<RelativeRow> over_time_s;
 };
-// Throws std::runtime_error when no pose has ground truth.
+// Throws std::runtime_error when no pose has ground truth, no stretch is long enough, or an error
+// is no number.
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s);

@@ -57,6 +57,19 @@ TEST(Evaluate, NoCommonTimeIsAnError) {
   EXPECT_THAT([&] { EvaluateRelative(input, {1}, {1}, 0.1); }, says_so);
 }
 
+TEST(Evaluate, AnErrorThatIsNoNumberIsNone) {
+  EvaluationInput input = Input("wild.tum", 0);
+  input.estimate[7].T.t.x() = 1e300;
+  const auto says_so = ThrowsMessage<std::runtime_error>(HasSubstr("wild.tum: its error cannot"));
+  EXPECT_THAT([&] { EvaluateAbsolute({input}, 0.1); }, says_so);
+  EXPECT_THAT([&] { EvaluateRelative(input, {1}, {1}, 0.1); }, says_so);
+}
+
+TEST(Evaluate, NoStretchAtAllIsAnError) {
+  EXPECT_THAT([] { EvaluateRelative(Input("short.tum", 0), {1000}, {1000}, 0.1); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("short.tum: it has no stretch")));
+}
+
 TEST(Evaluate, LinesBreakAtHoles) {
   const Trajectory trajectory = {{0, {}}, {500'000, {}}, {5'000'000, {}}};
   const auto points = TopView(trajectory, Alignment());

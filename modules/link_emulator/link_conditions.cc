@@ -2,40 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 namespace pangea {
-namespace {
-
-constexpr double kMaxDelay_ms = 60'000;
-
-// Also false for NaN.
-bool Within(double value, double low, double high) { return value >= low && value <= high; }
-
-}  // namespace
-
-std::optional<std::string> LinkConditions::Invalid() const {
-  for (const auto& [name, share] : {std::pair{"loss", loss}, std::pair{"reorder", reorder},
-                                    std::pair{"duplicate", duplicate}}) {
-    if (!Within(share, 0, 1)) {
-      return fmt::format("{} {} must be a share from 0 to 1", name, share);
-    }
-  }
-  for (const auto& [name, delay] :
-       {std::pair{"delay_ms", delay_ms}, std::pair{"jitter_ms", jitter_ms}}) {
-    if (!Within(delay, 0, kMaxDelay_ms)) {
-      return fmt::format("{} {} must be from 0 to {} ms", name, delay, kMaxDelay_ms);
-    }
-  }
-  const bool partitions_good = std::ranges::all_of(partitions, [](const LinkPartition& partition) {
-    return Within(partition.at_s, 0, 1e6) && Within(partition.seconds, 0, 1e6);
-  });
-  if (!partitions_good) {
-    return "a partition's at and seconds must not be negative";
-  }
-  return std::nullopt;
-}
 
 std::string Describe(const LinkConditions& conditions) {
   std::string text;

@@ -3,7 +3,6 @@
 // What a link does to packets, the same in both directions.
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,9 +21,6 @@ struct LinkConditions {
   double duplicate = 0;  // share of packets that arrive twice
   std::vector<LinkPartition> partitions;
   uint64_t seed = 1;  // of every decision
-
-  // Why they cannot be used, or nothing.
-  std::optional<std::string> Invalid() const;
 };
 
 // "loss 5 %, delay 50 ms": what differs from a perfect link, for people.

@@ -12,27 +12,32 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(LinkConditions, DefaultIsAPerfectLink) {
-  EXPECT_EQ(LinkConditions{}.Invalid(), std::nullopt);
-  EXPECT_EQ(Describe({}), "perfect");
-}
+TEST(LinkConditions, DefaultIsAPerfectLink) { EXPECT_EQ(Describe({}), "perfect"); }
 
-TEST(LinkConditions, SayWhatIsWrong) {
-  const auto invalid = [](const LinkConditions& conditions) {
-    return conditions.Invalid().value_or("nothing");
+TEST(LinkConditions, EveryNumberHasItsRange) {
+  const auto complaint = [](const std::string& text) -> std::string {
+    LinkConditions conditions;
+    YamlOptions yaml;
+    Bind(yaml, conditions);
+    try {
+      yaml.ReadText(text, "link.yaml");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "nothing";
   };
-  LinkConditions conditions;
-  conditions.loss = 5;
-  EXPECT_THAT(invalid(conditions), testing::AllOf(HasSubstr("loss 5"), HasSubstr("0 to 1")));
-  conditions = {};
-  conditions.duplicate = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(invalid(conditions), HasSubstr("duplicate"));
-  conditions = {};
-  conditions.jitter_ms = -1;
-  EXPECT_THAT(invalid(conditions), HasSubstr("jitter_ms"));
-  conditions = {};
-  conditions.partitions = {{30, -60}};
-  EXPECT_THAT(invalid(conditions), HasSubstr("partition"));
+  EXPECT_THAT(complaint("loss: 5"), HasSubstr("link.yaml:1: key 'loss' must be a number from 0 to "
+                                              "1, not '5'"));
+  EXPECT_THAT(complaint("reorder: -0.1"), HasSubstr("'reorder' must be a number from 0 to 1,"));
+  EXPECT_THAT(complaint("duplicate: .nan"), HasSubstr("'duplicate' must be a number from 0 to 1,"));
+  EXPECT_THAT(complaint("delay_ms: 1e300"),
+              HasSubstr("'delay_ms' must be a number from 0 to 60000,"));
+  EXPECT_THAT(complaint("jitter_ms: -1"),
+              HasSubstr("'jitter_ms' must be a number from 0 to 60000,"));
+  EXPECT_THAT(complaint("partitions: [{at: 30, seconds: -60}]"),
+              HasSubstr("'partitions[0].seconds' must be a number from 0 to 1000000,"));
+  EXPECT_THAT(complaint("partitions: [{at: .inf, seconds: 60}]"), HasSubstr("'partitions[0].at'"));
+  EXPECT_THAT(complaint("seed: -1"), HasSubstr("'seed' must be a whole number >= 0"));
 }
 
 TEST(LinkConditions, ReadFromYamlAndDescribed) {

@@ -1,7 +1,7 @@
 #pragma once
 
 // A link's conditions as YAML keys: an agent's `link:` in a session file, and the emulator's
-// options.
+// options. What is out of its range is refused by file, line and key.
 
 #include "common/yaml_options.h"
 #include "link_emulator/link_conditions.h"
@@ -9,16 +9,18 @@
 namespace pangea {
 
 inline void Bind(YamlOptions& yaml, LinkConditions& conditions) {
-  yaml.Add("loss", &conditions.loss);
-  yaml.Add("delay_ms", &conditions.delay_ms);
-  yaml.Add("jitter_ms", &conditions.jitter_ms);
-  yaml.Add("reorder", &conditions.reorder);
-  yaml.Add("duplicate", &conditions.duplicate);
+  constexpr double kMaxDelay_ms = 60'000;
+  constexpr double kMaxTime_s = 1e6;
+  yaml.AddBetween("loss", 0, 1, &conditions.loss);
+  yaml.AddBetween("delay_ms", 0, kMaxDelay_ms, &conditions.delay_ms);
+  yaml.AddBetween("jitter_ms", 0, kMaxDelay_ms, &conditions.jitter_ms);
+  yaml.AddBetween("reorder", 0, 1, &conditions.reorder);
+  yaml.AddBetween("duplicate", 0, 1, &conditions.duplicate);
   yaml.AddList("partitions", &conditions.partitions,
                [](YamlOptions& item, LinkPartition& partition) {
-                 item.Add("at", &partition.at_s);
+                 item.AddBetween("at", 0, kMaxTime_s, &partition.at_s);
                  item.Require("at");
-                 item.Add("seconds", &partition.seconds);
+                 item.AddBetween("seconds", 0, kMaxTime_s, &partition.seconds);
                  item.Require("seconds");
                });
   yaml.Add("seed", &conditions.seed);

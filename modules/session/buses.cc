@@ -12,6 +12,8 @@
 namespace pangea::session {
 namespace {
 
+constexpr uint32_t kLastPort = 65535;
+
 // LCM shares its port with other programs on the bus; binding it alone tells whether anybody is
 // there.
 bool PortIsFree(uint16_t port) {
@@ -28,6 +30,14 @@ bool PortIsFree(uint16_t port) {
   return is_free;
 }
 
+// Below the ports that the kernel gives to sockets without one, as every LCM sender's is: such a
+// socket could take a port between this look and the bus' opening.
+uint32_t RandomPort(size_t needed) {
+  constexpr uint32_t kFirst = 20000, kEnd = 32000;
+  std::random_device random;
+  return kFirst + random() % (kEnd - kFirst - static_cast<uint32_t>(needed));
+}
+
 std::string Url(uint16_t port) {
   return fmt::format("udpm://239.255.76.67:{}?ttl=0&recv_buf_size=4194304", port);
 }
@@ -36,19 +46,23 @@ std::string Url(uint16_t port) {
 
 Buses ChooseBuses(const std::vector<int32_t>& agent_ids, const std::vector<int32_t>& with_own_link,
                   std::optional<uint16_t> first_port) {
-  std::random_device random;
-  // Below the ports that the kernel gives to sockets without one, as every LCM sender's is: such a
-  // socket could take a port between this look and the bus' opening.
-  uint16_t port = first_port.value_or(static_cast<uint16_t>(20000 + random() % 12000));
+  const size_t needed = 2 + agent_ids.size() + with_own_link.size();
+  uint32_t port = first_port ? *first_port : RandomPort(needed);
   const auto next_url = [&] {
-    while (!PortIsFree(port)) {
+    while (port <= kLastPort && !PortIsFree(static_cast<uint16_t>(port))) {
       if (first_port) {
         throw std::runtime_error(fmt::format(
             "UDP port {} is in use: give another --port, or none to have free ones chosen", port));
       }
-      port = static_cast<uint16_t>(port + 1);
+      ++port;
     }
-    return Url(port++);
+    if (port > kLastPort) {
+      throw std::runtime_error(
+          fmt::format("this session needs {} UDP ports, and they end at {}: "
+                      "give a smaller --port, or none",
+                      needed, kLastPort));
+    }
+    return Url(static_cast<uint16_t>(port++));
   };
   Buses buses;
   buses.server = next_url();

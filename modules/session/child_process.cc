@@ -7,9 +7,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -40,12 +43,16 @@ ChildProcess::ChildProcess(std::string name, std::vector<std::string> argv,
     setpgid(0, 0);
     dup2(out, STDOUT_FILENO);
     dup2(out, STDERR_FILENO);
+    // LCM opens its sockets without close-on-exec. A child that had those of hundreds of buses
+    // would number its own from thousands on, which lcm-logger's select() cannot take.
+    close_range(STDERR_FILENO + 1, std::numeric_limits<unsigned>::max(), 0);
     execv(arguments[0], arguments.data());
     _exit(127);
   }
+  const int error = errno;
   close(out);
   if (pid_ < 0) {
-    throw std::runtime_error(fmt::format("cannot start {}", argv[0]));
+    throw std::runtime_error(fmt::format("cannot start {}: {}", argv[0], std::strerror(error)));
   }
 }
 
@@ -53,7 +60,9 @@ ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : name_(std::move(other.name_)),
       output_(std::move(other.output_)),
       pid_(std::exchange(other.pid_, -1)),
-      exit_(other.exit_) {}
+      exit_(other.exit_),
+      started_(other.started_),
+      ended_(other.ended_) {}
 
 ChildProcess::~ChildProcess() {
   if (pid_ > 0 && running()) {
@@ -68,6 +77,7 @@ std::optional<ChildProcess::Exit> ChildProcess::Poll() {
     if (waitpid(pid_, &status, WNOHANG) == pid_) {
       exit_ = WIFSIGNALED(status) ? Exit{128 + WTERMSIG(status), WTERMSIG(status)}
                                   : Exit{WEXITSTATUS(status), 0};
+      ended_ = std::chrono::steady_clock::now();
     }
   }
   return exit_;
@@ -99,6 +109,17 @@ std::string ChildProcess::LastLine() const {
     }
   }
   return last;
+}
+
+std::string ChildProcess::HowItEnded() {
+  const auto exit = Poll();
+  return !exit ? "it runs"
+               : fmt::format("{} {}: {}", exit->signal != 0 ? "signal" : "exit code",
+                             exit->signal != 0 ? exit->signal : exit->code, LastLine());
+}
+
+double ChildProcess::RanSeconds() const {
+  return std::chrono::duration<double>(ended_ - started_).count();
 }
 
 std::filesystem::path ProgramDirectory() {

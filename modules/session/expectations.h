@@ -35,8 +35,8 @@ using Expectations = std::map<std::string, double>;
 class ExpectationsSection {
  public:
   ExpectationsSection(YamlOptions& yaml, const std::string& key);
-  // What has been read. Throws std::runtime_error about a bound that means nothing.
-  Expectations Take(const std::string& file) const;
+  // What has been read.
+  Expectations Take() const;
 
  private:
   std::map<std::string, std::optional<double>> bounds_;

@@ -27,11 +27,15 @@ struct Graph {
   std::vector<GraphEdge> edges;
 };
 
-// Sum of the edges' xi^T covariance^-1 xi.
+// Sum of the edges' xi^T covariance^-1 xi. Throws std::runtime_error that names an edge whose share
+// is no number from 0 up.
 double Cost(const Graph& graph);
 
 std::string ToG2o(const Graph& graph);
-// Throws std::runtime_error with one line that names the file, the line and what is wrong.
-Graph ReadG2o(const std::string& path);
+// Throws std::runtime_error with one line that names the file, the line, the field and what is
+// wrong: a number that is none, a coordinate of a pose beyond `max_position_m`, a vertex or an edge
+// that is there twice, an end of an edge that is no vertex, an information matrix that is not
+// positive definite. Two different edges between the same vertices are two measurements.
+Graph ReadG2o(const std::string& path, double max_position_m = 1e12);
 
 }  // namespace pangea::session

@@ -1,11 +1,20 @@
 #include "session/kept_processes.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
 namespace pangea::session {
+
+bool QuickDeaths::Note(const std::string& why, double ran_s) {
+  if (ran_s > kAtItsStart_s) {
+    count_ = 0;
+    return false;
+  }
+  count_ = why == why_ ? count_ + 1 : 1;
+  why_ = why;
+  return count_ >= kMaxQuickDeaths;
+}
+
 KeptProcesses::KeptProcesses(std::filesystem::path logs) : logs_(std::move(logs)) {}
 
 std::filesystem::path KeptProcesses::LogOf(const std::string& name) const {
@@ -33,20 +42,28 @@ void KeptProcesses::ExpectEnd(const std::string& name) {
 std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
   std::vector<Revived> revived;
   for (Kept& kept : kept_) {
-    const auto exit = kept.child->Poll();
-    if (!exit || kept.unexpected >= kMaxRestarts) {
+    const auto exit = kept.given_up ? std::nullopt : kept.child->Poll();
+    if (!exit) {
       continue;
     }
     const std::string name = kept.child->name();
-    const std::string how = exit->signal != 0 ? fmt::format("signal {}", exit->signal)
-                                              : fmt::format("exit code {}", exit->code);
-    const std::string why = fmt::format("{}: {}", how, kept.child->LastLine());
-    kept.unexpected += kept.expects_end ? 0 : 1;
-    kept.expects_end = false;
-    kept.child.emplace(name, kept.argv, LogOf(name));
-    revived.push_back({name, why, kept.unexpected == kMaxRestarts, kept.unexpected});
+    const std::string why = kept.child->HowItEnded();
+    if (!std::exchange(kept.expects_end, false)) {
+      ++kept.unexpected;
+      kept.given_up =
+          kept.quick_deaths.Note(why, kept.child->RanSeconds()) || kept.unexpected > kMaxRestarts;
+    }
+    if (!kept.given_up) {
+      kept.child.emplace(name, kept.argv, LogOf(name));
+    }
+    revived.push_back({name, why, kept.given_up, kept.unexpected});
   }
   return revived;
+}
+
+bool KeptProcesses::GivenUp(const std::string& name) const {
+  return std::ranges::any_of(
+      kept_, [&](const Kept& kept) { return kept.given_up && kept.child->name() == name; });
 }
 
 void KeptProcesses::StopAll(double grace_s) {

@@ -1,8 +1,10 @@
 #include "session/kept_processes.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <thread>
@@ -49,18 +51,56 @@ TEST_F(KeptProcessesTest, AKilledOneIsAnotherProcessOfThatName) {
 }
 
 TEST_F(KeptProcessesTest, OneThatEndsTooOftenIsGivenUp) {
-  kept_.Start("kept_fails", {"/bin/sh", "-c", "echo no such device; exit 3"});
+  kept_.Start("kept_fails", {"/bin/sh", "-c", "echo at $(date +%N); exit 3"});
   KeptProcesses::Revived revived = NextRevived();
-  EXPECT_EQ(revived.why, "exit code 3: no such device");
-  EXPECT_FALSE(revived.last);
-  while (!revived.last && !HasFailure()) {
+  EXPECT_THAT(revived.why, testing::StartsWith("exit code 3: at "));
+  while (!revived.given_up && !HasFailure()) {
     revived = NextRevived();
   }
-  EXPECT_EQ(revived.unexpected, 20);
-  while (kept_.Find("kept_fails")->running()) {
+  EXPECT_EQ(revived.unexpected, KeptProcesses::kMaxRestarts + 1);
+  EXPECT_TRUE(kept_.GivenUp("kept_fails"));
+  EXPECT_TRUE(kept_.Revive().empty());
+}
+
+TEST_F(KeptProcessesTest, OneThatCannotStartIsGivenUpSoon) {
+  kept_.Start("kept_cannot", {"/bin/sh", "-c", "echo no such device; exit 3"});
+  kept_.Start("kept_sleeps", {"/bin/sleep", "100"});
+  for (int i = 1; i < QuickDeaths::kMaxQuickDeaths; ++i) {
+    EXPECT_FALSE(NextRevived().given_up);
+  }
+  const KeptProcesses::Revived revived = NextRevived();
+  EXPECT_TRUE(revived.given_up);
+  EXPECT_EQ(revived.why, "exit code 3: no such device");
+  EXPECT_EQ(revived.unexpected, QuickDeaths::kMaxQuickDeaths);
+  EXPECT_TRUE(kept_.GivenUp("kept_cannot"));
+  EXPECT_FALSE(kept_.GivenUp("kept_sleeps"));
+  EXPECT_TRUE(kept_.Revive().empty());
+  kept_.StopAll(5);
+}
+
+TEST(QuickDeaths, AreInARowAndOfOneReason) {
+  QuickDeaths deaths;
+  EXPECT_FALSE(deaths.Note("a", 1));
+  EXPECT_FALSE(deaths.Note("a", 1));
+  EXPECT_FALSE(deaths.Note("a", 11));  // it ran
+  EXPECT_FALSE(deaths.Note("a", 1));
+  EXPECT_FALSE(deaths.Note("b", 1));
+  EXPECT_FALSE(deaths.Note("a", 1));
+  EXPECT_FALSE(deaths.Note("a", 1));
+  EXPECT_TRUE(deaths.Note("a", 1));
+}
+
+// lcm-logger, which uses select(), would die of a descriptor above 1023.
+TEST_F(KeptProcessesTest, AChildHasNoneOfItsParentsFiles) {
+  const int leak = open("/dev/null", O_RDONLY);
+  ASSERT_GE(leak, 3);
+  ChildProcess child("kept_lists", {"/bin/ls", "/proc/self/fd"},
+                     testing::TempDir() + "kept_lists.txt");
+  while (child.running()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  EXPECT_TRUE(kept_.Revive().empty());
+  close(leak);
+  EXPECT_EQ(child.LastLine(), "3");  // ls' own
 }
 
 }  // namespace

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "common/bus/log_reader.h"
 #include "common/bus/log_writer.h"
 #include "common/channels.h"
 #include "common/messages.h"
+#include "common/messages_checks.h"
 #include "session/log_edit.h"
 #include "session/log_export.h"
 #include "session/report_groups.h"
@@ -52,12 +55,29 @@ MapState Solved(const FinalGroup& group, const CapturedSession& session, const G
   return state;
 }
 
+// Every group's new state, as it will be read again.
+std::vector<map_state_t> Chunks(const CapturedSession& session, const Graph& solved,
+                                const std::string& g2o) {
+  std::vector<map_state_t> chunks;
+  int next = 0;
+  for (const FinalGroup& group : FinalGroups(session)) {
+    for (map_state_t& chunk : ToMessages(Solved(group, session, solved, &next))) {
+      if (const auto read = Parse(chunk); !read.value) {
+        throw std::runtime_error(fmt::format("{}: the group of map {} cannot be placed so: {}", g2o,
+                                             ToString(group.frame), read.refused));
+      }
+      chunks.push_back(std::move(chunk));
+    }
+  }
+  return chunks;
+}
+
 }  // namespace
 
 int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out) {
-  const Graph solved = ReadG2o(g2o);
+  const Graph solved = ReadG2o(g2o, messages_checks::kMaxDistance);
   CheckVertices(GraphOf(log), solved, g2o);
-  const CapturedSession session = ReadServerLog(log);
+  const std::vector<map_state_t> chunks = Chunks(ReadServerLog(log), solved, g2o);
   CheckNew(out);
   LogFileWriter writer(out);
   int64_t latest = 0;
@@ -65,13 +85,10 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
     latest = std::max(latest, event.utime);
     writer.Write(event.utime, event.channel, event.data);
   });
-  int next = 0;
-  for (const FinalGroup& group : FinalGroups(session)) {
-    for (const map_state_t& chunk : ToMessages(Solved(group, session, solved, &next))) {
-      writer.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
-    }
+  for (const map_state_t& chunk : chunks) {
+    writer.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
   }
-  return next;
+  return std::ssize(solved.vertices);
 }
 
 }  // namespace pangea::session

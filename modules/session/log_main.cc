@@ -151,7 +151,7 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   out->callback([arguments] { Export(*arguments); });
   CLI::App* back = AddCommand(app, "import",
                               "A pose graph that was exported and solved elsewhere, back into the "
-                              "log: its poses are the newest state of each group",
+                              "log: its poses, not its edges, are the newest state of each group",
                               arguments, 1);
   back->add_option("--g2o", arguments->g2o, "g2o file; vertices numbered as exported")
       ->required()
@@ -159,7 +159,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   back->add_option("--out", arguments->out, "The new log")->required();
   back->callback([arguments] {
     const int64_t placed = ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out);
-    std::cout << fmt::format("{}: {} keyframes as in {}\n", arguments->out, placed, arguments->g2o);
+    std::cout << fmt::format(
+        "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own\n",
+        arguments->out, placed, arguments->g2o);
   });
   CLI::App* explain = AddCommand(
       app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",

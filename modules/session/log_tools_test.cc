@@ -1,5 +1,6 @@
 // pangea-log's parts on the captured sample session.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -212,14 +213,78 @@ TEST_F(LogToolsTest, AG2oFileOfAnotherLogIsRefused) {
   EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
-TEST_F(LogToolsTest, ABadG2oFileNamesTheLine) {
-  std::ofstream(Path("bad.g2o")) << "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n";
-  try {
-    ReadG2o(Path("bad.g2o"));
-    FAIL() << "was read";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("bad.g2o:2: VERTEX_SE2"), std::string::npos);
+// A pose that no message may carry would be refused by who reads the log, and the old ones stand.
+TEST_F(LogToolsTest, APoseThatNoMessageMayCarryIsNotTaken) {
+  Graph graph = GraphOf(kSample).graph;
+  graph.vertices.at(5).t.y() = 1e9;
+  std::ofstream(Path("far.g2o")) << ToG2o(graph);
+  EXPECT_THAT([this] { ImportG2o(kSample, Path("far.g2o"), Path("far.lcm")); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::HasSubstr("far.g2o:6: y 1e+09 is not from -100000 to 100000")));
+  EXPECT_FALSE(fs::exists(Path("far.lcm")));
+}
+
+class BadG2oTest : public LogToolsTest {
+ protected:
+  static constexpr const char* kVertices =
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n";
+  // A diagonal information matrix, its last element given.
+  static std::string Edge(const std::string& ends, const std::string& last) {
+    return "EDGE_SE3:QUAT " + ends + " 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 " +
+           last + "\n";
   }
+  std::string ErrorOf(const std::string& text) {
+    std::ofstream(Path("bad.g2o")) << text;
+    try {
+      return fmt::format("cost {}", Cost(ReadG2o(Path("bad.g2o"))));
+    } catch (const std::runtime_error& error) {
+      const std::string what = error.what();
+      return what.substr(std::min(what.find("bad.g2o"), what.size()));
+    }
+  }
+};
+
+TEST_F(BadG2oTest, NamesLineAndField) {
+  const std::string good = kVertices;
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1")), "cost 0");
+  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n"),
+              testing::StartsWith("bad.g2o:2: VERTEX_SE2"));
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 nan 0 0 0 0 1\n"),
+            "bad.g2o:1: y 'nan' is not a finite number");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 1e400 0 0 0 1\n"),
+            "bad.g2o:1: z '1e400' is not a finite number");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 1\n"), "bad.g2o:1: qw is missing");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1 7\n"),
+            "bad.g2o:1: '7' stands behind the last field");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0.5 0 0 0 0 0 0 1\n"),
+            "bad.g2o:1: the id '0.5' is no vertex' number");
+  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n"), testing::HasSubstr("not a rotation"));
+}
+
+TEST_F(BadG2oTest, NothingIsThereTwiceOrNowhere) {
+  const std::string good = kVertices;
+  EXPECT_EQ(ErrorOf(good + "VERTEX_SE3:QUAT 0 5 0 0 0 0 0 1\n"),
+            "bad.g2o:3: vertex 0 is there already, in line 1");
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1") + Edge("0 1", "1")),
+            "bad.g2o:4: edge 0 -> 1 is there already, the same, in line 3");
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1") + Edge("0 1", "2")), "cost 0");  // two measurements
+  EXPECT_EQ(ErrorOf(Edge("0 7", "1") + good),
+            "bad.g2o:1: an end of the edge, 7, is no vertex of the file");
+  EXPECT_EQ(ErrorOf(good + Edge("1 1", "1")), "bad.g2o:3: the edge's ends are both 1");
+  EXPECT_EQ(ErrorOf(good + "FIX 0 2\n"), "bad.g2o:3: to be fixed, 2, is no vertex of the file");
+}
+
+TEST_F(BadG2oTest, AnInformationMatrixIsPositiveDefinite) {
+  const std::string good = kVertices;
+  for (const char* last : {"0", "-1", "1e-40"}) {
+    EXPECT_EQ(ErrorOf(good + Edge("0 1", last)),
+              "bad.g2o:3: the information matrix is not positive definite")
+        << last;
+  }
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "nan")),
+            "bad.g2o:3: information 6,6 'nan' is not a finite number");
+  EXPECT_THAT(ErrorOf(good + Edge("0 1", "1e300")),
+              testing::StartsWith("bad.g2o:3: information 6,6 1e300 is not from"));
 }
 
 TEST_F(LogToolsTest, TrajectoriesAndPoints) {

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -16,6 +15,9 @@ namespace pangea::session {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int32_t kMaxAgentId = 65535;
+constexpr double kMaxTime_s = 1e6;  // eleven days
 
 // A recording is a folder with mav0 in it, or mav0 itself.
 bool IsRecording(const fs::path& folder) {
@@ -42,26 +44,19 @@ std::optional<fs::path> FindRecording(const fs::path& wanted) {
   return found;
 }
 
-// A session waits for it: neither "not a number" nor for ever.
-bool IsTime(double seconds) { return seconds >= 0 && std::isfinite(seconds); }
-
 void CheckAgents(const SessionScript& script, const std::string& file) {
   if (script.agents.empty()) {
     throw std::runtime_error(fmt::format("{}: 'agents' is empty: list at least one agent", file));
   }
+  if (script.agents.size() > kMaxSessionAgents) {
+    throw std::runtime_error(fmt::format("{}: 'agents' lists {}: a session takes {} at most", file,
+                                         script.agents.size(), kMaxSessionAgents));
+  }
   std::set<int32_t> ids;
   for (const AgentScript& agent : script.agents) {
-    if (agent.id < 1 || agent.id > 65535) {
-      throw std::runtime_error(
-          fmt::format("{}: agent id {}: use a number from 1 to 65535", file, agent.id));
-    }
     if (!ids.insert(agent.id).second) {
       throw std::runtime_error(
           fmt::format("{}: agent id {} is given twice: every agent needs its own", file, agent.id));
-    }
-    if (!IsTime(agent.delay_s) || !IsTime(agent.start_s) || !IsTime(agent.duration_s)) {
-      throw std::runtime_error(fmt::format(
-          "{}: agent {}: delay, start and duration must be seconds, from 0 up", file, agent.id));
     }
     if (agent.recording.empty() && agent.keyframes.empty()) {
       throw std::runtime_error(
@@ -71,14 +66,6 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
           file, agent.id));
-    }
-    if (!(agent.budget_kb_per_s == 0 ||
-          (agent.budget_kb_per_s >= 5 && agent.budget_kb_per_s < 1e6))) {
-      throw std::runtime_error(fmt::format(
-          "{}: agent {}: budget_kb_per_s must be at least 5, or 0 for no bound", file, agent.id));
-    }
-    if (const auto invalid = agent.link ? agent.link->Invalid() : std::nullopt) {
-      throw std::runtime_error(fmt::format("{}: agent {}: link: {}", file, agent.id, *invalid));
     }
   }
 }
@@ -110,10 +97,6 @@ void CheckProcess(const std::set<std::string>& names, const std::string& process
 void CheckFaults(const SessionScript& script, const std::string& file) {
   const std::set<std::string> names = ProcessNames(script);
   for (const Fault& fault : script.faults) {
-    if (!IsTime(fault.at_s) || !IsTime(fault.seconds)) {
-      throw std::runtime_error(
-          fmt::format("{}: faults: 'at' and 'seconds' must be seconds, from 0 up", file));
-    }
     if (!fault.kill.empty() + !fault.disk_full.empty() + (fault.disconnect != 0) != 1) {
       throw std::runtime_error(fmt::format(
           "{}: faults: at {} s: give one of 'kill' or 'disk_full', a process, or 'disconnect', an "
@@ -138,31 +121,34 @@ SessionScript ParseSessionFile(const fs::path& file) {
   SessionScript script;
   YamlOptions yaml;
   yaml.AddList("agents", &script.agents, [](YamlOptions& item, AgentScript& agent) {
-    item.Add("id", &agent.id);
+    item.AddBetween("id", 1, kMaxAgentId, &agent.id);
     item.Require("id");
     item.Add("recording", &agent.recording);
-    item.Add("delay", &agent.delay_s);
-    item.Add("start", &agent.start_s);
-    item.Add("duration", &agent.duration_s);
+    item.AddBetween("delay", 0, kMaxTime_s, &agent.delay_s);
+    item.AddBetween("start", 0, kMaxTime_s, &agent.start_s);
+    item.AddBetween("duration", 0, kMaxTime_s, &agent.duration_s);
     item.Add("keyframes", &agent.keyframes);
-    item.Add("budget_kb_per_s", &agent.budget_kb_per_s);
+    item.AddWithin(
+        "budget_kb_per_s", "a number from 5 to 1000000 (kB/s), or 0 for no bound",
+        [](double kb_per_s) { return kb_per_s == 0 || (kb_per_s >= 5 && kb_per_s <= 1e6); },
+        &agent.budget_kb_per_s);
     item.AddOptional("link", &agent.link,
                      [](YamlOptions& link, LinkConditions& conditions) { Bind(link, conditions); });
   });
   yaml.Require("agents");
   yaml.AddList("faults", &script.faults, [](YamlOptions& item, Fault& fault) {
-    item.Add("at", &fault.at_s);
+    item.AddBetween("at", 0, kMaxTime_s, &fault.at_s);
     item.Require("at");
     item.Add("kill", &fault.kill);
     item.Add("disk_full", &fault.disk_full);
-    item.Add("disconnect", &fault.disconnect);
-    item.Add("seconds", &fault.seconds);
+    item.AddBetween("disconnect", 1, kMaxAgentId, &fault.disconnect);
+    item.AddBetween("seconds", 0, kMaxTime_s, &fault.seconds);
   });
   const ExpectationsSection expect(yaml, "expect");
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());
   CheckFaults(script, file.string());
-  script.expect = expect.Take(file.string());
+  script.expect = expect.Take();
   return script;
 }
 

@@ -24,6 +24,9 @@
 
 namespace pangea::session {
 
+// What one machine has been seen to run: each agent is three processes and an LCM bus.
+inline constexpr size_t kMaxSessionAgents = 200;
+
 struct AgentScript {
   int32_t id = 0;  // 1 .. 65535, unique in the session
   // Folder, relative to the session file or to --recordings; may be absent where there are
@@ -37,7 +40,7 @@ struct AgentScript {
   // file; empty for none.
   std::string keyframes;
   std::optional<LinkConditions> link;  // a bad link of its own to the server
-  double budget_kb_per_s = 0;          // what its uplink may send, kB/s; 0: no bound
+  double budget_kb_per_s = 0;          // what its uplink may send, kB/s, 5 .. 1e6; 0: no bound
   std::filesystem::path resolved;      // the recording's folder, found; empty without a recording
   std::filesystem::path resolved_keyframes;
 };

@@ -56,9 +56,11 @@ TEST_F(SessionFileTest, ReadsABudget) {
   const std::string agent =
       "agents:\n  - {id: 1, recording: ../recordings/MH_01, budget_kb_per_s: ";
   EXPECT_EQ(ReadSessionFile(Write(agent + "20}\n"), std::nullopt).agents[0].budget_kb_per_s, 20);
-  for (const char* bad : {"1", "-20", ".nan", ".inf"}) {
-    EXPECT_THAT(ErrorOf(agent + bad + "}\n"), HasSubstr("budget_kb_per_s must be at least 5"))
-        << bad;
+  for (const char* bad : {"1", "-20", ".nan", ".inf", "1e300"}) {
+    EXPECT_THAT(ErrorOf(agent + bad + "}\n"),
+                testing::AllOf(HasSubstr("two.yaml:2: key 'agents[0].budget_kb_per_s' must be a "
+                                         "number from 5 to 1000000"),
+                               HasSubstr(bad)));
   }
 }
 
@@ -152,15 +154,10 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
   EXPECT_THAT(ErrorOf("agents: []\n"), HasSubstr("empty"));
   EXPECT_THAT(ErrorOf("agents: [{id: 6}]\n"),
               testing::AllOf(HasSubstr("agent 6"), HasSubstr("'recording'")));
-  for (const char* start : {"-3", ".nan", ".inf"}) {  // an agent that never starts, never ends
-    EXPECT_THAT(ErrorOf(std::string("agents: [{id: 1, recording: ../recordings/MH_02, start: ") +
-                        start + "}]\n"),
-                HasSubstr("agent 1: delay, start and duration must be seconds, from 0 up"));
-  }
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, link: {los: 0.1}}]\n"),
               HasSubstr("'agents[0].link.loss'"));
   EXPECT_THAT(ErrorOf("agents: [{id: 4, recording: ../recordings/MH_02, link: {loss: 5}}]\n"),
-              testing::AllOf(HasSubstr("agent 4: link: loss 5"), HasSubstr("0 to 1")));
+              HasSubstr("'agents[0].link.loss' must be a number from 0 to 1, not '5'"));
   const std::string agent = "agents: [{id: 1, recording: ../recordings/MH_02}]\n";
   EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, kill: fusoin}]\n"),
               testing::AllOf(HasSubstr("'fusoin'"), HasSubstr("did you mean 'fusion'?")));
@@ -171,9 +168,53 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
               HasSubstr("one of 'kill' or 'disk_full'"));
   EXPECT_THAT(ErrorOf(agent + "faults: [{at: 3, disconnect: 2}]\n"),
               HasSubstr("there is no agent 2"));
-  EXPECT_THAT(ErrorOf(agent + "faults: [{at: -3, kill: vio_1}]\n"), HasSubstr("from 0 up"));
   EXPECT_THAT(ErrorOf("agents: [{id: 1, recording: ../recordings/MH_02, keyframes: no.lcm}]\n"),
               testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));
+}
+
+// An agent that never starts, a session that never ends.
+TEST_F(SessionFileTest, EveryNumberHasItsRange) {
+  const std::string agent = "agents:\n  - {id: 1, recording: ../recordings/MH_02}\n";
+  const auto refuses = [&](const std::string& text, const std::string& key,
+                           const std::string& range) {
+    EXPECT_THAT(ErrorOf(text),
+                testing::MatchesRegex(".*two.yaml:[0-9]+: key '" + key +
+                                      "' must be a (whole )?number from " + range + ", not '.*"))
+        << text;
+  };
+  for (const std::string bad : {"-3", ".nan", ".inf", "1e300"}) {
+    for (const std::string key : {"delay", "start", "duration"}) {
+      refuses("agents: [{id: 1, recording: ../recordings/MH_02, " + key + ": " + bad + "}]\n",
+              "agents.0.\\." + key, "0 to 1000000");
+    }
+    for (const std::string key : {"at", "seconds"}) {
+      refuses(agent + "faults: [{kill: vio_1, " + key + ": " + bad + "}]\n", "faults.0.\\." + key,
+              "0 to 1000000");
+    }
+    refuses(agent + "expect: {coverage: " + bad + "}\n", "expect.coverage", "0 to 1");
+    refuses(agent + "expect: {groups: " + bad + "}\n", "expect.groups", "0 to 1000000");
+  }
+  for (const std::string id : {"0", "-1", "65536"}) {
+    refuses("agents: [{id: " + id + ", recording: ../recordings/MH_02}]\n", "agents.0..id",
+            "1 to 65535");
+    refuses(agent + "faults: [{at: 3, disconnect: " + id + "}]\n", "faults.0..disconnect",
+            "1 to 65535");
+  }
+}
+
+TEST_F(SessionFileTest, MoreAgentsThanASessionTakesAreRefused) {
+  const auto agents = [](size_t count) {
+    std::string text = "agents:\n";
+    for (size_t id = 1; id <= count; ++id) {
+      text += "  - {id: " + std::to_string(id) + ", recording: ../recordings/MH_02}\n";
+    }
+    return text;
+  };
+  EXPECT_EQ(ReadSessionFile(Write(agents(kMaxSessionAgents)), std::nullopt).agents.size(),
+            kMaxSessionAgents);
+  EXPECT_THAT(ErrorOf(agents(kMaxSessionAgents + 1)),
+              testing::AllOf(HasSubstr("two.yaml: 'agents' lists 201"),
+                             HasSubstr("a session takes 200 at most")));
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "session/buses.h"
 #include "session/child_process.h"
 #include "session/kept_processes.h"
+#include "session/open_files.h"
 #include "session/session_monitor.h"
 #include "session/session_progress.h"
 
@@ -29,6 +30,8 @@ constexpr double kStartTimeout_s = 20;  // for the server processes to report
 constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
 constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
+constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
+constexpr size_t kFilesBeside = 64;
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 
@@ -50,7 +53,7 @@ class Runner {
   Runner(const SessionScript& script, const RunOptions& options)
       : options_(options),
         faults_(script.faults),
-        buses_(ChooseBuses(Ids(script, false), Ids(script, true), options.first_port)),
+        buses_(OpenBuses(script, options)),
         monitor_(buses_),
         progress_(isatty(STDOUT_FILENO) != 0),
         kept_(options.out / "logs") {
@@ -82,6 +85,12 @@ class Runner {
   }
 
  private:
+  // The monitor listens on the server's bus and on each agent's.
+  static Buses OpenBuses(const SessionScript& script, const RunOptions& options) {
+    AllowOpenFiles(kFilesBeside + kFilesPerBus * (script.agents.size() + 1));
+    return ChooseBuses(Ids(script, false), Ids(script, true), options.first_port);
+  }
+
   static std::vector<int32_t> Ids(const SessionScript& script, bool only_with_bad_link) {
     std::vector<int32_t> ids;
     for (const AgentScript& agent : script.agents) {
@@ -143,6 +152,9 @@ class Runner {
       }
       monitor_.Handle(50);
       Revive();
+      if (!summary_.failures.empty()) {
+        throw std::runtime_error(summary_.failures.front());
+      }
     }
   }
 
@@ -272,11 +284,14 @@ class Runner {
 
   void Revive() {
     for (const KeptProcesses::Revived& revived : kept_.Revive()) {
-      progress_.Say(fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
-      summary_.restarted.push_back(revived.name);
-      if (revived.last) {
-        summary_.failures.push_back(
-            fmt::format("{} ended {} times and was given up", revived.name, revived.unexpected));
+      if (revived.given_up) {
+        summary_.failures.push_back(fmt::format(
+            "{} ended {} times and was given up ({}); its output is in {}", revived.name,
+            revived.unexpected, revived.why, (options_.out / "logs").string()));
+        progress_.Say(summary_.failures.back());
+      } else {
+        progress_.Say(fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
+        summary_.restarted.push_back(revived.name);
       }
     }
   }
@@ -319,17 +334,23 @@ class Runner {
     progress_.Update(lines, monitor_, Now() - begin_);
   }
 
-  // Until every process has worked off what has come. A server that goes on judging is slow, not
-  // stuck: it is waited for.
-  void Drain() {
+  // The processes that say when they have nothing to do.
+  std::vector<std::string> Working() const {
     std::vector<std::string> names = server_names_;
     for (const Player& player : players_) {
       names.push_back(fmt::format("uplink_{}", player.script.id));
     }
+    std::erase_if(names, [this](const std::string& name) { return kept_.GivenUp(name); });
+    return names;
+  }
+
+  // Until every process has worked off what has come. A server that goes on judging is slow, not
+  // stuck: it is waited for.
+  void Drain() {
     const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
     double deadline = Now() + patience_s;
     int verdicts = monitor_.num_verdicts();
-    while (!monitor_.Idle(names, kQuiet_s)) {
+    while (!monitor_.Idle(Working(), kQuiet_s)) {
       if (!summary_.interrupted && monitor_.num_verdicts() > verdicts) {
         verdicts = monitor_.num_verdicts();
         deadline = Now() + patience_s;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -20,6 +22,13 @@ bool IsAddress(const std::string& text) {
     return inet_pton(AF_INET6, text.substr(1, text.size() - 2).c_str(), address.data()) == 1;
   }
   return inet_pton(AF_INET, text.c_str(), address.data()) == 1;
+}
+
+bool IsPort(std::string_view text) {
+  uint16_t port = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, port);
+  return error == std::errc() && stop == end && port > 0;
 }
 
 std::string TypeOf(const fs::path& file) {
@@ -41,6 +50,9 @@ bool HostAllowed(std::string_view host, const std::vector<std::string>& names) {
   const size_t colon = host.rfind(':');
   const bool has_port =
       colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket);
+  if (has_port && !IsPort(host.substr(colon + 1))) {
+    return false;
+  }
   const std::string name(has_port ? host.substr(0, colon) : host);
   return name == "localhost" || IsAddress(name) ||
          std::find(names.begin(), names.end(), name) != names.end();

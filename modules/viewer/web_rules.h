@@ -12,7 +12,8 @@
 
 namespace pangea::viewer {
 
-// The Host header names an address, "localhost", or one of `names`; with or without a port.
+// The Host header names an address, "localhost", or one of `names`; with a port, 1 to 65535 in
+// digits, or without. So nothing else of it gets into the answer's headers.
 bool HostAllowed(std::string_view host, const std::vector<std::string>& names);
 
 // The Origin header is of a page that this server itself gave out under `host`.

@@ -25,9 +25,22 @@ using tcp = asio::ip::tcp;
 using Request = http::request<http::empty_body>;
 
 constexpr uint32_t kMaxHeader = 8192;
+constexpr std::chrono::seconds kAsking{5};   // a whole request
+constexpr std::chrono::seconds kTaking{30};  // a whole file
 constexpr std::chrono::seconds kSilence{30};
 
+// What a page may load and do; `host` is one that HostAllowed has let through.
+std::string PagePolicy(const std::string& host) {
+  return fmt::format(
+      "default-src 'self'; connect-src 'self' ws://{0} wss://{0}; img-src 'self' blob: data:; "
+      "style-src 'self' 'unsafe-inline'; frame-ancestors 'none'",
+      host);
+}
+constexpr const char* kNothing = "default-src 'none'; frame-ancestors 'none'";
+
 std::string Text(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
+class Connection;  // see below
 
 // A browser that shows the page.
 class Browser : public std::enable_shared_from_this<Browser> {
@@ -109,9 +122,11 @@ struct WebServer::Impl {
   WebOptions options;
   std::map<std::string, PageFile> page;
   Show& show;
+  // That ask for files; first the one whose request or answer has been under way for longest. They
+  // live as long as `io`.
+  std::list<Connection*> connections;
   asio::io_context io{1};
   tcp::acceptor acceptor;
-  int num_connections = 0;
   std::list<std::weak_ptr<Browser>> browsers;
 };
 
@@ -121,17 +136,17 @@ namespace {
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(tcp::socket socket, WebServer::Impl& server)
-      : stream_(std::move(socket)), server_(server) {
-    ++server_.num_connections;
-  }
-  ~Connection() { --server_.num_connections; }
+      : stream_(std::move(socket)),
+        server_(server),
+        place_(server.connections.insert(server.connections.end(), this)) {}
+  ~Connection() { server_.connections.erase(place_); }
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
   void Read() {
     parser_.emplace();
     parser_->header_limit(kMaxHeader);
-    stream_.expires_after(kSilence);
+    BeginWithin(kAsking);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](beast::error_code error, size_t) {
                        if (!error) {
@@ -140,7 +155,18 @@ class Connection : public std::enable_shared_from_this<Connection> {
                      });
   }
 
+  // For another's sake. It goes once its handler has heard of it, and is not chosen until then.
+  void Close() {
+    stream_.close();
+    server_.connections.splice(server_.connections.end(), server_.connections, place_);
+  }
+
  private:
+  void BeginWithin(std::chrono::seconds limit) {
+    stream_.expires_after(limit);
+    server_.connections.splice(server_.connections.end(), server_.connections, place_);
+  }
+
   void Answer(Request request) {
     const std::string host = Text(request[http::field::host]);
     if (!HostAllowed(host, server_.options.names)) {
@@ -155,7 +181,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
       if (file == server_.page.end()) {
         Refuse(request, http::status::not_found, "There is no such file.\n");
       } else {
-        Send(request, http::status::ok, file->second);
+        Send(request, http::status::ok, file->second, PagePolicy(host));
       }
     }
   }
@@ -174,25 +200,23 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   void Refuse(const Request& request, http::status status, const std::string& why) {
-    Send(request, status, {"text/plain; charset=utf-8", why});
+    Send(request, status, {"text/plain; charset=utf-8", why}, kNothing);
   }
 
-  void Send(const Request& request, http::status status, const PageFile& file) {
+  void Send(const Request& request, http::status status, const PageFile& file,
+            const std::string& policy) {
     response_.emplace(status, request.version());
     response_->set(http::field::content_type, file.type);
     response_->set(http::field::cache_control, "no-cache");
     response_->set("X-Content-Type-Options", "nosniff");
-    response_->set("Content-Security-Policy",
-                   fmt::format("default-src 'self'; connect-src 'self' ws://{0} wss://{0}; "
-                               "img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
-                               "frame-ancestors 'none'",
-                               Text(request[http::field::host])));
+    response_->set("Content-Security-Policy", policy);
     response_->keep_alive(request.keep_alive());
     response_->body() = file.body;
     response_->prepare_payload();
     if (request.method() == http::verb::head) {
       response_->body().clear();
     }
+    BeginWithin(kTaking);
     http::async_write(stream_, *response_,
                       [self = shared_from_this()](beast::error_code error, size_t) {
                         if (!error && self->response_->keep_alive()) {
@@ -203,6 +227,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   beast::tcp_stream stream_;
   WebServer::Impl& server_;
+  const std::list<Connection*>::iterator place_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::optional<http::response<http::string_body>> response_;
@@ -236,7 +261,10 @@ void WebServer::Impl::Listen() {
 
 void WebServer::Impl::Accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
-    if (!error && num_connections < kMaxConnections) {
+    if (!error) {
+      if (connections.size() >= kMaxConnections) {
+        connections.front()->Close();
+      }
       std::make_shared<Connection>(std::move(socket), *this)->Read();
     }
     if (error != asio::error::operation_aborted) {

@@ -1,9 +1,11 @@
 #pragma once
 
 // Gives out the page over HTTP and keeps a WebSocket to each browser that shows it, on one thread:
-// nothing runs outside Serve. Bounded: kMaxConnections at once (more are closed), kMaxBrowsers of
-// them with a socket (more are told so), requests of 8 kB, socket messages of PageLink::kMaxText,
-// one update under way per browser; who is silent for 30 s is closed.
+// nothing runs outside Serve. Bounded: kMaxConnections at once that ask for files (a further one
+// takes the place of the one that has asked for or taken nothing for longest), kMaxBrowsers with a
+// socket (more are told so), requests of 8 kB, socket messages of PageLink::kMaxText, one update
+// under way per browser. Closed is who takes more than 5 s to ask, 30 s to take a file, or is a
+// browser and silent for 30 s.
 
 #include <cstdint>
 #include <map>

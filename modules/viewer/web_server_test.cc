@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -29,6 +30,12 @@ TEST(WebRules, HostsThatAreThisMachine) {
        {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example",
         "localhost.evil.example:8080", "[evil]:1", ":8080", "robot.local.evil"}) {
     EXPECT_FALSE(HostAllowed(host, names)) << host;
+  }
+  for (const char* port : {"", "0", "65536", "99999999999999999999", "-1", "+1", " 1", "1 ", "0x50",
+                           "80;script-src *", "80 https://evil.example", "*"}) {
+    for (const char* host : {"localhost:", "127.0.0.1:", "[::1]:", "robot.local:"}) {
+      EXPECT_FALSE(HostAllowed(std::string(host) + port, names)) << host << port;
+    }
   }
 }
 
@@ -189,18 +196,34 @@ TEST_F(WebServerTest, BrowsersAreCounted) {
   EXPECT_THAT(Ask(Upgrade("http://127.0.0.1:1")), StartsWith("HTTP/1.1 101"));
 }
 
-TEST_F(WebServerTest, ConnectionsAreCounted) {
+// The policy header names the host the request was for: what it says there is read first.
+TEST_F(WebServerTest, NothingOfAHeaderGetsIntoThePolicy) {
+  const std::string answer =
+      Ask("GET / HTTP/1.1\r\nHost: localhost:80; script-src https://evil.example\r\n\r\n");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(answer, testing::Not(HasSubstr("evil")));
+}
+
+// Nobody locks the viewer by opening connections and saying nothing, or half a request, or by
+// leaving the answer where it is.
+TEST_F(WebServerTest, ANewConnectionTakesTheOldestsPlace) {
+  const char* const said[] = {"", "GET / HT", "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"};
   std::vector<std::unique_ptr<Client>> clients;
-  for (int i = 0; i < WebServer::kMaxConnections; ++i) {
+  for (int i = 0; i < 2 * WebServer::kMaxConnections; ++i) {
     clients.push_back(std::make_unique<Client>(server_.port()));
+    clients.back()->Send(said[i % 3]);
     server_.Serve(1);
   }
-  Client client(server_.port());
-  client.Send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  Serve();
-  bool closed = false;
-  EXPECT_EQ(client.Received(&closed), "");
-  EXPECT_TRUE(closed);
+  EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), HasSubstr("<p>page"));
+  const auto closed = std::ranges::count_if(clients, [](const auto& client) {
+    bool is_closed = false;
+    client->Received(&is_closed);
+    return is_closed;
+  });
+  EXPECT_EQ(closed, WebServer::kMaxConnections + 1);
+  bool newest_closed = false;
+  clients.back()->Received(&newest_closed);
+  EXPECT_FALSE(newest_closed);
 }
 
 TEST_F(WebServerTest, ALongRequestEndsTheConnection) {
