@@ -11,7 +11,6 @@ namespace pangea {
 namespace {
 
 // Big-endian: magic, event number, time stamp, length of the channel's name and of the data.
-constexpr uint32_t kMagic = 0xEDA1DA01;
 constexpr uint32_t kMaxChannelName = 63;
 constexpr uint32_t kMaxData = 16 << 20;
 
@@ -19,7 +18,7 @@ constexpr uint32_t kMaxData = 16 << 20;
 
 size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel, Bytes data,
                       std::vector<uint8_t>* out) {
-  PutBigEndian(kMagic, 4, out);
+  PutBigEndian(kLogMagic, 4, out);
   PutBigEndian(static_cast<uint64_t>(number), 8, out);
   PutBigEndian(static_cast<uint64_t>(utime), 8, out);
   PutBigEndian(channel.size(), 4, out);
@@ -31,7 +30,7 @@ size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel,
 }
 
 std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
-  if (bytes.size() < LogEventHeader::kBytes || GetBigEndian(bytes.data(), 4) != kMagic) {
+  if (bytes.size() < LogEventHeader::kBytes || GetBigEndian(bytes.data(), 4) != kLogMagic) {
     return std::nullopt;
   }
   const auto channel_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 20, 4));

@@ -12,6 +12,9 @@
 
 namespace pangea {
 
+// What each event begins with.
+inline constexpr uint32_t kLogMagic = 0xEDA1DA01;
+
 struct LogEventHeader {
   static constexpr size_t kBytes = 28;
   int64_t number = 0;  // of the event in its file
