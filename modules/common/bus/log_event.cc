@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "common/bus/big_endian.h"
@@ -12,7 +13,6 @@ namespace {
 
 // Big-endian: magic, event number, time stamp, length of the channel's name and of the data.
 constexpr uint32_t kMaxChannelName = 63;
-constexpr uint32_t kMaxData = 16 << 20;
 
 }  // namespace
 
@@ -35,12 +35,20 @@ std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
   }
   const auto channel_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 20, 4));
   const auto data_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 24, 4));
-  if (channel_bytes < 1 || channel_bytes > kMaxChannelName || data_bytes > kMaxData) {
+  if (channel_bytes < 1 || channel_bytes > kMaxChannelName ||
+      data_bytes > LogEventHeader::kMaxDataBytes) {
     return std::nullopt;
   }
   return LogEventHeader{static_cast<int64_t>(GetBigEndian(bytes.data() + 4, 8)),
                         static_cast<int64_t>(GetBigEndian(bytes.data() + 12, 8)),
                         static_cast<int32_t>(channel_bytes), static_cast<int32_t>(data_bytes)};
+}
+
+bool BeginsAsLogEvent(Bytes bytes) {
+  std::vector<uint8_t> magic;
+  PutBigEndian(kLogMagic, 4, &magic);
+  const size_t size = std::min(bytes.size(), magic.size());
+  return std::equal(magic.begin(), magic.begin() + static_cast<int64_t>(size), bytes.begin());
 }
 
 bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
@@ -75,12 +83,14 @@ bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {
   return true;
 }
 
-void SyncFolder(const std::string& folder) {
+bool SyncFolder(const std::string& folder) {
   const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd >= 0) {
-    fsync(fd);
-    close(fd);
+  if (fd < 0) {
+    return false;
   }
+  const bool synced = fsync(fd) == 0;
+  close(fd);
+  return synced;
 }
 
 }  // namespace pangea
