@@ -20,8 +20,8 @@
 namespace pangea {
 namespace {
 
-bool IsOwn(const std::string& channel) {
-  return channel == channels::kChecksums || channel == channels::kDamaged;
+bool IsOwn(const LogPiece& event) {
+  return event.channel == channels::kChecksums || FillsDamage(event);
 }
 
 // A device that takes what is written, such as /dev/full, has no end to append to, but also nothing
@@ -115,7 +115,7 @@ std::vector<DamagedPart> Journal::Scan(const Visitor& visitor) {
 }
 
 bool Journal::Take(const CheckedScan::Piece& piece, const Visitor& visitor) {
-  if (!IsOwn(piece.channel) &&
+  if (!IsOwn(piece) &&
       !visitor(piece.channel, piece.data,
                {piece.offset, static_cast<int32_t>(piece.bytes), piece.crc32})) {
     return false;

@@ -29,9 +29,9 @@ struct JournalMend {
 };
 
 // First keeps all the parts beside the journal, then mends it: parts that end it are cut off, the
-// others become DAMAGED events (of fewer than a header's bytes: zeros, which readers pass over;
-// such zeros need no mending). `file_bytes`: its length, and then its new one. Throws
-// std::runtime_error.
+// others become DAMAGED events. Of fewer bytes than an event needs (damage in place leaves none
+// such) they become zeros, which need no mending, but where LCM's own reader stops. `file_bytes`:
+// its length, and then its new one. Throws std::runtime_error.
 JournalMend MendJournal(const std::string& path, int fd, std::vector<DamagedPart> parts,
                         int64_t* file_bytes);
 

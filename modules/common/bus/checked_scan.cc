@@ -6,6 +6,8 @@
 
 namespace pangea {
 
+bool FillsDamage(const LogPiece& event) { return channels::kDamaged.starts_with(event.channel); }
+
 const CheckedScan::Piece* CheckedScan::Next() {
   while (num_ready_ == 0) {
     if (!Read()) {
@@ -51,13 +53,13 @@ void CheckedScan::Judge(const Checksums& checksums) {
   for (auto it = std::next(waiting_.rbegin());
        it != waiting_.rend() && expected >= checksums.first_event; ++it) {
     Piece& piece = it->piece;
-    if (piece.kind != LogPiece::Kind::kEvent || piece.channel == channels::kDamaged) {
+    if (piece.kind != LogPiece::Kind::kEvent || FillsDamage(piece)) {
       in_place = false;
       continue;
     }
     const int64_t number = in_place ? expected : piece.header.number;
     if (number < checksums.first_event || number > expected) {
-      return;  // it was there before those of the list
+      continue;  // it was there before those of the list, or who can say which it is
     }
     const auto index = static_cast<size_t>(number - checksums.first_event);
     if (piece.crc32 != checksums.crc32[index]) {

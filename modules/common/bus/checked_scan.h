@@ -14,6 +14,10 @@
 
 namespace pangea {
 
+// Whether an event only fills the place of damage: on DAMAGED, or so many of its letters as there
+// was room for.
+bool FillsDamage(const LogPiece& event);
+
 class CheckedScan {
  public:
   static constexpr size_t kMaxWaitingBytes = 4 << 20;
