@@ -6,6 +6,7 @@
 
 #include "pangea/again_t.hpp"
 #include "pangea/camera_t.hpp"
+#include "pangea/checksums_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/have_t.hpp"
@@ -26,6 +27,7 @@ namespace {
 TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(again_t::getHash()), 0x6f768b67d21c1586u);
   EXPECT_EQ(static_cast<uint64_t>(camera_t::getHash()), 0xe1fe7ec25d6f1ac5u);
+  EXPECT_EQ(static_cast<uint64_t>(checksums_t::getHash()), 0x52fe142c43cbb67au);
   EXPECT_EQ(static_cast<uint64_t>(constraint_t::getHash()), 0x2730b9abbbf2e325u);
   EXPECT_EQ(static_cast<uint64_t>(correction_t::getHash()), 0xfb0f44cb33451099u);
   EXPECT_EQ(static_cast<uint64_t>(have_t::getHash()), 0x9f58b67f2b9e7c17u);

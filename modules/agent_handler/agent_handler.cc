@@ -40,9 +40,9 @@ AgentHandler::AgentHandler(int32_t agent_id, const ReceiverOptions& options)
         return CheckKeyframe(id, bytes, continuity.get());
       }) {}
 
-void AgentHandler::Resume(const MapId& map, int32_t journalled_seq,
+void AgentHandler::Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps,
                           const std::optional<Keyframe>& newest) {
-  receiver_.Resume(map, journalled_seq);
+  receiver_.Resume(map, journalled_seq, gaps);
   if (newest) {
     continuity_->Check(*newest, 0);
   }

@@ -23,9 +23,9 @@ class AgentHandler {
  public:
   AgentHandler(int32_t agent_id, const ReceiverOptions& options);
 
-  // The journal already has this submap up to `journalled_seq`. What follows has to go on from
-  // `newest`, which may be left out of an old one.
-  void Resume(const MapId& map, int32_t journalled_seq,
+  // The journal already has this submap up to `journalled_seq`, but for `gaps`. What follows has to
+  // go on from `newest`, which may be left out of an old one.
+  void Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps = {},
               const std::optional<Keyframe>& newest = std::nullopt);
 
   // The packets that follow are another run's of the uplink.

@@ -100,7 +100,7 @@ AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
   const auto& on_disk = archive_.have();
   auto have = std::make_reverse_iterator(on_disk.lower_bound({agent_id + 1, 0}));
   for (int i = 0; have != on_disk.rend() && have->first.agent_id == agent_id; ++have, ++i) {
-    handler.Resume(have->first, have->second,
+    handler.Resume(have->first, have->second, archive_.Refillable(have->first),
                    i < kMaxLinkMaps ? archive_.Newest(have->first) : std::nullopt);
   }
   for (const auto& [map, correction] : corrections_) {
@@ -235,10 +235,11 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   node_.Set("keyframes", keyframes);
   node_.Set("keyframes_given_up", given_up);
   archive_.SetCounters();
-  node_.PublishStatus(
-      now_utime, pending,
-      fmt::format("{} agents, {} keyframes in the journal{}{}", connected, archive_.num_keyframes(),
-                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", OtherSoftware()));
+  node_.PublishStatus(now_utime, pending,
+                      fmt::format("{} agents, {} keyframes in the journal{}{}{}", connected,
+                                  archive_.num_keyframes(),
+                                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "",
+                                  archive_.Damage(), OtherSoftware()));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {

@@ -1,7 +1,10 @@
 #include "agent_handler/archive.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
+#include <iostream>
 #include <utility>
 
 #include "common/bus/missing.h"
@@ -16,6 +19,8 @@ constexpr double kResendBurst = 64'000;
 constexpr size_t kMaxJournalledBytes = 65'000;
 constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
 constexpr size_t kMaxHaveGaps = 1000;
+// An uplink gives up a gap that its odometry does not fill within ten seconds.
+constexpr int64_t kAskForGaps_us = 30'000'000;
 
 // Unreadable though it says it is of this type (or has lost even that): damaged. A type this
 // version does not know is left alone.
@@ -60,7 +65,13 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
         return LoadEvent(channel, data, place);
       });
-  node_.Set("journal_bytes_cut", journal_->cut_bytes());
+  const JournalMend& mend = journal_->mend();
+  node_.Set("journal_bytes_torn", mend.torn_bytes);
+  node_.Set("journal_bytes_damaged", mend.damaged_bytes);
+  asks_for_gaps_until_utime_ = mend.damaged_bytes > 0 ? now_utime + kAskForGaps_us : now_utime;
+  if (const std::string said = mend.Said(journal_path); !said.empty()) {
+    std::cerr << said << "\n";
+  }
   node_.bus().Subscribe(
       std::string(channels::kPlaceMatch),
       [this](const std::string& channel, Bytes data) { OnAnswer<place_match_t>(channel, data); });
@@ -218,6 +229,23 @@ void Archive::AnswerResendRequests() {
   }
 }
 
+std::vector<SeqGap> Archive::Refillable(const MapId& map) const {
+  return journal_->mend().damaged_bytes > 0 ? index_.Gaps(map) : std::vector<SeqGap>{};
+}
+
+// The others' maps go on behind what is said to be lost: not before its agent could send it again.
+std::vector<SeqGap> Archive::Lost(const MapId& map) const {
+  return now_utime_ < asks_for_gaps_until_utime_ ? std::vector<SeqGap>{} : index_.Gaps(map);
+}
+
+std::string Archive::Damage() const {
+  const JournalMend& mend = journal_->mend();
+  return mend.damaged_bytes == 0
+             ? ""
+             : fmt::format("; THE JOURNAL WAS DAMAGED: {} bytes, kept beside it",
+                           mend.damaged_bytes);
+}
+
 void Archive::PublishHave() {
   auto it = by_age_.begin();
   do {
@@ -225,7 +253,7 @@ void Archive::PublishHave() {
     for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
       message.maps.push_back(ToMessage(*it));
       message.highest_seq.push_back(have_.at(*it));
-      for (const SeqGap& gap : index_.Gaps(*it)) {
+      for (const SeqGap& gap : Lost(*it)) {
         if (message.gaps.size() < kMaxHaveGaps) {
           message.gaps.push_back(ToMessage(gap));
         }

@@ -56,6 +56,10 @@ class Archive {
   const std::vector<MapId>& maps() const { return by_age_; }
   // The keyframe with that seq, read from the disk.
   std::optional<Keyframe> Newest(const MapId& map) const;
+  // What agents may send again of a map: its gaps, if this start found damage.
+  std::vector<SeqGap> Refillable(const MapId& map) const;
+  // For people; empty if the journal was whole at the start.
+  std::string Damage() const;
   bool busy() const { return journal_->HasUnsynced() || resend_queue_.waiting() > 0; }
   bool disk_refuses() const { return disk_refuses_; }
   int64_t num_keyframes() const { return index_.num_keyframes(); }
@@ -72,6 +76,7 @@ class Archive {
   void OnVerdictRequest(const VerdictRequest& request);
   void OnAgain(const again_t& message);
   void NoteJournalled(const KeyframeId& id);
+  std::vector<SeqGap> Lost(const MapId& map) const;
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
   template <typename Message>
@@ -85,6 +90,7 @@ class Archive {
   std::unique_ptr<Journal> journal_;
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;
+  int64_t asks_for_gaps_until_utime_ = 0;
   std::map<MapId, int32_t> have_;
   std::vector<MapId> by_age_;
   OwedQuestions owed_;

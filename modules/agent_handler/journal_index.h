@@ -20,8 +20,11 @@
 namespace pangea {
 
 struct JournalPlace {
-  int64_t offset = 0;  // of the payload, bytes from the file's begin
-  int32_t size = 0;
+  int64_t offset = 0;  // of the event, bytes from the file's begin
+  int32_t size = 0;    // of all of it
+  uint32_t crc32 = 0;
+
+  bool operator==(const JournalPlace&) const = default;
 };
 
 enum class JournalChannel { kKeyframe, kPlaceMatch, kConstraint };

@@ -1,12 +1,16 @@
 #include "agent_handler/journal.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <lcm/lcm-cpp.hpp>
+
+#include "common/bus/log_event.h"
 
 namespace pangea {
 namespace {
@@ -20,10 +24,32 @@ struct Seen {
 class JournalTest : public testing::Test {
  protected:
   void SetUp() override {
-    path = testing::TempDir() + "pangea_journal_" + std::to_string(getpid()) + ".lcm";
-    std::filesystem::remove(path);
+    folder = testing::TempDir() + "pangea_journal_" + std::to_string(getpid());
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+    path = folder + "/journal.lcm";
   }
-  void TearDown() override { std::filesystem::remove(path); }
+  void TearDown() override { std::filesystem::remove_all(folder); }
+
+  using Contents = std::string;
+  static Contents ContentsOf(const std::filesystem::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  }
+  void WriteContents(const Contents& contents) const {
+    std::ofstream(path, std::ios::binary) << contents;
+  }
+  // What is kept beside the journal, which is taken away.
+  Contents Copies() const {
+    Contents copies;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (entry.path().filename().string().starts_with("journal.lcm.damaged-")) {
+        copies += ContentsOf(entry.path());
+        std::filesystem::remove(entry.path());
+      }
+    }
+    return copies;
+  }
 
   std::unique_ptr<Journal> Open() {
     seen.clear();
@@ -44,7 +70,7 @@ class JournalTest : public testing::Test {
     ASSERT_TRUE(journal->Sync());
   }
 
-  std::string path;
+  std::string folder, path;
   std::vector<Seen> seen;
 };
 
@@ -61,6 +87,10 @@ TEST_F(JournalTest, AnyLcmToolReadsIt) {
     const auto* data = static_cast<const uint8_t*>(event->data);
     EXPECT_EQ(std::vector<uint8_t>(data, data + event->datalen), Payload(i));
   }
+  const lcm::LogEvent* event = log.readNextEvent();
+  ASSERT_NE(event, nullptr);
+  EXPECT_EQ(event->channel, "CHECKSUMS");
+  EXPECT_EQ(event->eventnum, 5);
   EXPECT_EQ(log.readNextEvent(), nullptr);
 }
 
@@ -80,78 +110,175 @@ TEST_F(JournalTest, ReadsBackByPlaceBeforeAndAfterSyncAndReopening) {
   EXPECT_EQ(journal->Read(seen[1].place), Payload(2));
 }
 
-// Cut at every byte: what was complete is kept, the rest is cut, and appending goes on.
-TEST_F(JournalTest, TornTailIsCutAndHealed) {
+// Cut at every byte: what was complete is kept, the rest is kept beside, and appending goes on.
+TEST_F(JournalTest, ATornTailIsCutAndKeptBeside) {
   Write(3);
-  const auto full = static_cast<int64_t>(std::filesystem::file_size(path));
-  const auto last_begin = full - 28 - 10 - static_cast<int64_t>(Payload(2).size());
-  std::filesystem::remove(path);
-  for (int64_t length = last_begin; length < full; ++length) {
-    Write(3);
-    std::filesystem::resize_file(path, static_cast<uintmax_t>(length));
+  const Contents whole = ContentsOf(path);
+  Open();
+  const JournalPlace last = seen[2].place;
+  const int64_t last_end = last.offset + last.size;
+  for (int64_t length = last.offset + 1; length < static_cast<int64_t>(whole.size()); ++length) {
+    const bool has_last = length >= last_end;
+    const int64_t torn = length - (has_last ? last_end : last.offset);
+    WriteContents(whole.substr(0, static_cast<size_t>(length)));
     {
       const auto journal = Open();
-      EXPECT_EQ(seen.size(), 2u) << length;
-      EXPECT_EQ(journal->cut_bytes(), length - last_begin);
+      EXPECT_EQ(seen.size(), has_last ? 3u : 2u) << length;
+      EXPECT_EQ(journal->mend().torn_bytes, torn);
+      EXPECT_EQ(journal->mend().damaged_bytes, 0);
+      EXPECT_EQ(Copies(), torn > 0 ? whole.substr(static_cast<size_t>(length - torn),
+                                                  static_cast<size_t>(torn))
+                                   : "");
       journal->Append(9, "AFTER", Payload(4));
     }
-    Open();
-    ASSERT_EQ(seen.size(), 3u);
-    EXPECT_EQ(seen[2].channel, "AFTER");
-    EXPECT_EQ(seen[2].data, Payload(4));
-    std::filesystem::remove(path);
+    EXPECT_EQ(Open()->mend().copy, "");
+    EXPECT_EQ(seen.back().channel, "AFTER");
+    EXPECT_EQ(seen.back().data, Payload(4));
   }
 }
 
-TEST_F(JournalTest, DamagedContentInTheTailIsCutToo) {
+// In each place: it was cut there with all that followed, up to 2 MiB, or refused.
+TEST_F(JournalTest, DamageCostsTheEventThatWasHitAlone) {
+  Write(20);
+  const Contents whole = ContentsOf(path);
+  Open();
+  const auto events = seen;
+  for (size_t i = 0; i < events.size(); ++i) {
+    for (const int64_t at : {0, 3, 11, 19, 23, 27, 30, 40}) {
+      Contents damaged = whole;
+      damaged[static_cast<size_t>(events[i].place.offset + at)] ^= 1;
+      WriteContents(damaged);
+      const auto journal = Open();
+      EXPECT_EQ(seen.size(), events.size() - 1) << i << ", byte " << at;
+      EXPECT_EQ(journal->mend().damaged_bytes, events[i].place.size);
+      EXPECT_EQ(Copies(), damaged.substr(static_cast<size_t>(events[i].place.offset),
+                                         static_cast<size_t>(events[i].place.size)));
+      EXPECT_EQ(std::filesystem::file_size(path), whole.size());
+    }
+  }
+}
+
+TEST_F(JournalTest, WhatItsReaderCallsDamagedIsDamage) {
   {
     const auto journal = Open();
     journal->Append(1, "A", Payload(1));
     journal->Append(2, "A", Payload(99));
   }
-  EXPECT_GT(Open()->cut_bytes(), 0);
-  Open();
+  EXPECT_GT(Open()->mend().damaged_bytes, 0);
+  EXPECT_EQ(Open()->mend().copy, "");
   EXPECT_EQ(seen.size(), 1u);
+  lcm::LogFile log(path, "r");
+  for (const char* channel : {"A", "DAMAGED", "CHECKSUMS"}) {
+    const lcm::LogEvent* event = log.readNextEvent();
+    ASSERT_NE(event, nullptr);
+    EXPECT_EQ(event->channel, channel);
+  }
 }
 
-// It cannot be a torn tail: what comes after it is not thrown away with it.
-TEST_F(JournalTest, DamagedContentFarFromTheTailIsPassedOver) {
-  constexpr int kAfter = 50;
-  {
-    const auto journal = Open();
-    journal->Append(1, "A", Payload(99));
-    for (int i = 0; i < kAfter; ++i) {
-      journal->Append(1, "A", std::vector<uint8_t>(Journal::kMaxTornBytes / kAfter, 1));
-      journal->Sync();
-    }
+// As older versions wrote it, and without a word about it.
+TEST_F(JournalTest, AJournalWithoutChecksumsIsReadAsItIs) {
+  std::vector<uint8_t> events;
+  for (int i = 0; i < 3; ++i) {
+    AppendLogEvent(i, i, "A", Payload(i), &events);
   }
-  const auto size = std::filesystem::file_size(path);
-  EXPECT_EQ(Open()->cut_bytes(), 0);
-  EXPECT_EQ(seen.size(), 1u + kAfter);
-  EXPECT_EQ(std::filesystem::file_size(path), size);
+  WriteContents({events.begin(), events.end()});
+  Write(2);
+  Open();
+  ASSERT_EQ(seen.size(), 5u);
+  Contents damaged = ContentsOf(path);
+  damaged[static_cast<size_t>(seen[4].place.offset) + 45] ^= 4;
+  damaged[static_cast<size_t>(seen[1].place.offset) + 40] ^= 4;
+  WriteContents(damaged);
+  EXPECT_EQ(Open()->mend().damaged_parts, 2) << "what is appended checks some before it too";
+  EXPECT_EQ(seen.size(), 3u);
 }
 
-TEST_F(JournalTest, DamageThatIsNoTornTailIsNotThrownAway) {
+// Events that were copied into another log have other numbers: the lists beside them say nothing.
+TEST_F(JournalTest, ChecksumsOfAnotherLogCondemnNothing) {
+  Write(5);
+  Write(5);
+  const std::string copied = path + ".cut";
   {
-    const auto journal = Open();
-    for (int i = 0; i < 100; ++i) {
-      journal->Append(1, "A", std::vector<uint8_t>(50'000, 1));
-      journal->Sync();
+    lcm::LogFile from(path, "r"), to(copied, "w");
+    for (int i = 0; const lcm::LogEvent* event = from.readNextEvent(); ++i) {
+      if (i > 2) {
+        to.writeEvent(const_cast<lcm::LogEvent*>(event));
+      }
     }
   }
-  const auto size = std::filesystem::file_size(path);
-  const int fd = open(path.c_str(), O_WRONLY);
-  ASSERT_EQ(pwrite(fd, "xxxx", 4, 0), 4);
-  close(fd);
+  std::filesystem::rename(copied, path);
+  EXPECT_EQ(Open()->mend().copy, "");
+  EXPECT_EQ(seen.size(), 7u);
+}
+
+TEST_F(JournalTest, AFlippedBitIsSeenWhenItIsReadToo) {
+  Write(1);
+  const auto journal = Open();
+  Contents damaged = ContentsOf(path);
+  damaged[45] ^= 1;
+  WriteContents(damaged);
+  EXPECT_TRUE(journal->Read(seen[0].place).empty());
+}
+
+TEST_F(JournalTest, AFileThatIsNoLogStaysAsItIs) {
+  for (const Contents& text : {Contents("Notes: buy milk.\n"), Contents(40, '\0'), Contents("x"),
+                               Contents(3 << 20, 'y')}) {
+    WriteContents(text);
+    EXPECT_THROW(Open(), std::runtime_error);
+    EXPECT_EQ(ContentsOf(path), text);
+    EXPECT_EQ(Copies(), "");
+  }
+  const std::string folder = testing::TempDir();
+  EXPECT_THROW(Journal(folder, [](const auto&, Bytes, const auto&) { return true; }),
+               std::runtime_error);
+}
+
+// The very first write of a new journal was torn.
+TEST_F(JournalTest, TheBeginOfAFirstEventIsATornTail) {
+  Write(1);
+  const Contents whole = ContentsOf(path);
+  for (const size_t length : {1, 3, 4, 20, 40}) {
+    WriteContents(whole.substr(0, length));
+    EXPECT_EQ(Open()->mend().torn_bytes, static_cast<int64_t>(length));
+    EXPECT_EQ(Copies(), whole.substr(0, length));
+  }
+}
+
+TEST_F(JournalTest, WhatCannotBeKeptIsLeftAsItIs) {
+  Write(3);
+  Contents damaged = ContentsOf(path);
+  damaged[45] ^= 1;
+  WriteContents(damaged);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit full{10, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &full);
   EXPECT_THROW(Open(), std::runtime_error);
-  EXPECT_EQ(std::filesystem::file_size(path), size);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_EQ(ContentsOf(path), damaged);
+  EXPECT_EQ(Copies(), "");
+}
+
+// An event needs 29 bytes: fewer between two of them become zeros, once.
+TEST_F(JournalTest, DamageTooSmallForAnEventBecomesZeros) {
+  std::vector<uint8_t> events;
+  AppendLogEvent(0, 0, "A", Payload(0), &events);
+  events.insert(events.end(), 20, 'x');
+  AppendLogEvent(1, 0, "A", Payload(1), &events);
+  WriteContents({events.begin(), events.end()});
+  EXPECT_EQ(Open()->mend().damaged_bytes, 20);
+  EXPECT_EQ(Copies(), Contents(20, 'x'));
+  EXPECT_EQ(seen.size(), 2u);
+  EXPECT_EQ(Open()->mend().copy, "");
+  EXPECT_EQ(seen.size(), 2u);
 }
 
 TEST_F(JournalTest, EventNumbersGoOnAfterItWasOpenedAgain) {
   Write(3);
   Write(2);
   lcm::LogFile log(path, "r");
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 7; ++i) {  // two of them are checksums
     const lcm::LogEvent* event = log.readNextEvent();
     ASSERT_NE(event, nullptr);
     EXPECT_EQ(event->eventnum, i);

@@ -17,6 +17,9 @@ inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 inline constexpr std::string_view kVerdictRequest = "VERDICT_REQUEST";
+// In files alone.
+inline constexpr std::string_view kChecksums = "CHECKSUMS";
+inline constexpr std::string_view kDamaged = "DAMAGED";
 
 // LCM subscriptions are anchored regular expressions without grouping of alternatives.
 inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";

@@ -5,13 +5,16 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <optional>
+#include <iostream>
 #include <stdexcept>
 #include <system_error>
 
+#include "common/bus/checksums.h"
+#include "common/bus/damaged_copy.h"
 #include "common/bus/log_event.h"
 #include "common/channels.h"
 #include "common/messages.h"
@@ -56,6 +59,11 @@ std::optional<int64_t> NumberOf(const fs::path& file) {
   return good ? std::optional(std::stoll(digits)) : std::nullopt;
 }
 
+bool BeginsAsEvent(int fd, const LogPiece& piece) {
+  std::vector<uint8_t> begin(static_cast<size_t>(std::min<int64_t>(piece.bytes, 4)));
+  return ReadFully(fd, piece.offset, begin.data(), begin.size()) && BeginsAsLogEvent(begin);
+}
+
 }  // namespace
 
 Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
@@ -70,16 +78,22 @@ Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     Refuse("is in use by another process");
   }
-  std::map<int64_t, fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder_, error)) {
-    if (const auto number = NumberOf(entry.path())) {
-      files[*number] = entry.path();
-    }
-  }
-  for (const auto& [number, file] : files) {
+  FindFiles();
+  for (const auto& [number, segment] : std::map(segments_)) {
     newest_ = number;
     Load(number);
     RemoveIfRead(number);
+  }
+}
+
+void Spool::FindFiles() {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder_, error)) {
+    if (const auto number = NumberOf(entry.path())) {
+      segments_[*number] = {};
+    } else if (entry.path().filename().string().find(".lcm.damaged-") != std::string::npos) {
+      damaged_bytes_ += static_cast<int64_t>(entry.file_size(error));
+    }
   }
 }
 
@@ -98,48 +112,60 @@ fs::path Spool::File(int64_t segment) const {
   return folder_ / fmt::format("{}{:06}.lcm", kPrefix, segment);
 }
 
+void Spool::NoteDamage(int64_t number, const std::string& what) {
+  segments_.at(number).damaged = true;
+  ++num_damaged_;
+  std::cerr << fmt::format("the spool's '{}' IS DAMAGED: {}; the file stays when it is done with\n",
+                           File(number).string(), what);
+}
+
 void Spool::Load(int64_t number) {
-  Segment& segment = segments_[number];
   const int fd = open(File(number).c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {
-    return;
+    return NoteDamage(number, std::strerror(errno));
   }
-  const int64_t file_bytes = lseek(fd, 0, SEEK_END);
-  std::vector<uint8_t> start(LogEventHeader::kBytes), begin;
-  for (int64_t at = 0; at < file_bytes;) {
-    if (!ReadFully(fd, at, start.data(), start.size())) {
-      break;
-    }
-    const auto header = ParseLogEventHeader(start);
-    if (!header || at + header->event_bytes() > file_bytes) {
-      break;
-    }
-    const int64_t data_at = at + header->event_bytes() - header->data_bytes;
-    begin.resize(std::min<size_t>(static_cast<size_t>(header->data_bytes), 8 + kIdBytes));
-    if (!ReadFully(fd, data_at, begin.data(), begin.size())) {
-      break;
-    }
-    const auto id = IdOf(begin);
-    if (id && id->map.agent_id != agent_id_) {
-      close(fd);
-      Refuse(fmt::format("holds keyframes of agent {}, this is agent {}", id->map.agent_id,
-                         agent_id_));
-    }
-    if (id && places_.try_emplace(*id, Place{number, data_at, header->data_bytes}).second) {
-      ++segment.kept;
-    }
-    at += header->event_bytes();
+  try {
+    LoadFrom(fd, number);
+  } catch (...) {
+    close(fd);
+    throw;
   }
   close(fd);
-  segment.bytes = file_bytes;
-  bytes_ += file_bytes;
+}
+
+void Spool::LoadFrom(int fd, int64_t number) {
+  CheckedScan scan(fd);
+  segments_.at(number).bytes = scan.file_bytes();
+  bytes_ += scan.file_bytes();
+  while (const CheckedScan::Piece* piece = scan.Next()) {
+    if (piece->kind == LogPiece::Kind::kEvent) {
+      LoadEvent(number, *piece);
+    } else if (piece->kind == LogPiece::Kind::kDamage || !BeginsAsEvent(fd, *piece)) {
+      NoteDamage(number, fmt::format("{} bytes at byte {}", piece->bytes, piece->offset));
+    }
+  }
+}
+
+void Spool::LoadEvent(int64_t number, const CheckedScan::Piece& event) {
+  const auto id = IdOf(event.data);
+  if (id && id->map.agent_id != agent_id_) {
+    Refuse(
+        fmt::format("holds keyframes of agent {}, this is agent {}", id->map.agent_id, agent_id_));
+  }
+  const Place place{number, event.offset, static_cast<int32_t>(event.bytes), event.crc32};
+  if (id && places_.try_emplace(*id, place).second) {
+    ++segments_.at(number).kept;
+  } else if (!id && event.channel == channels::Keyframe(agent_id_)) {
+    NoteDamage(number, fmt::format("the keyframe at byte {}", event.offset));
+  }
 }
 
 bool Spool::Add(const KeyframeId& id, Bytes data, int64_t utime) {
   if (places_.contains(id)) {
     return true;
   }
-  refuses_ = bytes_ + static_cast<int64_t>(data.size()) > max_bytes_ || !Write(id, data, utime);
+  const int64_t needed = bytes_ + damaged_bytes_ + static_cast<int64_t>(data.size());
+  refuses_ = needed > max_bytes_ || !Write(id, data, utime);
   return !refuses_;
 }
 
@@ -155,38 +181,55 @@ bool Spool::Write(const KeyframeId& id, Bytes data, int64_t utime) {
     SyncFolder(folder_);
   }
   Segment& segment = segments_.at(newest_);
-  std::vector<uint8_t> event;
-  const size_t begin =
-      AppendLogEvent(next_event_, utime, channels::Keyframe(agent_id_), data, &event);
+  std::vector<uint8_t> bytes;
+  AppendLogEvent(next_event_, utime, channels::Keyframe(agent_id_), data, &bytes);
+  const Place place{newest_, segment.bytes, static_cast<int32_t>(bytes.size()),
+                    EventChecksum(bytes)};
+  AppendChecksumsEvent({next_event_, {place.crc32}}, utime, &bytes);
   // A part that was written before the disk refused is written over by the next keyframe.
-  if (!WriteFully(fd_, segment.bytes, event.data(), event.size())) {
+  if (!WriteFully(fd_, segment.bytes, bytes.data(), bytes.size())) {
     return false;
   }
-  places_[id] = {newest_, segment.bytes + static_cast<int64_t>(begin),
-                 static_cast<int32_t>(data.size())};
-  ++next_event_;
+  places_[id] = place;
+  next_event_ += 2;
   ++segment.kept;
-  segment.bytes += static_cast<int64_t>(event.size());
-  bytes_ += static_cast<int64_t>(event.size());
+  segment.bytes += static_cast<int64_t>(bytes.size());
+  bytes_ += static_cast<int64_t>(bytes.size());
   unsynced_ = true;
   return true;
 }
 
-std::vector<uint8_t> Spool::Read(const KeyframeId& id) const {
-  const auto place = places_.find(id);
-  if (place == places_.end()) {
+std::vector<uint8_t> Spool::Read(const KeyframeId& id) {
+  const auto found = places_.find(id);
+  if (found == places_.end()) {
     return {};
   }
-  std::vector<uint8_t> data(static_cast<size_t>(place->second.size));
-  const int fd = open(File(place->second.segment).c_str(), O_RDONLY | O_CLOEXEC);
-  const bool read = fd >= 0 && ReadFully(fd, place->second.offset, data.data(), data.size());
+  const Place place = found->second;
+  std::vector<uint8_t> data = ReadData(place);
+  keyframe_t message{};
+  if (DecodeMessage(data, &message) && Parse(message).value.has_value()) {
+    return data;
+  }
+  NoteDamage(place.segment, fmt::format("the keyframe at byte {}", place.offset));
+  places_.erase(found);
+  --segments_.at(place.segment).kept;
+  RemoveIfRead(place.segment);
+  return {};
+}
+
+// Empty if it is not what was written.
+std::vector<uint8_t> Spool::ReadData(const Place& place) const {
+  std::vector<uint8_t> event(static_cast<size_t>(place.size));
+  const int fd = open(File(place.segment).c_str(), O_RDONLY | O_CLOEXEC);
+  const bool read = fd >= 0 && ReadFully(fd, place.offset, event.data(), event.size());
   if (fd >= 0) {
     close(fd);
   }
-  // What a power cut left of it may be no keyframe.
-  keyframe_t message{};
-  const bool good = read && DecodeMessage(data, &message) && Parse(message).value.has_value();
-  return good ? data : std::vector<uint8_t>{};
+  const auto header = ParseLogEventHeader(event);
+  if (!read || !header || EventChecksum(event) != place.crc32) {
+    return {};
+  }
+  return {event.end() - header->data_bytes, event.end()};
 }
 
 void Spool::Release(const MapId& map, int32_t seq) {
@@ -208,8 +251,18 @@ void Spool::RemoveIfRead(int64_t number) {
   if (written_to) {
     CloseFile();
   }
+  Remove(number);
+}
+
+void Spool::Remove(int64_t number) {
+  const Segment& segment = segments_.at(number);
   std::error_code error;
-  fs::remove(File(number), error);
+  if (segment.damaged) {
+    fs::rename(File(number), DamagedName(File(number).string()), error);
+    damaged_bytes_ += segment.bytes;
+  } else {
+    fs::remove(File(number), error);
+  }
   bytes_ -= segment.bytes;
   segments_.erase(number);
 }

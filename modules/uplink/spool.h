@@ -8,8 +8,14 @@
 // tail torn by a crash is never written behind, and ignored. What the page cache has survives the
 // process; Sync makes it survive a power cut.
 //
-// Bound: `max_bytes` of segments. Then, or when the disk refuses, Add says no, and the keyframe has
-// to stay in memory. The index takes some 100 bytes of memory per keyframe. One thread.
+// A CHECKSUMS event (checksums.h) behind each keyframe shows when it is read whether it is still
+// what was written. What is damaged costs no other keyframe; a segment with damage is not removed
+// when its time has come, but kept under another name (keyframes_000001.lcm.damaged-<UTC time>)
+// until somebody takes it away.
+//
+// Bound: `max_bytes` of segments, those with damage included. Then, or when the disk refuses, Add
+// says no, and the keyframe has to stay in memory. The index takes some 100 bytes of memory per
+// keyframe. One thread.
 
 #include <cstdint>
 #include <filesystem>
@@ -18,6 +24,7 @@
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/bus/checked_scan.h"
 #include "common/ids.h"
 
 namespace pangea {
@@ -38,14 +45,18 @@ class Spool {
 
   // An encoded keyframe_t; false if it was not written. A repeat changes nothing.
   bool Add(const KeyframeId& id, Bytes data, int64_t utime);
-  // Empty if it is not there or cannot be read.
-  std::vector<uint8_t> Read(const KeyframeId& id) const;
+  // Empty if it is not there, or is damaged: then it is not kept any more.
+  std::vector<uint8_t> Read(const KeyframeId& id);
   // All of the map up to `seq` is acknowledged.
   void Release(const MapId& map, int32_t seq);
   void Sync();
 
   std::vector<KeyframeId> Kept() const;
   int64_t bytes() const { return bytes_; }
+  // Of segments with damage that are done with.
+  int64_t damaged_bytes() const { return damaged_bytes_; }
+  // Pieces that are no events, and keyframes that are not what was written, since the start.
+  int64_t num_damaged() const { return num_damaged_; }
   // The last write was refused, by the disk or by the bound.
   bool refuses() const { return refuses_; }
 
@@ -53,19 +64,27 @@ class Spool {
   struct Segment {
     int64_t bytes = 0;
     int kept = 0;  // keyframes
+    bool damaged = false;
   };
   struct Place {
     int64_t segment = 0;
-    int64_t offset = 0;  // of the payload
+    int64_t offset = 0;  // of the event
     int32_t size = 0;
+    uint32_t crc32 = 0;
   };
 
   [[noreturn]] void Refuse(const std::string& reason) const;  // in the constructor
   std::filesystem::path File(int64_t segment) const;
+  void FindFiles();
   void Load(int64_t segment);
+  void LoadFrom(int fd, int64_t segment);
+  void LoadEvent(int64_t segment, const CheckedScan::Piece& event);
+  void NoteDamage(int64_t segment, const std::string& what);
   bool Write(const KeyframeId& id, Bytes data, int64_t utime);
+  std::vector<uint8_t> ReadData(const Place& place) const;
   void CloseFile();
   void RemoveIfRead(int64_t segment);
+  void Remove(int64_t segment);
 
   const std::filesystem::path folder_;
   const int32_t agent_id_;
@@ -74,6 +93,8 @@ class Spool {
   std::map<int64_t, Segment> segments_;
   std::map<KeyframeId, Place> places_;
   int64_t bytes_ = 0;
+  int64_t damaged_bytes_ = 0;
+  int64_t num_damaged_ = 0;
   int64_t newest_ = 0;  // segment
   int fd_ = -1;         // of the newest, while it is written to
   int64_t next_event_ = 0;

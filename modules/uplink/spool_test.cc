@@ -1,5 +1,6 @@
 #include "uplink/spool.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -7,6 +8,7 @@
 #include <csignal>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
+#include <random>
 
 #include "agent_handler/test_keyframes.h"
 
@@ -33,6 +35,13 @@ class SpoolTest : public testing::Test {
     std::vector<fs::path> files(fs::directory_iterator(folder), {});
     std::sort(files.begin(), files.end());
     return files;
+  }
+  static void Flip(const fs::path& path, int64_t offset, int bits = 1) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(offset);
+    const auto byte = static_cast<char>(file.get() ^ bits);
+    file.seekp(offset);
+    file.put(byte);
   }
   fs::path folder;
 };
@@ -74,11 +83,14 @@ TEST_F(SpoolTest, AnyLcmToolReadsIt) {
     EXPECT_EQ(event->timestamp, seq);
     const auto* bytes = static_cast<const uint8_t*>(event->data);
     EXPECT_EQ(std::vector<uint8_t>(bytes, bytes + event->datalen), EncodeTestKeyframe({kMap, seq}));
+    event = file.readNextEvent();
+    ASSERT_NE(event, nullptr);
+    EXPECT_EQ(event->channel, "CHECKSUMS");
   }
   EXPECT_EQ(file.readNextEvent(), nullptr);
 }
 
-// Cut at every place of the last keyframe's event.
+// As a crash leaves it, cut anywhere in the last keyframe or its checksum: that is no damage.
 TEST_F(SpoolTest, ATornTailIsIgnored) {
   {
     Spool spool(folder, 1, kLarge);
@@ -87,22 +99,126 @@ TEST_F(SpoolTest, ATornTailIsIgnored) {
   }
   const fs::path file = Files()[0];
   const auto whole = fs::file_size(file);
-  for (const uint64_t cut : {1, 100, 20'000}) {
+  for (const uint64_t cut : {1, 200, 20'000}) {
     fs::resize_file(file, whole - cut);
     Spool spool(folder, 1, kLarge);
-    EXPECT_EQ(spool.Kept().size(), 1u) << cut;
-    EXPECT_EQ(spool.Read({kMap, 0}), EncodeTestKeyframe({kMap, 0}));
+    EXPECT_EQ(spool.Kept().size(), cut == 1 ? 2u : 1u) << cut;
+    for (const KeyframeId& id : spool.Kept()) {
+      EXPECT_EQ(spool.Read(id), EncodeTestKeyframe(id));
+    }
+    EXPECT_EQ(spool.num_damaged(), 0);
   }
+  Spool(folder, 1, kLarge).Release(kMap, 1);
+  EXPECT_TRUE(Files().empty());
 }
 
-TEST_F(SpoolTest, DamageIsNotSent) {
+TEST_F(SpoolTest, DamageIsNotSentAndTakenAnew) {
   Spool spool(folder, 1, kLarge);
   Add(&spool, 0);
-  std::fstream file(Files()[0], std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(60);
-  file << std::string(2000, '\xff');
-  file.close();
+  Add(&spool, 1);
+  Flip(Files()[0], 20'000);
   EXPECT_TRUE(spool.Read({kMap, 0}).empty());
+  EXPECT_EQ(spool.num_damaged(), 1);
+  EXPECT_TRUE(Add(&spool, 0));
+  EXPECT_EQ(spool.Read({kMap, 0}), EncodeTestKeyframe({kMap, 0}));
+  EXPECT_EQ(spool.Read({kMap, 1}), EncodeTestKeyframe({kMap, 1}));
+}
+
+// It was deleted, with all that was in it.
+TEST_F(SpoolTest, ADamagedFirstByteCostsOneKeyframeAndTheFileStays) {
+  {
+    Spool spool(folder, 1, kLarge);
+    for (int seq = 0; seq < 5; ++seq) {
+      Add(&spool, seq);
+    }
+  }
+  Flip(Files()[0], 0);
+  const auto size = static_cast<int64_t>(fs::file_size(Files()[0]));
+  {
+    Spool spool(folder, 1, kLarge);
+    EXPECT_EQ(spool.Kept().size(), 4u);
+    for (const KeyframeId& id : spool.Kept()) {
+      EXPECT_EQ(spool.Read(id), EncodeTestKeyframe(id));
+    }
+    spool.Release(kMap, 4);
+    ASSERT_EQ(Files().size(), 1u);
+    EXPECT_THAT(Files()[0].filename().string(),
+                testing::StartsWith("keyframes_000001.lcm.damaged-"));
+    EXPECT_EQ(spool.bytes(), 0);
+    EXPECT_EQ(spool.damaged_bytes(), size);
+  }
+  Spool spool(folder, 1, size + 1000);
+  EXPECT_EQ(spool.damaged_bytes(), size);
+  EXPECT_TRUE(spool.Kept().empty());
+  EXPECT_FALSE(Add(&spool, 9)) << "it counts towards the bound";
+}
+
+TEST_F(SpoolTest, AFileOfNothingButDamageStays) {
+  {
+    Spool spool(folder, 1, kLarge);
+    Add(&spool, 0);
+  }
+  fs::resize_file(Files()[0], 10'000);
+  Flip(Files()[0], 0);
+  EXPECT_TRUE(Spool(folder, 1, kLarge).Kept().empty());
+  ASSERT_EQ(Files().size(), 1u);
+  EXPECT_EQ(fs::file_size(Files()[0]), 10'000u);
+}
+
+// Without its checksum the agent's id would be another's, and the uplink would not start.
+TEST_F(SpoolTest, ADamagedIdIsNoOtherAgents) {
+  {
+    Spool spool(folder, 1, kLarge);
+    Add(&spool, 0);
+    Add(&spool, 1);
+  }
+  constexpr int64_t kAgentsByte = 28 + 10 + 8 + 2;
+  Flip(Files()[0], kAgentsByte);
+  EXPECT_THAT(Spool(folder, 1, kLarge).Kept(), testing::ElementsAre(KeyframeId{kMap, 1}));
+}
+
+// Of bits and of blocks of 4 kB.
+TEST_F(SpoolTest, RandomDamageLosesTheKeyframesItHitsAtMost) {
+  constexpr int kKeyframes = 8;
+  {
+    Spool spool(folder, 1, kLarge);
+    for (int seq = 0; seq < kKeyframes; ++seq) {
+      Add(&spool, seq);
+    }
+  }
+  const fs::path file = Files()[0];
+  const fs::path good = folder.string() + "_good";
+  fs::copy_file(file, good, fs::copy_options::overwrite_existing);
+  const auto event_bytes = static_cast<int64_t>(fs::file_size(file)) / kKeyframes;
+  std::mt19937_64 random(5);
+  for (const int64_t size : {1, 4096}) {
+    int64_t hit = 0, lost = 0, worst = 0;
+    for (int i = 0; i < 200; ++i) {
+      fs::remove_all(folder);
+      fs::create_directories(folder);
+      fs::copy_file(good, file);
+      const auto at =
+          static_cast<int64_t>(random() % static_cast<uint64_t>(event_bytes * kKeyframes - size));
+      for (int64_t k = 0; k < size; ++k) {
+        Flip(file, at + k, size == 1 ? 1 << random() % 8 : static_cast<int>(random() % 256));
+      }
+      Spool spool(folder, 1, kLarge);
+      const int64_t hits = (at + size - 1) / event_bytes - at / event_bytes + 1;
+      int64_t good_ones = 0;
+      for (const KeyframeId& id : spool.Kept()) {
+        const std::vector<uint8_t> read = spool.Read(id);
+        good_ones += read == EncodeTestKeyframe(id) ? 1 : 0;
+      }
+      EXPECT_GE(good_ones, kKeyframes - hits) << at;
+      hit += hits;
+      lost += kKeyframes - good_ones;
+      worst = std::max(worst, kKeyframes - good_ones);
+      spool.Release(kMap, kKeyframes);
+      EXPECT_EQ(Files().size(), spool.num_damaged() > 0 ? 1u : 0u);
+    }
+    fmt::print("| {} | 200 | {} | {} | {} |\n", size == 1 ? "one bit" : "4 kB", hit, lost, worst);
+  }
+  fs::remove(good);
 }
 
 TEST_F(SpoolTest, FullSaysNoAndHasRoomAgain) {

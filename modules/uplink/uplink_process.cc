@@ -274,14 +274,22 @@ void UplinkProcess::Tick(int64_t now_utime) {
   if (spool_ != nullptr) {
     spool_->Sync();
     node_.Set("spool_disk_bytes", spool_->bytes());
+    node_.Set("spool_damaged", spool_->num_damaged());
+    node_.Set("spool_damaged_bytes", spool_->damaged_bytes());
   }
-  node_.PublishStatus(now_utime, pending,
-                      fmt::format("{}, {} keyframes acknowledged, {} in the spool{}",
-                                  uplink_.Connected(now_us_) ? "connected" : "handler is away",
-                                  uplink_.keyframes_acked(), pending,
-                                  RateForPeople() + (spool_ != nullptr && spool_->refuses()
-                                                         ? "; THE SPOOL'S DISK REFUSES WRITES"
-                                                         : "")));
+  node_.PublishStatus(
+      now_utime, pending,
+      fmt::format("{}, {} keyframes acknowledged, {} in the spool{}{}",
+                  uplink_.Connected(now_us_) ? "connected" : "handler is away",
+                  uplink_.keyframes_acked(), pending, RateForPeople(), SpoolForPeople()));
+}
+
+std::string UplinkProcess::SpoolForPeople() const {
+  if (spool_ == nullptr) {
+    return "";
+  }
+  return std::string(spool_->refuses() ? "; THE SPOOL'S DISK REFUSES WRITES" : "") +
+         (spool_->num_damaged() > 0 ? "; THE SPOOL WAS DAMAGED, those files stay" : "");
 }
 
 }  // namespace pangea

@@ -39,6 +39,7 @@ class UplinkProcess : public PolledProcess {
   void PublishAsks();
   void PublishCorrections();
   std::string RateForPeople();
+  std::string SpoolForPeople() const;
 
   const int32_t agent_id_;
   Bus& link_bus_;

@@ -1,6 +1,8 @@
 // A journal or a log of keyframes as a crash, a full disk or a stranger left it.
 
+#include <algorithm>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <stdexcept>
 
@@ -30,19 +32,42 @@ bool Opens(const std::function<void()>& open) {
   }
 }
 
+std::vector<char> BytesOf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+bool IsSame(const std::vector<char>& a, Bytes b) {
+  return std::ranges::equal(a, b, {}, [](char c) { return static_cast<uint8_t>(c); });
+}
+
+int64_t NumFiles(const std::filesystem::path& folder) {
+  return std::distance(std::filesystem::directory_iterator(folder), {});
+}
+
 }  // namespace
 }  // namespace pangea::fuzz
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
-  const auto log = fuzz::ScratchFolder() / "journal.lcm";
+  std::cerr.rdbuf(nullptr);  // each damaged journal says so
+  const auto folder = fuzz::ScratchFolder() / "journal";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto log = folder / "journal.lcm";
   fuzz::WriteFile(log, {data, size});
   fuzz::Opens([&] { session::ReadKeyframeLog(log); });
   fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1); });
   if (fuzz::Opens([&] { fuzz::StartOn(log); })) {
-    const auto healed = std::filesystem::file_size(log);
+    const std::vector<char> healed = fuzz::BytesOf(log);
+    const int64_t files = fuzz::NumFiles(folder);
+    fuzz::Require(files == 2 || fuzz::IsSame(healed, {data, size}),
+                  "what is mended is kept beside");
     fuzz::Require(fuzz::Opens([&] { fuzz::StartOn(log); }), "a journal that opened opens again");
-    fuzz::Require(std::filesystem::file_size(log) == healed, "what was healed once stays");
+    fuzz::Require(fuzz::BytesOf(log) == healed, "what was healed once stays");
+    fuzz::Require(fuzz::NumFiles(folder) == files, "and is whole");
+  } else {
+    fuzz::Require(fuzz::IsSame(fuzz::BytesOf(log), {data, size}), "what is refused stays as it is");
   }
   return 0;
 }

@@ -1,5 +1,6 @@
 // A segment of a spool as a crash, a power cut or a stranger left it.
 
+#include <iostream>
 #include <stdexcept>
 
 #include "common/messages.h"
@@ -31,6 +32,7 @@ void Use(Spool* spool) {
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
+  std::cerr.rdbuf(nullptr);  // each damaged segment says so
   const auto folder = fuzz::ScratchFolder() / "spool";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "common/bus/big_endian.h"
@@ -11,15 +12,13 @@ namespace pangea {
 namespace {
 
 // Big-endian: magic, event number, time stamp, length of the channel's name and of the data.
-constexpr uint32_t kMagic = 0xEDA1DA01;
 constexpr uint32_t kMaxChannelName = 63;
-constexpr uint32_t kMaxData = 16 << 20;
 
 }  // namespace
 
 size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel, Bytes data,
                       std::vector<uint8_t>* out) {
-  PutBigEndian(kMagic, 4, out);
+  PutBigEndian(kLogMagic, 4, out);
   PutBigEndian(static_cast<uint64_t>(number), 8, out);
   PutBigEndian(static_cast<uint64_t>(utime), 8, out);
   PutBigEndian(channel.size(), 4, out);
@@ -31,17 +30,25 @@ size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel,
 }
 
 std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
-  if (bytes.size() < LogEventHeader::kBytes || GetBigEndian(bytes.data(), 4) != kMagic) {
+  if (bytes.size() < LogEventHeader::kBytes || GetBigEndian(bytes.data(), 4) != kLogMagic) {
     return std::nullopt;
   }
   const auto channel_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 20, 4));
   const auto data_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 24, 4));
-  if (channel_bytes < 1 || channel_bytes > kMaxChannelName || data_bytes > kMaxData) {
+  if (channel_bytes < 1 || channel_bytes > kMaxChannelName ||
+      data_bytes > LogEventHeader::kMaxDataBytes) {
     return std::nullopt;
   }
   return LogEventHeader{static_cast<int64_t>(GetBigEndian(bytes.data() + 4, 8)),
                         static_cast<int64_t>(GetBigEndian(bytes.data() + 12, 8)),
                         static_cast<int32_t>(channel_bytes), static_cast<int32_t>(data_bytes)};
+}
+
+bool BeginsAsLogEvent(Bytes bytes) {
+  std::vector<uint8_t> magic;
+  PutBigEndian(kLogMagic, 4, &magic);
+  const size_t size = std::min(bytes.size(), magic.size());
+  return std::equal(magic.begin(), magic.begin() + static_cast<int64_t>(size), bytes.begin());
 }
 
 bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
@@ -76,12 +83,14 @@ bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {
   return true;
 }
 
-void SyncFolder(const std::string& folder) {
+bool SyncFolder(const std::string& folder) {
   const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd >= 0) {
-    fsync(fd);
-    close(fd);
+  if (fd < 0) {
+    return false;
   }
+  const bool synced = fsync(fd) == 0;
+  close(fd);
+  return synced;
 }
 
 }  // namespace pangea

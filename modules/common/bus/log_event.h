@@ -12,8 +12,12 @@
 
 namespace pangea {
 
+// What each event begins with.
+inline constexpr uint32_t kLogMagic = 0xEDA1DA01;
+
 struct LogEventHeader {
   static constexpr size_t kBytes = 28;
+  static constexpr int64_t kMaxDataBytes = 16 << 20;
   int64_t number = 0;  // of the event in its file
   int64_t utime = 0;
   int32_t channel_bytes = 0;
@@ -27,11 +31,13 @@ size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel,
                       std::vector<uint8_t>* out);
 // Nothing if these bytes are no event's header, or one of absurd lengths.
 std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes);
+// Whether they may be the first of an event, however few there are.
+bool BeginsAsLogEvent(Bytes bytes);
 
 // All of it, going on after interruptions; false when the file refuses or ends.
 bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size);
 bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size);
-// Makes a new file in the folder outlive a power cut.
-void SyncFolder(const std::string& folder);
+// Makes a new file in the folder outlive a power cut; false if it may not.
+bool SyncFolder(const std::string& folder);
 
 }  // namespace pangea

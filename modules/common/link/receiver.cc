@@ -1,6 +1,7 @@
 #include "common/link/receiver.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace pangea {
 namespace {
@@ -15,8 +16,28 @@ bool GoesBefore(const KeyframeId& a, const KeyframeId& b) {
 Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
 
-void Receiver::Resume(const MapId& map, int32_t journalled_seq) {
-  maps_[map] = {journalled_seq + 1, journalled_seq, false, false, true};
+int32_t Receiver::Map::SkipRuns(int32_t seq) const {
+  const auto after = runs.upper_bound(seq);
+  return after == runs.begin() ? seq : std::max(seq, std::prev(after)->second + 1);
+}
+
+int32_t Receiver::Map::MissingBefore(int32_t seq) const {
+  int32_t missing = seq - next;
+  for (const auto& [first, last] : runs) {
+    missing -= std::max(0, std::min(last + 1, seq) - std::max(first, next));
+  }
+  return missing;
+}
+
+void Receiver::Resume(const MapId& map_id, int32_t journalled_seq,
+                      const std::vector<SeqGap>& gaps) {
+  const int32_t next = gaps.empty() ? journalled_seq + 1 : gaps.front().from_seq;
+  Map map{next, next - 1, false, false, true};
+  for (size_t i = 0; i < gaps.size(); ++i) {
+    const int32_t last = i + 1 < gaps.size() ? gaps[i + 1].from_seq - 1 : journalled_seq;
+    map.runs[gaps[i].to_seq + 1] = last;
+  }
+  maps_[map_id] = std::move(map);
 }
 
 void Receiver::OnHello(const LinkHello& hello) {
@@ -34,9 +55,9 @@ void Receiver::OnHello(const LinkHello& hello) {
     Map& map = maps_[announced.map];
     map.announced = map.in_hello = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
-      given_up_ += announced.first_seq - map.next;
-      map.next = announced.first_seq;
-      map.journalled = announced.first_seq - 1;
+      given_up_ += map.MissingBefore(announced.first_seq);
+      map.next = map.SkipRuns(announced.first_seq);
+      map.journalled = map.next - 1;
       auto it = cache_.lower_bound({announced.map, 0});
       while (it != cache_.end() && it->first < KeyframeId{announced.map, map.next}) {
         const auto passed = it++;
@@ -104,7 +125,7 @@ std::string Receiver::Add(const MapId& map_id, const LinkPiece& piece) {
   const int32_t next = map->second.next;
   const KeyframeId id{map_id,
                       next + static_cast<int8_t>(piece.seq_low - static_cast<uint8_t>(next))};
-  if (id.seq < next) {
+  if (id.seq < next || map->second.SkipRuns(id.seq) != id.seq) {
     return "";  // a repeat of what is handed over already
   }
   if (id.seq >= next + kMaxPartialKeyframes) {
@@ -166,7 +187,7 @@ std::vector<Receiver::Keyframe> Receiver::TakeReady() {
     if (id.seq == map.next && entry.whole()) {
       entry.taken = true;
       ready.push_back({id, Joined(entry)});
-      ++map.next;
+      map.next = map.SkipRuns(map.next + 1);
       map.brought = true;
     }
   }
@@ -180,7 +201,8 @@ void Receiver::Journalled(const KeyframeId& id) {
   }
   const auto map = maps_.find(id.map);
   if (map != maps_.end()) {
-    map->second.journalled = std::max(map->second.journalled, id.seq);
+    const int32_t known_to = map->second.SkipRuns(id.seq + 1) - 1;
+    map->second.journalled = std::max(map->second.journalled, known_to);
   }
 }
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/in_order.h"
 #include "common/link/wire.h"
 
 namespace pangea {
@@ -34,8 +35,9 @@ class Receiver {
 
   Receiver(const ReceiverOptions& options, Check check);
 
-  // The journal already has this map up to `journalled_seq`.
-  void Resume(const MapId& map, int32_t journalled_seq);
+  // The journal already has this map up to `journalled_seq`, but for `gaps` (ascending): those are
+  // taken first, until they are filled or given up.
+  void Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps = {});
   // Only maps of a hello (or of the journal) are received. What the uplink cannot deliver any more
   // is given up here, and counted.
   void OnHello(const LinkHello& hello);
@@ -64,6 +66,13 @@ class Receiver {
     bool announced = false;  // by this run of the uplink
     bool in_hello = false;   // the newest one
     bool brought = false;    // a keyframe, ever
+    std::map<int32_t, int32_t> runs =
+        {};  // the journal has them beyond `next`: first seq, last seq
+
+    // The first from `seq` on that the journal does not have.
+    int32_t SkipRuns(int32_t seq) const;
+    // Keyframes from `next` up to this one that the journal does not have.
+    int32_t MissingBefore(int32_t seq) const;
   };
   struct Entry {
     std::vector<std::vector<uint8_t>> pieces;

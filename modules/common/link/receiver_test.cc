@@ -93,6 +93,49 @@ TEST(Receiver, SeqsGoOnBeyondAByte) {
   EXPECT_EQ(seqs, (std::vector<int32_t>{255, 256, 257}));
 }
 
+// The journal lost some in its middle: they come first, and nothing twice.
+TEST(Receiver, FillsGapsBeforeItGoesOn) {
+  Receiver receiver({}, CheckContent);
+  receiver.Resume(kMap, 400, {{kMap, 3, 4}, {kMap, 300, 300}});
+  receiver.OnHello({"", {{kMap, 0, 0}}});
+  const auto journalled = [&] {
+    LinkAck ack;
+    receiver.FillAck(true, &ack);
+    return ack.journalled_seq.at(kMap);
+  };
+  const auto take = [&](const std::vector<int32_t>& seqs) {
+    for (const int32_t seq : seqs) {
+      AddAll(&receiver, {kMap, seq});
+    }
+    std::vector<int32_t> taken;
+    for (const auto& keyframe : receiver.TakeReady()) {
+      taken.push_back(keyframe.id.seq);
+    }
+    return taken;
+  };
+  EXPECT_EQ(journalled(), 2);
+  EXPECT_EQ(take({3, 4, 5, 6}), (std::vector<int32_t>{3, 4}));
+  receiver.Journalled({kMap, 3});
+  EXPECT_EQ(journalled(), 3) << "4 is not on the disk yet";
+  receiver.Journalled({kMap, 4});
+  EXPECT_EQ(journalled(), 299);
+  EXPECT_EQ(take({301, 300}), (std::vector<int32_t>{300}));
+  receiver.Journalled({kMap, 300});
+  EXPECT_EQ(journalled(), 400);
+  EXPECT_EQ(take({401}), (std::vector<int32_t>{401}));
+  EXPECT_EQ(receiver.pending(), 1u) << "of those it has, none stays";
+}
+
+TEST(Receiver, AGapThatIsGivenUpCostsWhatIsMissingAlone) {
+  Receiver receiver({}, CheckContent);
+  receiver.Resume(kMap, 400, {{kMap, 3, 4}, {kMap, 300, 300}});
+  receiver.OnHello({"", {{kMap, 20, 0}}});
+  EXPECT_EQ(receiver.given_up(), 2);
+  LinkAck ack;
+  receiver.FillAck(true, &ack);
+  EXPECT_EQ(ack.journalled_seq.at(kMap), 299);
+}
+
 TEST(Receiver, EarlierKeyframesMakeRoomInAFullCache) {
   Receiver receiver({100'000}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});
