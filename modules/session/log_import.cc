@@ -54,17 +54,19 @@ MapState Solved(const FinalGroup& group, const CapturedSession& session, const G
 
 }  // namespace
 
-int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out) {
+int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
+                  LogReadings* readings) {
   const Graph solved = ReadG2o(g2o);
-  CheckVertices(GraphOf(log), solved, g2o);
-  const CapturedSession session = ReadServerLog(log);
+  CheckVertices(GraphOf(log, readings), solved, g2o);
+  const CapturedSession session = ReadServerLog(log, readings);
   CheckNew(out);
   LogFileWriter writer(out);
   int64_t latest = 0;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto copy = [&](const LogEvent& event) {
     latest = std::max(latest, event.utime);
     writer.Write(event.utime, event.channel, event.data);
-  });
+  };
+  ReadLog(log, copy, readings);
   int next = 0;
   for (const FinalGroup& group : FinalGroups(session)) {
     for (const map_state_t& chunk : ToMessages(Solved(group, session, solved, &next))) {

@@ -5,12 +5,16 @@
 #include <cstdint>
 #include <string>
 
+#include "common/bus/log_reading.h"
+
 namespace pangea::session {
 
 // Writes `log` again to `out`, and at its end, as the newest MAP_STATE of each group, the poses of
 // a g2o file that was exported from it (vertices as GraphOf numbers them) and solved elsewhere. A
 // report or a viewer of `out` shows that solution. Returns how many keyframes it placed. Throws
-// std::runtime_error when the file's vertices are not the log's keyframes.
-int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out);
+// std::runtime_error when the file's vertices are not the log's keyframes. What of the log is lost
+// is noted in `readings` (log_reader.h); the new one is whole.
+int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
+                  LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

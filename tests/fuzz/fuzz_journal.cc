@@ -37,8 +37,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
   const auto log = fuzz::ScratchFolder() / "journal.lcm";
   fuzz::WriteFile(log, {data, size});
-  fuzz::Opens([&] { session::ReadKeyframeLog(log); });
-  fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1); });
+  LogReadings readings;
+  fuzz::Opens([&] { session::ReadKeyframeLog(log, &readings); });
+  fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1, &readings); });
   if (fuzz::Opens([&] { fuzz::StartOn(log); })) {
     const auto healed = std::filesystem::file_size(log);
     fuzz::Require(fuzz::Opens([&] { fuzz::StartOn(log); }), "a journal that opened opens again");
