@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <sstream>
 
 #include "programs.h"
@@ -96,9 +97,14 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   for (const char* command : {"info", "explain", "export --tum out"}) {
     const Outcome outcome =
         RunCommand(fmt::format("pangea-log {} " PANGEA_SOURCE_DIR "/README.md", command));
-    EXPECT_GT(outcome.exit_code, 100) << outcome.output;
-    EXPECT_THAT(outcome.output, HasSubstr("README.md: holds no event; is it an LCM log?"));
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr("README.md: is no LCM log"));
   }
+  const fs::path empty = FreshFolder("empty_log") / "empty.lcm";
+  std::ofstream(empty).flush();
+  const Outcome outcome = RunCommand("pangea-log info " + empty.string());
+  EXPECT_GT(outcome.exit_code, 100) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
 }
 
 // Not a report without ground truth, as if the recording had none.

@@ -116,10 +116,10 @@ std::vector<DamagedPart> Journal::Scan(const Visitor& visitor) {
 
 bool Journal::Take(const CheckedScan::Piece& piece, const Visitor& visitor) {
   if (!IsOwn(piece) && !visitor(piece.channel, piece.data,
-                                {piece.offset, static_cast<int32_t>(piece.bytes), piece.crc32})) {
+                                {piece.offset, static_cast<int32_t>(piece.bytes), piece.crc32()})) {
     return false;
   }
-  Note(piece.header.number, piece.header.utime, piece.crc32);
+  Note(piece.header.number, piece.header.utime, piece.crc32());
   KeepNewest(kRepeated);
   return true;
 }

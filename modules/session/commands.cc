@@ -43,7 +43,7 @@ void PrepareOut(const fs::path& out) {
   fs::create_directories(out);
 }
 
-// Exit codes; a wrong command line has CLI11's, above 100.
+// Exit codes; a wrong command line has CLI11's, above 100; kExitLost is main's.
 constexpr int kFailed = 1;
 constexpr int kMissed = 2;
 
@@ -69,7 +69,7 @@ struct RunArguments {
   int first_port = 0;
 };
 
-int Run(const RunArguments& arguments) {
+int Run(const RunArguments& arguments, LogReadings* readings) {
   SessionScript script =
       ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
   PlaceDisconnects(arguments.rate, &script);
@@ -84,7 +84,7 @@ int Run(const RunArguments& arguments) {
   PrepareOut(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
-  const int exit_code = Tell(ReportRun(script, summary, options.out));
+  const int exit_code = Tell(ReportRun(script, summary, options.out, readings));
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
   }
@@ -123,14 +123,15 @@ struct ReplayArguments : LogArguments {
   std::optional<int64_t> explain;
 };
 
-int TellDiff(const std::string& a, const std::string& b, double until_s) {
-  const LogDiff diff = DiffLogs(a, b, until_s);
+int TellDiff(const std::string& a, const std::string& b, double until_s, LogReadings* readings) {
+  const LogDiff diff = DiffLogs(a, b, until_s, readings);
   std::cout << fmt::format("first: {}, second: {}\n\n{}", a, b, ToText(diff)) << std::flush;
   return diff.First() == nullptr ? 0 : kMissed;
 }
 
 // With --only or --from-checkpoint: what is not run, or not yet, is taken from the log.
-void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log) {
+void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log,
+                   LogReadings* readings) {
   if (arguments.logs.size() != 1) {
     throw std::runtime_error(
         fmt::format("{}: takes one log, which has what is not to be said again",
@@ -143,7 +144,7 @@ void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log)
     part.processes = {arguments.only.begin(), arguments.only.end()};
   }
   part.checkpoint_s = arguments.checkpoint_s;
-  const int64_t taken_over = ReplayPart(log, part, out_log);
+  const int64_t taken_over = ReplayPart(log, part, out_log, readings);
   if (arguments.checkpoint_s) {
     std::cout << fmt::format("{} matches and verdicts of the first {:g} s: taken from {}\n",
                              taken_over, *arguments.checkpoint_s, log);
@@ -151,22 +152,23 @@ void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log)
 }
 
 // Some processes alone, and where what they say now parts from what they said.
-int RunReplayOnly(const ReplayArguments& arguments) {
+int RunReplayOnly(const ReplayArguments& arguments, LogReadings* readings) {
   const std::string log = fs::path(arguments.out) / "session.lcm";
   PrepareOut(arguments.out);
-  RunReplayPart(arguments, log);
+  RunReplayPart(arguments, log, readings);
   return TellDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
-                  arguments.until_s);
+                  arguments.until_s, readings);
 }
 
-void ExplainInto(const fs::path& out, int64_t constraint, const Remembered& known) {
-  const Explanation explanation = Explain(out / "session.lcm", constraint);
+void ExplainInto(const fs::path& out, int64_t constraint, const Remembered& known,
+                 LogReadings* readings) {
+  const Explanation explanation = Explain(out / "session.lcm", constraint, readings);
   const fs::path picture = out / fmt::format("constraint_{}.png", constraint);
   WriteExplanationPng(explanation, RecordingsAtHand(known), picture);
   std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
 }
 
-int RunReplay(const ReplayArguments& arguments) {
+int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   const fs::path out(arguments.out);
   for (const std::string& log : arguments.logs) {
     if (fs::exists(out) && fs::equivalent(fs::absolute(log).parent_path(), out)) {
@@ -175,36 +177,36 @@ int RunReplay(const ReplayArguments& arguments) {
     }
   }
   if (!arguments.only.empty()) {
-    return RunReplayOnly(arguments);
+    return RunReplayOnly(arguments, readings);
   }
   const Remembered known = KnownOf(arguments);
   PrepareOut(out);
   if (arguments.checkpoint_s) {
-    RunReplayPart(arguments, out / "session.lcm");
+    RunReplayPart(arguments, out / "session.lcm", readings);
   } else {
     const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()},
-                                         arguments.until_s, out / "session.lcm");
+                                         arguments.until_s, out / "session.lcm", readings);
     std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                              summary.agent_ids.size());
   }
-  int exit_code = Tell(ReportLog(out / "session.lcm", known, out));
+  int exit_code = Tell(ReportLog(out / "session.lcm", known, out, readings));
   if (arguments.explain) {
-    ExplainInto(out, *arguments.explain, known);
+    ExplainInto(out, *arguments.explain, known, readings);
   }
   if (!arguments.diff.empty()) {
-    exit_code =
-        std::max(exit_code, TellDiff(arguments.diff, out / "session.lcm", arguments.until_s));
+    exit_code = std::max(
+        exit_code, TellDiff(arguments.diff, out / "session.lcm", arguments.until_s, readings));
   }
   return exit_code;
 }
 
-int RunReport(const LogArguments& arguments) {
+int RunReport(const LogArguments& arguments, LogReadings* readings) {
   if (fs::exists(fs::path(arguments.out) / "session.lcm")) {
     throw std::runtime_error(fmt::format(
         "--out {}: holds a session and its own report; give another folder", arguments.out));
   }
   fs::create_directories(arguments.out);
-  return Tell(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out));
+  return Tell(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out, readings));
 }
 
 void AddResultOptions(CLI::App& command, LogArguments* arguments) {
@@ -221,7 +223,7 @@ void AddResultOptions(CLI::App& command, LogArguments* arguments) {
 
 }  // namespace
 
-void AddRunCommand(CLI::App& app, int* exit_code) {
+void AddRunCommand(CLI::App& app, CommandResult* result) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app.add_subcommand("run", "Play a session file through real processes");
   run->add_option("file", arguments->file, "Session file (YAML), or the name of one in sessions/")
@@ -239,7 +241,7 @@ void AddRunCommand(CLI::App& app, int* exit_code) {
   run->add_option("--port", arguments->first_port,
                   "First UDP port of the session's buses (default: free ones are chosen)")
       ->check(CLI::Range(1024, 65000));
-  run->callback([arguments, exit_code] { *exit_code = Run(*arguments); });
+  run->callback([arguments, result] { result->exit_code = Run(*arguments, &result->readings); });
 }
 
 void AddListCommand(CLI::App& app) {
@@ -273,7 +275,7 @@ void AddListCommand(CLI::App& app) {
   });
 }
 
-void AddReplayCommand(CLI::App& app, int* exit_code) {
+void AddReplayCommand(CLI::App& app, CommandResult* result) {
   auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* replay = app.add_subcommand(
       "replay", "Run the server over the keyframes of captured logs, deterministically");
@@ -312,10 +314,11 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
   for (const char* of_the_report : {"--recording", "--expect", "--explain"}) {
     replay->get_option("--only")->excludes(replay->get_option(of_the_report));
   }
-  replay->callback([arguments, exit_code] { *exit_code = RunReplay(*arguments); });
+  replay->callback(
+      [arguments, result] { result->exit_code = RunReplay(*arguments, &result->readings); });
 }
 
-void AddReportCommand(CLI::App& app, int* exit_code) {
+void AddReportCommand(CLI::App& app, CommandResult* result) {
   auto arguments = std::make_shared<LogArguments>();
   CLI::App* report = app.add_subcommand(
       "report", "What a captured server bus amounts to, whoever captured it: nothing is run again");
@@ -324,7 +327,8 @@ void AddReportCommand(CLI::App& app, int* exit_code) {
       ->expected(1)
       ->check(CLI::ExistingFile);
   AddResultOptions(*report, arguments.get());
-  report->callback([arguments, exit_code] { *exit_code = RunReport(*arguments); });
+  report->callback(
+      [arguments, result] { result->exit_code = RunReport(*arguments, &result->readings); });
 }
 
 }  // namespace pangea::session

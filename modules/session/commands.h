@@ -4,13 +4,20 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/bus/log_reading.h"
+
 namespace pangea::session {
 
+struct CommandResult {
+  int exit_code = 0;
+  LogReadings readings;  // of the logs it read
+};
+
 // Adds `run`, `list`, `replay` and `report` to the app; whichever is given runs when the app has
-// parsed. `exit_code` is set by it.
-void AddRunCommand(CLI::App& app, int* exit_code);
+// parsed, and sets `result`.
+void AddRunCommand(CLI::App& app, CommandResult* result);
 void AddListCommand(CLI::App& app);
-void AddReplayCommand(CLI::App& app, int* exit_code);
-void AddReportCommand(CLI::App& app, int* exit_code);
+void AddReplayCommand(CLI::App& app, CommandResult* result);
+void AddReportCommand(CLI::App& app, CommandResult* result);
 
 }  // namespace pangea::session

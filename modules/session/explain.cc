@@ -25,15 +25,16 @@ auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
   return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
 }
 
-Constraint FindVerdict(const std::string& log, int64_t id) {
+Constraint FindVerdict(const std::string& log, int64_t id, LogReadings* readings) {
   std::optional<Constraint> found;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto find = [&](const LogEvent& event) {
     if (event.channel == channels::kConstraint) {
       if (auto constraint = ParseEvent<constraint_t>(event); constraint && constraint->Id() == id) {
         found = std::move(constraint);
       }
     }
-  });
+  };
+  ReadLog(log, find, readings);
   if (!found) {
     throw std::runtime_error(
         fmt::format("{}: no constraint {}; pangea-log explain {} lists them", log, id, log));
@@ -41,9 +42,10 @@ Constraint FindVerdict(const std::string& log, int64_t id) {
   return *found;
 }
 
-PlaceCandidate FindCandidate(const std::string& log, const Constraint& constraint) {
+PlaceCandidate FindCandidate(const std::string& log, const Constraint& constraint,
+                             LogReadings* readings) {
   std::optional<PlaceCandidate> found;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto find = [&](const LogEvent& event) {
     const auto match =
         event.channel == channels::kPlaceMatch ? ParseEvent<place_match_t>(event) : std::nullopt;
     if (!match || match->query != constraint.to) {
@@ -54,7 +56,8 @@ PlaceCandidate FindCandidate(const std::string& log, const Constraint& constrain
         found = candidate;
       }
     }
-  });
+  };
+  ReadLog(log, find, readings);
   if (!found) {
     throw std::runtime_error(fmt::format(
         "{}: no PLACE_MATCH of {} with {} in this log: replay it, and explain the replay's log",
@@ -83,9 +86,9 @@ double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 }  // namespace
 
-std::string ListVerdicts(const std::string& log) {
+std::string ListVerdicts(const std::string& log, LogReadings* readings) {
   std::string text;
-  ReadLog(log, [&text](const LogEvent& event) {
+  const auto list = [&text](const LogEvent& event) {
     if (event.channel != channels::kConstraint) {
       return;
     }
@@ -94,14 +97,15 @@ std::string ListVerdicts(const std::string& log) {
                           ToString(constraint->from),
                           constraint->accepted ? "accepted" : constraint->reason);
     }
-  });
+  };
+  ReadLog(log, list, readings);
   return text.empty() ? fmt::format("{}: no CONSTRAINT in this log\n", log) : text;
 }
 
-Explanation Explain(const std::string& log, int64_t constraint_id) {
+Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings) {
   Explanation explanation;
-  explanation.said = FindVerdict(log, constraint_id);
-  explanation.candidate = FindCandidate(log, explanation.said);
+  explanation.said = FindVerdict(log, constraint_id, readings);
+  explanation.candidate = FindCandidate(log, explanation.said, readings);
   std::unique_ptr<PairJudge> judge;
   if (explanation.said.kind == PlaceKind::kIntra) {
     judge = std::make_unique<InterMapBa>(InterMapBaOptions{});
@@ -109,7 +113,7 @@ Explanation Explain(const std::string& log, int64_t constraint_id) {
     judge = std::make_unique<Fusion>(FusionOptions{});
   }
   bool from = false, to = false;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto add = [&](const LogEvent& event) {
     auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
                         ? ParseEvent<keyframe_t>(event)
                         : std::nullopt;
@@ -125,7 +129,8 @@ Explanation Explain(const std::string& log, int64_t constraint_id) {
       to = true;
     }
     judge->Add(std::move(*keyframe));
-  });
+  };
+  ReadLog(log, add, readings);
   if (!from || !to) {
     throw std::runtime_error(
         fmt::format("{}: keyframe {} is not in this log", log,

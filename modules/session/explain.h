@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/alignment/aligner.h"
+#include "common/bus/log_reading.h"
 #include "common/server_messages.h"
 
 namespace pangea::session {
@@ -20,10 +21,11 @@ struct Explanation {
   Keyframe from, to;
 };
 
-// Every verdict of the log, a line each.
-std::string ListVerdicts(const std::string& log);
+// Every verdict of the log, a line each. What of the log is lost is noted in `readings`
+// (log_reader.h), here and below.
+std::string ListVerdicts(const std::string& log, LogReadings* readings = nullptr);
 // Throws std::runtime_error when the log lacks the verdict, its candidate or a keyframe.
-Explanation Explain(const std::string& log, int64_t constraint_id);
+Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings = nullptr);
 
 std::string ToText(const Explanation& explanation);
 // Rows of the match on the left and the query on the right: the candidate's corners, PnP, and where

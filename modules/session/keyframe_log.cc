@@ -17,7 +17,8 @@ namespace pangea::session {
 namespace {
 
 // Names what is missing: "map 1/17…: keyframes 12 to 15 are missing".
-void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs) {
+void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs,
+               const LogReading& reading) {
   std::string gaps;
   for (const auto& [map, present] : seqs) {
     int32_t next = 0;
@@ -28,24 +29,29 @@ void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<
       next = seq + 1;
     }
   }
-  if (!gaps.empty()) {
-    throw std::runtime_error(fmt::format(
-        "{}: keyframes are missing, and a replay without them would not be the same:{}\n"
-        "The server's journal (journal.lcm beside a session.lcm) has every keyframe: replay that.",
-        log.string(), gaps));
+  if (gaps.empty()) {
+    return;
   }
+  throw std::runtime_error(fmt::format(
+      "{}: keyframes are missing, and a replay without them would not be the same:{}\n{}",
+      log.string(), gaps,
+      reading.whole()
+          ? "The server's journal (journal.lcm beside a session.lcm) has every keyframe: "
+            "replay that."
+          : "The log is damaged, and they were lost there. Another capture of the same "
+            "session, or the server's journal (journal.lcm beside a session.lcm), may "
+            "have them: replay that."));
 }
 
 }  // namespace
 
-std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
+std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
+                                            LogReadings* readings) {
   std::vector<LoggedKeyframe> keyframes;
   std::map<MapId, std::set<int32_t>> seqs;
   std::optional<int64_t> begin;
   int64_t latest = std::numeric_limits<int64_t>::min();
-  int64_t number = -1;
-  ReadLog(log.string(), [&](const LogEvent& event) {
-    ++number;
+  const auto take = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     latest = std::max(latest, event.utime);
     if (!event.channel.starts_with(channels::kKeyframePrefix)) {
@@ -59,7 +65,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
     const auto id = decoded ? Parse(message.id) : Parsed<KeyframeId>{};
     if (!id.value) {
       throw std::runtime_error(fmt::format("{}: event {} on {} is not a keyframe of this version",
-                                           log.string(), number, event.channel));
+                                           log.string(), event.number, event.channel));
     }
     keyframe.id = *id.value;
     keyframe.utime = message.utime;
@@ -68,16 +74,18 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log) {
     if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
       keyframes.push_back(std::move(keyframe));
     }
-  });
+  };
+  ReadLog(log.string(), take, readings);
   if (keyframes.empty()) {
     throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
   }
-  CheckGaps(log, seqs);
+  CheckGaps(log, seqs, readings == nullptr ? LogReading() : readings->at(log.string()));
   return keyframes;
 }
 
-std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id) {
-  std::vector<LoggedKeyframe> keyframes = ReadKeyframeLog(log);
+std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id,
+                                              LogReadings* readings) {
+  std::vector<LoggedKeyframe> keyframes = ReadKeyframeLog(log, readings);
   std::erase_if(keyframes, [agent_id](const LoggedKeyframe& keyframe) {
     return keyframe.id.map.agent_id != agent_id;
   });

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
 #include "common/ids.h"
 
 namespace pangea::session {
@@ -22,11 +23,13 @@ struct LoggedKeyframe {
 
 // All distinct keyframes of one log in log order. Throws std::runtime_error naming the log when it
 // cannot be read, a keyframe does not decode, there is none, or a map's keyframes have gaps or are
-// out of order (named).
-std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log);
+// out of order (named). What of the log is lost is noted in `readings` (log_reader.h).
+std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
+                                            LogReadings* readings = nullptr);
 
 // Those of one agent. Throws std::runtime_error naming the log when it has none.
-std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id);
+std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id,
+                                              LogReadings* readings = nullptr);
 
 // Several logs as if they had started together: ordered by the time since each log's first
 // keyframe, ties by the order of the logs; each log keeps its own order. That time, by the sensor

@@ -26,16 +26,22 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
       ->check(CLI::PositiveNumber);
+  app.footer(
+      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
+      "in "
+      "the middle of an event): then what could be read was played.");
   CLI11_PARSE(app, argc, argv);
+  pangea::LogReadings readings;
   try {
     options.rate = rate == "max" ? 0 : std::stod(rate);
     pangea::InstallSignalHandlers();
     pangea::LcmBus bus(bus_url);
-    pangea::session::PlayKeyframes(bus, options,
-                                   pangea::session::ReadKeyframeLogOf(log, options.agent_id));
-    return 0;
+    auto keyframes = pangea::session::ReadKeyframeLogOf(log, options.agent_id, &readings);
+    const int exit_code = pangea::TellLosses("pangea-keyframe-player", readings, 0);
+    pangea::session::PlayKeyframes(bus, options, std::move(keyframes));
+    return exit_code;
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-keyframe-player: {}\n", error.what());
-    return 1;
+    return pangea::TellLosses("pangea-keyframe-player", readings, 1);
   }
 }

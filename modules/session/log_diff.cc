@@ -26,16 +26,17 @@ bool TellsOfTheRun(const std::string& channel) {
          channel == "LCM_SELF_TEST";
 }
 
-Channels ReadChannels(const std::string& log, double until_s) {
+Channels ReadChannels(const std::string& log, double until_s, LogReadings* readings) {
   Channels channels;
   std::optional<int64_t> begin;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto read = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *begin));
     if (!TellsOfTheRun(event.channel) && seconds <= until_s) {
       channels[event.channel].push_back({seconds, {event.data.begin(), event.data.end()}});
     }
-  });
+  };
+  ReadLog(log, read, readings);
   return channels;
 }
 
@@ -116,8 +117,10 @@ const ChannelDiff* LogDiff::First() const {
   return first;
 }
 
-LogDiff DiffLogs(const std::string& a, const std::string& b, double until_s) {
-  Channels channels_a = ReadChannels(a, until_s), channels_b = ReadChannels(b, until_s);
+LogDiff DiffLogs(const std::string& a, const std::string& b, double until_s,
+                 LogReadings* readings) {
+  Channels channels_a = ReadChannels(a, until_s, readings);
+  Channels channels_b = ReadChannels(b, until_s, readings);
   LogDiff diff;
   for (const auto& [channel, messages] : channels_a) {
     diff.channels.push_back(Compare(channel, messages, channels_b[channel]));

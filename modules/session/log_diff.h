@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
+
 namespace pangea::session {
 
 struct ChannelDiff {
@@ -33,9 +35,10 @@ struct LogDiff {
 // revisions, which each run counts in its own way; capture times are not compared. STATUS_*, HAVE,
 // RESEND_REQUEST, VERDICT_REQUEST and AGAIN_*, which tell of the run and not of its outcome, are
 // left out. Of both logs the first `until_s` seconds. Throws std::runtime_error for a log that
-// cannot be read.
+// cannot be read; what of one is lost is noted in `readings` (log_reader.h).
 LogDiff DiffLogs(const std::string& a, const std::string& b,
-                 double until_s = std::numeric_limits<double>::infinity());
+                 double until_s = std::numeric_limits<double>::infinity(),
+                 LogReadings* readings = nullptr);
 
 std::string ToText(const LogDiff& diff);
 

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
-#include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <regex>
 #include <stdexcept>
@@ -30,17 +29,18 @@ std::regex Expression(const std::string& text) {
 
 // handler(event, seconds since the log's first event).
 template <typename Handler>
-void ReadCut(const std::string& log, const LogCut& cut, Handler handler) {
+void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings, Handler handler) {
   const std::regex channels = Expression(cut.channels);
   std::optional<int64_t> first;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto read = [&](const LogEvent& event) {
     first = first.value_or(event.utime);
     // Capture times may step back by a little, before the first one too.
     const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
     if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
       handler(event, seconds);
     }
-  });
+  };
+  ReadLog(log, read, readings);
 }
 
 // "a.b[12].c[3]" has the item 12 of an array.
@@ -91,8 +91,9 @@ struct Place {
 
 }  // namespace
 
-void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out) {
-  ReadCut(log, cut, [&](const LogEvent& event, double seconds) {
+void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
+                LogReadings* readings) {
+  ReadCut(log, cut, readings, [&](const LogEvent& event, double seconds) {
     if (as == ListAs::kJson) {
       ListJson(event, out);
       return;
@@ -113,17 +114,19 @@ void CheckNew(const std::string& path) {
   }
 }
 
-int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out) {
+int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
+               LogReadings* readings) {
   Expression(cut.channels);  // before a file is made
   CheckNew(out);
   LogFileWriter writer(out);
-  ReadCut(log, cut, [&writer](const LogEvent& event, double) {
+  ReadCut(log, cut, readings, [&writer](const LogEvent& event, double) {
     writer.Write(event.utime, event.channel, event.data);
   });
   return writer.count();
 }
 
-int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out) {
+int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
+                  LogReadings* readings) {
   CheckNew(out);
   LogFileWriter writer(out);
   std::vector<Place> places;
@@ -131,24 +134,23 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out) 
     size_t event = 0;
     // Within a log its own order stands: capture times in a log may step back.
     int64_t latest = std::numeric_limits<int64_t>::min();
-    ReadLog(logs[log], [&](const LogEvent& read) {
+    const auto note = [&](const LogEvent& read) {
       latest = std::max(latest, read.utime);
       places.push_back({latest, log, event++});
-    });
+    };
+    ReadLog(logs[log], note, readings);
   }
   std::ranges::stable_sort(places, {}, &Place::utime);
-  std::deque<lcm::LogFile> files;
+  std::deque<LogReader> files;
   for (const std::string& log : logs) {
-    files.emplace_back(log, "r");
+    files.emplace_back(log);
   }
   for (const Place& place : places) {
-    const lcm::LogEvent* event = files[place.log].readNextEvent();
+    const LogEvent* event = files[place.log].Next();
     if (event == nullptr) {
       throw std::runtime_error(fmt::format("{}: changed while it was read", logs[place.log]));
     }
-    writer.Write(
-        event->timestamp, event->channel,
-        Bytes(static_cast<const uint8_t*>(event->data), static_cast<size_t>(event->datalen)));
+    writer.Write(event->utime, event->channel, event->data);
   }
   return writer.count();
 }

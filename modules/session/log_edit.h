@@ -1,13 +1,16 @@
 #pragma once
 
 // LCM logs listed, cut and put together. The logs made are ordinary ones; events keep their capture
-// time.
+// time. Of a damaged log what can be read is taken: the new one is whole. What was lost is noted in
+// `readings` (log_reader.h).
 
 #include <cstdint>
 #include <limits>
 #include <ostream>
 #include <string>
 #include <vector>
+
+#include "common/bus/log_reading.h"
 
 namespace pangea::session {
 
@@ -24,15 +27,18 @@ enum class ListAs : uint8_t {
 };
 
 // The events of a cut, one a line.
-void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out);
+void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
+                LogReadings* readings = nullptr);
 
 // Throws std::runtime_error when the file exists: nothing is overwritten.
 void CheckNew(const std::string& path);
 
 // Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
 // read, an output that exists or cannot be written, and an expression that is none.
-int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out);
+int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
+               LogReadings* readings = nullptr);
 // All events of the logs in the order of capture; of equal times the earlier log's first.
-int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out);
+int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
+                  LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

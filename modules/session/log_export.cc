@@ -17,9 +17,9 @@ namespace pangea::session {
 namespace {
 
 // The odometry edges of the log's keyframes, by the keyframe they end at.
-std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log) {
+std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log, LogReadings* readings) {
   std::map<KeyframeId, OdometryEdge> edges;
-  ReadLog(log, [&edges](const LogEvent& event) {
+  const auto add = [&edges](const LogEvent& event) {
     keyframe_t message{};
     if (event.channel.starts_with(channels::kKeyframePrefix) &&
         DecodeMessage(event.data, &message)) {
@@ -27,7 +27,8 @@ std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log) {
         edges.emplace(keyframe.value->id, *keyframe.value->edge);
       }
     }
-  });
+  };
+  ReadLog(log, add, readings);
   return edges;
 }
 
@@ -65,11 +66,12 @@ class GraphBuilder {
 
 }  // namespace
 
-std::vector<std::string> ExportTum(const std::string& log, const std::string& folder) {
+std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
+                                   LogReadings* readings) {
   std::filesystem::create_directories(folder);
   std::vector<std::string> files;
   std::map<int32_t, int> of_agent;
-  for (const FinalGroup& group : FinalGroups(ReadServerLog(log))) {
+  for (const FinalGroup& group : FinalGroups(ReadServerLog(log, readings))) {
     for (const int32_t agent : group.Agents()) {
       // The first group that an agent is in has most of its company.
       const std::string name = of_agent[agent]++ == 0
@@ -82,20 +84,20 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
   return files;
 }
 
-void ExportPly(const std::string& log, const std::string& file) {
-  const CapturedSession session = ReadServerLog(log);
+void ExportPly(const std::string& log, const std::string& file, LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(log, readings);
   const ReportFigures figures = ComputeFigures({.server_log = log}, session);
   WriteTextFile(file, MapPly(session, figures,
                              figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
 }
 
-NamedGraph GraphOf(const std::string& log) {
-  const CapturedSession session = ReadServerLog(log);
+NamedGraph GraphOf(const std::string& log, LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(log, readings);
   GraphBuilder builder;
   for (const FinalGroup& group : FinalGroups(session)) {
     builder.AddVertices(group);
   }
-  for (const auto& [id, edge] : OdometryEdges(log)) {
+  for (const auto& [id, edge] : OdometryEdges(log, readings)) {
     builder.AddEdge({id.map, edge.from_seq}, id, edge.T_from_this, edge.covariance);
   }
   for (const auto& [id, constraint] : session.constraints) {

@@ -74,17 +74,19 @@ std::vector<map_state_t> Chunks(const CapturedSession& session, const Graph& sol
 
 }  // namespace
 
-int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out) {
+int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
+                  LogReadings* readings) {
   const Graph solved = ReadG2o(g2o, messages_checks::kMaxDistance);
-  CheckVertices(GraphOf(log), solved, g2o);
-  const std::vector<map_state_t> chunks = Chunks(ReadServerLog(log), solved, g2o);
+  CheckVertices(GraphOf(log, readings), solved, g2o);
+  const std::vector<map_state_t> chunks = Chunks(ReadServerLog(log, readings), solved, g2o);
   CheckNew(out);
   LogFileWriter writer(out);
   int64_t latest = 0;
-  ReadLog(log, [&](const LogEvent& event) {
+  const auto copy = [&](const LogEvent& event) {
     latest = std::max(latest, event.utime);
     writer.Write(event.utime, event.channel, event.data);
-  });
+  };
+  ReadLog(log, copy, readings);
   for (const map_state_t& chunk : chunks) {
     writer.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
   }

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <vector>
 
 #include "common/bus/log_event.h"
@@ -70,7 +69,8 @@ std::string ChannelTable(const LogSummary& summary) {
 
 LogSummary Summarise(const std::string& log) {
   LogSummary summary;
-  ReadLog(log, [&summary](const LogEvent& event) {
+  LogReadings readings;
+  const auto add = [&summary](const LogEvent& event) {
     if (summary.events == 0) {
       summary.first_utime = summary.last_utime = event.utime;
     }
@@ -89,8 +89,9 @@ LogSummary Summarise(const std::string& log) {
     } else if (event.channel == channels::kConstraint) {
       AddVerdict(event.data, &summary);
     }
-  });
-  summary.unread_bytes = static_cast<int64_t>(std::filesystem::file_size(log)) - summary.bytes;
+  };
+  ReadLog(log, add, &readings);
+  summary.reading = readings.at(log);
   return summary;
 }
 
@@ -100,10 +101,12 @@ std::string ToText(const LogSummary& summary, const std::string& log) {
       fmt::format("{}: {} events, {:.1f} MB, {:.1f} s from {:%Y-%m-%d %H:%M:%S} UTC\n", log,
                   summary.events, 1e-6 * static_cast<double>(summary.bytes),
                   Seconds(summary.last_utime - summary.first_utime), started);
-  if (summary.unread_bytes > 0) {
-    text += fmt::format(
-        "the last {} bytes cannot be read: the log was cut off, or is damaged from there on\n",
-        summary.unread_bytes);
+  if (!summary.reading.whole()) {
+    text += DescribeLoss(summary.reading) + "\n";
+  }
+  if (summary.reading.checksums > 0) {
+    text += fmt::format("its writer checks it: {} lists of checksums (CHECKSUMS)\n",
+                        summary.reading.checksums);
   }
   text += ChannelTable(summary);
   if (!summary.keyframes.empty()) {

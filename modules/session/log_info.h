@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/bus/log_reading.h"
 #include "common/ids.h"
 
 namespace pangea::session {
@@ -18,16 +19,16 @@ struct ChannelSummary {
 };
 
 struct LogSummary {
+  LogReading reading;
   int64_t events = 0;
   int64_t bytes = 0;                        // of the events read
-  int64_t unread_bytes = 0;                 // a torn tail
   int64_t first_utime = 0, last_utime = 0;  // of capture
   std::map<std::string, ChannelSummary> channels;
   std::map<MapId, std::set<int32_t>> keyframes;  // seqs by map
   std::map<std::string, int64_t> verdicts;       // constraints by reason; "accepted"
 };
 
-// Throws std::runtime_error when the log cannot be read.
+// Of what can be read of it. Throws std::runtime_error when the log cannot be opened, or is none.
 LogSummary Summarise(const std::string& log);
 // For people.
 std::string ToText(const LogSummary& summary, const std::string& log);

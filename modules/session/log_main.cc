@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
-#include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <optional>
 
@@ -29,24 +29,25 @@ struct Arguments {
   std::vector<std::string> recordings;  // ID=DIR
   bool fields = false, json = false;
   int exit_code = 0;
+  LogReadings readings;  // of the logs it read
 };
 
-void Export(const Arguments& arguments) {
+void Export(Arguments& arguments) {
   const std::string& log = arguments.logs.front();
   if (arguments.tum.empty() && arguments.g2o.empty() && arguments.ply.empty()) {
     throw std::runtime_error("export: say what, one or more of --tum, --g2o, --ply");
   }
   if (!arguments.tum.empty()) {
-    for (const std::string& file : ExportTum(log, arguments.tum)) {
+    for (const std::string& file : ExportTum(log, arguments.tum, &arguments.readings)) {
       std::cout << file << "\n";
     }
   }
   if (!arguments.ply.empty()) {
-    ExportPly(log, arguments.ply);
+    ExportPly(log, arguments.ply, &arguments.readings);
     std::cout << arguments.ply << "\n";
   }
   if (!arguments.g2o.empty()) {
-    const NamedGraph named = GraphOf(log);
+    const NamedGraph named = GraphOf(log, &arguments.readings);
     std::string text = ToG2o(named.graph);
     for (size_t i = 0; i < named.keyframes.size(); ++i) {
       text += fmt::format("# {} is keyframe {}\n", i, ToString(named.keyframes[i]));
@@ -58,13 +59,13 @@ void Export(const Arguments& arguments) {
   }
 }
 
-void ExplainVerdict(const Arguments& arguments) {
+void ExplainVerdict(Arguments& arguments) {
   const std::string& log = arguments.logs.front();
   if (!arguments.constraint) {
-    std::cout << ListVerdicts(log);
+    std::cout << ListVerdicts(log, &arguments.readings);
     return;
   }
-  const Explanation explanation = Explain(log, *arguments.constraint);
+  const Explanation explanation = Explain(log, *arguments.constraint, &arguments.readings);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
     std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
@@ -73,11 +74,10 @@ void ExplainVerdict(const Arguments& arguments) {
   }
 }
 
-// Of any file the LCM library reads nothing, and says nothing.
-std::string HoldsEvents(const std::string& path) {
-  lcm::LogFile log(path, "r");
-  const bool any = log.good() && log.readNextEvent() != nullptr;
-  return any ? "" : fmt::format("{}: holds no event; is it an LCM log?", path);
+// A file that is no log, its reader refuses.
+std::string IsNotEmpty(const std::string& path) {
+  return std::filesystem::file_size(path) > 0 ? ""
+                                              : fmt::format("{}: is empty: no event in it", path);
 }
 
 CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Arguments* arguments,
@@ -87,7 +87,7 @@ CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Argument
       ->required()
       ->expected(num_logs)
       ->check(CLI::ExistingFile)
-      ->check(HoldsEvents);
+      ->check(IsNotEmpty);
   return command;
 }
 
@@ -107,7 +107,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   AddCommand(app, "info", "Channels, keyframes and verdicts in a log", arguments, 1)
       ->callback([arguments] {
         const std::string& log = arguments->logs.front();
-        std::cout << ToText(Summarise(log), log);
+        const LogSummary summary = Summarise(log);
+        arguments->readings[log] = summary.reading;
+        std::cout << ToText(summary, log);
       });
   CLI::App* list = AddCommand(app, "list", "The messages of a log, one a line", arguments, 1);
   AddCutOptions(*list, arguments);
@@ -118,7 +120,7 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                arguments->json     ? ListAs::kJson
                : arguments->fields ? ListAs::kFields
                                    : ListAs::kLines,
-               std::cout);
+               std::cout, &arguments->readings);
   });
   CLI::App* diff =
       AddCommand(app, "diff",
@@ -126,23 +128,30 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                  "and its field; exit code 2 when one does",
                  arguments, 2);
   diff->callback([arguments] {
-    const LogDiff differences = DiffLogs(arguments->logs[0], arguments->logs[1]);
+    const LogDiff differences =
+        DiffLogs(arguments->logs[0], arguments->logs[1], std::numeric_limits<double>::infinity(),
+                 &arguments->readings);
     std::cout << ToText(differences);
     arguments->exit_code = differences.First() == nullptr ? 0 : 2;
   });
-  CLI::App* cut = AddCommand(app, "cut", "A part of a log: a time, some channels", arguments, 1);
+  CLI::App* cut =
+      AddCommand(app, "cut",
+                 "A part of a log: a time, some channels; of a damaged log all that can be "
+                 "read, as a whole one",
+                 arguments, 1);
   AddCutOptions(*cut, arguments);
   cut->add_option("--out", arguments->out, "The new log")->required();
   cut->callback([arguments] {
-    std::cout << fmt::format("{}: {} events\n", arguments->out,
-                             CutLog(arguments->logs.front(), arguments->cut, arguments->out));
+    std::cout << fmt::format(
+        "{}: {} events\n", arguments->out,
+        CutLog(arguments->logs.front(), arguments->cut, arguments->out, &arguments->readings));
   });
   CLI::App* cat = AddCommand(app, "cat", "Several logs in one, by time of capture", arguments, -1);
   cat->alias("merge");
   cat->add_option("--out", arguments->out, "The new log")->required();
   cat->callback([arguments] {
     std::cout << fmt::format("{}: {} events\n", arguments->out,
-                             MergeLogs(arguments->logs, arguments->out));
+                             MergeLogs(arguments->logs, arguments->out, &arguments->readings));
   });
   CLI::App* out = AddCommand(app, "export", "What a server bus' log amounts to", arguments, 1);
   out->add_option("--tum", arguments->tum, "Folder for the agents' trajectories, TUM format");
@@ -158,7 +167,8 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
       ->check(CLI::ExistingFile);
   back->add_option("--out", arguments->out, "The new log")->required();
   back->callback([arguments] {
-    const int64_t placed = ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out);
+    const int64_t placed =
+        ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out, &arguments->readings);
     std::cout << fmt::format(
         "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own\n",
         arguments->out, placed, arguments->g2o);
@@ -186,6 +196,11 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
 int main(int argc, char** argv) {
   CLI::App app("What is in a captured LCM log, parts of it, and other formats", "pangea-log");
   app.require_subcommand(1);
+  app.footer(
+      "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "
+      "log is lost (it is damaged, or ends in the middle of an event): then all is of what could "
+      "be "
+      "read; above 100 for a wrong command line.");
   pangea::session::Arguments arguments;
   pangea::session::AddCommands(app, &arguments);
   try {
@@ -194,7 +209,7 @@ int main(int argc, char** argv) {
     return app.exit(error);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-log: {}\n", error.what());
-    return 1;
+    arguments.exit_code = 1;
   }
-  return arguments.exit_code;
+  return pangea::TellLosses("pangea-log", arguments.readings, arguments.exit_code);
 }

@@ -13,19 +13,21 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when an expectation of the session file "
-      "was missed or logs differ; above 100 for a wrong command line.");
-  int exit_code = 0;
-  pangea::session::AddRunCommand(app, &exit_code);
+      "was missed or logs differ; 3 when something of a log is lost (it is damaged, or ends in the "
+      "middle of an event): then all is of what could be read; above 100 for a wrong command "
+      "line.");
+  pangea::session::CommandResult result;
+  pangea::session::AddRunCommand(app, &result);
   pangea::session::AddListCommand(app);
-  pangea::session::AddReplayCommand(app, &exit_code);
-  pangea::session::AddReportCommand(app, &exit_code);
+  pangea::session::AddReplayCommand(app, &result);
+  pangea::session::AddReportCommand(app, &result);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-session: {}\n", error.what());
-    return 1;
+    result.exit_code = 1;
   }
-  return exit_code;
+  return pangea::TellLosses("pangea-session", result.readings, result.exit_code);
 }

@@ -139,10 +139,10 @@ std::string Speaker(const LogEvent& event) {
 
 // What says something of the map; not who has what and asks for what again.
 std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const fs::path& log,
-                                  double until_s) {
+                                  double until_s, LogReadings* readings) {
   std::vector<LoggedWord> words;
   std::optional<int64_t> begin;
-  ReadLog(log.string(), [&](const LogEvent& event) {
+  const auto take = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
     const std::string speaker = Speaker(event);
@@ -153,7 +153,8 @@ std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const 
                        {event.data.begin(), event.data.end()},
                        processes.contains(speaker)});
     }
-  });
+  };
+  ReadLog(log.string(), take, readings);
   return words;
 }
 
@@ -197,11 +198,12 @@ int64_t TakeOver(std::span<LoggedWord> past, LocalBus& bus) {
 
 }  // namespace
 
-ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log) {
+ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log,
+                     LogReadings* readings) {
   UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
   for (const fs::path& log : logs) {
-    by_log.push_back(ReadKeyframeLog(log));
+    by_log.push_back(ReadKeyframeLog(log, readings));
   }
   std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
   const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
@@ -226,10 +228,11 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs
   return summary;
 }
 
-int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log) {
+int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log,
+                   LogReadings* readings) {
   UseOneThread();
-  ReadKeyframeLog(log);  // throws if keyframes are missing
-  std::vector<LoggedWord> words = ReadWords(part.processes, log, part.until_s);
+  ReadKeyframeLog(log, readings);  // throws if keyframes are missing
+  std::vector<LoggedWord> words = ReadWords(part.processes, log, part.until_s, readings);
   LocalBus bus;
   Server server(bus, part.processes);
   int64_t taken_over = 0;

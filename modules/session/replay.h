@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
+
 namespace pangea::session {
 
 struct ReplaySummary {
@@ -24,9 +26,9 @@ struct ReplaySummary {
 // one's first keyframe, as if they had started together; the first log's map is the oldest.
 // `until_s`: only keyframes of so many seconds, since the log's first event, or since the first
 // keyframes of several. Throws std::runtime_error for a log that cannot be read, has no keyframes,
-// or has gaps (named).
+// or has gaps (named). What of a log is lost is noted in `readings` (log_reader.h), here and below.
 ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, double until_s,
-                     const std::filesystem::path& out_log);
+                     const std::filesystem::path& out_log, LogReadings* readings = nullptr);
 
 inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
                                             "posegraph", "global_ba"};
@@ -46,6 +48,6 @@ struct ReplayedPart {
 // of anyone's. Returns how many matches and verdicts are the log's instead of their own. Throws as
 // Replay does.
 int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
-                   const std::filesystem::path& out_log);
+                   const std::filesystem::path& out_log, LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -40,9 +40,10 @@ void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures
 
 }  // namespace
 
-WrittenReport WriteReport(const ReportInput& input, const std::string& folder) {
-  const CapturedSession session = ReadServerLog(input.server_log);
-  ReportFigures figures = ComputeFigures(input, session);
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
+                          LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(input.server_log, readings);
+  ReportFigures figures = ComputeFigures(input, session, readings);
   for (const AgentFigures& agent : figures.agents) {
     WriteTrajectories(agent, figures.groups, folder);
   }

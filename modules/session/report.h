@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
 #include "session/expectations.h"
 
 namespace pangea::session {
@@ -72,7 +73,10 @@ struct WrittenReport {
 };
 
 // Throws std::runtime_error when the server log cannot be read or the folder not written; a picture
-// that cannot be drawn is a note in the report.
-WrittenReport WriteReport(const ReportInput& input, const std::string& folder);
+// that cannot be drawn is a note in the report. Of a damaged log the figures are of what can be
+// read, and the report says so at its top; what is lost is noted in `readings` (log_reader.h), and
+// the report tells that of the logs noted there already too, which this one was made from.
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
+                          LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -72,10 +72,10 @@ std::map<MapId, int64_t> FusedRevisions(const CapturedSession& session) {
 }
 
 void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentFigures* agent,
-                  std::vector<std::string>* notes) {
+                  std::vector<std::string>* notes, LogReadings* readings) {
   PoseTrack track;
   if (!run.bus_log.empty() && std::filesystem::exists(run.bus_log)) {
-    track = ReadPoses(run.bus_log, run.id);
+    track = ReadPoses(run.bus_log, run.id, readings);
   }
   agent->odometry = std::move(track.odometry);
   agent->samples = std::move(track.samples);
@@ -150,12 +150,13 @@ void CountBytes(AgentFigures* agent) {
 }
 
 AgentFigures FiguresOf(const AgentRun& run, const CapturedSession& session,
-                       const std::vector<GroupFigures>& groups, std::vector<std::string>* notes) {
+                       const std::vector<GroupFigures>& groups, std::vector<std::string>* notes,
+                       LogReadings* readings) {
   AgentFigures agent;
   agent.id = run.id;
   agent.run = run;
   ReadGroundTruth(run, &agent, notes);
-  ReadOdometry(run, session, &agent, notes);
+  ReadOdometry(run, session, &agent, notes, readings);
   CountBytes(&agent);
   ChooseMain(groups, session, &agent);
   const Trajectory keyframes =
@@ -208,7 +209,8 @@ size_t ReportFigures::IndexOf(int32_t agent_id) const {
                              agents.begin());
 }
 
-ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session) {
+ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session,
+                             LogReadings* readings) {
   ReportFigures figures;
   figures.notes = input.notes;
   for (const auto& [channel, count] : session.unreadable) {
@@ -226,12 +228,13 @@ ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& se
     figures.groups.push_back({std::move(group), std::nullopt, {}});
   }
   for (const auto& [id, run] : Runs(input, session)) {
-    figures.agents.push_back(FiguresOf(run, session, figures.groups, &figures.notes));
+    figures.agents.push_back(FiguresOf(run, session, figures.groups, &figures.notes, readings));
   }
   for (GroupFigures& group : figures.groups) {
     AddJoint(figures.agents, &group);
   }
   AddConstraints(session, &figures);
+  figures.lost = readings == nullptr ? std::vector<std::string>() : LossLines(*readings);
   return figures;
 }
 

@@ -50,11 +50,14 @@ struct ReportFigures {
   ConstraintsTruth inter_constraints;
   ConstraintsTruth intra_constraints;
   std::vector<std::string> notes;
+  std::vector<std::string> lost;  // of the logs read, lines of LossLines
 
   // The agent's place in `agents`, which gives it its colour.
   size_t IndexOf(int32_t agent_id) const;
 };
 
-ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session);
+// What is lost of the agents' logs is noted in `readings` (log_reader.h); `lost` is of all in it.
+ReportFigures ComputeFigures(const ReportInput& input, const CapturedSession& session,
+                             LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

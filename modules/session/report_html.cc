@@ -204,7 +204,11 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
                        const ReportFigures& figures) {
   const std::vector<Picture> pictures = Pictures(figures);
   std::string html = Head();
-  html += "<h1>Session report</h1>\n" + Tiles(session, figures);
+  html += "<h1>Session report</h1>\n";
+  if (!figures.lost.empty()) {
+    html += Paragraph(kLostExplained) + List(figures.lost);
+  }
+  html += Tiles(session, figures);
   html += Section("agents", "Agents",
                   AgentTable(figures).Html() +
                       Aside("ATE: RMSE of positions after SE(3) alignment without scale; it counts "

@@ -152,6 +152,7 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
     json["fused_at"].push_back(ChangeJson(change, figures));
   }
   json["processes"] = ProcessesJson(input, session);
+  json["lost"] = figures.lost;
   json["notes"] = figures.notes;
   return json;
 }

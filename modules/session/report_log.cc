@@ -189,11 +189,11 @@ bool AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
 
 }  // namespace
 
-CapturedSession ReadServerLog(const std::string& path) {
+CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
   CapturedSession session;
   States states(&session);
   std::optional<int64_t> begin;
-  ReadLog(path, [&](const LogEvent& event) {
+  const auto add = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     session.begin_utime = *begin;
     const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
@@ -210,17 +210,18 @@ CapturedSession ReadServerLog(const std::string& path) {
     if (!good) {
       ++session.unreadable[event.channel];
     }
-  });
+  };
+  ReadLog(path, add, readings);
   session.incomplete_states = states.pending();
   return session;
 }
 
-PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
+PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings) {
   PoseTrack track;
   Frames frames;
   const std::string poses = channels::Pose(agent_id);
   const std::string corrections = channels::Correction(agent_id);
-  ReadLog(path, [&](const LogEvent& event) {
+  const auto add = [&](const LogEvent& event) {
     if (event.channel == poses) {
       AddPose(event.data, &track);
     } else if (event.channel == corrections) {
@@ -231,7 +232,8 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id) {
         AddSample(status, event.utime, &track.samples);
       }
     }
-  });
+  };
+  ReadLog(path, add, readings);
   Finish(frames, &track);
   return track;
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
 #include "common/ids.h"
 #include "common/server_messages.h"
 #include "common/trajectory.h"
@@ -80,9 +81,10 @@ struct CapturedSession {
   int incomplete_states = 0;              // of which a chunk is missing
 };
 
-// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_* of a server bus' log.
-CapturedSession ReadServerLog(const std::string& path);
+// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_* of a server bus' log. What of the log is lost
+// is noted in `readings` (log_reader.h), here and below.
+CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = nullptr);
 // Reads POSE_<agent_id>, CORRECTION_<agent_id> and STATUS_* of an agent bus' log.
-PoseTrack ReadPoses(const std::string& path, int32_t agent_id);
+PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -20,6 +20,8 @@ Table TruthTable(const ReportFigures& figures);      // accepted constraints aga
 Table ProcessTable(const ReportInput& input, const CapturedSession& session);
 Table TrafficTable(const ReportFigures& figures);  // on the link, beside the paper's
 
+inline constexpr const char* kLostExplained =
+    "Not all of the logs could be read; this is what the rest of them says.";
 inline constexpr const char* kNeesExplained =
     "NEES: squared error / covariance, per dimension; 1 when the covariance is honest.";
 

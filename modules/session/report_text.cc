@@ -12,8 +12,12 @@ std::string FileName(const MapId& map) {
 
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
                            const ReportFigures& figures) {
-  std::string text = fmt::format(
-      "# Session report\n\n{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
+  std::string text = "# Session report\n\n";
+  if (!figures.lost.empty()) {
+    text += fmt::format("**{}**\n\n- {}\n\n", kLostExplained, fmt::join(figures.lost, "\n- "));
+  }
+  text += fmt::format(
+      "{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
       "counts "
       "with coverage of at least 0.95 and one map.\n",
       AgentTable(figures).Text());

@@ -45,8 +45,8 @@ AgentRun RunOf(const AgentScript& script) {
 }
 
 // Its report, and in words what it missed.
-ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out) {
-  WrittenReport report = WriteReport(input, out.string());
+ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadings* readings) {
+  WrittenReport report = WriteReport(input, out.string(), readings);
   ReportOutcome outcome{std::move(report.text), {}};
   for (const CheckedExpectation& one : report.checked) {
     if (!one.met) {
@@ -59,8 +59,8 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out) {
 
 }  // namespace
 
-ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
-                        const fs::path& out) {
+ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, const fs::path& out,
+                        LogReadings* readings) {
   ReportInput input;
   input.server_log = (out / "session.lcm").string();
   double recorded_s = 0;
@@ -95,10 +95,11 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
   input.expect = script.expect;
-  return OutcomeOf(input, out);
+  return OutcomeOf(input, out, readings);
 }
 
-ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::path& out) {
+ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::path& out,
+                        LogReadings* readings) {
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
@@ -107,7 +108,7 @@ ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }
-  return OutcomeOf(input, out);
+  return OutcomeOf(input, out, readings);
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {

@@ -19,13 +19,13 @@ struct ReportOutcome {
   std::vector<std::string> missed;  // expectations that were not met, a line each
 };
 
-// Writes the report of a live run into `out`.
+// Writes the report of a live run into `out`. `readings`: as WriteReport's, here and below.
 ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
-                        const std::filesystem::path& out);
+                        const std::filesystem::path& out, LogReadings* readings);
 
 // The same for any log of a server bus. `known` may lack agents of the log.
 ReportOutcome ReportLog(const std::filesystem::path& log, const Remembered& known,
-                        const std::filesystem::path& out);
+                        const std::filesystem::path& out, LogReadings* readings);
 
 // What is remembered of the session beside its log.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);

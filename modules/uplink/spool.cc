@@ -152,7 +152,7 @@ void Spool::LoadEvent(int64_t number, const CheckedScan::Piece& event) {
     Refuse(
         fmt::format("holds keyframes of agent {}, this is agent {}", id->map.agent_id, agent_id_));
   }
-  const Place place{number, event.offset, static_cast<int32_t>(event.bytes), event.crc32};
+  const Place place{number, event.offset, static_cast<int32_t>(event.bytes), event.crc32()};
   if (id && places_.try_emplace(*id, place).second) {
     ++segments_.at(number).kept;
   } else if (!id && event.channel == channels::Keyframe(agent_id_)) {

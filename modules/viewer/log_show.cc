@@ -36,7 +36,7 @@ void LogShow::Read(const std::string& path) {
   SceneEvents parser;
   std::optional<int64_t> begin;
   double time_s = 0;
-  ReadLog(path, [&](const LogEvent& event) {
+  const auto take = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     // A logger's stamps are not always in order; the file is.
     time_s = std::max(time_s, 1e-6 * static_cast<double>(event.utime - *begin));
@@ -45,7 +45,11 @@ void LogShow::Read(const std::string& path) {
     if (outcome.event) {
       events_.push_back({time_s, std::move(*outcome.event)});
     }
-  });
+  };
+  ReadLog(path, take, &readings_);
+  if (!readings_.at(path).whole()) {
+    source_ += " (damaged: not all of it can be read)";
+  }
 }
 
 // Only images of keyframes are shown; the others are most of what an agent's log holds.

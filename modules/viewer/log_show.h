@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reading.h"
 #include "viewer/scene_events.h"
 #include "viewer/show.h"
 
@@ -18,7 +19,8 @@ class LogShow : public Show {
   // not its group's last is left out until they fit (a pose is about 100 bytes).
   static constexpr size_t kMaxSolvedPoses = 4'000'000;
 
-  // Throws std::runtime_error naming the log when it cannot be read or shows nothing.
+  // Of a damaged log what can be read. Throws std::runtime_error naming the log when it cannot be
+  // opened, is none, or shows nothing.
   explicit LogShow(const std::string& path, size_t max_solved_poses = kMaxSolvedPoses);
 
   // The player's clock goes on by this much, if it plays.
@@ -35,6 +37,8 @@ class LogShow : public Show {
 
   // Messages that were refused while reading.
   int64_t num_refused() const { return num_refused_; }
+  // What of the log is lost.
+  const LogReadings& readings() const { return readings_; }
   size_t NumSolvedPoses() const;
 
  private:
@@ -50,6 +54,7 @@ class LogShow : public Show {
   void RunTo(double time_s);
 
   std::string source_;
+  LogReadings readings_;
   std::vector<Timed> events_;
   std::vector<Fusion> all_fusions_;
   int64_t num_refused_ = 0;

@@ -43,13 +43,17 @@ int main(int argc, char** argv) {
   app.add_option("--name", options.names,
                  "a name of this machine by which browsers may ask for the page");
   app.add_option("--page", page, "folder of the built page")->capture_default_str();
+  app.footer(
+      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
+      "in "
+      "the middle of an event): then what could be read was shown.");
   CLI11_PARSE(app, argc, argv);
   InstallSignalHandlers();
   try {
     if (log.empty()) {
       ServeBus(url, agent_urls, options, page);
     } else {
-      ServeLog(log, options, page);
+      return ServeLog(log, options, page);
     }
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-viewer: {}\n", error.what());

@@ -47,8 +47,9 @@ void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls
   }
 }
 
-void ServeLog(const std::string& log, const WebOptions& options, const std::string& page) {
+int ServeLog(const std::string& log, const WebOptions& options, const std::string& page) {
   LogShow show(log);
+  const int exit_code = TellLosses("pangea-viewer", show.readings(), 0);
   WebServer server(options, ReadPage(page), show);
   Announce(server, options);
   int64_t now = WallUtime();
@@ -58,6 +59,7 @@ void ServeLog(const std::string& log, const WebOptions& options, const std::stri
     show.Advance(1e-6 * static_cast<double>(now - before));
     server.Serve(kServe_ms);
   }
+  return exit_code;
 }
 
 }  // namespace pangea::viewer

@@ -56,8 +56,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   std::filesystem::create_directories(folder);
   const auto log = folder / "journal.lcm";
   fuzz::WriteFile(log, {data, size});
-  fuzz::Opens([&] { session::ReadKeyframeLog(log); });
-  fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1); });
+  LogReadings readings;
+  fuzz::Opens([&] { session::ReadKeyframeLog(log, &readings); });
+  fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1, &readings); });
   if (fuzz::Opens([&] { fuzz::StartOn(log); })) {
     const std::vector<char> healed = fuzz::BytesOf(log);
     const int64_t files = fuzz::NumFiles(folder);

@@ -8,6 +8,13 @@ namespace pangea {
 
 bool FillsDamage(const LogPiece& event) { return channels::kDamaged.starts_with(event.channel); }
 
+uint32_t CheckedScan::Piece::crc32() const {
+  if (!crc32_) {
+    crc32_ = EventChecksum(whole);
+  }
+  return *crc32_;
+}
+
 const CheckedScan::Piece* CheckedScan::Next() {
   while (num_ready_ == 0) {
     if (!Read()) {
@@ -33,7 +40,6 @@ bool CheckedScan::Read() {
   next.bytes.assign(read->whole.begin(), read->whole.end());
   next.piece.whole = next.bytes;
   next.piece.data = Bytes(next.bytes).last(read->data.size());
-  next.piece.crc32 = EventChecksum(next.bytes);
   waiting_bytes_ += next.bytes.size();
   const bool is_list = read->channel == channels::kChecksums;
   if (const auto checksums = is_list ? ChecksumsOf(next.bytes) : std::nullopt) {
@@ -62,7 +68,7 @@ void CheckedScan::Judge(const Checksums& checksums) {
       continue;  // it was there before those of the list, or who can say which it is
     }
     const auto index = static_cast<size_t>(number - checksums.first_event);
-    if (piece.crc32 != checksums.crc32[index]) {
+    if (piece.crc32() != checksums.crc32[index]) {
       piece.kind = LogPiece::Kind::kDamage;
     }
     expected = number - 1;

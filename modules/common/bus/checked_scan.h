@@ -23,7 +23,12 @@ class CheckedScan {
   static constexpr size_t kMaxWaitingBytes = 4 << 20;
 
   struct Piece : LogPiece {
-    uint32_t crc32 = 0;  // of an event, as it is in the file
+    // Of an event, as it is in the file. Computed when asked for: most logs have nothing to compare
+    // it with.
+    uint32_t crc32() const;
+
+   private:
+    mutable std::optional<uint32_t> crc32_;
   };
 
   explicit CheckedScan(int fd) : scan_(fd) {}
