@@ -4,9 +4,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <fstream>
 #include <sstream>
 #include <stdexcept>
+
+#include "common/text_file.h"
 
 namespace pangea::session {
 namespace {
@@ -131,10 +132,7 @@ std::string ToG2o(const Graph& graph) {
 }
 
 Graph ReadG2o(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be read", path));
-  }
+  std::ifstream file = OpenFile(path);
   Graph graph;
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {
