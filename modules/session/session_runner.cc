@@ -29,6 +29,7 @@ constexpr double kStartTimeout_s = 20;  // for the server processes to report
 constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
 constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
+constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no pose
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 
@@ -254,7 +255,9 @@ class Runner {
     if (!exit || player.done()) {
       return;
     }
-    if (exit->code == 0 || StopRequested()) {
+    // What a killed vio left may be too short to start in.
+    const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
+    if (exit->code == 0 || is_rest || StopRequested()) {
       player.ended = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
       // Killed: the same agent goes on where it was, in a new map.
