@@ -79,6 +79,7 @@ void Play(const Arguments& arguments) {
     std::string why;
     const cv::Mat image = T_odom_body ? recording.LoadImage(i, &why) : cv::Mat();
     if (image.empty()) {
+      std::cerr << (why.empty() ? "" : fmt::format("warning: {}\n", why));
       continue;
     }
     if (const auto keyframe = maker.Add(utime, image, *T_odom_body)) {

@@ -1,5 +1,7 @@
 #include "common/camera_model.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace pangea {
@@ -141,6 +143,10 @@ std::optional<std::string> CameraModel::Invalid() const {
   }
   if (!T_body_cam.t.allFinite() || !(std::abs(T_body_cam.q.norm() - 1) < 1e-6)) {
     return "T_body_cam must be a finite rigid transform";
+  }
+  if (T_body_cam.t.norm() > kMaxLever_m) {
+    return fmt::format("the camera is {:.3g} m from the body; at most {} are plausible",
+                       T_body_cam.t.norm(), kMaxLever_m);
   }
   if (!(std::abs(time_offset_s) < 10) || !(readout_s >= 0 && readout_s < 1)) {
     return "time offset or read-out out of range";

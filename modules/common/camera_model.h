@@ -16,6 +16,8 @@ namespace pangea {
 
 struct CameraModel {
   enum class Kind { kRadtan, kEquidistant };
+  // From the body to the camera, metres: the largest of vehicles, and a phone's in centimetres.
+  static constexpr double kMaxLever_m = 10;
 
   Kind kind = Kind::kRadtan;
   int width = 0;  // pixels

@@ -5,8 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <stdexcept>
+
+#include "common/text_file.h"
 
 namespace pangea {
 namespace {
@@ -50,10 +51,7 @@ bool ParseWhole(std::string_view field, T* value) {
 }  // namespace
 
 std::vector<CsvRow> ReadCsv(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be opened", path));
-  }
+  std::ifstream file = OpenFile(path);
   std::vector<CsvRow> rows;
   std::string text;
   for (int line = 1; std::getline(file, text); ++line) {

@@ -17,7 +17,7 @@ struct CsvRow {
 
 // Splits at commas or, when a line has none, at blanks; skips empty lines and those that begin with
 // '#' or are a header (first field not a number and no row before it).
-// Throws std::runtime_error when the file cannot be opened.
+// Throws as OpenFile (text_file.h).
 std::vector<CsvRow> ReadCsv(const std::string& path);
 
 // Whole-field conversions; false on anything left over, on overflow, and on NaN or infinity.

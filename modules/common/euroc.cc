@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "common/csv.h"
 #include "common/euroc_calibration.h"
+#include "common/grey_image.h"
 #include "common/median.h"
+#include "common/text_file.h"
 
 namespace pangea {
 namespace {
@@ -17,11 +19,15 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string FindMav0(const std::string& folder) {
-  if (!fs::exists(folder)) {
-    throw std::runtime_error(fmt::format("{}: there is no such recording folder", folder));
+  std::error_code error;
+  if (!fs::exists(folder, error)) {
+    throw std::runtime_error(
+        fmt::format("{}: there is no such recording folder{}", folder,
+                    error ? fmt::format(": {}", error.message()) : std::string()));
   }
   for (const fs::path& candidate : {fs::path(folder) / "mav0", fs::path(folder)}) {
-    if (fs::is_directory(candidate / "cam0") || fs::is_directory(candidate / "imu0")) {
+    if (fs::is_directory(candidate / "cam0", error) ||
+        fs::is_directory(candidate / "imu0", error)) {
       return candidate.string();
     }
   }
@@ -37,6 +43,25 @@ void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
         fmt::format("{}:{}: the last row has no line end and may be cut off; row dropped", path,
                     rows->back().line));
     rows->pop_back();
+  }
+}
+
+// A recording lasts minutes, hours at most. What is stamped further than a day from the middle of
+// it is a slip, and would stand for its beginning or its end.
+template <typename T>
+void DropFarStamps(std::vector<T>* items, const std::string& path,
+                   std::vector<std::string>* warnings) {
+  constexpr int64_t kDay_us = 86'400'000'000;
+  std::vector<int64_t> utimes;
+  for (const T& item : *items) {
+    utimes.push_back(item.utime);
+  }
+  const int64_t middle = Median(std::move(utimes));
+  const size_t far = std::erase_if(
+      *items, [middle](const T& item) { return std::abs(item.utime - middle) > kDay_us; });
+  if (far > 0) {
+    warnings->push_back(
+        fmt::format("{}: {} rows are stamped more than a day from the others; dropped", path, far));
   }
 }
 
@@ -76,7 +101,7 @@ Trajectory ReadGroundTruthIn(const std::string& mav0, const Rigid3& T_s_body,
                              std::vector<std::string>* warnings) {
   for (const char* sensor : {"state_groundtruth_estimate0", "mocap0"}) {
     const fs::path folder = fs::path(mav0) / sensor;
-    if (!fs::exists(folder / "data.csv")) {
+    if (!Exists((folder / "data.csv").string())) {
       continue;
     }
     try {
@@ -102,10 +127,14 @@ EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folde
   ReadCamera();
   const Rigid3 T_s_body = ReadImuCalibration();
   camera_.T_body_cam = T_s_body.Inverse() * camera_.T_body_cam;
+  if (const auto invalid = camera_.Invalid()) {
+    throw std::runtime_error(fmt::format(
+        "{}: {}; fields 'T_BS' of cam0/sensor.yaml and imu0/sensor.yaml", mav0_, *invalid));
+  }
   ReadImages();
   ReadImu();
   DropImagesOutsideImu();
-  CheckFirstImage();
+  CheckImages();
   ground_truth_ = ReadGroundTruthIn(mav0_, T_s_body, &warnings_);
 }
 
@@ -131,7 +160,8 @@ void EurocRecording::ReadImages() {
     }
     image.utime = UtimeFromNs(image.stamp_ns);
     image.path = fmt::format("{}/cam0/data/{}", mav0_, row.fields[1]);
-    if (fs::is_regular_file(image.path)) {
+    std::error_code error;
+    if (fs::is_regular_file(image.path, error)) {
       images_.push_back(std::move(image));
     } else {
       missing.Add(row.line, fmt::format("image data/{} is missing", row.fields[1]));
@@ -144,6 +174,7 @@ void EurocRecording::ReadImages() {
     throw std::runtime_error(
         fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
   }
+  DropFarStamps(&images_, csv, &warnings_);
   Warn(SortByTime(&images_), csv, &warnings_);
   NameGaps(images_, 3.5, csv, &warnings_);
 }
@@ -173,6 +204,7 @@ void EurocRecording::ReadImu() {
   if (imu_.empty()) {
     throw std::runtime_error(fmt::format("{}: holds no sample; expected rows: {}", csv, expected));
   }
+  DropFarStamps(&imu_, csv, &warnings_);
   Warn(SortByTime(&imu_), csv, &warnings_);
   NameGaps(imu_, 2.5, csv, &warnings_);
 }
@@ -195,34 +227,33 @@ void EurocRecording::DropImagesOutsideImu() {
   }
 }
 
-void EurocRecording::CheckFirstImage() const {
-  for (const EurocImage& image : images_) {
-    const cv::Mat pixels = cv::imread(image.path, cv::IMREAD_GRAYSCALE);
-    if (pixels.empty()) {
-      continue;  // corrupt: LoadImage will name it
+// A single one of another size is skipped when its turn comes, as one that is corrupt.
+void EurocRecording::CheckImages() const {
+  constexpr int kOfAnotherSize = 20;  // so many in a row are no accident
+  const cv::Size expected(camera_.width, camera_.height);
+  std::string last;
+  int of_another_size = 0;
+  for (size_t i = 0; i < images_.size() && of_another_size < kOfAnotherSize; ++i) {
+    const GreyImage image = ReadGrey(images_[i].path, expected);
+    if (!image.pixels.empty()) {
+      return;
     }
-    if (pixels.cols != camera_.width || pixels.rows != camera_.height) {
-      throw std::runtime_error(fmt::format(
-          "{} is {}x{} pixels but cam0/sensor.yaml says {}x{}; the calibration must be of these "
-          "images (field 'resolution')",
-          image.path, pixels.cols, pixels.rows, camera_.width, camera_.height));
-    }
-    return;
+    of_another_size += !image.size.empty() && image.size != expected ? 1 : 0;
+    last = fmt::format("{}: {}", images_[i].path, image.why);
   }
-  throw std::runtime_error(fmt::format("{}/cam0/data: none of the images can be read", mav0_));
+  throw std::runtime_error(
+      fmt::format("{}/cam0/data: none of the images can be used; the calibration must be of these "
+                  "(cam0/sensor.yaml, field 'resolution'); the last one tried: {}",
+                  mav0_, last));
 }
 
 cv::Mat EurocRecording::LoadImage(size_t index, std::string* why) const {
   const std::string& path = images_.at(index).path;
-  cv::Mat pixels = cv::imread(path, cv::IMREAD_GRAYSCALE);
-  if (pixels.empty()) {
-    *why = fmt::format("{}: corrupt image, skipped", path);
-  } else if (pixels.cols != camera_.width || pixels.rows != camera_.height) {
-    *why = fmt::format("{}: {}x{} pixels instead of {}x{}, skipped", path, pixels.cols, pixels.rows,
-                       camera_.width, camera_.height);
-    pixels = cv::Mat();
+  GreyImage image = ReadGrey(path, {camera_.width, camera_.height});
+  if (image.pixels.empty()) {
+    *why = fmt::format("{}: {}, skipped", path, image.why);
   }
-  return pixels;
+  return image.pixels;
 }
 
 std::optional<int64_t> FirstImageUtimeOf(const std::string& folder) {

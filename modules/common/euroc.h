@@ -41,8 +41,8 @@ class EurocRecording {
   const Trajectory& ground_truth() const { return ground_truth_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
-  // 8-bit grey, of the calibration's size; empty, with the reason in `why`, when the file is
-  // corrupt or of another size.
+  // 8-bit grey, of the calibration's size; empty, with the reason in `why`, when the file cannot be
+  // read, is neither PNG nor JPEG, is corrupt or of another size (grey_image.h).
   cv::Mat LoadImage(size_t index, std::string* why) const;
 
  private:
@@ -51,7 +51,7 @@ class EurocRecording {
   void ReadImages();
   void ReadImu();
   void DropImagesOutsideImu();
-  void CheckFirstImage() const;
+  void CheckImages() const;
 
   std::string mav0_;
   CameraModel camera_;

@@ -4,11 +4,10 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <vector>
+
+#include "common/text_file.h"
 
 namespace pangea {
 namespace {
@@ -18,11 +17,7 @@ namespace {
 }
 
 YAML::Node Load(const std::string& path) {
-  std::ifstream file(path);
-  if (!std::filesystem::is_regular_file(path) || !file) {
-    Throw(path, "cannot be opened; a recording needs its calibration there");
-  }
-  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::string text = ReadTextFile(path);
   if (text.starts_with("%YAML:")) {  // OpenCV's spelling of the directive is not YAML
     text.erase(0, text.find('\n'));
   }
@@ -71,7 +66,13 @@ Rigid3 Extrinsics(const YAML::Node& root, const std::string& file) {
     Throw(file, fmt::format("the rotation in 'T_BS' is not one (|R R' - I| = {:.2g}, det {:.2g})",
                             error, R.determinant()));
   }
-  return {Eigen::Quaterniond(R).normalized(), {m[3], m[7], m[11]}};
+  const Eigen::Vector3d t(m[3], m[7], m[11]);
+  if (t.norm() > CameraModel::kMaxLever_m) {
+    Throw(file, fmt::format("the translation in 'T_BS' is {:.3g} m long; at most {} are plausible: "
+                            "is it in metres?",
+                            t.norm(), CameraModel::kMaxLever_m));
+  }
+  return {Eigen::Quaterniond(R).normalized(), t};
 }
 
 CameraModel::Kind Distortion(const YAML::Node& root, const std::string& file) {
@@ -105,6 +106,11 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
   CameraModel camera;
   camera.kind = Distortion(root, sensor_yaml);
   const std::vector<double> size = Numbers(root, sensor_yaml, "resolution", 2);
+  for (const double pixels : size) {
+    if (!(pixels >= 1 && pixels <= 1e6)) {
+      Throw(sensor_yaml, fmt::format("field 'resolution' is out of range: {} pixels", pixels));
+    }
+  }
   camera.width = static_cast<int>(size[0]);
   camera.height = static_cast<int>(size[1]);
   const std::vector<double> k = Numbers(root, sensor_yaml, "intrinsics", 4);
@@ -157,7 +163,7 @@ EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
 }
 
 Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
-  if (!std::filesystem::exists(sensor_yaml)) {
+  if (!Exists(sensor_yaml)) {
     return {};
   }
   const YAML::Node root = Load(sensor_yaml);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -14,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -139,7 +141,7 @@ TEST_F(EurocTest, EquidistantOffsetAndReadout) {
 TEST_F(EurocTest, MissingPartsAreNamed) {
   EXPECT_THROW(EurocRecording("/nonexistent/recording"), std::runtime_error);
   fs::remove(root_ + "/mav0/imu0/data.csv");
-  EXPECT_THAT(Complaint(), HasSubstr("imu0/data.csv: cannot be opened"));
+  EXPECT_THAT(Complaint(), HasSubstr("imu0/data.csv: cannot be opened: No such file"));
   fs::remove(root_ + "/mav0/cam0/sensor.yaml");
   EXPECT_THAT(Complaint(), HasSubstr("cam0/sensor.yaml: cannot be opened"));
   fs::remove_all(root_ + "/mav0");
@@ -152,7 +154,7 @@ TEST_F(EurocTest, CalibrationMistakesNameTheField) {
   WriteCamera("radtan", "32");
   EXPECT_THAT(Complaint(), HasSubstr("'resolution' must be a list of 2 numbers"));
   WriteCamera("radtan", "64, 48");
-  EXPECT_THAT(Complaint(), HasSubstr("is 32x24 pixels but cam0/sensor.yaml says 64x48"));
+  EXPECT_THAT(Complaint(), HasSubstr("png: 32x24 pixels instead of 64x48"));
   WriteCamera("radtan", "32, 24");
   std::string imu = Text("imu0/sensor.yaml");
   Write("imu0/sensor.yaml", imu.substr(0, imu.find("accelerometer_random_walk")));
@@ -199,6 +201,85 @@ TEST_F(EurocTest, CorruptAndMismatchedImagesAreNamedWhenLoaded) {
   EXPECT_TRUE(recording.LoadImage(3, &why).empty());
   EXPECT_THAT(why, HasSubstr("16x12 pixels instead of 32x24"));
   EXPECT_FALSE(recording.LoadImage(4, &why).empty());
+}
+
+// A PNG whose header claims more pixels than a decoder would take, and files of other formats.
+TEST_F(EurocTest, OddAndOversizedImagesAreSkippedByName) {
+  std::vector<uint8_t> png;
+  cv::imencode(".png", cv::Mat(24, 32, CV_8UC1, cv::Scalar(1)), png);
+  for (const size_t i : {16U, 20U}) {  // big-endian width and height: 60000
+    png[i + 2] = 0xea;
+    png[i + 3] = 0x60;
+  }
+  std::ofstream(ImagePath(0), std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+  std::ofstream(ImagePath(1)) << "P5 60000 60000 255\n";
+  std::ofstream(ImagePath(2)) << "BM....";
+  std::ofstream(ImagePath(3)) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 60000 +X 60000\n";
+  const EurocRecording recording(root_);
+  ASSERT_EQ(recording.images().size(), 10U);
+  std::string why;
+  for (const auto& [i, what] : {std::pair(0, "60000x60000 pixels instead of 32x24, skipped"),
+                                {1, "PNM image; only PNG and JPEG are read, skipped"},
+                                {2, "BMP image; only PNG and JPEG are read, skipped"},
+                                {3, "Radiance HDR image; only PNG and JPEG are read, skipped"}}) {
+    EXPECT_TRUE(recording.LoadImage(i, &why).empty());
+    EXPECT_EQ(why, fmt::format("{}: {}", ImagePath(i), what));
+  }
+  EXPECT_FALSE(recording.LoadImage(4, &why).empty());
+}
+
+TEST_F(EurocTest, WhatIsNoFileIsRefusedByName) {
+  for (const char* file : {"imu0/data.csv", "imu0/sensor.yaml", "cam0/sensor.yaml"}) {
+    const std::string text = Text(file);
+    const std::string path = root_ + "/mav0/" + file;
+    fs::remove(path);
+    ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+    EXPECT_EQ(Complaint(), path + ": cannot be opened: it is a FIFO; only regular files are read");
+    fs::remove(path);
+    fs::create_symlink(fs::path(path).filename(), path);
+    EXPECT_EQ(Complaint(), path + ": cannot be opened: Too many levels of symbolic links");
+    fs::remove(path);
+    Write(file, text);
+  }
+  fs::remove(ImagePath(3));
+  fs::create_symlink(fs::path(ImagePath(3)).filename(), ImagePath(3));
+  EXPECT_THAT(EurocRecording(root_).warnings(), Contains(HasSubstr("is missing")));
+  fs::create_symlink("loop", root_ + "/loop");
+  root_ += "/loop";
+  EXPECT_THAT(Complaint(), HasSubstr("/loop: there is no such recording folder: Too many levels"));
+}
+
+TEST_F(EurocTest, StampsADayFromTheOthersAreDropped) {
+  const std::string imu = Text("imu0/data.csv"), cam = Text("cam0/data.csv");
+  const std::string values = ",0,0,0,0,0,9.81\n";
+  Write("imu0/data.csv", imu + "9223372036854775807" + values + "-9223372036854775808" + values);
+  Write("cam0/data.csv", cam + fmt::format("9223372036854775807,{}.png\n", kStart));
+  const EurocRecording recording(root_);
+  EXPECT_EQ(recording.imu().size(), 200U);
+  EXPECT_EQ(recording.images().size(), 10U);
+  EXPECT_THAT(recording.warnings(),
+              ElementsAre(HasSubstr("cam0/data.csv: 1 rows are stamped more than a day from"),
+                          HasSubstr("imu0/data.csv: 2 rows are stamped more than a day from")));
+}
+
+TEST_F(EurocTest, LeversAreMetres) {
+  for (const char* file : {"cam0/sensor.yaml", "imu0/sensor.yaml"}) {
+    const std::string yaml = Text(file);
+    for (const char* far : {"1e30", "-11"}) {
+      std::string moved = yaml;
+      moved.replace(moved.find("1,0,0,0,"), 8, fmt::format("1,0,0,{},", far));
+      Write(file, moved);
+      EXPECT_THAT(Complaint(), HasSubstr(fmt::format("{}: the translation in 'T_BS' is ", file)));
+      EXPECT_THAT(Complaint(), HasSubstr(" m long; at most 10 are plausible"));
+    }
+    std::string moved = yaml;
+    moved.replace(moved.find("1,0,0,0,"), 8, file[0] == 'c' ? "1,0,0,6," : "1,0,0,-6,");
+    Write(file, moved);
+  }
+  EXPECT_THAT(Complaint(), HasSubstr("mav0: the camera is 12 m from the body; at most 10 are"));
+  WriteCamera("radtan", "1e30, 24");
+  EXPECT_THAT(Complaint(), HasSubstr("'resolution' is out of range: 1e+30 pixels"));
 }
 
 TEST_F(EurocTest, TruncatedImuCsvLosesOnlyItsLastRow) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <stdexcept>
 
 #include "common/csv.h"
@@ -73,7 +72,7 @@ Trajectory Finished(Trajectory trajectory, const std::string& path, const RowCom
 
 }  // namespace
 
-int64_t UtimeFromNs(int64_t ns) { return ns >= 0 ? ns / 1000 : -((-ns + 999) / 1000); }
+int64_t UtimeFromNs(int64_t ns) { return ns / 1000 - (ns % 1000 < 0 ? 1 : 0); }
 
 void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings) {
   if (outcome.out_of_order > 0) {
@@ -135,7 +134,7 @@ Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string
 }
 
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings) {
-  std::ifstream file(path);
+  std::ifstream file = OpenFile(path);
   std::string line;
   while (std::getline(file, line) && (line.empty() || line.front() == '#')) {
   }

@@ -5,13 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <set>
 #include <stdexcept>
 
 #include "common/nearest_word.h"
+#include "common/text_file.h"
 
 namespace pangea {
 
@@ -348,14 +346,7 @@ void YamlOptions::ReadText(const std::string& text, const std::string& name) {
   Read(node, name, "");
 }
 
-void YamlOptions::ReadFile(const std::string& path) {
-  std::ifstream file(path);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!std::filesystem::is_regular_file(path) || !file) {
-    throw std::runtime_error(fmt::format("{}: cannot be read; is the path right?", path));
-  }
-  ReadText(text, path);
-}
+void YamlOptions::ReadFile(const std::string& path) { ReadText(ReadTextFile(path), path); }
 
 std::string YamlOptions::PrintIndented(int indent) const {
   std::string text;

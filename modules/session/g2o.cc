@@ -15,6 +15,8 @@
 
 #include "common/csv.h"
 
+#include "common/text_file.h"
+
 namespace pangea::session {
 namespace {
 
@@ -267,10 +269,7 @@ std::string ToG2o(const Graph& graph) {
 }
 
 Graph ReadG2o(const std::string& path, double max_position_m) {
-  std::ifstream file(path);
-  if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be read", path));
-  }
+  std::ifstream file = OpenFile(path);
   Reader reader(path, max_position_m);
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {

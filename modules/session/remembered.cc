@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -50,12 +49,11 @@ Remembered ReadRemembered(const std::vector<fs::path>& logs) {
   std::set<fs::path> seen;
   for (const fs::path& log : logs) {
     const fs::path file = fs::absolute(log).parent_path() / kFile;
-    if (!fs::exists(file) || !seen.insert(file).second) {
+    if (!Exists(file) || !seen.insert(file).second) {
       continue;
     }
     try {
-      std::ifstream stream(file);
-      const json remembered = json::parse(stream);
+      const json remembered = json::parse(ReadTextFile(file));
       for (const json& agent : remembered.at("agents")) {
         session.agents.push_back(RunOf(agent));
       }
@@ -72,7 +70,7 @@ Remembered ReadRemembered(const std::vector<fs::path>& logs) {
 std::map<int32_t, std::string> RecordingsAtHand(const Remembered& session) {
   std::map<int32_t, std::string> folders;
   for (const AgentRun& agent : session.agents) {
-    if (!agent.recording.empty() && fs::exists(agent.recording)) {
+    if (!agent.recording.empty() && Exists(agent.recording)) {
       folders.emplace(agent.id, agent.recording);
     }
   }

@@ -4,10 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <stdexcept>
 
 #include "common/nearest_word.h"
+#include "common/text_file.h"
 #include "session/child_process.h"
 #include "session/session_file.h"
 
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 // The first line, where that is a comment.
 std::string Title(const fs::path& file) {
-  std::ifstream stream(file);
+  std::ifstream stream = OpenFile(file);
   std::string line;
   std::getline(stream, line);
   const size_t text = line.find_first_not_of("# ");
@@ -120,14 +120,16 @@ std::string DescribeSessions(const std::vector<fs::path>& files,
                              const std::optional<fs::path>& recordings) {
   std::string text;
   for (const fs::path& file : files) {
-    const std::string title = Title(file);
-    text += fmt::format("{}{}{}\n", file.string(), title.empty() ? "" : ": ", title);
+    std::string title;
+    std::string details;
     try {
+      title = Title(file);
       const SessionScript script = ParseSessionFile(file);
-      text += DescribeScript(script) + DescribeInputs(file, recordings, script);
+      details = DescribeScript(script) + DescribeInputs(file, recordings, script);
     } catch (const std::runtime_error& error) {
-      text += fmt::format("  cannot be run: {}\n", error.what());
+      details = fmt::format("  cannot be run: {}\n", error.what());
     }
+    text += fmt::format("{}{}{}\n{}", file.string(), title.empty() ? "" : ": ", title, details);
   }
   return text;
 }

@@ -32,6 +32,7 @@ constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lo
 constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
+constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no pose
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 
@@ -266,7 +267,9 @@ class Runner {
     if (!exit || player.done()) {
       return;
     }
-    if (exit->code == 0 || StopRequested()) {
+    // What a killed vio left may be too short to start in.
+    const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
+    if (exit->code == 0 || is_rest || StopRequested()) {
       player.ended = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
       // Killed: the same agent goes on where it was, in a new map.

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
+#include "common/grey_image.h"
+
 namespace pangea::sim {
 
 namespace fs = std::filesystem;
@@ -22,11 +24,8 @@ std::string FrameCache::PathOf(int64_t stamp_ns) const {
   return fmt::format("{}/{}.png", folder_, stamp_ns);
 }
 
-cv::Mat FrameCache::Load(int64_t stamp_ns) const {
-  if (folder_.empty() || !fs::exists(PathOf(stamp_ns))) {
-    return {};
-  }
-  return cv::imread(PathOf(stamp_ns), cv::IMREAD_GRAYSCALE);
+cv::Mat FrameCache::Load(int64_t stamp_ns, cv::Size size) const {
+  return folder_.empty() ? cv::Mat() : ReadGrey(PathOf(stamp_ns), size).pixels;
 }
 
 void FrameCache::Store(int64_t stamp_ns, const cv::Mat& frame) const {

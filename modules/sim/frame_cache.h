@@ -14,8 +14,8 @@ class FrameCache {
   // An empty `root` keeps nothing.
   FrameCache(const std::string& root, uint64_t key);
 
-  // Empty when it is not there.
-  cv::Mat Load(int64_t stamp_ns) const;
+  // Empty when it is not there, or is not what was stored.
+  cv::Mat Load(int64_t stamp_ns, cv::Size size) const;
   // Failures (a full disk) are ignored: the cache only saves time.
   void Store(int64_t stamp_ns, const cv::Mat& frame) const;
 

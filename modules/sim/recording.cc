@@ -201,7 +201,7 @@ CameraRates Recorder::RatesAt(int64_t stamp_ns) const {
 }
 
 cv::Mat Recorder::NoiseFreeFrame(int64_t stamp_ns) {
-  cv::Mat frame = cache_->Load(stamp_ns);
+  cv::Mat frame = cache_->Load(stamp_ns, {options_.camera.width, options_.camera.height});
   if (frame.empty()) {
     EnsureScene();
     frame = sensor_->NoiseFree(renderer_->Render(RowPoses(stamp_ns)), RatesAt(stamp_ns));

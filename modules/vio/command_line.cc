@@ -18,6 +18,8 @@
 namespace pangea::vio {
 namespace {
 
+constexpr int kNoPose = 2;  // exit code
+
 struct Arguments {
   std::string bus = kDefaultBusUrl;
   std::string recording;
@@ -69,7 +71,16 @@ double ParseRate(const std::string& rate) {
   return value;
 }
 
-void Run(const Arguments& a, const VioFileOptions& file_options) {
+// Says so where no pose came of it all. To be stopped before there is one is no failure.
+int Outcome(const VioProcess& process) {
+  const std::optional<std::string> why = process.NoPoseYet();
+  if (why) {
+    std::cerr << fmt::format("pangea-vio: no pose: {}\n", *why);
+  }
+  return why && !StopRequested() ? kNoPose : 0;
+}
+
+int Run(const Arguments& a, const VioFileOptions& file_options) {
   std::optional<EurocRecording> recording;
   if (!a.live) {
     recording.emplace(a.recording);
@@ -88,12 +99,13 @@ void Run(const Arguments& a, const VioFileOptions& file_options) {
   if (recording) {
     process.Open(recording->camera(), recording->imu_noise());
     Playback(lcm_bus ? &*lcm_bus : nullptr, process, *recording, a.playback).Run();
-    return;
+    return Outcome(process);
   }
   LiveInput live(process, a.process.agent_id, file_options.live_imu);
   RunProcess(*lcm_bus, process);
   process.Flush();
   process.PublishFinished(WallUtime());
+  return Outcome(process);
 }
 
 void Check(const Arguments& a) {
@@ -114,6 +126,10 @@ int RunCommandLine(int argc, char** argv) {
   CLI::App app("Visual-inertial odometry of one agent", "pangea-vio");
   Arguments arguments;
   AddOptions(app, arguments);
+  app.footer(fmt::format(
+      "Exit code: 0; 1 when something could not be done; {} when a recording was played to its end "
+      "and gave no pose.",
+      kNoPose));
   CLI11_PARSE(app, argc, argv);
   try {
     VioFileOptions file_options;
@@ -131,8 +147,7 @@ int RunCommandLine(int argc, char** argv) {
     arguments.process.vio = file_options.vio;
     // The agent shares its machine with the other processes, and one thread gives the same bytes.
     cv::setNumThreads(1);
-    Run(arguments, file_options);
-    return 0;
+    return Run(arguments, file_options);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-vio: {}\n", error.what());
     return 1;

@@ -2,7 +2,8 @@
 
 namespace pangea::vio {
 
-// pangea-vio, whole: returns the exit code. What is wrong is said in one line on stderr.
+// pangea-vio, whole: returns the exit code (--help has them). What is wrong is said in one line on
+// stderr.
 int RunCommandLine(int argc, char** argv);
 
 }  // namespace pangea::vio

@@ -74,6 +74,7 @@ void Run(const std::string& folder, double step_s, bool landmarks,
     }
     const cv::Mat image = recording.LoadImage(i, &why);
     if (image.empty()) {
+      std::cerr << fmt::format("{}\n", why);
       continue;
     }
     // Fresh features stand for the tracked ones: where the tracker would put them.

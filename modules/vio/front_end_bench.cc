@@ -122,6 +122,7 @@ void Run(const Options& options) {
     }
     const cv::Mat image = recording.LoadImage(i, &why);
     if (image.empty()) {
+      std::cerr << fmt::format("{}\n", why);
       continue;
     }
     const Eigen::Quaterniond q = last == 0 ? Eigen::Quaterniond::Identity()

@@ -23,6 +23,11 @@ constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgo
 constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
 constexpr size_t kMinTracks = 20;
 
+// What an accelerometer shows over a second or more, however it is moved by hand or flown: about
+// gravity. Far less is a dead sensor or one in units of g, far more one in other units.
+constexpr double kMinMeanAccel = 4;   // m/s^2
+constexpr double kMaxMeanAccel = 25;  // m/s^2
+
 // At rest: the image stands, the accelerometer and the gyro are quiet.
 constexpr double kRestSpan_s = 1.0;
 constexpr double kRestSigmas = 2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
@@ -56,6 +61,14 @@ double SpanSeconds(int64_t from_utime, int64_t to_utime) {
   return 1e-6 * static_cast<double>(to_utime - from_utime);
 }
 
+double MeanMagnitude(const std::vector<ImuSample>& samples) {
+  double sum = 0;
+  for (const ImuSample& sample : samples) {
+    sum += sample.accel.norm();
+  }
+  return sum / static_cast<double>(samples.size());
+}
+
 }  // namespace
 
 Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)
@@ -67,7 +80,7 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
     return {std::nullopt, "no inertial samples up to the image's time"};
   }
   if (!frames_.empty() && SpanSeconds(frames_.back().utime, frame.utime) < kFrameSpacing_s) {
-    return {std::nullopt, "collecting images"};
+    return {std::nullopt, why_not_};
   }
   frames_.push_back(frame);
   while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
@@ -76,9 +89,21 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
   std::erase_if(samples_, [&](const ImuSample& sample) {
     return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
   });
-  const double span = SpanSeconds(frames_.front().utime, frame.utime);
+  InitialResult result = Try();
+  why_not_ = result.reason;
+  return result;
+}
+
+InitialResult Initialiser::Try() {
+  const double span = SpanSeconds(frames_.front().utime, frames_.back().utime);
   if (span < kMinSpan_s) {
     return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
+  }
+  const double accel = MeanMagnitude(samples_);
+  if (!(accel > kMinMeanAccel && accel < kMaxMeanAccel)) {
+    return {std::nullopt,
+            fmt::format("the accelerometer shows {:.2f} m/s^2 on average, where gravity is {:.1f}",
+                        accel, kGravity)};
   }
   if (auto at_rest = TryAtRest()) {
     return {at_rest, ""};

@@ -52,6 +52,7 @@ class Initialiser {
   InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
 
  private:
+  InitialResult Try();
   std::optional<InitialState> TryAtRest() const;
   InitialResult TryMoving();
   InitialResult TryMoving(const std::vector<StartFrame>& frames) const;
@@ -63,6 +64,7 @@ class Initialiser {
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
   double time_offset_change_s_ = 0;
+  std::string why_not_ = "collecting images";  // at the newest try
 };
 
 }  // namespace pangea::vio

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "common/channels.h"
+#include "common/grey_image.h"
 #include "common/messages.h"
 
 namespace pangea::vio {
@@ -14,6 +16,22 @@ namespace {
 // Any of these is a broken sensor, not a phone in a hand.
 constexpr double kMaxGyro = 100;   // rad/s
 constexpr double kMaxAccel = 500;  // m/s^2
+
+GreyImage Decode(int8_t encoding, std::span<const uint8_t> bytes, const CameraModel& camera) {
+  const cv::Size size(camera.width, camera.height);
+  if (encoding == image_t::ENCODING_PNG) {
+    return DecodeGrey(bytes, size);
+  }
+  if (encoding != image_t::ENCODING_RAW8) {
+    return {{}, "unknown encoding", {}};
+  }
+  if (bytes.size() != static_cast<size_t>(size.area())) {
+    return {{}, "not one byte for each pixel", {}};
+  }
+  GreyImage image{cv::Mat(size, CV_8U), "", size};
+  std::memcpy(image.pixels.data, bytes.data(), bytes.size());
+  return image;
+}
 
 }  // namespace
 
@@ -52,17 +70,44 @@ void LiveInput::OnImu(const imu_t& message) {
     process_.node().Refuse("imu: not finite or absurd");
     return;
   }
-  if (newest_sample_ && sample.utime <= *newest_sample_) {
-    process_.node().Refuse("imu: not after the last sample");
+  if (!TakeStamp(&imu_stamps_, "imu: ", sample.utime)) {
     return;
   }
-  newest_sample_ = sample.utime;
   samples_.push_back(sample);
   if (samples_.size() > kMaxSamples) {
     samples_.erase(samples_.begin(), samples_.begin() + kMaxSamples / 2);
     process_.node().NoteDropped(kMaxSamples / 2);
   }
   Deliver();
+}
+
+// Whether it is the stream's, which may go on from an earlier time than before.
+bool LiveInput::TakeStamp(StampCheck* stamps, const std::string& what, int64_t utime) {
+  switch (stamps->Check(utime)) {
+    case StampCheck::Verdict::kNext:
+      return true;
+    case StampCheck::Verdict::kWentBack:
+      StartAnew();
+      return true;
+    case StampCheck::Verdict::kNotAfter:
+      process_.node().Refuse(what + "not after the last one");
+      return false;
+    case StampCheck::Verdict::kFarAhead:
+      process_.node().Refuse(what + "far ahead of the last one");
+      return false;
+    case StampCheck::Verdict::kOutOfRange:
+      process_.node().Refuse(what + "stamp out of range");
+      return false;
+  }
+  return false;
+}
+
+// What waits is of a time that is over.
+void LiveInput::StartAnew() {
+  process_.node().NoteDropped(static_cast<int64_t>(images_.size()));
+  images_.clear();
+  samples_.clear();
+  process_.StartAnew();
 }
 
 bool LiveInput::Plausible(const image_t& message) const {
@@ -78,18 +123,13 @@ void LiveInput::OnImage(const image_t& message) {
     process_.node().Refuse(camera_ ? "image: size or chunk does not fit" : "image: no CAMERA yet");
     return;
   }
-  if (newest_image_ && message.utime <= *newest_image_) {
-    process_.node().Refuse("image: not after the last one");
+  const std::optional<int64_t>& newest = image_stamps_.newest();
+  if (newest && message.utime <= *newest && message.utime > *newest - kMaxImageStep_us) {
+    process_.node().Refuse(
+        "image: not after the last one");  // a late chunk; no image is made of it
     return;
   }
-  Assembly& assembly = assemblies_[message.utime];
-  if (assembly.have.empty()) {
-    assembly.utime = message.utime;
-    assembly.encoding = message.encoding;
-    assembly.bytes.resize(static_cast<size_t>(message.total_bytes));
-    assembly.have.resize(static_cast<size_t>(message.num_chunks), false);
-    assembly.missing = assembly.have.size();
-  }
+  Assembly& assembly = AssemblyOf(message);
   const auto chunk = static_cast<size_t>(message.chunk);
   if (assembly.bytes.size() != static_cast<size_t>(message.total_bytes) ||
       assembly.have.size() != static_cast<size_t>(message.num_chunks) || assembly.have[chunk]) {
@@ -100,35 +140,49 @@ void LiveInput::OnImage(const image_t& message) {
             assembly.bytes.begin() + message.offset_bytes);
   assembly.have[chunk] = true;
   if (--assembly.missing == 0) {
-    const Assembly complete = std::move(assembly);
-    // Older ones have lost a chunk for good.
-    const auto end = assemblies_.upper_bound(message.utime);
-    process_.node().NoteDropped(std::distance(assemblies_.begin(), end) - 1);
-    assemblies_.erase(assemblies_.begin(), end);
-    Finish(complete);
-  } else if (assemblies_.size() > kMaxImages) {
-    assemblies_.erase(assemblies_.begin());
-    process_.node().NoteDropped();
+    Complete(message.utime);
   }
 }
 
-void LiveInput::Finish(const Assembly& assembly) {
-  const cv::Size size(camera_->width, camera_->height);
-  cv::Mat image;
-  if (assembly.encoding == image_t::ENCODING_RAW8) {
-    if (assembly.bytes.size() == static_cast<size_t>(size.area())) {
-      image.create(size, CV_8U);
-      std::memcpy(image.data, assembly.bytes.data(), assembly.bytes.size());
-    }
-  } else if (assembly.encoding == image_t::ENCODING_PNG) {
-    image = cv::imdecode(assembly.bytes, cv::IMREAD_GRAYSCALE);
+// Begun with its first chunk; of too many the one that was begun first goes.
+LiveInput::Assembly& LiveInput::AssemblyOf(const image_t& message) {
+  const auto begun = std::ranges::find(assemblies_, message.utime, &Assembly::utime);
+  if (begun != assemblies_.end()) {
+    return *begun;
   }
-  if (image.size() != size) {
-    process_.node().Refuse("image: cannot be decoded");
+  if (assemblies_.size() == kMaxImages) {
+    assemblies_.pop_front();
+    process_.node().NoteDropped();
+  }
+  Assembly& assembly = assemblies_.emplace_back();
+  assembly.utime = message.utime;
+  assembly.encoding = message.encoding;
+  assembly.bytes.resize(static_cast<size_t>(message.total_bytes));
+  assembly.have.resize(static_cast<size_t>(message.num_chunks), false);
+  assembly.missing = assembly.have.size();
+  return assembly;
+}
+
+void LiveInput::Complete(int64_t utime) {
+  const auto found = std::ranges::find(assemblies_, utime, &Assembly::utime);
+  const Assembly complete = std::move(*found);
+  assemblies_.erase(found);
+  if (!TakeStamp(&image_stamps_, "image: ", utime)) {
     return;
   }
-  newest_image_ = assembly.utime;
-  images_.emplace_back(assembly.utime, image);
+  // Older ones have lost a chunk for good.
+  process_.node().NoteDropped(static_cast<int64_t>(
+      std::erase_if(assemblies_, [utime](const Assembly& other) { return other.utime < utime; })));
+  Finish(complete);
+}
+
+void LiveInput::Finish(const Assembly& assembly) {
+  const GreyImage image = Decode(assembly.encoding, assembly.bytes, *camera_);
+  if (image.pixels.empty()) {
+    process_.node().Refuse("image: " + image.why);
+    return;
+  }
+  images_.emplace_back(assembly.utime, image.pixels);
   if (images_.size() > kMaxImages) {
     images_.pop_front();
     process_.node().NoteDropped();
@@ -137,8 +191,8 @@ void LiveInput::Finish(const Assembly& assembly) {
 }
 
 void LiveInput::Deliver() {
-  while (!images_.empty() && newest_sample_ &&
-         *newest_sample_ >= process_.ImuTimeOf(images_.front().first)) {
+  while (!images_.empty() && imu_stamps_.newest() &&
+         *imu_stamps_.newest() >= process_.ImuTimeOf(images_.front().first)) {
     const auto [utime, image] = images_.front();
     images_.pop_front();
     const int64_t imu_time = process_.ImuTimeOf(utime);

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <iostream>
 #include <sstream>
 #include <stdexcept>
 
 #include "common/csv.h"
+#include "common/text_file.h"
 
 namespace pangea::vio {
 namespace {
@@ -21,7 +21,7 @@ int64_t ToUs(double seconds) { return static_cast<int64_t>(1e6 * seconds); }
 }  // namespace
 
 std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraModel& camera) {
-  std::ifstream file(csv);
+  std::ifstream file = OpenFile(csv);
   std::map<int64_t, TrackedFrame> frames;
   std::string line;
   while (std::getline(file, line)) {

@@ -110,6 +110,14 @@ Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
 
 std::vector<Keyframe> Vio::Flush() { return Complete(estimator_->Flush()); }
 
+std::vector<Keyframe> Vio::StartAnew() {
+  std::vector<Keyframe> keyframes = Flush();
+  OpenNewMap();
+  turn_imu_.clear();
+  last_utime_.reset();
+  return keyframes;
+}
+
 std::vector<Keyframe> Vio::Complete(const std::vector<FinishedKeyframe>& finished) {
   std::vector<Keyframe> keyframes;
   for (const FinishedKeyframe& one : finished) {

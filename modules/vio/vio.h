@@ -59,6 +59,8 @@ class Vio {
                       std::span<const ImuSample> imu);
   // The keyframes still in the window, at the end.
   std::vector<Keyframe> Flush();
+  // The same, and a new map: what comes next is from another time, perhaps an earlier one.
+  std::vector<Keyframe> StartAnew();
 
   // The IMU's time of an image.
   int64_t ImuTimeOf(int64_t image_utime) const;

@@ -72,6 +72,9 @@ void VioProcess::Handle(const VioOutput& output) {
     first_image_utime_ = output.utime;
   }
   const bool tracking = output.state == EstimatorState::kTracking;
+  ++num_images_;
+  has_tracked_ = has_tracked_ || tracking;
+  why_not_tracking_ = output.reason;
   node_.Count("frames");
   node_.Set("maps", vio_->maps_opened());
   node_.Set("tracked", output.num_tracked);
@@ -158,6 +161,28 @@ void VioProcess::WriteTum(const VioOutput& output) {
     }
   }
   tum_ << ToTum({{output.utime, output.T_odom_body}}) << std::flush;
+}
+
+std::optional<std::string> VioProcess::NoPoseYet() const {
+  if (has_tracked_) {
+    return std::nullopt;
+  }
+  return num_images_ == 0 ? "no image came to the odometry"
+                          : fmt::format("the odometry did not start in {} images; at the last: {}",
+                                        num_images_, why_not_tracking_);
+}
+
+void VioProcess::StartAnew() {
+  if (!vio_) {
+    return;
+  }
+  for (const Keyframe& keyframe : vio_->StartAnew()) {
+    PublishKeyframe(keyframe);
+  }
+  shown_map_ = {};
+  tum_map_.reset();
+  first_image_utime_.reset();
+  node_.Count("started_anew");
 }
 
 void VioProcess::Flush() {

@@ -56,8 +56,12 @@ class VioProcess : public Process {
   // As Vio::AddImage and Vio::AddTracks.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
+  // The sensors' time begins anew: finishes the map, and opens another.
+  void StartAnew();
   // No more images: finishes the keyframes in the window.
   void Flush();
+  // Why no image has given a pose so far; nothing once one has.
+  std::optional<std::string> NoPoseYet() const;
   // Everything is said: the last status, with the counter finished = 1.
   void PublishFinished(int64_t now_utime);
 
@@ -88,6 +92,9 @@ class VioProcess : public Process {
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
+  std::string why_not_tracking_;  // at the newest image
+  int64_t num_images_ = 0;
+  bool has_tracked_ = false;
   std::ofstream tum_;
   std::optional<MapId> tum_map_;
   int tum_files_ = 0;

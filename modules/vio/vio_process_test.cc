@@ -1,20 +1,25 @@
 #include "vio/vio_process.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <lcm/lcm-cpp.hpp>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 
 #include "common/channels.h"
 #include "common/messages.h"
 #include "common/testing/test_cameras.h"
+#include "common/text_file.h"
 #include "pangea/again_t.hpp"
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
+#include "vio/command_line.h"
 #include "vio/live_input.h"
 #include "vio/test_images.h"
 
@@ -120,6 +125,33 @@ class VioProcessTest : public ::testing::Test {
       }
     }
     return -1;
+  }
+
+  int64_t Refused(const std::string& reason) const {
+    for (const counter_t& counter : status_.refused) {
+      if (counter.name == reason) {
+        return counter.count;
+      }
+    }
+    return 0;
+  }
+  // A sensor at rest.
+  void PublishImu(int64_t utime, LocalBus* bus = nullptr) {
+    imu_t message{};
+    message.utime = utime;
+    message.accel_body.z = kGravity;
+    PublishMessage(bus == nullptr ? bus_ : *bus, "IMU_7", message);
+  }
+  void PublishImage(int64_t utime, const cv::Mat& image, LocalBus* bus = nullptr);
+  // From `from` to before `to`; no images where `image` is empty.
+  void PlayLive(int64_t from, int64_t to, const cv::Mat& image, LocalBus* bus = nullptr) {
+    for (int64_t utime = from; utime < to; utime += kImuStep_us) {
+      PublishImu(utime, bus);
+      if (utime % kImageStep_us == 0 && !image.empty()) {
+        PublishImage(utime, image, bus);
+      }
+    }
+    (bus == nullptr ? bus_ : *bus).Drain();
   }
 
   World world_;
@@ -332,25 +364,39 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
   EXPECT_GT(expected, 3);
 }
 
-std::vector<image_t> Chunks(int64_t utime, const cv::Mat& image) {
+std::vector<image_t> Chunks(int64_t utime, Bytes bytes, cv::Size size) {
   std::vector<image_t> chunks;
   constexpr int32_t kChunk = 30'000;
-  const auto total = static_cast<int32_t>(image.total());
+  const auto total = static_cast<int32_t>(bytes.size());
   for (int32_t offset = 0; offset < total; offset += kChunk) {
     image_t chunk{};
     chunk.utime = utime;
-    chunk.encoding = image_t::ENCODING_RAW8;
-    chunk.width = image.cols;
-    chunk.height = image.rows;
+    chunk.encoding = image_t::ENCODING_PNG;
+    chunk.width = size.width;
+    chunk.height = size.height;
     chunk.chunk = static_cast<int16_t>(offset / kChunk);
     chunk.num_chunks = static_cast<int16_t>((total + kChunk - 1) / kChunk);
     chunk.total_bytes = total;
     chunk.offset_bytes = offset;
     chunk.num_bytes = static_cast<int16_t>(std::min(kChunk, total - offset));
-    chunk.data.assign(image.data + offset, image.data + offset + chunk.num_bytes);
+    chunk.data.assign(bytes.data() + offset, bytes.data() + offset + chunk.num_bytes);
     chunks.push_back(chunk);
   }
   return chunks;
+}
+
+std::vector<image_t> Chunks(int64_t utime, const cv::Mat& image) {
+  std::vector<image_t> chunks = Chunks(utime, Bytes(image.data, image.total()), image.size());
+  for (image_t& chunk : chunks) {
+    chunk.encoding = image_t::ENCODING_RAW8;
+  }
+  return chunks;
+}
+
+void VioProcessTest::PublishImage(int64_t utime, const cv::Mat& image, LocalBus* bus) {
+  for (const image_t& chunk : Chunks(utime, image)) {
+    PublishMessage(bus == nullptr ? bus_ : *bus, "IMAGE_7", chunk);
+  }
 }
 
 TEST_F(VioProcessTest, LiveImagesComeInChunksAndWaitForTheirSamples) {
@@ -381,6 +427,175 @@ TEST_F(VioProcessTest, LiveImagesComeInChunksAndWaitForTheirSamples) {
   process.Tick(1);
   bus_.Drain();
   EXPECT_GE(status_.num_refused, 2);
+}
+
+TEST_F(VioProcessTest, OneStampFarAheadDoesNotBlockTheLiveStream) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  PlayLive(0, 300'000, image);
+  const size_t before = poses_.size();
+  PublishImu(std::numeric_limits<int64_t>::max());
+  PublishImu(3'600'000'000);
+  PublishImage(3'600'000'000, image);
+  PublishImage(std::numeric_limits<int64_t>::max(), image);
+  PlayLive(300'000, 600'000, image);
+  EXPECT_EQ(poses_.size(), before + 3);
+  EXPECT_EQ(poses_.back().utime, 500'000);
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_EQ(Refused("imu: far ahead of the last one"), 1);
+  EXPECT_EQ(Refused("imu: stamp out of range"), 1);
+  EXPECT_EQ(Refused("image: far ahead of the last one"), 1);
+  EXPECT_EQ(Refused("image: stamp out of range"), 1);
+  EXPECT_EQ(Counter("started_anew"), -1);
+}
+
+TEST_F(VioProcessTest, AFirstStampFarOffIsLeftBehind) {
+  for (const int64_t first : {int64_t{1'000'000'000'000}, int64_t{-1'000'000'000'000}}) {
+    LocalBus bus;
+    std::vector<pose_t> poses;
+    bus.Subscribe("POSE_7", [&](const std::string&, Bytes data) {
+      ASSERT_TRUE(DecodeMessage(data, &poses.emplace_back()));
+    });
+    VioProcess process(bus, options_, 0);
+    LiveInput live(process, 7, ImuNoise{});
+    PublishMessage(bus, "CAMERA_7", ToMessage(world_.camera()));
+    const cv::Mat image = RandomTexture(752, 480, 3);
+    PublishImu(first, &bus);
+    PublishImage(first, image, &bus);
+    bus.Drain();
+    poses.clear();
+    PlayLive(0, 2'500'000, image, &bus);
+    ASSERT_GE(poses.size(), 13u) << first;
+    EXPECT_EQ(poses.back().utime, 2'400'000);
+    EXPECT_EQ(poses.back().state, pose_t::STATE_TRACKING) << poses.back().reason;
+  }
+}
+
+// A sensor that is started again counts from 0: another map, and no end of the odometry.
+TEST_F(VioProcessTest, ALiveStreamThatGoesBackOpensANewMap) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  PlayLive(3'600'000'000, 3'603'000'000, image);
+  EXPECT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
+  PlayLive(0, 4'000'000, image);
+  EXPECT_EQ(poses_.back().utime, 3'900'000);
+  EXPECT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
+  process.Flush();
+  process.Tick(1);
+  bus_.Drain();
+  ASSERT_GE(keyframes_.size(), 2u);
+  EXPECT_EQ(keyframes_.front().id, (KeyframeId{{7, kMapUtime}, 0}));
+  EXPECT_EQ(keyframes_.back().id, (KeyframeId{{7, kMapUtime + 1}, 0}));
+  EXPECT_EQ(Counter("started_anew"), 2) << "the samples, then the images";
+  EXPECT_GE(Refused("imu: not after the last one"), 60);
+}
+
+// Chunks of images that never become whole give way in the order they began, whatever their stamps.
+TEST_F(VioProcessTest, PiecesOfImagesFarAheadDoNotTakeThePlaceOfOthers) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  for (int64_t i = 0; i < 20; ++i) {
+    PublishMessage(bus_, "IMAGE_7", Chunks(1'000'000'000 + i, image)[0]);
+  }
+  PlayLive(0, 300'000, image);
+  EXPECT_EQ(poses_.size(), 3u);
+}
+
+TEST_F(VioProcessTest, OddLivePngsAreRefusedAndCounted) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  std::vector<uint8_t> whole;
+  cv::imencode(".png", image, whole);
+  std::vector<uint8_t> huge = whole;
+  for (const size_t i : {16u, 20u}) {
+    huge[i + 2] = 0xea;  // 60000
+    huge[i + 3] = 0x60;
+  }
+  std::vector<uint8_t> bmp;
+  cv::imencode(".bmp", image, bmp);
+  const std::string pgm = "P5 60000 60000 255\n";
+  int64_t utime = 0;
+  for (const std::vector<uint8_t>& bytes : {huge, bmp, std::vector<uint8_t>(pgm.begin(), pgm.end()),
+                                            std::vector<uint8_t>(100), whole}) {
+    for (const image_t& chunk : Chunks(utime += 100'000, bytes, image.size())) {
+      PublishMessage(bus_, "IMAGE_7", chunk);
+    }
+  }
+  PlayLive(0, 600'000, cv::Mat());
+  ASSERT_EQ(poses_.size(), 1u);
+  EXPECT_EQ(poses_[0].utime, 500'000);
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_EQ(Refused("image: 60000x60000 pixels instead of 752x480"), 1);
+  EXPECT_EQ(Refused("image: BMP image; only PNG and JPEG are read"), 1);
+  EXPECT_EQ(Refused("image: PNM image; only PNG and JPEG are read"), 1);
+  EXPECT_EQ(Refused("image: corrupt image: neither PNG nor JPEG"), 1);
+}
+
+TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
+  VioProcess process(bus_, options_, 0);
+  EXPECT_EQ(process.NoPoseYet(), "no image came to the odometry");
+  process.Open(world_.camera(), ImuNoise{});
+  const cv::Mat image = RandomTexture(752, 480, 11);
+  for (int64_t utime = 0; utime < 3'000'000; utime += kImageStep_us) {
+    std::vector<ImuSample> imu;
+    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+      imu.push_back({next_imu_, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()});
+    }
+    process.AddTracks(world_.Frame(utime), image, imu);
+  }
+  EXPECT_EQ(process.NoPoseYet(),
+            "the odometry did not start in 30 images; at the last: the accelerometer shows 0.00 "
+            "m/s^2 on average, where gravity is 9.8");
+}
+
+// As somebody sees it who plays a recording of a dead sensor.
+TEST_F(VioProcessTest, TheProgramFailsWhenNoPoseComesOfARecording) {
+  namespace fs = std::filesystem;
+  const fs::path mav0 = fs::path(::testing::TempDir()) / "vio_no_pose" / "mav0";
+  fs::remove_all(mav0);
+  fs::create_directories(mav0 / "cam0/data");
+  fs::create_directories(mav0 / "imu0");
+  const std::string T_BS = "T_BS: {rows: 4, cols: 4, data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n";
+  WriteTextFile(mav0 / "cam0/sensor.yaml",
+                T_BS +
+                    "resolution: [320, 240]\nintrinsics: [200, 200, 160, 120]\n"
+                    "distortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n");
+  WriteTextFile(mav0 / "imu0/sensor.yaml",
+                T_BS +
+                    "rate_hz: 200\ngyroscope_noise_density: 1e-4\ngyroscope_random_walk: 2e-5\n"
+                    "accelerometer_noise_density: 3e-3\naccelerometer_random_walk: 4e-3\n");
+  std::string imu, images;
+  for (int64_t utime = 0; utime <= 2'000'000; utime += kImuStep_us) {
+    imu += fmt::format("{}000,0,0,0,0,0,0\n", utime);
+  }
+  for (int64_t utime = 0; utime < 2'000'000; utime += kImageStep_us / 2) {
+    images += fmt::format("{0}000,{0}.png\n", utime);
+    cv::imwrite((mav0 / fmt::format("cam0/data/{}.png", utime)).string(),
+                RandomTexture(320, 240, 3));
+  }
+  WriteTextFile(mav0 / "imu0/data.csv", imu);
+  WriteTextFile(mav0 / "cam0/data.csv", images);
+  std::vector<std::string> words = {"pangea-vio", "--agent", "1",           "--bus",      "none",
+                                    "--rate",     "max",     "--recording", mav0.string()};
+  std::vector<char*> argv;
+  for (std::string& word : words) {
+    argv.push_back(word.data());
+  }
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(RunCommandLine(static_cast<int>(argv.size()), argv.data()), 2);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "pangea-vio: no pose: the odometry did not start in 40 images; at the last: the "
+            "accelerometer shows 0.00 m/s^2 on average, where gravity is 9.8\n");
 }
 
 TEST_F(VioProcessTest, LiveNonsenseIsRefused) {

@@ -15,19 +15,20 @@ volatile std::sig_atomic_t stop_requested = 0;
 constexpr int64_t kTickInterval_us = 100'000;
 constexpr int kHandleTimeout_ms = 50;
 
+template <typename Clock>
+int64_t MicrosOf() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
+      .count();
+}
+
 }  // namespace
 
 int64_t WallUtime() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
+  static const int64_t begin = MicrosOf<std::chrono::system_clock>() - SteadyMicros();
+  return begin + SteadyMicros();
 }
 
-int64_t SteadyMicros() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
+int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
 
 void InstallSignalHandlers() {
   struct sigaction action {};
