@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 #include "programs.h"
 
 namespace pangea::tests {

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <random>
 
-#include "common/euroc.h"
-#include "common/trajectory.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 #include "programs.h"
 
 namespace pangea::tests {

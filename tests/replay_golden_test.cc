@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 #include "programs.h"
 
 namespace pangea::tests {

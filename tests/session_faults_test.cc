@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 #include "programs.h"
 
 namespace pangea::tests {

@@ -6,15 +6,15 @@
 #include <iostream>
 #include <optional>
 
-#include "common/bus/keyframe_outlet.h"
-#include "common/bus/log_writer.h"
-#include "common/bus/node.h"
-#include "common/bus/playback_pace.h"
-#include "common/bus/process.h"
-#include "common/channels.h"
-#include "common/euroc.h"
-#include "common/messages.h"
-#include "common/trajectory.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "log_file/log_writer.h"
+#include "bus/node.h"
+#include "bus/retransmission/playback_pace.h"
+#include "bus/process.h"
+#include "messages/channels.h"
+#include "recording/euroc.h"
+#include "messages/messages.h"
+#include "recording/trajectory.h"
 #include "keyframe_maker.h"
 
 namespace pangea::example {

@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "agent_handler/test_keyframes.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
+#include "messages/channels.h"
+#include "link/agent_key.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 

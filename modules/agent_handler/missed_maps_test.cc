@@ -9,7 +9,7 @@
 
 #include "agent_handler/link_test_world.h"
 #include "agent_handler/test_keyframes.h"
-#include "common/bus/keyframe_outlet.h"
+#include "bus/retransmission/keyframe_outlet.h"
 
 namespace pangea {
 namespace {

@@ -12,11 +12,11 @@
 #include <random>
 #include <set>
 
-#include "agent_handler/journal.h"
+#include "agent_handler/journal/journal.h"
 #include "agent_handler/test_keyframes.h"
-#include "common/bus/process.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
+#include "bus/process.h"
+#include "messages/channels.h"
+#include "link/agent_key.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "common/link/wire.h"
+#include "link/wire.h"
 
 namespace pangea {
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "common/euroc.h"
-#include "common/text_file.h"
+#include "recording/euroc.h"
+#include "recording/text_file.h"
 
 namespace pangea {
 namespace {

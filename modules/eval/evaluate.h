@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 #include "eval/metrics.h"
 #include "eval/plot.h"
 

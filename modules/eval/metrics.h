@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 #include "eval/alignment.h"
 
 namespace pangea {

@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "common/alignment/ba_factors.h"
-#include "common/testing/numeric_jacobian.h"
+#include "loop_verification/joint_ba/ba_factors.h"
+#include "core/testing/numeric_jacobian.h"
 #include "global_ba/ba_test_world.h"
 
 namespace pangea {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/alignment/ba_factors.h"
+#include "loop_verification/joint_ba/ba_factors.h"
 #include "global_ba/ba_factors.h"
 
 namespace pangea {

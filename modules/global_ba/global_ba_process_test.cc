@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "common/channels.h"
-#include "common/messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "global_ba/ba_test_world.h"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"

@@ -2,7 +2,7 @@
 
 // The global bundle adjustment's options as YAML keys.
 
-#include "common/yaml_options.h"
+#include "options/yaml_options.h"
 #include "global_ba/global_ba.h"
 
 namespace pangea {

@@ -1,5 +1,5 @@
-#include "common/alignment/alignment_yaml.h"
-#include "common/bus/process_main.h"
+#include "loop_verification/alignment_yaml.h"
+#include "bus/process_main.h"
 #include "inter_map_ba/inter_map_ba_process.h"
 
 // KEYFRAME_*, PLACE_MATCH --> InterMapBaProcess --> CONSTRAINT

@@ -3,7 +3,7 @@
 // A link's conditions as YAML keys: an agent's `link:` in a session file, and the emulator's
 // options.
 
-#include "common/yaml_options.h"
+#include "options/yaml_options.h"
 #include "link_emulator/link_conditions.h"
 
 namespace pangea {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "common/channels.h"
+#include "messages/channels.h"
 #include "link_emulator/link_emulator_process.h"
 
 namespace pangea {

@@ -8,10 +8,10 @@
 #include <cstdint>
 #include <map>
 
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/state_chunks.h"
+#include "bus/retransmission/missing.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "messages/state_chunks.h"
 #include "map_points/map_points.h"
 #include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"

@@ -2,7 +2,7 @@
 
 // The options of map_points as YAML keys.
 
-#include "common/yaml_options.h"
+#include "options/yaml_options.h"
 #include "map_points/map_points.h"
 
 namespace pangea {

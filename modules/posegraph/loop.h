@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "posegraph/four_dof.h"
+#include "posegraph/solver/four_dof.h"
 #include "posegraph/odometry_chain.h"
 
 namespace pangea {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "common/nearest_word.h"
+#include "options/nearest_word.h"
 #include "session/child_process.h"
 #include "session/session_file.h"
 

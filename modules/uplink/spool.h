@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
-#include "common/ids.h"
+#include "bus/bus.h"
+#include "core/ids.h"
 
 namespace pangea {
 

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "agent_handler/test_keyframes.h"
-#include "common/messages.h"
+#include "messages/messages.h"
 
 namespace pangea {
 namespace {

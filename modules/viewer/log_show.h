@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/scene_events.h"
+#include "viewer/scene/scene_events.h"
 #include "viewer/show.h"
 
 namespace pangea::viewer {

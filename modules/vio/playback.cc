@@ -9,7 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "common/csv.h"
+#include "recording/csv.h"
 
 namespace pangea::vio {
 namespace {

@@ -5,9 +5,9 @@
 #include <functional>
 #include <stdexcept>
 
-#include "common/channels.h"
-#include "common/messages.h"
-#include "common/trajectory.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "recording/trajectory.h"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "fuzz.h"
 #include "pangea_schemas.h"
-#include "session/message_fields.h"
+#include "log_tools/message_fields.h"
 
 namespace pangea::fuzz {
 namespace {

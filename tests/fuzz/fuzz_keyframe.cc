@@ -1,6 +1,6 @@
 // keyframe_t, from bytes to the domain type.
 
-#include "common/messages.h"
+#include "messages/messages.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -2,11 +2,11 @@
 
 #include <iterator>
 
-#include "common/catch_up_messages.h"
-#include "common/link/compression.h"
-#include "common/link/wire.h"
-#include "common/messages.h"
-#include "common/state_chunks.h"
+#include "messages/catch_up_messages.h"
+#include "link/compression.h"
+#include "link/wire.h"
+#include "messages/messages.h"
+#include "messages/state_chunks.h"
 #include "fuzz.h"
 
 namespace pangea::fuzz {

@@ -4,8 +4,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "common/euroc.h"
-#include "common/trajectory.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 #include "fuzz.h"
 
 namespace pangea::fuzz {

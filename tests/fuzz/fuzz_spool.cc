@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "common/messages.h"
+#include "messages/messages.h"
 #include "fuzz.h"
 #include "uplink/spool.h"
 

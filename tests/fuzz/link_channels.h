@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "common/link/wire.h"
+#include "link/wire.h"
 #include "fuzz.h"
 #include "pangea/again_t.hpp"
 #include "pangea/constraint_t.hpp"

@@ -1,0 +1,41 @@
+// pangea-keyframe-player: a log of keyframes ─► KEYFRAME_k
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "replay/keyframe_player.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
+               "pangea-keyframe-player");
+  pangea::session::KeyframePlayerOptions options;
+  std::string bus_url = pangea::kDefaultBusUrl;
+  std::string log, rate = "1";
+  app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
+      ->required()
+      ->check(CLI::Range(1, 65535));
+  app.add_option("--keyframes", log,
+                 "LCM log with KEYFRAME_k: of pangea-vio --out-keyframes, or of an earlier session")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app.add_option("--bus", bus_url, "LCM URL of the agent's bus")->capture_default_str();
+  app.add_option("--rate", rate, "1 = as recorded, 2 = twice as fast, max = as the server keeps up")
+      ->check(CLI::PositiveNumber | CLI::IsMember({"max"}))
+      ->capture_default_str();
+  app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
+      ->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    options.rate = rate == "max" ? 0 : std::stod(rate);
+    pangea::InstallSignalHandlers();
+    pangea::LcmBus bus(bus_url);
+    pangea::session::PlayKeyframes(bus, options,
+                                   pangea::session::ReadKeyframeLogOf(log, options.agent_id));
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-keyframe-player: {}\n", error.what());
+    return 1;
+  }
+}
