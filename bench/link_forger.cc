@@ -15,8 +15,8 @@
 #include <random>
 
 #include "bus/process.h"
-#include "messages/channels.h"
 #include "link/poll_loop.h"
+#include "messages/channels.h"
 
 namespace pangea {
 namespace {

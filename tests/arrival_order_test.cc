@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "log_file/log_writer.h"
-#include "recording/trajectory.h"
 #include "eval/metrics.h"
+#include "log_file/log_writer.h"
 #include "programs.h"
+#include "recording/trajectory.h"
 #include "replay/keyframe_log.h"
 
 namespace pangea::tests {

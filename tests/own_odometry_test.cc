@@ -6,9 +6,9 @@
 #include <fstream>
 #include <random>
 
+#include "programs.h"
 #include "recording/euroc.h"
 #include "recording/trajectory.h"
-#include "programs.h"
 
 namespace pangea::tests {
 namespace {

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "log_file/log_writer.h"
 #include "link/wire.h"
-#include "recording/trajectory.h"
+#include "log_file/log_writer.h"
 #include "programs.h"
+#include "recording/trajectory.h"
 #include "replay/keyframe_log.h"
 #include "uplink/thin.h"
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "bus/bus.h"
-#include "recording/euroc.h"
 #include "messages/messages.h"
+#include "recording/euroc.h"
 #include "replay/keyframe_log.h"
 
 namespace pangea::bench {

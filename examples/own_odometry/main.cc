@@ -6,16 +6,16 @@
 #include <iostream>
 #include <optional>
 
-#include "bus/retransmission/keyframe_outlet.h"
-#include "log_file/log_writer.h"
 #include "bus/node.h"
-#include "bus/retransmission/playback_pace.h"
 #include "bus/process.h"
-#include "messages/channels.h"
-#include "recording/euroc.h"
-#include "messages/messages.h"
-#include "recording/trajectory.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/playback_pace.h"
 #include "keyframe_maker.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 
 namespace pangea::example {
 namespace {

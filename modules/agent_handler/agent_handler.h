@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "link/map_continuity.h"
 #include "agent_handler/receiver.h"
+#include "link/map_continuity.h"
 
 namespace pangea {
 

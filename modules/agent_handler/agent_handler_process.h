@@ -14,8 +14,8 @@
 
 #include "agent_handler/agent_handler.h"
 #include "agent_handler/journal/archive.h"
-#include "bus/retransmission/missing.h"
 #include "bus/node.h"
+#include "bus/retransmission/missing.h"
 #include "link/agent_key.h"
 #include "link/poll_loop.h"
 

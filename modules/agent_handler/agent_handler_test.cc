@@ -6,8 +6,8 @@
 
 #include "agent_handler/journal/owed_questions.h"
 #include "agent_handler/journal/resend_queue.h"
-#include "agent_handler/test_keyframes.h"
 #include "link/compression.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "agent_handler/receiver.h"
-#include "uplink/sender.h"
 #include "link/test_content.h"
+#include "uplink/sender.h"
 
 namespace pangea {
 namespace {

@@ -13,10 +13,10 @@
 #include <set>
 
 #include "agent_handler/journal/journal.h"
-#include "agent_handler/test_keyframes.h"
 #include "bus/process.h"
-#include "messages/channels.h"
 #include "link/agent_key.h"
+#include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"

@@ -8,10 +8,10 @@
 #include <limits>
 #include <thread>
 
+#include "bus/node.h"
 #include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_first.h"
 #include "bus/retransmission/missing.h"
-#include "bus/node.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"

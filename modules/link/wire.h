@@ -1,8 +1,8 @@
 #pragma once
 
 // What crosses the agent link, as domain types, and as the compact bodies of packets
-// (link_session.h seals those). Like messages/messages.h, this is a border: past Parse every field is
-// bounded.
+// (link_session.h seals those). Like messages/messages.h, this is a border: past Parse every field
+// is bounded.
 //
 // A keyframe's encoded bytes are compressed and cut into pieces, each a packet of its own (paper,
 // IV.A: "we divide the packet ... artificially"; 4 KiB there, one Ethernet frame by default here).

@@ -9,12 +9,12 @@
 #include <optional>
 #include <stdexcept>
 
-#include "log_file/log_reader.h"
-#include "messages/channels.h"
 #include "core/median.h"
-#include "messages/messages.h"
 #include "fusion/fusion.h"
 #include "inter_map_ba/inter_map_ba.h"
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 namespace pangea::session {
 namespace {

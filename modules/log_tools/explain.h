@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "loop_verification/aligner.h"
 #include "core/server_messages.h"
+#include "loop_verification/aligner.h"
 
 namespace pangea::session {
 

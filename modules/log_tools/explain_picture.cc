@@ -6,8 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "recording/euroc.h"
 #include "log_tools/explain.h"
+#include "recording/euroc.h"
 
 namespace pangea::session {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "log_file/log_reader.h"
-#include "messages/channels.h"
 #include "log_tools/message_fields.h"
+#include "messages/channels.h"
 
 namespace pangea::session {
 namespace {

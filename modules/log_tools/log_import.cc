@@ -7,10 +7,10 @@
 
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
-#include "messages/channels.h"
-#include "messages/messages.h"
 #include "log_tools/log_edit.h"
 #include "log_tools/log_export.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "report/metrics/report_groups.h"
 
 namespace pangea::session {

@@ -8,7 +8,6 @@
 #include <map>
 #include <optional>
 
-#include "recording/text_file.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/log_edit.h"
@@ -16,6 +15,7 @@
 #include "log_tools/log_import.h"
 #include "log_tools/log_info.h"
 #include "log_tools/recording_arguments.h"
+#include "recording/text_file.h"
 #include "report/remembered.h"
 
 namespace pangea::session {

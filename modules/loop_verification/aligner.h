@@ -20,13 +20,13 @@
 #include <string>
 #include <vector>
 
-#include "loop_verification/joint_ba/joint_ba.h"
+#include "core/server_messages.h"
 #include "loop_verification/correspondences/match_sets.h"
 #include "loop_verification/correspondences/projection_search.h"
+#include "loop_verification/joint_ba/joint_ba.h"
 #include "loop_verification/surroundings.h"
 #include "loop_verification/upright_pnp.h"
 #include "loop_verification/window.h"
-#include "core/server_messages.h"
 
 namespace pangea {
 

@@ -23,11 +23,11 @@
 #include <string>
 #include <utility>
 
-#include "loop_verification/pair_judge.h"
 #include "bus/bus.h"
-#include "bus/retransmission/missing.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "bus/retransmission/missing.h"
+#include "loop_verification/pair_judge.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 

@@ -4,9 +4,9 @@
 // verdict depends on the two keyframes, those just before each and, within one map, the odometry
 // edges between them; so it is the same whatever the order of arrival. Not thread safe.
 
+#include "core/submap_store.h"
 #include "loop_verification/aligner.h"
 #include "loop_verification/drift_gate.h"
-#include "core/submap_store.h"
 
 namespace pangea {
 

@@ -5,10 +5,10 @@
 #include <random>
 
 #include "bus/bus.h"
-#include "messages/channels.h"
-#include "messages/messages.h"
 #include "core/testing/test_cameras.h"
 #include "map_points/map_points_process.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 namespace pangea {
 namespace {

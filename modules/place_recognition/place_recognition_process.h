@@ -17,10 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/in_order.h"
-#include "bus/retransmission/missing.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/missing.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/place_match_t.hpp"

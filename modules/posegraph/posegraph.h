@@ -27,11 +27,11 @@
 
 #include "core/keyframe.h"
 #include "core/server_messages.h"
-#include "posegraph/solver/group_solver.h"
 #include "posegraph/loop.h"
 #include "posegraph/odometry_chain.h"
 #include "posegraph/pair_evidence.h"
 #include "posegraph/refinement.h"
+#include "posegraph/solver/group_solver.h"
 
 namespace pangea {
 

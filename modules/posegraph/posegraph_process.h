@@ -28,10 +28,10 @@
 #include <set>
 #include <string>
 
-#include "bus/retransmission/in_order.h"
-#include "bus/retransmission/missing.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/missing.h"
 #include "messages/catch_up_messages.h"
 #include "messages/state_chunks.h"
 #include "pangea/again_t.hpp"

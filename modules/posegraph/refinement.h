@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "core/server_messages.h"
-#include "posegraph/solver/four_dof.h"
 #include "posegraph/odometry_chain.h"
+#include "posegraph/solver/four_dof.h"
 
 namespace pangea {
 

@@ -7,9 +7,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "core/median.h"
 #include "recording/csv.h"
 #include "recording/euroc_calibration.h"
-#include "core/median.h"
 
 namespace pangea {
 namespace {

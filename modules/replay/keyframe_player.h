@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "bus/retransmission/keyframe_outlet.h"
 #include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
 #include "replay/keyframe_log.h"
 
 namespace pangea::session {

@@ -10,12 +10,12 @@
 #include <stdexcept>
 
 #include "bus/bus.h"
-#include "log_file/log_reader.h"
-#include "log_file/log_writer.h"
-#include "messages/channels.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
 #include "pangea/again_t.hpp"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"

@@ -23,8 +23,8 @@
 #include <string>
 #include <vector>
 
-#include "options/yaml_options.h"
 #include "eval/table.h"
+#include "options/yaml_options.h"
 
 namespace pangea::session {
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <set>
 
-#include "log_file/log_reader.h"
 #include "bus/node.h"
-#include "messages/channels.h"
 #include "core/keyframe.h"
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
 #include "messages/messages.h"
 #include "messages/state_chunks.h"
 #include "pangea/correction_t.hpp"

@@ -11,8 +11,8 @@
 
 #include "core/ids.h"
 #include "core/server_messages.h"
-#include "recording/trajectory.h"
 #include "pangea/status_t.hpp"
+#include "recording/trajectory.h"
 
 namespace pangea::session {
 

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "log_file/log_writer.h"
 #include "core/keyframe.h"
 #include "core/rigid3.h"
 #include "core/server_messages.h"
+#include "log_file/log_writer.h"
 #include "recording/trajectory.h"
 #include "report/report.h"
 

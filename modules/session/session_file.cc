@@ -8,9 +8,9 @@
 #include <set>
 #include <stdexcept>
 
+#include "link_emulator/link_conditions_yaml.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
-#include "link_emulator/link_conditions_yaml.h"
 
 namespace pangea::session {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "bus/process.h"
 #include "link/agent_key.h"
-#include "recording/text_file.h"
 #include "link_emulator/link_conditions_yaml.h"
+#include "recording/text_file.h"
 #include "session/buses.h"
 #include "session/child_process.h"
 #include "session/kept_processes.h"

@@ -12,12 +12,12 @@
 #include <thread>
 
 #include "sim/euroc_writer.h"
-#include "sim/render/frame_cache.h"
 #include "sim/imu_simulator.h"
 #include "sim/random.h"
+#include "sim/render/frame_cache.h"
 #include "sim/render/renderer.h"
-#include "sim/schedule.h"
 #include "sim/render/tracks.h"
+#include "sim/schedule.h"
 
 namespace pangea::sim {
 namespace {

@@ -16,12 +16,12 @@
 
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
-#include "sim/render/cameras.h"
 #include "sim/path/path_generator.h"
 #include "sim/path/path_steps.h"
-#include "sim/scene/scene_builder.h"
-#include "sim/render/sensor.h"
 #include "sim/path/spline_path.h"
+#include "sim/render/cameras.h"
+#include "sim/render/sensor.h"
+#include "sim/scene/scene_builder.h"
 
 namespace pangea::sim {
 

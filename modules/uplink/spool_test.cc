@@ -8,7 +8,7 @@
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
 
-#include "agent_handler/test_keyframes.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "bus/bus.h"
-#include "bus/retransmission/missing.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "bus/retransmission/missing.h"
 #include "messages/catch_up_messages.h"
 #include "viewer/scene/scene_events.h"
 #include "viewer/show.h"

@@ -19,8 +19,8 @@
 
 #include "core/keyframe.h"
 #include "vio/front_end/describer.h"
-#include "vio/window/estimator.h"
 #include "vio/front_end/tracker.h"
+#include "vio/window/estimator.h"
 
 namespace pangea::vio {
 

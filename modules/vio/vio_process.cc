@@ -7,9 +7,9 @@
 
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "recording/trajectory.h"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
+#include "recording/trajectory.h"
 
 namespace pangea::vio {
 namespace {

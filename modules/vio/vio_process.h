@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/keyframe_outlet.h"
-#include "log_file/log_writer.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "log_file/log_writer.h"
 #include "recording/euroc.h"
 #include "vio/live/live_alignment.h"
 #include "vio/live/shown_pose.h"

@@ -7,16 +7,16 @@
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
+#include "core/testing/test_cameras.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "core/testing/test_cameras.h"
 #include "pangea/again_t.hpp"
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
-#include "vio/live/live_input.h"
 #include "vio/front_end/test_images.h"
+#include "vio/live/live_input.h"
 
 namespace pangea::vio {
 namespace {

@@ -4,9 +4,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "fuzz.h"
 #include "recording/euroc.h"
 #include "recording/trajectory.h"
-#include "fuzz.h"
 
 namespace pangea::fuzz {
 namespace {

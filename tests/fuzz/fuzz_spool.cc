@@ -2,8 +2,8 @@
 
 #include <stdexcept>
 
-#include "messages/messages.h"
 #include "fuzz.h"
+#include "messages/messages.h"
 #include "uplink/spool.h"
 
 namespace pangea::fuzz {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "bus/retransmission/in_order.h"
-#include "messages/catch_up_messages.h"
 #include "core/server_messages.h"
+#include "messages/catch_up_messages.h"
 
 namespace pangea {
 

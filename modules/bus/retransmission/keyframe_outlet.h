@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "bus/node.h"
-#include "messages/catch_up_messages.h"
 #include "core/ids.h"
+#include "messages/catch_up_messages.h"
 
 namespace pangea {
 

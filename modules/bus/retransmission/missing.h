@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
-#include "bus/retransmission/in_order.h"
 #include "bus/node.h"
+#include "bus/retransmission/in_order.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "pangea/again_t.hpp"

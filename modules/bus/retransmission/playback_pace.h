@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "bus/retransmission/keyframe_outlet.h"
 #include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
 
 namespace pangea {
 

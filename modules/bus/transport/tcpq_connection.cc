@@ -16,8 +16,8 @@
 #include <thread>
 #include <utility>
 
-#include "bus/transport/big_endian.h"
 #include "bus/process.h"
+#include "bus/transport/big_endian.h"
 
 namespace pangea {
 namespace {

@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "loop_verification/correspondences/point_observation.h"
 #include "core/server_messages.h"
+#include "loop_verification/correspondences/point_observation.h"
 
 namespace pangea {
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "loop_verification/correspondences/point_observation.h"
 #include "core/testing/numeric_jacobian.h"
+#include "loop_verification/correspondences/point_observation.h"
 
 namespace pangea {
 namespace {

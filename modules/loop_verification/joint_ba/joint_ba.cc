@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "loop_verification/joint_ba/joint_problem.h"
 #include "core/median.h"
+#include "loop_verification/joint_ba/joint_problem.h"
 
 namespace pangea {
 namespace {

@@ -4,9 +4,9 @@
 #include <sodium.h>
 
 #include "report/html/report_charts.h"
+#include "report/html/report_svg.h"
 #include "report/metrics/report_paper.h"
 #include "report/report_pictures.h"
-#include "report/html/report_svg.h"
 #include "report/report_tables.h"
 
 namespace pangea::session {

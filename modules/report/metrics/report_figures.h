@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "eval/metrics.h"
-#include "report/report.h"
 #include "report/metrics/report_groups.h"
 #include "report/metrics/report_live.h"
-#include "report/report_log.h"
 #include "report/metrics/report_truth.h"
+#include "report/report.h"
+#include "report/report_log.h"
 
 namespace pangea::session {
 

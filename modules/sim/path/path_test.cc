@@ -7,9 +7,9 @@
 #include "sim/imu_simulator.h"
 #include "sim/path/path_generator.h"
 #include "sim/path/path_steps.h"
+#include "sim/path/spline_path.h"
 #include "sim/random.h"
 #include "sim/scene/route.h"
-#include "sim/path/spline_path.h"
 #include "sim/scene/test_scenes.h"
 
 namespace pangea::sim {

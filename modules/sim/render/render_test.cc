@@ -7,14 +7,14 @@
 #include <opencv2/core.hpp>
 
 #include "core/testing/test_cameras.h"
-#include "sim/render/cameras.h"
 #include "sim/random.h"
+#include "sim/render/cameras.h"
 #include "sim/render/renderer.h"
+#include "sim/render/sensor.h"
+#include "sim/render/tracks.h"
 #include "sim/scene/route.h"
 #include "sim/scene/scene_builder.h"
-#include "sim/render/sensor.h"
 #include "sim/scene/test_scenes.h"
-#include "sim/render/tracks.h"
 
 namespace pangea::sim {
 namespace {

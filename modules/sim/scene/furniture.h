@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/scene/painter.h"
 #include "sim/random.h"
+#include "sim/scene/painter.h"
 #include "sim/scene/scene.h"
 
 namespace pangea::sim {

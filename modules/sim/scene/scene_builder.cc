@@ -7,9 +7,9 @@
 #include <cmath>
 #include <utility>
 
+#include "sim/random.h"
 #include "sim/scene/furniture.h"
 #include "sim/scene/painter.h"
-#include "sim/random.h"
 #include "sim/scene/route.h"
 
 namespace pangea::sim {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "viewer/show.h"
 #include "viewer/scene/update.h"
+#include "viewer/show.h"
 
 namespace pangea::viewer {
 

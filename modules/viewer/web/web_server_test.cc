@@ -10,8 +10,8 @@
 #include <fstream>
 #include <string>
 
-#include "viewer/web/page_link.h"
 #include "viewer/viewer_test_world.h"
+#include "viewer/web/page_link.h"
 
 namespace pangea::viewer {
 namespace {

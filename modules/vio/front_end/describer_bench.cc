@@ -9,8 +9,8 @@
 #include <ctime>
 #include <iostream>
 
-#include "recording/euroc.h"
 #include "core/matching.h"
+#include "recording/euroc.h"
 #include "vio/front_end/describer.h"
 #include "vio/front_end/tracker.h"
 

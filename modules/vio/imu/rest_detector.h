@@ -9,9 +9,9 @@
 #include <optional>
 
 #include "core/camera_model.h"
+#include "vio/front_end/tracks.h"
 #include "vio/imu/imu_buffer.h"
 #include "vio/keyframes/track_history.h"
-#include "vio/front_end/tracks.h"
 
 namespace pangea::vio {
 

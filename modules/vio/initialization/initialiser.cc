@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/median.h"
 #include "core/imu/preintegration.h"
+#include "core/median.h"
 #include "vio/imu/imu_noise.h"
 #include "vio/initialization/initial_solution.h"
 

@@ -17,8 +17,8 @@
 
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
-#include "vio/initialization/initial_solution.h"
 #include "vio/front_end/tracks.h"
+#include "vio/initialization/initial_solution.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

@@ -9,9 +9,9 @@
 
 #include "core/imu/preintegration.h"
 #include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
 #include "vio/initialization/initial_solution.h"
 #include "vio/initialization/start_test_world.h"
-#include "core/testing/test_random.h"
 
 namespace pangea::vio {
 namespace {

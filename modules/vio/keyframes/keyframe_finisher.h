@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "vio/window/estimator.h"
 #include "vio/keyframes/track_history.h"
+#include "vio/window/estimator.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/camera_model.h"
-#include "vio/window/point_geometry.h"
 #include "vio/front_end/tracks.h"
+#include "vio/window/point_geometry.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vio/keyframes/frame_choice.h"
 #include "vio/imu/imu_buffer.h"
-#include "vio/initialization/initialiser.h"
-#include "vio/keyframes/keyframe_finisher.h"
-#include "vio/window/landmark_store.h"
 #include "vio/imu/rest_detector.h"
+#include "vio/initialization/initialiser.h"
+#include "vio/keyframes/frame_choice.h"
+#include "vio/keyframes/keyframe_finisher.h"
 #include "vio/keyframes/track_history.h"
+#include "vio/window/landmark_store.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_start.h"
 

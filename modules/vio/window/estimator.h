@@ -17,8 +17,8 @@
 
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
-#include "core/keyframe.h"
 #include "core/imu/preintegration.h"
+#include "core/keyframe.h"
 #include "core/rigid3.h"
 #include "vio/front_end/tracks.h"
 #include "vio/window/window_poses.h"
