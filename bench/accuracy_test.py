@@ -180,7 +180,7 @@ class MeasuredTest(unittest.TestCase):
 class PaperTest(unittest.TestCase):
     """A session's report compares with the paper too, and has no Python: its figures are these."""
 
-    SOURCE = Path(__file__).resolve().parents[1] / "modules/session/report_paper.cc"
+    SOURCE = Path(__file__).resolve().parents[1] / "modules/report/metrics/report_paper.cc"
 
     def rows(self, names):
         pattern = r"\{" + r'"(MH_0\d)", ' * names + r"([\d., ]+)\}"

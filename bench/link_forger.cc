@@ -14,9 +14,9 @@
 #include <iostream>
 #include <random>
 
-#include "common/bus/process.h"
-#include "common/channels.h"
-#include "common/link/poll_loop.h"
+#include "bus/process.h"
+#include "link/poll_loop.h"
+#include "messages/channels.h"
 
 namespace pangea {
 namespace {

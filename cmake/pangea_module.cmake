@@ -26,6 +26,22 @@ if(PANGEA_SANITIZE)
   endif()
 endif()
 
+# The include path of one module alone: a folder in which only this module's is. So a library sees the
+# headers of the modules whose libraries it names, and of those that these name, and no others: an
+# include that goes round the layers does not compile.
+function(pangea_include_root out)
+  file(RELATIVE_PATH module ${CMAKE_SOURCE_DIR}/modules ${CMAKE_CURRENT_SOURCE_DIR})
+  string(REGEX REPLACE "/.*" "" module ${module})
+  if(module STREQUAL "..")  # tests, benches and examples have no headers for others
+    set(${out} "" PARENT_SCOPE)
+    return()
+  endif()
+  set(root ${CMAKE_BINARY_DIR}/include_roots/${module})
+  file(MAKE_DIRECTORY ${root})
+  file(CREATE_LINK ${CMAKE_SOURCE_DIR}/modules/${module} ${root}/${module} SYMBOLIC)
+  set(${out} ${root} PARENT_SCOPE)
+endfunction()
+
 # pangea_library(name [INTERNAL] [SOURCES ...] DEPENDS ...): a static library, or one of headers alone,
 # included as "<module>/<header>.h"; installed as pangea::<name without pangea_>. INTERNAL: not
 # installed (of tests and benches).
@@ -38,7 +54,8 @@ function(pangea_library name)
     add_library(${name} INTERFACE)
     set(scope INTERFACE)
   endif()
-  target_include_directories(${name} ${scope} $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/modules>
+  pangea_include_root(root)
+  target_include_directories(${name} ${scope} $<BUILD_INTERFACE:${root}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/pangea>)
   target_compile_features(${name} ${scope} cxx_std_20)
   target_link_libraries(${name} ${scope} ${ARG_DEPENDS})
@@ -71,7 +88,8 @@ endfunction()
 function(pangea_program name)
   cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
-  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
+  pangea_include_root(root)
+  target_include_directories(${name} PRIVATE ${root})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} CLI11::CLI11)
   # What takes time is in the libraries; CLI11 compiles a third faster so.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
@@ -107,7 +125,8 @@ function(pangea_test name)
   add_executable(${name} ${ARG_SOURCES})
   # A test spends its time in the libraries; its own code is compiled a third faster so.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
-  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/modules)
+  pangea_include_root(root)
+  target_include_directories(${name} PRIVATE ${root})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE PANGEA_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
     PANGEA_BINARY_DIR="${CMAKE_BINARY_DIR}")

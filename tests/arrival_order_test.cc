@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "common/bus/log_writer.h"
-#include "common/trajectory.h"
 #include "eval/metrics.h"
+#include "log_file/log_writer.h"
 #include "programs.h"
-#include "session/keyframe_log.h"
+#include "recording/trajectory.h"
+#include "replay/keyframe_log.h"
 
 namespace pangea::tests {
 namespace {

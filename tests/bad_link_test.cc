@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/trajectory.h"
 #include "programs.h"
+#include "recording/trajectory.h"
 
 namespace pangea::tests {
 namespace {

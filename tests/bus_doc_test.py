@@ -73,7 +73,7 @@ class BusDoc(unittest.TestCase):
             self.assertEqual(described[name], members, name)
 
     def test_every_channel(self):
-        header = (ROOT / "modules/common/channels.h").read_text()
+        header = (ROOT / "modules/messages/channels.h").read_text()
         named = set(re.findall(r'"([A-Z_]+_)\{\}"', header)) | set(re.findall(r' = "([A-Z_]+)";', header))
         in_doc = {re.sub(r"_(k|<process>)$", "_", name) for name, _ in CHANNELS}
         self.assertEqual(in_doc, named)
@@ -107,7 +107,7 @@ class BusDoc(unittest.TestCase):
 
     def test_default_urls_are_the_programs(self):
         described = set(quoted(" ".join(row[2] for row in table("Three buses"))))
-        sources = [ROOT / "modules" / name for name in ("common/link/wire.h", "common/bus/bus.h")]
+        sources = [ROOT / "modules" / name for name in ("link/wire.h", "bus/bus.h")]
         in_code = {url for path in sources for url in re.findall(r'"(udpm://[^"]+)"', path.read_text())}
         self.assertEqual(in_code, {url for url in described if url.startswith("udpm")})
 

@@ -9,8 +9,8 @@
 
 #include <fstream>
 
-#include "common/bus/log_reading.h"
-#include "common/bus/log_scan.h"
+#include "log_file/log_reading.h"
+#include "log_file/log_scan.h"
 #include "programs.h"
 
 namespace pangea::tests {

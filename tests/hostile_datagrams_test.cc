@@ -14,12 +14,12 @@
 #include <random>
 #include <thread>
 
-#include "agent_handler/test_keyframes.h"
-#include "common/bus/process.h"
-#include "common/bus/test_datagrams.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
-#include "common/testing/program.h"
+#include "bus/process.h"
+#include "bus/transport/test_datagrams.h"
+#include "core/testing/program.h"
+#include "link/agent_key.h"
+#include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
 #include "pangea/status_t.hpp"
 

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <random>
 
-#include "common/euroc.h"
-#include "common/trajectory.h"
 #include "programs.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 
 namespace pangea::tests {
 namespace {

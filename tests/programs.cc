@@ -11,7 +11,7 @@
 #include <limits>
 #include <sstream>
 
-#include "common/trajectory.h"
+#include "recording/trajectory.h"
 
 namespace pangea::tests {
 

@@ -8,9 +8,9 @@
 #include <optional>
 #include <set>
 
-#include "common/bus/log_reader.h"
-#include "common/bus/log_writer.h"
-#include "common/channels.h"
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
 #include "pangea/constraint_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "programs.h"

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "common/trajectory.h"
 #include "programs.h"
+#include "recording/trajectory.h"
 
 namespace pangea::tests {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <fstream>
 
-#include "common/trajectory.h"
 #include "programs.h"
+#include "recording/trajectory.h"
 
 namespace pangea::tests {
 namespace {

@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/bus/log_writer.h"
-#include "common/link/wire.h"
-#include "common/trajectory.h"
+#include "link/wire.h"
+#include "log_file/log_writer.h"
 #include "programs.h"
-#include "session/keyframe_log.h"
+#include "recording/trajectory.h"
+#include "replay/keyframe_log.h"
 #include "uplink/thin.h"
 
 namespace pangea::tests {

@@ -2,7 +2,7 @@
 
 PAPER_*: Liu et al., tables II-IV. ORB-SLAM3: its tables II (single sessions) and V (multi-session). COVINS: its table 1,
 aligned with scale. All of these were measured on the real EuRoC recordings. The paper's stand in
-modules/session/report_paper.cc as well; accuracy_test.py compares the two.
+modules/report/metrics/report_paper.cc as well; accuracy_test.py compares the two.
 """
 
 SEQUENCES = ["MH_01", "MH_02", "MH_03", "MH_04", "MH_05"]

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "common/ids.h"
+#include "core/ids.h"
 
 namespace pangea::bench {
 

@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "common/bus/bus.h"
-#include "common/euroc.h"
-#include "common/messages.h"
-#include "session/keyframe_log.h"
+#include "bus/bus.h"
+#include "messages/messages.h"
+#include "recording/euroc.h"
+#include "replay/keyframe_log.h"
 
 namespace pangea::bench {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "common/trajectory.h"
+#include "core/keyframe.h"
+#include "recording/trajectory.h"
 
 namespace pangea::bench {
 

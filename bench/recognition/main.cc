@@ -6,7 +6,7 @@
 
 #include "bench/recognition/input.h"
 #include "bench/recognition/report.h"
-#include "common/text_file.h"
+#include "files/text_file.h"
 
 namespace pangea::bench {
 namespace {

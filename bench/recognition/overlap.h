@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "common/keyframe.h"
+#include "core/keyframe.h"
 
 namespace pangea::bench {
 

@@ -9,7 +9,7 @@
 #include "bench/recognition/input.h"
 #include "bench/recognition/overlap.h"
 #include "bench/recognition/report.h"
-#include "common/testing/test_cameras.h"
+#include "core/testing/test_cameras.h"
 
 namespace pangea::bench {
 namespace {

@@ -9,7 +9,7 @@
 #include "fusion/fusion.h"
 #include "inter_map_ba/inter_map_ba.h"
 #include "place_recognition/place_recognition.h"
-#include "session/report_truth.h"
+#include "report/metrics/report_truth.h"
 
 namespace pangea::bench {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bench/recognition/curve.h"
-#include "common/keyframe.h"
-#include "common/trajectory.h"
+#include "core/keyframe.h"
+#include "recording/trajectory.h"
 
 namespace pangea::bench {
 

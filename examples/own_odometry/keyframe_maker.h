@@ -13,9 +13,9 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "common/keyframe.h"
-#include "vio/describer.h"
-#include "vio/tracker.h"
+#include "core/keyframe.h"
+#include "vio/front_end/describer.h"
+#include "vio/front_end/tracker.h"
 
 namespace pangea::example {
 

@@ -6,16 +6,16 @@
 #include <iostream>
 #include <optional>
 
-#include "common/bus/keyframe_outlet.h"
-#include "common/bus/log_writer.h"
-#include "common/bus/node.h"
-#include "common/bus/playback_pace.h"
-#include "common/bus/process.h"
-#include "common/channels.h"
-#include "common/euroc.h"
-#include "common/messages.h"
-#include "common/trajectory.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/playback_pace.h"
 #include "keyframe_maker.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 
 namespace pangea::example {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/link/compression.h"
+#include "link/compression.h"
 
 namespace pangea {
 namespace {

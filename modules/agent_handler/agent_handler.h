@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "common/link/map_continuity.h"
-#include "common/link/receiver.h"
+#include "agent_handler/receiver.h"
+#include "link/map_continuity.h"
 
 namespace pangea {
 

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <utility>
 
-#include "common/channels.h"
-#include "common/messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 
 namespace pangea {

@@ -13,11 +13,11 @@
 #include <string>
 
 #include "agent_handler/agent_handler.h"
-#include "agent_handler/archive.h"
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/link/agent_key.h"
-#include "common/link/poll_loop.h"
+#include "agent_handler/journal/archive.h"
+#include "bus/node.h"
+#include "bus/retransmission/missing.h"
+#include "link/agent_key.h"
+#include "link/poll_loop.h"
 
 namespace pangea {
 

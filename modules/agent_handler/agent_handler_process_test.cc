@@ -10,8 +10,8 @@
 #include <filesystem>
 
 #include "agent_handler/link_test_world.h"
-#include "agent_handler/test_keyframes.h"
-#include "common/link/agent_key.h"
+#include "link/agent_key.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"

@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "agent_handler/owed_questions.h"
-#include "agent_handler/resend_queue.h"
-#include "agent_handler/test_keyframes.h"
-#include "common/link/compression.h"
+#include "agent_handler/journal/owed_questions.h"
+#include "agent_handler/journal/resend_queue.h"
+#include "link/compression.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <iostream>
 
-#include "common/link/agent_key.h"
+#include "link/agent_key.h"
 
 namespace pangea {
 

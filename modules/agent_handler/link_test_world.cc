@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "agent_handler/test_keyframes.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
+#include "link/agent_key.h"
+#include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "agent_handler/agent_handler_process.h"
-#include "common/bus/bus.h"
+#include "bus/bus.h"
 #include "uplink/uplink_process.h"
 
 namespace pangea {

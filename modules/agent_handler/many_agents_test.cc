@@ -8,9 +8,9 @@
 #include <stdexcept>
 
 #include "agent_handler/link_test_world.h"
-#include "agent_handler/test_keyframes.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
+#include "link/agent_key.h"
+#include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/status_t.hpp"
 
 namespace pangea {

@@ -8,8 +8,8 @@
 #include <memory>
 
 #include "agent_handler/link_test_world.h"
-#include "agent_handler/test_keyframes.h"
-#include "common/bus/keyframe_outlet.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

@@ -9,13 +9,13 @@
 #include <random>
 #include <set>
 
-#include "agent_handler/journal.h"
-#include "agent_handler/test_keyframes.h"
-#include "common/bus/process.h"
-#include "common/bus/test_datagrams.h"
-#include "common/channels.h"
-#include "common/link/agent_key.h"
-#include "common/testing/program.h"
+#include "agent_handler/journal/journal.h"
+#include "bus/process.h"
+#include "bus/transport/test_datagrams.h"
+#include "core/testing/program.h"
+#include "link/agent_key.h"
+#include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"

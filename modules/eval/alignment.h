@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/rigid3.h"
+#include "core/rigid3.h"
 
 namespace pangea {
 

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "common/csv.h"
-#include "common/euroc.h"
-#include "common/text_file.h"
+#include "files/csv.h"
+#include "files/text_file.h"
+#include "recording/euroc.h"
 
 namespace pangea {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "common/trajectory.h"
 #include "eval/metrics.h"
 #include "eval/plot.h"
+#include "recording/trajectory.h"
 
 namespace pangea {
 

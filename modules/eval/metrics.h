@@ -9,8 +9,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/trajectory.h"
 #include "eval/alignment.h"
+#include "recording/trajectory.h"
 
 namespace pangea {
 

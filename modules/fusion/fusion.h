@@ -6,7 +6,7 @@
 // between the two bodies with its covariance, or the reason it was refused. Which maps form a
 // group follows from the constraints and is the posegraph's to say: nothing is glued here.
 
-#include "common/alignment/pair_judge.h"
+#include "loop_verification/pair_judge.h"
 
 namespace pangea {
 

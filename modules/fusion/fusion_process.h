@@ -2,8 +2,8 @@
 
 // KEYFRAME_*, PLACE_MATCH (candidates of kind inter) in; CONSTRAINT, STATUS_fusion out.
 
-#include "common/alignment/candidate_process.h"
 #include "fusion/fusion.h"
+#include "loop_verification/candidate_process.h"
 
 namespace pangea {
 

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "common/alignment/alignment_test_world.h"
-#include "common/channels.h"
-#include "common/messages.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "loop_verification/alignment_test_world.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"
 

@@ -1,6 +1,6 @@
-#include "common/alignment/alignment_yaml.h"
-#include "common/bus/process_main.h"
+#include "bus/process_main.h"
 #include "fusion/fusion_process.h"
+#include "loop_verification/alignment_yaml.h"
 
 // KEYFRAME_*, PLACE_MATCH --> FusionProcess --> CONSTRAINT
 int main(int argc, char** argv) {

@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "common/alignment/ba_factors.h"
+#include "loop_verification/joint_ba/ba_factors.h"
 
 namespace pangea {
 namespace {

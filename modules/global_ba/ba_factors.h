@@ -2,13 +2,14 @@
 
 // Residuals of the global bundle adjustment, with analytic Jacobians.
 //
-// Blocks: a pose T_map_body is 7 doubles with RigidManifold (common/alignment/ba_factors.h: tangent
-// (dp, dtheta) in the left frame); a motion is 9: velocity in the map frame (m/s), gyro bias
-// (rad/s), accelerometer bias (m/s^2); a landmark is its position in the map frame (metres).
+// Blocks: a pose T_map_body is 7 doubles with RigidManifold
+// (loop_verification/joint_ba/ba_factors.h: tangent (dp, dtheta) in the left frame); a motion is 9:
+// velocity in the map frame (m/s), gyro bias (rad/s), accelerometer bias (m/s^2); a landmark is its
+// position in the map frame (metres).
 
 #include <ceres/sized_cost_function.h>
 
-#include "common/inertial_factor.h"
+#include "core/imu/inertial_factor.h"
 
 namespace pangea {
 
@@ -33,7 +34,8 @@ class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
 };
 
 // The preintegrated motion between two keyframes, and biases that wander
-// (common/inertial_factor.h). Blocks: pose and motion of the first, pose and motion of the second.
+// (core/imu/inertial_factor.h). Blocks: pose and motion of the first, pose and motion of the
+// second.
 class InertialFactor : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
   InertialFactor(const Preintegration& measured, const ImuNoise& noise);

@@ -4,9 +4,9 @@
 
 #include <random>
 
-#include "common/alignment/ba_factors.h"
-#include "common/testing/numeric_jacobian.h"
+#include "core/testing/numeric_jacobian.h"
 #include "global_ba/ba_test_world.h"
+#include "loop_verification/joint_ba/ba_factors.h"
 
 namespace pangea {
 namespace {

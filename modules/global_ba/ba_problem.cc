@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/alignment/ba_factors.h"
 #include "global_ba/ba_factors.h"
+#include "loop_verification/joint_ba/ba_factors.h"
 
 namespace pangea {
 namespace {

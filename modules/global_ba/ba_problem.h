@@ -26,8 +26,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/ids.h"
-#include "common/inertial_factor.h"
+#include "core/ids.h"
+#include "core/imu/inertial_factor.h"
 
 namespace pangea {
 

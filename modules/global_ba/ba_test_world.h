@@ -7,8 +7,8 @@
 
 #include <vector>
 
-#include "common/keyframe.h"
-#include "common/server_messages.h"
+#include "core/keyframe.h"
+#include "core/server_messages.h"
 #include "global_ba/ba_problem.h"
 
 namespace pangea {

@@ -21,8 +21,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/server_messages.h"
-#include "common/submap_store.h"
+#include "core/server_messages.h"
+#include "core/submap_store.h"
 #include "global_ba/ba_problem.h"
 #include "global_ba/group_world.h"
 

@@ -5,9 +5,9 @@
 #include <functional>
 #include <utility>
 
-#include "common/catch_up_messages.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "messages/catch_up_messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 namespace pangea {
 namespace {

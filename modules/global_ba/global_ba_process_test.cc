@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "common/channels.h"
-#include "common/messages.h"
 #include "global_ba/ba_test_world.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"
 

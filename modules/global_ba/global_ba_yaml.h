@@ -2,8 +2,8 @@
 
 // The global bundle adjustment's options as YAML keys.
 
-#include "common/yaml_options.h"
 #include "global_ba/global_ba.h"
+#include "options/yaml_options.h"
 
 namespace pangea {
 

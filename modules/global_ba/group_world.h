@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "common/server_messages.h"
-#include "common/submap_store.h"
+#include "core/server_messages.h"
+#include "core/submap_store.h"
 #include "global_ba/landmarks.h"
 #include "global_ba/redundancy.h"
 

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "common/alignment/point_observation.h"
+#include "loop_verification/correspondences/point_observation.h"
 
 namespace pangea {
 namespace {

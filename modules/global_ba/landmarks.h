@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/submap_store.h"
+#include "core/submap_store.h"
 #include "global_ba/ba_problem.h"
 
 namespace pangea {

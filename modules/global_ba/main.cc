@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "common/bus/process_main.h"
+#include "bus/process_main.h"
 #include "global_ba/global_ba_process.h"
 #include "global_ba/global_ba_yaml.h"
 

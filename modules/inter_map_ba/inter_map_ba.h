@@ -7,7 +7,7 @@
 // adjustment of the windows before both keyframes, as in fusion; besides, the drift the loop would
 // mean must be one that odometry can make over that path.
 
-#include "common/alignment/pair_judge.h"
+#include "loop_verification/pair_judge.h"
 
 namespace pangea {
 

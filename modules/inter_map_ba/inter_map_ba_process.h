@@ -2,8 +2,8 @@
 
 // KEYFRAME_*, PLACE_MATCH (candidates of kind intra) in; CONSTRAINT, STATUS_inter_map_ba out.
 
-#include "common/alignment/candidate_process.h"
 #include "inter_map_ba/inter_map_ba.h"
+#include "loop_verification/candidate_process.h"
 
 namespace pangea {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <numbers>
 
-#include "common/alignment/alignment_test_world.h"
+#include "loop_verification/alignment_test_world.h"
 
 namespace pangea {
 namespace {

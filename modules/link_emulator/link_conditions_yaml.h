@@ -3,8 +3,8 @@
 // A link's conditions as YAML keys: an agent's `link:` in a session file, and the emulator's
 // options. What is out of its range is refused by file, line and key.
 
-#include "common/yaml_options.h"
 #include "link_emulator/link_conditions.h"
+#include "options/yaml_options.h"
 
 namespace pangea {
 

@@ -21,7 +21,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/bus/bus.h"
+#include "bus/bus.h"
 #include "link_emulator/link_conditions.h"
 
 namespace pangea {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/channels.h"
+#include "messages/channels.h"
 
 namespace pangea {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/node.h"
-#include "common/link/poll_loop.h"
+#include "bus/node.h"
+#include "link/poll_loop.h"
 #include "link_emulator/link_emulator.h"
 
 namespace pangea {

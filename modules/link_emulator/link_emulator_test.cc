@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <map>
 
-#include "common/channels.h"
 #include "link_emulator/link_emulator_process.h"
+#include "messages/channels.h"
 
 namespace pangea {
 namespace {

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "common/bus/process_main.h"
+#include "bus/process_main.h"
 #include "map_points/map_points_process.h"
 #include "map_points/map_points_yaml.h"
 

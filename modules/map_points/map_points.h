@@ -22,9 +22,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/map_landmarks.h"
-#include "common/server_messages.h"
-#include "common/submap_store.h"
+#include "core/map_landmarks.h"
+#include "core/server_messages.h"
+#include "core/submap_store.h"
 #include "map_points/track_point.h"
 
 namespace pangea {

@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <map>
 
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/state_chunks.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/missing.h"
 #include "map_points/map_points.h"
+#include "messages/state_chunks.h"
 #include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/pose_t.hpp"

@@ -4,11 +4,11 @@
 
 #include <random>
 
-#include "common/bus/bus.h"
-#include "common/channels.h"
-#include "common/messages.h"
-#include "common/testing/test_cameras.h"
+#include "bus/bus.h"
+#include "core/testing/test_cameras.h"
 #include "map_points/map_points_process.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 namespace pangea {
 namespace {

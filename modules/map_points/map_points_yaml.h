@@ -2,8 +2,8 @@
 
 // The options of map_points as YAML keys.
 
-#include "common/yaml_options.h"
 #include "map_points/map_points.h"
+#include "options/yaml_options.h"
 
 namespace pangea {
 

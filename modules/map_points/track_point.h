@@ -7,8 +7,8 @@
 #include <map>
 #include <optional>
 
-#include "common/keyframe.h"
-#include "common/submap_store.h"
+#include "core/keyframe.h"
+#include "core/submap_store.h"
 
 namespace pangea {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
-#include "common/testing/test_cameras.h"
+#include "core/testing/test_cameras.h"
 
 namespace pangea {
 namespace {

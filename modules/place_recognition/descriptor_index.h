@@ -17,7 +17,7 @@
 #include <memory>
 #include <vector>
 
-#include "common/keyframe.h"
+#include "core/keyframe.h"
 
 namespace pangea {
 

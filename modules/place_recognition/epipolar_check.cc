@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "common/rigid3.h"
+#include "core/rigid3.h"
 
 namespace pangea {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/matching.h"
+#include "core/matching.h"
 #include "place_recognition/epipolar_check.h"
 
 namespace pangea {

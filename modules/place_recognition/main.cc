@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "common/bus/process_main.h"
+#include "bus/process_main.h"
 #include "place_recognition/place_recognition_process.h"
 
 int main(int argc, char** argv) {

@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "common/matching.h"
-#include "common/server_messages.h"
+#include "core/keyframe.h"
+#include "core/matching.h"
+#include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
 #include "place_recognition/epipolar_check.h"
 

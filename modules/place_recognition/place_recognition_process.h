@@ -17,11 +17,11 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/in_order.h"
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/catch_up_messages.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/missing.h"
+#include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "place_recognition/place_recognition.h"

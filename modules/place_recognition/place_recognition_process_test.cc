@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "common/channels.h"
-#include "common/messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/status_t.hpp"
 #include "place_recognition/test_world.h"
 

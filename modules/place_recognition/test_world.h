@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "common/testing/test_cameras.h"
+#include "core/keyframe.h"
+#include "core/testing/test_cameras.h"
 
 namespace pangea::test {
 

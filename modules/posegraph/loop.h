@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "posegraph/four_dof.h"
 #include "posegraph/odometry_chain.h"
+#include "posegraph/solver/four_dof.h"
 
 namespace pangea {
 

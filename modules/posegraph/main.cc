@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "common/bus/process_main.h"
+#include "bus/process_main.h"
 #include "posegraph/posegraph_process.h"
 #include "posegraph/posegraph_yaml.h"
 

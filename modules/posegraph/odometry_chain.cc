@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/median.h"
+#include "core/median.h"
 
 namespace pangea {
 namespace {

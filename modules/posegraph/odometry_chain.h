@@ -11,8 +11,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "posegraph/four_dof.h"
+#include "core/keyframe.h"
+#include "posegraph/solver/four_dof.h"
 
 namespace pangea {
 

@@ -25,13 +25,13 @@
 #include <utility>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "common/server_messages.h"
-#include "posegraph/group_solver.h"
+#include "core/keyframe.h"
+#include "core/server_messages.h"
 #include "posegraph/loop.h"
 #include "posegraph/odometry_chain.h"
 #include "posegraph/pair_evidence.h"
 #include "posegraph/refinement.h"
+#include "posegraph/solver/group_solver.h"
 
 namespace pangea {
 

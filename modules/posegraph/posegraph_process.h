@@ -28,12 +28,12 @@
 #include <set>
 #include <string>
 
-#include "common/bus/in_order.h"
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/catch_up_messages.h"
-#include "common/state_chunks.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/missing.h"
+#include "messages/catch_up_messages.h"
+#include "messages/state_chunks.h"
 #include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "posegraph/posegraph.h"

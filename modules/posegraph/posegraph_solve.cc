@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/median.h"
+#include "core/median.h"
 #include "posegraph/posegraph.h"
 
 namespace pangea {

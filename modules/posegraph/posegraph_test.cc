@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <random>
 
-#include "common/testing/synthetic_world.h"
+#include "core/testing/synthetic_world.h"
 
 namespace pangea {
 namespace {

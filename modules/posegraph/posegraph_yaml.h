@@ -2,7 +2,7 @@
 
 // The pose graph's options as YAML keys.
 
-#include "common/yaml_options.h"
+#include "options/yaml_options.h"
 #include "posegraph/posegraph.h"
 
 namespace pangea {

@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/server_messages.h"
-#include "posegraph/four_dof.h"
+#include "core/server_messages.h"
 #include "posegraph/odometry_chain.h"
+#include "posegraph/solver/four_dof.h"
 
 namespace pangea {
 

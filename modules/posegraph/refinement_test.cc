@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "common/testing/synthetic_world.h"
+#include "core/testing/synthetic_world.h"
 #include "posegraph/posegraph.h"
 
 namespace pangea {

@@ -6,9 +6,9 @@
 
 #include <random>
 
-#include "common/channels.h"
-#include "common/messages.h"
-#include "common/testing/synthetic_world.h"
+#include "core/testing/synthetic_world.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/correction_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/resend_request_t.hpp"

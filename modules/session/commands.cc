@@ -9,11 +9,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "session/explain.h"
-#include "session/log_diff.h"
-#include "session/recording_arguments.h"
-#include "session/remembered.h"
-#include "session/replay.h"
+#include "log_tools/explain.h"
+#include "log_tools/log_diff.h"
+#include "log_tools/recording_arguments.h"
+#include "replay/replay.h"
+#include "report/remembered.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
 #include "session/session_report.h"

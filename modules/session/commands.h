@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/bus/log_reading.h"
+#include "log_file/log_reading.h"
 
 namespace pangea::session {
 

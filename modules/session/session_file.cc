@@ -7,9 +7,9 @@
 #include <set>
 #include <stdexcept>
 
-#include "common/nearest_word.h"
-#include "common/yaml_options.h"
 #include "link_emulator/link_conditions_yaml.h"
+#include "options/nearest_word.h"
+#include "options/yaml_options.h"
 
 namespace pangea::session {
 namespace {

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "link_emulator/link_conditions.h"
-#include "session/expectations.h"
+#include "report/expectations.h"
 #include "session/faults.h"
 
 namespace pangea::session {

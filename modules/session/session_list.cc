@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "common/nearest_word.h"
-#include "common/text_file.h"
+#include "files/text_file.h"
+#include "options/nearest_word.h"
 #include "session/child_process.h"
 #include "session/session_file.h"
 

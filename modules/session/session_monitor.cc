@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <set>
 
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
-#include "common/drift.h"
+#include "bus/bus.h"
+#include "core/drift.h"
 #include "pangea/status_t.hpp"
 #include "session/buses.h"
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/bus/node.h"
+#include "bus/node.h"
 #include "session/session_monitor.h"
 
 namespace pangea::session {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "session/remembered.h"
-#include "session/report.h"
+#include "report/remembered.h"
+#include "report/report.h"
 #include "session/session_file.h"
 #include "session/session_runner.h"
 

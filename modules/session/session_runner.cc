@@ -10,9 +10,9 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "common/bus/process.h"
-#include "common/link/agent_key.h"
-#include "common/text_file.h"
+#include "bus/process.h"
+#include "files/text_file.h"
+#include "link/agent_key.h"
 #include "link_emulator/link_conditions_yaml.h"
 #include "session/buses.h"
 #include "session/child_process.h"

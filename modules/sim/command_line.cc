@@ -7,7 +7,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "sim/frame_cache.h"
+#include "sim/render/frame_cache.h"
 
 namespace pangea::sim {
 namespace {

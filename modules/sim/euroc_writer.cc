@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "common/text_file.h"
+#include "files/text_file.h"
 
 namespace pangea::sim {
 namespace {

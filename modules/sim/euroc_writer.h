@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/camera_model.h"
-#include "common/imu.h"
+#include "core/camera_model.h"
+#include "core/imu/imu.h"
 #include "sim/imu_simulator.h"
 
 namespace pangea::sim {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/imu.h"
-#include "sim/spline_path.h"
+#include "core/imu/imu.h"
+#include "sim/path/spline_path.h"
 
 namespace pangea::sim {
 

@@ -12,12 +12,12 @@
 #include <thread>
 
 #include "sim/euroc_writer.h"
-#include "sim/frame_cache.h"
 #include "sim/imu_simulator.h"
 #include "sim/random.h"
-#include "sim/renderer.h"
+#include "sim/render/frame_cache.h"
+#include "sim/render/renderer.h"
+#include "sim/render/tracks.h"
 #include "sim/schedule.h"
-#include "sim/tracks.h"
 
 namespace pangea::sim {
 namespace {

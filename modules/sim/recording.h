@@ -14,14 +14,14 @@
 #include <string>
 #include <vector>
 
-#include "common/camera_model.h"
-#include "common/imu.h"
-#include "sim/cameras.h"
-#include "sim/path_generator.h"
-#include "sim/path_steps.h"
-#include "sim/scene_builder.h"
-#include "sim/sensor.h"
-#include "sim/spline_path.h"
+#include "core/camera_model.h"
+#include "core/imu/imu.h"
+#include "sim/path/path_generator.h"
+#include "sim/path/path_steps.h"
+#include "sim/path/spline_path.h"
+#include "sim/render/cameras.h"
+#include "sim/render/sensor.h"
+#include "sim/scene/scene_builder.h"
 
 namespace pangea::sim {
 

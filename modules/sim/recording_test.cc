@@ -7,10 +7,10 @@
 #include <fstream>
 #include <map>
 
-#include "common/euroc.h"
-#include "common/trajectory.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 #include "sim/random.h"
-#include "sim/test_scenes.h"
+#include "sim/scene/test_scenes.h"
 
 namespace pangea::sim {
 namespace {

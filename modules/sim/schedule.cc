@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "common/csv.h"
+#include "files/csv.h"
 #include "sim/euroc_writer.h"
 
 namespace pangea::sim {

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
-#include "common/link/agent_key.h"
+#include "link/agent_key.h"
 #include "uplink/uplink_process.h"
 
 int main(int argc, char** argv) {

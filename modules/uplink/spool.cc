@@ -13,11 +13,11 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "common/bus/checksums.h"
-#include "common/bus/damaged_copy.h"
-#include "common/bus/log_event.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "log_file/checksums.h"
+#include "log_file/damaged_copy.h"
+#include "log_file/log_event.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/keyframe_t.hpp"
 
 namespace pangea {

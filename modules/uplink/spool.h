@@ -23,9 +23,9 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
-#include "common/bus/checked_scan.h"
-#include "common/ids.h"
+#include "bus/bus.h"
+#include "core/ids.h"
+#include "log_file/checked_scan.h"
 
 namespace pangea {
 

@@ -10,7 +10,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
-#include "agent_handler/test_keyframes.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

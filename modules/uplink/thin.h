@@ -3,7 +3,7 @@
 // A keyframe with fewer corners, for a link that must not carry them all. Pose, edge and
 // preintegration stay as they are, so the chain of poses has no gap.
 
-#include "common/keyframe.h"
+#include "core/keyframe.h"
 
 namespace pangea {
 

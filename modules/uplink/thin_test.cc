@@ -4,8 +4,8 @@
 
 #include <map>
 
-#include "agent_handler/test_keyframes.h"
-#include "common/messages.h"
+#include "messages/messages.h"
+#include "messages/testing/test_keyframes.h"
 
 namespace pangea {
 namespace {

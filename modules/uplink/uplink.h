@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/in_order.h"
-#include "common/link/sender.h"
+#include "bus/retransmission/in_order.h"
+#include "uplink/sender.h"
 
 namespace pangea {
 

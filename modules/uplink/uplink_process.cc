@@ -6,8 +6,8 @@
 #include <functional>
 #include <string_view>
 
-#include "common/channels.h"
-#include "common/link/compression.h"
+#include "link/compression.h"
+#include "messages/channels.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"

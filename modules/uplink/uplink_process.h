@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/node.h"
-#include "common/link/map_continuity.h"
-#include "common/link/poll_loop.h"
+#include "bus/node.h"
+#include "link/map_continuity.h"
+#include "link/poll_loop.h"
 #include "uplink/ladder.h"
 #include "uplink/spool.h"
 #include "uplink/uplink.h"

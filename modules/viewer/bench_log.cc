@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
-#include "common/bus/log_writer.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "bus/bus.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 #include "pangea/status_t.hpp"
 

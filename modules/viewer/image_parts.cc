@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "viewer/scene.h"
+#include "viewer/scene/scene.h"
 
 namespace pangea::viewer {
 namespace {

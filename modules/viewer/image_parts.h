@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "pangea/image_t.hpp"
-#include "viewer/agent_view.h"
+#include "viewer/scene/agent_view.h"
 
 namespace pangea::viewer {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "common/bus/log_reader.h"
+#include "log_file/log_reader.h"
 
 namespace pangea::viewer {
 

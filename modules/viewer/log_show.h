@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/log_reading.h"
-#include "viewer/scene_events.h"
+#include "log_file/log_reading.h"
+#include "viewer/scene/scene_events.h"
 #include "viewer/show.h"
 
 namespace pangea::viewer {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "common/bus/process.h"
+#include "bus/process.h"
 #include "viewer/serve.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <iostream>
 #include <memory>
 
-#include "common/bus/process.h"
+#include "bus/process.h"
 #include "viewer/log_show.h"
 #include "viewer/viewer_process.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/web_server.h"
+#include "viewer/web/web_server.h"
 
 namespace pangea::viewer {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/scene.h"
+#include "viewer/scene/scene.h"
 
 namespace pangea::viewer {
 

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/bus/log_reader.h"
-#include "common/bus/log_writer.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/image_t.hpp"

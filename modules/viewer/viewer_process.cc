@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "common/channels.h"
-#include "common/messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 namespace pangea::viewer {
 namespace {

@@ -6,12 +6,12 @@
 #include <set>
 #include <string>
 
-#include "common/bus/bus.h"
-#include "common/bus/missing.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/catch_up_messages.h"
-#include "viewer/scene_events.h"
+#include "bus/bus.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/missing.h"
+#include "messages/catch_up_messages.h"
+#include "viewer/scene/scene_events.h"
 #include "viewer/show.h"
 
 namespace pangea::viewer {

@@ -2,7 +2,7 @@
 
 // A small world for the viewer's tests: agents on straight lines, one point a keyframe.
 
-#include "viewer/scene.h"
+#include "viewer/scene/scene.h"
 #include "viewer/show.h"
 
 namespace pangea::viewer {

@@ -8,9 +8,9 @@
 #include <optional>
 #include <string>
 
-#include "common/bus/process.h"
-#include "common/euroc.h"
-#include "vio/live_input.h"
+#include "bus/process.h"
+#include "recording/euroc.h"
+#include "vio/live/live_input.h"
 #include "vio/playback.h"
 #include "vio/vio_process.h"
 #include "vio/vio_yaml.h"

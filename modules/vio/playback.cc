@@ -8,8 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "common/csv.h"
-#include "common/text_file.h"
+#include "files/csv.h"
+#include "files/text_file.h"
 
 namespace pangea::vio {
 namespace {

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/playback_pace.h"
-#include "common/euroc.h"
-#include "vio/tracks.h"
+#include "bus/retransmission/playback_pace.h"
+#include "recording/euroc.h"
+#include "vio/front_end/tracks.h"
 #include "vio/vio_process.h"
 
 namespace pangea::vio {

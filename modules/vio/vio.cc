@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "common/rigid3.h"
-#include "vio/rolling_shutter.h"
+#include "core/rigid3.h"
+#include "vio/live/rolling_shutter.h"
 
 namespace pangea::vio {
 

@@ -17,10 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "common/keyframe.h"
-#include "vio/describer.h"
-#include "vio/estimator.h"
-#include "vio/tracker.h"
+#include "core/keyframe.h"
+#include "vio/front_end/describer.h"
+#include "vio/front_end/tracker.h"
+#include "vio/window/estimator.h"
 
 namespace pangea::vio {
 

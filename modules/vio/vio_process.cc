@@ -5,11 +5,11 @@
 #include <functional>
 #include <stdexcept>
 
-#include "common/channels.h"
-#include "common/messages.h"
-#include "common/trajectory.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
+#include "recording/trajectory.h"
 
 namespace pangea::vio {
 namespace {

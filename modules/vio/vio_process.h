@@ -15,13 +15,13 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/keyframe_outlet.h"
-#include "common/bus/log_writer.h"
-#include "common/bus/node.h"
-#include "common/bus/process.h"
-#include "common/euroc.h"
-#include "vio/live_alignment.h"
-#include "vio/shown_pose.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "log_file/log_writer.h"
+#include "recording/euroc.h"
+#include "vio/live/live_alignment.h"
+#include "vio/live/shown_pose.h"
 #include "vio/vio.h"
 
 namespace lcm {

@@ -10,18 +10,18 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-#include "common/channels.h"
-#include "common/messages.h"
-#include "common/testing/test_cameras.h"
-#include "common/text_file.h"
+#include "core/testing/test_cameras.h"
+#include "files/text_file.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "vio/command_line.h"
-#include "vio/live_input.h"
-#include "vio/test_images.h"
+#include "vio/front_end/test_images.h"
+#include "vio/live/live_input.h"
 
 namespace pangea::vio {
 namespace {

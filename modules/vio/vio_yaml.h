@@ -2,8 +2,8 @@
 
 // The odometry's options as a YAML file: `pangea-vio --print-options` shows it whole.
 
-#include "common/imu.h"
-#include "common/yaml_options.h"
+#include "core/imu/imu.h"
+#include "options/yaml_options.h"
 #include "vio/vio.h"
 
 namespace pangea::vio {

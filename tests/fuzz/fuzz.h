@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/bus.h"
+#include "bus/bus.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 

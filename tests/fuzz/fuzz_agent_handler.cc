@@ -1,8 +1,8 @@
 // The agent_handler with a fresh journal, and everything it hears on the link and the server bus.
 
 #include "agent_handler/agent_handler_process.h"
-#include "common/link/agent_key.h"
 #include "fuzz.h"
+#include "link/agent_key.h"
 #include "link_channels.h"
 
 namespace pangea::fuzz {

@@ -1,7 +1,7 @@
 // Datagrams of several senders on a multicast bus, one after the other: what a receiver makes of
 // them below the channel. A step's channel is who sends it.
 
-#include "common/bus/udpm_assembler.h"
+#include "bus/transport/udpm_assembler.h"
 #include "fuzz.h"
 
 namespace pangea::fuzz {

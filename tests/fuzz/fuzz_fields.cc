@@ -4,8 +4,8 @@
 #include <map>
 
 #include "fuzz.h"
+#include "log_tools/message_fields.h"
 #include "pangea_schemas.h"
-#include "session/message_fields.h"
 
 namespace pangea::fuzz {
 namespace {

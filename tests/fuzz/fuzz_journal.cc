@@ -8,7 +8,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "fuzz.h"
-#include "session/keyframe_log.h"
+#include "replay/keyframe_log.h"
 
 namespace pangea::fuzz {
 namespace {

@@ -1,7 +1,7 @@
 // keyframe_t, from bytes to the domain type.
 
-#include "common/messages.h"
 #include "fuzz.h"
+#include "messages/messages.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;

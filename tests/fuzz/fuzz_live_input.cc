@@ -3,7 +3,7 @@
 
 #include "fuzz.h"
 #include "sensor_channels.h"
-#include "vio/live_input.h"
+#include "vio/live/live_input.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;

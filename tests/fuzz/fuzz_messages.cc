@@ -2,12 +2,12 @@
 
 #include <iterator>
 
-#include "common/catch_up_messages.h"
-#include "common/link/compression.h"
-#include "common/link/wire.h"
-#include "common/messages.h"
-#include "common/state_chunks.h"
 #include "fuzz.h"
+#include "link/compression.h"
+#include "link/wire.h"
+#include "messages/catch_up_messages.h"
+#include "messages/messages.h"
+#include "messages/state_chunks.h"
 
 namespace pangea::fuzz {
 namespace {

@@ -3,10 +3,10 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "common/alignment/alignment_yaml.h"
-#include "common/link/agent_key.h"
 #include "fuzz.h"
 #include "global_ba/global_ba_yaml.h"
+#include "link/agent_key.h"
+#include "loop_verification/alignment_yaml.h"
 #include "map_points/map_points_yaml.h"
 #include "posegraph/posegraph_yaml.h"
 #include "session/session_file.h"

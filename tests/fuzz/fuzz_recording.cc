@@ -4,9 +4,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "common/euroc.h"
-#include "common/trajectory.h"
 #include "fuzz.h"
+#include "recording/euroc.h"
+#include "recording/trajectory.h"
 
 namespace pangea::fuzz {
 namespace {

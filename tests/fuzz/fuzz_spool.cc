@@ -3,8 +3,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "common/messages.h"
 #include "fuzz.h"
+#include "messages/messages.h"
 #include "uplink/spool.h"
 
 namespace pangea::fuzz {

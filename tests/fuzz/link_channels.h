@@ -6,8 +6,8 @@
 
 #include <vector>
 
-#include "common/link/wire.h"
 #include "fuzz.h"
+#include "link/wire.h"
 #include "pangea/again_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"

@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <vector>
 
-#include "common/bus/bus.h"
-#include "common/channels.h"
-#include "common/messages.h"
+#include "bus/bus.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
 
 int main() {
   pangea::LocalBus bus;

@@ -1,4 +1,4 @@
-// What crosses the WebSocket. The server's side, with the layout of the bytes: modules/viewer/update.h.
+// What crosses the WebSocket. The server's side, with the layout of the bytes: modules/viewer/scene/update.h.
 
 // x y z, qw qx qy qz.
 export type PoseNumbers = ArrayLike<number>;

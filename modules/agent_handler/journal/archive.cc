@@ -1,0 +1,286 @@
+#include "agent_handler/journal/archive.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <iostream>
+#include <utility>
+
+#include "bus/retransmission/missing.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "pangea/have_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr double kResendBurst = 64'000;
+constexpr size_t kMaxJournalledBytes = 65'000;
+constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
+constexpr size_t kMaxHaveGaps = 1000;
+// An uplink gives up a gap that its odometry does not fill within ten seconds.
+constexpr int64_t kAskForGaps_us = 30'000'000;
+
+// Unreadable though it says it is of this type (or has lost even that): damaged. A type this
+// version does not know is left alone.
+template <typename Message>
+bool IsDamaged(Bytes data) {
+  Message message{};
+  if (DecodeMessage(data, &message) || data.size() < 8) {
+    return data.size() < 8;
+  }
+  const std::vector<uint8_t> fresh = EncodeMessage(Message{});
+  const bool same_type = std::equal(fresh.begin(), fresh.begin() + 8, data.begin());
+  const bool zeros = std::all_of(data.begin(), data.begin() + 8, [](uint8_t b) { return b == 0; });
+  return same_type || zeros;
+}
+
+seq_gap_t ToMessage(const SeqGap& gap) {
+  seq_gap_t message{};
+  message.map = pangea::ToMessage(gap.map);
+  message.from_seq = gap.from_seq;
+  message.to_seq = gap.to_seq;
+  return message;
+}
+
+template <typename Message>
+auto DecodeAndParse(Bytes data) -> decltype(Parse(Message{})) {
+  Message message{};
+  if (!DecodeMessage(data, &message)) {
+    return {std::nullopt, std::string(Message::getTypeName()) + " does not decode"};
+  }
+  return Parse(message);
+}
+
+}  // namespace
+
+Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
+                 const ArchiveOptions& options)
+    : node_(node),
+      options_(options),
+      resend_pacer_(options.resend_bytes_per_s, kResendBurst),
+      now_utime_(now_utime) {
+  journal_ = std::make_unique<Journal>(
+      journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
+        return LoadEvent(channel, data, place);
+      });
+  const JournalMend& mend = journal_->mend();
+  node_.Set("journal_bytes_torn", mend.torn_bytes);
+  node_.Set("journal_bytes_damaged", mend.damaged_bytes);
+  asks_for_gaps_until_utime_ = mend.damaged_bytes > 0 ? now_utime + kAskForGaps_us : now_utime;
+  if (const std::string said = mend.Said(journal_path); !said.empty()) {
+    std::cerr << said << "\n";
+  }
+  node_.bus().Subscribe(
+      std::string(channels::kPlaceMatch),
+      [this](const std::string& channel, Bytes data) { OnAnswer<place_match_t>(channel, data); });
+  node_.bus().Subscribe(
+      std::string(channels::kConstraint),
+      [this](const std::string& channel, Bytes data) { OnAnswer<constraint_t>(channel, data); });
+  node_.Subscribe<resend_request_t>(
+      std::string(channels::kResendRequest),
+      [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
+  node_.Listen<verdict_request_t>(channels::kVerdictRequest,
+                                  std::bind_front(&Archive::OnVerdictRequest, this));
+  node_.Subscribe<again_t>(
+      channels::Again(node_.name()),
+      [this](const std::string&, const again_t& message) { OnAgain(message); });
+}
+
+void Archive::OnResendRequest(const resend_request_t& message) {
+  if (message.requester == node_.name()) {
+    return;
+  }
+  const std::string reason = resend_queue_.Add(message, index_);
+  if (!reason.empty()) {
+    node_.Refuse(reason);
+  }
+}
+
+void Archive::OnVerdictRequest(const VerdictRequest& request) {
+  if (request.requester != node_.name() && !resend_queue_.Add(request, index_)) {
+    node_.Refuse("too many resend requests are waiting");
+  }
+}
+
+void Archive::OnAgain(const again_t& message) {
+  if (message.channel == channels::kPlaceMatch) {
+    OnAnswer<place_match_t>(message.channel, message.data);
+  } else if (message.channel == channels::kConstraint) {
+    OnAnswer<constraint_t>(message.channel, message.data);
+  }
+}
+
+void Archive::NoteJournalled(const KeyframeId& id) {
+  const auto [highest, is_new] = have_.try_emplace(id.map, id.seq);
+  highest->second = std::max(highest->second, id.seq);
+  if (is_new) {
+    by_age_.push_back(id.map);
+  }
+}
+
+std::optional<Keyframe> Archive::Newest(const MapId& map) const {
+  const auto places = index_.Find(JournalChannel::kKeyframe, {map, have_.at(map)});
+  return places.empty() ? std::nullopt
+                        : DecodeAndParse<keyframe_t>(journal_->Read(places.front())).value;
+}
+
+bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
+  if (channel.starts_with(channels::kKeyframePrefix)) {
+    if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {
+      const KeyframeId& id = keyframe.value->id;
+      index_.AddKeyframe(id, place);
+      NoteJournalled(id);
+      return true;
+    }
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<keyframe_t>(data);
+  }
+  if (channel == channels::kPlaceMatch) {
+    return LoadAnswer<place_match_t>(data, place);
+  }
+  return channel != channels::kConstraint || LoadAnswer<constraint_t>(data, place);
+}
+
+template <typename Message>
+bool Archive::LoadAnswer(Bytes data, const JournalPlace& place) {
+  const auto answer = DecodeAndParse<Message>(data);
+  if (!answer.value) {
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<Message>(data);
+  }
+  if (index_.Look(*answer.value) == JournalIndex::Added::kNew) {
+    index_.Add(*answer.value, place);
+  }
+  return true;
+}
+
+void Archive::Append(const KeyframeId& id, std::vector<uint8_t> bytes) {
+  if (unsynced_.empty()) {
+    oldest_unsynced_us_ = now_us_;
+  }
+  const JournalPlace place =
+      journal_->Append(now_utime_, channels::Keyframe(id.map.agent_id), bytes);
+  unsynced_.push_back({id, std::move(bytes), place});
+}
+
+std::vector<KeyframeId> Archive::Sync() {
+  std::vector<KeyframeId> synced;
+  if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < options_.sync_interval_us) {
+    return synced;
+  }
+  oldest_unsynced_us_ = now_us_;
+  disk_refuses_ = !journal_->Sync();
+  if (disk_refuses_) {
+    node_.Count("journal_writes_failed");
+    return synced;
+  }
+  for (const Unsynced& keyframe : unsynced_) {
+    index_.AddKeyframe(keyframe.id, keyframe.place);
+    NoteJournalled(keyframe.id);
+    synced.push_back(keyframe.id);
+    node_.bus().Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe.bytes);
+  }
+  unsynced_.clear();
+  return synced;
+}
+
+template <typename Message>
+void Archive::OnAnswer(const std::string& channel, Bytes data) {
+  const auto answer = DecodeAndParse<Message>(data);
+  if (!answer.value) {
+    return node_.Refuse(answer.refused);
+  }
+  if (data.size() > kMaxJournalledBytes) {
+    return node_.Refuse(channel + " is too large");
+  }
+  const JournalIndex::Added added = index_.Look(*answer.value);
+  if (added == JournalIndex::Added::kUnknownKeyframe) {
+    return node_.Refuse(channel + " of a keyframe that is not journalled");
+  }
+  if (added == JournalIndex::Added::kNew && !journal_->Full()) {
+    index_.Add(*answer.value, journal_->Append(now_utime_, channel, data));
+  }
+}
+
+void Archive::AnswerResendRequests() {
+  // Also bounds the work of one call when keyframes have no match or verdict to send.
+  constexpr int kMaxKeyframes = 200;
+  resend_pacer_.Refill(now_us_);
+  for (int i = 0; i < kMaxKeyframes && resend_pacer_.Ready(); ++i) {
+    const auto answer = resend_queue_.Next(index_);
+    if (!answer) {
+      return;
+    }
+    for (const JournalPlace& place : answer->places) {
+      again_t again{};
+      again.channel = answer->channel;
+      again.data = journal_->Read(place);
+      again.num_bytes = static_cast<int32_t>(again.data.size());
+      if (again.data.empty()) {
+        node_.Count("journal_reads_failed");
+        continue;
+      }
+      node_.Publish(channels::Again(answer->requester), again);
+      node_.Count("sent_again");
+      resend_pacer_.Take(again.num_bytes);
+    }
+  }
+}
+
+std::vector<SeqGap> Archive::Refillable(const MapId& map) const {
+  return journal_->mend().damaged_bytes > 0 ? index_.Gaps(map) : std::vector<SeqGap>{};
+}
+
+// The others' maps go on behind what is said to be lost: not before its agent could send it again.
+std::vector<SeqGap> Archive::Lost(const MapId& map) const {
+  return now_utime_ < asks_for_gaps_until_utime_ ? std::vector<SeqGap>{} : index_.Gaps(map);
+}
+
+std::string Archive::Damage() const {
+  const JournalMend& mend = journal_->mend();
+  return mend.damaged_bytes == 0
+             ? ""
+             : fmt::format("; THE JOURNAL WAS DAMAGED: {} bytes, kept beside it",
+                           mend.damaged_bytes);
+}
+
+void Archive::PublishHave() {
+  auto it = by_age_.begin();
+  do {
+    have_t message{};
+    for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
+      message.maps.push_back(ToMessage(*it));
+      message.highest_seq.push_back(have_.at(*it));
+      for (const SeqGap& gap : Lost(*it)) {
+        if (message.gaps.size() < kMaxHaveGaps) {
+          message.gaps.push_back(ToMessage(gap));
+        }
+      }
+    }
+    message.num_maps = static_cast<int16_t>(message.maps.size());
+    message.num_gaps = static_cast<int16_t>(message.gaps.size());
+    node_.Publish(std::string(channels::kHave), message);
+  } while (it != by_age_.end());
+}
+
+void Archive::AskForOwed() {
+  const OwedQuestions::Questions questions = owed_.Due(index_, now_utime_);
+  for (const SeqGap& gap : questions.matches) {
+    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+  }
+  for (const VerdictNames& names : questions.verdicts) {
+    AskForVerdicts(node_, names);
+  }
+}
+
+void Archive::SetCounters() {
+  node_.Set("journal_bytes", journal_->size());
+  node_.Set("journal_keyframes", index_.num_keyframes());
+  node_.Set("journal_matches", index_.num_matches());
+  node_.Set("journal_constraints", index_.num_constraints());
+  node_.Set("verdicts_missing", index_.num_missing_verdicts());
+}
+
+}  // namespace pangea

@@ -1,0 +1,104 @@
+#pragma once
+
+// What the server has on its disk, towards the server bus: keyframes, place matches and verdicts,
+// each journalled once, told about (HAVE) and sent again to whoever lacks them.
+//   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
+//               VERDICT_REQUEST out;
+//               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name> in
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agent_handler/journal/journal.h"
+#include "agent_handler/journal/owed_questions.h"
+#include "agent_handler/journal/resend_queue.h"
+#include "bus/node.h"
+#include "link/pacer.h"
+#include "pangea/again_t.hpp"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+
+struct ArchiveOptions {
+  // What arrives within this time shares one write to the disk.
+  int64_t sync_interval_us = 20'000;
+  double resend_bytes_per_s = 6e6;
+};
+
+class Archive {
+ public:
+  // Reads the journal; throws if it cannot be used. `now_utime`: wall clock.
+  Archive(Node& node, const std::string& journal_path, int64_t now_utime,
+          const ArchiveOptions& options);
+
+  // Steady and wall clock, for all that follows.
+  void set_now_us(int64_t steady_us) { now_us_ = steady_us; }
+  void set_now_utime(int64_t utime) { now_utime_ = utime; }
+
+  // While it is, nothing may be appended.
+  bool Full() const { return journal_->Full(); }
+  void Append(const KeyframeId& id, std::vector<uint8_t> bytes);
+  // Writes what is due; the keyframes that the disk has since, published.
+  std::vector<KeyframeId> Sync();
+  void AnswerResendRequests();
+  void PublishHave();
+  // Asks for the matches and verdicts that keyframes should have by now.
+  void AskForOwed();
+  void SetCounters();
+
+  // The highest seq on the disk of each map; the maps in the journal's order.
+  const std::map<MapId, int32_t>& have() const { return have_; }
+  const std::vector<MapId>& maps() const { return by_age_; }
+  // The keyframe with that seq, read from the disk.
+  std::optional<Keyframe> Newest(const MapId& map) const;
+  // What agents may send again of a map: its gaps, if this start found damage.
+  std::vector<SeqGap> Refillable(const MapId& map) const;
+  // For people; empty if the journal was whole at the start.
+  std::string Damage() const;
+  bool busy() const { return journal_->HasUnsynced() || resend_queue_.waiting() > 0; }
+  bool disk_refuses() const { return disk_refuses_; }
+  int64_t num_keyframes() const { return index_.num_keyframes(); }
+
+ private:
+  // A keyframe in the journal's queue.
+  struct Unsynced {
+    KeyframeId id;
+    std::vector<uint8_t> bytes;
+    JournalPlace place;
+  };
+
+  void OnResendRequest(const resend_request_t& message);
+  void OnVerdictRequest(const VerdictRequest& request);
+  void OnAgain(const again_t& message);
+  void NoteJournalled(const KeyframeId& id);
+  std::vector<SeqGap> Lost(const MapId& map) const;
+  bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
+  // Answers are place matches and constraints: of a journal that is read, and new ones.
+  template <typename Message>
+  bool LoadAnswer(Bytes data, const JournalPlace& place);
+  template <typename Message>
+  void OnAnswer(const std::string& channel, Bytes data);
+
+  Node& node_;
+  const ArchiveOptions options_;
+  JournalIndex index_;
+  std::unique_ptr<Journal> journal_;
+  std::deque<Unsynced> unsynced_;
+  int64_t oldest_unsynced_us_ = 0;
+  int64_t asks_for_gaps_until_utime_ = 0;
+  std::map<MapId, int32_t> have_;
+  std::vector<MapId> by_age_;
+  OwedQuestions owed_;
+  ResendQueue resend_queue_;
+  Pacer resend_pacer_;
+  int64_t now_us_ = 0;
+  int64_t now_utime_ = 0;
+  bool disk_refuses_ = false;
+};
+
+}  // namespace pangea

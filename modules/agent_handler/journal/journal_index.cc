@@ -1,0 +1,178 @@
+#include "agent_handler/journal/journal_index.h"
+
+#include <algorithm>
+
+namespace pangea {
+
+const JournalIndex::Map* JournalIndex::FindMap(const MapId& id) const {
+  const auto it = maps_.find(id);
+  return it == maps_.end() ? nullptr : &it->second;
+}
+
+JournalIndex::Added JournalIndex::AddKeyframe(const KeyframeId& id, const JournalPlace& place) {
+  const bool added = maps_[id.map].keyframes.emplace(id.seq, place).second;
+  num_keyframes_ += added ? 1 : 0;
+  return added ? Added::kNew : Added::kRepeat;
+}
+
+JournalIndex::Added JournalIndex::Look(const PlaceMatch& match) const {
+  const Map* map = FindMap(match.query.map);
+  if (map == nullptr || !map->keyframes.contains(match.query.seq)) {
+    return Added::kUnknownKeyframe;
+  }
+  return map->matches.contains(match.query.seq) ? Added::kRepeat : Added::kNew;
+}
+
+JournalIndex::Added JournalIndex::Look(const Constraint& constraint) const {
+  const Map* map = FindMap(constraint.to.map);
+  if (map == nullptr || !map->keyframes.contains(constraint.to.seq)) {
+    return Added::kUnknownKeyframe;
+  }
+  const auto verdicts = map->verdicts.find(constraint.to.seq);
+  if (verdicts == map->verdicts.end()) {
+    return Added::kNew;
+  }
+  const bool known = verdicts->second.contains(constraint.Id());
+  return known || verdicts->second.size() >= kMaxVerdicts ? Added::kRepeat : Added::kNew;
+}
+
+void JournalIndex::Add(const PlaceMatch& match, const JournalPlace& place) {
+  Map& map = maps_[match.query.map];
+  if (!map.matches.emplace(match.query.seq, place).second) {
+    return;
+  }
+  ++num_matches_;
+  const auto verdicts = map.verdicts.find(match.query.seq);
+  for (const PlaceCandidate& candidate : match.candidates) {
+    Constraint expected;
+    expected.from = candidate.match;
+    expected.to = match.query;
+    expected.kind = candidate.kind;
+    const bool known = verdicts != map.verdicts.end() && verdicts->second.contains(expected.Id());
+    if (!known && map.missing_verdicts[match.query.seq].insert(expected.Id()).second) {
+      ++num_missing_verdicts_;
+    }
+  }
+  while (map.matches.contains(map.matched_below)) {
+    ++map.matched_below;
+  }
+}
+
+void JournalIndex::Add(const Constraint& constraint, const JournalPlace& place) {
+  Map& map = maps_[constraint.to.map];
+  const bool added = map.verdicts[constraint.to.seq].emplace(constraint.Id(), place).second;
+  num_constraints_ += added ? 1 : 0;
+  const auto missing = map.missing_verdicts.find(constraint.to.seq);
+  if (missing != map.missing_verdicts.end() && missing->second.erase(constraint.Id()) > 0) {
+    --num_missing_verdicts_;
+    if (missing->second.empty()) {
+      map.missing_verdicts.erase(missing);
+    }
+  }
+}
+
+std::vector<JournalPlace> JournalIndex::Find(JournalChannel channel, const KeyframeId& id) const {
+  const Map* map = FindMap(id.map);
+  if (map == nullptr) {
+    return {};
+  }
+  std::vector<JournalPlace> places;
+  if (channel == JournalChannel::kConstraint) {
+    const auto it = map->verdicts.find(id.seq);
+    if (it != map->verdicts.end()) {
+      for (const auto& [constraint_id, place] : it->second) {
+        places.push_back(place);
+      }
+    }
+    return places;
+  }
+  const auto& single = channel == JournalChannel::kKeyframe ? map->keyframes : map->matches;
+  const auto it = single.find(id.seq);
+  if (it != single.end()) {
+    places.push_back(it->second);
+  }
+  return places;
+}
+
+std::vector<JournalPlace> JournalIndex::Find(const VerdictNames& names) const {
+  std::vector<JournalPlace> places;
+  const Map* map = FindMap(names.map);
+  if (map == nullptr) {
+    return places;
+  }
+  for (const auto& [seq, constraint_id] : names.verdicts) {
+    const auto of_keyframe = map->verdicts.find(seq);
+    if (of_keyframe == map->verdicts.end()) {
+      continue;
+    }
+    const auto verdict = of_keyframe->second.find(constraint_id);
+    if (verdict != of_keyframe->second.end()) {
+      places.push_back(verdict->second);
+    }
+  }
+  return places;
+}
+
+int32_t JournalIndex::Highest(const MapId& id) const {
+  const Map* map = FindMap(id);
+  return map == nullptr || map->keyframes.empty() ? -1 : map->keyframes.rbegin()->first;
+}
+
+std::vector<MapId> JournalIndex::Maps() const {
+  std::vector<MapId> ids;
+  for (const auto& [id, map] : maps_) {
+    ids.push_back(id);
+  }
+  return ids;
+}
+
+std::vector<SeqGap> JournalIndex::Gaps(const MapId& id) const {
+  const Map* map = FindMap(id);
+  std::vector<SeqGap> gaps;
+  if (map == nullptr || static_cast<int64_t>(map->keyframes.size()) == Highest(id) + 1) {
+    return gaps;
+  }
+  int32_t next = 0;
+  for (const auto& [seq, place] : map->keyframes) {
+    if (seq > next) {
+      gaps.push_back({id, next, seq - 1});
+    }
+    next = seq + 1;
+  }
+  return gaps;
+}
+
+std::optional<SeqGap> JournalIndex::MissingMatches(const MapId& id, int32_t up_to) const {
+  const Map* map = FindMap(id);
+  if (map == nullptr) {
+    return std::nullopt;
+  }
+  for (auto it = map->keyframes.lower_bound(map->matched_below);
+       it != map->keyframes.end() && it->first <= up_to; ++it) {
+    if (!map->matches.contains(it->first)) {
+      const auto next = map->matches.upper_bound(it->first);
+      const int32_t end = next == map->matches.end() ? up_to : next->first - 1;
+      return SeqGap{id, it->first, std::min(up_to, end)};
+    }
+  }
+  return std::nullopt;
+}
+
+VerdictNames JournalIndex::MissingVerdicts(const MapId& id, int32_t up_to) const {
+  VerdictNames names{id, {}};
+  const Map* map = FindMap(id);
+  if (map == nullptr) {
+    return names;
+  }
+  for (const auto& [seq, constraint_ids] : map->missing_verdicts) {
+    for (const int64_t constraint_id : constraint_ids) {
+      if (seq > up_to || names.verdicts.size() == VerdictNames::kMax) {
+        return names;
+      }
+      names.verdicts.emplace_back(seq, constraint_id);
+    }
+  }
+  return names;
+}
+
+}  // namespace pangea

@@ -1,0 +1,76 @@
+#include "agent_handler/journal/resend_queue.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "messages/catch_up_messages.h"
+#include "messages/channels.h"
+
+namespace pangea {
+
+std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex& index) {
+  if (message.channel == channels::kMapState) {
+    return "";  // for the pose graph
+  }
+  const auto parsed = Parse(message);
+  if (!parsed.value) {
+    return parsed.refused;
+  }
+  const auto& [map, from_seq, to_seq] = parsed.value->range;
+  Request request{parsed.value->requester,
+                  parsed.value->channel,
+                  JournalChannel::kKeyframe,
+                  map,
+                  from_seq,
+                  std::min(to_seq, index.Highest(map))};
+  if (request.channel_name == channels::kPlaceMatch) {
+    request.channel = JournalChannel::kPlaceMatch;
+  } else if (request.channel_name == channels::kConstraint) {
+    request.channel = JournalChannel::kConstraint;
+  } else if (request.channel_name != channels::Keyframe(map.agent_id)) {
+    return "resend request for a channel that is not journalled";
+  }
+  const bool covered = std::any_of(requests_.begin(), requests_.end(), [&](const Request& r) {
+    return r.requester == request.requester && r.channel == request.channel &&
+           r.map == request.map && r.next_seq <= request.next_seq && request.to_seq <= r.to_seq;
+  });
+  if (covered || request.to_seq < request.next_seq) {
+    return "";
+  }
+  if (waiting() >= kMaxRequests) {
+    return "too many resend requests are waiting";
+  }
+  requests_.push_back(std::move(request));
+  return "";
+}
+
+bool ResendQueue::Add(const VerdictRequest& request, const JournalIndex& index) {
+  std::vector<JournalPlace> places = index.Find(request.names);
+  if (!places.empty() && waiting() >= kMaxRequests) {
+    return false;
+  }
+  if (!places.empty()) {
+    named_.push_back({request.requester, std::string(channels::kConstraint), std::move(places)});
+  }
+  return true;
+}
+
+std::optional<ResendQueue::Answer> ResendQueue::Next(const JournalIndex& index) {
+  if (!named_.empty()) {
+    Answer answer = std::move(named_.front());
+    named_.pop_front();
+    return answer;
+  }
+  if (requests_.empty()) {
+    return std::nullopt;
+  }
+  Request& request = requests_.front();
+  Answer answer{request.requester, request.channel_name,
+                index.Find(request.channel, {request.map, request.next_seq})};
+  if (++request.next_seq > request.to_seq) {
+    requests_.pop_front();
+  }
+  return answer;
+}
+
+}  // namespace pangea

@@ -1,0 +1,48 @@
+#pragma once
+
+// Requests for old messages, answered one after the other so that a restarted process catches up
+// without flooding the bus. Bounded: kMaxRequests wait; one that is covered by a waiting one is
+// dropped, and so is one beyond the bound (who still misses something asks again).
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agent_handler/journal/journal_index.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+
+class ResendQueue {
+ public:
+  static constexpr size_t kMaxRequests = 200;
+
+  // Why it was refused, or an empty string.
+  std::string Add(const resend_request_t& request, const JournalIndex& index);
+  // For the verdicts that are journalled; the others will come. False when too many requests wait.
+  bool Add(const VerdictRequest& request, const JournalIndex& index);
+
+  struct Answer {
+    std::string requester;
+    std::string channel;
+    std::vector<JournalPlace> places;  // of one keyframe, or asked for by name; may be empty
+  };
+  std::optional<Answer> Next(const JournalIndex& index);
+  size_t waiting() const { return requests_.size() + named_.size(); }
+
+ private:
+  struct Request {
+    std::string requester;
+    std::string channel_name;
+    JournalChannel channel;
+    MapId map;
+    int32_t next_seq;
+    int32_t to_seq;
+  };
+  std::deque<Request> requests_;
+  std::deque<Answer> named_;  // answers to requests that name verdicts
+};
+
+}  // namespace pangea

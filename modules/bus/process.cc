@@ -1,0 +1,70 @@
+#include "bus/process.h"
+
+#include <dlfcn.h>
+
+#include <chrono>
+#include <csignal>
+
+#include "bus/retransmission/journal_first.h"
+
+namespace pangea {
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+constexpr int64_t kTickInterval_us = 100'000;
+constexpr int kHandleTimeout_ms = 50;
+
+template <typename Clock>
+int64_t MicrosOf() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+int64_t WallUtime() {
+  static const int64_t begin = MicrosOf<std::chrono::system_clock>() - SteadyMicros();
+  return begin + SteadyMicros();
+}
+
+int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
+
+void InstallSignalHandlers() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  // A file that may not grow (a quota, ulimit -f) is a full disk like any other: an error, no
+  // death.
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+bool StopRequested() { return stop_requested != 0; }
+
+// By name: only programs that solve have OpenMP in them. With no level of parallel regions allowed
+// each region runs in one thread.
+void UseOneThread() {
+  if (void* const symbol = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
+    reinterpret_cast<void (*)(int)>(symbol)(0);
+  }
+}
+
+int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
+  InstallSignalHandlers();
+  int64_t next_tick = 0;
+  while (!StopRequested()) {
+    bus.Handle(kHandleTimeout_ms);
+    const int64_t now = WallUtime();
+    if (journal_first != nullptr) {
+      journal_first->Poll(now);
+    }
+    if (now >= next_tick) {
+      process.Tick(now);
+      next_tick = now + kTickInterval_us;
+    }
+  }
+  return 0;
+}
+
+}  // namespace pangea

@@ -1,0 +1,41 @@
+#pragma once
+
+// The loop around a process class: bus, ticks, signals.
+
+#include <cstdint>
+
+#include "bus/bus.h"
+
+namespace pangea {
+
+// A process without its loop. Handlers run between Ticks, on one thread.
+class Process {
+ public:
+  virtual ~Process() = default;
+  // Housekeeping at about 10 Hz: resend requests, time-outs, status. Never called in a replay, so
+  // no result may depend on it.
+  virtual void Tick(int64_t now_utime) = 0;
+};
+
+// Microseconds since 1970 that never step: the wall clock as it was when the process first asked,
+// and from there as SteadyMicros goes. So what is paced by it goes on as it should when somebody
+// sets the clock; what is stamped by it (statuses, maps, the journal) is of the new time from the
+// next start on.
+int64_t WallUtime();
+// Monotonic clock, microseconds.
+int64_t SteadyMicros();
+
+// Set by SIGINT and SIGTERM once InstallSignalHandlers has run.
+void InstallSignalHandlers();
+bool StopRequested();
+
+// What is solved is solved in the thread that asks for it. CHOLMOD would start three more, which
+// OMP_NUM_THREADS does not keep it from: it asks OpenMP for four by number. Call it at the start.
+void UseOneThread();
+
+class JournalFirstBus;
+
+// Handles messages and ticks until a signal. Returns the exit code.
+int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first = nullptr);
+
+}  // namespace pangea

@@ -1,0 +1,27 @@
+#pragma once
+
+// main() of a server process: command line, options, bus, messages until a signal.
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "bus/process.h"
+#include "options/yaml_options.h"
+
+namespace pangea {
+
+struct ProcessDescription {
+  std::string name;                // "pangea-fusion"
+  std::string summary;             // for --help
+  YamlOptions* options = nullptr;  // of --options FILE.yaml; none when it has no options
+};
+
+// Reads the command line (--bus URL, --options FILE.yaml, --print-options), then makes the process,
+// whose options are set by now, and runs it: the journal's HAVE first (journal_first.h), messages
+// and ticks until a signal. Errors become one line and exit code 1.
+using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
+int ProcessMain(int argc, char** argv, const ProcessDescription& description,
+                const ProcessFactory& factory);
+
+}  // namespace pangea

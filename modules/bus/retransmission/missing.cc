@@ -1,0 +1,94 @@
+#include "bus/retransmission/missing.h"
+
+#include <algorithm>
+
+#include "messages/messages.h"
+#include "pangea/resend_request_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+// One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
+constexpr int32_t kMaxAsked = 50;
+constexpr int32_t kMaxSmallAsked = 500;
+
+}  // namespace
+
+void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
+  resend_request_t request{};
+  request.requester = node.name();
+  request.channel = channel;
+  request.map = ToMessage(gap.map);
+  request.from_seq = gap.from_seq;
+  request.to_seq = gap.to_seq;
+  node.Publish(std::string(channels::kResendRequest), request);
+  node.NoteResendAsked();
+}
+
+void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq) {
+  for (int32_t seq = 0; seq <= highest_seq; seq += kMaxSmallAsked) {
+    AskAgain(node, channel, {map, seq, std::min(seq + kMaxSmallAsked - 1, highest_seq)});
+  }
+}
+
+void AskForVerdicts(Node& node, const VerdictNames& names) {
+  verdict_request_t request{};
+  request.requester = node.name();
+  request.map = ToMessage(names.map);
+  for (const auto& [seq, constraint_id] : names.verdicts) {
+    request.seq.push_back(seq);
+    request.constraint_id.push_back(constraint_id);
+  }
+  request.num_verdicts = static_cast<int16_t>(request.seq.size());
+  node.Publish(std::string(channels::kVerdictRequest), request);
+  node.NoteResendAsked();
+}
+
+void AskForState(Node& node, const MapId& map) {
+  AskAgain(node, std::string(channels::kMapState), {map, 0, 0});
+}
+
+void MissingMessages::Announce(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
+    stream_.Announce(map, highest_seq);
+  }
+  for (const SeqGap& gap : have.gaps) {
+    stream_.Skip(gap);
+  }
+}
+
+std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {
+  std::vector<SeqGap> due;
+  for (const SeqGap& gap : stream_.Gaps()) {
+    Asked& asked = asked_[gap.map];
+    if (asked.from_seq != gap.from_seq) {
+      asked = {gap.from_seq, now_utime + kSecond};
+    } else if (now_utime >= asked.next_utime) {
+      asked.next_utime = now_utime + 2 * kSecond;
+      due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
+    }
+  }
+  return due;
+}
+
+void MissingStates::Note(const std::vector<MapId>& maps) {
+  for (const MapId& map : maps) {
+    times_asked_.erase(map);
+  }
+}
+
+std::vector<MapId> MissingStates::Due(int64_t now_utime) {
+  std::vector<MapId> due;
+  if (now_utime < next_utime_) {
+    return due;
+  }
+  next_utime_ = now_utime + 2 * kSecond;
+  for (auto it = times_asked_.begin(); it != times_asked_.end() && due.size() < kMaxAsked;) {
+    due.push_back(it->first);
+    it = ++it->second < kMaxTimes ? std::next(it) : times_asked_.erase(it);
+  }
+  return due;
+}
+
+}  // namespace pangea

@@ -1,0 +1,13 @@
+#include "core/keyframe.h"
+
+namespace pangea {
+
+std::optional<Eigen::Vector3d> PointInCamera(const Keyframe& keyframe, const MapPoint& point) {
+  const auto ray = keyframe.camera.Unproject(keyframe.corners[point.corner].pixel.cast<double>());
+  if (!ray) {
+    return std::nullopt;
+  }
+  return Eigen::Vector3d(ray->x(), ray->y(), 1.0) / point.inverse_depth;
+}
+
+}  // namespace pangea

@@ -1,0 +1,58 @@
+#pragma once
+
+// Matching of binary descriptors: whole keyframe against whole keyframe, and guided by where a
+// point should appear. Pixels are raw (distorted) pixels throughout. Nothing here is random: equal
+// distances are settled by the lower index.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "core/keyframe.h"
+
+namespace pangea {
+
+struct MatchingOptions {
+  int max_distance = 64;   // of 256 bits; two unrelated descriptors differ in about 128
+  double max_ratio = 0.8;  // best distance / second best; 1 switches the test off
+  // A corner may be described on several octaves: the second best of the ratio test has to be
+  // another place of the image, at least this far (pixels) from the best.
+  double other_corner_px = 5.0;
+};
+
+struct CornerMatch {
+  int a = 0;  // index into the first list of corners
+  int b = 0;  // index into the second
+  int distance = 0;
+};
+
+// Mutual nearest neighbours that pass the ratio test, in the order of a.
+std::vector<CornerMatch> MatchCorners(const std::vector<Corner>& a, const std::vector<Corner>& b,
+                                      const MatchingOptions& options);
+
+// Corners by image position, for "the nearest descriptor within r pixels of here".
+class CornerGrid {
+ public:
+  // Keeps a pointer: `corners` must outlive the grid.
+  explicit CornerGrid(const std::vector<Corner>& corners);
+
+  // Indices of the corners within `radius_px`, ascending.
+  std::vector<int> Within(const Eigen::Vector2d& pixel, double radius_px) const;
+  // The one of these with the nearest descriptor (`a` of the result is 0), if it passes distance
+  // and ratio.
+  std::optional<CornerMatch> Nearest(const Eigen::Vector2d& pixel, double radius_px,
+                                     const Descriptor& descriptor,
+                                     const MatchingOptions& options) const;
+
+ private:
+  int Column(double u) const;
+  int Row(double v) const;
+
+  const std::vector<Corner>* corners_;
+  Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();  // of cell (0, 0), pixels
+  int columns_ = 1;
+  int rows_ = 1;
+  std::vector<std::vector<int>> cells_;
+};
+
+}  // namespace pangea

@@ -1,0 +1,87 @@
+#include "core/rigid3.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace pangea {
+
+Eigen::Matrix3d Hat(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& omega) {
+  const double angle2 = omega.squaredNorm();
+  // sin(x/2)/x by its series below 1e-4 rad, where the quotient loses digits.
+  const double angle = std::sqrt(angle2);
+  const double imag = angle2 < 1e-8 ? 0.5 - angle2 / 48.0 : std::sin(0.5 * angle) / angle;
+  const double real = angle2 < 1e-8 ? 1.0 - angle2 / 8.0 : std::cos(0.5 * angle);
+  return Eigen::Quaterniond(real, imag * omega.x(), imag * omega.y(), imag * omega.z())
+      .normalized();
+}
+
+Eigen::Vector3d LogSo3(const Eigen::Quaterniond& q) {
+  const double sign = q.w() < 0 ? -1.0 : 1.0;  // q and -q are one rotation
+  const Eigen::Vector3d v = sign * q.vec();
+  const double n = v.norm();
+  if (n < 1e-10) {
+    return 2.0 * v;
+  }
+  return 2.0 * std::atan2(n, sign * q.w()) / n * v;
+}
+
+Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& omega) {
+  const double a2 = omega.squaredNorm();
+  const Eigen::Matrix3d W = Hat(omega);
+  if (a2 < 1e-8) {
+    return Eigen::Matrix3d::Identity() - 0.5 * W + W * W / 6.0;
+  }
+  const double a = std::sqrt(a2);
+  return Eigen::Matrix3d::Identity() - (1 - std::cos(a)) / a2 * W +
+         (a - std::sin(a)) / (a2 * a) * W * W;
+}
+
+Eigen::Matrix3d RightJacobianInverse(const Eigen::Vector3d& omega) {
+  const double a2 = omega.squaredNorm();
+  const Eigen::Matrix3d W = Hat(omega);
+  if (a2 < 1e-8) {
+    return Eigen::Matrix3d::Identity() + 0.5 * W + W * W / 12.0;
+  }
+  const double a = std::sqrt(a2);
+  return Eigen::Matrix3d::Identity() + 0.5 * W +
+         (1.0 / a2 - (1 + std::cos(a)) / (2 * a * std::sin(a))) * W * W;
+}
+
+Eigen::Quaterniond YawRotation(double yaw) {
+  return {std::cos(0.5 * yaw), 0.0, 0.0, std::sin(0.5 * yaw)};
+}
+
+double YawOf(const Eigen::Quaterniond& q) {
+  return std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
+}
+
+double WrapAngle(double angle) {
+  constexpr double kTwoPi = 2 * std::numbers::pi;
+  const double wrapped = std::remainder(angle, kTwoPi);
+  return wrapped <= -std::numbers::pi ? std::numbers::pi : wrapped;
+}
+
+Vector6d Rigid3::Minus(const Rigid3& other) const {
+  Vector6d xi;
+  xi << t - other.t, LogSo3(q * other.q.conjugate());
+  return xi;
+}
+
+Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const Rigid3& T_b_c,
+                           const Matrix6d& cov_b_c) {
+  // t_ac = R_ab t_bc + t_ab: the left factor's rotation error turns the lever R_ab t_bc.
+  Matrix6d J_left = Matrix6d::Identity();
+  J_left.topRightCorner<3, 3>() = -Hat(T_a_b.q * T_b_c.t);
+  Matrix6d J_right = Matrix6d::Zero();
+  J_right.topLeftCorner<3, 3>() = T_a_b.R();
+  J_right.bottomRightCorner<3, 3>() = T_a_b.R();
+  return J_left * cov_a_b * J_left.transpose() + J_right * cov_b_c * J_right.transpose();
+}
+
+}  // namespace pangea

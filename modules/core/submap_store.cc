@@ -1,0 +1,186 @@
+#include "core/submap_store.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pangea {
+
+KeyframeView::KeyframeView(std::shared_ptr<const Keyframe> keyframe)
+    : keyframe_(std::move(keyframe)),
+      T_odom_cam_(keyframe_->T_odom_cam()),
+      grid_(keyframe_->corners) {
+  const CameraModel& camera = keyframe_->camera;
+  const int n = static_cast<int>(keyframe_->corners.size());
+  has_ray_.assign(n, false);
+  rays_.assign(n, Eigen::Vector2f::Zero());
+  pixel_jacobians_.assign(n, Eigen::Matrix2f::Identity());
+
+  for (int i = 0; i < n; ++i) {
+    const Corner& corner = keyframe_->corners[i];
+    if (corner.landmark_id != kNoLandmark) {
+      landmark_corners_.emplace_back(corner.landmark_id, i);
+    }
+    const auto ray = camera.Unproject(corner.pixel.cast<double>());
+    if (!ray) {
+      continue;
+    }
+    Eigen::Matrix<double, 2, 3> J;
+    if (!camera.Project(Eigen::Vector3d(ray->x(), ray->y(), 1.0), &J)) {
+      continue;
+    }
+    has_ray_[i] = true;
+    rays_[i] = ray->cast<float>();
+    pixel_jacobians_[i] = J.leftCols<2>().cast<float>();
+  }
+  std::sort(landmark_corners_.begin(), landmark_corners_.end());
+}
+
+std::vector<int> KeyframeView::CornersOfLandmark(int32_t landmark_id) const {
+  std::vector<int> corners;
+  for (auto it = std::lower_bound(landmark_corners_.begin(), landmark_corners_.end(),
+                                  std::make_pair(landmark_id, 0));
+       it != landmark_corners_.end() && it->first == landmark_id; ++it) {
+    corners.push_back(it->second);
+  }
+  return corners;
+}
+
+void SubmapStore::Add(Keyframe keyframe) {
+  const KeyframeId id = keyframe.id;
+  if (keyframes_.contains(id)) {
+    return;
+  }
+  if (!options_.keep_preintegration) {
+    keyframe.preintegration.reset();
+  }
+  keyframes_.emplace(id, std::make_shared<const Keyframe>(std::move(keyframe)));
+  arrival_.push_back(id);
+  if (arrival_.size() > static_cast<size_t>(options_.max_keyframes)) {
+    keyframes_.erase(arrival_.front());
+    if (const auto cached = views_.find(arrival_.front()); cached != views_.end()) {
+      uses_.erase(cached->second.use);
+      views_.erase(cached);
+    }
+    arrival_.pop_front();
+  }
+}
+
+std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
+  if (const auto cached = views_.find(id); cached != views_.end()) {
+    uses_.splice(uses_.begin(), uses_, cached->second.use);
+    return cached->second.view;
+  }
+  const auto stored = keyframes_.find(id);
+  if (stored == keyframes_.end()) {
+    return nullptr;
+  }
+  auto view = std::make_shared<const KeyframeView>(stored->second);
+  uses_.push_front(id);
+  views_.emplace(id, Cached{view, uses_.begin()});
+  if (uses_.size() > static_cast<size_t>(options_.max_views)) {
+    views_.erase(uses_.back());
+    uses_.pop_back();
+  }
+  return view;
+}
+
+KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
+  KeyframeWindow window;
+  KeyframeId next = id;
+  while (static_cast<int>(window.size()) < count) {
+    auto view = Find(next);
+    if (view == nullptr) {
+      break;
+    }
+    window.push_back(view);
+    if (!view->keyframe().edge) {
+      break;
+    }
+    next.seq = view->keyframe().edge->from_seq;
+  }
+  std::reverse(window.begin(), window.end());
+  return window;
+}
+
+void SubmapStore::NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
+  lost_[{map, to_seq}] = from_seq;
+}
+
+std::optional<int32_t> SubmapStore::LostSince(const KeyframeId& id) const {
+  const auto it = lost_.lower_bound(id);
+  if (it != lost_.end() && it->first.map == id.map && it->second <= id.seq) {
+    return it->second;
+  }
+  return std::nullopt;
+}
+
+bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
+  KeyframeId next = id;
+  for (int i = 0; i < count; ++i) {
+    const auto it = keyframes_.find(next);
+    if (it == keyframes_.end()) {
+      return LostSince(next).has_value();
+    }
+    if (!it->second->edge) {
+      return true;
+    }
+    next.seq = it->second->edge->from_seq;
+  }
+  return true;
+}
+
+bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const {
+  KeyframeId next = newer;
+  while (next.seq > older.seq) {
+    const auto it = keyframes_.find(next);
+    if (it != keyframes_.end()) {
+      if (!it->second->edge) {
+        return true;
+      }
+      next.seq = it->second->edge->from_seq;
+    } else if (const auto lost_since = LostSince(next)) {
+      next.seq = *lost_since - 1;
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
+                                               const KeyframeId& newer) const {
+  double path_m = 0;
+  KeyframeId next = newer;
+  const Keyframe* after_gap = nullptr;
+  while (next.seq >= older.seq) {
+    const auto it = keyframes_.find(next);
+    if (it == keyframes_.end()) {
+      const auto lost_since = LostSince(next);
+      if (!lost_since) {
+        return std::nullopt;
+      }
+      next.seq = *lost_since - 1;
+      continue;
+    }
+    const Keyframe& keyframe = *it->second;
+    if (after_gap != nullptr) {
+      path_m += (after_gap->T_odom_body.t - keyframe.T_odom_body.t).norm();
+      after_gap = nullptr;
+    }
+    if (next == older) {
+      return path_m;
+    }
+    if (!keyframe.edge) {
+      return std::nullopt;
+    }
+    next.seq = keyframe.edge->from_seq;
+    if (keyframes_.contains(next)) {
+      path_m += keyframe.edge->T_from_this.t.norm();
+    } else {
+      after_gap = &keyframe;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace pangea

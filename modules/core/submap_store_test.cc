@@ -1,0 +1,106 @@
+#include "core/submap_store.h"
+
+#include <gtest/gtest.h>
+
+namespace pangea {
+namespace {
+
+const MapId kMap{1, 5};
+
+Keyframe MakeKeyframe(int32_t seq) {
+  Keyframe keyframe;
+  keyframe.id = {kMap, seq};
+  keyframe.camera.width = 640;
+  keyframe.camera.height = 480;
+  keyframe.camera.fx = keyframe.camera.fy = 400;
+  keyframe.camera.cx = 320;
+  keyframe.camera.cy = 240;
+  keyframe.corners.resize(2);
+  keyframe.corners[0].pixel = {320, 240};
+  keyframe.corners[1].pixel = {420, 240};
+  keyframe.corners[1].landmark_id = 77;
+  keyframe.points.push_back({1, 0.5f, 0.01f});
+  if (seq > 0) {
+    keyframe.edge = OdometryEdge{};
+    keyframe.edge->from_seq = seq - 1;
+    keyframe.edge->T_from_this.t = {2, 0, 0};
+  }
+  return keyframe;
+}
+
+TEST(SubmapStore, ViewUndistortsAndFindsLandmarks) {
+  SubmapStore store;
+  store.Add(MakeKeyframe(0));
+  const auto view = store.Find({kMap, 0});
+  ASSERT_NE(view, nullptr);
+  EXPECT_TRUE(view->has_ray(1));
+  EXPECT_NEAR(view->ray(1).x(), 0.25, 1e-6);
+  EXPECT_NEAR(view->pixel_jacobian(1)(0, 0), 400, 1e-3);
+  EXPECT_EQ(view->CornersOfLandmark(77), std::vector<int>{1});
+  EXPECT_TRUE(view->CornersOfLandmark(78).empty());
+  EXPECT_EQ(store.Find({kMap, 1}), nullptr);
+}
+
+TEST(SubmapStore, WindowFollowsTheEdges) {
+  SubmapStore store;
+  store.Add(MakeKeyframe(3));
+  store.Add(MakeKeyframe(1));
+  EXPECT_FALSE(store.ChainIsComplete({kMap, 1}, {kMap, 3}));
+  store.Add(MakeKeyframe(2));
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 3}, 3));
+  EXPECT_FALSE(store.WindowIsComplete({kMap, 3}, 4));  // 0 is missing
+  EXPECT_TRUE(store.ChainIsComplete({kMap, 1}, {kMap, 3}));
+  store.Add(MakeKeyframe(0));
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 3}, 9));  // the map begins at 0
+  const KeyframeWindow window = store.WindowUpTo({kMap, 3}, 3);
+  ASSERT_EQ(window.size(), 3u);
+  EXPECT_EQ(window[0]->keyframe().id.seq, 1);
+  EXPECT_EQ(window[2]->keyframe().id.seq, 3);
+  EXPECT_NEAR(*store.PathBetween({kMap, 1}, {kMap, 3}), 4.0, 1e-12);
+}
+
+TEST(SubmapStore, ABridgedGapIsNoGap) {
+  SubmapStore store;
+  store.Add(MakeKeyframe(0));
+  Keyframe bridged = MakeKeyframe(5);
+  bridged.edge->from_seq = 0;
+  store.Add(bridged);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 5}, 5));
+  EXPECT_EQ(store.WindowUpTo({kMap, 5}, 5).size(), 2u);
+  EXPECT_TRUE(store.PathBetween({kMap, 0}, {kMap, 5}));
+  EXPECT_FALSE(store.PathBetween({kMap, 3}, {kMap, 5}));
+}
+
+TEST(SubmapStore, GoesOnAfterWhatWasLost) {
+  SubmapStore store;
+  for (const int seq : {0, 1, 4, 5}) {
+    Keyframe keyframe = MakeKeyframe(seq);
+    keyframe.T_odom_body.t = {2.0 * seq, 0, 0};
+    store.Add(keyframe);
+  }
+  EXPECT_FALSE(store.WindowIsComplete({kMap, 5}, 5));
+  EXPECT_FALSE(store.ChainIsComplete({kMap, 0}, {kMap, 5}));
+  store.NoteLost(kMap, 2, 3);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 5}, 5));
+  EXPECT_EQ(store.WindowUpTo({kMap, 5}, 5).size(), 2u);
+  EXPECT_TRUE(store.ChainIsComplete({kMap, 0}, {kMap, 5}));
+  EXPECT_NEAR(store.PathBetween({kMap, 0}, {kMap, 5}).value_or(0), 10.0, 1e-12);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 3}, 5));  // no more of it will come
+  EXPECT_TRUE(store.WindowUpTo({kMap, 3}, 5).empty());
+}
+
+TEST(SubmapStore, IsBounded) {
+  SubmapStore store({.max_keyframes = 3, .max_views = 2});
+  for (int seq = 0; seq < 5; ++seq) {
+    store.Add(MakeKeyframe(seq));
+    EXPECT_NE(store.Find({kMap, seq}), nullptr);
+  }
+  EXPECT_EQ(store.size(), 3u);
+  EXPECT_FALSE(store.Contains({kMap, 1}));
+  for (int seq = 2; seq < 5; ++seq) {
+    EXPECT_NE(store.Find({kMap, seq}), nullptr);  // a view that was dropped is made again
+  }
+}
+
+}  // namespace
+}  // namespace pangea

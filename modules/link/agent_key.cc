@@ -1,0 +1,214 @@
+#include "link/agent_key.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sodium.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kHexBytes = 2 * SecretKey::kBytes;
+constexpr size_t kMaxFileBytes = 4096;
+
+[[noreturn]] void Fail(const fs::path& file, const std::string& what) {
+  throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
+}
+
+struct OpenFile {
+  explicit OpenFile(const fs::path& file)
+      : fd(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}  // waits not even on a FIFO
+  ~OpenFile() {
+    if (fd >= 0) {
+      close(fd);
+    }
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  const int fd;
+};
+
+// Of an open file, so that what is checked is what is read.
+void Check(const fs::path& file, int fd) {
+  struct stat info {};
+  if (fd < 0 || fstat(fd, &info) != 0) {
+    Fail(file, fmt::format("{}; make one with pangea-agent-handler keygen", std::strerror(errno)));
+  }
+  if (!S_ISREG(info.st_mode)) {
+    Fail(file, "is not a file");
+  }
+  if ((info.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    Fail(file, fmt::format("others may read or write it: chmod 600 {}", file.string()));
+  }
+  if (info.st_size > static_cast<off_t>(kMaxFileBytes)) {
+    Fail(file, "is no key file: it is too long");
+  }
+}
+
+// A text that is wiped when it goes.
+struct SecretText {
+  ~SecretText() { sodium_memzero(bytes.data(), bytes.size()); }
+  std::string_view view() const { return {bytes.data(), size}; }
+  std::array<char, kMaxFileBytes> bytes{};
+  size_t size = 0;
+};
+
+SecretText ReadSecret(const fs::path& file) {
+  const OpenFile opened(file);
+  Check(file, opened.fd);
+  SecretText text;
+  const ssize_t n = read(opened.fd, text.bytes.data(), text.bytes.size());
+  if (n < 0) {
+    Fail(file, std::strerror(errno));
+  }
+  text.size = static_cast<size_t>(n);
+  return text;
+}
+
+std::optional<SecretKey> FromHex(std::string_view text) {
+  std::array<uint8_t, SecretKey::kBytes> bytes{};
+  const bool whole =
+      text.size() == kHexBytes && sodium_hex2bin(bytes.data(), bytes.size(), text.data(),
+                                                 text.size(), nullptr, nullptr, nullptr) == 0;
+  auto key = whole ? std::optional<SecretKey>(bytes) : std::nullopt;
+  sodium_memzero(bytes.data(), bytes.size());
+  return key;
+}
+
+// What follows "name:" and blanks in the line, if it is of that name.
+std::optional<std::string_view> ValueOf(std::string_view line, std::string_view name) {
+  if (!line.starts_with(name) || line.substr(name.size()).substr(0, 1) != ":") {
+    return std::nullopt;
+  }
+  line.remove_prefix(name.size() + 1);
+  line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+  line = line.substr(0, line.find_last_not_of(" \r") + 1);
+  return line;
+}
+
+}  // namespace
+
+std::string KeyFileName(int32_t agent_id) { return fmt::format("agent_{}.key", agent_id); }
+
+void MakeKeyFile(const fs::path& file, int32_t agent_id) {
+  const SecretKey key = SecretKey::Random();
+  char hex[kHexBytes + 1];
+  sodium_bin2hex(hex, sizeof(hex), key.bytes().data(), key.bytes().size());
+  const std::string text = fmt::format(
+      "# Lets agent {0} into a Pangea server. Secret: a copy for the agent (pangea-uplink --key), "
+      "a "
+      "copy for the\n# server's folder of keys (pangea-agent-handler --keys).\nagent: {0}\nkey: "
+      "{1}\n",
+      agent_id, hex);
+  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (fd < 0) {
+    Fail(file, errno == EEXIST ? "exists already, and is left as it is: give another --out"
+                               : std::strerror(errno));
+  }
+  const bool written = write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  const bool closed = close(fd) == 0;
+  sodium_memzero(hex, sizeof(hex));
+  if (!written || !closed) {
+    unlink(file.c_str());
+    Fail(file, "cannot be written");
+  }
+}
+
+AgentKey ReadKeyFile(const fs::path& file) {
+  const SecretText text = ReadSecret(file);
+  std::optional<int32_t> agent_id;
+  std::optional<SecretKey> key;
+  for (std::string_view rest = text.view(); !rest.empty();) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
+    if (const auto id = ValueOf(line, "agent")) {
+      int32_t value = 0;
+      const auto [end, error] = std::from_chars(id->data(), id->data() + id->size(), value);
+      if (error != std::errc() || end != id->data() + id->size() || value < 1 || value > 65535) {
+        Fail(file, "agent must be 1 .. 65535");
+      }
+      agent_id = value;
+    } else if (const auto hex = ValueOf(line, "key")) {
+      key = FromHex(*hex);
+      if (!key) {
+        Fail(file, fmt::format("key must be {} hexadecimal digits", kHexBytes));
+      }
+    } else if (!line.empty() && line[0] != '#') {
+      Fail(file, "is no key file: it has lines agent: and key: only");
+    }
+  }
+  if (!agent_id || !key) {
+    Fail(file, "is no key file: it needs the lines agent: and key:");
+  }
+  return {*agent_id, *key};
+}
+
+SecretKey ReadKeyFileOf(const fs::path& file, int32_t agent_id) {
+  const AgentKey read = ReadKeyFile(file);
+  if (read.agent_id != agent_id) {
+    Fail(file, fmt::format("is agent {}'s, and this is agent {}: give its own key, or --agent {}",
+                           read.agent_id, agent_id, read.agent_id));
+  }
+  return read.key;
+}
+
+KeyFolder::Stamps KeyFolder::Look() const {
+  Stamps stamps;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    std::error_code gone;
+    if (entry.path().extension() == ".key") {
+      stamps[entry.path()] = fs::last_write_time(entry.path(), gone);
+    }
+  }
+  return stamps;
+}
+
+bool KeyFolder::Changed() const {
+  try {
+    return Look() != seen_;
+  } catch (const fs::filesystem_error&) {
+    return true;
+  }
+}
+
+bool KeyFolder::IsGone(int32_t agent_id) const {
+  const auto file = files_.find(agent_id);
+  std::error_code error;
+  return file == files_.end() || !fs::exists(file->second, error);
+}
+
+std::map<int32_t, SecretKey> KeyFolder::Read() {
+  std::error_code error;
+  if (!fs::is_directory(folder_, error)) {
+    throw std::runtime_error(
+        fmt::format("no folder of keys {}: make it, and in it a key for each agent "
+                    "(pangea-agent-handler keygen --agent 1 --out {})",
+                    folder_.string(), (folder_ / KeyFileName(1)).string()));
+  }
+  const Stamps stamps = Look();
+  std::map<int32_t, SecretKey> keys;
+  std::map<int32_t, fs::path> files;
+  for (const auto& [file, stamp] : stamps) {
+    const AgentKey read = ReadKeyFile(file);
+    if (!keys.emplace(read.agent_id, read.key).second) {
+      Fail(file, fmt::format("is a second key of agent {}: take one of them out", read.agent_id));
+    }
+    files[read.agent_id] = file;
+  }
+  seen_ = stamps;
+  files_ = std::move(files);
+  return keys;
+}
+
+}  // namespace pangea

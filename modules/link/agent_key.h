@@ -1,0 +1,56 @@
+#pragma once
+
+// An agent's pre-shared key as a file: text, mode 0600, made by `pangea-agent-handler keygen`. The
+// agent has one, the server a folder of them.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "link/seal.h"
+
+namespace pangea {
+
+struct AgentKey {
+  int32_t agent_id = 0;
+  SecretKey key;
+};
+
+// "agent_4.key"
+std::string KeyFileName(int32_t agent_id);
+
+// A new random key. Throws std::runtime_error if the file exists or cannot be written.
+void MakeKeyFile(const std::filesystem::path& file, int32_t agent_id);
+
+// Throws std::runtime_error that names the file and the mend: missing, readable by others,
+// malformed.
+AgentKey ReadKeyFile(const std::filesystem::path& file);
+// ... or another agent's.
+SecretKey ReadKeyFileOf(const std::filesystem::path& file, int32_t agent_id);
+
+// The *.key files of a folder. Looked at again, it says whether anything has changed, so that
+// agents can be let in and shut out while the server runs.
+class KeyFolder {
+ public:
+  explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  // Throws std::runtime_error: no such folder, a file of it cannot be used, two of one agent.
+  std::map<int32_t, SecretKey> Read();
+  // Whether files have come, gone or changed since the last Read.
+  bool Changed() const;
+  // Whether the file is gone that the last successful Read had the agent's key from.
+  bool IsGone(int32_t agent_id) const;
+
+ private:
+  using Stamps = std::map<std::filesystem::path, std::filesystem::file_time_type>;
+  Stamps Look() const;
+
+  std::filesystem::path folder_;
+  Stamps seen_;
+  std::map<int32_t, std::filesystem::path> files_;
+};
+
+}  // namespace pangea

@@ -1,0 +1,103 @@
+#include "link/agent_key.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class AgentKeyTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+  fs::path Write(const std::string& name, const std::string& text) const {
+    fs::path file = folder / name;
+    std::ofstream(file) << text;
+    fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+    return file;
+  }
+
+  const fs::path folder = testing::TempDir() + "pangea_keys_" + std::to_string(getpid());
+};
+
+std::string ReasonOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(AgentKeyTest, RoundTrip) {
+  const fs::path a = folder / "a.key", b = folder / "b.key";
+  MakeKeyFile(a, 4);
+  MakeKeyFile(b, 5);
+  EXPECT_EQ(fs::status(a).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(ReadKeyFile(a).agent_id, 4);
+  EXPECT_TRUE(ReadKeyFileOf(a, 4) == ReadKeyFile(a).key);
+  EXPECT_FALSE(ReadKeyFile(a).key == ReadKeyFile(b).key);
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFileOf(a, 7); }),
+              testing::AllOf(HasSubstr("a.key"), HasSubstr("agent 4"), HasSubstr("agent 7")));
+}
+
+TEST_F(AgentKeyTest, NeverWritesOver) {
+  const fs::path file = folder / "a.key";
+  MakeKeyFile(file, 4);
+  const SecretKey key = ReadKeyFile(file).key;
+  EXPECT_THAT(ReasonOf([&] { MakeKeyFile(file, 4); }), HasSubstr("exists already"));
+  EXPECT_TRUE(ReadKeyFile(file).key == key);
+}
+
+TEST_F(AgentKeyTest, MistakesGetAnAnswerWithoutTheSecret) {
+  const std::string good(64, 'a');
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(folder / "none.key"); }), HasSubstr("keygen"));
+  const fs::path open = Write("open.key", "agent: 4\nkey: " + good + "\n");
+  EXPECT_EQ(ReasonOf([&] { ReadKeyFile(open); }), "");
+  fs::permissions(open, fs::perms::group_read, fs::perm_options::add);
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(open); }), HasSubstr("chmod 600"));
+  for (const auto& [text, said] :
+       {std::pair{"agent: 4\n", "key:"}, std::pair{"agent: 4\nkey: 12345\n", "hexadecimal"},
+        std::pair{"agent: 0\n", "1 .. 65535"}, std::pair{"agent: 4x\n", "1 .. 65535"},
+        std::pair{"agents: 4\n", "agent:"}}) {
+    EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", text)); }),
+                testing::AllOf(HasSubstr("bad.key"), HasSubstr(said)));
+  }
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("long.key", std::string(5000, '#'))); }),
+              HasSubstr("too long"));
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(folder); }), HasSubstr("is not a file"));
+  const std::string secret(63, 'b');
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", "agent: 4\nkey: " + secret + "\n")); }),
+              testing::Not(HasSubstr("bbbb")));
+}
+
+TEST_F(AgentKeyTest, AFolderOfKeys) {
+  EXPECT_THAT(ReasonOf([&] { KeyFolder(folder / "none").Read(); }), HasSubstr("keygen"));
+  KeyFolder keys(folder);
+  EXPECT_TRUE(keys.Read().empty());
+  EXPECT_FALSE(keys.Changed());
+  MakeKeyFile(folder / "agent_4.key", 4);
+  Write("readme.txt", "no key");
+  EXPECT_TRUE(keys.Changed());
+  EXPECT_THAT(keys.Read(), testing::ElementsAre(testing::Key(4)));
+  EXPECT_FALSE(keys.Changed());
+  MakeKeyFile(folder / "again.key", 4);
+  EXPECT_THAT(ReasonOf([&] { keys.Read(); }), HasSubstr("second key of agent 4"));
+  EXPECT_TRUE(keys.Changed()) << "until it is mended";
+  fs::remove(folder / "again.key");
+  fs::remove(folder / "agent_4.key");
+  EXPECT_TRUE(keys.Changed());
+  EXPECT_TRUE(keys.Read().empty());
+}
+
+}  // namespace
+}  // namespace pangea

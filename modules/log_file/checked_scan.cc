@@ -1,0 +1,79 @@
+#include "log_file/checked_scan.h"
+
+#include <utility>
+
+#include "messages/channels.h"
+
+namespace pangea {
+
+bool FillsDamage(const LogPiece& event) { return channels::kDamaged.starts_with(event.channel); }
+
+uint32_t CheckedScan::Piece::crc32() const {
+  if (!crc32_) {
+    crc32_ = EventChecksum(whole);
+  }
+  return *crc32_;
+}
+
+const CheckedScan::Piece* CheckedScan::Next() {
+  while (num_ready_ == 0) {
+    if (!Read()) {
+      return nullptr;
+    }
+  }
+  current_ = std::move(waiting_.front());
+  waiting_.pop_front();
+  waiting_bytes_ -= current_.bytes.size();
+  --num_ready_;
+  return &current_.piece;
+}
+
+// One more piece; false when there is none, and none waits.
+bool CheckedScan::Read() {
+  const auto read = scan_.Next();
+  if (!read) {
+    num_ready_ = waiting_.size();
+    return num_ready_ > 0;
+  }
+  Waiting& next = waiting_.emplace_back();
+  static_cast<LogPiece&>(next.piece) = *read;
+  next.bytes.assign(read->whole.begin(), read->whole.end());
+  next.piece.whole = next.bytes;
+  next.piece.data = Bytes(next.bytes).last(read->data.size());
+  waiting_bytes_ += next.bytes.size();
+  const bool is_list = read->channel == channels::kChecksums;
+  if (const auto checksums = is_list ? ChecksumsOf(next.bytes) : std::nullopt) {
+    Judge(*checksums);
+    num_ready_ = waiting_.size();
+  } else if (waiting_bytes_ > kMaxWaitingBytes) {
+    num_ready_ = 1;
+  }
+  return true;
+}
+
+// From the list backwards. Which of its events another is, its place says, and behind damage, which
+// may have taken any number of events, the event itself.
+void CheckedScan::Judge(const Checksums& checksums) {
+  int64_t expected = checksums.event_number() - 1;
+  bool in_place = true;
+  for (auto it = std::next(waiting_.rbegin());
+       it != waiting_.rend() && expected >= checksums.first_event; ++it) {
+    Piece& piece = it->piece;
+    if (piece.kind != LogPiece::Kind::kEvent || FillsDamage(piece)) {
+      in_place = false;
+      continue;
+    }
+    const int64_t number = in_place ? expected : piece.header.number;
+    if (number < checksums.first_event || number > expected) {
+      continue;  // it was there before those of the list, or who can say which it is
+    }
+    const auto index = static_cast<size_t>(number - checksums.first_event);
+    if (piece.crc32() != checksums.crc32[index]) {
+      piece.kind = LogPiece::Kind::kDamage;
+    }
+    expected = number - 1;
+    in_place = true;
+  }
+}
+
+}  // namespace pangea

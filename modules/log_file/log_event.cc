@@ -1,0 +1,96 @@
+#include "log_file/log_event.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "core/big_endian.h"
+
+namespace pangea {
+namespace {
+
+// Big-endian: magic, event number, time stamp, length of the channel's name and of the data.
+constexpr uint32_t kMaxChannelName = 63;
+
+}  // namespace
+
+size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel, Bytes data,
+                      std::vector<uint8_t>* out) {
+  PutBigEndian(kLogMagic, 4, out);
+  PutBigEndian(static_cast<uint64_t>(number), 8, out);
+  PutBigEndian(static_cast<uint64_t>(utime), 8, out);
+  PutBigEndian(channel.size(), 4, out);
+  PutBigEndian(data.size(), 4, out);
+  out->insert(out->end(), channel.begin(), channel.end());
+  const size_t begin = out->size();
+  out->insert(out->end(), data.begin(), data.end());
+  return begin;
+}
+
+std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
+  if (bytes.size() < LogEventHeader::kBytes || GetBigEndian(bytes.data(), 4) != kLogMagic) {
+    return std::nullopt;
+  }
+  const auto channel_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 20, 4));
+  const auto data_bytes = static_cast<uint32_t>(GetBigEndian(bytes.data() + 24, 4));
+  if (channel_bytes < 1 || channel_bytes > kMaxChannelName ||
+      data_bytes > LogEventHeader::kMaxDataBytes) {
+    return std::nullopt;
+  }
+  return LogEventHeader{static_cast<int64_t>(GetBigEndian(bytes.data() + 4, 8)),
+                        static_cast<int64_t>(GetBigEndian(bytes.data() + 12, 8)),
+                        static_cast<int32_t>(channel_bytes), static_cast<int32_t>(data_bytes)};
+}
+
+bool BeginsAsLogEvent(Bytes bytes) {
+  std::vector<uint8_t> magic;
+  PutBigEndian(kLogMagic, 4, &magic);
+  const size_t size = std::min(bytes.size(), magic.size());
+  return std::equal(magic.begin(), magic.begin() + static_cast<int64_t>(size), bytes.begin());
+}
+
+bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
+  while (size > 0) {
+    const ssize_t got = pread(fd, out, size, offset);
+    if (got <= 0) {
+      if (got < 0 && errno == EINTR) {
+        continue;
+      }
+      return false;
+    }
+    out += got;
+    offset += got;
+    size -= static_cast<size_t>(got);
+  }
+  return true;
+}
+
+bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {
+  while (size > 0) {
+    const ssize_t put = pwrite(fd, data, size, offset);
+    if (put < 0) {
+      if (errno == EINTR) {
+        continue;
+      }
+      return false;
+    }
+    data += put;
+    offset += put;
+    size -= static_cast<size_t>(put);
+  }
+  return true;
+}
+
+bool SyncFolder(const std::string& folder) {
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) {
+    return false;
+  }
+  const bool synced = fsync(fd) == 0;
+  close(fd);
+  return synced;
+}
+
+}  // namespace pangea

@@ -1,0 +1,27 @@
+#pragma once
+
+// A new LCM log, event by event.
+
+#include <cstdint>
+#include <lcm/lcm-cpp.hpp>
+#include <string>
+
+#include "bus/bus.h"
+
+namespace pangea {
+
+class LogFileWriter {
+ public:
+  // Overwrites. Throws std::runtime_error when the file cannot be written.
+  explicit LogFileWriter(const std::string& path);
+
+  void Write(int64_t utime, const std::string& channel, Bytes data);  // throws the same
+  int64_t count() const { return count_; }
+
+ private:
+  const std::string path_;
+  lcm::LogFile file_;
+  int64_t count_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,209 @@
+#include "log_tools/explain.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+#include "core/median.h"
+#include "fusion/fusion.h"
+#include "inter_map_ba/inter_map_ba.h"
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+
+namespace pangea::session {
+namespace {
+
+template <typename Message>
+auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
+  Message message{};
+  return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
+}
+
+Constraint FindVerdict(const std::string& log, int64_t id, LogReadings* readings) {
+  std::optional<Constraint> found;
+  const auto find = [&](const LogEvent& event) {
+    if (event.channel == channels::kConstraint) {
+      if (auto constraint = ParseEvent<constraint_t>(event); constraint && constraint->Id() == id) {
+        found = std::move(constraint);
+      }
+    }
+  };
+  ReadLog(log, find, readings);
+  if (!found) {
+    throw std::runtime_error(
+        fmt::format("{}: no constraint {}; pangea-log explain {} lists them", log, id, log));
+  }
+  return *found;
+}
+
+PlaceCandidate FindCandidate(const std::string& log, const Constraint& constraint,
+                             LogReadings* readings) {
+  std::optional<PlaceCandidate> found;
+  const auto find = [&](const LogEvent& event) {
+    const auto match =
+        event.channel == channels::kPlaceMatch ? ParseEvent<place_match_t>(event) : std::nullopt;
+    if (!match || match->query != constraint.to) {
+      return;
+    }
+    for (const PlaceCandidate& candidate : match->candidates) {
+      if (candidate.match == constraint.from && candidate.kind == constraint.kind) {
+        found = candidate;
+      }
+    }
+  };
+  ReadLog(log, find, readings);
+  if (!found) {
+    throw std::runtime_error(fmt::format(
+        "{}: no PLACE_MATCH of {} with {} in this log: replay it, and explain the replay's log",
+        log, ToString(constraint.to), ToString(constraint.from)));
+  }
+  return *found;
+}
+
+// Median over the inliers, for people.
+std::string MissOf(const std::vector<ShownMatch>& matches, double ShownMatch::*miss) {
+  std::vector<double> values;
+  for (const ShownMatch& match : matches) {
+    if (match.inlier) {
+      values.push_back(match.*miss);
+    }
+  }
+  return values.empty() ? "-" : fmt::format("{:.1f}", Median(std::move(values)));
+}
+
+std::string CountOf(const std::vector<ShownMatch>& matches) {
+  const auto inliers = std::ranges::count(matches, true, &ShownMatch::inlier);
+  return fmt::format("{} of {} inliers", inliers, matches.size());
+}
+
+double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
+
+}  // namespace
+
+std::string ListVerdicts(const std::string& log, LogReadings* readings) {
+  std::string text;
+  const auto list = [&text](const LogEvent& event) {
+    if (event.channel != channels::kConstraint) {
+      return;
+    }
+    if (const auto constraint = ParseEvent<constraint_t>(event)) {
+      text += fmt::format("{:>20}  {} in {}  {}\n", constraint->Id(), ToString(constraint->to),
+                          ToString(constraint->from),
+                          constraint->accepted ? "accepted" : constraint->reason);
+    }
+  };
+  ReadLog(log, list, readings);
+  return text.empty() ? fmt::format("{}: no CONSTRAINT in this log\n", log) : text;
+}
+
+Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings) {
+  Explanation explanation;
+  explanation.said = FindVerdict(log, constraint_id, readings);
+  explanation.candidate = FindCandidate(log, explanation.said, readings);
+  std::unique_ptr<PairJudge> judge;
+  if (explanation.said.kind == PlaceKind::kIntra) {
+    judge = std::make_unique<InterMapBa>(InterMapBaOptions{});
+  } else {
+    judge = std::make_unique<Fusion>(FusionOptions{});
+  }
+  bool from = false, to = false;
+  const auto add = [&](const LogEvent& event) {
+    auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
+                        ? ParseEvent<keyframe_t>(event)
+                        : std::nullopt;
+    if (!keyframe) {
+      return;
+    }
+    if (keyframe->id == explanation.said.from) {
+      explanation.from = *keyframe;
+      from = true;
+    }
+    if (keyframe->id == explanation.said.to) {
+      explanation.to = *keyframe;
+      to = true;
+    }
+    judge->Add(std::move(*keyframe));
+  };
+  ReadLog(log, add, readings);
+  if (!from || !to) {
+    throw std::runtime_error(
+        fmt::format("{}: keyframe {} is not in this log", log,
+                    ToString(from ? explanation.said.to : explanation.said.from)));
+  }
+  explanation.again = judge->Judge(explanation.said.to, explanation.candidate, &explanation.report);
+  return explanation;
+}
+
+std::string ToText(const Explanation& e) {
+  const AlignmentReport& report = e.report;
+  const AlignmentOptions limits;
+  const auto verdict = [](const Constraint& c) { return c.accepted ? "accepted" : c.reason; };
+  std::string text = fmt::format(
+      "{} (query) in {} (match), {}\nverdict in the log: {}\nmade again:         {}\n\n",
+      ToString(e.said.to), ToString(e.said.from),
+      e.said.from.map == e.said.to.map ? "one map" : "two maps", verdict(e.said), verdict(e.again));
+  text += fmt::format("candidate      {} corners matched, score {:.4f}\n",
+                      e.candidate.corner_matches.size(), e.candidate.score);
+  text += fmt::format("PnP            {}, {} landmarks (at least {})\n", CountOf(report.first),
+                      report.pnp_inliers, limits.min_pnp_inliers);
+  text += fmt::format(
+      "surroundings   {} points ought to be seen (at least {}), {:.0f} % found (at least {:.0f}), "
+      "in "
+      "{:.0f} % of the view (at least {:.0f})\n",
+      report.comparable, limits.min_comparable, 100 * report.found_share,
+      100 * limits.min_found_share, 100 * report.first_supported_share,
+      100 * limits.min_first_supported_share);
+  if (report.found.empty()) {
+    return text + "window BA      not reached\n";
+  }
+  const Constraint& c = e.again;
+  const Vector6d sigma = c.covariance.diagonal().cwiseSqrt();
+  text += fmt::format(
+      "window BA      {} in the two keyframes; {} observations, {:.0f} % of all (at least {:.0f})\n"
+      "               inliers miss by {} px at PnP's pose, {} px after (median)\n",
+      CountOf(report.found), c.num_inliers, 100 * c.inlier_ratio, 100 * limits.min_inlier_ratio,
+      MissOf(report.found, &ShownMatch::miss_before_px),
+      MissOf(report.found, &ShownMatch::miss_after_px));
+  text += fmt::format(
+      "tilt           {:.2f} degrees between the two gravities, chi-squared {:.1f} (at most "
+      "{:.1f})\n",
+      Degrees(report.tilt), report.tilt_chi2, limits.max_tilt_chi2);
+  text +=
+      fmt::format("landmarks      {} (at least {}) in {} cells of the image (at least {})\n",
+                  report.landmarks, limits.min_inliers, report.cells, limits.min_occupied_cells);
+  text += fmt::format(
+      "uncertainty    {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} degrees (worst at most {:.3f} "
+      "m, "
+      "{:.2f} degrees)\n",
+      sigma[0], sigma[1], sigma[2], Degrees(sigma[3]), Degrees(sigma[4]), Degrees(sigma[5]),
+      limits.max_sigma_m, Degrees(limits.max_sigma_rad));
+  if (report.sigma_without_one_m > 0) {
+    text += fmt::format("               worst {:.3f} m without the landmark that says most\n",
+                        report.sigma_without_one_m);
+  }
+  if (report.sigma_of_sure_m > 0) {
+    text += fmt::format(
+        "               worst {:.3f} m by surely alike landmarks alone (at most {:.3f})\n",
+        report.sigma_of_sure_m, limits.max_sigma_m);
+  }
+  if (report.supported_share > 0) {
+    text += fmt::format("on the way     in {:.0f} % of the view (at least {:.0f})\n",
+                        100 * report.supported_share, 100 * limits.min_supported_share);
+  }
+  if (report.halves_chi2 > 0) {
+    text += fmt::format("halves         differ by {:.1f} (at most {:.1f})\n", report.halves_chi2,
+                        limits.max_halves_chi2);
+  }
+  text += fmt::format("pose           {:.3f} {:.3f} {:.3f} m, {:.1f} degrees from match to query\n",
+                      c.T_from_to.t.x(), c.T_from_to.t.y(), c.T_from_to.t.z(),
+                      Degrees(LogSo3(c.T_from_to.q).norm()));
+  return text;
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,281 @@
+#include "log_tools/g2o.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "files/csv.h"
+
+#include "files/text_file.h"
+
+namespace pangea::session {
+namespace {
+
+// d e / d xi: e's translation is in the measurement's frame, and its rotation part half an angle.
+Matrix6d ErrorOfTangent(const Rigid3& T_from_to) {
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = T_from_to.R().transpose();
+  J.bottomRightCorner<3, 3>() = 0.5 * T_from_to.R().transpose();
+  return J;
+}
+
+std::string Pose(const Rigid3& pose) {
+  return fmt::format("{:.9g} {:.9g} {:.9g} {:.12g} {:.12g} {:.12g} {:.12g}", pose.t.x(), pose.t.y(),
+                     pose.t.z(), pose.q.x(), pose.q.y(), pose.q.z(), pose.q.w());
+}
+
+constexpr double kMaxInformation = 1e30;
+// Of a matrix whose diagonal is scaled to ones: below it, the inverse would be noise.
+constexpr double kMinEigenvalue = 1e-13;
+
+// With any units of its rows.
+bool PositiveDefinite(const Matrix6d& m) {
+  if (!m.allFinite() || m.diagonal().minCoeff() < 1 / kMaxInformation) {
+    return false;
+  }
+  const Vector6d scale = m.diagonal().cwiseSqrt().cwiseInverse();
+  const Matrix6d scaled = scale.asDiagonal() * m * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scaled, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().minCoeff() > kMinEigenvalue;
+}
+
+Matrix6d InverseOf(const Matrix6d& m) {
+  const Vector6d scale = m.diagonal().cwiseSqrt().cwiseInverse();
+  const Matrix6d scaled = scale.asDiagonal() * m * scale.asDiagonal();
+  return scale.asDiagonal() * scaled.llt().solve(Matrix6d::Identity()) * scale.asDiagonal();
+}
+
+// One line's fields, or what is wrong with them.
+class Line {
+ public:
+  Line(const std::string& path, int number, const std::string& text)
+      : path_(path), number_(number), stream_(text) {}
+
+  int number() const { return number_; }
+  std::string Word() {
+    std::string word;
+    stream_ >> word;
+    return word;
+  }
+  bool AtEnd() { return (stream_ >> std::ws).eof(); }
+  int Vertex(const std::string& field) {
+    const std::string word = Word();
+    int64_t id = 0;
+    if (!ParseNumber(word, &id) || id < 0 || id > std::numeric_limits<int>::max()) {
+      Fail(fmt::format("{} '{}' is no vertex' number", field, word));
+    }
+    return static_cast<int>(id);
+  }
+  double Number(const std::string& field, double most) {
+    const std::string word = Word();
+    double value = 0;
+    if (!ParseNumber(word, &value)) {
+      Fail(word.empty() ? field + " is missing"
+                        : fmt::format("{} '{}' is not a finite number", field, word));
+    }
+    if (std::abs(value) > most) {
+      Fail(fmt::format("{} {} is not from {} to {}", field, word, -most, most));
+    }
+    return value;
+  }
+  Rigid3 Pose(double max_position_m) {
+    Rigid3 pose;
+    for (int i = 0; i < 3; ++i) {
+      pose.t[i] = Number(std::string(1, "xyz"[i]), max_position_m);
+    }
+    Eigen::Vector4d q;  // in Eigen's order and g2o's: x y z w
+    for (int i = 0; i < 4; ++i) {
+      q[i] = Number(std::string("q") + "xyzw"[i], 2);
+    }
+    if (q.norm() < 0.5) {
+      Fail("the quaternion (qx qy qz qw) is not a rotation");
+    }
+    pose.q = Eigen::Quaterniond(q).normalized();
+    return pose;
+  }
+  // Upper triangle, row by row.
+  Matrix6d Information() {
+    Matrix6d information;
+    for (int row = 0; row < 6; ++row) {
+      for (int column = row; column < 6; ++column) {
+        information(row, column) = information(column, row) =
+            Number(fmt::format("information {},{}", row + 1, column + 1), kMaxInformation);
+      }
+    }
+    return information;
+  }
+  void End() {
+    if (!AtEnd()) {
+      Fail(fmt::format("'{}' stands behind the last field", Word()));
+    }
+  }
+  [[noreturn]] void Fail(const std::string& what) const { FailAt(path_, number_, what); }
+
+  [[noreturn]] static void FailAt(const std::string& path, int number, const std::string& what) {
+    throw std::runtime_error(fmt::format("{}:{}: {}", path, number, what));
+  }
+
+ private:
+  const std::string& path_;
+  int number_;
+  std::istringstream stream_;
+};
+
+class Reader {
+ public:
+  Reader(const std::string& path, double max_position_m)
+      : path_(path), max_position_m_(max_position_m) {}
+
+  void Take(Line line) {
+    const std::string kind = line.Word();
+    if (kind == "VERTEX_SE3:QUAT") {
+      TakeVertex(&line);
+    } else if (kind == "FIX") {
+      TakeFixed(&line);
+    } else if (kind == "EDGE_SE3:QUAT") {
+      TakeEdge(&line);
+    } else if (!kind.empty() && !kind.starts_with('#')) {
+      line.Fail(fmt::format("{} is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", kind));
+    }
+  }
+
+  // A file may have its edges before their vertices.
+  Graph Finish() {
+    for (size_t i = 0; i < graph_.edges.size(); ++i) {
+      for (const int id : {graph_.edges[i].from, graph_.edges[i].to}) {
+        CheckVertex(id, edge_lines_[i], "an end of the edge");
+      }
+    }
+    for (size_t i = 0; i < graph_.fixed.size(); ++i) {
+      CheckVertex(graph_.fixed[i], fixed_lines_[i], "to be fixed");
+    }
+    return std::move(graph_);
+  }
+
+ private:
+  void TakeVertex(Line* line) {
+    const int id = line->Vertex("the id");
+    if (const auto [first, is_new] = vertex_lines_.emplace(id, line->number()); !is_new) {
+      line->Fail(fmt::format("vertex {} is there already, in line {}", id, first->second));
+    }
+    graph_.vertices[id] = line->Pose(max_position_m_);
+    line->End();
+  }
+
+  void TakeFixed(Line* line) {
+    do {
+      graph_.fixed.push_back(line->Vertex("the id"));
+      fixed_lines_.push_back(line->number());
+    } while (!line->AtEnd());
+  }
+
+  void TakeEdge(Line* line) {
+    GraphEdge edge;
+    edge.from = line->Vertex("the first end");
+    edge.to = line->Vertex("the second end");
+    if (edge.from == edge.to) {
+      line->Fail(fmt::format("the edge's ends are both {}", edge.from));
+    }
+    edge.T_from_to = line->Pose(max_position_m_);
+    const Matrix6d information = line->Information();
+    line->End();
+    if (!PositiveDefinite(information)) {
+      line->Fail("the information matrix is not positive definite");
+    }
+    const Matrix6d inverse = ErrorOfTangent(edge.T_from_to).inverse();
+    edge.covariance = inverse * InverseOf(information) * inverse.transpose();
+    if (!PositiveDefinite(edge.covariance)) {
+      line->Fail("the information matrix cannot be inverted: its shares differ too much");
+    }
+    CheckNew(edge, *line);
+    edges_between_[{edge.from, edge.to}].push_back(graph_.edges.size());
+    edge_lines_.push_back(line->number());
+    graph_.edges.push_back(edge);
+  }
+
+  void CheckNew(const GraphEdge& edge, const Line& line) {
+    for (const size_t i : edges_between_[{edge.from, edge.to}]) {
+      const GraphEdge& other = graph_.edges[i];
+      if (other.T_from_to.t == edge.T_from_to.t &&
+          other.T_from_to.q.coeffs() == edge.T_from_to.q.coeffs() &&
+          other.covariance == edge.covariance) {
+        line.Fail(fmt::format("edge {} -> {} is there already, the same, in line {}", edge.from,
+                              edge.to, edge_lines_[i]));
+      }
+    }
+  }
+
+  void CheckVertex(int id, int line, const std::string& what) const {
+    if (!graph_.vertices.contains(id)) {
+      Line::FailAt(path_, line, fmt::format("{}, {}, is no vertex of the file", what, id));
+    }
+  }
+
+  const std::string& path_;
+  const double max_position_m_;
+  Graph graph_;
+  std::map<int, int> vertex_lines_;  // by vertex
+  std::vector<int> fixed_lines_;     // as graph_.fixed
+  std::vector<int> edge_lines_;      // as graph_.edges
+  std::map<std::pair<int, int>, std::vector<size_t>> edges_between_;
+};
+
+}  // namespace
+
+double Cost(const Graph& graph) {
+  double cost = 0;
+  for (const GraphEdge& edge : graph.edges) {
+    const Rigid3 T_from_to = graph.vertices.at(edge.from).Inverse() * graph.vertices.at(edge.to);
+    const Vector6d xi = T_from_to.Minus(edge.T_from_to);
+    const double share = xi.dot(edge.covariance.ldlt().solve(xi));
+    if (!std::isfinite(share) || share < 0) {
+      throw std::runtime_error(
+          fmt::format("the edge {} -> {} has the cost {}", edge.from, edge.to, share));
+    }
+    cost += share;
+  }
+  return cost;
+}
+
+std::string ToG2o(const Graph& graph) {
+  std::string text;
+  for (const auto& [id, pose] : graph.vertices) {
+    text += fmt::format("VERTEX_SE3:QUAT {} {}\n", id, Pose(pose));
+  }
+  for (const int id : graph.fixed) {
+    text += fmt::format("FIX {}\n", id);
+  }
+  for (const GraphEdge& edge : graph.edges) {
+    const Matrix6d J = ErrorOfTangent(edge.T_from_to);
+    const Matrix6d information = (J * edge.covariance * J.transpose()).inverse();
+    text += fmt::format("EDGE_SE3:QUAT {} {} {}", edge.from, edge.to, Pose(edge.T_from_to));
+    for (int row = 0; row < 6; ++row) {
+      for (int column = row; column < 6; ++column) {
+        text += fmt::format(" {:.12g}", information(row, column));
+      }
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+Graph ReadG2o(const std::string& path, double max_position_m) {
+  std::ifstream file = OpenFile(path);
+  Reader reader(path, max_position_m);
+  std::string text;
+  for (int number = 1; std::getline(file, text); ++number) {
+    reader.Take(Line(path, number, text));
+  }
+  return reader.Finish();
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,158 @@
+#include "log_tools/log_edit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <regex>
+#include <stdexcept>
+
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "log_tools/message_fields.h"
+
+namespace pangea::session {
+namespace {
+
+std::regex Expression(const std::string& text) {
+  try {
+    return std::regex(text, std::regex::extended);
+  } catch (const std::regex_error&) {
+    throw std::runtime_error(fmt::format(
+        "--channels {}: is no regular expression; for example KEYFRAME_.* or (POSE_1|POSE_2)",
+        text));
+  }
+}
+
+// handler(event, seconds since the log's first event).
+template <typename Handler>
+void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings, Handler handler) {
+  const std::regex channels = Expression(cut.channels);
+  std::optional<int64_t> first;
+  const auto read = [&](const LogEvent& event) {
+    first = first.value_or(event.utime);
+    // Capture times may step back by a little, before the first one too.
+    const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
+    if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
+      handler(event, seconds);
+    }
+  };
+  ReadLog(log, read, readings);
+}
+
+// "a.b[12].c[3]" has the item 12 of an array.
+bool IsFarInArray(const std::string& path) {
+  constexpr int kShown = 8;
+  for (size_t open = path.find('['); open != std::string::npos; open = path.find('[', open + 1)) {
+    if (std::atoi(path.c_str() + open + 1) >= kShown) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void ListFields(Bytes data, std::ostream& out) {
+  const auto message = DecodeFields(data);
+  if (!message) {
+    out << "            does not decode\n";
+    return;
+  }
+  size_t hidden = 0;
+  for (const MessageField& field : message->fields) {
+    if (IsFarInArray(field.path)) {
+      ++hidden;
+    } else {
+      out << fmt::format("            {} = {}\n", field.path, field.value);
+    }
+  }
+  if (hidden > 0) {
+    out << fmt::format("            and {} further items of arrays\n", hidden);
+  }
+}
+
+void ListJson(const LogEvent& event, std::ostream& out) {
+  const auto message = DecodeFields(event.data);
+  nlohmann::ordered_json json = {{"utime", event.utime}, {"channel", event.channel}};
+  json["type"] = message ? nlohmann::ordered_json(message->type) : nullptr;
+  json["message"] = message ? ToJson(*message) : nullptr;
+  // Texts are whatever was on the bus.
+  out << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+}
+
+// The place of an event in its log.
+struct Place {
+  int64_t utime = 0;
+  size_t log = 0;
+  size_t event = 0;
+};
+
+}  // namespace
+
+void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
+                LogReadings* readings) {
+  ReadCut(log, cut, readings, [&](const LogEvent& event, double seconds) {
+    if (as == ListAs::kJson) {
+      ListJson(event, out);
+      return;
+    }
+    const auto type = TypeOf(event.data);
+    out << fmt::format("{:>10.6f}  {}  {}  {} bytes\n", seconds, event.channel,
+                       type.value_or("of no type of ours"), event.data.size());
+    if (as == ListAs::kFields) {
+      ListFields(event.data, out);
+    }
+  });
+}
+
+void CheckNew(const std::string& path) {
+  if (std::filesystem::exists(path)) {
+    throw std::runtime_error(
+        fmt::format("{}: exists; give another name, nothing is overwritten", path));
+  }
+}
+
+int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
+               LogReadings* readings) {
+  Expression(cut.channels);  // before a file is made
+  CheckNew(out);
+  LogFileWriter writer(out);
+  ReadCut(log, cut, readings, [&writer](const LogEvent& event, double) {
+    writer.Write(event.utime, event.channel, event.data);
+  });
+  return writer.count();
+}
+
+int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
+                  LogReadings* readings) {
+  CheckNew(out);
+  LogFileWriter writer(out);
+  std::vector<Place> places;
+  for (size_t log = 0; log < logs.size(); ++log) {
+    size_t event = 0;
+    // Within a log its own order stands: capture times in a log may step back.
+    int64_t latest = std::numeric_limits<int64_t>::min();
+    const auto note = [&](const LogEvent& read) {
+      latest = std::max(latest, read.utime);
+      places.push_back({latest, log, event++});
+    };
+    ReadLog(logs[log], note, readings);
+  }
+  std::ranges::stable_sort(places, {}, &Place::utime);
+  std::deque<LogReader> files;
+  for (const std::string& log : logs) {
+    files.emplace_back(log);
+  }
+  for (const Place& place : places) {
+    const LogEvent* event = files[place.log].Next();
+    if (event == nullptr) {
+      throw std::runtime_error(fmt::format("{}: changed while it was read", logs[place.log]));
+    }
+    writer.Write(event->utime, event->channel, event->data);
+  }
+  return writer.count();
+}
+
+}  // namespace pangea::session

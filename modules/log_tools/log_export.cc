@@ -1,0 +1,111 @@
+#include "log_tools/log_export.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+
+#include "files/text_file.h"
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "report/metrics/report_figures.h"
+#include "report/report_pictures.h"
+#include "report/report_text.h"
+
+namespace pangea::session {
+namespace {
+
+// The odometry edges of the log's keyframes, by the keyframe they end at.
+std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log, LogReadings* readings) {
+  std::map<KeyframeId, OdometryEdge> edges;
+  const auto add = [&edges](const LogEvent& event) {
+    keyframe_t message{};
+    if (event.channel.starts_with(channels::kKeyframePrefix) &&
+        DecodeMessage(event.data, &message)) {
+      if (const auto keyframe = Parse(message); keyframe.value && keyframe.value->edge) {
+        edges.emplace(keyframe.value->id, *keyframe.value->edge);
+      }
+    }
+  };
+  ReadLog(log, add, readings);
+  return edges;
+}
+
+class GraphBuilder {
+ public:
+  void AddVertices(const FinalGroup& group) {
+    bool first = true;
+    for (const FinalKeyframe& keyframe : group.keyframes) {
+      const int number = static_cast<int>(graph_.keyframes.size());
+      numbers_.emplace(keyframe.id, number);
+      graph_.graph.vertices.emplace(number, keyframe.T_map_body);
+      graph_.keyframes.push_back(keyframe.id);
+      if (first && keyframe.id.map == group.frame) {
+        graph_.graph.fixed.push_back(number);
+        first = false;
+      }
+    }
+  }
+
+  // An edge to a keyframe that the log has no pose of is left out.
+  void AddEdge(const KeyframeId& from, const KeyframeId& to, const Rigid3& T_from_to,
+               const Matrix6d& covariance) {
+    const auto a = numbers_.find(from), b = numbers_.find(to);
+    if (a != numbers_.end() && b != numbers_.end()) {
+      graph_.graph.edges.push_back({a->second, b->second, T_from_to, covariance});
+    }
+  }
+
+  NamedGraph Take() { return std::move(graph_); }
+
+ private:
+  NamedGraph graph_;
+  std::map<KeyframeId, int> numbers_;
+};
+
+}  // namespace
+
+std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
+                                   LogReadings* readings) {
+  std::filesystem::create_directories(folder);
+  std::vector<std::string> files;
+  std::map<int32_t, int> of_agent;
+  for (const FinalGroup& group : FinalGroups(ReadServerLog(log, readings))) {
+    for (const int32_t agent : group.Agents()) {
+      // The first group that an agent is in has most of its company.
+      const std::string name = of_agent[agent]++ == 0
+                                   ? fmt::format("agent_{}.tum", agent)
+                                   : fmt::format("agent_{}.{}.tum", agent, FileName(group.frame));
+      files.push_back(fmt::format("{}/{}", folder, name));
+      WriteTum(files.back(), group.TrajectoryOf(agent));
+    }
+  }
+  return files;
+}
+
+void ExportPly(const std::string& log, const std::string& file, LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(log, readings);
+  const ReportFigures figures = ComputeFigures({.server_log = log}, session);
+  WriteTextFile(file, MapPly(session, figures,
+                             figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
+}
+
+NamedGraph GraphOf(const std::string& log, LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(log, readings);
+  GraphBuilder builder;
+  for (const FinalGroup& group : FinalGroups(session)) {
+    builder.AddVertices(group);
+  }
+  for (const auto& [id, edge] : OdometryEdges(log, readings)) {
+    builder.AddEdge({id.map, edge.from_seq}, id, edge.T_from_this, edge.covariance);
+  }
+  for (const auto& [id, constraint] : session.constraints) {
+    if (constraint.accepted) {
+      builder.AddEdge(constraint.from, constraint.to, constraint.T_from_to, constraint.covariance);
+    }
+  }
+  return builder.Take();
+}
+
+}  // namespace pangea::session

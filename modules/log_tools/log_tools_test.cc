@@ -1,0 +1,334 @@
+// pangea-log's parts on the captured sample session.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "log_tools/explain.h"
+#include "log_tools/log_edit.h"
+#include "log_tools/log_export.h"
+#include "log_tools/log_import.h"
+#include "log_tools/log_info.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kSample = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks/session.lcm";
+
+class LogToolsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        fs::temp_directory_path() / (std::string("pangea_log_tools_") +
+                                     testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  fs::path folder_;
+};
+
+std::vector<std::string> Events(const std::string& log) {
+  std::vector<std::string> events;
+  ReadLog(log, [&events](const LogEvent& event) {
+    events.push_back(std::to_string(event.utime) + event.channel +
+                     std::string(event.data.begin(), event.data.end()));
+  });
+  return events;
+}
+
+// The error and its square as g2o's documentation has them, from the file's numbers alone.
+double CostByG2o(const std::string& path) {
+  std::ifstream file(path);
+  std::map<int, Eigen::Isometry3d> vertices;
+  const auto read_pose = [](std::istream& in) {
+    Eigen::Vector3d t;
+    Eigen::Quaterniond q;
+    in >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translate(t);
+    pose.rotate(q);
+    return pose;
+  };
+  double cost = 0;
+  std::string text;
+  while (std::getline(file, text)) {
+    std::istringstream line(text);
+    std::string kind;
+    line >> kind;
+    if (kind == "VERTEX_SE3:QUAT") {
+      int id = 0;
+      line >> id;
+      vertices[id] = read_pose(line);
+    } else if (kind == "EDGE_SE3:QUAT") {
+      int from = 0, to = 0;
+      line >> from >> to;
+      const Eigen::Isometry3d Z = read_pose(line);
+      const Eigen::Isometry3d delta = Z.inverse() * (vertices[from].inverse() * vertices[to]);
+      Eigen::Quaterniond q(delta.rotation());
+      if (q.w() < 0) {
+        q.coeffs() *= -1;
+      }
+      Eigen::Matrix<double, 6, 1> e;
+      e << delta.translation(), q.vec();
+      Eigen::Matrix<double, 6, 6> information;
+      for (int row = 0; row < 6; ++row) {
+        for (int column = row; column < 6; ++column) {
+          line >> information(row, column);
+          information(column, row) = information(row, column);
+        }
+      }
+      cost += e.dot(information * e);
+    }
+  }
+  return cost;
+}
+
+TEST_F(LogToolsTest, InfoNamesChannelsMapsAndVerdicts) {
+  const LogSummary summary = Summarise(kSample);
+  EXPECT_TRUE(summary.reading.whole());
+  ASSERT_EQ(summary.keyframes.size(), 2U);
+  size_t keyframes = 0;
+  for (const auto& [map, seqs] : summary.keyframes) {
+    keyframes += seqs.size();
+  }
+  EXPECT_EQ(keyframes, 63U);
+  EXPECT_GT(summary.verdicts.at("accepted"), 0);
+  const std::string text = ToText(summary, "sample");
+  EXPECT_NE(text.find("KEYFRAME_1"), std::string::npos);
+  EXPECT_NE(text.find("0-"), std::string::npos);
+}
+
+TEST_F(LogToolsTest, ATornTailIsNamed) {
+  fs::copy_file(kSample, Path("torn.lcm"));
+  fs::resize_file(Path("torn.lcm"), fs::file_size(kSample) - 100);
+  const LogSummary whole = Summarise(kSample), torn = Summarise(Path("torn.lcm"));
+  EXPECT_EQ(torn.events, whole.events - 1);
+  EXPECT_GT(torn.reading.torn_bytes, 0);
+  EXPECT_NE(ToText(torn, "torn").find("ends in the middle of an event"), std::string::npos);
+}
+
+TEST_F(LogToolsTest, CutsAddUpToTheWhole) {
+  const double middle = 10;
+  CutLog(kSample, {.to_s = middle}, Path("a.lcm"));
+  CutLog(kSample, {.from_s = middle}, Path("b.lcm"));
+  const auto a = Events(Path("a.lcm")), b = Events(Path("b.lcm"));
+  EXPECT_GT(a.size(), 10U);
+  EXPECT_GT(b.size(), 10U);
+  EXPECT_EQ(MergeLogs({Path("b.lcm"), Path("a.lcm")}, Path("ab.lcm")),
+            static_cast<int64_t>(a.size() + b.size()));
+  auto all = Events(kSample), merged = Events(Path("ab.lcm"));
+  std::ranges::sort(all);
+  std::ranges::sort(merged);
+  EXPECT_TRUE(merged == all);  // too long to print
+}
+
+// By capture time, but within a log its own order stands: its stamps may step back.
+TEST_F(LogToolsTest, MergesByTimeAndKeepsEachLogsOrder) {
+  const auto write = [this](const std::string& name, const std::vector<int64_t>& utimes) {
+    LogFileWriter log(Path(name));
+    for (const int64_t utime : utimes) {
+      log.Write(utime, name, {});
+    }
+    return Path(name);
+  };
+  MergeLogs({write("a", {10, 20, 15}), write("b", {12, 18, 20})}, Path("ab.lcm"));
+  EXPECT_THAT(Events(Path("ab.lcm")),
+              testing::ElementsAre("10a", "12b", "18b", "20a", "15a", "20b"));
+}
+
+TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
+  const int64_t events = CutLog(kSample, {.channels = "KEYFRAME_1"}, Path("one.lcm"));
+  const LogSummary summary = Summarise(Path("one.lcm"));
+  EXPECT_EQ(summary.events, events);
+  EXPECT_EQ(summary.channels.size(), 1U);
+  EXPECT_THROW(CutLog(kSample, {}, Path("one.lcm")), std::runtime_error);
+  EXPECT_EQ(Summarise(Path("one.lcm")).events, events);
+  EXPECT_THROW(CutLog(kSample, {.channels = "("}, Path("other.lcm")), std::runtime_error);
+}
+
+// An independent reading of the file has the cost that our own convention gives.
+TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
+  const NamedGraph named = GraphOf(kSample);
+  EXPECT_EQ(named.graph.vertices.size(), 63U);
+  EXPECT_EQ(named.keyframes.size(), 63U);
+  EXPECT_GT(named.graph.edges.size(), 80U);
+  std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
+  const double ours = Cost(named.graph);
+  EXPECT_GT(ours, 1);
+  EXPECT_NEAR(CostByG2o(Path("graph.g2o")) / ours, 1, 1e-3);
+  const Graph again = ReadG2o(Path("graph.g2o"));
+  EXPECT_EQ(again.edges.size(), named.graph.edges.size());
+  EXPECT_EQ(again.fixed, named.graph.fixed);
+  EXPECT_NEAR(Cost(again) / ours, 1, 1e-5);
+}
+
+// Another solver's poses, here a lift of all by a metre, are what a report of the new log sees.
+TEST_F(LogToolsTest, AG2oFileComesBackIntoTheLog) {
+  const NamedGraph named = GraphOf(kSample);
+  Graph lifted = named.graph;
+  for (auto& [number, pose] : lifted.vertices) {
+    pose.t.z() += 1;
+  }
+  std::ofstream(Path("lifted.g2o")) << ToG2o(lifted);
+  EXPECT_EQ(ImportG2o(kSample, Path("lifted.g2o"), Path("lifted.lcm")), 63);
+  const NamedGraph again = GraphOf(Path("lifted.lcm"));
+  EXPECT_EQ(again.keyframes, named.keyframes);
+  EXPECT_EQ(again.graph.edges.size(), named.graph.edges.size());
+  for (const auto& [number, pose] : lifted.vertices) {
+    EXPECT_LT(again.graph.vertices.at(number).Minus(pose).norm(), 1e-7);
+  }
+  // Twice is no more than once: the newest counts.
+  std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
+  ImportG2o(Path("lifted.lcm"), Path("graph.g2o"), Path("back.lcm"));
+  EXPECT_NEAR(Cost(GraphOf(Path("back.lcm")).graph) / Cost(named.graph), 1, 1e-5);
+}
+
+TEST_F(LogToolsTest, AG2oFileOfAnotherLogIsRefused) {
+  const auto error_of = [this](const Graph& graph) {
+    std::ofstream(Path("other.g2o")) << ToG2o(graph);
+    try {
+      ImportG2o(kSample, Path("other.g2o"), Path("other.lcm"));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  Graph graph = GraphOf(kSample).graph;
+  graph.edges.clear();
+  graph.vertices.emplace(63, Rigid3());
+  EXPECT_NE(error_of(graph).find("vertex 63 is none of the log's 63 keyframes"), std::string::npos);
+  graph.vertices.erase(63);
+  graph.vertices.erase(7);
+  EXPECT_NE(error_of(graph).find("vertex 7, keyframe 1/"), std::string::npos) << error_of(graph);
+  EXPECT_FALSE(fs::exists(Path("other.lcm")));
+}
+
+// A pose that no message may carry would be refused by who reads the log, and the old ones stand.
+TEST_F(LogToolsTest, APoseThatNoMessageMayCarryIsNotTaken) {
+  Graph graph = GraphOf(kSample).graph;
+  graph.vertices.at(5).t.y() = 1e9;
+  std::ofstream(Path("far.g2o")) << ToG2o(graph);
+  EXPECT_THAT([this] { ImportG2o(kSample, Path("far.g2o"), Path("far.lcm")); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::HasSubstr("far.g2o:6: y 1e+09 is not from -100000 to 100000")));
+  EXPECT_FALSE(fs::exists(Path("far.lcm")));
+}
+
+class BadG2oTest : public LogToolsTest {
+ protected:
+  static constexpr const char* kVertices =
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n";
+  // A diagonal information matrix, its last element given.
+  static std::string Edge(const std::string& ends, const std::string& last) {
+    return "EDGE_SE3:QUAT " + ends + " 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 " +
+           last + "\n";
+  }
+  std::string ErrorOf(const std::string& text) {
+    std::ofstream(Path("bad.g2o")) << text;
+    try {
+      return fmt::format("cost {}", Cost(ReadG2o(Path("bad.g2o"))));
+    } catch (const std::runtime_error& error) {
+      const std::string what = error.what();
+      return what.substr(std::min(what.find("bad.g2o"), what.size()));
+    }
+  }
+};
+
+TEST_F(BadG2oTest, NamesLineAndField) {
+  const std::string good = kVertices;
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1")), "cost 0");
+  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n"),
+              testing::StartsWith("bad.g2o:2: VERTEX_SE2"));
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 nan 0 0 0 0 1\n"),
+            "bad.g2o:1: y 'nan' is not a finite number");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 1e400 0 0 0 1\n"),
+            "bad.g2o:1: z '1e400' is not a finite number");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 1\n"), "bad.g2o:1: qw is missing");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1 7\n"),
+            "bad.g2o:1: '7' stands behind the last field");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0.5 0 0 0 0 0 0 1\n"),
+            "bad.g2o:1: the id '0.5' is no vertex' number");
+  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n"), testing::HasSubstr("not a rotation"));
+}
+
+TEST_F(BadG2oTest, NothingIsThereTwiceOrNowhere) {
+  const std::string good = kVertices;
+  EXPECT_EQ(ErrorOf(good + "VERTEX_SE3:QUAT 0 5 0 0 0 0 0 1\n"),
+            "bad.g2o:3: vertex 0 is there already, in line 1");
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1") + Edge("0 1", "1")),
+            "bad.g2o:4: edge 0 -> 1 is there already, the same, in line 3");
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1") + Edge("0 1", "2")), "cost 0");  // two measurements
+  EXPECT_EQ(ErrorOf(Edge("0 7", "1") + good),
+            "bad.g2o:1: an end of the edge, 7, is no vertex of the file");
+  EXPECT_EQ(ErrorOf(good + Edge("1 1", "1")), "bad.g2o:3: the edge's ends are both 1");
+  EXPECT_EQ(ErrorOf(good + "FIX 0 2\n"), "bad.g2o:3: to be fixed, 2, is no vertex of the file");
+}
+
+TEST_F(BadG2oTest, AnInformationMatrixIsPositiveDefinite) {
+  const std::string good = kVertices;
+  for (const char* last : {"0", "-1", "1e-40"}) {
+    EXPECT_EQ(ErrorOf(good + Edge("0 1", last)),
+              "bad.g2o:3: the information matrix is not positive definite")
+        << last;
+  }
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "nan")),
+            "bad.g2o:3: information 6,6 'nan' is not a finite number");
+  EXPECT_THAT(ErrorOf(good + Edge("0 1", "1e300")),
+              testing::StartsWith("bad.g2o:3: information 6,6 1e300 is not from"));
+}
+
+TEST_F(LogToolsTest, TrajectoriesAndPoints) {
+  EXPECT_EQ(ExportTum(kSample, Path("tum")).size(), 2U);
+  EXPECT_GT(fs::file_size(Path("tum/agent_1.tum")), 1000U);
+  ExportPly(kSample, Path("map.ply"));
+  EXPECT_GT(fs::file_size(Path("map.ply")), 10000U);
+}
+
+// Verdicts made again from the log say what the log says, but for a few: acceptance was laxer when
+// the sample was captured.
+TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedVerdicts) {
+  std::istringstream verdicts(ListVerdicts(kSample));
+  std::map<std::string, Explanation> same;  // by reason
+  int num_verdicts = 0, num_same = 0;
+  for (std::string line; std::getline(verdicts, line); ++num_verdicts) {
+    const Explanation explanation = Explain(kSample, std::stoll(line));
+    if (explanation.again.reason == explanation.said.reason) {
+      ++num_same;
+      same.emplace(explanation.said.reason, explanation);
+    }
+  }
+  EXPECT_GT(num_same, 0.9 * num_verdicts);
+  EXPECT_GE(same.size(), 3U);
+  for (const auto& [reason, explanation] : same) {
+    EXPECT_NE(ToText(explanation).find(reason), std::string::npos);
+  }
+  const Explanation& accepted = same.at("");
+  EXPECT_LT(accepted.again.T_from_to.Minus(accepted.said.T_from_to).norm(), 0.01);
+  EXPECT_GT(accepted.report.found.size(), 10U);
+  WriteExplanationPng(accepted, {}, Path("picture.png"));
+  EXPECT_GT(fs::file_size(Path("picture.png")), 10000U);
+  EXPECT_THROW(Explain(kSample, 42), std::runtime_error);
+}
+
+// The window BA may drop every match that is in the two keyframes themselves.
+TEST(Explanation, IsToldWithoutAnInlier) {
+  Explanation explanation;
+  explanation.again.reason = "too few inliers";
+  explanation.report.found.resize(2);
+  const std::string text = ToText(explanation);
+  EXPECT_NE(text.find("0 of 2 inliers in the two keyframes"), std::string::npos) << text;
+  EXPECT_NE(text.find("inliers miss by - px"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace pangea::session

@@ -1,0 +1,55 @@
+#include "loop_verification/correspondences/epipolar_filter.h"
+
+#include <opencv2/calib3d.hpp>
+
+namespace pangea {
+
+std::vector<PointMatch> FilterByFundamental(const Window& window_m, const Window& window_c,
+                                            const std::vector<PointMatch>& matches,
+                                            double max_error_px, int min_pairs) {
+  std::vector<size_t> tested;
+  std::vector<cv::Point2d> holder_points, observer_points;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const bool forward = matches[i].direction == Direction::kForward;
+    const Window& holder = forward ? window_m : window_c;
+    const Window& observer = forward ? window_c : window_m;
+    const WindowLandmark& landmark = holder.landmarks[matches[i].landmark];
+    if (matches[i].observed.frame != observer.newest() ||
+        landmark.observations.back().frame != holder.newest()) {
+      continue;
+    }
+    // Undistorted pixels of an ideal camera, always (m, c).
+    const Eigen::Vector2d a = holder.frames.back()->ray(landmark.observations.back().corner) /
+                              holder.frames.back()->keyframe().camera.PixelAngle();
+    const Eigen::Vector2d b = observer.frames.back()->ray(matches[i].observed.corner) /
+                              observer.frames.back()->keyframe().camera.PixelAngle();
+    holder_points.emplace_back(forward ? a.x() : b.x(), forward ? a.y() : b.y());
+    observer_points.emplace_back(forward ? b.x() : a.x(), forward ? b.y() : a.y());
+    tested.push_back(i);
+  }
+  if (static_cast<int>(tested.size()) < min_pairs) {
+    return matches;
+  }
+  // OpenCV seeds this RANSAC the same way every time.
+  std::vector<uchar> inliers;
+  constexpr double kConfidence = 0.99;
+  constexpr int kMaxIterations = 200;
+  const cv::Mat F = cv::findFundamentalMat(holder_points, observer_points, cv::FM_RANSAC,
+                                           max_error_px, kConfidence, kMaxIterations, inliers);
+  if (F.empty()) {
+    return matches;
+  }
+  std::vector<bool> keep(matches.size(), true);
+  for (size_t i = 0; i < tested.size(); ++i) {
+    keep[tested[i]] = inliers[i] != 0;
+  }
+  std::vector<PointMatch> kept;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (keep[i]) {
+      kept.push_back(matches[i]);
+    }
+  }
+  return kept;
+}
+
+}  // namespace pangea

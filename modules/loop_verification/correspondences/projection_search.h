@@ -1,0 +1,48 @@
+#pragma once
+
+// Map points of one window looked for in a keyframe of the other, where an alignment says they
+// are: the paper's forward and reverse projection (section IV.D).
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "loop_verification/correspondences/point_observation.h"
+
+namespace pangea {
+
+struct SearchOptions {
+  double pixel_sigma = 1.0;  // of a corner on octave 0
+  int max_hamming = 75;      // of 256 bits
+  double max_ratio = 0.9;    // best to second-best distance, corners 4 px and further apart
+  double max_chi2 = 11.8;    // within 3 sigma of the prediction (2 degrees of freedom)
+  double min_radius_px = 4;  // of the search, whatever the prediction claims
+  double max_radius_px = 40;
+  double max_depth_m = 60;      // the deeper, the worse triangulated
+  double max_view_angle = 0.9;  // radians between the two lines of sight
+  double max_scale = 2.2;       // ratio of the two distances
+};
+
+// A point that should be seen in the keyframe.
+struct Projection {
+  int landmark = 0;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  bool found = false;
+  // Seen from so near its host's viewpoint that it ought to be found, unless occluded.
+  bool comparable = false;
+};
+
+struct SearchResult {
+  std::vector<PointMatch> matches;  // by landmark, each landmark and each corner at most once
+  std::vector<Projection> projections;
+};
+
+// `pose` is T_m_c and its covariance whatever the direction.
+SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
+                                int frame, const PoseEstimate& pose, const SearchOptions& options);
+
+// Nearest descriptors without any prediction: the newest keyframe's corners against the window's
+// points. For a first guess; a third of these may be wrong.
+std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& window_c,
+                                          Direction direction, int max_hamming, double max_ratio);
+
+}  // namespace pangea

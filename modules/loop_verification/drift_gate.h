@@ -1,0 +1,23 @@
+#pragma once
+
+// How far one map's odometry may have drifted between two of its keyframes. Generous: a gate
+// against look-alikes at the other end of a hall, not an estimate of drift.
+
+#include <string>
+
+#include "loop_verification/aligner.h"
+
+namespace pangea {
+
+struct DriftGateOptions {
+  double max_drift_m = 1.0;      // however short the path
+  double max_drift_share = 0.1;  // of the path between the keyframes
+  double max_yaw = 0.15;         // radians, however short the path
+  double max_yaw_per_m = 0.01;   // radians a metre of path
+};
+
+// For keyframes `path_m` apart along the odometry; `p_odom` is where the newer one is.
+AlignmentGate MakeDriftGate(const DriftGateOptions& options, double path_m,
+                            const Eigen::Vector3d& p_odom);
+
+}  // namespace pangea

@@ -1,0 +1,85 @@
+#include "loop_verification/joint_ba/joint_ba.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/median.h"
+#include "loop_verification/joint_ba/joint_problem.h"
+
+namespace pangea {
+namespace {
+
+// Median distance of the inliers' points from the newest keyframe of their window.
+double MedianDistance(const Window& window_m, const Window& window_c,
+                      const std::vector<PointMatch>& matches, const std::vector<bool>& inlier) {
+  std::vector<double> distances;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (inlier[i]) {
+      const Window& holder = HolderSide(matches[i]) == kSideM ? window_m : window_c;
+      distances.push_back(holder.landmarks[matches[i].landmark].p_w.norm());
+    }
+  }
+  return Median(std::move(distances));
+}
+
+}  // namespace
+
+std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& window_c,
+                                          const std::vector<PointMatch>& matches,
+                                          const Rigid3& T_m_c, const JointBaOptions& options) {
+  JointProblem problem(window_m, window_c, T_m_c, options);
+  JointBaResult result;
+  result.inlier.assign(matches.size(), true);
+  double chi2_sum = 0;
+  // Round one finds the outliers, round two is the estimate.
+  constexpr double kCauchyScale = 2.0, kHuberScale = 2.0;
+  if (!problem.Solve(matches, result.inlier, new ceres::CauchyLoss(kCauchyScale))) {
+    return std::nullopt;
+  }
+  problem.Classify(matches, &result.inlier, &chi2_sum);
+  if (!problem.Solve(matches, result.inlier, new ceres::HuberLoss(kHuberScale))) {
+    return std::nullopt;
+  }
+  problem.Classify(matches, &result.inlier, &chi2_sum);
+  for (const bool inlier : result.inlier) {
+    result.num_inlier_observations += inlier ? 1 : 0;
+  }
+  const auto marginals = problem.MarginalsOfNewestC(matches, result.inlier);
+  if (!marginals || result.num_inlier_observations == 0) {
+    return std::nullopt;
+  }
+  // chi2 is in sigmas of each corner's own octave; two dimensions an observation.
+  const double variance = chi2_sum / (2.0 * result.num_inlier_observations);
+  result.rms_px = options.pixel_sigma * std::sqrt(2.0 * variance);
+
+  const Rigid3 T_w_Km = problem.NewestPose(kSideM);
+  const Rigid3 T_w_Kc = problem.NewestPose(kSideC);
+  result.T_m_c = T_w_Kc * window_c.T_w_body.back().Inverse();
+  result.T_Km_Kc = T_w_Km.Inverse() * T_w_Kc;
+  // From the window's axes to Km's; its origin is Km's already.
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
+  turn.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
+  const double turn_floor =
+      options.systematic_px * window_c.keyframe(window_c.newest()).camera.PixelAngle();
+  const double step_floor = turn_floor * MedianDistance(window_m, window_c, matches, result.inlier);
+  Vector6d floor;
+  floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(turn_floor);
+  const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {
+    // Never smaller than the residuals say.
+    Matrix6d turned = std::max(1.0, variance) * turn * covariance * turn.transpose();
+    turned.diagonal() += floor.cwiseAbs2();
+    return turned;
+  };
+  result.covariance = in_Km(marginals->all);
+  result.covariance_without_one = in_Km(marginals->without_one);
+  if (marginals->of_sure) {
+    result.covariance_of_sure = in_Km(*marginals->of_sure);
+  }
+  return result;
+}
+
+}  // namespace pangea

@@ -1,0 +1,203 @@
+#include "loop_verification/joint_ba/joint_ba.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "loop_verification/alignment_test_world.h"
+#include "loop_verification/correspondences/projection_search.h"
+
+namespace pangea {
+namespace {
+
+// A match's landmark in both windows: the one of a pair that matches join has the other's name.
+using Joined = std::map<std::pair<Direction, int>, std::set<std::pair<Direction, int>>>;
+
+Joined Partners(const Window& m, const Window& c, const std::vector<PointMatch>& matches) {
+  Joined partners;
+  for (const PointMatch& match : matches) {
+    const bool forward = match.direction == Direction::kForward;
+    const int other =
+        (forward ? c : m).landmark_of_corner[match.observed.frame][match.observed.corner];
+    const std::pair own{match.direction, match.landmark};
+    partners[own].insert(own);
+    if (other < 0) {
+      continue;
+    }
+    const std::pair mate{forward ? Direction::kReverse : Direction::kForward, other};
+    partners[own].insert(mate);
+    partners[mate].insert(own);
+  }
+  return partners;
+}
+
+int LandmarkAt(const Window& window, const CornerRef& corner) {
+  return window.landmark_of_corner[corner.frame][corner.corner];
+}
+
+// Two walks through one room, and what matches from the true alignment; all are inliers.
+class JointBaTest : public testing::Test {
+ protected:
+  JointBaTest() {
+    const auto room = MakeTestRoom({.seed = 3, .num_points = 400});
+    TestAgentOptions walk_m, walk_c;
+    walk_m.num_keyframes = walk_c.num_keyframes = 6;
+    walk_m.pixel_sigma = walk_c.pixel_sigma = 0.3;
+    walk_c.map = {2, 2000};
+    walk_c.radius = 2.3;
+    const TestAgent agent_m = RunTestAgent(room, walk_m), agent_c = RunTestAgent(room, walk_c);
+    for (const TestAgent* agent : {&agent_m, &agent_c}) {
+      for (const Keyframe& keyframe : agent->keyframes) {
+        store_.Add(keyframe);
+      }
+    }
+    m_ = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
+    c_ = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
+    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() * agent_c.T_room_body[5] *
+             c_.T_w_body.back().Inverse();
+    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+      for (int frame = 0; frame < 5; ++frame) {
+        const SearchResult found =
+            SearchByProjection(m_, c_, direction, frame, {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
+        matches_.insert(matches_.end(), found.matches.begin(), found.matches.end());
+      }
+    }
+    options_.max_chi2 = options_.max_depth_chi2 = 1e3;
+  }
+
+  // Trace of the position's covariance from the matches whose landmarks `keep` lets pass.
+  template <typename Keep>
+  double PositionTrace(const Keep& keep) const {
+    std::vector<PointMatch> kept;
+    for (const PointMatch& match : matches_) {
+      if (keep(std::pair{match.direction, match.landmark})) {
+        kept.push_back(match);
+      }
+    }
+    const auto result = SolveJointBa(m_, c_, kept, T_m_c_, options_);
+    return result ? result->covariance.topLeftCorner<3, 3>().trace() : 0;
+  }
+
+  SubmapStore store_;
+  Window m_, c_;
+  Rigid3 T_m_c_;
+  std::vector<PointMatch> matches_;
+  JointBaOptions options_;
+};
+
+// What the optimisation says of its covariance without the landmark that says most is what an
+// optimisation without that landmark says.
+TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
+  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(all);
+  double worst = 0;
+  for (const auto& [landmark, joined] : Partners(m_, c_, matches_)) {
+    const double without =
+        PositionTrace([&joined = joined](const auto& own) { return !joined.contains(own); });
+    ASSERT_GT(without, 0);
+    worst = std::max(worst, without);
+  }
+  const double said = all->covariance_without_one.topLeftCorner<3, 3>().trace();
+  const double with_all = all->covariance.topLeftCorner<3, 3>().trace();
+  EXPECT_GT(said / with_all, 1.03);
+  EXPECT_NEAR(said / worst, 1, 0.03);
+}
+
+// So with the landmarks that are alike in one match at least: as if there were no others.
+TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
+  std::vector<int> distances;
+  for (const PointMatch& match : matches_) {
+    distances.push_back(match.distance);
+  }
+  std::sort(distances.begin(), distances.end());
+  options_.sure_hamming = distances[distances.size() / 8];
+  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(all && all->covariance_of_sure);
+  std::set<std::pair<Direction, int>> sure;
+  const Joined partners = Partners(m_, c_, matches_);
+  for (const PointMatch& match : matches_) {
+    if (match.distance <= options_.sure_hamming) {
+      sure.merge(std::set(partners.at({match.direction, match.landmark})));
+    }
+  }
+  const double of_sure = PositionTrace([&](const auto& own) { return sure.contains(own); });
+  const double said = all->covariance_of_sure->topLeftCorner<3, 3>().trace();
+  const double with_all = all->covariance.topLeftCorner<3, 3>().trace();
+  EXPECT_GT(said / with_all, 1.1);
+  EXPECT_NEAR(said / of_sure, 1, 0.05);
+
+  options_.sure_hamming = -1;
+  const auto none = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(none);
+  EXPECT_FALSE(none->covariance_of_sure);
+}
+
+// What no number of corners averages out: a turn, and the step that looks the same at the points'
+// distance, the same in every direction.
+TEST_F(JointBaTest, SystematicErrorsAreAdded) {
+  options_.systematic_px = 0;
+  const auto without = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  options_.systematic_px = 0.5;
+  const auto with = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(without && with);
+  const Matrix6d added = with->covariance - without->covariance;
+  const double turn = 0.5 * c_.keyframe(c_.newest()).camera.PixelAngle();
+  EXPECT_LT((added.bottomRightCorner<3, 3>() - turn * turn * Eigen::Matrix3d::Identity()).norm(),
+            1e-6 * turn * turn);
+  const double step = std::sqrt(added(0, 0));
+  EXPECT_GT(step / turn, 2);  // the room is 4 to 6 m wide
+  EXPECT_LT(step / turn, 6);
+  EXPECT_LT((added.topLeftCorner<3, 3>() - step * step * Eigen::Matrix3d::Identity()).norm(),
+            1e-6 * step * step);
+}
+
+// With noise as it is claimed between one sigma an observation, where the point follows its
+// corners, and both dimensions' full ones.
+TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
+  options_.pixel_sigma = 0.3;
+  const auto result = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(result);
+  EXPECT_GT(result->rms_px, 0.3);
+  EXPECT_LT(result->rms_px, std::sqrt(2.0) * 0.3);
+}
+
+// Corners that find each other both ways count half each, and yet are as far off as they are. A
+// point is held by its own corner with weight 1 and drawn by the other's with w: of their distance
+// 1/(1 + w) is left, 2/3 where it was 1/2.
+TEST_F(JointBaTest, CountingHalfDoesNotMakeAResidualSmaller) {
+  std::vector<PointMatch> both_ways, one_way;
+  for (const PointMatch& forward : matches_) {
+    for (const PointMatch& reverse : matches_) {
+      if (forward.direction == Direction::kForward && reverse.direction == Direction::kReverse &&
+          LandmarkAt(c_, forward.observed) == reverse.landmark &&
+          LandmarkAt(m_, reverse.observed) == forward.landmark) {
+        both_ways.insert(both_ways.end(), {forward, reverse});
+        one_way.push_back(forward);
+      }
+    }
+  }
+  ASSERT_GT(one_way.size(), 20u);
+  const auto both = SolveJointBa(m_, c_, both_ways, T_m_c_, options_);
+  const auto one = SolveJointBa(m_, c_, one_way, T_m_c_, options_);
+  ASSERT_TRUE(both && one);
+  EXPECT_NEAR(both->rms_px / one->rms_px, 4.0 / 3.0, 0.15);
+}
+
+// Pixels that claim six times too much are found out by their residuals.
+TEST_F(JointBaTest, TheCovarianceIsNeverSmallerThanTheResidualsSay) {
+  options_.systematic_px = 0;
+  options_.pixel_sigma = 0.3;
+  const auto honest = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  options_.pixel_sigma = 0.05;
+  const auto bold = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  ASSERT_TRUE(honest && bold);
+  EXPECT_GT(bold->covariance.trace(), 0.5 * honest->covariance.trace());
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,95 @@
+#include "loop_verification/window.h"
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+struct Estimate {
+  CornerRef host;
+  double inverse_depth = 0;
+  double sigma = 0;
+  double relative() const { return sigma / inverse_depth; }
+};
+
+WindowLandmark MakeLandmark(const Window& window, int32_t id, const Estimate& estimate) {
+  WindowLandmark landmark;
+  landmark.id = id;
+  landmark.host = estimate.host;
+  landmark.inverse_depth = estimate.inverse_depth;
+  landmark.inverse_depth_sigma = estimate.sigma;
+  const Eigen::Vector2d ray = window.frames[estimate.host.frame]->ray(estimate.host.corner);
+  const Rigid3& T_w_cam = window.T_w_cam[estimate.host.frame];
+  landmark.p_w = T_w_cam * (Eigen::Vector3d(ray.x(), ray.y(), 1.0) / estimate.inverse_depth);
+  // p - o is proportional to 1/rho: d(p)/d(rho) = -(p - o) / rho.
+  landmark.depth_sigma_w = -(landmark.p_w - T_w_cam.t) * estimate.relative();
+  return landmark;
+}
+
+}  // namespace
+
+Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
+  Window window;
+  window.frames = std::move(frames);
+  const Eigen::Vector3d origin = window.frames.back()->keyframe().T_odom_body.t;
+  for (const auto& view : window.frames) {
+    const Keyframe& keyframe = view->keyframe();
+    window.T_w_body.emplace_back(keyframe.T_odom_body.q, keyframe.T_odom_body.t - origin);
+    window.T_w_cam.push_back(window.T_w_body.back() * keyframe.camera.T_body_cam);
+    window.landmark_of_corner.emplace_back(keyframe.corners.size(), -1);
+  }
+
+  // The newest depth of each landmark: it rests on most observations. (Not the one that claims to
+  // be the most certain: sigma over inverse depth favours depths whose error makes them near.)
+  // Points without a landmark stand alone.
+  std::map<int32_t, Estimate> newest;
+  std::vector<Estimate> alone;
+  for (int f = 0; f <= window.newest(); ++f) {
+    for (const MapPoint& point : window.keyframe(f).points) {
+      const Estimate estimate{{f, point.corner},
+                              point.inverse_depth,
+                              std::sqrt(static_cast<double>(point.inverse_depth_var))};
+      if (!window.frames[f]->has_ray(point.corner) ||
+          estimate.relative() > options.max_relative_depth_sigma) {
+        continue;
+      }
+      const int32_t id = window.corner(estimate.host).landmark_id;
+      if (id == kNoLandmark) {
+        alone.push_back(estimate);
+        continue;
+      }
+      newest[id] = estimate;
+    }
+  }
+
+  const auto add = [&window](int32_t id, const Estimate& estimate) {
+    WindowLandmark landmark = MakeLandmark(window, id, estimate);
+    const int index = static_cast<int>(window.landmarks.size());
+    for (int f = 0; f <= window.newest(); ++f) {
+      std::vector<int> corners;
+      if (id != kNoLandmark) {
+        corners = window.frames[f]->CornersOfLandmark(id);
+      } else if (f == estimate.host.frame) {
+        corners = {estimate.host.corner};
+      }
+      for (const int corner : corners) {
+        if (window.frames[f]->has_ray(corner)) {
+          landmark.observations.push_back({f, corner});
+          window.landmark_of_corner[f][corner] = index;
+        }
+      }
+    }
+    window.landmarks.push_back(std::move(landmark));
+  };
+  for (const auto& [id, estimate] : newest) {
+    add(id, estimate);
+  }
+  for (const Estimate& estimate : alone) {
+    add(kNoLandmark, estimate);
+  }
+  return window;
+}
+
+}  // namespace pangea

@@ -1,0 +1,55 @@
+#pragma once
+
+// A local window (the paper's vKF and vMP, section IV.D): a keyframe, those before it, and the map
+// points they hold, merged over the landmark they observe.
+//
+// Frame `w` of a window: gravity-aligned like the map's odom, its origin at the newest keyframe's
+// body. Near origins keep rotations and translations of an alignment well separated.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/submap_store.h"
+
+namespace pangea {
+
+struct WindowOptions {
+  int num_keyframes = 5;  // M: the keyframe and M - 1 before it
+  // Inverse depths less certain than this share of themselves are no map points.
+  double max_relative_depth_sigma = 0.4;
+};
+
+struct CornerRef {
+  int frame = 0;  // index into the window's frames
+  int corner = 0;
+};
+
+struct WindowLandmark {
+  int32_t id = kNoLandmark;
+  CornerRef host;            // where its depth is best known
+  double inverse_depth = 0;  // 1/m, host camera's z axis
+  double inverse_depth_sigma = 0;
+  Eigen::Vector3d p_w = Eigen::Vector3d::Zero();
+  // What one sigma of inverse depth moves p_w by, first order.
+  Eigen::Vector3d depth_sigma_w = Eigen::Vector3d::Zero();
+  // Every corner that is this landmark, ascending, host included; one or more in a frame (octaves).
+  std::vector<CornerRef> observations;
+};
+
+struct Window {
+  KeyframeWindow frames;  // ascending; the last is the keyframe itself
+  std::vector<Rigid3> T_w_body;
+  std::vector<Rigid3> T_w_cam;
+  std::vector<WindowLandmark> landmarks;
+  std::vector<std::vector<int>> landmark_of_corner;  // [frame][corner], or -1
+
+  int newest() const { return static_cast<int>(frames.size()) - 1; }
+  const Keyframe& keyframe(int frame) const { return frames[frame]->keyframe(); }
+  const Corner& corner(const CornerRef& ref) const {
+    return keyframe(ref.frame).corners[ref.corner];
+  }
+};
+
+Window MakeWindow(KeyframeWindow frames, const WindowOptions& options);
+
+}  // namespace pangea

@@ -1,0 +1,47 @@
+#pragma once
+
+// The border for what processes tell each other to catch up: what exists (have_t), and what is to
+// be sent again (resend_request_t, verdict_request_t). As in messages.h, past Parse every field is
+// bounded.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/ids.h"
+#include "messages/messages.h"
+#include "pangea/have_t.hpp"
+#include "pangea/resend_request_t.hpp"
+#include "pangea/verdict_request_t.hpp"
+
+namespace pangea {
+
+struct Have {
+  std::vector<std::pair<MapId, int32_t>> highest_seq;  // of each map
+  std::vector<SeqGap> gaps;                            // lost for good
+};
+
+struct ResendRequest {
+  std::string requester;  // a process name: the answers go to AGAIN_<requester>
+  std::string channel;
+  SeqGap range;
+};
+
+// Verdicts on candidates of one map's keyframes: the keyframe's seq, the constraint's id.
+struct VerdictNames {
+  static constexpr size_t kMax = 500;
+
+  MapId map;
+  std::vector<std::pair<int32_t, int64_t>> verdicts;  // at most kMax
+};
+
+struct VerdictRequest {
+  std::string requester;
+  VerdictNames names;
+};
+
+Parsed<Have> Parse(const have_t& message);
+Parsed<ResendRequest> Parse(const resend_request_t& message);
+Parsed<VerdictRequest> Parse(const verdict_request_t& message);
+
+}  // namespace pangea

@@ -1,0 +1,55 @@
+#pragma once
+
+// The border: LCM messages become domain types here, bounded and finite, or are refused with a
+// reason. Past it nothing checks again.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/keyframe.h"
+#include "core/map_landmarks.h"
+#include "core/server_messages.h"
+#include "pangea/camera_t.hpp"
+#include "pangea/constraint_t.hpp"
+#include "pangea/correction_t.hpp"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/landmarks_t.hpp"
+#include "pangea/map_state_t.hpp"
+#include "pangea/place_match_t.hpp"
+#include "pangea/rigid3_t.hpp"
+
+namespace pangea {
+
+template <typename T>
+struct Parsed {
+  std::optional<T> value;
+  std::string refused;  // why there is no value
+};
+
+map_id_t ToMessage(const MapId& id);
+keyframe_id_t ToMessage(const KeyframeId& id);
+rigid3_t ToMessage(const Rigid3& T);
+vector3_t ToMessage(const Eigen::Vector3d& v);
+camera_t ToMessage(const CameraModel& camera);
+keyframe_t ToMessage(const Keyframe& keyframe);
+place_match_t ToMessage(const PlaceMatch& match);
+constraint_t ToMessage(const Constraint& constraint);
+correction_t ToMessage(const Correction& correction);
+landmarks_t ToMessage(const MapLandmarks& landmarks);
+// At most 500 keyframes a chunk.
+std::vector<map_state_t> ToMessages(const MapState& state);
+
+Parsed<MapId> Parse(const map_id_t& message);
+Parsed<KeyframeId> Parse(const keyframe_id_t& message);
+Parsed<Rigid3> Parse(const rigid3_t& message);
+Parsed<CameraModel> Parse(const camera_t& message);
+Parsed<Keyframe> Parse(const keyframe_t& message);
+Parsed<PlaceMatch> Parse(const place_match_t& message);
+Parsed<Constraint> Parse(const constraint_t& message);
+Parsed<Correction> Parse(const correction_t& message);
+Parsed<MapLandmarks> Parse(const landmarks_t& message);
+// One chunk as a MapState of its own.
+Parsed<MapState> Parse(const map_state_t& message);
+
+}  // namespace pangea

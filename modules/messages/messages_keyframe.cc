@@ -1,0 +1,220 @@
+#include <algorithm>
+#include <cmath>
+
+#include "messages/messages.h"
+#include "messages/messages_checks.h"
+
+namespace pangea {
+
+using namespace messages_checks;
+
+namespace {
+
+constexpr double kPixelScale = 16.0;
+// Of position to accelerometer bias, half the duration squared, after an hour.
+constexpr double kMaxBiasJacobian = 1e7;
+
+preintegration_t ToMessage(const Preintegration& p) {
+  preintegration_t m{};
+  m.duration_s = p.duration_s;
+  m.delta_rotation.w = p.delta_q.w();
+  m.delta_rotation.x = p.delta_q.x();
+  m.delta_rotation.y = p.delta_q.y();
+  m.delta_rotation.z = p.delta_q.z();
+  m.delta_velocity = pangea::ToMessage(p.delta_v);
+  m.delta_position = pangea::ToMessage(p.delta_p);
+  FromMatrix(p.covariance, m.covariance);
+  FromMatrix(p.bias_jacobian, m.bias_jacobian);
+  m.gyro_bias = pangea::ToMessage(p.gyro_bias);
+  m.accel_bias = pangea::ToMessage(p.accel_bias);
+  return m;
+}
+
+Parsed<Preintegration> Parse(const preintegration_t& m) {
+  Preintegration p;
+  p.duration_s = m.duration_s;
+  p.delta_q = Eigen::Quaterniond(m.delta_rotation.w, m.delta_rotation.x, m.delta_rotation.y,
+                                 m.delta_rotation.z);
+  p.delta_v = ToVector(m.delta_velocity);
+  p.delta_p = ToVector(m.delta_position);
+  p.bias_jacobian = Eigen::Map<const Eigen::Matrix<double, 9, 6, Eigen::RowMajor>>(m.bias_jacobian);
+  p.gyro_bias = ToVector(m.gyro_bias);
+  p.accel_bias = ToVector(m.accel_bias);
+  const auto covariance = ToCovariance<9>(m.covariance);
+  if (!(p.duration_s > 0 && p.duration_s < 3600) || !(std::abs(p.delta_q.norm() - 1) < 1e-3) ||
+      !Bounded(p.delta_v, kMaxDistance) || !Bounded(p.delta_p, kMaxDistance) ||
+      !p.bias_jacobian.allFinite() || p.bias_jacobian.cwiseAbs().maxCoeff() > kMaxBiasJacobian ||
+      !Bounded(p.gyro_bias, 10) || !Bounded(p.accel_bias, 100) || !covariance) {
+    return Refused<Preintegration>("preintegration out of range");
+  }
+  p.delta_q.normalize();
+  p.covariance = *covariance;
+  return {p, ""};
+}
+
+void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
+  m->num_corners = static_cast<int16_t>(keyframe.corners.size());
+  m->descriptors.resize(keyframe.corners.size() * sizeof(Descriptor));
+  m->num_descriptor_bytes = static_cast<int16_t>(m->descriptors.size());
+  for (size_t i = 0; i < keyframe.corners.size(); ++i) {
+    const Corner& corner = keyframe.corners[i];
+    m->u_16th_px.push_back(static_cast<int16_t>(std::lround(corner.pixel.x() * kPixelScale)));
+    m->v_16th_px.push_back(static_cast<int16_t>(std::lround(corner.pixel.y() * kPixelScale)));
+    m->octave.push_back(corner.octave);
+    std::memcpy(m->descriptors.data() + i * sizeof(Descriptor), corner.descriptor.data(),
+                sizeof(Descriptor));
+    if (corner.landmark_id != kNoLandmark) {
+      m->tracked_corner.push_back(static_cast<int16_t>(i));
+      m->landmark_id.push_back(corner.landmark_id);
+    }
+  }
+  m->num_tracked = static_cast<int16_t>(m->tracked_corner.size());
+}
+
+// Returns what is wrong, or an empty string.
+std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
+  if (m.num_corners < 0 || m.num_corners > kMaxCorners) {
+    return "more than 700 corners";
+  }
+  if (m.num_descriptor_bytes != m.num_corners * static_cast<int>(sizeof(Descriptor))) {
+    return "descriptor bytes do not match the corners";
+  }
+  keyframe->corners.resize(m.num_corners);
+  for (int i = 0; i < m.num_corners; ++i) {
+    Corner& corner = keyframe->corners[i];
+    corner.pixel = Eigen::Vector2f(m.u_16th_px[i], m.v_16th_px[i]) / kPixelScale;
+    corner.octave = m.octave[i];
+    if (!keyframe->camera.Contains(corner.pixel.cast<double>(), -1.0)) {
+      return "corner outside the image";
+    }
+    if (corner.octave < 0 || corner.octave > 15) {
+      return "octave out of range";
+    }
+    std::memcpy(corner.descriptor.data(), m.descriptors.data() + i * sizeof(Descriptor),
+                sizeof(Descriptor));
+  }
+  for (int i = 0; i < m.num_tracked; ++i) {
+    if (m.tracked_corner[i] < 0 || m.tracked_corner[i] >= m.num_corners || m.landmark_id[i] < 0) {
+      return "tracked corner out of range";
+    }
+    keyframe->corners[m.tracked_corner[i]].landmark_id = m.landmark_id[i];
+  }
+  return "";
+}
+
+std::string UnpackPoints(const keyframe_t& m, Keyframe* keyframe) {
+  if (m.num_points < 0 || m.num_points > m.num_corners) {
+    return "more points than corners";
+  }
+  for (int i = 0; i < m.num_points; ++i) {
+    MapPoint point{m.point_corner[i], m.inverse_depth[i], m.inverse_depth_variance[i]};
+    if (point.corner < 0 || point.corner >= m.num_corners) {
+      return "point's corner out of range";
+    }
+    if (!(point.inverse_depth > 1e-5f && point.inverse_depth < 1e3f) ||
+        !(point.inverse_depth_var > 0 && point.inverse_depth_var < 1e6f)) {
+      return "inverse depth out of range";
+    }
+    keyframe->points.push_back(point);
+  }
+  return "";
+}
+
+std::string UnpackEdge(const keyframe_t& m, Keyframe* keyframe) {
+  if (m.has_edge) {
+    const auto T = pangea::Parse(m.T_from_this);
+    const auto covariance = ToCovariance<6>(m.edge_covariance);
+    if (!T.value || !covariance) {
+      return "odometry edge's transform or covariance is invalid";
+    }
+    if (m.edge_from_seq < 0 || m.edge_from_seq >= m.id.seq) {
+      return "odometry edge does not begin at an earlier keyframe";
+    }
+    keyframe->edge = OdometryEdge{m.edge_from_seq, *T.value, *covariance};
+  }
+  if (m.has_preintegration) {
+    const auto preintegration = Parse(m.preintegration);
+    if (!preintegration.value) {
+      return preintegration.refused;
+    }
+    keyframe->preintegration = preintegration.value;
+  }
+  return "";
+}
+
+}  // namespace
+
+keyframe_t ToMessage(const Keyframe& keyframe) {
+  keyframe_t m{};
+  m.id = ToMessage(keyframe.id);
+  m.utime = keyframe.utime;
+  m.camera = ToMessage(keyframe.camera);
+  m.T_odom_body = ToMessage(keyframe.T_odom_body);
+  m.v_odom_body = ToMessage(keyframe.v_odom_body);
+  m.gyro_bias = ToMessage(keyframe.gyro_bias);
+  m.accel_bias = ToMessage(keyframe.accel_bias);
+  FromMatrix(keyframe.roll_pitch_covariance, m.roll_pitch_covariance);
+  m.has_edge = keyframe.edge.has_value();
+  if (keyframe.edge) {
+    m.edge_from_seq = keyframe.edge->from_seq;
+    m.T_from_this = ToMessage(keyframe.edge->T_from_this);
+    FromMatrix(keyframe.edge->covariance, m.edge_covariance);
+  }
+  m.has_preintegration = keyframe.preintegration.has_value();
+  if (keyframe.preintegration) {
+    m.preintegration = ToMessage(*keyframe.preintegration);
+  }
+  PackCorners(keyframe, &m);
+  for (const MapPoint& point : keyframe.points) {
+    m.point_corner.push_back(static_cast<int16_t>(point.corner));
+    m.inverse_depth.push_back(point.inverse_depth);
+    m.inverse_depth_variance.push_back(point.inverse_depth_var);
+  }
+  m.num_points = static_cast<int16_t>(keyframe.points.size());
+  m.group_revision = keyframe.group_revision;
+  return m;
+}
+
+Parsed<Keyframe> Parse(const keyframe_t& m) {
+  const auto id = Parse(m.id);
+  const auto camera = Parse(m.camera);
+  const auto T_odom_body = Parse(m.T_odom_body);
+  if (!id.value) {
+    return Refused<Keyframe>(id.refused);
+  }
+  if (!camera.value) {
+    return Refused<Keyframe>(camera.refused);
+  }
+  if (!T_odom_body.value) {
+    return Refused<Keyframe>("T_odom_body: " + T_odom_body.refused);
+  }
+  Keyframe keyframe;
+  keyframe.id = *id.value;
+  keyframe.utime = m.utime;
+  keyframe.camera = *camera.value;
+  keyframe.T_odom_body = *T_odom_body.value;
+  keyframe.v_odom_body = ToVector(m.v_odom_body);
+  keyframe.gyro_bias = ToVector(m.gyro_bias);
+  keyframe.accel_bias = ToVector(m.accel_bias);
+  keyframe.group_revision = m.group_revision;
+  if (m.utime < 0) {
+    return Refused<Keyframe>("negative time");
+  }
+  if (!Bounded(keyframe.v_odom_body, 1000) || !Bounded(keyframe.gyro_bias, 10) ||
+      !Bounded(keyframe.accel_bias, 100)) {
+    return Refused<Keyframe>("velocity or biases out of range");
+  }
+  const auto roll_pitch = ToCovariance<2>(m.roll_pitch_covariance);
+  if (!roll_pitch) {
+    return Refused<Keyframe>("roll/pitch covariance is not positive definite");
+  }
+  keyframe.roll_pitch_covariance = *roll_pitch;
+  for (const auto& unpack : {UnpackEdge, UnpackCorners, UnpackPoints}) {
+    if (std::string reason = unpack(m, &keyframe); !reason.empty()) {
+      return Refused<Keyframe>(std::move(reason));
+    }
+  }
+  return {std::move(keyframe), ""};
+}
+
+}  // namespace pangea

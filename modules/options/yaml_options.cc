@@ -1,0 +1,361 @@
+#include "options/yaml_options.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "files/text_file.h"
+#include "options/nearest_word.h"
+
+namespace pangea {
+
+struct YamlOptions::Entry {
+  std::string key;
+  bool required = false;
+  // (node, file, path of the key for messages)
+  std::function<void(const YAML::Node&, const std::string&, const std::string&)> read;
+  // What stands behind "key:", newline included, for an indentation of so many blanks.
+  std::function<std::string(int)> print;
+  std::unique_ptr<YamlOptions> section;
+};
+
+namespace {
+
+std::string Where(const std::string& file, const YAML::Node& node) {
+  return node.Mark().is_null() ? file : fmt::format("{}:{}", file, node.Mark().line + 1);
+}
+
+[[noreturn]] void ThrowType(const YAML::Node& node, const std::string& file,
+                            const std::string& path, const std::string& expected) {
+  const std::string found = node.IsScalar()     ? fmt::format("'{}'", node.Scalar())
+                            : node.IsSequence() ? "a list"
+                            : node.IsMap()      ? "a section of keys"
+                                                : "nothing";
+  throw std::runtime_error(
+      fmt::format("{}: key '{}' must be {}, not {}", Where(file, node), path, expected, found));
+}
+
+template <typename T>
+std::string ScalarText(const T& value) {
+  return fmt::format("{}", value);
+}
+// Shortest text that reads back the same, and always a float to the eye.
+template <typename T>
+std::string FloatText(T value) {
+  std::string text = fmt::format("{}", value);
+  if (text == "inf") {
+    return ".inf";
+  }
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+std::string ScalarText(const double& value) { return FloatText(value); }
+std::string ScalarText(const float& value) { return FloatText(value); }
+std::string ScalarText(const std::string& value) {
+  YAML::Emitter emitter;
+  emitter << YAML::DoubleQuoted << value;
+  return emitter.c_str();
+}
+
+template <typename T>
+T ScalarValue(const YAML::Node& node, const std::string& file, const std::string& path,
+              const std::string& type) {
+  T value{};
+  // yaml-cpp tags quoted scalars "!": a quoted number is a string.
+  const bool quoted_number = !std::is_same_v<T, std::string> && node.Tag() == "!";
+  if (!node.IsScalar() || quoted_number || !YAML::convert<T>::decode(node, value)) {
+    ThrowType(node, file, path, type);
+  }
+  return value;
+}
+
+template <typename T>
+T ValueWithin(const YAML::Node& node, const std::string& file, const std::string& path,
+              const std::string& type, const std::function<bool(double)>& is_within) {
+  const T value = ScalarValue<T>(node, file, path, type);
+  if (!std::isfinite(static_cast<double>(value)) || !is_within(static_cast<double>(value))) {
+    ThrowType(node, file, path, type);
+  }
+  return value;
+}
+
+std::string RangeText(const std::string& of, double low, double high) {
+  return fmt::format("{} from {} to {}", of, low, high);
+}
+
+std::function<bool(double)> Between(double low, double high) {
+  return [low, high](double value) { return value >= low && value <= high; };
+}
+
+}  // namespace
+
+YamlOptions::YamlOptions() = default;
+YamlOptions::~YamlOptions() = default;
+YamlOptions::YamlOptions(YamlOptions&&) noexcept = default;
+YamlOptions& YamlOptions::operator=(YamlOptions&&) noexcept = default;
+
+YamlOptions::Entry& YamlOptions::NewEntry(const std::string& key) {
+  if (std::ranges::any_of(entries_, [&](const auto& entry) { return entry->key == key; })) {
+    throw std::logic_error(fmt::format("option '{}' is bound twice", key));
+  }
+  entries_.push_back(std::make_unique<Entry>());
+  entries_.back()->key = key;
+  return *entries_.back();
+}
+
+template <typename T>
+void YamlOptions::AddScalar(const std::string& key, const std::string& type, T* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value, type](const YAML::Node& node, const std::string& file,
+                             const std::string& path) {
+    *value = ScalarValue<T>(node, file, path, type);
+  };
+  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddWithin(const std::string& key, const std::string& type,
+                            const std::function<bool(double)>& is_within, double* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value, type, is_within](const YAML::Node& node, const std::string& file,
+                                        const std::string& path) {
+    *value = ValueWithin<double>(node, file, path, type, is_within);
+  };
+  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddBetween(const std::string& key, double low, double high, double* value) {
+  AddWithin(key, RangeText("a number", low, high), Between(low, high), value);
+}
+
+void YamlOptions::AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [=](const YAML::Node& node, const std::string& file, const std::string& path) {
+    *value = ValueWithin<int32_t>(node, file, path, RangeText("a whole number", low, high),
+                                  Between(low, high));
+  };
+  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddBetween(const std::string& key, double low, double high,
+                             std::optional<double>* value) {
+  Add(key, value);
+  entries_.back()->read = [=](const YAML::Node& node, const std::string& file,
+                              const std::string& path) {
+    value->reset();
+    if (!node.IsNull()) {
+      *value = ValueWithin<double>(node, file, path, RangeText("a number", low, high),
+                                   Between(low, high));
+    }
+  };
+}
+
+void YamlOptions::Add(const std::string& key, std::optional<double>* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value](const YAML::Node& node, const std::string& file, const std::string& path) {
+    value->reset();
+    if (!node.IsNull()) {
+      *value = ScalarValue<double>(node, file, path, "a number");
+    }
+  };
+  entry.print = [value](int) {
+    return fmt::format(" {}\n", value->has_value() ? ScalarText(**value) : "~");
+  };
+}
+
+template <typename T>
+void YamlOptions::AddScalars(const std::string& key, const std::string& type,
+                             std::vector<T>* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [value, type](const YAML::Node& node, const std::string& file,
+                             const std::string& path) {
+    if (!node.IsSequence()) {
+      ThrowType(node, file, path, "a list, each item " + type);
+    }
+    std::vector<T> items;
+    for (size_t i = 0; i < node.size(); ++i) {
+      items.push_back(ScalarValue<T>(node[i], file, fmt::format("{}[{}]", path, i), type));
+    }
+    *value = std::move(items);
+  };
+  entry.print = [value](int) {
+    std::string text;
+    for (const T& item : *value) {
+      text += fmt::format("{}{}", text.empty() ? "" : ", ", ScalarText(item));
+    }
+    return fmt::format(" [{}]\n", text);
+  };
+}
+
+void YamlOptions::Add(const std::string& key, bool* value) {
+  AddScalar(key, "true or false", value);
+}
+void YamlOptions::Add(const std::string& key, int32_t* value) {
+  AddScalar(key, "a whole number", value);
+}
+void YamlOptions::Add(const std::string& key, int64_t* value) {
+  AddScalar(key, "a whole number", value);
+}
+void YamlOptions::Add(const std::string& key, uint64_t* value) {
+  AddScalar(key, "a whole number >= 0", value);
+}
+void YamlOptions::Add(const std::string& key, float* value) { AddScalar(key, "a number", value); }
+void YamlOptions::Add(const std::string& key, double* value) { AddScalar(key, "a number", value); }
+void YamlOptions::AddPositive(const std::string& key, double* value) {
+  AddWithin(
+      key, "a number above 0", [](double x) { return x > 0; }, value);
+}
+void YamlOptions::AddNotNegative(const std::string& key, double* value) {
+  AddWithin(
+      key, "a number, 0 or above", [](double x) { return x >= 0; }, value);
+}
+void YamlOptions::Add(const std::string& key, std::string* value) {
+  AddScalar(key, "a text", value);
+}
+void YamlOptions::Add(const std::string& key, std::vector<double>* value) {
+  AddScalars(key, "a number", value);
+}
+void YamlOptions::Add(const std::string& key, std::vector<std::string>* value) {
+  AddScalars(key, "a text", value);
+}
+
+void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string>& names,
+                           const std::function<void(size_t)>& set,
+                           const std::function<size_t()>& get) {
+  Entry& entry = NewEntry(key);
+  entry.read = [names, set](const YAML::Node& node, const std::string& file,
+                            const std::string& path) {
+    const auto found = node.IsScalar() ? std::ranges::find(names, node.Scalar()) : names.end();
+    if (found == names.end()) {
+      ThrowType(node, file, path, fmt::format("one of {}", fmt::join(names, ", ")));
+    }
+    set(static_cast<size_t>(found - names.begin()));
+  };
+  entry.print = [names, get](int) { return fmt::format(" {}\n", names[get()]); };
+}
+
+YamlOptions& YamlOptions::Section(const std::string& key) {
+  Entry& entry = NewEntry(key);
+  entry.section = std::make_unique<YamlOptions>();
+  YamlOptions* section = entry.section.get();
+  entry.read = [section](const YAML::Node& node, const std::string& file, const std::string& path) {
+    section->Read(node, file, path + ".");
+  };
+  entry.print = [section](int indent) {
+    return fmt::format("\n{}", section->PrintIndented(indent + 2));
+  };
+  return *section;
+}
+
+void YamlOptions::AddSequence(const std::string& key,
+                              std::function<std::vector<YamlOptions>(size_t)> resize,
+                              std::function<std::vector<YamlOptions>()> current) {
+  Entry& entry = NewEntry(key);
+  entry.read = [resize = std::move(resize)](const YAML::Node& node, const std::string& file,
+                                            const std::string& path) {
+    if (!node.IsSequence()) {
+      ThrowType(node, file, path, "a list");
+    }
+    std::vector<YamlOptions> items = resize(node.size());
+    for (size_t i = 0; i < items.size(); ++i) {
+      items[i].Read(node[i], file, fmt::format("{}[{}].", path, i));
+    }
+  };
+  entry.print = [current = std::move(current)](int indent) {
+    const std::vector<YamlOptions> items = current();
+    std::string text = items.empty() ? " []\n" : "\n";
+    for (const YamlOptions& item : items) {
+      std::string block = item.PrintIndented(indent + 4);
+      block[static_cast<size_t>(indent) + 2] = '-';
+      text += block;
+    }
+    return text;
+  };
+}
+
+void YamlOptions::AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
+                                     std::function<std::optional<YamlOptions>()> current) {
+  Entry& entry = NewEntry(key);
+  entry.read = [start = std::move(start)](const YAML::Node& node, const std::string& file,
+                                          const std::string& path) {
+    if (!node.IsNull()) {
+      start().Read(node, file, path + ".");
+    }
+  };
+  entry.print = [current = std::move(current)](int indent) {
+    const std::optional<YamlOptions> section = current();
+    return section ? fmt::format("\n{}", section->PrintIndented(indent + 2)) : std::string(" ~\n");
+  };
+}
+
+void YamlOptions::Require(const std::string& key) {
+  for (const auto& entry : entries_) {
+    if (entry->key == key) {
+      entry->required = true;
+      return;
+    }
+  }
+  throw std::logic_error(fmt::format("option '{}' is required but not bound", key));
+}
+
+void YamlOptions::Read(const YAML::Node& node, const std::string& file, const std::string& path) {
+  if (!node.IsMap() && !node.IsNull()) {
+    ThrowType(node, file, path.empty() ? "(top)" : path.substr(0, path.size() - 1),
+              "a section of keys");
+  }
+  std::set<std::string> seen;
+  for (const auto& item : node) {
+    if (!item.first.IsScalar()) {
+      throw std::runtime_error(
+          fmt::format("{}: a key must be a plain word", Where(file, item.first)));
+    }
+    const std::string& key = item.first.Scalar();
+    if (!seen.insert(key).second) {
+      throw std::runtime_error(
+          fmt::format("{}: key '{}{}' stands twice", Where(file, item.first), path, key));
+    }
+    const auto entry = std::ranges::find_if(entries_, [&](const auto& e) { return e->key == key; });
+    if (entry == entries_.end()) {
+      std::vector<std::string> known;
+      for (const auto& e : entries_) {
+        known.push_back(e->key);
+      }
+      throw std::runtime_error(fmt::format("{}: unknown key '{}{}'{}", Where(file, item.first),
+                                           path, key, NearestWordHint(key, known, path)));
+    }
+    (*entry)->read(item.second, file, path + key);
+  }
+  for (const auto& entry : entries_) {
+    if (entry->required && !seen.contains(entry->key)) {
+      throw std::runtime_error(
+          fmt::format("{}: key '{}{}' is missing", Where(file, node), path, entry->key));
+    }
+  }
+}
+
+void YamlOptions::ReadText(const std::string& text, const std::string& name) {
+  YAML::Node node;
+  try {
+    node = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: not YAML: {}", name, error.mark.line + 1, error.msg));
+  }
+  Read(node, name, "");
+}
+
+void YamlOptions::ReadFile(const std::string& path) { ReadText(ReadTextFile(path), path); }
+
+std::string YamlOptions::PrintIndented(int indent) const {
+  std::string text;
+  for (const auto& entry : entries_) {
+    text += fmt::format("{:{}}{}:{}", "", indent, entry->key, entry->print(indent));
+  }
+  return text;
+}
+
+std::string YamlOptions::Print() const { return PrintIndented(0); }
+
+}  // namespace pangea

@@ -1,0 +1,63 @@
+#pragma once
+
+// Poses and relative poses of four degrees of freedom: x, y, z and yaw (the paper, section IV.D;
+// Qin et al., VINS-Mono, TRO 2018, section VIII).
+//
+// Gravity makes roll and pitch observable, so a keyframe keeps those of its odometry. What is left
+// is where its body is in the map and by how much its odom axes are turned about z:
+//   T_map_body = (Rz(yaw) q_odom_body, p).
+// Using the turn of the odom axes instead of the body's own yaw has no singularity at any attitude.
+
+#include <Eigen/Core>
+
+#include "core/rigid3.h"
+
+namespace pangea {
+
+using Vector4d = Eigen::Vector4d;
+using Matrix4d = Eigen::Matrix4d;
+
+// p = Rz(yaw) * (point in the odom axes) + p. For a keyframe, p is p_map_body; for a whole map it
+// is the origin of odom, and the pose is T_map_odom.
+struct Pose4 {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  // metres
+  double yaw = 0;                               // radians
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    return YawRotation(yaw) * point + p;
+  }
+  Pose4 operator*(const Pose4& other) const { return {*this * other.p, yaw + other.yaw}; }
+  Pose4 Inverse() const { return {-(YawRotation(-yaw) * p), -yaw}; }
+  Rigid3 ToRigid3() const { return {YawRotation(yaw), p}; }
+};
+
+// Where keyframe `to` is, seen from `from`: t in from's odom axes, yaw = turn of to's odom axes
+// against from's. Covariance of (t, yaw), a perturbation of each in from's odom axes.
+struct Relative4 {
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+  double yaw = 0;
+  Matrix4d covariance = Matrix4d::Identity();
+
+  Relative4 Inverse() const;  // in to's odom axes
+};
+
+// Of a relative pose between bodies, with its 6x6 covariance in from's body frame
+// (docs/conventions.md). The covariance is turned into from's odom axes, where dtheta.z is yaw, and
+// its (x, y, z, yaw) block taken: roll and pitch are marginalised, not conditioned. The tilt error
+// of from's own attitude moves t too and is added.
+Relative4 MakeRelative4(const Rigid3& T_from_to, const Matrix6d& covariance,
+                        const Eigen::Quaterniond& q_odom_from,
+                        const Eigen::Matrix2d& roll_pitch_covariance_from,
+                        const Eigen::Quaterniond& q_odom_to);
+
+// predicted - measured for two keyframe poses, in from's odom axes.
+Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured);
+
+// L^T of information = L L^T: |L^T r|^2 = r^T information r (a plain L only does for a diagonal
+// one). Variances below 1e-10 and above 1e6 are beyond what a solve can use and are bounded.
+Matrix4d Whitening(const Matrix4d& covariance);
+
+// How a small error (dt, dyaw) of a pose at `at` moves a point that hangs on it, and turns it.
+Matrix4d CovarianceAt(const Matrix4d& covariance, const Eigen::Vector3d& lever);
+
+}  // namespace pangea

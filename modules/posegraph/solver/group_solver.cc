@@ -1,0 +1,180 @@
+#include "posegraph/solver/group_solver.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Sparse>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "posegraph/solver/pose_cost.h"
+
+namespace pangea {
+namespace {
+
+constexpr double kOne = 1;
+constexpr int kSettleRounds = 5;
+
+// Weight of a residual under the GNC surrogate with control parameter mu (RA-L 2020, eq. 14).
+double GraduatedWeight(double squared_residual, double c2, double mu) {
+  if (squared_residual <= mu / (mu + 1) * c2) {
+    return 1;
+  }
+  if (squared_residual >= (mu + 1) / mu * c2) {
+    return 0;
+  }
+  return std::clamp(std::sqrt(c2 / squared_residual * mu * (mu + 1)) - mu, 0.0, 1.0);
+}
+
+}  // namespace
+
+GroupSolver::GroupSolver(const GroupSolverOptions& options)
+    : options_(options), problem_(std::make_unique<ceres::Problem>()) {}
+
+GroupSolver::~GroupSolver() = default;
+
+int GroupSolver::AddNode(const Pose4& pose, bool fixed) {
+  nodes_.push_back({pose.p.x(), pose.p.y(), pose.p.z(), pose.yaw});
+  fixed_.push_back(fixed);
+  problem_->AddParameterBlock(nodes_.back().data(), 4);
+  if (fixed) {
+    problem_->SetParameterBlockConstant(nodes_.back().data());
+  }
+  return static_cast<int>(nodes_.size()) - 1;
+}
+
+void GroupSolver::AddEdge(int from, int to, const Relative4& relative, const Matrix4d& whitening,
+                          const double* sqrt_weight) {
+  problem_->AddResidualBlock(new RelativePoseCost(relative, whitening, sqrt_weight), nullptr,
+                             nodes_[from].data(), nodes_[to].data());
+}
+
+void GroupSolver::AddOdometry(int from, int to, const Relative4& relative) {
+  AddEdge(from, to, relative, Whitening(relative.covariance), &kOne);
+}
+
+int GroupSolver::AddLoop(int from, int to, const Relative4& relative, bool on) {
+  loops_.push_back({from, to, relative, Whitening(relative.covariance)});
+  Loop& loop = loops_.back();
+  SetWeight(&loop, on ? 1 : 0);
+  AddEdge(from, to, relative, loop.whitening, &loop.sqrt_weight);
+  return static_cast<int>(loops_.size()) - 1;
+}
+
+Pose4 GroupSolver::pose(int node) const {
+  return {Eigen::Vector3d::Map(nodes_[node].data()), nodes_[node][3]};
+}
+
+void GroupSolver::SetWeight(Loop* loop, double weight) {
+  loop->weight = weight;
+  loop->sqrt_weight = std::sqrt(weight);
+}
+
+double GroupSolver::SquaredResidual(const Loop& loop) const {
+  return (loop.whitening * Residual(pose(loop.from), pose(loop.to), loop.relative)).squaredNorm();
+}
+
+void GroupSolver::Minimise(int max_iterations) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  options.num_threads = 1;
+  options.max_num_iterations = max_iterations;
+  // A graph that odometry and alignments start well needs next to no damping.
+  options.initial_trust_region_radius = 1e8;
+  options.function_tolerance = 1e-9;
+  options.parameter_tolerance = 1e-10;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, problem_.get(), &summary);
+}
+
+void GroupSolver::SolveGraduated() {
+  constexpr int kIterationsPerStep = 4;
+  const double c2 = options_.loop_chi2;
+  Minimise(options_.max_iterations);
+  double worst = 0;
+  for (const Loop& loop : loops_) {
+    worst = std::max(worst, loop.weight * SquaredResidual(loop));
+  }
+  if (worst > c2) {
+    double mu = c2 / (2 * worst - c2);
+    for (int step = 0; step < options_.gnc_steps; ++step, mu *= options_.gnc_factor) {
+      bool decided = true;
+      for (Loop& loop : loops_) {
+        SetWeight(&loop, GraduatedWeight(SquaredResidual(loop), c2, mu));
+        decided = decided && (loop.weight == 0 || loop.weight == 1);
+      }
+      Minimise(kIterationsPerStep);
+      if (decided && mu > 1) {
+        break;
+      }
+    }
+    for (Loop& loop : loops_) {
+      SetWeight(&loop, loop.weight > 0.5 ? 1 : 0);
+    }
+    Minimise(options_.max_iterations);
+  }
+  Settle(std::vector<bool>(loops_.size(), true));
+}
+
+void GroupSolver::SolveWarm(const std::vector<bool>& may_go) {
+  Minimise(options_.max_iterations);
+  Settle(may_go);
+}
+
+void GroupSolver::Settle(const std::vector<bool>& may_go) {
+  for (int round = 0; round < kSettleRounds; ++round) {
+    bool changed = false;
+    for (size_t i = 0; i < loops_.size(); ++i) {
+      const bool fits = SquaredResidual(loops_[i]) <= options_.loop_chi2;
+      const bool on = loop_on(static_cast<int>(i));
+      // A loop that came back stays: two that take turns would never settle.
+      if (fits != on && (!on || (may_go[i] && round < kSettleRounds - 1))) {
+        SetWeight(&loops_[i], fits ? 1 : 0);
+        changed = true;
+      }
+    }
+    if (!changed) {
+      return;
+    }
+    Minimise(options_.max_iterations);
+  }
+}
+
+std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) const {
+  std::vector<double*> blocks;
+  std::vector<int> column(nodes_.size(), -1);
+  for (size_t i = 0; i < nodes_.size(); ++i) {
+    if (!fixed_[i]) {
+      column[i] = static_cast<int>(4 * blocks.size());
+      blocks.push_back(const_cast<double*>(nodes_[i].data()));
+    }
+  }
+  std::vector<Matrix4d> marginals(nodes.size(), Matrix4d::Zero());
+  if (blocks.empty()) {
+    return marginals;
+  }
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = blocks;
+  ceres::CRSMatrix crs;
+  problem_->Evaluate(options, nullptr, nullptr, nullptr, &crs);
+  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
+      crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
+      crs.cols.data(), crs.values.data());
+  const Eigen::SparseMatrix<double> H = J.transpose() * J;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(H);
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    if (column[nodes[i]] < 0 || factor.info() != Eigen::Success) {
+      continue;
+    }
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(H.rows(), 4);
+    unit.middleRows<4>(column[nodes[i]]).setIdentity();
+    const Eigen::MatrixXd solution = factor.solve(unit);
+    const Matrix4d block = solution.middleRows<4>(column[nodes[i]]);
+    marginals[i] = 0.5 * (block + block.transpose());
+  }
+  return marginals;
+}
+
+}  // namespace pangea

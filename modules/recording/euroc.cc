@@ -1,0 +1,279 @@
+#include "recording/euroc.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+
+#include "core/median.h"
+#include "files/csv.h"
+#include "files/text_file.h"
+#include "recording/euroc_calibration.h"
+#include "recording/grey_image.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string FindMav0(const std::string& folder) {
+  std::error_code error;
+  if (!fs::exists(folder, error)) {
+    throw std::runtime_error(
+        fmt::format("{}: there is no such recording folder{}", folder,
+                    error ? fmt::format(": {}", error.message()) : std::string()));
+  }
+  for (const fs::path& candidate : {fs::path(folder) / "mav0", fs::path(folder)}) {
+    if (fs::is_directory(candidate / "cam0", error) ||
+        fs::is_directory(candidate / "imu0", error)) {
+      return candidate.string();
+    }
+  }
+  throw std::runtime_error(fmt::format(
+      "{}: not a recording in EuRoC's format; it must hold mav0/cam0 and mav0/imu0", folder));
+}
+
+// A row the file was cut off in: its last number may be cut too.
+void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
+                  std::vector<std::string>* warnings) {
+  if (!rows->empty() && !rows->back().line_ended) {
+    warnings->push_back(
+        fmt::format("{}:{}: the last row has no line end and may be cut off; row dropped", path,
+                    rows->back().line));
+    rows->pop_back();
+  }
+}
+
+// A recording lasts minutes, hours at most. What is stamped further than a day from the middle of
+// it is a slip, and would stand for its beginning or its end.
+template <typename T>
+void DropFarStamps(std::vector<T>* items, const std::string& path,
+                   std::vector<std::string>* warnings) {
+  constexpr int64_t kDay_us = 86'400'000'000;
+  std::vector<int64_t> utimes;
+  for (const T& item : *items) {
+    utimes.push_back(item.utime);
+  }
+  const int64_t middle = Median(std::move(utimes));
+  const size_t far = std::erase_if(
+      *items, [middle](const T& item) { return std::abs(item.utime - middle) > kDay_us; });
+  if (far > 0) {
+    warnings->push_back(
+        fmt::format("{}: {} rows are stamped more than a day from the others; dropped", path, far));
+  }
+}
+
+// Names the gaps that are well above the median period.
+template <typename T>
+void NameGaps(const std::vector<T>& items, double factor, const std::string& path,
+              std::vector<std::string>* warnings) {
+  if (items.size() < 3) {
+    return;
+  }
+  std::vector<int64_t> periods;
+  for (size_t i = 1; i < items.size(); ++i) {
+    periods.push_back(items[i].utime - items[i - 1].utime);
+  }
+  const double limit_us = factor * static_cast<double>(Median(periods));
+  constexpr int kNamed = 5;
+  int gaps = 0;
+  for (size_t i = 0; i < periods.size(); ++i) {
+    if (static_cast<double>(periods[i]) > limit_us && ++gaps <= kNamed) {
+      warnings->push_back(
+          fmt::format("{}: gap of {:.3f} s after {:.3f} s", path, 1e-6 * periods[i],
+                      1e-6 * static_cast<double>(items[i].utime - items.front().utime)));
+    }
+  }
+  if (gaps > kNamed) {
+    warnings->push_back(fmt::format("{}: ... and {} more gaps", path, gaps - kNamed));
+  }
+}
+
+void Append(const RowComplaints& complaints, std::vector<std::string>* warnings) {
+  for (const std::string& line : complaints.Lines()) {
+    warnings->push_back(line + "; row dropped");
+  }
+}
+
+Trajectory ReadGroundTruthIn(const std::string& mav0, const Rigid3& T_s_body,
+                             std::vector<std::string>* warnings) {
+  for (const char* sensor : {"state_groundtruth_estimate0", "mocap0"}) {
+    const fs::path folder = fs::path(mav0) / sensor;
+    if (!Exists((folder / "data.csv").string())) {
+      continue;
+    }
+    try {
+      // Both sensors' T_BS go from sensor to rig: T_ref_body = T_ref_gt * T_s_gt^-1 * T_s_body.
+      const Rigid3 T_gt_body =
+          ReadEurocExtrinsics((folder / "sensor.yaml").string()).Inverse() * T_s_body;
+      Trajectory trajectory = ReadEurocGroundTruth((folder / "data.csv").string(), warnings);
+      for (StampedPose& pose : trajectory) {
+        pose.T = pose.T * T_gt_body;
+      }
+      return trajectory;
+    } catch (const std::runtime_error& error) {
+      warnings->push_back(fmt::format("{}; going on without ground truth", error.what()));
+      return {};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folder)) {
+  ReadCamera();
+  const Rigid3 T_s_body = ReadImuCalibration();
+  camera_.T_body_cam = T_s_body.Inverse() * camera_.T_body_cam;
+  if (const auto invalid = camera_.Invalid()) {
+    throw std::runtime_error(fmt::format(
+        "{}: {}; fields 'T_BS' of cam0/sensor.yaml and imu0/sensor.yaml", mav0_, *invalid));
+  }
+  ReadImages();
+  ReadImu();
+  DropImagesOutsideImu();
+  CheckImages();
+  ground_truth_ = ReadGroundTruthIn(mav0_, T_s_body, &warnings_);
+}
+
+void EurocRecording::ReadCamera() { camera_ = ReadEurocCamera(mav0_ + "/cam0/sensor.yaml"); }
+
+Rigid3 EurocRecording::ReadImuCalibration() {
+  const EurocImuCalibration calibration = ReadEurocImuCalibration(mav0_ + "/imu0/sensor.yaml");
+  imu_noise_ = calibration.noise;
+  return calibration.T_s_body;
+}
+
+void EurocRecording::ReadImages() {
+  const std::string csv = mav0_ + "/cam0/data.csv";
+  const std::vector<CsvRow> rows = ReadCsv(csv);
+  RowComplaints malformed(csv);
+  RowComplaints missing(csv);
+  for (const CsvRow& row : rows) {
+    EurocImage image;
+    if (row.fields.size() != 2 || row.fields[1].empty() ||
+        !ParseNumber(row.fields[0], &image.stamp_ns)) {
+      malformed.Add(row.line, "not 'nanoseconds, file name'");
+      continue;
+    }
+    image.utime = UtimeFromNs(image.stamp_ns);
+    image.path = fmt::format("{}/cam0/data/{}", mav0_, row.fields[1]);
+    std::error_code error;
+    if (fs::is_regular_file(image.path, error)) {
+      images_.push_back(std::move(image));
+    } else {
+      missing.Add(row.line, fmt::format("image data/{} is missing", row.fields[1]));
+    }
+  }
+  malformed.ThrowIfTooMany(rows.size(), "nanoseconds, file name");
+  Append(malformed, &warnings_);
+  Append(missing, &warnings_);
+  if (images_.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
+  }
+  DropFarStamps(&images_, csv, &warnings_);
+  Warn(SortByTime(&images_), csv, &warnings_);
+  NameGaps(images_, 3.5, csv, &warnings_);
+}
+
+void EurocRecording::ReadImu() {
+  const std::string csv = mav0_ + "/imu0/data.csv";
+  const std::string expected = "nanoseconds, gyro x y z [rad/s], accel x y z [m/s^2]";
+  std::vector<CsvRow> rows = ReadCsv(csv);
+  const size_t num_rows = rows.size();
+  DropTornTail(&rows, csv, &warnings_);
+  RowComplaints complaints(csv);
+  for (const CsvRow& row : rows) {
+    int64_t ns = 0;
+    double v[6];
+    bool good = row.fields.size() == 7 && ParseNumber(row.fields[0], &ns);
+    for (size_t i = 0; good && i < 6; ++i) {
+      good = ParseNumber(row.fields[i + 1], &v[i]);
+    }
+    if (good) {
+      imu_.push_back({UtimeFromNs(ns), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
+    } else {
+      complaints.Add(row.line, fmt::format("not '{}'", expected));
+    }
+  }
+  complaints.ThrowIfTooMany(num_rows, expected);
+  Append(complaints, &warnings_);
+  if (imu_.empty()) {
+    throw std::runtime_error(fmt::format("{}: holds no sample; expected rows: {}", csv, expected));
+  }
+  DropFarStamps(&imu_, csv, &warnings_);
+  Warn(SortByTime(&imu_), csv, &warnings_);
+  NameGaps(imu_, 2.5, csv, &warnings_);
+}
+
+void EurocRecording::DropImagesOutsideImu() {
+  const size_t before = images_.size();
+  const int64_t begin = imu_.front().utime;
+  const int64_t end = imu_.back().utime;
+  std::erase_if(images_,
+                [&](const EurocImage& image) { return image.utime < begin || image.utime > end; });
+  if (images_.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: no image lies within the IMU's time; are imu0 and cam0 of one recording?", mav0_));
+  }
+  if (images_.size() < before) {
+    warnings_.push_back(
+        fmt::format("{}/cam0/data.csv: {} of {} images are outside the IMU's time; "
+                    "dropped",
+                    mav0_, before - images_.size(), before));
+  }
+}
+
+// A single one of another size is skipped when its turn comes, as one that is corrupt.
+void EurocRecording::CheckImages() const {
+  constexpr int kOfAnotherSize = 20;  // so many in a row are no accident
+  const cv::Size expected(camera_.width, camera_.height);
+  std::string last;
+  int of_another_size = 0;
+  for (size_t i = 0; i < images_.size() && of_another_size < kOfAnotherSize; ++i) {
+    const GreyImage image = ReadGrey(images_[i].path, expected);
+    if (!image.pixels.empty()) {
+      return;
+    }
+    of_another_size += !image.size.empty() && image.size != expected ? 1 : 0;
+    last = fmt::format("{}: {}", images_[i].path, image.why);
+  }
+  throw std::runtime_error(
+      fmt::format("{}/cam0/data: none of the images can be used; the calibration must be of these "
+                  "(cam0/sensor.yaml, field 'resolution'); the last one tried: {}",
+                  mav0_, last));
+}
+
+cv::Mat EurocRecording::LoadImage(size_t index, std::string* why) const {
+  const std::string& path = images_.at(index).path;
+  GreyImage image = ReadGrey(path, {camera_.width, camera_.height});
+  if (image.pixels.empty()) {
+    *why = fmt::format("{}: {}, skipped", path, image.why);
+  }
+  return image.pixels;
+}
+
+std::optional<int64_t> FirstImageUtimeOf(const std::string& folder) {
+  std::optional<int64_t> first;
+  try {
+    for (const CsvRow& row : ReadCsv(FindMav0(folder) + "/cam0/data.csv")) {
+      int64_t ns = 0;
+      if (ParseNumber(row.fields[0], &ns)) {
+        first = std::min(first.value_or(UtimeFromNs(ns)), UtimeFromNs(ns));
+      }
+    }
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
+  return first;
+}
+
+Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings) {
+  const std::string mav0 = FindMav0(folder);
+  return ReadGroundTruthIn(mav0, ReadEurocExtrinsics(mav0 + "/imu0/sensor.yaml"), warnings);
+}
+
+}  // namespace pangea

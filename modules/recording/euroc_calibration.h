@@ -1,0 +1,24 @@
+#pragma once
+
+// EuRoC's sensor.yaml files.
+
+#include <string>
+
+#include "core/camera_model.h"
+#include "core/imu/imu.h"
+
+namespace pangea {
+
+struct EurocImuCalibration {
+  ImuNoise noise;
+  Rigid3 T_s_body;  // EuRoC's T_BS of the IMU: rig frame from IMU
+};
+
+// T_body_cam of the result is the file's T_BS: rig frame from camera.
+// Both throw std::runtime_error naming file and field.
+CameraModel ReadEurocCamera(const std::string& sensor_yaml);
+EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml);
+// T_BS of any sensor; identity when the file or the key is missing.
+Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml);
+
+}  // namespace pangea

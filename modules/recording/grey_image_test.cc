@@ -1,0 +1,104 @@
+#include "recording/grey_image.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+namespace pangea {
+namespace {
+
+using ::testing::HasSubstr;
+
+const cv::Size kSize(32, 24);
+
+std::vector<uint8_t> Encoded(const std::string& extension, cv::Size size = kSize) {
+  std::vector<uint8_t> bytes;
+  cv::imencode(extension, cv::Mat(size, CV_8UC1, cv::Scalar(77)), bytes);
+  return bytes;
+}
+
+std::vector<uint8_t> Bytes(std::string_view text) { return {text.begin(), text.end()}; }
+
+// A PNG whose header says so, with pixels or without: a decoder that believes it asks for 3.6 GB.
+std::vector<uint8_t> PngThatClaims(int width, int height) {
+  std::vector<uint8_t> bytes = Encoded(".png");
+  for (int i = 0; i < 4; ++i) {
+    bytes[16 + i] = static_cast<uint8_t>(width >> (24 - 8 * i));
+    bytes[20 + i] = static_cast<uint8_t>(height >> (24 - 8 * i));
+  }
+  return bytes;
+}
+
+std::string Why(const std::vector<uint8_t>& bytes) {
+  const GreyImage image = DecodeGrey(bytes, kSize);
+  EXPECT_TRUE(image.pixels.empty());
+  return image.why;
+}
+
+TEST(GreyImage, DecodesPngAndJpeg) {
+  for (const char* extension : {".png", ".jpg"}) {
+    const GreyImage image = DecodeGrey(Encoded(extension), kSize);
+    ASSERT_EQ(image.pixels.size(), kSize) << image.why;
+    EXPECT_EQ(image.pixels.at<uint8_t>(3, 3), 77);
+    EXPECT_EQ(image.size, kSize);
+  }
+}
+
+TEST(GreyImage, TheSizeIsReadBeforeAPixelIsDecoded) {
+  EXPECT_EQ(Why(PngThatClaims(60000, 60000)), "60000x60000 pixels instead of 32x24");
+  EXPECT_EQ(Why(PngThatClaims(0, 24)), "corrupt image: a PNG without its size");
+  EXPECT_EQ(Why(PngThatClaims(-1, -1)), "corrupt image: a PNG without its size");
+  EXPECT_EQ(Why(Encoded(".jpg", {48, 40})), "48x40 pixels instead of 32x24");
+  EXPECT_EQ(DecodeGrey(PngThatClaims(60000, 60000), kSize).size, cv::Size(60000, 60000));
+}
+
+TEST(GreyImage, OtherFormatsAreRefusedByName) {
+  for (const auto& [bytes, name] : {std::pair(Encoded(".bmp"), "BMP"),
+                                    {Encoded(".pgm"), "PNM"},
+                                    {Encoded(".tiff"), "TIFF"},
+                                    {Bytes("P5 60000 60000 255\n"), "PNM"},
+                                    {Bytes("#?RADIANCE\n\n-Y 60000 +X 60000\n"), "Radiance HDR"},
+                                    {Bytes("RIFF\1\1\1\1WEBPVP8 "), "WebP"}}) {
+    EXPECT_EQ(Why(bytes), fmt::format("{} image; only PNG and JPEG are read", name));
+  }
+  EXPECT_EQ(Why(Bytes("no image")), "corrupt image: neither PNG nor JPEG");
+  EXPECT_EQ(Why({}), "corrupt image: neither PNG nor JPEG");
+}
+
+// Whatever the decoder makes of half an image, it ends here.
+TEST(GreyImage, WhatIsCutOrFlippedIsNoException) {
+  for (const char* extension : {".png", ".jpg"}) {
+    const std::vector<uint8_t> whole = Encoded(extension);
+    for (size_t length = 0; length < whole.size(); ++length) {
+      const GreyImage cut = DecodeGrey(std::span(whole).first(length), kSize);
+      EXPECT_EQ(cut.pixels.empty(), !cut.why.empty());
+      std::vector<uint8_t> flipped = whole;
+      flipped[length] ^= 0x41;
+      const GreyImage odd = DecodeGrey(flipped, kSize);
+      EXPECT_EQ(odd.pixels.empty(), !odd.why.empty());
+    }
+  }
+}
+
+TEST(GreyImage, OfAFileNothingIsThrown) {
+  const std::string folder = ::testing::TempDir() + "pangea_grey_image";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  EXPECT_THAT(ReadGrey(folder + "/none.png", kSize).why, HasSubstr("No such file"));
+  EXPECT_THAT(ReadGrey(folder, kSize).why, HasSubstr("it is a folder"));
+  ASSERT_EQ(mkfifo((folder + "/fifo.png").c_str(), 0600), 0);
+  EXPECT_THAT(ReadGrey(folder + "/fifo.png", kSize).why, HasSubstr("it is a FIFO"));
+  std::vector<uint8_t> bytes = Encoded(".png");
+  bytes.resize(9'000'000);
+  std::ofstream(folder + "/long.png", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), 9'000'000);
+  EXPECT_EQ(ReadGrey(folder + "/long.png", kSize).why, "too many bytes for 32x24 pixels");
+}
+
+}  // namespace
+}  // namespace pangea

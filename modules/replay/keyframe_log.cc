@@ -1,0 +1,128 @@
+#include "replay/keyframe_log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <stdexcept>
+
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+
+namespace pangea::session {
+namespace {
+
+// Names what is missing: "map 1/17…: keyframes 12 to 15 are missing".
+void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs,
+               const LogReading& reading) {
+  std::string gaps;
+  for (const auto& [map, present] : seqs) {
+    int32_t next = 0;
+    for (const int32_t seq : present) {
+      if (seq != next) {
+        gaps += fmt::format("\n  map {}: keyframes {} to {}", ToString(map), next, seq - 1);
+      }
+      next = seq + 1;
+    }
+  }
+  if (gaps.empty()) {
+    return;
+  }
+  throw std::runtime_error(fmt::format(
+      "{}: keyframes are missing, and a replay without them would not be the same:{}\n{}",
+      log.string(), gaps,
+      reading.whole()
+          ? "The server's journal (journal.lcm beside a session.lcm) has every keyframe: "
+            "replay that."
+          : "The log is damaged, and they were lost there. Another capture of the same "
+            "session, or the server's journal (journal.lcm beside a session.lcm), may "
+            "have them: replay that."));
+}
+
+}  // namespace
+
+std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
+                                            LogReadings* readings) {
+  std::vector<LoggedKeyframe> keyframes;
+  std::map<MapId, std::set<int32_t>> seqs;
+  std::optional<int64_t> begin;
+  int64_t latest = std::numeric_limits<int64_t>::min();
+  const auto take = [&](const LogEvent& event) {
+    begin = begin.value_or(event.utime);
+    latest = std::max(latest, event.utime);
+    if (!event.channel.starts_with(channels::kKeyframePrefix)) {
+      return;
+    }
+    LoggedKeyframe keyframe;
+    keyframe.channel = event.channel;
+    keyframe.data.assign(event.data.begin(), event.data.end());
+    keyframe_t message;
+    const bool decoded = DecodeMessage(event.data, &message);
+    const auto id = decoded ? Parse(message.id) : Parsed<KeyframeId>{};
+    if (!id.value) {
+      throw std::runtime_error(fmt::format("{}: event {} on {} is not a keyframe of this version",
+                                           log.string(), event.number, event.channel));
+    }
+    keyframe.id = *id.value;
+    keyframe.utime = message.utime;
+    keyframe.captured_utime = latest;
+    keyframe.elapsed_us = latest - *begin;
+    if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
+      keyframes.push_back(std::move(keyframe));
+    }
+  };
+  ReadLog(log.string(), take, readings);
+  if (keyframes.empty()) {
+    throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
+  }
+  CheckGaps(log, seqs, readings == nullptr ? LogReading() : readings->at(log.string()));
+  return keyframes;
+}
+
+std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id,
+                                              LogReadings* readings) {
+  std::vector<LoggedKeyframe> keyframes = ReadKeyframeLog(log, readings);
+  std::erase_if(keyframes, [agent_id](const LoggedKeyframe& keyframe) {
+    return keyframe.id.map.agent_id != agent_id;
+  });
+  if (keyframes.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no keyframes of agent {} in this log; an agent has "
+                    "the id its keyframes were made with",
+                    log.string(), agent_id));
+  }
+  return keyframes;
+}
+
+std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs) {
+  if (logs.size() == 1) {
+    return std::move(logs.front());
+  }
+  std::vector<LoggedKeyframe> merged;
+  std::vector<size_t> next(logs.size(), 0);
+  while (true) {
+    size_t best = logs.size();
+    int64_t best_elapsed = 0;
+    for (size_t i = 0; i < logs.size(); ++i) {
+      if (next[i] < logs[i].size()) {
+        const int64_t elapsed = logs[i][next[i]].utime - logs[i].front().utime;
+        if (best == logs.size() || elapsed < best_elapsed) {
+          best = i;
+          best_elapsed = elapsed;
+        }
+      }
+    }
+    if (best == logs.size()) {
+      return merged;
+    }
+    // A copy: the log's first keyframe is its clock to the end.
+    merged.push_back(logs[best][next[best]++]);
+    merged.back().elapsed_us = best_elapsed;
+  }
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,93 @@
+#include "replay/keyframe_log.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "log_file/log_writer.h"
+#include "pangea/keyframe_t.hpp"
+
+namespace pangea::session {
+namespace {
+
+using testing::HasSubstr;
+
+// A log of keyframes of one map: (seq, utime).
+std::filesystem::path WriteLog(const std::string& name, int32_t agent,
+                               const std::vector<std::pair<int32_t, int64_t>>& keyframes) {
+  std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
+  std::filesystem::remove(path);
+  LogFileWriter file(path.string());
+  for (const auto& [seq, utime] : keyframes) {
+    keyframe_t message{};
+    message.id.map.agent_id = agent;
+    message.id.map.opened_utime = 100;
+    message.id.seq = seq;
+    message.utime = utime;
+    file.Write(utime, "KEYFRAME_" + std::to_string(agent), EncodeMessage(message));
+  }
+  return path;
+}
+
+std::string ErrorOf(const std::filesystem::path& log) {
+  try {
+    ReadKeyframeLog(log);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(KeyframeLog, RepeatsCountOnce) {
+  const auto keyframes =
+      ReadKeyframeLog(WriteLog("repeats.lcm", 1, {{0, 10}, {1, 20}, {1, 20}, {2, 30}}));
+  ASSERT_EQ(keyframes.size(), 3u);
+  EXPECT_EQ(keyframes[2].id.seq, 2);
+  EXPECT_EQ(keyframes[2].utime, 30);
+}
+
+// Capture times may step back by a little in a log; the time since its beginning does not.
+TEST(KeyframeLog, ElapsedTimeIsThatOfTheCapture) {
+  const auto keyframes = Interleave({ReadKeyframeLog(
+      WriteLog("elapsed.lcm", 1, {{0, 1'000'010}, {1, 1'000'030}, {2, 1'000'020}}))});
+  ASSERT_EQ(keyframes.size(), 3u);
+  EXPECT_EQ(keyframes[1].elapsed_us, 20);
+  EXPECT_EQ(keyframes[2].elapsed_us, 20);
+  EXPECT_EQ(keyframes[2].utime, 1'000'020);
+}
+
+TEST(KeyframeLog, OfOneAgent) {
+  const auto log = WriteLog("one_agent.lcm", 3, {{0, 10}, {1, 20}});
+  EXPECT_EQ(ReadKeyframeLogOf(log, 3).size(), 2u);
+  EXPECT_THROW(ReadKeyframeLogOf(log, 4), std::runtime_error);
+}
+
+TEST(KeyframeLog, NamesGaps) {
+  EXPECT_THAT(ErrorOf(WriteLog("gap.lcm", 3, {{0, 10}, {4, 20}})),
+              testing::AllOf(HasSubstr("gap.lcm"), HasSubstr("3/100"), HasSubstr("1 to 3")));
+}
+
+TEST(KeyframeLog, SaysWhenThereIsNothing) {
+  EXPECT_THAT(ErrorOf(WriteLog("empty.lcm", 1, {})), HasSubstr("no KEYFRAME_*"));
+  EXPECT_THAT(ErrorOf("/nonexistent/log.lcm"), HasSubstr("no such log"));
+}
+
+// Two clocks that have nothing to do with each other: only the time since each log's start counts.
+TEST(KeyframeLog, InterleavesByElapsedTime) {
+  std::vector<std::vector<LoggedKeyframe>> logs;
+  logs.push_back(ReadKeyframeLog(WriteLog("a.lcm", 1, {{0, 1000}, {1, 1500}, {2, 2000}})));
+  logs.push_back(ReadKeyframeLog(WriteLog("b.lcm", 2, {{0, 90}, {1, 500}, {2, 1200}})));
+  std::vector<std::pair<int32_t, int32_t>> order;
+  std::vector<int64_t> elapsed_us;
+  for (const LoggedKeyframe& keyframe : Interleave(logs)) {
+    order.emplace_back(keyframe.id.map.agent_id, keyframe.id.seq);
+    elapsed_us.push_back(keyframe.elapsed_us);
+  }
+  EXPECT_THAT(elapsed_us, testing::ElementsAre(0, 0, 410, 500, 1000, 1110));
+  EXPECT_THAT(order, testing::ElementsAre(std::pair{1, 0}, std::pair{2, 0}, std::pair{2, 1},
+                                          std::pair{1, 1}, std::pair{1, 2}, std::pair{2, 2}));
+}
+
+}  // namespace
+}  // namespace pangea::session

@@ -1,0 +1,71 @@
+#include "replay/keyframe_player.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "bus/retransmission/playback_pace.h"
+
+namespace pangea::session {
+namespace {
+
+constexpr int64_t kStatusInterval_us = 1'000'000;
+
+}  // namespace
+
+KeyframePlayer::KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
+                               std::vector<LoggedKeyframe> keyframes, int64_t now_utime)
+    : options_(options),
+      keyframes_(std::move(keyframes)),
+      node_(bus, fmt::format("keyframes_{}", options.agent_id)),
+      outlet_(node_, options.agent_id, keyframes_.size(), now_utime) {}
+
+std::optional<int64_t> KeyframePlayer::next_us() const {
+  if (next_ == keyframes_.size()) {
+    return std::nullopt;
+  }
+  const int64_t elapsed_us = keyframes_[next_].utime - keyframes_.front().utime;
+  const bool over =
+      options_.duration_s && 1e-6 * static_cast<double>(elapsed_us) > *options_.duration_s;
+  return over ? std::nullopt : std::optional(elapsed_us);
+}
+
+void KeyframePlayer::PlayNext() {
+  const LoggedKeyframe& keyframe = keyframes_[next_++];
+  outlet_.Publish(keyframe.id, keyframe.data);
+}
+
+void KeyframePlayer::Tick(int64_t now_utime) {
+  outlet_.Tick(now_utime);
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kStatusInterval_us;
+    node_.PublishStatus(now_utime, outlet_.Unacknowledged(),
+                        fmt::format("agent {}: stored keyframe {} of {}", options_.agent_id, next_,
+                                    keyframes_.size()));
+  }
+}
+
+void KeyframePlayer::PublishFinished(int64_t now_utime) {
+  node_.Set("finished", 1);
+  node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "finished");
+}
+
+void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
+                   std::vector<LoggedKeyframe> keyframes) {
+  const int64_t begin = WallUtime();
+  KeyframePlayer player(bus, options, std::move(keyframes), begin);
+  PlaybackPace pace(&bus, player, player.outlet());
+  for (auto next = player.next_us(); next && !StopRequested(); next = player.next_us()) {
+    if (options.rate > 0) {
+      pace.WaitUntil(begin + std::llround(static_cast<double>(*next) / options.rate));
+    } else {
+      pace.WaitForAcknowledgements();
+    }
+    player.PlayNext();
+    pace.Serve(0);
+  }
+  pace.WaitAtTheEnd();
+  player.PublishFinished(WallUtime());
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,53 @@
+#pragma once
+
+// Stored keyframes on an agent's bus in place of an odometry: the server and the link are measured
+// without anybody computing the keyframes again.
+//   KEYFRAME_k, STATUS_keyframes_k out; HAVE, RESEND_REQUEST in, answered on AGAIN_<requester>.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "bus/process.h"
+#include "bus/retransmission/keyframe_outlet.h"
+#include "replay/keyframe_log.h"
+
+namespace pangea::session {
+
+struct KeyframePlayerOptions {
+  int32_t agent_id = 0;
+  // Recording seconds per second; 0 = as fast as the server keeps up.
+  double rate = 1;
+  std::optional<double> duration_s;  // of the recording; to its end without it
+};
+
+class KeyframePlayer : public Process {
+ public:
+  // `keyframes`: this agent's.
+  KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
+                 std::vector<LoggedKeyframe> keyframes, int64_t now_utime);
+
+  // Time of the next keyframe since the first one, sensor clock; nothing at the end.
+  std::optional<int64_t> next_us() const;
+  void PlayNext();
+  void Tick(int64_t now_utime) override;
+  // Everything is said: the last status, with the counter finished = 1.
+  void PublishFinished(int64_t now_utime);
+
+  const KeyframeOutlet& outlet() const { return outlet_; }
+
+ private:
+  KeyframePlayerOptions options_;
+  std::vector<LoggedKeyframe> keyframes_;
+  Node node_;
+  KeyframeOutlet outlet_;
+  size_t next_ = 0;
+  int64_t next_status_utime_ = 0;
+};
+
+// Plays all in the keyframes' own time, or as fast as the server keeps up; then waits until
+// everything is acknowledged or nobody will.
+void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
+                   std::vector<LoggedKeyframe> keyframes);
+
+}  // namespace pangea::session

@@ -1,0 +1,47 @@
+// pangea-keyframe-player: a log of keyframes ─► KEYFRAME_k
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "replay/keyframe_player.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
+               "pangea-keyframe-player");
+  pangea::session::KeyframePlayerOptions options;
+  std::string bus_url = pangea::kDefaultBusUrl;
+  std::string log, rate = "1";
+  app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
+      ->required()
+      ->check(CLI::Range(1, 65535));
+  app.add_option("--keyframes", log,
+                 "LCM log with KEYFRAME_k: of pangea-vio --out-keyframes, or of an earlier session")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app.add_option("--bus", bus_url, "LCM URL of the agent's bus")->capture_default_str();
+  app.add_option("--rate", rate, "1 = as recorded, 2 = twice as fast, max = as the server keeps up")
+      ->check(CLI::PositiveNumber | CLI::IsMember({"max"}))
+      ->capture_default_str();
+  app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
+      ->check(CLI::PositiveNumber);
+  app.footer(
+      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
+      "in "
+      "the middle of an event): then what could be read was played.");
+  CLI11_PARSE(app, argc, argv);
+  pangea::LogReadings readings;
+  try {
+    options.rate = rate == "max" ? 0 : std::stod(rate);
+    pangea::InstallSignalHandlers();
+    pangea::LcmBus bus(bus_url);
+    auto keyframes = pangea::session::ReadKeyframeLogOf(log, options.agent_id, &readings);
+    const int exit_code = pangea::TellLosses("pangea-keyframe-player", readings, 0);
+    pangea::session::PlayKeyframes(bus, options, std::move(keyframes));
+    return exit_code;
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-keyframe-player: {}\n", error.what());
+    return pangea::TellLosses("pangea-keyframe-player", readings, 1);
+  }
+}

@@ -1,0 +1,272 @@
+#include "replay/replay.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <lcm/lcm-cpp.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+
+#include "bus/bus.h"
+#include "fusion/fusion_process.h"
+#include "global_ba/global_ba_process.h"
+#include "inter_map_ba/inter_map_ba_process.h"
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "messages/channels.h"
+#include "pangea/again_t.hpp"
+#include "place_recognition/place_recognition_process.h"
+#include "posegraph/posegraph_process.h"
+#include "replay/keyframe_log.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Everything said on the bus, into an LCM log. Time stamps are those of the logs replayed, never
+// the clock's.
+class Recorder {
+ public:
+  Recorder(Bus& bus, const fs::path& log) : log_(log.string()) {
+    bus.Subscribe(".*", [this](const std::string& channel, Bytes data) {
+      log_.Write(utime_++, channel, data);
+    });
+  }
+
+  // Events never share a stamp, so that tools which sort by it keep their order.
+  void SetTime(int64_t utime) { utime_ = std::max(utime, utime_); }
+
+ private:
+  LogFileWriter log_;
+  int64_t utime_ = 0;
+};
+
+// The server's processes, or some of them.
+class Server {
+ public:
+  Server(LocalBus& bus, const std::set<std::string>& processes) : bus_(bus) {
+    const auto wanted = [&processes](const char* process) { return processes.contains(process); };
+    if (wanted("place_recognition")) {
+      place_recognition_.emplace(bus, PlaceRecognitionOptions{});
+    }
+    if (wanted("inter_map_ba")) {
+      inter_map_ba_.emplace(bus, InterMapBaOptions{});
+    }
+    if (wanted("fusion")) {
+      fusion_.emplace(bus, FusionOptions{});
+    }
+    if (wanted("posegraph")) {
+      posegraph_.emplace(bus, PoseGraphOptions{});
+    }
+    if (wanted("global_ba")) {
+      global_ba_.emplace(bus, GlobalBaOptions{});
+    }
+  }
+
+  // What waits for a quiet bus when live.
+  void Finish() {
+    if (posegraph_) {
+      posegraph_->Finish();
+      bus_.Drain();
+    }
+    if (global_ba_) {
+      global_ba_->Finish();
+      bus_.Drain();
+    }
+  }
+
+ private:
+  LocalBus& bus_;
+  std::optional<PlaceRecognitionProcess> place_recognition_;
+  std::optional<InterMapBaProcess> inter_map_ba_;
+  std::optional<FusionProcess> fusion_;
+  std::optional<PoseGraphProcess> posegraph_;
+  std::optional<GlobalBaProcess> global_ba_;
+};
+
+void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
+  std::erase_if(*keyframes, [until_s](const LoggedKeyframe& keyframe) {
+    return 1e-6 * static_cast<double>(keyframe.elapsed_us) > until_s;
+  });
+  if (keyframes->empty()) {
+    throw std::runtime_error(fmt::format("--until {:g}: no keyframe had come by then", until_s));
+  }
+}
+
+// A message of a log that is replayed for some processes.
+struct LoggedWord {
+  int64_t utime = 0;
+  double elapsed_s = 0;  // since the log's first event
+  std::string channel;
+  std::vector<uint8_t> data;
+  bool own = false;  // one of them said it
+};
+
+bool IsKeyframe(const std::string& channel) {
+  return channel.starts_with(channels::kKeyframePrefix);
+}
+
+// What place_recognition, inter_map_ba and fusion say, once each.
+bool IsJudgement(const std::string& channel) {
+  return channel == channels::kPlaceMatch || channel == channels::kConstraint;
+}
+
+bool IsNews(const LoggedWord& word) {
+  return !word.own && (IsKeyframe(word.channel) || IsJudgement(word.channel));
+}
+
+// Who says so; empty for agents.
+std::string Speaker(const LogEvent& event) {
+  if (event.channel == channels::kPlaceMatch) {
+    return "place_recognition";
+  }
+  if (event.channel == channels::kMapState ||
+      event.channel.starts_with(channels::kCorrectionPrefix)) {
+    return "posegraph";
+  }
+  if (event.channel == channels::kRefinement) {
+    return "global_ba";
+  }
+  constraint_t message{};
+  if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message)) {
+    return message.kind == place_candidate_t::KIND_INTRA ? "inter_map_ba" : "fusion";
+  }
+  return "";
+}
+
+// What says something of the map; not who has what and asks for what again.
+std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const fs::path& log,
+                                  double until_s, LogReadings* readings) {
+  std::vector<LoggedWord> words;
+  std::optional<int64_t> begin;
+  const auto take = [&](const LogEvent& event) {
+    begin = begin.value_or(event.utime);
+    const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
+    const std::string speaker = Speaker(event);
+    if ((!speaker.empty() || IsKeyframe(event.channel)) && elapsed_s <= until_s) {
+      words.push_back({event.utime,
+                       elapsed_s,
+                       event.channel,
+                       {event.data.begin(), event.data.end()},
+                       processes.contains(speaker)});
+    }
+  };
+  ReadLog(log.string(), take, readings);
+  return words;
+}
+
+// What comes before the first keyframe that is later than `checkpoint_s`: so of each keyframe all
+// that was said is taken over, or nothing.
+std::span<LoggedWord> Past(std::vector<LoggedWord>& words, double checkpoint_s) {
+  const auto end = std::ranges::find_if(words, [checkpoint_s](const LoggedWord& word) {
+    return IsKeyframe(word.channel) && word.elapsed_s > checkpoint_s;
+  });
+  if (end == words.end()) {
+    throw std::runtime_error(fmt::format(
+        "--from-checkpoint {:g}: no keyframe comes after it, nothing is to be run", checkpoint_s));
+  }
+  return {words.begin(), end};
+}
+
+// Those who judge learn what they said, as a process that was started again learns it from the
+// journal; the log says it in their place. Returns how much that is.
+int64_t TakeOver(std::span<LoggedWord> past, LocalBus& bus) {
+  int64_t count = 0;
+  for (LoggedWord& word : past) {
+    if (!IsJudgement(word.channel)) {
+      continue;
+    }
+    again_t again{};
+    again.channel = word.channel;
+    again.num_bytes = static_cast<int32_t>(word.data.size());
+    again.data = word.data;
+    if (word.channel == channels::kPlaceMatch) {
+      PublishMessage(bus, channels::Again("place_recognition"), again);
+    } else {
+      PublishMessage(bus, channels::Again("inter_map_ba"), again);
+      PublishMessage(bus, channels::Again("fusion"), again);
+    }
+    word.own = false;
+    ++count;
+  }
+  bus.Drain();
+  return count;
+}
+
+}  // namespace
+
+ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log,
+                     LogReadings* readings) {
+  UseOneThread();
+  std::vector<std::vector<LoggedKeyframe>> by_log;
+  for (const fs::path& log : logs) {
+    by_log.push_back(ReadKeyframeLog(log, readings));
+  }
+  std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
+  const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
+  DropLater(until_s, &keyframes);
+
+  LocalBus bus;
+  Recorder recorder(bus, out_log);
+  Server server(bus, {std::begin(kReplayed), std::end(kReplayed)});
+  ReplaySummary summary;
+  for (const LoggedKeyframe& keyframe : keyframes) {
+    recorder.SetTime(begin_utime + keyframe.elapsed_us);
+    bus.Publish(keyframe.channel, keyframe.data);
+    bus.Drain();
+    ++summary.keyframes;
+    const int32_t agent_id = keyframe.id.map.agent_id;
+    if (std::find(summary.agent_ids.begin(), summary.agent_ids.end(), agent_id) ==
+        summary.agent_ids.end()) {
+      summary.agent_ids.push_back(agent_id);
+    }
+  }
+  server.Finish();
+  return summary;
+}
+
+int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log,
+                   LogReadings* readings) {
+  UseOneThread();
+  ReadKeyframeLog(log, readings);  // throws if keyframes are missing
+  std::vector<LoggedWord> words = ReadWords(part.processes, log, part.until_s, readings);
+  LocalBus bus;
+  Server server(bus, part.processes);
+  int64_t taken_over = 0;
+  if (part.checkpoint_s) {
+    taken_over = TakeOver(Past(words, *part.checkpoint_s), bus);
+    if (taken_over == 0) {
+      throw std::runtime_error(fmt::format(
+          "{}: no match and no verdict before the checkpoint; --from-checkpoint goes on from a log "
+          "that has them: a replay's or a session's session.lcm, or a journal.lcm",
+          log.string()));
+    }
+  }
+
+  size_t after_news = words.size();
+  while (after_news > 0 && !IsNews(words[after_news - 1])) {
+    --after_news;
+  }
+  Recorder recorder(bus, out_log);
+  bool finished = false;
+  for (size_t i = 0; i < words.size(); ++i) {
+    recorder.SetTime(words[i].utime);
+    if (!words[i].own) {
+      bus.Publish(words[i].channel, words[i].data);
+      bus.Drain();
+    } else if (i >= after_news && !finished) {
+      // There is no news any more, and yet one of them spoke: it took the time for what waits.
+      server.Finish();
+      finished = true;
+    }
+  }
+  if (!finished) {
+    server.Finish();
+  }
+  return taken_over;
+}
+
+}  // namespace pangea::session

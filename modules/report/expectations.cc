@@ -1,0 +1,189 @@
+#include "report/expectations.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string_view>
+
+namespace pangea::session {
+namespace {
+
+using nlohmann::ordered_json;
+
+enum class Relation : uint8_t { kExactly, kAtMost, kAtLeast };
+
+// A figure of the session, or one of each agent.
+struct Figure {
+  std::string of;  // "agent 2: "; empty for the session's
+  std::optional<double> value;
+};
+using Figures = std::vector<Figure>;
+
+std::optional<double> Number(const ordered_json& value) {
+  return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
+}
+
+Figures Groups(const ordered_json& report) {
+  return {{"", static_cast<double>(report.at("groups").size())}};
+}
+
+std::set<int32_t> Agents(const ordered_json& group) {
+  return group.at("agents").get<std::set<int32_t>>();
+}
+
+// The first fusion that all agents were in, and have not left since.
+Figures FusedBy(const ordered_json& report) {
+  std::set<int32_t> all;
+  for (const ordered_json& agent : report.at("agents")) {
+    all.insert(agent.at("id").get<int32_t>());
+  }
+  std::optional<double> since;
+  for (const ordered_json& change : report.at("fused_at")) {
+    if (change.at("change") != "fused") {
+      since.reset();
+    } else if (!since && Agents(change) == all) {
+      since = Number(change.at("session_s"));
+    }
+  }
+  const bool together = !report.at("groups").empty() && Agents(report.at("groups").front()) == all;
+  return {{"", together ? since : std::nullopt}};
+}
+
+template <typename Of>
+Figures OfEach(const ordered_json& report, Of of) {
+  Figures figures;
+  for (const ordered_json& agent : report.at("agents")) {
+    figures.push_back({fmt::format("agent {}: ", agent.at("id").get<int32_t>()), of(agent)});
+  }
+  return figures;
+}
+
+Figures Maps(const ordered_json& report) {
+  return OfEach(report, [](const ordered_json& agent) {
+    return std::optional(static_cast<double>(agent.at("map_ids").size()));
+  });
+}
+
+template <const char* kKey>
+Figures Each(const ordered_json& report) {
+  return OfEach(report, [](const ordered_json& agent) { return Number(agent.at(kKey)); });
+}
+
+Figures Joint(const ordered_json& report) { return {{"", Number(report.at("ate_joint_m"))}}; }
+
+Figures Wrong(const ordered_json& report) {
+  const ordered_json& truth = report.at("constraints_truth");
+  // Nothing was checked: nothing is known.
+  const bool any = truth.at("checked").get<int64_t>() > 0;
+  return {{"", any ? Number(truth.at("wrong")) : std::nullopt}};
+}
+
+constexpr char kCoverage[] = "coverage";
+constexpr char kAteVio[] = "ate_vio_m";
+constexpr char kAteServer[] = "ate_server_m";
+
+struct Kind {
+  std::string_view name;
+  Relation relation;
+  std::string_view unit;
+  double most;  // that a bound may be
+  Figures (*figures)(const ordered_json& report);
+};
+
+constexpr std::array kKinds = {
+    Kind{"groups", Relation::kExactly, "", 1e6, Groups},
+    Kind{"fused_by", Relation::kAtMost, " s", 1e6, FusedBy},
+    Kind{"maps", Relation::kAtMost, "", 1e6, Maps},
+    Kind{kCoverage, Relation::kAtLeast, "", 1, Each<kCoverage>},
+    Kind{kAteVio, Relation::kAtMost, " m", 1e6, Each<kAteVio>},
+    Kind{kAteServer, Relation::kAtMost, " m", 1e6, Each<kAteServer>},
+    Kind{"ate_joint_m", Relation::kAtMost, " m", 1e6, Joint},
+    Kind{"wrong_constraints", Relation::kAtMost, "", 1e6, Wrong},
+};
+
+bool Met(Relation relation, double bound, double value) {
+  switch (relation) {
+    case Relation::kExactly:
+      return value == bound;
+    case Relation::kAtMost:
+      return value <= bound;
+    case Relation::kAtLeast:
+      return value >= bound;
+  }
+  return false;
+}
+
+std::string BoundText(const Kind& kind, double bound) {
+  const char* relation = kind.relation == Relation::kAtMost    ? "at most "
+                         : kind.relation == Relation::kAtLeast ? "at least "
+                                                               : "";
+  return fmt::format("{}{:g}{}", relation, bound, kind.unit);
+}
+
+CheckedExpectation CheckOne(const Kind& kind, double bound, const Figures& figures) {
+  CheckedExpectation checked{std::string(kind.name), bound, BoundText(kind, bound), "", true};
+  for (const Figure& figure : figures) {
+    checked.figure +=
+        fmt::format("{}{}{}", checked.figure.empty() ? "" : ", ", figure.of,
+                    figure.value ? fmt::format("{:.4g}{}", *figure.value, kind.unit) : "none");
+    checked.met &= figure.value && Met(kind.relation, bound, *figure.value);
+  }
+  if (figures.empty()) {
+    checked.figure = "none";
+    checked.met = false;
+  }
+  return checked;
+}
+
+}  // namespace
+
+ExpectationsSection::ExpectationsSection(YamlOptions& yaml, const std::string& key) {
+  YamlOptions& section = yaml.Section(key);
+  for (const Kind& kind : kKinds) {
+    const std::string name(kind.name);
+    section.AddBetween(name, 0, kind.most, &bounds_[name]);
+  }
+}
+
+Expectations ExpectationsSection::Take() const {
+  Expectations expectations;
+  for (const auto& [name, bound] : bounds_) {
+    if (bound) {
+      expectations.emplace(name, *bound);
+    }
+  }
+  return expectations;
+}
+
+std::vector<CheckedExpectation> Check(const Expectations& expectations,
+                                      const ordered_json& report) {
+  std::vector<CheckedExpectation> checked;
+  for (const Kind& kind : kKinds) {
+    if (const auto given = expectations.find(std::string(kind.name)); given != expectations.end()) {
+      checked.push_back(CheckOne(kind, given->second, kind.figures(report)));
+    }
+  }
+  return checked;
+}
+
+Table ToTable(const std::vector<CheckedExpectation>& checked) {
+  Table table({"expected", "bound", "figure", "result"});
+  for (const CheckedExpectation& one : checked) {
+    table.Add({one.name, one.text, one.figure, one.met ? "met" : "MISSED"});
+  }
+  return table;
+}
+
+ordered_json ToJson(const std::vector<CheckedExpectation>& checked) {
+  ordered_json json = ordered_json::array();
+  for (const CheckedExpectation& one : checked) {
+    json.push_back(
+        {{"name", one.name}, {"bound", one.bound}, {"figure", one.figure}, {"met", one.met}});
+  }
+  return json;
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,115 @@
+#include "report/expectations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace pangea::session {
+namespace {
+
+using nlohmann::ordered_json;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Two agents: fused at 20 s, taken apart at 25 s, fused again at 30 s and once more with a third
+// map.
+ordered_json Report() {
+  return ordered_json::parse(R"({
+    "agents": [
+      {"id": 1, "map_ids": ["1/10"], "coverage": 0.99, "ate_vio_m": 0.04, "ate_server_m": 0.02},
+      {"id": 2, "map_ids": ["2/10", "2/20"], "coverage": 0.7, "ate_vio_m": 0.03, "ate_server_m": null}],
+    "groups": [{"agents": [1, 2]}],
+    "ate_joint_m": 0.05,
+    "constraints_truth": {"checked": 12, "wrong": 1},
+    "fused_at": [
+      {"change": "fused", "session_s": 10.5, "agents": [2]},
+      {"change": "fused", "session_s": 20.5, "agents": [1, 2]},
+      {"change": "taken apart", "session_s": 25.5, "agents": [1]},
+      {"change": "fused", "session_s": 30.5, "agents": [1, 2]},
+      {"change": "fused", "session_s": 40.5, "agents": [1, 2]}]})");
+}
+
+CheckedExpectation Only(const Expectations& expectations, const ordered_json& report) {
+  const std::vector<CheckedExpectation> checked = Check(expectations, report);
+  EXPECT_EQ(checked.size(), 1u);
+  return checked.at(0);
+}
+
+bool Met(const std::string& name, double bound, const ordered_json& report = Report()) {
+  return Only({{name, bound}}, report).met;
+}
+
+TEST(Expectations, BoundsAreOnEitherSide) {
+  EXPECT_TRUE(Met("groups", 1));
+  EXPECT_FALSE(Met("groups", 2));
+  EXPECT_TRUE(Met("ate_joint_m", 0.05));
+  EXPECT_FALSE(Met("ate_joint_m", 0.04));
+  EXPECT_TRUE(Met("ate_vio_m", 0.04));
+  EXPECT_FALSE(Met("ate_vio_m", 0.035));
+  EXPECT_TRUE(Met("coverage", 0.7));
+  EXPECT_FALSE(Met("coverage", 0.95));
+  EXPECT_TRUE(Met("maps", 2));
+  EXPECT_FALSE(Met("maps", 1));
+  EXPECT_TRUE(Met("wrong_constraints", 1));
+  EXPECT_FALSE(Met("wrong_constraints", 0));
+}
+
+TEST(Expectations, FusedIsForGood) {
+  EXPECT_TRUE(Met("fused_by", 30.5));
+  EXPECT_FALSE(Met("fused_by", 30));
+  ordered_json apart = Report();
+  apart["groups"] = {{{"agents", {1}}}, {{"agents", {2}}}};
+  EXPECT_FALSE(Met("fused_by", 1000, apart));
+}
+
+TEST(Expectations, AFigureThatIsNotThereMisses) {
+  const CheckedExpectation server = Only({{"ate_server_m", 1}}, Report());
+  EXPECT_FALSE(server.met);
+  EXPECT_EQ(server.figure, "agent 1: 0.02 m, agent 2: none");
+  ordered_json nothing = Report();
+  nothing["agents"] = ordered_json::array();
+  nothing["groups"] = ordered_json::array();
+  nothing["ate_joint_m"] = nullptr;
+  nothing["constraints_truth"] = {{"checked", 0}, {"wrong", 0}};
+  for (const char* name : {"ate_joint_m", "wrong_constraints", "fused_by", "maps", "coverage"}) {
+    EXPECT_FALSE(Met(name, 1, nothing)) << name;
+  }
+}
+
+TEST(Expectations, AreToldWithTheirFigures) {
+  const auto checked = Check({{"fused_by", 40}, {"coverage", 0.9}}, Report());
+  const std::string text = ToTable(checked).Text();
+  EXPECT_THAT(text, HasSubstr("| fused_by | at most 40 s "));
+  EXPECT_THAT(text, HasSubstr("30.5 s"));
+  EXPECT_THAT(text, HasSubstr("agent 1: 0.99, agent 2: 0.7 | MISSED"));
+  const ordered_json json = ToJson(checked);
+  ASSERT_EQ(json.size(), 2u);
+  EXPECT_EQ(json[0]["name"], "fused_by");
+  EXPECT_EQ(json[0]["met"], true);
+  EXPECT_EQ(json[1]["met"], false);
+}
+
+Expectations Read(const std::string& text) {
+  YamlOptions yaml;
+  const ExpectationsSection section(yaml, "expect");
+  yaml.ReadText(text, "a.yaml");
+  return section.Take();
+}
+
+TEST(Expectations, AreReadFromASessionFile) {
+  EXPECT_TRUE(Read("").empty());
+  EXPECT_THAT(Read("expect: {fused_by: 40, groups: 0}"),
+              ElementsAre(std::pair("fused_by", 40), std::pair("groups", 0)));
+  for (const char* bad : {"-1", ".nan", ".inf"}) {
+    try {
+      Read(std::string("expect: {fused_by: ") + bad + "}");
+      FAIL() << bad << " was taken";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("a.yaml:1: key 'expect.fused_by'"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pangea::session

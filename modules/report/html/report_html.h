@@ -1,0 +1,19 @@
+#pragma once
+
+// report.html: the whole report as one page that needs nothing else: no network, no further file.
+
+#include <string>
+
+#include "eval/table.h"
+#include "report/metrics/report_figures.h"
+
+namespace pangea::session {
+
+std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
+                       const ReportFigures& figures);
+
+// The page with one more section at its end.
+std::string WithSection(std::string page, const std::string& id, const std::string& title,
+                        const Table& table);
+
+}  // namespace pangea::session

@@ -1,0 +1,85 @@
+#include "report/metrics/report_counts.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace pangea::session {
+namespace {
+
+struct Span {
+  int64_t begin = 0, end = 0;
+};
+
+// From the first pose of its odometry to the last, sensor clock.
+std::optional<Span> OdometrySpan(const AgentFigures& agent) {
+  std::optional<Span> span;
+  for (const auto& [map, odometry] : agent.odometry) {
+    if (!odometry.empty()) {
+      const Span of_map{odometry.front().utime, odometry.back().utime};
+      span = span ? Span{std::min(span->begin, of_map.begin), std::max(span->end, of_map.end)}
+                  : of_map;
+    }
+  }
+  return span;
+}
+
+// Recording time played: of its link bytes, what a second of it costs.
+std::optional<double> PlayedSeconds(const AgentFigures& agent) {
+  const Span span = OdometrySpan(agent).value_or(Span());
+  const double seconds = 1e-6 * static_cast<double>(span.end - span.begin) +
+                         std::max(0.0, agent.initialised_s.value_or(0));
+  return seconds > 0 ? std::optional(seconds) : std::nullopt;
+}
+
+// Refused for the same reason, whatever the figures in it.
+std::string WithoutFigures(const std::string& reason) {
+  std::string text;
+  for (size_t i = 0; i < reason.size(); ++i) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(reason[i])) != 0;
+    const bool inside_number = !text.empty() && text.back() == '#';
+    const bool point = reason[i] == '.' && inside_number && i + 1 < reason.size() &&
+                       std::isdigit(static_cast<unsigned char>(reason[i + 1])) != 0;
+    if (!digit && !point) {
+      text += reason[i];
+    } else if (!inside_number) {
+      text += '#';
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+ConstraintCounts CountConstraints(const CapturedSession& session) {
+  ConstraintCounts counts;
+  for (const auto& [id, constraint] : session.constraints) {
+    if (!constraint.accepted) {
+      ++counts.num_refused;
+      ++counts.refused[WithoutFigures(constraint.reason)];
+    } else if (constraint.kind == PlaceKind::kIntra) {
+      ++counts.accepted_intra;
+    } else {
+      ++counts.accepted_inter;
+    }
+  }
+  return counts;
+}
+
+std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
+  const auto seconds = PlayedSeconds(agent);
+  if (!seconds || !agent.run.bytes_up) {
+    return std::nullopt;
+  }
+  return 1e-3 * static_cast<double>(*agent.run.bytes_up) / *seconds;
+}
+
+double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t utime) {
+  for (const AgentFigures& agent : figures.agents) {
+    if (const auto span = agent.id == agent_id ? OdometrySpan(agent) : std::nullopt) {
+      return 1e-6 * static_cast<double>(utime - span->begin) + agent.initialised_s.value_or(0);
+    }
+  }
+  return 0;
+}
+
+}  // namespace pangea::session

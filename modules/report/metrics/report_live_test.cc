@@ -1,0 +1,91 @@
+#include "report/metrics/report_live.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace pangea::session {
+namespace {
+
+const MapId kMap{2, 200};
+const MapId kOlder{1, 100};
+const Rigid3 kMapFromOdom{YawRotation(0.8), {4, -2, 0.5}};
+constexpr int64_t kPeriod = 50'000;
+
+Rigid3 Truth(int i) {
+  const double s = 0.05 * i;
+  return {ExpSo3({0.1 * std::sin(s), 0, 0.3 * s}), {3 * std::cos(0.3 * s), 2 * std::sin(s), 0}};
+}
+
+// 20 s: raw odometry of 5 % too small a scale; from second 5 on corrected in its own frame, from
+// second 10 on in the older map's, exact but for `error` in x of every other second.
+struct Shown {
+  std::vector<LivePose> poses;
+  Trajectory ground_truth;
+
+  explicit Shown(double error) {
+    for (int i = 0; i < 400; ++i) {
+      const int64_t utime = i * kPeriod;
+      ground_truth.push_back({utime, Truth(i)});
+      Rigid3 raw = Truth(i);
+      raw.t *= 0.95;
+      LivePose pose{utime, kMap, kMap, i < 100 ? 0 : 3, raw, raw};
+      if (i >= 200) {
+        pose.frame = kOlder;
+        pose.revision = 6;
+        pose.T_map_body = kMapFromOdom * Truth(i);
+        pose.T_map_body.t.x() += i / 20 % 2 == 0 ? error : -error;
+      }
+      poses.push_back(pose);
+    }
+  }
+};
+
+TEST(LiveFigures, TheErrorIsThatOfWhatWasShownSinceTheFusion) {
+  const Shown shown(0.02);
+  const LiveFigures figures = LiveFiguresOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
+  EXPECT_NEAR(*figures.ate_m, 0.02, 0.002);
+  EXPECT_GT(*figures.ate_raw_m, 0.04);
+  EXPECT_LT(*figures.ate_raw_m, 0.15);
+}
+
+TEST(LiveFigures, WithoutAFusionTheFirstCorrectionBegins) {
+  const Shown shown(0);
+  const LiveFigures figures = LiveFiguresOf(shown.poses, {}, shown.ground_truth);
+  // A quarter to a half of the stretch is shown as the raw odometry, in a frame of its own.
+  EXPECT_GT(*figures.ate_m, 0.01);
+  EXPECT_LT(*figures.ate_m, *figures.ate_raw_m);
+}
+
+TEST(LiveFigures, TheJumpIsWhatTheOdometryDidNotSee) {
+  Shown shown(0);
+  for (LivePose& pose : shown.poses) {
+    pose.T_map_body = kMapFromOdom * pose.T_odom_body;
+  }
+  EXPECT_NEAR(*LiveFiguresOf(shown.poses, {}, {}).jump_max_m, 0, 1e-9)
+      << "a new frame, and a turned one, are no jump";
+  for (size_t i = 300; i < shown.poses.size(); ++i) {
+    shown.poses[i].T_map_body.t += Eigen::Vector3d(0.03, 0, 0.04);
+  }
+  EXPECT_NEAR(*LiveFiguresOf(shown.poses, {}, {}).jump_max_m, 0.05, 1e-9);
+}
+
+TEST(LiveFigures, NothingShownNothingSaid) {
+  const Shown shown(0);
+  const LiveFigures none = LiveFiguresOf({}, {{kMap, 6}}, shown.ground_truth);
+  EXPECT_FALSE(none.ate_m || none.ate_raw_m || none.jump_max_m);
+  const LiveFigures untrue = LiveFiguresOf(shown.poses, {{kMap, 6}}, {});
+  EXPECT_FALSE(untrue.ate_m || untrue.ate_raw_m);
+  EXPECT_TRUE(untrue.jump_max_m);
+}
+
+TEST(LiveFigures, UncorrectedPosesHaveNoError) {
+  Shown shown(0);
+  shown.poses.resize(100);
+  const LiveFigures figures = LiveFiguresOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
+  EXPECT_FALSE(figures.ate_m || figures.ate_raw_m);
+  EXPECT_NEAR(*figures.jump_max_m, 0, 1e-12);
+}
+
+}  // namespace
+}  // namespace pangea::session

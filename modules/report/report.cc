@@ -1,0 +1,83 @@
+#include "report/report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "files/text_file.h"
+#include "report/html/report_html.h"
+#include "report/report_json.h"
+#include "report/report_pictures.h"
+#include "report/report_text.h"
+
+namespace pangea::session {
+namespace {
+
+using nlohmann::ordered_json;
+
+void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures>& groups,
+                       const std::string& folder) {
+  const std::string prefix = fmt::format("{}/agent_{}", folder, agent.id);
+  for (const auto& [map, odometry] : agent.odometry) {
+    if (map != agent.main_map) {
+      WriteTum(fmt::format("{}.{}.vio.tum", prefix, FileName(map)), odometry);
+    }
+  }
+  const auto main = agent.odometry.find(agent.main_map);
+  WriteTum(prefix + ".vio.tum", main == agent.odometry.end() ? Trajectory() : main->second);
+  WriteTum(prefix + ".tum",
+           groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id));
+  for (size_t i = 0; i < groups.size(); ++i) {
+    for (const MapId& map : groups[i].group.maps) {
+      if (i != agent.group && map.agent_id == agent.id) {
+        WriteTum(fmt::format("{}.{}.tum", prefix, FileName(map)),
+                 groups[i].group.TrajectoryOf(map));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
+                          LogReadings* readings) {
+  const CapturedSession session = ReadServerLog(input.server_log, readings);
+  ReportFigures figures = ComputeFigures(input, session, readings);
+  for (const AgentFigures& agent : figures.agents) {
+    WriteTrajectories(agent, figures.groups, folder);
+  }
+  WriteTextFile(folder + "/map.ply",
+                MapPly(session, figures,
+                       figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
+  for (size_t i = 1; i < figures.groups.size(); ++i) {
+    const FinalGroup& group = figures.groups[i].group;
+    WriteTextFile(fmt::format("{}/map.{}.ply", folder, FileName(group.frame)),
+                  MapPly(session, figures, group));
+  }
+  try {
+    for (const Picture& picture : Pictures(figures)) {
+      WritePng(picture.plot, folder + "/" + picture.file);
+    }
+  } catch (const std::runtime_error& error) {
+    figures.notes.emplace_back(error.what());
+  }
+  ordered_json json = ReportJson(input, session, figures);
+  std::string markdown = ReportMarkdown(input, session, figures);
+  std::string html = ReportHtml(input, session, figures);
+  std::vector<CheckedExpectation> checked = Check(input.expect, json);
+  if (!checked.empty()) {
+    const Table table = ToTable(checked);
+    json["expectations"] = ToJson(checked);
+    markdown += fmt::format("\n## Expectations\n\n{}", table.Text());
+    html = WithSection(std::move(html), "expectations", "Expectations", table);
+  }
+  // Texts of a log may be any bytes.
+  WriteTextFile(folder + "/report.json",
+                json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+  WriteTextFile(folder + "/report.md", markdown);
+  WriteTextFile(folder + "/report.html", html);
+  return {std::move(markdown), std::move(checked)};
+}
+
+}  // namespace pangea::session

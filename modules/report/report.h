@@ -1,0 +1,82 @@
+#pragma once
+
+// From captured logs to the output directory: trajectories, map, figures, pictures. A pure function
+// of its input, the same after a live run and after a replay; the same input gives the same bytes.
+//
+// Writes into `folder` (which must exist):
+//   agent_<id>.vio.tum       T_odom_body of the agent's main map, raw odometry at camera rate
+//                            (of its other maps: agent_<id>.<map>.vio.tum)
+//   agent_<id>.tum           T_map_body of its keyframes in the map frame of its main group: the
+//                            group that has most of them (other maps: agent_<id>.<map>.tum)
+//   map.ply                  points coloured by agent, in the largest group's map frame (other
+//                            groups, whose frames are unrelated to it: map.<map>.ply)
+//   report.json, report.md, report.html
+//   trajectory.png, error.png  (groups that no ground truth places: trajectory.<map>.png)
+//
+// A map that no MAP_STATE mentions is a group of its own with the odometry's poses. <map> is
+// "<agent>_<opened utime>".
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "log_file/log_reading.h"
+#include "report/expectations.h"
+
+namespace pangea::session {
+
+// A bad link between an agent and the server, as the session made it.
+struct LinkRun {
+  std::string conditions;                     // for people: "loss 5 %, delay 50 ms"
+  std::map<std::string, int64_t> packets_up;  // by what became of them: "taken", "delivered", ...
+  std::map<std::string, int64_t> packets_down;
+};
+
+struct AgentRun {
+  int32_t id = 0;
+  // EuRoC folder, for ground truth; empty, or without ground truth: no ATE
+  std::string recording;
+  // the part of the recording that was played, seconds since its first image
+  double start_s = 0;
+  std::optional<double> duration_s;  // none: to its end
+  // log of the agent's bus with POSE_<id>; empty or absent: the VIO's track is that of its
+  // keyframes
+  std::string bus_log;
+  // payload on the link bus, both directions; none when it was not measured (a replay)
+  std::optional<int64_t> bytes_up;
+  std::optional<int64_t> bytes_down;
+  std::optional<LinkRun> link;
+  // recording time played / wall time it took
+  std::optional<double> realtime_factor;
+};
+
+struct ReportInput {
+  // log of the server bus: KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_*
+  std::string server_log = {};
+  // an agent that is only in the log need not be here
+  std::vector<AgentRun> agents = {};
+  // of the other processes, by process name: recording time / CPU or wall time, as measured
+  std::map<std::string, double> realtime_factors = {};
+  // how often each process died and was started again, by name; none are not listed
+  std::map<std::string, int> restarts = {};
+  // what else a reader must know, e.g. warnings about a recording
+  std::vector<std::string> notes = {};
+  // bounds on the figures, checked at the end of the report
+  Expectations expect = {};
+};
+
+struct WrittenReport {
+  std::string text;                         // of report.md
+  std::vector<CheckedExpectation> checked;  // each of the input's
+};
+
+// Throws std::runtime_error when the server log cannot be read or the folder not written; a picture
+// that cannot be drawn is a note in the report. Of a damaged log the figures are of what can be
+// read, and the report says so at its top; what is lost is noted in `readings` (log_reader.h), and
+// the report tells that of the logs noted there already too, which this one was made from.
+WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
+                          LogReadings* readings = nullptr);
+
+}  // namespace pangea::session

@@ -1,0 +1,160 @@
+#include "report/report_json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "report/metrics/report_counts.h"
+
+namespace pangea::session {
+namespace {
+
+using nlohmann::ordered_json;
+
+// A microsecond, a micrometre: no more digits than mean something.
+ordered_json Number(double value) { return std::round(value * 1e6) / 1e6; }
+ordered_json Number(const std::optional<double>& value) {
+  return value ? Number(*value) : ordered_json();
+}
+ordered_json Rmse(const std::optional<Ate>& ate) {
+  return ate ? Number(ate->position_m.rmse) : ordered_json();
+}
+
+ordered_json NormalisedJson(const NormalisedError& error, bool any) {
+  if (!any) {
+    return {};
+  }
+  return {{"mean", Number(error.mean)},
+          {"median", Number(error.median)},
+          {"share_above_99", Number(error.share_above_99)}};
+}
+
+ordered_json TruthJson(const ConstraintsTruth& truth) {
+  const bool any = truth.checked > 0;
+  const auto metres = [any](double value) { return any ? Number(value) : ordered_json(); };
+  return {{"checked", truth.checked},
+          {"wrong", truth.wrong},
+          {"precision", Number(truth.Precision())},
+          {"nees_per_dim", NormalisedJson(truth.pose, any)},
+          {"nees_per_dim_position", NormalisedJson(truth.position, any)},
+          {"nees_yaw", NormalisedJson(truth.yaw, any)},
+          {"translation_median_m", metres(truth.translation_median_m)},
+          {"translation_p95_m", metres(truth.translation_p95_m)}};
+}
+
+ordered_json MapIds(const std::vector<MapId>& maps) {
+  ordered_json ids = ordered_json::array();
+  for (const MapId& map : maps) {
+    ids.push_back(ToString(map));
+  }
+  return ids;
+}
+
+ordered_json LinkJson(const AgentRun& run) {
+  if (!run.link) {
+    return {};
+  }
+  return {{"conditions", run.link->conditions},
+          {"packets_up", run.link->packets_up},
+          {"packets_down", run.link->packets_down}};
+}
+
+ordered_json AgentJson(const AgentFigures& agent) {
+  const AgentRun& run = agent.run;
+  return {{"id", agent.id},
+          {"map_ids", MapIds(agent.maps)},
+          {"keyframes", agent.keyframes},
+          {"initialised_s", Number(agent.initialised_s)},
+          {"path_m", Number(agent.path_m)},
+          {"ate_vio_m", Rmse(agent.vio)},
+          {"ate_server_m", Rmse(agent.server)},
+          {"coverage", Number(agent.coverage)},
+          {"ate_live_m", Number(agent.live.ate_m)},
+          {"ate_live_raw_m", Number(agent.live.ate_raw_m)},
+          {"live_jump_max_m", Number(agent.live.jump_max_m)},
+          {"bytes_up", run.bytes_up ? ordered_json(*run.bytes_up) : ordered_json()},
+          {"bytes_down", run.bytes_down ? ordered_json(*run.bytes_down) : ordered_json()},
+          {"kb_per_s_up", Number(KilobytesPerSecondUp(agent))},
+          {"link", LinkJson(run)},
+          {"realtime_factor", Number(run.realtime_factor)}};
+}
+
+ordered_json JointJson(const GroupFigures& group) {
+  return group.joint ? Number(group.joint->position_m.rmse) : ordered_json();
+}
+
+ordered_json ChangeJson(const GroupChange& change, const ReportFigures& figures) {
+  ordered_json json = {{"change", change.fused ? "fused" : "taken apart"},
+                       {"session_s", Number(change.session_s)}};
+  json["agents"] = FinalGroup{{}, change.maps, {}, 0}.Agents();
+  json["map_ids"] = MapIds(change.maps);
+  json["recording_s"] = ordered_json::object();
+  for (const auto& [agent, utime] : change.newest_utime) {
+    json["recording_s"][fmt::format("{}", agent)] = Number(RecordingSeconds(figures, agent, utime));
+  }
+  return json;
+}
+
+ordered_json ProcessesJson(const ReportInput& input, const CapturedSession& session) {
+  ordered_json processes = ordered_json::object();
+  for (const auto& [name, status] : session.statuses) {
+    ordered_json& process = processes[name];
+    process = {{"messages_in", status.messages_in},
+               {"messages_out", status.messages_out},
+               {"dropped", status.dropped},
+               {"handling_median_ms", Number(status.handling_median_ms)},
+               {"handling_p99_ms", Number(status.handling_p99_ms)},
+               {"memory_mb", Number(status.memory_mb)},
+               {"cpu_s", Number(status.cpu_s)}};
+    for (const counter_t& refused : status.refused) {
+      process["refused"][refused.name] = refused.count;
+    }
+  }
+  for (const auto& [name, factor] : input.realtime_factors) {
+    processes[name]["realtime_factor"] = Number(factor);
+  }
+  for (const auto& [name, count] : input.restarts) {
+    processes[name]["restarts"] = count;
+  }
+  return processes;
+}
+
+}  // namespace
+
+ordered_json ReportJson(const ReportInput& input, const CapturedSession& session,
+                        const ReportFigures& figures) {
+  ordered_json json;
+  json["agents"] = ordered_json::array();
+  for (const AgentFigures& agent : figures.agents) {
+    json["agents"].push_back(AgentJson(agent));
+  }
+  json["groups"] = ordered_json::array();
+  for (const GroupFigures& group : figures.groups) {
+    json["groups"].push_back({{"agents", group.group.Agents()},
+                              {"map_ids", MapIds(group.group.maps)},
+                              {"keyframes", group.group.keyframes.size()},
+                              {"constraints_switched_off", group.group.num_switched_off},
+                              {"ate_joint_m", JointJson(group)}});
+  }
+  // The first group has most agents.
+  json["ate_joint_m"] = figures.groups.empty() ? ordered_json() : JointJson(figures.groups.front());
+  const ConstraintCounts counts = CountConstraints(session);
+  json["constraints"] = {{"accepted", counts.accepted_inter + counts.accepted_intra},
+                         {"accepted_inter", counts.accepted_inter},
+                         {"accepted_intra", counts.accepted_intra},
+                         {"refused", counts.num_refused},
+                         {"refused_by_reason", counts.refused}};
+  json["constraints_truth"] = TruthJson(figures.all_constraints);
+  json["constraints_truth"]["inter"] = TruthJson(figures.inter_constraints);
+  json["constraints_truth"]["intra"] = TruthJson(figures.intra_constraints);
+  json["fused_at"] = ordered_json::array();
+  for (const GroupChange& change : session.changes) {
+    json["fused_at"].push_back(ChangeJson(change, figures));
+  }
+  json["processes"] = ProcessesJson(input, session);
+  json["lost"] = figures.lost;
+  json["notes"] = figures.notes;
+  return json;
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,241 @@
+#include "report/report_log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "bus/node.h"
+#include "core/keyframe.h"
+#include "log_file/log_reader.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "messages/state_chunks.h"
+#include "pangea/correction_t.hpp"
+#include "pangea/pose_t.hpp"
+
+namespace pangea::session {
+namespace {
+
+CapturedKeyframe Captured(const Keyframe& keyframe, double session_s) {
+  CapturedKeyframe captured{keyframe.utime, keyframe.T_odom_body, {}, session_s};
+  for (const MapPoint& point : keyframe.points) {
+    if (const auto p_cam = PointInCamera(keyframe, point)) {
+      captured.points.push_back(
+          {keyframe.camera.T_body_cam * *p_cam,
+           keyframe.corners[static_cast<size_t>(point.corner)].landmark_id,
+           std::sqrt(static_cast<double>(point.inverse_depth_var)) / point.inverse_depth});
+    }
+  }
+  return captured;
+}
+
+// Puts the chunks of MAP_STATE together and keeps what counts.
+class States {
+ public:
+  explicit States(CapturedSession* session) : session_(session) {}
+
+  void AddChunk(const map_state_t& message, MapState chunk, double session_s) {
+    auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(chunk));
+    if (whole) {
+      std::ranges::sort(whole->maps);
+      Add(std::make_shared<const MapState>(std::move(*whole)), session_s);
+    }
+  }
+
+  int pending() const { return static_cast<int>(chunks_.pending()); }
+
+ private:
+  std::set<MapId> Together(const MapId& map) const {
+    const auto state = session_->states.find(map);
+    std::set<MapId> together = {map};
+    for (const auto& [other, others_state] : session_->states) {
+      if (state != session_->states.end() && others_state == state->second) {
+        together.insert(other);
+      }
+    }
+    return together;
+  }
+
+  void Add(const std::shared_ptr<const MapState>& state, double session_s) {
+    bool fused = false;
+    bool split = false;
+    for (const MapId& map : state->maps) {
+      const std::set<MapId> before = Together(map);
+      fused |= !std::ranges::includes(before, state->maps);
+      split |= !std::ranges::includes(state->maps, before);
+    }
+    bool newest = false;
+    for (const MapId& map : state->maps) {
+      auto& current = session_->states[map];
+      if (current == nullptr || current->revision < state->revision) {
+        current = state;
+        newest = true;
+      }
+    }
+    if (newest && (fused || split)) {
+      GroupChange change{fused, session_s, state->revision, state->group, state->maps, {}};
+      for (const KeyframePose& pose : state->keyframes) {
+        auto& utime = change.newest_utime[pose.id.map.agent_id];
+        utime = std::max(utime, pose.utime);
+      }
+      session_->changes.push_back(std::move(change));
+    }
+  }
+
+  CapturedSession* session_;
+  StateChunks chunks_;
+};
+
+void AddPose(Bytes data, PoseTrack* track) {
+  pose_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  track->first_utime = std::min(track->first_utime.value_or(message.utime), message.utime);
+  if (message.state != pose_t::STATE_TRACKING) {
+    return;
+  }
+  const auto map = Parse(message.map);
+  const auto T_odom_body = Parse(message.T_odom_body);
+  if (!map.value || !T_odom_body.value) {
+    return;
+  }
+  auto& first = track->first_tracking_utime;
+  first = std::min(first.value_or(message.utime), message.utime);
+  track->odometry[*map.value].push_back({message.utime, *T_odom_body.value});
+  if (const auto T_map_body = Parse(message.T_map_body); T_map_body.value) {
+    track->live.push_back({message.utime, *map.value, *map.value, message.group_revision,
+                           *T_odom_body.value, *T_map_body.value});
+  }
+}
+
+// The frame each map is shown in from a revision on.
+using Frames = std::map<MapId, std::map<int64_t, MapId>>;
+
+void AddFrame(Bytes data, Frames* frames) {
+  correction_t message{};
+  if (DecodeMessage(data, &message)) {
+    if (const auto correction = Parse(message); correction.value) {
+      (*frames)[correction.value->map][correction.value->revision] = correction.value->group;
+    }
+  }
+}
+
+// A pose and the correction in it come in any order, so frames are told at the end.
+void Finish(const Frames& frames, PoseTrack* track) {
+  for (auto& [map, odometry] : track->odometry) {
+    SortByTime(&odometry);
+  }
+  SortByTime(&track->live);
+  for (LivePose& pose : track->live) {
+    const auto of_map = frames.find(pose.map);
+    if (of_map != frames.end()) {
+      const auto after = of_map->second.upper_bound(pose.revision);
+      pose.frame = after == of_map->second.begin() ? pose.map : std::prev(after)->second;
+    }
+  }
+}
+
+bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
+  keyframe_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto keyframe = Parse(message);
+  if (keyframe.value) {
+    session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value, session_s));
+  }
+  return keyframe.value.has_value();
+}
+
+bool AddConstraint(Bytes data, CapturedSession* session) {
+  constraint_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto constraint = Parse(message);
+  if (constraint.value) {
+    session->constraints.insert_or_assign(constraint.value->Id(), *constraint.value);
+  }
+  return constraint.value.has_value();
+}
+
+bool AddState(Bytes data, double session_s, States* states) {
+  map_state_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  auto state = Parse(message);
+  if (state.value) {
+    states->AddChunk(message, std::move(*state.value), session_s);
+  }
+  return state.value.has_value();
+}
+
+void AddSample(const status_t& status, int64_t utime, ProcessSamples* samples) {
+  (*samples)[status.process].push_back(
+      {utime, status.cpu_s, CounterOf(status, "bytes_up"), CounterOf(status, "bytes_down")});
+}
+
+bool AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
+  status_t message{};
+  const bool good = DecodeMessage(data, &message);
+  if (good) {
+    AddSample(message, utime, &session->samples);
+    session->statuses.insert_or_assign(message.process, message);
+  }
+  return good;
+}
+
+}  // namespace
+
+CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
+  CapturedSession session;
+  States states(&session);
+  std::optional<int64_t> begin;
+  const auto add = [&](const LogEvent& event) {
+    begin = begin.value_or(event.utime);
+    session.begin_utime = *begin;
+    const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
+    bool good = true;
+    if (channels::AgentOf(event.channel, channels::kKeyframePrefix) > 0) {
+      good = AddKeyframe(event.data, session_s, &session);
+    } else if (event.channel == channels::kConstraint) {
+      good = AddConstraint(event.data, &session);
+    } else if (event.channel == channels::kMapState) {
+      good = AddState(event.data, session_s, &states);
+    } else if (event.channel.starts_with(channels::kStatusPrefix)) {
+      good = AddStatus(event.data, event.utime, &session);
+    }
+    if (!good) {
+      ++session.unreadable[event.channel];
+    }
+  };
+  ReadLog(path, add, readings);
+  session.incomplete_states = states.pending();
+  return session;
+}
+
+PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings) {
+  PoseTrack track;
+  Frames frames;
+  const std::string poses = channels::Pose(agent_id);
+  const std::string corrections = channels::Correction(agent_id);
+  const auto add = [&](const LogEvent& event) {
+    if (event.channel == poses) {
+      AddPose(event.data, &track);
+    } else if (event.channel == corrections) {
+      AddFrame(event.data, &frames);
+    } else if (event.channel.starts_with(channels::kStatusPrefix)) {
+      status_t status{};
+      if (DecodeMessage(event.data, &status)) {
+        AddSample(status, event.utime, &track.samples);
+      }
+    }
+  };
+  ReadLog(path, add, readings);
+  Finish(frames, &track);
+  return track;
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,90 @@
+#pragma once
+
+// What a report needs of a session's logs.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/server_messages.h"
+#include "log_file/log_reading.h"
+#include "pangea/status_t.hpp"
+#include "recording/trajectory.h"
+
+namespace pangea::session {
+
+struct CapturedPoint {
+  Eigen::Vector3d p_body;
+  int32_t landmark_id = 0;    // kNoLandmark for none
+  double relative_sigma = 0;  // of the depth
+};
+
+struct CapturedKeyframe {
+  int64_t utime = 0;
+  Rigid3 T_odom_body;
+  std::vector<CapturedPoint> points;
+  double session_s = 0;  // when it came, since the log's first event
+};
+
+// What an agent showed at one image.
+struct LivePose {
+  int64_t utime = 0;
+  MapId map;    // its odom frame
+  MapId frame;  // the map whose odom frame T_map_body is in
+  int64_t revision = 0;
+  Rigid3 T_odom_body;
+  Rigid3 T_map_body;
+};
+
+// What a process said of itself, once a second.
+struct ProcessSample {
+  int64_t utime = 0;                            // the log's, wall clock
+  double cpu_s = 0;                             // since the process' start
+  std::optional<int64_t> bytes_up, bytes_down;  // on the link, of an uplink
+};
+using ProcessSamples = std::map<std::string, std::vector<ProcessSample>>;  // by process
+
+// POSE_k and CORRECTION_k of one agent, and what its processes said of themselves.
+struct PoseTrack {
+  std::optional<int64_t> first_utime;  // first pose message, whatever its state
+  std::optional<int64_t> first_tracking_utime;
+  std::map<MapId, Trajectory> odometry;  // T_odom_body while tracking
+  std::vector<LivePose> live;            // while tracking, ascending in time
+  ProcessSamples samples;
+};
+
+// A change of groups, in the order of the log.
+struct GroupChange {
+  bool fused = true;                        // false: maps were taken apart
+  double session_s = 0;                     // since the log's first event
+  int64_t revision = 0;                     // of the state that made it
+  MapId frame;                              // the map whose odom frame is the group's
+  std::vector<MapId> maps;                  // the group after it
+  std::map<int32_t, int64_t> newest_utime;  // of each agent's keyframes in the group
+};
+
+struct CapturedSession {
+  int64_t begin_utime = 0;  // the log's first event, wall clock
+  std::map<KeyframeId, CapturedKeyframe> keyframes;
+  // the newest complete state that mentions the map; maps of one group share the object
+  std::map<MapId, std::shared_ptr<const MapState>> states;
+  std::vector<GroupChange> changes;
+  std::map<int64_t, Constraint> constraints;  // by id
+  std::map<std::string, status_t> statuses;   // newest of each process
+  ProcessSamples samples;
+  std::map<int32_t, PoseTrack> poses;
+  std::map<std::string, int> unreadable;  // messages that did not decode or parse, by channel
+  int incomplete_states = 0;              // of which a chunk is missing
+};
+
+// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_* of a server bus' log. What of the log is lost
+// is noted in `readings` (log_reader.h), here and below.
+CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = nullptr);
+// Reads POSE_<agent_id>, CORRECTION_<agent_id> and STATUS_* of an agent bus' log.
+PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
+
+}  // namespace pangea::session

@@ -1,0 +1,185 @@
+#include "report/report_pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "core/keyframe.h"
+#include "eval/evaluate.h"
+#include "report/report_text.h"
+
+namespace pangea::session {
+namespace {
+
+// A point whose depth is less certain than this is a ray, not a point.
+constexpr double kMaxRelativeSigma = 0.3;
+
+struct PlyPoint {
+  Eigen::Vector3d p_map;
+  double relative_sigma = 0;
+};
+
+// Landmarks by id, then the points that are none, of all keyframes of one map.
+std::vector<Eigen::Vector3d> PointsOf(const CapturedSession& session, const FinalGroup& group,
+                                      const MapId& map) {
+  std::map<int32_t, PlyPoint> landmarks;
+  std::vector<Eigen::Vector3d> points;
+  for (const FinalKeyframe& keyframe : group.keyframes) {
+    const auto captured = session.keyframes.find(keyframe.id);
+    if (keyframe.id.map != map || captured == session.keyframes.end()) {
+      continue;
+    }
+    for (const CapturedPoint& point : captured->second.points) {
+      if (point.relative_sigma > kMaxRelativeSigma) {
+        continue;
+      }
+      const PlyPoint candidate{keyframe.T_map_body * point.p_body, point.relative_sigma};
+      if (point.landmark_id == kNoLandmark) {
+        points.push_back(candidate.p_map);
+        continue;
+      }
+      const auto [best, inserted] = landmarks.try_emplace(point.landmark_id, candidate);
+      if (!inserted && candidate.relative_sigma < best->second.relative_sigma) {
+        best->second = candidate;
+      }
+    }
+  }
+  for (const auto& [id, point] : landmarks) {
+    points.push_back(point.p_map);
+  }
+  return points;
+}
+
+std::array<int, 3> Rgb(const std::string& colour) {
+  const int value = std::stoi(colour.substr(1), nullptr, 16);
+  return {value >> 16, (value >> 8) & 255, value & 255};
+}
+
+void AddGroup(const ReportFigures& figures, const GroupFigures& group, Plot* plot) {
+  const Alignment alignment = group.joint ? group.joint->alignment : Alignment();
+  for (const int32_t agent_id : group.group.Agents()) {
+    const size_t index = figures.IndexOf(agent_id);
+    const Trajectory keyframes = group.group.TrajectoryOf(agent_id);
+    std::string label = fmt::format("agent {}", agent_id);
+    const auto with_truth = std::ranges::find(group.joint_agents, agent_id);
+    if (group.joint && with_truth != group.joint_agents.end()) {
+      const auto i = static_cast<size_t>(with_truth - group.joint_agents.begin());
+      label += fmt::format(" ({:.3f} m)", group.joint->agents[i].position_m.rmse);
+    }
+    plot->lines.push_back({.label = label,
+                           .colour = AgentColour(index),
+                           .width = 2.5,
+                           .points = TopView(keyframes, alignment),
+                           .mark_start = true});
+  }
+}
+
+Plot TopViewPlot(const std::string& title) {
+  return {.title = title, .x_label = "x [m]", .y_label = "y [m]", .equal_axes = true};
+}
+
+std::string GroupTitle(const GroupFigures& group) {
+  const std::vector<int32_t> agents = group.group.Agents();
+  return agents.size() == 1 ? fmt::format("agent {}", agents.front())
+                            : fmt::format("agents {} fused", fmt::join(agents, ", "));
+}
+
+Picture AllWithGroundTruth(const ReportFigures& figures) {
+  Picture picture{"trajectory.png", TopViewPlot("")};
+  for (const AgentFigures& agent : figures.agents) {
+    if (!agent.ground_truth.empty()) {
+      picture.plot.lines.push_back({.label = picture.plot.lines.empty() ? "ground truth" : "",
+                                    .name = "ground truth",
+                                    .colour = kGroundTruthColour,
+                                    .width = 5,
+                                    .points = TopView(agent.ground_truth, Alignment())});
+    }
+  }
+  std::string title;
+  for (const GroupFigures& group : figures.groups) {
+    if (group.joint) {
+      title += fmt::format("{}{}: ATE {:.3f} m", title.empty() ? "" : "; ", GroupTitle(group),
+                           group.joint->position_m.rmse);
+      AddGroup(figures, group, &picture.plot);
+    }
+  }
+  picture.plot.title = title;
+  return picture;
+}
+
+Picture ErrorPicture(const ReportFigures& figures) {
+  Picture picture{"error.png",
+                  {.title = "position error",
+                   .x_label = "time since the ground truth's beginning [s]",
+                   .y_label = "position error [m]",
+                   .y_from_zero = true}};
+  for (size_t i = 0; i < figures.agents.size(); ++i) {
+    const AgentFigures& agent = figures.agents[i];
+    if (agent.ground_truth.empty()) {
+      continue;
+    }
+    const int64_t begin = agent.ground_truth.front().utime;
+    if (agent.vio) {
+      picture.plot.lines.push_back(
+          {.label = fmt::format("agent {} alone ({:.3f} m)", agent.id, agent.vio->position_m.rmse),
+           .colour = AgentColour(i),
+           .width = 1.5,
+           .dashed = true,
+           .points = ErrorOverTime(agent.vio->errors, begin)});
+    }
+    if (agent.server) {
+      picture.plot.lines.push_back({.label = fmt::format("agent {} with server ({:.3f} m)",
+                                                         agent.id, agent.server->position_m.rmse),
+                                    .colour = AgentColour(i),
+                                    .width = 2.5,
+                                    .points = ErrorOverTime(agent.server->errors, begin)});
+    }
+  }
+  if (picture.plot.lines.empty()) {
+    picture.plot.title = "no ground truth, so no error";
+  }
+  return picture;
+}
+
+}  // namespace
+
+std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
+                   const FinalGroup& group) {
+  std::string body;
+  size_t count = 0;
+  for (const MapId& map : group.maps) {
+    const auto [red, green, blue] = Rgb(AgentColour(figures.IndexOf(map.agent_id)));
+    for (const Eigen::Vector3d& p : PointsOf(session, group, map)) {
+      body += fmt::format("{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), red, green, blue);
+      ++count;
+    }
+  }
+  return fmt::format(
+      "ply\nformat ascii 1.0\ncomment map frame: odom of map {}, metres, z up\nelement vertex {}\n"
+      "property float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n{}",
+      ToString(group.frame), count, body);
+}
+
+std::vector<Picture> Pictures(const ReportFigures& figures) {
+  std::vector<Picture> pictures;
+  const bool any_placed = std::ranges::any_of(
+      figures.groups, [](const GroupFigures& g) { return g.joint.has_value(); });
+  if (any_placed || figures.groups.empty()) {
+    pictures.push_back(AllWithGroundTruth(figures));
+  }
+  for (const GroupFigures& group : figures.groups) {
+    if (!group.joint) {
+      const std::string file = pictures.empty()
+                                   ? "trajectory.png"
+                                   : fmt::format("trajectory.{}.png", FileName(group.group.frame));
+      pictures.push_back({file, TopViewPlot(GroupTitle(group) + ", in its own map frame")});
+      AddGroup(figures, group, &pictures.back().plot);
+    }
+  }
+  pictures.push_back(ErrorPicture(figures));
+  return pictures;
+}
+
+}  // namespace pangea::session

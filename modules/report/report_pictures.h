@@ -1,0 +1,26 @@
+#pragma once
+
+// map.ply and the two pictures.
+
+#include <string>
+#include <vector>
+
+#include "eval/plot.h"
+#include "report/metrics/report_figures.h"
+
+namespace pangea::session {
+
+// ASCII PLY of the group's map points in its map frame; a landmark seen by several keyframes of a
+// map counts once, from where its depth is known best.
+std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
+                   const FinalGroup& group);
+
+struct Picture {
+  std::string file;  // name in the output folder
+  Plot plot;
+};
+
+// One top view of everything ground truth places; each further group in its own.
+std::vector<Picture> Pictures(const ReportFigures& figures);
+
+}  // namespace pangea::session

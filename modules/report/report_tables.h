@@ -1,0 +1,33 @@
+#pragma once
+
+// The tables and lists of a report, for its Markdown and its page alike. A table without rows has
+// nothing to tell.
+
+#include <string>
+#include <vector>
+
+#include "eval/table.h"
+#include "report/metrics/report_figures.h"
+
+namespace pangea::session {
+
+Table AgentTable(const ReportFigures& figures);
+Table GroupTable(const ReportFigures& figures);
+Table LiveTable(const ReportFigures& figures);       // what agents showed
+Table LinksTable(const ReportFigures& figures);      // links that the session made bad
+Table RefusedTable(const CapturedSession& session);  // constraints, by reason
+Table TruthTable(const ReportFigures& figures);      // accepted constraints against ground truth
+Table ProcessTable(const ReportInput& input, const CapturedSession& session);
+Table TrafficTable(const ReportFigures& figures);  // on the link, beside the paper's
+
+inline constexpr const char* kLostExplained =
+    "Not all of the logs could be read; this is what the rest of them says.";
+inline constexpr const char* kNeesExplained =
+    "NEES: squared error / covariance, per dimension; 1 when the covariance is honest.";
+
+// When maps became one or were taken apart, a line each.
+std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportFigures& figures);
+// How many constraints were accepted and refused.
+std::string ConstraintsLine(const CapturedSession& session);
+
+}  // namespace pangea::session

@@ -1,0 +1,54 @@
+#include "report/report_text.h"
+
+#include <fmt/format.h>
+
+#include "report/report_tables.h"
+
+namespace pangea::session {
+
+std::string FileName(const MapId& map) {
+  return fmt::format("{}_{}", map.agent_id, map.opened_utime);
+}
+
+std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
+                           const ReportFigures& figures) {
+  std::string text = "# Session report\n\n";
+  if (!figures.lost.empty()) {
+    text += fmt::format("**{}**\n\n- {}\n\n", kLostExplained, fmt::join(figures.lost, "\n- "));
+  }
+  text += fmt::format(
+      "{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
+      "counts "
+      "with coverage of at least 0.95 and one map.\n",
+      AgentTable(figures).Text());
+  if (const Table links = LinksTable(figures); !links.empty()) {
+    text += fmt::format("\n{}\nDelivered counts doubled packets twice.\n", links.Text());
+  }
+  if (const Table live = LiveTable(figures); !live.empty()) {
+    text += fmt::format(
+        "\nWhat each agent showed while the session ran, from its first fusion on:\n\n{}",
+        live.Text());
+  }
+  text +=
+      fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n",
+                  GroupTable(figures).Text());
+  const std::vector<std::string> changes = ChangeLines(session, figures);
+  text +=
+      changes.empty() ? "No maps were fused.\n" : fmt::format("- {}\n", fmt::join(changes, "\n- "));
+  text += fmt::format("\n## Constraints\n\n{}\n", ConstraintsLine(session));
+  if (const Table refused = RefusedTable(session); !refused.empty()) {
+    text += fmt::format("\n{}", refused.Text());
+  }
+  if (const Table truth = TruthTable(figures); !truth.empty()) {
+    text += fmt::format("\n{}\n{}\n", truth.Text(), kNeesExplained);
+  }
+  if (const Table processes = ProcessTable(input, session); !processes.empty()) {
+    text += fmt::format("\n## Processes\n\n{}", processes.Text());
+  }
+  if (!figures.notes.empty()) {
+    text += fmt::format("\n## Notes\n\n- {}\n", fmt::join(figures.notes, "\n- "));
+  }
+  return text;
+}
+
+}  // namespace pangea::session

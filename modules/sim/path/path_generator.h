@@ -1,0 +1,28 @@
+#pragma once
+
+// Paths of our own along a scene's route (route.h): a hand-held walk, or a drone's flight that
+// leans into its accelerations. Several rounds over the same area, so that two paths of one scene
+// overlap.
+
+#include <cstdint>
+
+#include "recording/trajectory.h"
+#include "sim/scene/scene_builder.h"
+
+namespace pangea::sim {
+
+enum class Motion { kWalk, kFlight };
+
+struct GeneratedPathOptions {
+  Motion motion = Motion::kWalk;
+  SceneKind scene = SceneKind::kHall;
+  uint64_t seed = 1;
+  double duration_s = 60;
+  double static_start_s = 0;  // at rest this long first; 0: moving from the first frame
+  Eigen::Quaterniond q_body_cam = Eigen::Quaterniond::Identity();  // the camera looks ahead
+};
+
+// T_ref_body at 50 Hz.
+Trajectory GeneratePath(const GeneratedPathOptions& options);
+
+}  // namespace pangea::sim

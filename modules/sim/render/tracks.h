@@ -1,0 +1,42 @@
+#pragma once
+
+// Exact feature tracks: persistent points of the scene's surfaces, where they appear in each frame.
+// A point once seen is followed for as long as it is visible; new ones fill the empty cells.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/camera_model.h"
+#include "sim/scene/scene.h"
+
+namespace pangea::sim {
+
+struct TrackedPoint {
+  int32_t landmark_id = 0;
+  Eigen::Vector2d pixel;  // raw (distorted)
+};
+
+class TrackMaker {
+ public:
+  // Both must outlive it. `count` points a frame, where that many are visible.
+  TrackMaker(const Scene& scene, const CameraModel& camera, int count, uint64_t seed);
+
+  const std::vector<Eigen::Vector3d>& landmarks() const { return landmarks_; }
+  // Call in order of time. T_ref_cam: one pose for all rows, or one a row, as in Renderer::Render.
+  std::vector<TrackedPoint> Next(const std::vector<Rigid3>& T_ref_cam);
+
+ private:
+  // Where a landmark falls into the image, and the pose of the row it falls on.
+  std::optional<Eigen::Vector2d> PixelOf(const std::vector<Rigid3>& T_ref_cam,
+                                         const Eigen::Vector3d& landmark, Rigid3* pose) const;
+  bool Hidden(const Eigen::Vector3d& eye, const Eigen::Vector3d& landmark) const;
+
+  const Scene& scene_;
+  const CameraModel& camera_;
+  int count_;
+  std::vector<Eigen::Vector3d> landmarks_;
+  std::vector<int32_t> followed_;
+};
+
+}  // namespace pangea::sim

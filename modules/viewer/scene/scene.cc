@@ -1,0 +1,263 @@
+#include "viewer/scene/scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pangea::viewer {
+namespace {
+
+// A solve that moves a keyframe by less than both is not worth telling a page.
+constexpr double kLeastMove_m = 5e-4;
+constexpr double kLeastTurn_rad = 5e-4;
+
+bool Moved(const Rigid3& from, const Rigid3& to) {
+  return (from.t - to.t).norm() > kLeastMove_m || from.q.angularDistance(to.q) > kLeastTurn_rad;
+}
+
+// The index of `key`, given a new one by `append` if there are fewer than `limit`; else -1.
+template <typename Key, typename Append>
+int IndexOf(std::map<Key, int>* index, const Key& key, size_t limit, const Append& append) {
+  const auto known = index->find(key);
+  if (known != index->end()) {
+    return known->second;
+  }
+  if (index->size() >= limit) {
+    return -1;
+  }
+  const int next = static_cast<int>(index->size());
+  index->emplace(key, next);
+  append();
+  return next;
+}
+
+}  // namespace
+
+std::optional<int> Scene::MapIndex(const MapId& id) const {
+  const auto found = map_index_.find(id);
+  return found == map_index_.end() ? std::nullopt : std::make_optional(found->second);
+}
+
+int Scene::MapOf(const MapId& id) {
+  const int map = IndexOf(&map_index_, id, kMaxMaps, [&] {
+    SceneMap added;
+    added.id = id;
+    added.group = id;
+    changes_.Touch({ItemKind::kMap, static_cast<int64_t>(maps_.size())});
+    maps_.push_back(std::move(added));
+  });
+  num_left_out_ += map < 0 ? 1 : 0;
+  return map;
+}
+
+int Scene::KeyframeOf(const KeyframeId& id) {
+  const int map = MapOf(id.map);
+  if (map < 0) {
+    return -1;
+  }
+  const int keyframe = IndexOf(&keyframe_index_, id, kMaxKeyframes, [&] {
+    SceneKeyframe added;
+    added.shown.id = id;
+    added.map = map;
+    keyframes_.push_back(std::move(added));
+  });
+  num_left_out_ += keyframe < 0 ? 1 : 0;
+  return keyframe;
+}
+
+SceneAgent* Scene::AgentOf(int32_t id) {
+  if (agents_.size() >= kMaxAgents && !agents_.contains(id)) {
+    ++num_left_out_;
+    return nullptr;
+  }
+  SceneAgent& agent = agents_[id];
+  agent.id = id;
+  agent.heard_s = time_s_;
+  changes_.Touch({ItemKind::kAgent, id});
+  return &agent;
+}
+
+void Scene::WorksIn(SceneAgent& agent, int map, const Rigid3& T_odom_body) {
+  const bool newer = agent.map < 0 || maps_[static_cast<size_t>(map)].id.opened_utime >=
+                                          maps_[static_cast<size_t>(agent.map)].id.opened_utime;
+  if (newer) {
+    agent.map = map;
+    agent.T_odom_body = T_odom_body;
+  }
+}
+
+// A landmark is one point, and stays with the keyframe that told it first: drawn once for each
+// keyframe that saw it, it would be a smear along the views.
+void Scene::AddPoints(SceneKeyframe& keyframe) {
+  std::vector<ShownPoint>& points = keyframe.shown.points;
+  std::unordered_set<int32_t>& landmarks = maps_[static_cast<size_t>(keyframe.map)].landmarks;
+  std::erase_if(points, [&landmarks](const ShownPoint& point) {
+    return point.landmark_id != kNoLandmark && !landmarks.insert(point.landmark_id).second;
+  });
+  if (num_points_ + points.size() > kMaxPoints) {
+    points.clear();
+    ++num_left_out_;
+  }
+  num_points_ += points.size();
+}
+
+void Scene::Take(const ShownKeyframe& keyframe) {
+  const int index = KeyframeOf(keyframe.id);
+  if (index < 0 || keyframes_[static_cast<size_t>(index)].arrived) {
+    return;
+  }
+  SceneKeyframe& known = keyframes_[static_cast<size_t>(index)];
+  known.arrived = true;
+  known.shown = keyframe;
+  known.shown.corners = {};
+  AddPoints(known);
+  ++maps_[static_cast<size_t>(known.map)].num_keyframes;
+  changes_.Touch({ItemKind::kKeyframe, index});
+
+  SceneAgent* agent = AgentOf(keyframe.id.map.agent_id);
+  if (agent != nullptr) {
+    agent->T_body_cam = keyframe.T_body_cam;
+    agent->view = keyframe.view;
+    agent->camera.Take(keyframe.corners);
+    if (!agent->pose || agent->pose->map != keyframe.id.map) {
+      WorksIn(*agent, known.map, keyframe.T_odom_body);
+    }
+  }
+}
+
+void Scene::Take(const ShownPose& pose) {
+  SceneAgent* agent = AgentOf(pose.agent_id);
+  if (agent == nullptr) {
+    return;
+  }
+  const int map = pose.map ? MapOf(*pose.map) : -1;
+  if (map >= 0) {
+    WorksIn(*agent, map, pose.T_odom_body);
+  }
+  agent->pose = pose;
+}
+
+void Scene::Take(const std::shared_ptr<const ShownImage>& image) {
+  SceneAgent* agent = AgentOf(image->agent_id);
+  if (agent != nullptr) {
+    agent->camera.Take(image);
+  }
+}
+
+void Scene::Take(const Constraint& constraint) {
+  if (MapOf(constraint.from.map) < 0 || MapOf(constraint.to.map) < 0) {
+    return;
+  }
+  const int index = IndexOf(&constraint_index_, constraint.Id(), kMaxConstraints,
+                            [&] { constraints_.push_back(constraint); });
+  if (index < 0) {
+    ++num_left_out_;
+    return;
+  }
+  constraints_[static_cast<size_t>(index)] = constraint;
+  changes_.Touch({ItemKind::kConstraint, index});
+}
+
+void Scene::Take(const Correction& correction) {
+  const int map = MapOf(correction.map);
+  if (map < 0 || !maps_[static_cast<size_t>(map)].drift.Take(correction)) {
+    return;
+  }
+  JoinGroup(correction.map, correction.group, correction.revision);
+  maps_[static_cast<size_t>(map)].T_map_odom = correction.T_map_odom;
+  changes_.Touch({ItemKind::kMap, map});
+  AgentOf(correction.map.agent_id);
+}
+
+void Scene::Take(const MapState& state) {
+  for (const MapId& map : state.maps) {
+    JoinGroup(map, state.group, state.revision);
+  }
+  for (const KeyframePose& pose : state.keyframes) {
+    Place(pose, state);
+  }
+  NoteGroups(state);
+}
+
+void Scene::Place(const KeyframePose& pose, const MapState& state) {
+  const int index = KeyframeOf(pose.id);
+  if (index < 0) {
+    return;
+  }
+  SceneKeyframe& keyframe = keyframes_[static_cast<size_t>(index)];
+  if (keyframe.T_map_body && keyframe.revision >= state.revision) {
+    return;
+  }
+  keyframe.revision = state.revision;
+  if (!keyframe.T_map_body || keyframe.group != state.group ||
+      Moved(*keyframe.T_map_body, pose.T_map_body)) {
+    keyframe.T_map_body = pose.T_map_body;
+    keyframe.group = state.group;
+    changes_.Touch({ItemKind::kSolved, index});
+  }
+}
+
+void Scene::JoinGroup(const MapId& map, const MapId& group, int64_t revision) {
+  const int index = MapOf(map);
+  if (index < 0 || MapOf(group) < 0) {
+    return;
+  }
+  SceneMap& joining = maps_[static_cast<size_t>(index)];
+  if (revision < joining.revision) {
+    return;
+  }
+  joining.revision = revision;
+  if (joining.group != group) {
+    joining.group = group;
+    changes_.Touch({ItemKind::kMap, index});
+  }
+}
+
+void Scene::NoteGroups(const MapState& state) {
+  const std::set<MapId> now(state.maps.begin(), state.maps.end());
+  bool fused = false;
+  bool split = false;
+  bool newest = false;
+  for (const MapId& map : state.maps) {
+    const auto [known, first] = together_.try_emplace(map, 0, std::set<MapId>{map});
+    auto& [revision, before] = known->second;
+    if (state.revision > revision) {
+      newest = true;
+      fused |= !std::ranges::includes(before, now);
+      split |= !std::ranges::includes(now, before);
+      revision = state.revision;
+      before = now;
+    }
+  }
+  if (newest && (fused || split) && fusions_.size() < kMaxFusions) {
+    changes_.Touch({ItemKind::kFusion, static_cast<int64_t>(fusions_.size())});
+    fusions_.push_back({time_s_, fused, {now.begin(), now.end()}});
+  }
+}
+
+void Scene::Take(const ProcessHealth& health) {
+  const int index =
+      IndexOf(&process_index_, health.process, kMaxProcesses, [&] { processes_.emplace_back(); });
+  if (index < 0) {
+    ++num_left_out_;
+    return;
+  }
+  processes_[static_cast<size_t>(index)] = {health, time_s_};
+  changes_.Touch({ItemKind::kProcess, index});
+}
+
+double Scene::DriftOf(const SceneAgent& agent) const {
+  return agent.map < 0 ? 0 : maps_[static_cast<size_t>(agent.map)].drift.Moved(agent.T_odom_body.t);
+}
+
+std::optional<Eigen::Matrix3d> Scene::PositionCovariance(const SceneAgent& agent) const {
+  if (agent.map < 0 || !maps_[static_cast<size_t>(agent.map)].drift.newest()) {
+    return std::nullopt;
+  }
+  const Correction& correction = *maps_[static_cast<size_t>(agent.map)].drift.newest();
+  // p_map = T_map_odom p_odom; with xi = (dp, dtheta) in map, d p_map = dp - [R p_odom]x dtheta.
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), -Hat(correction.T_map_odom.q * agent.T_odom_body.t);
+  return J * correction.covariance * J.transpose();
+}
+
+}  // namespace pangea::viewer

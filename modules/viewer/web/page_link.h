@@ -1,0 +1,37 @@
+#pragma once
+
+// One page's end of the conversation, without its socket. A page is sent an update, says when it
+// has taken it in, and is sent the next: never more than one is under way, so a slow browser falls
+// behind in time, not in memory, and then sees the newest state.
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "viewer/scene/update.h"
+#include "viewer/show.h"
+
+namespace pangea::viewer {
+
+class PageLink {
+ public:
+  static constexpr size_t kMaxText = 1000;
+  static constexpr double kMaxSpeed = 1000;
+
+  explicit PageLink(Show& show) : show_(show) {}
+
+  // What to send now; nothing while the last one is under way or when there is no news.
+  std::optional<std::vector<uint8_t>> Next();
+
+  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT}.
+  // False for anything else: no page of ours says it.
+  bool Hear(std::string_view text);
+
+ private:
+  Show& show_;
+  Seen seen_;
+  bool under_way_ = false;
+};
+
+}  // namespace pangea::viewer

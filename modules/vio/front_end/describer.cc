@@ -1,0 +1,264 @@
+#include "vio/front_end/describer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace pangea::vio {
+namespace {
+
+// The descriptor's tests reach 15 px from the centre before rotation, 22 after; its patch for the
+// angle is a disc of radius 15.
+constexpr int kPatchRadius = 15;
+constexpr int kBorder = 23;
+constexpr float kPatchSize = 31.F;
+// How far, on its octave, a tracked landmark may lie from the corner it is described at.
+constexpr float kSnapRadius = 2.F;
+
+// Half width of each row of the disc, the same in both directions so that turning the patch turns
+// the centroid.
+std::array<int, kPatchRadius + 1> DiscHalfWidths() {
+  std::array<int, kPatchRadius + 1> widths{};
+  for (int v = 0; v <= kPatchRadius; ++v) {
+    widths[v] = static_cast<int>(std::lround(std::sqrt(kPatchRadius * kPatchRadius - v * v)));
+  }
+  return widths;
+}
+
+// Keeps the strongest corner of each cell first, then the second of each, and so on: an even
+// spread without losing the strong ones.
+template <typename T>
+std::vector<T> SpreadOver(const std::vector<T>& corners, int cell_px, int columns, size_t wanted) {
+  std::vector<T> sorted = corners;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const T& a, const T& b) { return a.response > b.response; });
+  std::vector<std::pair<int, size_t>> ranked;
+  std::vector<int> count(1, 0);
+  for (size_t i = 0; i < sorted.size(); ++i) {
+    const size_t cell = static_cast<size_t>(sorted[i].level_pixel.y) / cell_px * columns +
+                        static_cast<size_t>(sorted[i].level_pixel.x) / cell_px;
+    if (cell >= count.size()) {
+      count.resize(cell + 1, 0);
+    }
+    ranked.emplace_back(count[cell]++, i);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<T> kept;
+  for (size_t i = 0; i < std::min(wanted, ranked.size()); ++i) {
+    kept.push_back(sorted[ranked[i].second]);
+  }
+  return kept;
+}
+
+}  // namespace
+
+Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
+    : camera_(camera),
+      options_(options),
+      // One level: it takes the corners of a given octave as they are.
+      orb_(cv::ORB::create(1, 1.2F, 1, kPatchRadius, 0, 2)) {
+  for (int octave = 0; octave < options_.octaves; ++octave) {
+    scales_.push_back(std::pow(options_.scale_factor, octave));
+  }
+}
+
+void Describer::BuildPyramid(const cv::Mat& image) {
+  pyramid_.resize(scales_.size());
+  for (size_t octave = 0; octave < scales_.size(); ++octave) {
+    if (octave == 0) {
+      pyramid_[0] = image;
+    } else {
+      const cv::Size size(static_cast<int>(std::lround(image.cols / scales_[octave])),
+                          static_cast<int>(std::lround(image.rows / scales_[octave])));
+      cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
+    }
+  }
+}
+
+std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted) const {
+  const cv::Mat& level = pyramid_[octave];
+  const int cell_px = options_.cell_px;
+  const int columns = (level.cols + cell_px - 1) / cell_px;
+  std::vector<cv::KeyPoint> found;
+  cv::FAST(level, found, options_.fast_threshold_low, true);
+  // A cell with strong corners keeps only those.
+  std::vector<bool> has_strong;
+  const auto cell_of = [&](const cv::KeyPoint& corner) {
+    return static_cast<size_t>(corner.pt.y) / cell_px * columns +
+           static_cast<size_t>(corner.pt.x) / cell_px;
+  };
+  has_strong.resize(static_cast<size_t>(columns) * (level.rows / cell_px + 1), false);
+  for (const cv::KeyPoint& corner : found) {
+    if (corner.response >= static_cast<float>(options_.fast_threshold)) {
+      has_strong[cell_of(corner)] = true;
+    }
+  }
+  std::vector<Candidate> candidates;
+  for (const cv::KeyPoint& corner : found) {
+    const bool inside = corner.pt.x >= kBorder && corner.pt.y >= kBorder &&
+                        corner.pt.x < static_cast<float>(level.cols - kBorder) &&
+                        corner.pt.y < static_cast<float>(level.rows - kBorder);
+    if (inside && (corner.response >= static_cast<float>(options_.fast_threshold) ||
+                   !has_strong[cell_of(corner)])) {
+      Candidate candidate;
+      candidate.level_pixel = corner.pt;
+      candidate.octave = octave;
+      candidate.response = corner.response;
+      candidates.push_back(candidate);
+    }
+  }
+  return SpreadOver(candidates, cell_px, columns, static_cast<size_t>(wanted));
+}
+
+float Describer::CornerStrength(int octave, const cv::Point2f& level_pixel, cv::Point2f* at) const {
+  constexpr int kReach = 3;       // of the window the score is computed in
+  constexpr int kFastRadius = 4;  // FAST looks at 3 px around and ignores the image's rim
+  const cv::Mat& level = pyramid_[octave];
+  const cv::Point centre(cvRound(level_pixel.x), cvRound(level_pixel.y));
+  const int reach = kReach + kFastRadius;
+  const cv::Rect window(centre.x - reach, centre.y - reach, 2 * reach + 1, 2 * reach + 1);
+  if ((window & cv::Rect(0, 0, level.cols, level.rows)) != window) {
+    return 0;
+  }
+  std::vector<cv::KeyPoint> found;
+  cv::FAST(level(window), found, options_.fast_threshold_low, true);
+  float best = 0;
+  for (const cv::KeyPoint& corner : found) {
+    const cv::Point2f position = corner.pt + cv::Point2f(window.tl());
+    if (corner.response > best && cv::norm(position - level_pixel) <= kSnapRadius) {
+      best = corner.response;
+      *at = position;
+    }
+  }
+  return best;
+}
+
+std::vector<Describer::Candidate> Describer::PlaceLandmarks(const TrackedFrame& frame) const {
+  std::vector<Candidate> candidates;
+  for (const Observation& observation : frame.observations) {
+    Candidate best;
+    bool placed = false;
+    for (size_t octave = 0; octave < scales_.size(); ++octave) {
+      const cv::Point2f level_pixel = ToLevel(static_cast<int>(octave), observation.pixel);
+      const cv::Mat& level = pyramid_[octave];
+      if (level_pixel.x < kBorder || level_pixel.y < kBorder ||
+          level_pixel.x >= static_cast<float>(level.cols - kBorder) ||
+          level_pixel.y >= static_cast<float>(level.rows - kBorder)) {
+        break;  // coarser levels only come closer to the rim
+      }
+      cv::Point2f at = level_pixel;
+      const float strength = CornerStrength(static_cast<int>(octave), level_pixel, &at);
+      if (!placed || strength > best.response) {
+        best.octave = static_cast<int>(octave);
+        best.level_pixel = at;
+        best.response = strength;
+        placed = true;
+      }
+    }
+    if (placed) {
+      best.landmark_id = observation.landmark_id;
+      best.pixel = observation.pixel;
+      candidates.push_back(best);
+    }
+  }
+  return candidates;
+}
+
+// Pixel centres: (0, 0) is the middle of the top-left pixel on each octave; the real scale differs
+// from the nominal one because sizes are whole pixels.
+cv::Point2f Describer::ToLevel(int octave, const Eigen::Vector2f& pixel) const {
+  const cv::Mat& level = pyramid_[octave];
+  const cv::Mat& image = pyramid_[0];
+  return {
+      (pixel.x() + 0.5F) * static_cast<float>(level.cols) / static_cast<float>(image.cols) - 0.5F,
+      (pixel.y() + 0.5F) * static_cast<float>(level.rows) / static_cast<float>(image.rows) - 0.5F};
+}
+
+Eigen::Vector2f Describer::ToImage(int octave, const cv::Point2f& level_pixel) const {
+  const cv::Mat& level = pyramid_[octave];
+  const cv::Mat& image = pyramid_[0];
+  return {(level_pixel.x + 0.5F) * static_cast<float>(image.cols) / static_cast<float>(level.cols) -
+              0.5F,
+          (level_pixel.y + 0.5F) * static_cast<float>(image.rows) / static_cast<float>(level.rows) -
+              0.5F};
+}
+
+// Rublee et al., eq. 1-3: the direction from the corner to the intensity centroid of a disc.
+float Describer::Angle(int octave, const cv::Point2f& level_pixel) const {
+  static const std::array<int, kPatchRadius + 1> kHalfWidth = DiscHalfWidths();
+  const cv::Mat& level = pyramid_[octave];
+  const int x0 = cvRound(level_pixel.x);
+  const int y0 = cvRound(level_pixel.y);
+  int m10 = 0, m01 = 0;
+  for (int v = -kPatchRadius; v <= kPatchRadius; ++v) {
+    const uchar* row = level.ptr<uchar>(y0 + v);
+    const int half = kHalfWidth[std::abs(v)];
+    int sum = 0;
+    for (int u = -half; u <= half; ++u) {
+      m10 += u * row[x0 + u];
+      sum += row[x0 + u];
+    }
+    m01 += v * sum;
+  }
+  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
+}
+
+void Describer::Compute(const std::vector<Candidate>& candidates,
+                        std::vector<Corner>* corners) const {
+  std::vector<cv::KeyPoint> keypoints;
+  for (size_t octave = 0; octave < scales_.size(); ++octave) {
+    keypoints.clear();
+    for (size_t i = 0; i < candidates.size(); ++i) {
+      if (candidates[i].octave == static_cast<int>(octave)) {
+        keypoints.emplace_back(candidates[i].level_pixel, kPatchSize,
+                               Angle(candidates[i].octave, candidates[i].level_pixel),
+                               candidates[i].response, 0, static_cast<int>(i));
+      }
+    }
+    if (keypoints.empty()) {
+      continue;
+    }
+    cv::Mat descriptors;
+    orb_->compute(pyramid_[octave], keypoints, descriptors);
+    for (int row = 0; row < descriptors.rows; ++row) {
+      const Candidate& candidate = candidates[static_cast<size_t>(keypoints[row].class_id)];
+      Corner& corner = (*corners)[static_cast<size_t>(keypoints[row].class_id)];
+      corner.octave = static_cast<int8_t>(octave);
+      corner.landmark_id = candidate.landmark_id;
+      corner.pixel = candidate.landmark_id != kNoLandmark
+                         ? candidate.pixel
+                         : ToImage(candidate.octave, candidate.level_pixel);
+      std::memcpy(corner.descriptor.data(), descriptors.ptr(row), sizeof(Descriptor));
+    }
+  }
+}
+
+std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
+  BuildPyramid(image);
+  std::vector<Candidate> candidates = PlaceLandmarks(frame);
+  const int wanted = options_.max_corners - static_cast<int>(candidates.size());
+  // Octaves share the rest by their side length, as a corner's density in the image would have it.
+  double share_sum = 0;
+  for (const double scale : scales_) {
+    share_sum += 1.0 / scale;
+  }
+  std::vector<Candidate> others;
+  double owed = 0;  // what coarser octaves could not use goes to the finer ones
+  for (int octave = static_cast<int>(scales_.size()) - 1; octave >= 0; --octave) {
+    owed += wanted / scales_[octave] / share_sum;
+    const auto found = FindCorners(octave, std::max(0, static_cast<int>(std::lround(owed))));
+    owed -= static_cast<double>(found.size());
+    others.insert(others.end(), found.begin(), found.end());
+  }
+  candidates.insert(candidates.end(), others.begin(), others.end());
+  if (static_cast<int>(candidates.size()) > options_.max_corners) {
+    candidates.resize(options_.max_corners);
+  }
+  std::vector<Corner> corners(candidates.size());
+  Compute(candidates, &corners);
+  return corners;
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,62 @@
+#pragma once
+
+// Describes a keyframe once: its tracked landmarks first, then FAST corners spread over the whole
+// image and a pyramid, each with a 256-bit rotation-aware binary descriptor (ORB: Rublee et al.,
+// ICCV 2011, the intensity centroid's angle and learned tests as OpenCV has them).
+//
+// Matching is across viewpoints and distances, so a tracked landmark is described on the octaves
+// where it is a corner, not where the tracker happens to follow it.
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+#include <vector>
+
+#include "core/camera_model.h"
+#include "core/keyframe.h"
+#include "vio/front_end/tracks.h"
+
+namespace pangea::vio {
+
+struct DescriberOptions {
+  int max_corners = 600;  // at most kMaxCorners
+  int octaves = 8;
+  double scale_factor = 1.2;  // between octaves; Corner::octave's sigma rule assumes it
+  int fast_threshold = 20;
+  int fast_threshold_low = 7;  // in cells where the first finds nothing
+  int cell_px = 40;            // on each octave
+};
+
+class Describer {
+ public:
+  Describer(const CameraModel& camera, const DescriberOptions& options);
+
+  // Corners of the image: those with a landmark_id first, in the order of the frame.
+  std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame);
+
+ private:
+  struct Candidate {
+    cv::Point2f level_pixel;  // on its octave
+    int octave = 0;
+    float response = 0;
+    int32_t landmark_id = kNoLandmark;
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // raw, full size
+  };
+
+  void BuildPyramid(const cv::Mat& image);
+  std::vector<Candidate> FindCorners(int octave, int wanted) const;
+  std::vector<Candidate> PlaceLandmarks(const TrackedFrame& frame) const;
+  float CornerStrength(int octave, const cv::Point2f& level_pixel, cv::Point2f* at) const;
+  cv::Point2f ToLevel(int octave, const Eigen::Vector2f& pixel) const;
+  Eigen::Vector2f ToImage(int octave, const cv::Point2f& level_pixel) const;
+  float Angle(int octave, const cv::Point2f& level_pixel) const;
+  void Compute(const std::vector<Candidate>& candidates, std::vector<Corner>* corners) const;
+
+  CameraModel camera_;
+  DescriberOptions options_;
+  std::vector<double> scales_;  // nominal, of each octave
+  std::vector<cv::Mat> pyramid_;
+  cv::Ptr<cv::ORB> orb_;
+};
+
+}  // namespace pangea::vio

@@ -1,0 +1,147 @@
+// Measures keyframe descriptions against a recording's ground truth: of the matches between two
+// views, how many agree with one motion near the true one; for views close in time and for later
+// visits of the same place.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <ctime>
+#include <iostream>
+
+#include "core/matching.h"
+#include "recording/euroc.h"
+#include "vio/front_end/describer.h"
+#include "vio/front_end/tracker.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr int64_t kMaxGap_us = 20'000;
+
+struct View {
+  double time_s = 0;
+  Rigid3 T_reference_cam;
+  std::vector<Corner> corners;
+};
+
+struct Tally {
+  int pairs = 0;
+  double matches = 0;
+  double correct = 0;
+  void Print(const char* name) const {
+    fmt::print("{}: {} pairs, {:.1f} matches a pair, {:.3f} of them agree with one motion\n", name,
+               pairs, matches / std::max(1, pairs), correct / std::max(1.0, matches));
+  }
+};
+
+// How many of the matches agree with one motion near the true one. The true rotation itself is only
+// good to about a degree on real recordings, so it is a guess, refined by the matches.
+int Consistent(const CameraModel& camera, const View& a, const View& b,
+               const std::vector<CornerMatch>& matches) {
+  std::vector<Eigen::Vector2d> rays_a, rays_b;
+  for (const CornerMatch& match : matches) {
+    const auto ray_a = camera.Unproject(a.corners[match.a].pixel.cast<double>());
+    const auto ray_b = camera.Unproject(b.corners[match.b].pixel.cast<double>());
+    if (ray_a && ray_b) {
+      rays_a.push_back(*ray_a);
+      rays_b.push_back(*ray_b);
+    }
+  }
+  TwoViewOptions options;
+  options.inlier_px = 3;
+  options.rotation_sigma = 0.03;
+  options.iterations = 300;
+  const Eigen::Quaterniond q_b_a = b.T_reference_cam.q.conjugate() * a.T_reference_cam.q;
+  return CheckTwoView(rays_a, rays_b, q_b_a, camera.PixelAngle(), options).num_inliers;
+}
+
+void Run(const std::string& folder, double step_s, bool landmarks,
+         const DescriberOptions& options) {
+  const EurocRecording recording(folder);
+  const CameraModel& camera = recording.camera();
+  Tracker tracker(camera, {});
+  Describer describer(camera, options);
+  std::vector<View> views;
+  double milliseconds = 0, corners = 0;
+  for (size_t i = 0; i < recording.images().size(); ++i) {
+    const EurocImage& entry = recording.images()[i];
+    const double t = 1e-6 * static_cast<double>(entry.utime - recording.images().front().utime);
+    std::string why;
+    const auto T = Interpolate(recording.ground_truth(), entry.utime, kMaxGap_us);
+    if ((!views.empty() && t < views.back().time_s + step_s) || !T) {
+      continue;
+    }
+    const cv::Mat image = recording.LoadImage(i, &why);
+    if (image.empty()) {
+      std::cerr << fmt::format("{}\n", why);
+      continue;
+    }
+    // Fresh features stand for the tracked ones: where the tracker would put them.
+    tracker.Reset();
+    const TrackedFrame& frame = tracker.Track(entry.utime, image, Eigen::Quaterniond::Identity());
+    const std::clock_t begin = std::clock();
+    views.push_back(
+        {t, *T * camera.T_body_cam, describer.Describe(image, landmarks ? frame : TrackedFrame{})});
+    milliseconds += 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    corners += static_cast<double>(views.back().corners.size());
+  }
+  Tally near, revisit, unlike;
+  for (size_t i = 0; i < views.size(); ++i) {
+    for (size_t j = i + 1; j < views.size(); ++j) {
+      const double dt = views[j].time_s - views[i].time_s;
+      const Rigid3 T_i_j = views[i].T_reference_cam.Inverse() * views[j].T_reference_cam;
+      const double angle = T_i_j.q.angularDistance(Eigen::Quaterniond::Identity());
+      Tally* tally = nullptr;
+      if (T_i_j.t.norm() < 0.05) {
+        continue;  // the epipolar line says nothing
+      }
+      if (dt < 1.3) {
+        tally = &near;
+      } else if (dt > 8 && angle < 0.5 && T_i_j.t.norm() < 1.5) {
+        tally = &revisit;
+      } else if (angle > 1.8) {
+        tally = &unlike;
+      }
+      if (tally == nullptr || tally->pairs > 300) {
+        continue;
+      }
+      ++tally->pairs;
+      const auto matches = MatchCorners(views[i].corners, views[j].corners, {});
+      tally->matches += static_cast<double>(matches.size());
+      tally->correct += Consistent(camera, views[i], views[j], matches);
+    }
+  }
+  const auto n = static_cast<double>(views.size());
+  fmt::print("{} views, {:.0f} corners each, {:.1f} ms each\n", views.size(), corners / n,
+             milliseconds / n);
+  near.Print("0.3 .. 1.3 s apart");
+  revisit.Print("a later visit within 1.5 m and 29 degrees");
+  unlike.Print("another direction (over 103 degrees)");
+}
+
+}  // namespace
+}  // namespace pangea::vio
+
+int main(int argc, char** argv) {
+  std::string recording;
+  double step_s = 0.4;
+  bool landmarks = true;
+  pangea::vio::DescriberOptions options;
+  CLI::App app("Measures keyframe descriptions against ground truth", "pangea-vio-describer-bench");
+  app.add_option("recording", recording)->required();
+  app.add_option("--step", step_s, "seconds between views");
+  app.add_option("--landmarks", landmarks, "0: no tracked landmarks, corners only");
+  app.add_option("--corners", options.max_corners);
+  app.add_option("--octaves", options.octaves);
+  app.add_option("--cell", options.cell_px);
+  CLI11_PARSE(app, argc, argv);
+  cv::setNumThreads(1);
+  try {
+    pangea::vio::Run(recording, step_s, landmarks, options);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

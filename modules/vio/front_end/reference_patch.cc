@@ -1,0 +1,140 @@
+#include "vio/front_end/reference_patch.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+
+namespace pangea::vio {
+namespace {
+
+constexpr int kIterations = 10;
+constexpr float kConverged_px = 0.01F;
+// Correction of what image-to-image tracking says, beyond which it is another place.
+constexpr float kMaxCorrection_px = 2.0F;
+// Correlation of the patch with what is found.
+constexpr float kMinCorrelation = 0.85F;
+// Singular values of a deformation that is still the same patch.
+constexpr float kMinStretch = 0.6F;
+constexpr float kMaxStretch = 1.7F;
+// Standard deviations of grey values that are texture, not noise.
+constexpr float kMinContrast = 2.0F;
+// The deformation changes little from image to image: weight of that against the patch's own
+// gradients, whose position columns have this relative to them.
+constexpr float kStiffness = 0.02F;
+constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
+
+}  // namespace
+
+bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
+                            const Eigen::Matrix2f& a, Values* values) {
+  const float reach_x = kHalf * (std::abs(a(0, 0)) + std::abs(a(0, 1)));
+  const float reach_y = kHalf * (std::abs(a(1, 0)) + std::abs(a(1, 1)));
+  if (!(at.x() - reach_x >= 0 && at.y() - reach_y >= 0 &&
+        at.x() + reach_x < static_cast<float>(image.cols - 1) &&
+        at.y() + reach_y < static_cast<float>(image.rows - 1))) {
+    return false;
+  }
+  int i = 0;
+  for (int v = 0; v < kSize; ++v) {
+    Eigen::Vector2f p = at + a * Eigen::Vector2f(-kHalf, static_cast<float>(v) - kHalf);
+    for (int u = 0; u < kSize; ++u, ++i, p += a.col(0)) {
+      const int x = static_cast<int>(p.x());
+      const int y = static_cast<int>(p.y());
+      const float fx = p.x() - static_cast<float>(x);
+      const float fy = p.y() - static_cast<float>(y);
+      const uchar* above = image.ptr<uchar>(y) + x;
+      const uchar* below = above + image.step;
+      const float top = above[0] + fx * static_cast<float>(above[1] - above[0]);
+      const float bottom = below[0] + fx * static_cast<float>(below[1] - below[0]);
+      (*values)[i] = top + fy * (bottom - top);
+    }
+  }
+  return true;
+}
+
+float ReferencePatch::Normalise(Values* values) {
+  values->array() -= values->mean();
+  const float length = values->norm();
+  if (length < kMinContrast * kSize) {
+    return 0;
+  }
+  *values /= length;
+  return length;
+}
+
+std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
+                                                   const Eigen::Vector2f& pixel) {
+  ReferencePatch patch;
+  const Eigen::Matrix2f a = Eigen::Matrix2f::Identity();
+  const Eigen::Vector2f dx = Eigen::Vector2f::UnitX();
+  const Eigen::Vector2f dy = Eigen::Vector2f::UnitY();
+  Values left, right, up, down;
+  if (!Sample(image, pixel, a, &patch.look_) || !Sample(image, pixel - dx, a, &left) ||
+      !Sample(image, pixel + dx, a, &right) || !Sample(image, pixel - dy, a, &up) ||
+      !Sample(image, pixel + dy, a, &down)) {
+    return std::nullopt;
+  }
+  const float length = Normalise(&patch.look_);
+  if (length == 0) {
+    return std::nullopt;
+  }
+  const Values gx = (right - left) / (2 * length);
+  const Values gy = (down - up) / (2 * length);
+  for (int i = 0; i < kCount; ++i) {
+    const int row = i / kSize;
+    const float u = static_cast<float>(i - row * kSize) - kHalf;
+    const float v = static_cast<float>(row) - kHalf;
+    patch.jacobian_.row(i) << gx[i], gy[i], gx[i] * u, gy[i] * u, gx[i] * v, gy[i] * v;
+  }
+  // Normalising makes the look blind to brightness and contrast: so is its derivative.
+  for (int column = 0; column < 6; ++column) {
+    auto j = patch.jacobian_.col(column);
+    j.array() -= j.mean();
+    j -= patch.look_.dot(j) * patch.look_;
+  }
+  Eigen::Matrix<float, 6, 6> h = patch.jacobian_.transpose() * patch.jacobian_;
+  h.diagonal().tail<4>().array() += kStiffness * kHalf * kHalf * (h(0, 0) + h(1, 1));
+  h.diagonal().array() += kTiny;
+  patch.gain_ = h.inverse();
+  return patch;
+}
+
+std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
+                                                    const Eigen::Vector2f& guess) {
+  Eigen::Matrix2f a = a_;
+  Eigen::Vector2f at = guess;
+  Values values;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    if (!Sample(image, at, a, &values) || Normalise(&values) == 0) {
+      return std::nullopt;
+    }
+    const Eigen::Matrix<float, 6, 1> step = gain_ * (jacobian_.transpose() * (values - look_));
+    // The patch itself would have to move by `step` to look like what is seen: the warp takes its
+    // inverse.
+    Eigen::Matrix2f da;
+    da << 1 + step[2], step[4], step[3], 1 + step[5];
+    const Eigen::Matrix2f da_inverse = da.inverse();
+    const Eigen::Vector2f move = a * (da_inverse * step.head<2>());
+    a = a * da_inverse;
+    at -= move;
+    if (!((at - guess).squaredNorm() < kMaxCorrection_px * kMaxCorrection_px)) {
+      return std::nullopt;
+    }
+    if (move.squaredNorm() < kConverged_px * kConverged_px) {
+      break;
+    }
+  }
+  if (!Sample(image, at, a, &values) || Normalise(&values) == 0 ||
+      values.dot(look_) < kMinCorrelation) {
+    return std::nullopt;
+  }
+  a_ = a;
+  return at;
+}
+
+bool ReferencePatch::IsWornOut() const {
+  const Eigen::Vector2f stretch = Eigen::JacobiSVD<Eigen::Matrix2f>(a_).singularValues();
+  return !(stretch[0] < kMaxStretch && stretch[1] > kMinStretch);
+}
+
+}  // namespace pangea::vio

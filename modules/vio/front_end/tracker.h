@@ -1,0 +1,102 @@
+#pragma once
+
+// Feature tracks through an image stream: Shi-Tomasi corners on a grid, pyramidal KLT with the
+// gyro's rotation as the first guess, forward-backward check, alignment with how the feature looked
+// at first (reference_patch.h), two-view outlier rejection on undistorted rays (the paper, section
+// III-A, and VINS-Mono's front end, which it builds on).
+//
+// In: grey images and the rotation of the camera since the last one. Out: the tracked frame.
+// Landmark ids count up from 0 and are never used twice until Reset. One thread; deterministic.
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+#include "core/camera_model.h"
+#include "vio/front_end/reference_patch.h"
+#include "vio/front_end/tracks.h"
+#include "vio/front_end/two_view_check.h"
+
+namespace pangea::vio {
+
+struct TrackerOptions {
+  int max_features = 150;
+  int grid_columns = 15;
+  int grid_rows = 10;
+  double min_distance_px = 22;  // between features
+  int window_px = 21;           // of the KLT
+  int pyramid_levels = 4;
+  double max_forward_backward_px = 0.7;
+  double border_px = 8;
+  // A corner's smaller eigenvalue against the image's strongest one, and the least at all (of a
+  // contrast-equalised image, OpenCV's units).
+  double quality = 0.01;
+  double min_eigenvalue = 1e-4;
+  bool equalize = true;  // contrast-limited histogram equalisation before everything
+  double equalize_clip = 3.0;
+  double sigma_px = 0.5;  // of an observation
+  TwoViewOptions two_view;
+};
+
+class Tracker {
+ public:
+  Tracker(const CameraModel& camera, const TrackerOptions& options);
+
+  // `q_cam_lastcam` takes directions from the last image's camera frame to this one's.
+  const TrackedFrame& Track(int64_t utime, const cv::Mat& image,
+                            const Eigen::Quaterniond& q_cam_lastcam);
+  // Ends these tracks: the estimator has found them inconsistent.
+  void Drop(const std::vector<int32_t>& landmark_ids);
+  // Forgets all tracks; ids start again at 0 (a new map).
+  void Reset();
+
+  // Of the newest image: tracks that went on, and why the others ended.
+  struct Statistics {
+    int tracked = 0;
+    int lost_klt = 0;
+    int lost_backward = 0;
+    int lost_two_view = 0;
+    int added = 0;
+  };
+  const Statistics& statistics() const { return statistics_; }
+
+ private:
+  struct Feature {
+    int32_t id = 0;
+    cv::Point2f pixel;
+    Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+    std::unique_ptr<ReferencePatch> patch;  // null: to be taken anew
+  };
+  struct Bearing {
+    int32_t id;
+    Eigen::Vector2d ray;
+  };
+
+  void Prepare(const cv::Mat& image);
+  std::vector<Bearing> Bearings() const;
+  void TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam);
+  void AlignWithPatches(const cv::Mat& image);
+  void TakePatches(const cv::Mat& image);
+  void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
+  void AddFeatures();
+  std::vector<std::pair<float, cv::Point>> FindCorners(const cv::Rect& cell) const;
+  bool Inside(const cv::Point2f& pixel) const;
+  void FillFrame(int64_t utime);
+
+  CameraModel camera_;
+  TrackerOptions options_;
+  cv::Ptr<cv::CLAHE> equalizer_;
+  std::vector<cv::Mat> pyramid_;  // of the newest image
+  std::vector<cv::Mat> last_pyramid_;
+  std::vector<Feature> features_;  // oldest first
+  int32_t next_id_ = 0;
+  double strongest_ = 0;  // eigenvalue, running
+  Statistics statistics_;
+  TrackedFrame frame_;
+};
+
+}  // namespace pangea::vio

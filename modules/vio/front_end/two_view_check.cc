@@ -1,0 +1,170 @@
+#include "vio/front_end/two_view_check.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "core/rigid3.h"
+
+namespace pangea::vio {
+namespace {
+
+// Hypotheses and the first fits tolerate the gyro's bias: thresholds in multiples of inlier_px.
+constexpr double kHypothesisSlack = 3.0;
+constexpr double kFitSlack[] = {3.0, 1.5, 1.0, 1.0};
+constexpr size_t kMinTracks = 6;
+
+struct Tracks {
+  std::vector<Eigen::Vector3d> a;  // unit
+  std::vector<Eigen::Vector3d> b;  // unit
+};
+
+// Angle between ray b and the epipolar plane of (ray a rotated into b, translation), radians.
+double EpipolarError(const Eigen::Vector3d& a_in_b, const Eigen::Vector3d& b,
+                     const Eigen::Vector3d& t) {
+  const double length = t.cross(a_in_b).norm();
+  return length < 1e-6 ? 0.0 : t.dot(a_in_b.cross(b)) / length;
+}
+
+// Truncated squared error of a direction of translation.
+double Score(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen::Vector3d>& b,
+             const Eigen::Vector3d& t, double threshold) {
+  double score = 0;
+  for (size_t i = 0; i < b.size(); ++i) {
+    const double e = EpipolarError(a_in_b[i], b[i], t);
+    score += std::min(e * e, threshold * threshold);
+  }
+  return score;
+}
+
+Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
+                              const std::vector<Eigen::Vector3d>& b, double threshold,
+                              int iterations) {
+  std::mt19937_64 random(b.size());
+  std::uniform_int_distribution<size_t> pick(0, b.size() - 1);
+  Eigen::Vector3d best = Eigen::Vector3d::UnitX();
+  double best_score = std::numeric_limits<double>::max();
+  for (int k = 0; k < iterations; ++k) {
+    const size_t i = pick(random);
+    const size_t j = pick(random);
+    const Eigen::Vector3d t = a_in_b[i].cross(b[i]).cross(a_in_b[j].cross(b[j]));
+    const double length = t.norm();
+    if (i == j || length < 1e-12) {
+      continue;
+    }
+    const double score = Score(a_in_b, b, t / length, threshold);
+    if (score < best_score) {
+      best_score = score;
+      best = t / length;
+    }
+  }
+  return best;
+}
+
+// One Gauss-Newton step in rotation (left, frame b) and direction of translation on
+//   e = t . (R a x b) / |t x R a|,   de/dtheta = ((t.Ra) b - (Ra.b) t) / |t x R a|,
+// Cauchy weights at `threshold`, `from_gyro` as prior of the rotation.
+void FitStep(const Tracks& tracks, double threshold, double rotation_sigma, double noise,
+             const Eigen::Quaterniond& from_gyro, Eigen::Quaterniond* q, Eigen::Vector3d* t) {
+  const Eigen::Vector3d u = t->unitOrthogonal();
+  Eigen::Matrix<double, 3, 2> tangent;
+  tangent << u, t->cross(u);
+  Eigen::Matrix<double, 5, 5> h = Eigen::Matrix<double, 5, 5>::Identity() * 1e-9;
+  Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Zero();
+  for (size_t i = 0; i < tracks.a.size(); ++i) {
+    const Eigen::Vector3d a = *q * tracks.a[i];
+    const Eigen::Vector3d& b = tracks.b[i];
+    const double length = t->cross(a).norm();
+    if (length < 1e-6) {
+      continue;
+    }
+    const double e = t->dot(a.cross(b)) / length;
+    Eigen::Matrix<double, 5, 1> row;
+    row.head<3>() = (t->dot(a) * b - a.dot(b) * *t) / length;
+    row.tail<2>() = tangent.transpose() * a.cross(b) / length;
+    const double weight = 1.0 / (1.0 + e * e / (threshold * threshold));
+    h += weight * row * row.transpose();
+    g += weight * row * e;
+  }
+  const double prior = noise * noise / (rotation_sigma * rotation_sigma);
+  h.topLeftCorner<3, 3>() += prior * Eigen::Matrix3d::Identity();
+  g.head<3>() += prior * LogSo3(*q * from_gyro.conjugate());
+  // Where there is no parallax the direction is free: keep it where it is.
+  h.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() * noise * noise;
+  const Eigen::Matrix<double, 5, 1> step = -h.ldlt().solve(g);
+  *q = (ExpSo3(step.head<3>()) * *q).normalized();
+  *t = (*t + tangent * step.tail<2>()).normalized();
+}
+
+// Depth times baseline has the sign of (a x t) . (a x b), up to the sign of t: the side most points
+// are on is the front.
+void RejectBehind(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen::Vector3d>& b,
+                  const Eigen::Vector3d& t, double threshold, std::vector<bool>* inlier) {
+  std::vector<int> side(b.size(), 0);
+  int sum = 0;
+  for (size_t i = 0; i < b.size(); ++i) {
+    const Eigen::Vector3d parallax = a_in_b[i].cross(b[i]);
+    const double length = a_in_b[i].cross(t).norm();
+    // Too little parallax, or too near the epipole, to tell.
+    if (!(*inlier)[i] || parallax.norm() < 2.0 * threshold || length < 0.1) {
+      continue;
+    }
+    side[i] = parallax.dot(a_in_b[i].cross(t)) > 0 ? 1 : -1;
+    sum += side[i];
+  }
+  for (size_t i = 0; i < b.size(); ++i) {
+    if (side[i] * sum < 0) {
+      (*inlier)[i] = false;
+    }
+  }
+}
+
+std::vector<Eigen::Vector3d> Rotate(const Eigen::Quaterniond& q,
+                                    const std::vector<Eigen::Vector3d>& rays) {
+  std::vector<Eigen::Vector3d> rotated;
+  rotated.reserve(rays.size());
+  const Eigen::Matrix3d R = q.toRotationMatrix();
+  for (const Eigen::Vector3d& ray : rays) {
+    rotated.push_back(R * ray);
+  }
+  return rotated;
+}
+
+}  // namespace
+
+TwoViewResult CheckTwoView(const std::vector<Eigen::Vector2d>& rays_a,
+                           const std::vector<Eigen::Vector2d>& rays_b,
+                           const Eigen::Quaterniond& q_b_a, double pixel_angle,
+                           const TwoViewOptions& options) {
+  TwoViewResult result;
+  result.q_b_a = q_b_a;
+  result.inlier.assign(rays_a.size(), true);
+  result.num_inliers = static_cast<int>(rays_a.size());
+  if (rays_a.size() < kMinTracks) {
+    return result;
+  }
+  Tracks tracks;
+  for (size_t i = 0; i < rays_a.size(); ++i) {
+    tracks.a.push_back(rays_a[i].homogeneous().normalized());
+    tracks.b.push_back(rays_b[i].homogeneous().normalized());
+  }
+  const double threshold = options.inlier_px * pixel_angle;
+  Eigen::Vector3d t = BestDirection(Rotate(q_b_a, tracks.a), tracks.b, kHypothesisSlack * threshold,
+                                    options.iterations);
+  for (const double slack : kFitSlack) {
+    FitStep(tracks, slack * threshold, options.rotation_sigma, 0.3 * pixel_angle, q_b_a,
+            &result.q_b_a, &t);
+  }
+  const std::vector<Eigen::Vector3d> a_in_b = Rotate(result.q_b_a, tracks.a);
+  for (size_t i = 0; i < a_in_b.size(); ++i) {
+    result.inlier[i] = std::abs(EpipolarError(a_in_b[i], tracks.b[i], t)) < threshold;
+  }
+  RejectBehind(a_in_b, tracks.b, t, threshold, &result.inlier);
+  result.num_inliers =
+      static_cast<int>(std::count(result.inlier.begin(), result.inlier.end(), true));
+  return result;
+}
+
+}  // namespace pangea::vio

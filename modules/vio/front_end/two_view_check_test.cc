@@ -1,0 +1,106 @@
+#include "vio/front_end/two_view_check.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/rigid3.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr double kPixelAngle = 1.0 / 460;
+
+struct World {
+  std::vector<Eigen::Vector2d> a, b;
+  std::vector<bool> good;
+};
+
+// 120 points at 2 to 10 m seen from two poses with 0.3 px noise; `wrong` of them are moved by 3 to
+// 15 px in a random direction.
+World MakeWorld(const Eigen::Quaterniond& q_b_a, const Eigen::Vector3d& t_b_a, int wrong,
+                uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::normal_distribution<double> noise(0, 0.3 * kPixelAngle);
+  World world;
+  for (int i = 0; i < 120; ++i) {
+    const double depth = 6 + 4 * uniform(random);
+    const Eigen::Vector3d p_a(0.8 * uniform(random) * depth, 0.5 * uniform(random) * depth, depth);
+    const Eigen::Vector3d p_b = q_b_a * p_a + t_b_a;
+    Eigen::Vector2d b = p_b.hnormalized() + Eigen::Vector2d(noise(random), noise(random));
+    if (i < wrong) {
+      const double angle = 3.14159265 * uniform(random);
+      b += kPixelAngle * (9 + 6 * uniform(random)) * Eigen::Vector2d(cos(angle), sin(angle));
+    }
+    world.a.push_back(p_a.hnormalized());
+    world.b.push_back(b);
+    world.good.push_back(i >= wrong);
+  }
+  return world;
+}
+
+struct Rates {
+  double kept_good = 0;
+  double kept_wrong = 0;
+};
+
+Rates Judge(const World& world, const TwoViewResult& result) {
+  double good = 0, wrong = 0, kept_good = 0, kept_wrong = 0;
+  for (size_t i = 0; i < world.good.size(); ++i) {
+    (world.good[i] ? good : wrong) += 1;
+    (world.good[i] ? kept_good : kept_wrong) += result.inlier[i] ? 1 : 0;
+  }
+  return {kept_good / good, wrong > 0 ? kept_wrong / wrong : 0};
+}
+
+const Eigen::Quaterniond kTurn = ExpSo3({0.02, -0.03, 0.05});
+// The gyro's bias over 50 ms, before anybody knows it.
+const Eigen::Quaterniond kBias = ExpSo3({0.001, 0.002, -0.004});
+
+TEST(TwoViewCheck, SeparatesOutliersWhenMoving) {
+  const World world = MakeWorld(kTurn, {0.1, 0.02, 0.05}, 36, 1);
+  const Rates rates = Judge(world, CheckTwoView(world.a, world.b, kBias * kTurn, kPixelAngle, {}));
+  EXPECT_GT(rates.kept_good, 0.95);
+  // A third of wrong tracks may run along its epipolar line, where two views cannot tell.
+  EXPECT_LT(rates.kept_wrong, 0.35);
+}
+
+TEST(TwoViewCheck, KeepsEverythingGoodAtStandstill) {
+  const World world = MakeWorld(Eigen::Quaterniond::Identity(), {0, 0, 0}, 20, 2);
+  const Rates rates =
+      Judge(world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
+  EXPECT_GT(rates.kept_good, 0.97);
+  EXPECT_LT(rates.kept_wrong, 0.4);
+}
+
+TEST(TwoViewCheck, KeepsEverythingGoodInPureRotation) {
+  const World world = MakeWorld(kTurn, {0, 0, 0}, 0, 3);
+  const TwoViewResult result = CheckTwoView(world.a, world.b, kBias * kTurn, kPixelAngle, {});
+  EXPECT_GT(Judge(world, result).kept_good, 0.97);
+  // The bias is seen: the rotation is the true one, not the gyro's.
+  EXPECT_LT(result.q_b_a.angularDistance(kTurn), 3e-4);
+}
+
+TEST(TwoViewCheck, RejectsPointsThatRunBackwards) {
+  World world = MakeWorld(Eigen::Quaterniond::Identity(), {0.15, 0, 0}, 0, 4);
+  for (int i = 0; i < 20; ++i) {
+    world.b[i] = world.a[i] - (world.b[i] - world.a[i]);
+    world.good[i] = false;
+  }
+  const Rates rates =
+      Judge(world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
+  EXPECT_GT(rates.kept_good, 0.95);
+  EXPECT_LT(rates.kept_wrong, 0.1);
+}
+
+TEST(TwoViewCheck, AHandfulOfTracksIsKept) {
+  const World world = MakeWorld(kTurn, {0.1, 0, 0}, 0, 5);
+  const std::vector<Eigen::Vector2d> a(world.a.begin(), world.a.begin() + 4);
+  const std::vector<Eigen::Vector2d> b(world.b.begin(), world.b.begin() + 4);
+  EXPECT_EQ(CheckTwoView(a, b, kTurn, kPixelAngle, {}).num_inliers, 4);
+  EXPECT_EQ(CheckTwoView({}, {}, kTurn, kPixelAngle, {}).num_inliers, 0);
+}
+
+}  // namespace
+}  // namespace pangea::vio

@@ -1,0 +1,83 @@
+#include "vio/imu/imu_buffer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "vio/imu/imu_noise.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr int64_t kMaxGap_us = 300'000;
+constexpr int64_t kMargin_us = 50'000;  // for changes of the time offset
+constexpr size_t kMinKept = 100;        // to tell a rest, or the noise, by
+constexpr std::ptrdiff_t kNoiseSamples = 100;
+
+}  // namespace
+
+void ImuBuffer::Add(std::span<const ImuSample> samples) {
+  samples_.insert(samples_.end(), samples.begin(), samples.end());
+}
+
+void ImuBuffer::Forget(int64_t before_utime) {
+  size_t old = 0;
+  while (samples_.size() - old > kMinKept && samples_[old + 1].utime < before_utime - kMargin_us) {
+    ++old;
+  }
+  samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(old));
+}
+
+std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) const {
+  bool any = false;
+  for (size_t i = 0; i + 1 < samples_.size(); ++i) {
+    const ImuSample& a = samples_[i];
+    const ImuSample& b = samples_[i + 1];
+    if (b.utime <= from_utime || a.utime >= to_utime) {
+      continue;
+    }
+    any = true;
+    if (b.utime - a.utime > kMaxGap_us) {
+      return fmt::format("the inertial samples have a gap of {:.2f} s",
+                         1e-6 * static_cast<double>(b.utime - a.utime));
+    }
+  }
+  if (!any || samples_.back().utime < to_utime - kMargin_us) {
+    return "no inertial samples up to the image's time";
+  }
+  return std::nullopt;
+}
+
+ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
+                                          const ImuScales& scales, const Eigen::Vector3d& gyro_bias,
+                                          const Eigen::Vector3d& accel_bias) const {
+  // The time offset may want a little more than has come: the last sample holds.
+  return IntegrateScaled(SamplesBetween(samples_, from_utime, to_utime),
+                         NoiseAround(from_utime, to_utime), scales, gyro_bias, accel_bias);
+}
+
+// Measured on the span, or on as much before its end as tells the noise.
+ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
+  const auto before = [](int64_t utime) {
+    return [utime](const ImuSample& sample) { return sample.utime <= utime; };
+  };
+  const auto begin = std::partition_point(samples_.begin(), samples_.end(), before(from_utime));
+  const auto end = std::partition_point(samples_.begin(), samples_.end(), before(to_utime));
+  const auto enough = end - std::min<std::ptrdiff_t>(kNoiseSamples, end - samples_.begin());
+  const std::vector<ImuSample> around(std::min(begin, enough), end);
+  return MeasuredNoise(noise_, around);
+}
+
+const ImuSample& ImuBuffer::At(int64_t utime) const {
+  const auto sample =
+      std::partition_point(samples_.begin(), samples_.end(),
+                           [utime](const ImuSample& one) { return one.utime < utime; });
+  return sample == samples_.end() ? samples_.back() : *sample;
+}
+
+std::vector<ImuSample> ImuBuffer::Latest(size_t count) const {
+  const size_t kept = std::min(count, samples_.size());
+  return {samples_.end() - static_cast<std::ptrdiff_t>(kept), samples_.end()};
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,72 @@
+#include "vio/imu/imu_buffer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "vio/window/window_test_world.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+constexpr int64_t kFirst_us = 1'000'000;
+
+ImuBuffer Filled(int count) {
+  ImuBuffer buffer(ImuNoise{});
+  buffer.Add(TestSamples(count, kFirst_us, 1));  // 5 ms apart
+  return buffer;
+}
+
+TEST(ImuBuffer, IntegratesExactlyTheSpan) {
+  const ImuBuffer buffer = Filled(100);
+  const Vector3d bg(0.01, 0, 0), ba(0, 0.1, 0);
+  const Preintegration whole =
+      buffer.Integrate(kFirst_us + 12'000, kFirst_us + 93'000, {}, bg, ba).measured;
+  EXPECT_NEAR(whole.duration_s, 0.081, 1e-12);
+  // Two parts make the whole.
+  const Preintegration a =
+      buffer.Integrate(kFirst_us + 12'000, kFirst_us + 50'000, {}, bg, ba).measured;
+  const Preintegration b =
+      buffer.Integrate(kFirst_us + 50'000, kFirst_us + 93'000, {}, bg, ba).measured;
+  EXPECT_LT((a.delta_v + a.delta_q * b.delta_v - whole.delta_v).norm(), 1e-9);
+  EXPECT_LT(LogSo3((a.delta_q * b.delta_q).conjugate() * whole.delta_q).norm(), 1e-9);
+}
+
+TEST(ImuBuffer, TheLastSampleHoldsALittleLonger) {
+  const ImuBuffer buffer = Filled(100);
+  const int64_t last = kFirst_us + 99 * 5'000;
+  const Preintegration span =
+      buffer.Integrate(last - 10'000, last + 3'000, {}, Vector3d::Zero(), Vector3d::Zero())
+          .measured;
+  EXPECT_NEAR(span.duration_s, 0.013, 1e-12);
+  EXPECT_EQ(buffer.At(last + 3'000).utime, last);
+  EXPECT_EQ(buffer.At(last - 7'000).utime, last - 5'000);
+}
+
+TEST(ImuBuffer, NamesWhatIsMissing) {
+  ImuBuffer buffer = Filled(100);
+  const int64_t last = kFirst_us + 99 * 5'000;
+  EXPECT_FALSE(buffer.Gap(kFirst_us, last));
+  EXPECT_THAT(buffer.Gap(kFirst_us, last + 200'000).value(), HasSubstr("no inertial samples"));
+  EXPECT_THAT(buffer.Gap(last + 1, last + 10'000).value(), HasSubstr("no inertial samples"));
+  buffer.Add(TestSamples(100, last + 400'000, 2));
+  EXPECT_THAT(buffer.Gap(kFirst_us, last + 500'000).value(), HasSubstr("gap of 0.40 s"));
+  EXPECT_FALSE(buffer.Gap(last + 400'000, last + 500'000));
+}
+
+TEST(ImuBuffer, ForgetsButForAMarginAndTheNewest) {
+  ImuBuffer buffer = Filled(200);
+  buffer.Forget(kFirst_us + 500'000);
+  const auto all = buffer.Latest(1000);
+  EXPECT_LE(all.front().utime, kFirst_us + 450'000);
+  EXPECT_GE(all.front().utime, kFirst_us + 440'000);
+  buffer.Forget(kFirst_us + 100'000'000);
+  EXPECT_EQ(buffer.Latest(1000).size(), 100u);
+  EXPECT_EQ(buffer.Latest(20).size(), 20u);
+  EXPECT_EQ(buffer.Latest(20).back().utime, kFirst_us + 199 * 5'000);
+}
+
+}  // namespace
+}  // namespace pangea::vio

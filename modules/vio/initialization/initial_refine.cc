@@ -1,0 +1,142 @@
+// Bundle adjustment of the start-up window.
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/imu/preintegration.h"
+#include "vio/initialization/initial_solution.h"
+#include "vio/initialization/start_problem.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kInlierSigmas = 4.0;
+constexpr double kMaxDistance = 200;  // m, of a point: beyond it the start's baseline says nothing
+// A point straight ahead may be anywhere along its ray, and one such leaves all unknowns without a
+// covariance. So each is held to the closed-form solution, by this many times its distance.
+constexpr double kPointPrior = 10;
+constexpr double kMinDepth = 0.1;  // m, of a point before a camera that saw it
+// The closed form is too small where noise is large beside the motion's changes, and scale is a
+// long flat valley: fewer iterations end half way up it, where the covariance is smaller.
+constexpr int kMaxIterations = 100;
+
+void AddStates(const Quaterniond& q_odom_first, const LinearStart& start, StartProblem* problem) {
+  for (size_t k = 0; k < start.T_first_body.size(); ++k) {
+    ImuState state;
+    state.T_odom_body = Rigid3(q_odom_first, Vector3d::Zero()) * start.T_first_body[k];
+    state.v_odom_body = q_odom_first * start.v_first_body[k];
+    state.gyro_bias = problem->expected_gyro_bias;
+    problem->states.push_back(state);
+  }
+}
+
+void AddLinks(std::span<const StartFrame> frames, const ImuNoise& noise, StartProblem* problem) {
+  for (size_t k = 1; k < frames.size(); ++k) {
+    Preintegrator integrator(noise, problem->expected_gyro_bias, Vector3d::Zero());
+    integrator.Add(frames[k].imu);
+    StartLink link{integrator.result(), {}};
+    // Keeps a span of a single sample invertible: positions to 1 micrometre.
+    link.measured.covariance.diagonal().array() += 1e-12;
+    link.information =
+        link.measured.covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity());
+    problem->links.push_back(link);
+  }
+}
+
+// A ray counts where its point is before the camera. Returns how many rays there are, counted or
+// not.
+int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_first,
+              const LinearStart& start, StartProblem* problem) {
+  std::map<int32_t, StartPoint> points;
+  int rays = 0;
+  for (size_t k = 0; k < frames.size(); ++k) {
+    const Rigid3 T_cam_odom = (problem->states[k].T_odom_body * problem->T_body_cam).Inverse();
+    for (const auto& [id, ray] : frames[k].rays) {
+      const auto found = start.p_first.find(id);
+      if (found == start.p_first.end() || found->second.norm() > kMaxDistance) {
+        continue;
+      }
+      ++rays;
+      const Vector3d p_odom = q_odom_first * found->second;
+      if (!((T_cam_odom * p_odom).z() > kMinDepth)) {
+        continue;
+      }
+      StartPoint& point = points[id];
+      if (point.rays.empty()) {
+        point.p_odom = point.expected = p_odom;
+        point.expected_sigma = kPointPrior * (1 + p_odom.norm());
+      }
+      point.rays.push_back({static_cast<int>(k), ray});
+    }
+  }
+  for (const auto& [id, point] : points) {
+    problem->points.push_back(point);
+  }
+  return rays;
+}
+
+void SumUpRays(const StartProblem& problem, int rays, RefinedStart* out) {
+  double sum = 0;
+  int inliers = 0;
+  for (const StartPoint& point : problem.points) {
+    for (const StartRay& seen : point.rays) {
+      const double error = problem.RayError(point, seen);
+      if (error < kInlierSigmas) {
+        ++inliers;
+        sum += error * error;
+      }
+    }
+  }
+  out->inlier_share = rays > 0 ? static_cast<double>(inliers) / rays : 0;
+  out->rms_sigma = inliers > 0 ? std::sqrt(sum / (2.0 * inliers)) : 1e9;
+}
+
+}  // namespace
+
+std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                                   const ImuNoise& noise, const Vector3d& gyro_bias,
+                                   const LinearStart& start, double ray_sigma) {
+  StartProblem problem;
+  problem.T_body_cam = T_body_cam;
+  problem.ray_sigma = ray_sigma;
+  problem.expected_gyro_bias = gyro_bias;
+  const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
+  AddStates(q_odom_first, start, &problem);
+  AddLinks(frames, noise, &problem);
+  const int rays = AddPoints(frames, q_odom_first, start, &problem);
+  RefinedStart out;
+  int before_camera = 0;
+  for (const StartPoint& point : problem.points) {
+    before_camera += static_cast<int>(point.rays.size());
+  }
+  out.inlier_share = rays > 0 ? static_cast<double>(before_camera) / rays : 0;
+  if (out.inlier_share < kMinInlierShare) {
+    return out;  // what is behind the cameras stays there: nothing to be gained by refining
+  }
+  if (!problem.Optimise(kMaxIterations)) {
+    return std::nullopt;
+  }
+  const auto covariance = problem.NewestCovariance();
+  if (!covariance) {
+    return std::nullopt;
+  }
+  SumUpRays(problem, rays, &out);
+  out.states = problem.states;
+  for (ImuState& state : out.states) {
+    state.T_odom_body.t -= problem.states.back().T_odom_body.t;
+  }
+  out.tilt_sigma = std::sqrt(std::max((*covariance)(0, 0), (*covariance)(1, 1)));
+  out.velocity_sigma = std::sqrt(
+      Eigen::SelfAdjointEigenSolver<Matrix3d>(Matrix3d(covariance->bottomRightCorner<3, 3>()))
+          .eigenvalues()[2]);
+  return out;
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,220 @@
+#include "vio/initialization/initialiser.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/imu/preintegration.h"
+#include "core/median.h"
+#include "vio/imu/imu_noise.h"
+#include "vio/initialization/initial_solution.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
+constexpr double kMinSpan_s = 1.0;        // shortest start-up window, and
+constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgotten
+constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
+constexpr size_t kMinTracks = 20;
+
+// What an accelerometer shows over a second or more, however it is moved by hand or flown: about
+// gravity. Far less is a dead sensor or one in units of g, far more one in other units.
+constexpr double kMinMeanAccel = 4;   // m/s^2
+constexpr double kMaxMeanAccel = 25;  // m/s^2
+
+// At rest: the image stands, the accelerometer and the gyro are quiet.
+constexpr double kRestSpan_s = 1.0;
+constexpr double kRestSigmas = 2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
+constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
+constexpr double kRestGyro = 0.03;   // rad/s
+
+// A moving start must be at least this certain and explain this much.
+constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
+constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
+constexpr double kMaxTiltSigma = 0.035;     // rad
+constexpr double kMaxRmsSigmas = 1.8;
+constexpr double kMaxAccelBias = 0.8;  // m/s^2
+
+double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
+  std::vector<double> displacement;
+  for (const Observation& first : a.observations) {
+    for (const Observation& second : b.observations) {
+      if (first.landmark_id == second.landmark_id) {
+        displacement.push_back((first.pixel - second.pixel).norm());
+      }
+    }
+  }
+  *shared = displacement.size();
+  if (displacement.empty()) {
+    return 1e9;
+  }
+  return Median(std::move(displacement));
+}
+
+double SpanSeconds(int64_t from_utime, int64_t to_utime) {
+  return 1e-6 * static_cast<double>(to_utime - from_utime);
+}
+
+double MeanMagnitude(const std::vector<ImuSample>& samples) {
+  double sum = 0;
+  for (const ImuSample& sample : samples) {
+    sum += sample.accel.norm();
+  }
+  return sum / static_cast<double>(samples.size());
+}
+
+}  // namespace
+
+Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)
+    : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma) {}
+
+InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
+  samples_.insert(samples_.end(), imu.begin(), imu.end());
+  if (samples_.empty() || samples_.back().utime < frame.utime) {
+    return {std::nullopt, "no inertial samples up to the image's time"};
+  }
+  if (!frames_.empty() && SpanSeconds(frames_.back().utime, frame.utime) < kFrameSpacing_s) {
+    return {std::nullopt, why_not_};
+  }
+  frames_.push_back(frame);
+  while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
+    frames_.erase(frames_.begin());
+  }
+  std::erase_if(samples_, [&](const ImuSample& sample) {
+    return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
+  });
+  InitialResult result = Try();
+  why_not_ = result.reason;
+  return result;
+}
+
+InitialResult Initialiser::Try() {
+  const double span = SpanSeconds(frames_.front().utime, frames_.back().utime);
+  if (span < kMinSpan_s) {
+    return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
+  }
+  const double accel = MeanMagnitude(samples_);
+  if (!(accel > kMinMeanAccel && accel < kMaxMeanAccel)) {
+    return {std::nullopt,
+            fmt::format("the accelerometer shows {:.2f} m/s^2 on average, where gravity is {:.1f}",
+                        accel, kGravity)};
+  }
+  if (auto at_rest = TryAtRest()) {
+    return {at_rest, ""};
+  }
+  return TryMoving();
+}
+
+std::optional<InitialState> Initialiser::TryAtRest() const {
+  const int64_t now = frames_.back().utime;
+  const auto oldest = std::find_if(frames_.begin(), frames_.end(), [now](const TrackedFrame& one) {
+    return SpanSeconds(one.utime, now) <= kRestSpan_s + kFrameSpacing_s;
+  });
+  const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
+  size_t shared = 0;
+  const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);
+  if (samples.size() < 20 || shared < kMinTracks || moved > kRestSigmas * pixel_sigma_) {
+    return std::nullopt;
+  }
+  const SampleMoments moments = MomentsOf(samples);
+  if (moments.accel_variance > kRestAccel * kRestAccel ||
+      moments.gyro_variance > kRestGyro * kRestGyro) {
+    return std::nullopt;
+  }
+  InitialState state;
+  state.at_rest = true;
+  ImuState imu;
+  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
+  imu.gyro_bias = moments.gyro_mean;
+  state.frames.push_back({frames_.back(), imu});
+  // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
+  Eigen::Matrix<double, 15, 1> sigma;
+  constexpr double kAccelBiasSigma = 0.1;
+  sigma << Vector3d(kAccelBiasSigma / kGravity, kAccelBiasSigma / kGravity, 1e-4),
+      Vector3d::Constant(1e-4), Vector3d::Constant(0.01), Vector3d::Constant(0.002),
+      Vector3d::Constant(kAccelBiasSigma);
+  state.covariance = sigma.cwiseAbs2().asDiagonal();
+  return state;
+}
+
+std::vector<StartFrame> Initialiser::StartFrames() const {
+  const int64_t shift = std::llround(1e6 * time_offset_change_s_);
+  std::vector<StartFrame> frames;
+  for (const TrackedFrame& frame : frames_) {
+    StartFrame start;
+    start.utime = frame.utime + shift;
+    if (!frames.empty()) {
+      start.imu = SamplesBetween(samples_, frames.back().utime, start.utime);
+    }
+    for (const Observation& observation : frame.observations) {
+      start.rays[observation.landmark_id] = observation.ray;
+    }
+    frames.push_back(std::move(start));
+  }
+  return frames;
+}
+
+InitialResult Initialiser::TryMoving() {
+  const std::vector<StartFrame> frames = StartFrames();
+  InitialResult result = TryMoving(frames);
+  if (result.state || !result.contradicts) {
+    return result;
+  }
+  // The clocks may be further apart than the calibration says.
+  const auto offset = SolveTimeOffset(frames, camera_.T_body_cam, samples_, noise_);
+  if (!offset) {
+    return result;
+  }
+  time_offset_change_s_ += *offset;
+  return TryMoving(StartFrames());
+}
+
+InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) const {
+  const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
+  if (!gyro_bias) {
+    return {std::nullopt, "too few features are tracked from image to image"};
+  }
+  const auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
+  if (!linear) {
+    return {std::nullopt, "the motion does not determine velocity and gravity yet"};
+  }
+  const ImuNoise noise = MeasuredNoise(noise_, samples_);
+  const auto refined = Refine(frames, camera_.T_body_cam, noise, *gyro_bias, *linear,
+                              pixel_sigma_ * camera_.PixelAngle());
+  if (!refined) {
+    return {std::nullopt, "the start-up bundle adjustment did not converge"};
+  }
+  if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
+    return {std::nullopt,
+            fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
+                        100 * refined->inlier_share, refined->rms_sigma),
+            true};
+  }
+  // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
+  // certain, if certainty were asked for in metres per second.
+  const double speed = refined->states.back().v_odom_body.norm();
+  const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
+  if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {
+    return {
+        std::nullopt,
+        fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
+                    refined->velocity_sigma, refined->tilt_sigma * 57.3)};
+  }
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias) {
+    return {std::nullopt, "the start needs an implausible accelerometer bias"};
+  }
+  InitialState state;
+  state.time_offset_change_s = time_offset_change_s_;
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    state.frames.push_back({frames_[i], refined->states[i]});
+  }
+  return {state, ""};
+}
+
+}  // namespace pangea::vio

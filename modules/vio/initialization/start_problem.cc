@@ -1,0 +1,280 @@
+#include "vio/initialization/start_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using Equations = StartProblem::Equations;
+
+constexpr double kGyroBiasSigma = 0.02;   // rad/s, about the epipolar solution
+constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
+constexpr double kHeld = 1e-8;            // rad^2, m^2: the first frame's yaw and position
+constexpr double kHuber = 2.0;            // sigmas
+constexpr double kMinDepth = 0.05;        // m
+// A step that promises less than this of the cost (a half is one sigma of one direction) is the
+// last.
+constexpr double kEnough = 1e-3;
+constexpr int kMaxRetries = 8;
+// Likewise of a point for itself.
+constexpr double kPointEnough = 1e-4;
+constexpr int kPointIterations = 3;
+constexpr double kMaxRetreat = 0.9;  // of an inverse depth, in one step: ten times as far
+
+double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
+double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
+
+// A ray's residual in sigmas, and its derivatives by the frame's pose and by the point in odom.
+struct RayTerm {
+  Vector2d r;
+  Eigen::Matrix<double, 2, kPoseSize> J_pose;
+  Eigen::Matrix<double, 2, 3> J_point;
+};
+
+// The point in the camera of a frame.
+Vector3d InCamera(const StartProblem& problem, int frame, const Vector3d& p_odom) {
+  const Rigid3& T = problem.states[frame].T_odom_body;
+  return problem.T_body_cam.Inverse() * (T.q.conjugate() * (p_odom - T.t));
+}
+
+double RayErrorOf(const StartProblem& problem, const StartRay& seen, const Vector3d& p_odom) {
+  const Vector3d y = InCamera(problem, seen.frame, p_odom);
+  return y.z() > kMinDepth ? (y.head<2>() / y.z() - seen.ray).norm() / problem.ray_sigma
+                           : std::numeric_limits<double>::infinity();
+}
+
+double PointCost(const StartProblem& problem, const StartPoint& point, const Vector3d& p_odom) {
+  const double sigma = point.expected_sigma;
+  double cost = 0.5 * (p_odom - point.expected).squaredNorm() / (sigma * sigma);
+  for (const StartRay& seen : point.rays) {
+    cost += HuberCost(RayErrorOf(problem, seen, p_odom));
+  }
+  return cost;
+}
+
+RayTerm LineariseRay(const StartProblem& problem, const StartRay& seen, const Vector3d& p_odom) {
+  const Vector3d y = InCamera(problem, seen.frame, p_odom);
+  const double inv = 1 / y.z();
+  Eigen::Matrix<double, 2, 3> J;
+  J << inv, 0, -y.x() * inv * inv, 0, inv, -y.y() * inv * inv;
+  RayTerm term;
+  term.r = (y.head<2>() * inv - seen.ray) / problem.ray_sigma;
+  term.J_point = J *
+                 (problem.states[seen.frame].T_odom_body.q * problem.T_body_cam.q)
+                     .conjugate()
+                     .toRotationMatrix() /
+                 problem.ray_sigma;
+  term.J_pose << term.J_point * Hat(p_odom), -term.J_point;
+  const double root = std::sqrt(HuberWeight(term.r.norm()));
+  term.r *= root;
+  term.J_point *= root;
+  term.J_pose *= root;
+  return term;
+}
+
+Equations::Elimination AddPoint(const StartProblem& problem, const StartPoint& point,
+                                double damping, Equations* out) {
+  const int first = point.rays.front().frame;
+  const int columns = kPoseSize * (point.rays.back().frame - first + 1);
+  const double prior = 1 / (point.expected_sigma * point.expected_sigma);
+  Matrix3d V = prior * Matrix3d::Identity();
+  Vector3d g_point = prior * (point.p_odom - point.expected);
+  Eigen::Matrix<double, 3, Eigen::Dynamic> W(3, columns);
+  W.setZero();
+  for (const StartRay& seen : point.rays) {
+    const RayTerm term = LineariseRay(problem, seen, point.p_odom);
+    const int at = problem.PoseColumn(seen.frame);
+    out->H.block<kPoseSize, kPoseSize>(at, at) += term.J_pose.transpose() * term.J_pose;
+    out->g.segment<kPoseSize>(at) += term.J_pose.transpose() * term.r;
+    W.middleCols<kPoseSize>(kPoseSize * (seen.frame - first)) =
+        term.J_point.transpose() * term.J_pose;
+    V += term.J_point.transpose() * term.J_point;
+    g_point += term.J_point.transpose() * term.r;
+  }
+  V.diagonal() *= 1 + damping;
+  // With V = L L^T, what is left is H - S^T S, S = L^-1 W.
+  const Eigen::LLT<Matrix3d> llt(V);
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> S = llt.matrixL().solve(W);
+  const Vector3d d = llt.matrixL().solve(g_point);
+  const int at = problem.PoseColumn(first);
+  for (int c = 0; c < columns; ++c) {
+    out->H.col(at + c).segment(at + c, columns - c).noalias() -=
+        S.rightCols(columns - c).transpose().lazyProduct(S.col(c));
+  }
+  out->g.segment(at, columns).noalias() -= S.transpose() * d;
+  return {first, -llt.matrixU().solve(d), -llt.matrixU().solve(S)};
+}
+
+// Moves a point to where its rays want it, from where it is or from `offered`, the better of the
+// two; by inverse depth in the camera that saw it first, in which rays are nearly linear.
+void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* point) {
+  double cost = PointCost(problem, *point, point->p_odom);
+  const auto improve = [&](const Vector3d& p_odom) {
+    const double new_cost = PointCost(problem, *point, p_odom);
+    if (new_cost < cost) {
+      cost = new_cost;
+      point->p_odom = p_odom;
+      return true;
+    }
+    return false;
+  };
+  improve(offered);
+  const Vector3d centre =
+      problem.states[point->rays.front().frame].T_odom_body * problem.T_body_cam.t;
+  for (int iteration = 0; iteration < kPointIterations && std::isfinite(cost); ++iteration) {
+    const double prior = 1 / (point->expected_sigma * point->expected_sigma);
+    Matrix3d V = prior * Matrix3d::Identity();
+    Vector3d g = prior * (point->p_odom - point->expected);
+    for (const StartRay& seen : point->rays) {
+      const RayTerm term = LineariseRay(problem, seen, point->p_odom);
+      V += term.J_point.transpose() * term.J_point;
+      g += term.J_point.transpose() * term.r;
+    }
+    const Vector3d step = -V.llt().solve(g);
+    if (-0.5 * g.dot(step) < kPointEnough) {
+      return;
+    }
+    const Vector3d r = point->p_odom - centre;
+    const double along = r.dot(step) / r.squaredNorm();
+    if (!improve(centre + (r + step - along * r) / (1 - std::min(along, kMaxRetreat)))) {
+      return;
+    }
+  }
+}
+
+void AddLink(const StartProblem& problem, int from, Equations* out) {
+  const StartLink& link = problem.links[from];
+  const InertialResidual residual =
+      ComputeInertialResidual(link.measured, problem.states[from], problem.states[from + 1]);
+  constexpr int kColumns = 24;
+  Eigen::Matrix<double, 9, kColumns> J;
+  J << residual.J_from.block<9, 6>(0, kGyroBias), residual.J_from.block<9, kPoseSize>(0, kTheta),
+      residual.J_to.block<9, kPoseSize>(0, kTheta), residual.J_from.block<9, 3>(0, kVelocity),
+      residual.J_to.block<9, 3>(0, kVelocity);
+  std::array<int, kColumns> columns{};
+  std::iota(columns.begin(), columns.begin() + 6, 0);
+  std::iota(columns.begin() + 6, columns.begin() + 18, problem.PoseColumn(from));
+  std::iota(columns.begin() + 18, columns.end(), problem.VelocityColumn(from));
+  const Eigen::Matrix<double, kColumns, 9> JtL = J.transpose() * link.information;
+  out->H(columns, columns) += JtL * J;
+  out->g(columns) += JtL * residual.r.head<9>();
+}
+
+}  // namespace
+
+double StartProblem::Cost() const {
+  double cost = 0.5 * (states[0].gyro_bias - expected_gyro_bias).squaredNorm() /
+                    (kGyroBiasSigma * kGyroBiasSigma) +
+                0.5 * states[0].accel_bias.squaredNorm() / (kAccelBiasSigma * kAccelBiasSigma);
+  for (size_t i = 0; i < links.size(); ++i) {
+    const Eigen::Matrix<double, 9, 1> r =
+        ComputeInertialResidual(links[i].measured, states[i], states[i + 1]).r.head<9>();
+    cost += 0.5 * r.dot(links[i].information * r);
+  }
+  for (const StartPoint& point : points) {
+    cost += PointCost(*this, point, point.p_odom);
+  }
+  return cost;
+}
+
+double StartProblem::RayError(const StartPoint& point, const StartRay& seen) const {
+  return RayErrorOf(*this, seen, point.p_odom);
+}
+
+Equations StartProblem::Linearise(double damping) const {
+  Equations out;
+  out.H.setZero(size(), size());
+  out.g.setZero(size());
+  out.H.diagonal().head<3>().setConstant(1 / (kGyroBiasSigma * kGyroBiasSigma));
+  out.H.diagonal().segment<3>(3).setConstant(1 / (kAccelBiasSigma * kAccelBiasSigma));
+  out.g.head<3>() = (states[0].gyro_bias - expected_gyro_bias) / (kGyroBiasSigma * kGyroBiasSigma);
+  out.g.segment<3>(3) = states[0].accel_bias / (kAccelBiasSigma * kAccelBiasSigma);
+  out.H.diagonal().segment<4>(PoseColumn(0) + 2).setConstant(1 / kHeld);
+  for (int i = 0; i < static_cast<int>(links.size()); ++i) {
+    AddLink(*this, i, &out);
+  }
+  for (const StartPoint& point : points) {
+    out.eliminations.push_back(AddPoint(*this, point, damping, &out));
+  }
+  return out;
+}
+
+void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
+  for (int i = 0; i < static_cast<int>(states.size()); ++i) {
+    ImuState& state = states[i];
+    const Eigen::Quaterniond turn = ExpSo3(step.segment<3>(PoseColumn(i) + kTheta));
+    state.T_odom_body.q = (turn * state.T_odom_body.q).normalized();
+    state.T_odom_body.t = turn * state.T_odom_body.t + step.segment<3>(PoseColumn(i) + kPosition);
+    state.v_odom_body = turn * state.v_odom_body + step.segment<3>(VelocityColumn(i));
+    state.gyro_bias += step.head<3>();
+    state.accel_bias += step.segment<3>(3);
+  }
+  for (size_t i = 0; i < points.size(); ++i) {
+    const auto& [first, offset, gain] = equations.eliminations[i];
+    Settle(*this, points[i].p_odom + offset + gain * step.segment(PoseColumn(first), gain.cols()),
+           &points[i]);
+  }
+}
+
+bool StartProblem::Optimise(int max_iterations) {
+  double damping = 0;
+  double cost = Cost();
+  for (int iteration = 0, retries = 0; iteration < max_iterations; ++iteration) {
+    const Equations equations = Linearise(damping);
+    // The units differ by orders of magnitude.
+    const VectorXd scale = equations.H.diagonal().cwiseSqrt().cwiseInverse();
+    MatrixXd H = scale.asDiagonal() * equations.H * scale.asDiagonal();
+    H.diagonal().array() += damping;
+    const VectorXd step =
+        -(scale.asDiagonal() * H.llt().solve(scale.asDiagonal() * equations.g)).eval();
+    StartProblem moved = *this;
+    moved.Retract(equations, step);
+    const double new_cost = moved.Cost();
+    if (new_cost <= cost + 1e-9 * (1 + cost)) {
+      const bool is_last = damping == 0 && -0.5 * equations.g.dot(step) < kEnough;
+      *this = std::move(moved);
+      cost = new_cost;
+      damping = damping < 1e-5 ? 0 : 0.1 * damping;
+      retries = 0;
+      if (is_last) {
+        return true;
+      }
+    } else if (++retries > kMaxRetries) {
+      return false;
+    } else {
+      damping = damping == 0 ? 1e-4 : 10 * damping;
+    }
+  }
+  return true;
+}
+
+std::optional<Matrix6d> StartProblem::NewestCovariance() const {
+  const MatrixXd H = Linearise(0).H;
+  const VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * H * scale.asDiagonal());
+  if (llt.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  const int newest = static_cast<int>(states.size()) - 1;
+  // The newest (dtheta, dv), dv = xi_v + dtheta x v, by the error.
+  MatrixXd J = MatrixXd::Zero(size(), 6);
+  J.block<3, 3>(PoseColumn(newest) + kTheta, 0).setIdentity();
+  J.block<3, 3>(PoseColumn(newest) + kTheta, 3) = Hat(states[newest].v_odom_body);
+  J.block<3, 3>(VelocityColumn(newest), 3).setIdentity();
+  const MatrixXd half = llt.matrixL().solve(scale.asDiagonal() * J);
+  const Matrix6d covariance = half.transpose() * half;
+  return covariance.allFinite() ? std::optional(covariance) : std::nullopt;
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,85 @@
+#pragma once
+
+// The start-up window as a least-squares problem: rays of points, inertial measurements between
+// consecutive frames, one pair of biases for all of them with weak priors. The first frame's
+// position and yaw are held.
+//
+// Points are eliminated one by one (Schur complement). They are plain points of odom, so that a
+// change of scale is a straight line: scale is the long valley of a start. What is far away does
+// not step straight; so after each step of the frames every point settles where its rays want it
+// ("embedded point iterations": Jeong et al., CVPR 2010). A handful of steps does. Errors of frames
+// are right-invariant (window_state.h).
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/imu/preintegration.h"
+#include "core/rigid3.h"
+#include "vio/window/window_state.h"
+
+namespace pangea::vio {
+
+struct StartRay {
+  int frame = 0;
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+};
+
+struct StartPoint {
+  Eigen::Vector3d p_odom = Eigen::Vector3d::Zero();
+  Eigen::Vector3d expected = Eigen::Vector3d::Zero();  // in odom, and how well
+  double expected_sigma = 0;                           // m
+  std::vector<StartRay> rays;                          // frames in order
+};
+
+struct StartLink {
+  Preintegration measured;
+  Eigen::Matrix<double, 9, 9> information;  // order (rotation, velocity, position)
+};
+
+class StartProblem {
+ public:
+  Rigid3 T_body_cam;
+  double ray_sigma = 0;
+  std::vector<ImuState> states;  // all with one pair of biases
+  std::vector<StartLink> links;  // links[i]: from frame i to frame i + 1
+  std::vector<StartPoint> points;
+  Eigen::Vector3d expected_gyro_bias = Eigen::Vector3d::Zero();
+
+  // Columns of the error: (gyro bias, accel bias), then each frame's (dtheta, xi_p), then each
+  // frame's xi_v.
+  int size() const { return VelocityColumn(static_cast<int>(states.size())); }
+  int PoseColumn(int frame) const { return 6 + kPoseSize * frame; }
+  int VelocityColumn(int frame) const {
+    return PoseColumn(static_cast<int>(states.size())) + 3 * frame;
+  }
+
+  // A half of the sum of squared residuals, in sigmas (those of rays after Huber, 1964); infinite
+  // when a point is behind a camera that saw it.
+  double Cost() const;
+  double RayError(const StartPoint& point, const StartRay& seen) const;  // sigmas; or infinite
+  // The cost's derivatives by the error, points eliminated; of H only the lower triangle.
+  struct Equations {
+    Eigen::MatrixXd H;
+    Eigen::VectorXd g;
+    // Of each point: its step = offset + gain * (step of the poses from `first_frame` on).
+    struct Elimination {
+      int first_frame = 0;
+      Eigen::Vector3d offset;
+      Eigen::Matrix<double, 3, Eigen::Dynamic> gain;
+    };
+    std::vector<Elimination> eliminations;
+  };
+  // `damping`: Levenberg-Marquardt's, a share of the diagonal.
+  Equations Linearise(double damping) const;
+  // Moves the frames by `step`, the points with them, and lets those settle.
+  void Retract(const Equations& equations, const Eigen::VectorXd& step);
+  // False when no step is left that makes it better, though one was promised.
+  bool Optimise(int max_iterations);
+  // Marginal covariance of the newest frame's (dtheta, dv), dv plain; nothing when something is not
+  // determined at all.
+  std::optional<Matrix6d> NewestCovariance() const;
+};
+
+}  // namespace pangea::vio

@@ -1,0 +1,201 @@
+// The start's bundle adjustment: its derivatives, its covariance, and where it leads.
+
+#include "vio/initialization/start_problem.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "core/imu/preintegration.h"
+#include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
+#include "vio/initialization/initial_solution.h"
+#include "vio/initialization/start_test_world.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr int kFrames = 6, kPoints = 12;
+
+// No residual at all: rays without noise, and links that say what the states do.
+StartProblem ExactProblem() {
+  std::mt19937_64 rng(3);
+  StartProblem problem;
+  problem.T_body_cam = kT_body_cam;
+  problem.ray_sigma = kRaySigma;
+  problem.expected_gyro_bias = kGyroBias;
+  for (int i = 0; i < kFrames; ++i) {
+    ImuState state;
+    state.T_odom_body = Lively(1 + 0.1 * i);
+    state.v_odom_body = VelocityAt(Lively, 1 + 0.1 * i);
+    state.gyro_bias = kGyroBias;
+    problem.states.push_back(state);
+  }
+  const StartWorld world = Record(Lively, 0, 0);
+  for (int i = 0; i + 1 < kFrames; ++i) {
+    Preintegrator integrator(ImuNoise{}, kGyroBias, Vector3d::Zero());
+    integrator.Add(world.frames[i + 1].imu);
+    Preintegration measured = integrator.result();
+    const ImuState& from = problem.states[i];
+    const ImuState& to = problem.states[i + 1];
+    const double dt = measured.duration_s;
+    const Vector3d gravity(0, 0, -kGravity);
+    const Quaterniond q_body_odom = from.T_odom_body.q.conjugate();
+    measured.delta_q = q_body_odom * to.T_odom_body.q;
+    measured.delta_v = q_body_odom * (to.v_odom_body - from.v_odom_body - dt * gravity);
+    measured.delta_p = q_body_odom * (to.T_odom_body.t - from.T_odom_body.t -
+                                      dt * from.v_odom_body - 0.5 * dt * dt * gravity);
+    problem.links.push_back(
+        {measured, measured.covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity())});
+  }
+  for (int k = 0; k < kPoints; ++k) {
+    StartPoint point;
+    point.p_odom = point.expected = Vector3d(5, 0, 0) + RandomVector(rng, 1);
+    point.expected_sigma = 20;
+    for (int i = k % 3; i < kFrames; ++i) {
+      const Vector3d y = (problem.states[i].T_odom_body * kT_body_cam).Inverse() * point.p_odom;
+      point.rays.push_back({i, y.head<2>() / y.z()});
+    }
+    problem.points.push_back(point);
+  }
+  return problem;
+}
+
+VectorXd RandomStep(const StartProblem& problem, double sigma) {
+  std::mt19937_64 rng(5);
+  VectorXd step(problem.size());
+  for (int i = 0; i < problem.size(); i += 3) {
+    step.segment<3>(i) = RandomVector(rng, sigma);
+  }
+  return step;
+}
+
+StartProblem Moved(const StartProblem& problem, const VectorXd& step) {
+  StartProblem moved = problem;
+  moved.Retract(problem.Linearise(0), step);
+  return moved;
+}
+
+MatrixXd HessianOf(const StartProblem& problem) {
+  return problem.Linearise(0).H.selfadjointView<Eigen::Lower>();
+}
+
+// With the points where they are; some rays are beyond Huber's bound.
+TEST(StartProblem, GradientMatchesDifferencesOfTheCost) {
+  const StartProblem exact = ExactProblem();
+  StartProblem problem = Moved(exact, RandomStep(exact, 0.003));
+  for (StartPoint& point : problem.points) {
+    point.p_odom += Vector3d(0.02, -0.03, 0.02);
+  }
+  const auto equations = problem.Linearise(0);
+  VectorXd g = NumericJacobian(problem.size(), 1e-6, [&](const VectorXd& step) {
+                 StartProblem moved = Moved(problem, step);
+                 moved.points = problem.points;
+                 return VectorXd::Constant(1, moved.Cost()).eval();
+               }).transpose();
+  // Eliminated: g + gain^T g_point.
+  for (int k = 0; k < kPoints; ++k) {
+    const VectorXd g_point = NumericJacobian(3, 1e-6, [&](const VectorXd& step) {
+                               StartProblem moved = problem;
+                               moved.points[k].p_odom += step;
+                               return VectorXd::Constant(1, moved.Cost()).eval();
+                             }).transpose();
+    const auto& elimination = equations.eliminations[k];
+    g.segment(problem.PoseColumn(elimination.first_frame), elimination.gain.cols()) +=
+        elimination.gain.transpose() * g_point;
+  }
+  const VectorXd scale = HessianOf(problem).diagonal().cwiseSqrt().cwiseInverse();
+  const VectorXd scaled = scale.asDiagonal() * g;
+  ASSERT_GT(scaled.cwiseAbs().maxCoeff(), 1);
+  EXPECT_LT((scale.asDiagonal() * equations.g - scaled).cwiseAbs().maxCoeff(),
+            1e-5 * scaled.cwiseAbs().maxCoeff());
+}
+
+// Without residuals Gauss and Newton's matrix is the Hessian, that of the gradient with settled
+// points.
+TEST(StartProblem, HessianMatchesDifferencesOfTheGradient) {
+  const StartProblem problem = ExactProblem();
+  ASSERT_LT(problem.Cost(), 1e-12);
+  MatrixXd H = HessianOf(problem);
+  H.diagonal().segment<4>(problem.PoseColumn(0) + 2).array() -= 1e8;  // held, with no gradient
+  const MatrixXd numeric = NumericJacobian(problem.size(), 1e-6, [&](const VectorXd& step) {
+    return Moved(problem, step).Linearise(0).g;
+  });
+  const VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixXd error = scale.asDiagonal() * (H - numeric) * scale.asDiagonal();
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 2e-4);
+}
+
+TEST(StartProblem, CovarianceIsThatOfTheNewestFrame) {
+  const StartProblem problem = ExactProblem();
+  const ImuState& newest = problem.states.back();
+  const MatrixXd J = NumericJacobian(problem.size(), 1e-6, [&](const VectorXd& step) {
+    const StartProblem moved = Moved(problem, step);
+    const ImuState& state = moved.states.back();
+    VectorXd d(6);
+    d << LogSo3(state.T_odom_body.q * newest.T_odom_body.q.conjugate()),
+        state.v_odom_body - newest.v_odom_body;
+    return d;
+  });
+  const MatrixXd H = HessianOf(problem);
+  const MatrixXd expected =
+      J * H.ldlt().solve(MatrixXd::Identity(problem.size(), problem.size())) * J.transpose();
+  const auto covariance = problem.NewestCovariance();
+  ASSERT_TRUE(covariance);
+  EXPECT_LT((*covariance - expected).norm(), 1e-4 * expected.norm());
+}
+
+// What the closed form mostly gets wrong.
+LinearStart Scaled(const LinearStart& start, double scale) {
+  LinearStart scaled = start;
+  scaled.v0 *= scale;
+  for (Rigid3& T : scaled.T_first_body) {
+    T.t *= scale;
+  }
+  for (Vector3d& v : scaled.v_first_body) {
+    v *= scale;
+  }
+  for (auto& [id, p] : scaled.p_first) {
+    p *= scale;
+  }
+  return scaled;
+}
+
+TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
+  const StartWorld world = Record(Lively, 0, kRaySigma);
+  const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  const auto refine = [&](double scale) {
+    return Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, Scaled(*start, scale),
+                  kRaySigma);
+  };
+  const auto from_whole = refine(1), from_third = refine(0.33);
+  ASSERT_TRUE(from_whole && from_third);
+  const Vector3d v = from_whole->states.back().v_odom_body;
+  EXPECT_LT((v - from_third->states.back().v_odom_body).norm(), 0.05 * from_whole->velocity_sigma);
+  EXPECT_NEAR(v.norm(), VelocityAt(Lively, 3).norm(), 4 * from_whole->velocity_sigma);
+  EXPECT_GT(from_whole->inlier_share, 0.99);
+  EXPECT_NEAR(from_whole->rms_sigma, 1, 0.1);
+}
+
+TEST(Refine, DoesNotTryWithPointsBehindTheCamera) {
+  const StartWorld world = Record(Lively, 0, kRaySigma);
+  auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  for (auto& [id, p] : start->p_first) {
+    p *= id % 3 == 0 ? -1 : 1;
+  }
+  const auto refined = Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start, kRaySigma);
+  ASSERT_TRUE(refined);
+  EXPECT_NEAR(refined->inlier_share, 2.0 / 3, 0.02);
+  EXPECT_TRUE(refined->states.empty());
+}
+
+}  // namespace
+}  // namespace pangea::vio

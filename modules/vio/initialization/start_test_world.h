@@ -1,0 +1,33 @@
+#pragma once
+
+// A camera and an IMU on a path, as the steps of a moving start see them: for tests.
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "core/testing/test_cameras.h"
+#include "vio/initialization/initial_solution.h"
+
+namespace pangea::vio {
+
+inline constexpr double kRaySigma = 0.5 / 400;
+inline const Eigen::Vector3d kGyroBias(0.02, -0.03, 0.01);
+inline const Rigid3 kT_body_cam{LookingAhead() * ExpSo3({0.05, -0.03, 0.02}), {0.05, -0.02, 0.01}};
+
+using Path = std::function<Rigid3(double)>;
+Rigid3 Lively(double t);
+Rigid3 TurningEvenly(double t);
+Eigen::Vector3d VelocityAt(const Path& path, double t);
+
+struct StartWorld {
+  std::vector<ImuSample> samples;
+  std::vector<StartFrame> frames;  // taken `late_s` later than they say
+};
+
+// 2 s of images at 10 Hz, from the path's first second on. The samples go on for `margin_s` to
+// either side.
+StartWorld Record(const Path& path, double late_s, double ray_sigma, double margin_s = 0.1,
+                  uint64_t seed = 7);
+
+}  // namespace pangea::vio

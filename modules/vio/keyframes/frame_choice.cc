@@ -1,0 +1,57 @@
+#include "vio/keyframes/frame_choice.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace pangea::vio {
+namespace {
+
+constexpr double kRestTrackShare = 0.5;
+constexpr double kAnyParallax = std::numeric_limits<double>::infinity();
+
+// Whether the newest image has changed enough since another frame of the window.
+bool HasMoved(const WindowState& state, const TrackHistory& history, int64_t since_utime,
+              double parallax, double track_share) {
+  const auto since = state.Find(since_utime);
+  if (!since || state.frames[*since].pose_only) {
+    return true;  // nothing is left in common to measure
+  }
+  const WindowFrame& newest = state.frames.back();
+  const Eigen::Quaterniond q_newest_since =
+      (newest.imu.T_odom_body.q * state.T_body_cam.q).conjugate() *
+      (state.frames[*since].imu.T_odom_body.q * state.T_body_cam.q);
+  const TrackHistory::Shift shift = history.ShiftBetween(since_utime, newest.utime, q_newest_since);
+  const double share =
+      static_cast<double>(shift.shared) /
+      std::max<double>(1.0, static_cast<double>(history.Frame(since_utime).size()));
+  return shift.median > parallax || share < track_share;
+}
+
+}  // namespace
+
+bool FrameChoice::IsWorthAPlace(const WindowState& state, const TrackHistory& history) const {
+  const WindowFrame& newest = state.frames.back();
+  const WindowFrame& last = state.frames[state.Newest() - 1];
+  if (newest.at_rest) {
+    // A rest is held by the frame it began with, and handed on before its tracks run out.
+    return !last.at_rest || HasMoved(state, history, last.utime, kAnyParallax, kRestTrackShare);
+  }
+  return HasMoved(state, history, last.utime, options_.window_parallax_px * pixel_angle_,
+                  options_.window_track_share);
+}
+
+void FrameChoice::Choose(const TrackHistory& history, WindowState* state) {
+  WindowFrame& newest = state->frames.back();
+  const double elapsed_s = 1e-6 * static_cast<double>(newest.utime - last_keyframe_utime_);
+  newest.is_keyframe =
+      last_keyframe_utime_ == 0 || elapsed_s >= options_.keyframe_interval_s ||
+      (elapsed_s >= options_.keyframe_min_interval_s && !newest.at_rest && newest.is_sight &&
+       HasMoved(*state, history, last_keyframe_utime_, options_.keyframe_parallax_px * pixel_angle_,
+                options_.keyframe_track_share));
+  if (newest.is_keyframe) {
+    last_keyframe_utime_ = newest.utime;
+  }
+  newest.stays = newest.is_keyframe || state->frames.size() == 1 || IsWorthAPlace(*state, history);
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,127 @@
+#include "vio/keyframes/keyframe_finisher.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "vio/window/point_geometry.h"
+#include "vio/window/window_factors.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+// A depth is worth sending when it is known to this share of itself.
+constexpr double kMaxRelativeSigma = 0.3;
+constexpr size_t kMinRays = 4;
+constexpr double kMaxRms = 2.0;  // sigmas
+
+// Nothing is better known than this, whatever the window's rays say.
+constexpr double kMinRelativeSigma = 0.005;
+
+// Variance of the inverse depth: that of the rays, and what the errors of calibration and frames
+// (covariance P) do to it.
+double DepthVariance(const WindowState& state, const MatrixXd& P, const Triangulated& point,
+                     const std::vector<FrameRay>& rays) {
+  NormalEquations unused;
+  unused.H.setZero(state.size(), state.size());
+  unused.g.setZero(state.size());
+  AddLandmark(state, {0, point.point, rays}, 0, &unused);
+  const auto& gain = unused.eliminations.front().gain;
+  Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
+  J.head<kCalibrationSize>() = gain.row(2).head<kCalibrationSize>();
+  for (int i = 0; i < static_cast<int>(rays.size()); ++i) {
+    J.segment<kPoseSize>(state.Offset(rays[i].frame)) =
+        gain.row(2).segment<kPoseSize>(kCalibrationSize + kPoseSize * i);
+  }
+  return point.covariance(2, 2) + J.dot(J * P);
+}
+
+std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const MatrixXd& P,
+                                     const TrackHistory& history, int frame) {
+  const std::vector<FrameRay> rays = history.RaysOf(id, state, 0);
+  const auto own = std::find_if(rays.begin(), rays.end(),
+                                [frame](const FrameRay& ray) { return ray.frame == frame; });
+  if (rays.size() < kMinRays || own == rays.end()) {
+    return std::nullopt;
+  }
+  const auto point = Triangulate(state, rays, static_cast<size_t>(own - rays.begin()));
+  if (!point || point->rms > kMaxRms) {
+    return std::nullopt;
+  }
+  const double rho = point->point.ray_rho.z();
+  const double floor = kMinRelativeSigma * rho;
+  const double variance = std::max(DepthVariance(state, P, *point, rays), floor * floor);
+  if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
+    return std::nullopt;
+  }
+  return LandmarkDepth{id, rho, variance};
+}
+
+}  // namespace
+
+Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, int i, int j) {
+  // p_ij = R_i^T (p_j - p_i), with p = Exp(dtheta) p^ + xi for both.
+  const Rigid3& T_i = state.frames[i].imu.T_odom_body;
+  const Rigid3& T_j = state.frames[j].imu.T_odom_body;
+  const Matrix3d R = T_i.R().transpose();
+  MatrixXd J = MatrixXd::Zero(6, 12);  // (dtheta_i, xi_i, dtheta_j, xi_j)
+  J.block<3, 3>(0, 0) = R * Hat(T_j.t);
+  J.block<3, 3>(0, 3) = -R;
+  J.block<3, 3>(0, 6) = -R * Hat(T_j.t);
+  J.block<3, 3>(0, 9) = R;
+  J.block<3, 3>(3, 0) = -R;
+  J.block<3, 3>(3, 6) = R;
+  const int at_i = state.Offset(i), at_j = state.Offset(j);
+  MatrixXd P(12, 12);
+  P << P_window.block<6, 6>(at_i, at_i), P_window.block<6, 6>(at_i, at_j),
+      P_window.block<6, 6>(at_j, at_i), P_window.block<6, 6>(at_j, at_j);
+  Matrix6d covariance = J * P * J.transpose();
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  // At rest two poses are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
+  Eigen::Matrix<double, 6, 1> floor;
+  floor << Vector3d::Constant(1e-8), Vector3d::Constant(1e-10);
+  covariance.diagonal() += floor;
+  return covariance;
+}
+
+Matrix6d CorrectionCovariance(const Matrix6d& lost, const Rigid3& T_odom_i,
+                              const Rigid3& T_odom_j) {
+  const Matrix3d R = T_odom_i.R().transpose();
+  Matrix6d J = Matrix6d::Zero();  // the columns of i in RelativeCovariance
+  J.block<3, 3>(0, 0) = R * Hat(T_odom_j.t);
+  J.block<3, 3>(0, 3) = -R;
+  J.block<3, 3>(3, 0) = -R;
+  const Matrix6d covariance = J * lost * J.transpose();
+  // Differences of large numbers: rounding must not make it negative.
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (covariance + covariance.transpose()));
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
+                                const TrackHistory& history, int index) {
+  const WindowFrame& frame = state.frames[index];
+  FinishedKeyframe keyframe;
+  keyframe.utime = frame.utime;
+  // The state is where the body was by the time offset as the frame came.
+  keyframe.T_odom_body = state.PoseAhead(index, state.Ahead(index, 0));
+  keyframe.v_odom_body = frame.imu.v_odom_body;
+  keyframe.omega_body = frame.omega_body;
+  keyframe.gyro_bias = frame.imu.gyro_bias;
+  keyframe.accel_bias = frame.imu.accel_bias;
+  const int at = state.Offset(index);
+  keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
+  keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
+  for (const auto& [id, ray] : history.Frame(frame.utime)) {
+    if (const auto depth = DepthOf(id, state, P, history, index)) {
+      keyframe.landmarks.push_back(*depth);
+    }
+  }
+  return keyframe;
+}
+
+}  // namespace pangea::vio

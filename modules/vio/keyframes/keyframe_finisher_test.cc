@@ -1,0 +1,29 @@
+#include "vio/keyframes/keyframe_finisher.h"
+
+#include <gtest/gtest.h>
+
+#include "vio/window/window_test_world.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+
+// The time offset was found after the frame had come: its image was taken later than was thought.
+TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
+  constexpr int kFrame = 2;
+  constexpr double kLate_s = 0.01;
+  const WindowState state = TestWindow({.late_s = kLate_s}).state;
+  const int size = state.size();
+  const MatrixXd P = 1e-6 * MatrixXd::Identity(size, size);
+  const FinishedKeyframe keyframe = FinishKeyframe(state, P, TrackHistory{}, kFrame);
+  const WindowFrame& frame = state.frames[kFrame];
+  const Rigid3 moved(frame.imu.T_odom_body.q * ExpSo3(kLate_s * frame.omega_body),
+                     frame.imu.T_odom_body.t + kLate_s * frame.imu.v_odom_body);
+  EXPECT_GT((keyframe.T_odom_body.t - frame.imu.T_odom_body.t).norm(), 0.001);
+  EXPECT_LT((keyframe.T_odom_body.t - moved.t).norm(), 1e-9);
+  EXPECT_LT(keyframe.T_odom_body.q.angularDistance(moved.q), 1e-9);
+}
+
+}  // namespace
+}  // namespace pangea::vio

@@ -1,0 +1,97 @@
+#include "vio/live/stamp_check.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace pangea::vio {
+namespace {
+
+using Verdict = StampCheck::Verdict;
+
+constexpr int64_t kStep_us = 5'000;
+constexpr int64_t kMaxStep_us = 300'000;
+constexpr int64_t kNow = 1'700'000'000'000'000;
+
+// Stamps at 200 Hz from `begin` on until one is taken; how many were refused before.
+int RefusedUntilTaken(StampCheck* check, int64_t begin) {
+  for (int i = 0; i < 1000; ++i) {
+    const Verdict verdict = check->Check(begin + i * kStep_us);
+    if (verdict == Verdict::kNext || verdict == Verdict::kWentBack) {
+      return i;
+    }
+  }
+  return 1000;
+}
+
+TEST(StampCheck, OneFarAheadIsRefusedAndTheStreamGoesOn) {
+  StampCheck check(kMaxStep_us);
+  EXPECT_EQ(check.Check(kNow), Verdict::kNext);
+  EXPECT_EQ(check.Check(kNow + kMaxStep_us + 1), Verdict::kFarAhead);
+  EXPECT_EQ(check.Check(StampCheck::kMaxUtime), Verdict::kFarAhead);
+  EXPECT_EQ(check.Check(std::numeric_limits<int64_t>::max()), Verdict::kOutOfRange);
+  EXPECT_EQ(check.Check(std::numeric_limits<int64_t>::min()), Verdict::kOutOfRange);
+  EXPECT_EQ(check.Check(-StampCheck::kMaxUtime), Verdict::kNotAfter);
+  EXPECT_EQ(check.Check(kNow), Verdict::kNotAfter);
+  EXPECT_EQ(check.Check(kNow + kStep_us), Verdict::kNext);
+  EXPECT_EQ(check.Check(kNow + kStep_us + kMaxStep_us), Verdict::kNext);
+}
+
+TEST(StampCheck, AFirstOneThatIsFarOffDoesNotBlockForEver) {
+  for (const int64_t first : {StampCheck::kMaxUtime, kNow + 3'600'000'000, int64_t{0}}) {
+    StampCheck check(kMaxStep_us);
+    EXPECT_EQ(check.Check(first), Verdict::kNext);
+    EXPECT_EQ(RefusedUntilTaken(&check, kNow), kMaxStep_us / kStep_us + 1) << first;
+    EXPECT_EQ(RefusedUntilTaken(&check, kNow + 310'000), 0);
+  }
+}
+
+TEST(StampCheck, SaysWhenTheStreamWentBack) {
+  StampCheck check(kMaxStep_us);
+  check.Check(kNow);
+  Verdict verdict = Verdict::kNext;
+  for (int i = 0; i <= 61; ++i) {
+    verdict = check.Check(i * kStep_us);
+  }
+  EXPECT_EQ(verdict, Verdict::kWentBack);
+  EXPECT_EQ(check.newest(), 61 * kStep_us);
+}
+
+// As a bus may deliver what it delivers twice.
+TEST(StampCheck, RepeatsDoNotHinderNorHelp) {
+  StampCheck check(kMaxStep_us);
+  check.Check(kNow);
+  int taken = 0;
+  for (int i = 0; i <= 61; ++i) {
+    taken += check.Check(i * kStep_us) == Verdict::kWentBack ? 1 : 0;
+    taken += check.Check(i * kStep_us) == Verdict::kWentBack ? 1 : 0;
+  }
+  EXPECT_EQ(taken, 1);
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_EQ(check.Check(kNow), Verdict::kFarAhead);
+  }
+}
+
+// Two sources on one channel: the one that was there first stays.
+TEST(StampCheck, WhatIsBetweenTakenOnesNeverAgrees) {
+  StampCheck check(kMaxStep_us);
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_EQ(check.Check(kNow + i * kStep_us), Verdict::kNext);
+    EXPECT_EQ(check.Check(i * kStep_us), Verdict::kNotAfter);
+    EXPECT_EQ(check.Check(2 * kNow + i * kStep_us), Verdict::kFarAhead);
+  }
+}
+
+// One that is ahead by no more than may be bridged costs what it is ahead by, and no new beginning.
+TEST(StampCheck, OneALittleAheadIsCaughtUpWith) {
+  StampCheck check(kMaxStep_us);
+  check.Check(kNow);
+  EXPECT_EQ(check.Check(kNow + kMaxStep_us), Verdict::kNext);
+  for (int64_t utime = kNow + kStep_us; utime <= kNow + kMaxStep_us; utime += kStep_us) {
+    EXPECT_EQ(check.Check(utime), Verdict::kNotAfter);
+  }
+  EXPECT_EQ(check.Check(kNow + kMaxStep_us + kStep_us), Verdict::kNext);
+}
+
+}  // namespace
+}  // namespace pangea::vio

@@ -1,0 +1,413 @@
+#include "vio/window/estimator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "vio/imu/imu_buffer.h"
+#include "vio/imu/rest_detector.h"
+#include "vio/initialization/initialiser.h"
+#include "vio/keyframes/frame_choice.h"
+#include "vio/keyframes/keyframe_finisher.h"
+#include "vio/keyframes/track_history.h"
+#include "vio/window/landmark_store.h"
+#include "vio/window/window_problem.h"
+#include "vio/window/window_start.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+
+constexpr double kMaxFrameGap_s = 1.0;
+constexpr int64_t kStartSpan_us = 4'000'000;  // samples a start may ask for
+constexpr double kMaxBlind_s = 5;             // with nothing to go by but inertial samples: lost
+// An image is a sight when this many tracks, and this share of those before, go on in it. In the
+// mere noise of a covered lens a tenth does.
+constexpr size_t kMinTracks = 4;
+constexpr double kMinTrackShare = 0.3;
+constexpr double kMaxSpeed = 50;     // m/s
+constexpr double kMaxGyroBias = 1;   // rad/s
+constexpr double kMaxAccelBias = 4;  // m/s^2
+
+constexpr int kMaxIterations = 4;
+// A start has no solution of the image before: where it knows little, four end half way.
+constexpr int kStartIterations = 20;
+// A landmark is an outlier when its newest ray is this far off, or all of them together.
+constexpr double kMaxRayError = 5.0;     // sigmas
+constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
+
+double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
+
+// 95 % quantile of chi-square (Wilson & Hilferty, 1931).
+double ChiSquare95(int degrees_of_freedom) {
+  const double k = degrees_of_freedom;
+  const double c = 1 - 2 / (9 * k) + 1.6449 * std::sqrt(2 / (9 * k));
+  return k * c * c * c;
+}
+
+struct LandmarkError {
+  double sum = 0;    // of squares, sigmas
+  double worst = 0;  // ray, sigmas
+};
+LandmarkError ErrorOf(const WindowState& state, const Landmark& landmark) {
+  LandmarkError error;
+  for (const FrameRay& ray : landmark.rays) {
+    const double e = RayError(state, landmark.point, ray);
+    error.sum += e * e;
+    error.worst = std::max(error.worst, e);
+  }
+  return error;
+}
+
+bool IsSeenIn(int frame, const Landmark& landmark) {
+  return std::any_of(landmark.rays.begin(), landmark.rays.end(),
+                     [frame](const FrameRay& ray) { return ray.frame == frame; });
+}
+
+}  // namespace
+
+struct Estimator::Impl {
+  Impl(const EstimatorOptions& o, const CameraModel& c, const ImuNoise& n)
+      : options(o),
+        camera(c),
+        noise(n),
+        ray_sigma(o.pixel_sigma * c.PixelAngle()),
+        initialiser(c, n, o.pixel_sigma),
+        imu_samples(n),
+        rest(c, ray_sigma),
+        choice(o, c) {
+    problem.state.T_body_cam = c.T_body_cam;
+    problem.state.time_offset_s = c.time_offset_s;
+  }
+
+  FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
+  std::vector<FinishedKeyframe> Flush();
+
+  void Start(const InitialState& initial);
+  InertialLink Link(const WindowFrame& from, int64_t to_imu_utime) const;
+  void Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link);
+  std::optional<std::string> AddToWindow(const TrackedFrame& frame);
+  void DropPassing();
+  bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
+  std::vector<int32_t> Solve(int max_iterations);
+  void FoldLandmarks(int frame);
+  void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
+  void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
+  FinishedKeyframe Publish(int index, const MatrixXd& P);
+  std::optional<std::string> Implausible() const;
+  int64_t ImuTime(int64_t frame_utime) const {
+    return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
+  }
+  WindowFrame& Newest() { return problem.state.frames.back(); }
+  const WindowFrame& LastStaying() const {
+    const auto& frames = problem.state.frames;
+    return frames.back().stays ? frames.back() : frames[frames.size() - 2];
+  }
+
+  EstimatorOptions options;
+  CameraModel camera;
+  ImuNoise noise;
+  double ray_sigma;
+  Initialiser initialiser;
+  bool started = false;
+  WindowProblem problem;
+  TrackHistory history;
+  LandmarkStore landmarks;
+  ImuBuffer imu_samples;  // since the last published keyframe
+  RestDetector rest;
+  FrameChoice choice;
+  std::optional<FinishedKeyframe> previous;         // the last published keyframe
+  Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
+  int64_t last_sight = 0;                           // utime of the newest image that is one
+  bool lost = false;
+};
+
+// The window takes over the frames the start was found from: they go on being refined. All of them,
+// and what is too much is marginalised: of somebody who turns on the spot hardly two are apart
+// enough to be worth a place, and those two know neither speed nor tilt.
+void Estimator::Impl::Start(const InitialState& initial) {
+  const int64_t offset_us = ImuTime(0);  // as it was when the initialiser got the frames
+  problem.state.time_offset_s += initial.time_offset_change_s;
+  for (const InitialState::Frame& from : initial.frames) {
+    TrackedFrame tracked = from.tracked;
+    tracked.utime -= offset_us;
+    history.AddFrame(tracked, camera, ray_sigma);
+    if (problem.state.frames.empty()) {
+      Append(tracked.utime, from.imu, std::nullopt);
+      problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance, noise)
+                                      : MovingStartPrior(problem.state, noise);
+    } else {
+      Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
+    }
+    Newest().stays = true;
+  }
+  started = true;
+}
+
+InertialLink Estimator::Impl::Link(const WindowFrame& from, int64_t to_imu_utime) const {
+  InertialLink link;
+  link.span = imu_samples.Integrate(from.imu_utime, to_imu_utime, problem.state.imu_scales,
+                                    from.imu.gyro_bias, from.imu.accel_bias);
+  link.information = InertialInformation(link.span.measured, noise);
+  return link;
+}
+
+void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link) {
+  WindowFrame frame;
+  frame.utime = utime;
+  frame.imu_utime = ImuTime(utime);
+  frame.time_offset_s = problem.state.time_offset_s;
+  frame.imu = imu;
+  frame.omega_body =
+      problem.state.imu_scales.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
+  problem.state.frames.push_back(frame);
+  problem.links.push_back(std::move(link));
+}
+
+// A frame that does not stay makes room for the next one: its rays go, its inertial samples are
+// measured again as part of the longer span.
+void Estimator::Impl::DropPassing() {
+  if (!Newest().stays) {
+    history.RemoveFrame(Newest().utime);
+    problem.state.frames.pop_back();
+    problem.links.pop_back();
+  }
+}
+
+// Nothing when it worked, else what is wrong.
+std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
+  const int64_t imu_utime = ImuTime(frame.utime);
+  if (auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
+    return wrong;
+  }
+  history.AddFrame(frame, camera, ray_sigma);
+  const std::optional<double> shift =
+      LastStaying().at_rest
+          ? std::optional(history.MedianShiftSigmas(LastStaying().utime, frame.utime))
+          : std::nullopt;
+  const bool at_rest = rest.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
+  const bool is_sight = TracksGoOn(Newest().utime, frame.utime);
+  DropPassing();
+  const InertialLink link = Link(Newest(), imu_utime);
+  Append(frame.utime, Predict(link.span.measured, Newest().imu), link);
+  Newest().at_rest = at_rest;
+  Newest().is_sight = is_sight;
+  return std::nullopt;
+}
+
+bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
+  const size_t go_on = history.Shared(from_utime, to_utime);
+  const auto all = static_cast<double>(history.Frame(from_utime).size());
+  return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
+}
+
+// Optimises the window; the tracks that turned out to be outliers.
+std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
+  problem.landmarks = landmarks.Gather(problem.state, history);
+  Optimise(problem, max_iterations);
+  std::vector<int32_t> outliers;
+  const int newest = problem.state.Newest();
+  std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
+    const bool is_seen = IsSeenIn(newest, landmark);
+    const auto [sum, worst] = ErrorOf(problem.state, landmark);
+    const double rms = std::sqrt(sum / (2.0 * static_cast<double>(landmark.rays.size())));
+    if (rms < kMaxLandmarkRms && worst < kMaxRayError) {
+      return false;
+    }
+    history.RemoveLandmark(landmark.id);
+    if (is_seen) {
+      outliers.push_back(landmark.id);
+    }
+    return true;
+  });
+  landmarks.Keep(problem);
+  last_sight = Newest().is_sight ? Newest().utime : last_sight;
+  return outliers;
+}
+
+FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
+  WindowState& state = problem.state;
+  FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
+  const int at = state.Offset(index);
+  const auto from = previous ? state.Find(previous->utime) : std::nullopt;
+  if (from) {
+    const int at_from = state.Offset(*from);
+    keyframe.edge = FinishedKeyframe::Edge{previous->T_odom_body.Inverse() * keyframe.T_odom_body,
+                                           RelativeCovariance(state, P, *from, index)};
+    keyframe.edge->covariance +=
+        CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
+                             previous->T_odom_body, keyframe.T_odom_body);
+    ScaledPreintegration span =
+        imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime), state.imu_scales,
+                              previous->gyro_bias, previous->accel_bias);
+    if (span.measured.duration_s > 0) {
+      span.measured.covariance.diagonal().array() += 1e-14;
+      keyframe.preintegration = span.measured;
+    }
+  }
+  state.frames[index].is_published = true;
+  previous = keyframe;
+  previous_covariance = P.block<6, 6>(at, at);
+  return keyframe;
+}
+
+// Publishes the keyframes up to frame `newest` that have not been.
+void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished) {
+  MatrixXd P;
+  for (int i = 0; i <= newest; ++i) {
+    const WindowFrame& frame = problem.state.frames[i];
+    if (frame.is_keyframe && !frame.is_published) {
+      if (P.size() == 0) {
+        P = WindowCovariance(problem);
+      }
+      finished->push_back(Publish(i, P));
+    }
+  }
+}
+
+void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
+  WindowState& state = problem.state;
+  int due = -1;  // keyframes up to here have waited long enough
+  for (int i = 0; i <= state.Newest(); ++i) {
+    due = Seconds(Newest().utime - state.frames[i].utime) > options.keyframe_interval_s ? i : due;
+  }
+  PublishUpTo(due, finished);
+  while (Newest().stays) {
+    const int oldest = state.frames.front().pose_only ? 1 : 0;
+    if (state.Newest() + 1 - oldest <= options.window) {
+      break;
+    }
+    PublishUpTo(oldest, finished);
+    const int64_t published = previous ? previous->utime : 0;
+    Marginalisation what;
+    what.keep_pose = state.frames[oldest].utime == published;
+    what.drop_kept_pose = state.frames.front().utime != published;
+    FoldLandmarks(oldest);
+    history.RemoveFrame(state.frames[oldest].utime);
+    MarginaliseOldest(problem, what);
+  }
+  landmarks.Forget(history);
+  const int64_t needed = std::min(state.frames.front().imu_utime,
+                                  previous ? ImuTime(previous->utime) : Newest().imu_utime);
+  imu_samples.Forget(needed);
+}
+
+// The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
+// that do not fit go without a word.
+void Estimator::Impl::FoldLandmarks(int frame) {
+  std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
+    if (landmark.point.anchor != frame) {
+      return false;
+    }
+    landmarks.StartAnew(landmark.id, Newest().utime);
+    return ErrorOf(problem.state, landmark).sum >
+           ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
+  });
+}
+
+std::optional<std::string> Estimator::Impl::Implausible() const {
+  const ImuState& imu = problem.state.frames.back().imu;
+  if (!imu.T_odom_body.t.allFinite() || !imu.v_odom_body.allFinite() ||
+      !imu.T_odom_body.q.coeffs().allFinite()) {
+    return "the estimate is not finite";
+  }
+  if (imu.v_odom_body.norm() > kMaxSpeed) {
+    return "the estimated speed is implausible";
+  }
+  if (imu.gyro_bias.norm() > kMaxGyroBias || imu.accel_bias.norm() > kMaxAccelBias) {
+    return "the estimated biases are implausible";
+  }
+  const double blind_s = Seconds(problem.state.frames.back().utime - last_sight);
+  if (blind_s > kMaxBlind_s) {
+    return fmt::format("nothing trackable for {:.1f} s", blind_s);
+  }
+  return std::nullopt;
+}
+
+FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
+  FrameResult result;
+  imu_samples.Add(imu);
+  const auto fail = [&](const std::string& reason) {
+    lost = true;
+    result.state = EstimatorState::kLost;
+    result.reason = reason;
+    return result;
+  };
+  if (lost) {
+    return fail("lost before");
+  }
+  if (!started) {
+    imu_samples.Forget(frame.utime - kStartSpan_us);
+    TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
+    shifted.utime = ImuTime(frame.utime);
+    const InitialResult initial = initialiser.AddFrame(shifted, imu);
+    if (!initial.state) {
+      result.reason = initial.reason;
+      return result;
+    }
+    Start(*initial.state);
+    Solve(kStartIterations);
+  } else {
+    const double gap_s = Seconds(frame.utime - Newest().utime);
+    if (gap_s > kMaxFrameGap_s) {
+      return fail(fmt::format("no images for {:.1f} s", gap_s));
+    }
+    if (const auto wrong = AddToWindow(frame)) {
+      return fail(*wrong);
+    }
+    result.outlier_landmarks = Solve(kMaxIterations);
+  }
+  if (const auto wrong = Implausible()) {
+    return fail(*wrong);
+  }
+  choice.Choose(history, &problem.state);
+  ShrinkWindow(&result.finished);
+  result.state = EstimatorState::kTracking;
+  result.T_odom_body = Newest().imu.T_odom_body;
+  result.v_odom_body = Newest().imu.v_odom_body;
+  result.omega_body = Newest().omega_body;
+  result.gyro_bias = Newest().imu.gyro_bias;
+  result.accel_bias = Newest().imu.accel_bias;
+  result.is_keyframe = Newest().is_keyframe;
+  return result;
+}
+
+std::vector<FinishedKeyframe> Estimator::Impl::Flush() {
+  std::vector<FinishedKeyframe> finished;
+  PublishUpTo(problem.state.Newest(), &finished);
+  return finished;
+}
+
+Estimator::Estimator(const EstimatorOptions& options, const CameraModel& camera,
+                     const ImuNoise& noise)
+    : impl_(std::make_unique<Impl>(options, camera, noise)) {}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+Estimator& Estimator::operator=(Estimator&&) noexcept = default;
+
+FrameResult Estimator::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
+  return impl_->AddFrame(frame, imu);
+}
+
+std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
+
+CameraModel Estimator::camera() const { return impl_->problem.state.Calibrated(impl_->camera); }
+
+WindowPoses Estimator::Poses() const {
+  const WindowState& state = impl_->problem.state;
+  WindowPoses poses;
+  std::vector<int> rows;
+  for (int i = 0; i <= state.Newest(); ++i) {
+    poses.utimes.push_back(state.frames[i].utime);
+    poses.T_odom_body.push_back(state.PoseAhead(i, state.Ahead(i, 0)));
+    for (int row = 0; row < kPoseSize; ++row) {
+      rows.push_back(state.Offset(i) + row);
+    }
+  }
+  poses.covariance = WindowCovariance(impl_->problem)(rows, rows);
+  return poses;
+}
+
+}  // namespace pangea::vio

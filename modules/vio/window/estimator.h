@@ -1,0 +1,108 @@
+#pragma once
+
+// Visual-inertial odometry of one map: tracked features and inertial samples in, poses and finished
+// keyframes out.
+//
+// Starts by itself, at rest or moving (initialiser.h), then optimises over a sliding window of
+// frames; what leaves it stays behind as a prior (window_problem.h). Frames: odom is
+// gravity-aligned (z up), its origin and yaw are those of the first pose. No threads, no clock, no
+// files: the same input gives the same output.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera_model.h"
+#include "core/imu/imu.h"
+#include "core/imu/preintegration.h"
+#include "core/keyframe.h"
+#include "core/rigid3.h"
+#include "vio/front_end/tracks.h"
+#include "vio/window/window_poses.h"
+
+namespace pangea::vio {
+
+struct EstimatorOptions {
+  int window = 12;  // frames that stay in the window
+  // A frame stays when the image has moved this far (rotation taken out) since the last one that
+  // stayed, or when this share of that one's tracks is left.
+  double window_parallax_px = 15;
+  double window_track_share = 0.7;
+  double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels
+  // A keyframe is taken when the image has moved this far (rotation taken out) since the last one,
+  // ...
+  double keyframe_parallax_px = 20;
+  // ... or when this share of the last keyframe's tracks is left, or after this long.
+  double keyframe_track_share = 0.5;
+  double keyframe_interval_s = 5;
+  double keyframe_min_interval_s = 0.2;
+};
+
+enum class EstimatorState { kInitialising, kTracking, kLost };
+
+struct LandmarkDepth {
+  int32_t landmark_id = 0;
+  double inverse_depth = 0;      // 1/m, along the camera's z axis
+  double inverse_depth_var = 0;  // 1/m^2
+};
+
+// A keyframe that left the window, or has waited long enough: all of it is final.
+struct FinishedKeyframe {
+  int64_t utime = 0;  // of its TrackedFrame
+  Rigid3 T_odom_body;
+  Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+  Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y
+  // Of all of it, in the window's coordinates (window_state.h).
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
+  // From the keyframe finished before; none in the first of the map.
+  struct Edge {
+    Rigid3 T_previous_this;
+    Matrix6d covariance = Matrix6d::Identity();  // (translation, rotation) in previous' body frame
+  };
+  std::optional<Edge> edge;
+  std::optional<Preintegration> preintegration;  // the same span
+  std::vector<LandmarkDepth> landmarks;
+};
+
+struct FrameResult {
+  EstimatorState state = EstimatorState::kInitialising;
+  std::string reason;  // why it is not tracking
+  Rigid3 T_odom_body;  // at this frame; valid while tracking
+  Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+  bool is_keyframe = false;  // this frame will be finished as a keyframe later
+  std::vector<FinishedKeyframe> finished;
+  std::vector<int32_t> outlier_landmarks;  // the tracker should drop these
+};
+
+class Estimator {
+ public:
+  Estimator(const EstimatorOptions& options, const CameraModel& camera, const ImuNoise& noise);
+  ~Estimator();
+  Estimator(Estimator&&) noexcept;
+  Estimator& operator=(Estimator&&) noexcept;
+
+  // Frames in time order. `imu`: all samples after those of the previous call, up to and including
+  // the first one at or after this frame's time (the estimator keeps what it still needs).
+  FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
+  // The keyframes still in the window, at the end.
+  std::vector<FinishedKeyframe> Flush();
+  // The calibration in use, refined online.
+  CameraModel camera() const;
+  // The window as the newest frame left it; only while tracking. Costs about an iteration.
+  WindowPoses Poses() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pangea::vio

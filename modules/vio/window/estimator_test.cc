@@ -1,0 +1,404 @@
+#include "vio/window/estimator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/imu/preintegration.h"
+#include "vio/window/test_ride.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+// Root mean square position error after the best alignment in position and yaw.
+double Ate(const Ride& ride) {
+  Vector3d mean_e = Vector3d::Zero(), mean_t = Vector3d::Zero();
+  const double n = static_cast<double>(ride.tracked.size());
+  for (const Ride::Frame& frame : ride.tracked) {
+    mean_e += frame.result.T_odom_body.t / n;
+    mean_t += frame.truth.T_odom_body.t / n;
+  }
+  double sine = 0, cosine = 0;
+  for (const Ride::Frame& frame : ride.tracked) {
+    const Vector3d e = frame.result.T_odom_body.t - mean_e, t = frame.truth.T_odom_body.t - mean_t;
+    cosine += t.x() * e.x() + t.y() * e.y();
+    sine += t.x() * e.y() - t.y() * e.x();
+  }
+  const Eigen::Quaterniond q = YawRotation(std::atan2(sine, cosine));
+  double sum = 0;
+  for (const Ride::Frame& frame : ride.tracked) {
+    sum += (frame.result.T_odom_body.t - mean_e - q * (frame.truth.T_odom_body.t - mean_t))
+               .squaredNorm();
+  }
+  return std::sqrt(sum / n);
+}
+
+double TiltError(const ImuState& truth, const FrameResult& result) {
+  const Vector3d up_true = truth.T_odom_body.q.conjugate() * Vector3d::UnitZ();
+  const Vector3d up = result.T_odom_body.q.conjugate() * Vector3d::UnitZ();
+  return std::acos(std::min(1.0, up.dot(up_true)));
+}
+
+TEST(Estimator, StartsMoving) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    Ride ride(options);
+    ride.Advance(45);
+    ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+    EXPECT_LE(ride.started_s, 3.0);
+    const Ride::Frame& first = ride.tracked.front();
+    EXPECT_LT(TiltError(first.truth, first.result), 0.035);
+    EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 0.01);
+    EXPECT_LT((first.result.accel_bias - first.truth.accel_bias).norm(), 0.35);
+    EXPECT_NEAR(first.result.v_odom_body.norm(), first.truth.v_odom_body.norm(), 0.2);
+    // Scale: how far it went since.
+    const Ride::Frame& last = ride.tracked.back();
+    const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
+    const double length = (last.result.T_odom_body.t - first.result.T_odom_body.t).norm();
+    EXPECT_NEAR(length / true_length, 1, 0.05) << "seed " << seed;
+  }
+}
+
+// Hardly shaken at an even 5 m/s, scale is all but unknown: a start may come late, or not at all,
+// but not at a third of the speed.
+TEST(Estimator, ADrivesStartIsNotTooSmall) {
+  VioTestWorldOptions options;
+  options.drive_mps = 5;
+  Ride ride(options);
+  ride.Advance(22);
+  if (!ride.tracked.empty()) {
+    EXPECT_NEAR(ride.tracked.front().result.v_odom_body.norm(), 5, 1);
+  }
+}
+
+// Hardly two images are apart enough for a place in the window; what the start found must stay.
+TEST(Estimator, StartsTurningOnTheSpot) {
+  double squares = 0;
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.spin_rps = 0.8;
+    options.pixel_noise = 0.3;
+    Ride ride(options);
+    ride.Advance(60);
+    ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+    const Ride::Frame& first = ride.tracked.front();
+    double furthest = 0;
+    for (const Ride::Frame& frame : ride.tracked) {
+      const Vector3d went = (first.result.T_odom_body.Inverse() * frame.result.T_odom_body).t;
+      const Vector3d truth = (first.truth.T_odom_body.Inverse() * frame.truth.T_odom_body).t;
+      furthest = std::max(furthest, (went - truth).norm());
+    }
+    std::cout << "started after " << ride.started_s << " s, at most " << furthest << " m off\n";
+    squares += furthest * furthest / 4;
+  }
+  EXPECT_LT(std::sqrt(squares), 0.055);
+}
+
+TEST(Estimator, StartsAtRest) {
+  VioTestWorldOptions options;
+  options.pixel_noise = 0.2;  // a standing image is tracked better than a moving one
+  options.rest_begin_s = -1;
+  options.rest_end_s = 4;
+  Ride ride(options);
+  ride.Advance(80);
+  ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+  EXPECT_LE(ride.started_s, 1.5);
+  const Ride::Frame& first = ride.tracked.front();
+  EXPECT_LT(first.result.v_odom_body.norm(), 0.02);
+  EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 2e-3);
+  EXPECT_LT(TiltError(first.truth, first.result), 0.03);
+  const Ride::Frame& last = ride.tracked.back();  // 4 s on the move
+  EXPECT_LT(TiltError(last.truth, last.result), 0.01);
+  const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
+  EXPECT_NEAR((last.result.T_odom_body.t - first.result.T_odom_body.t).norm() / true_length, 1,
+              0.05);
+}
+
+TEST(Estimator, FollowsThePathForHalfAMinute) {
+  VioTestWorldOptions options;
+  options.seed = 3;
+  // A mount that is further off than the estimator supposes, by three times.
+  options.extrinsics_rotation_sigma = 0.003;
+  options.extrinsics_position_sigma = 0.003;
+  options.time_offset_sigma = 0.002;
+  Ride ride(options);
+  ride.Advance(300);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+  const double ate = Ate(ride);
+  std::cout << "ATE over 30 s: " << ate << " m\n";
+  EXPECT_LT(ate, 0.12);
+  EXPECT_LT(TiltError(ride.tracked.back().truth, ride.tracked.back().result), 0.01);
+  // The calibration got better, not worse.
+  const CameraModel camera = ride.estimator.camera();
+  EXPECT_NEAR(camera.time_offset_s, ride.world.true_time_offset_s(), 0.001);
+  EXPECT_LT(LogSo3(camera.T_body_cam.q * ride.world.true_T_body_cam().q.conjugate()).norm(), 0.004);
+}
+
+TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.time_offset_sigma = 0.025;
+    Ride ride(options);
+    ride.Advance(100);
+    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+    std::cout << "time offset " << ride.world.true_time_offset_s() << " s, found "
+              << ride.estimator.camera().time_offset_s << " s after " << ride.started_s << " s\n";
+    EXPECT_NEAR(ride.estimator.camera().time_offset_s, ride.world.true_time_offset_s(), 0.003);
+  }
+}
+
+// Off by some three times what a calibration is taken to be.
+TEST(Estimator, FindsTheFocalLength) {
+  for (const uint64_t seed : {2, 3}) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.focal_sigma = 0.003;
+    options.centre_sigma = 0.003;
+    Ride ride(options);
+    ride.Advance(300);
+    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+    const CameraModel& truth = ride.world.true_intrinsics();
+    const CameraModel given = ride.world.camera(), found = ride.estimator.camera();
+    std::cout << "off by " << given.fx - truth.fx << ", " << given.cx - truth.cx << ", "
+              << given.cy - truth.cy << " px, now by " << found.fx - truth.fx << ", "
+              << found.cx - truth.cx << ", " << found.cy - truth.cy << "\n";
+    EXPECT_NEAR(found.fx / truth.fx, 1, 0.0015);
+    EXPECT_NEAR(found.fy / truth.fy, 1, 0.0015);
+    EXPECT_NEAR(found.cx, truth.cx, 0.6);
+    EXPECT_NEAR(found.cy, truth.cy, 0.6);
+  }
+}
+
+TEST(Estimator, StandsStillWithoutDrift) {
+  double squared_distance = 0, squared_speed = 0;
+  for (const uint64_t seed : {4, 5}) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.rest_begin_s = 5;
+    options.rest_end_s = 17;
+    Ride ride(options);
+    ride.Advance(60);  // t = 6.9: at rest for 1.4 s
+    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+    const Rigid3 before = ride.last.T_odom_body;
+    ride.Advance(100);
+    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+    squared_distance += (ride.last.T_odom_body.t - before.t).squaredNorm() / 2;
+    squared_speed += ride.last.v_odom_body.squaredNorm() / 2;
+    EXPECT_LT(LogSo3(ride.last.T_odom_body.q * before.q.conjugate()).norm(), 0.005);
+    // ... and walks on as if nothing had been.
+    ride.Advance(50);
+    EXPECT_LT(Ate(ride), 0.1);
+  }
+  std::cout << "in 10 s " << std::sqrt(squared_distance) << " m, then at "
+            << std::sqrt(squared_speed) << " m/s\n";
+  EXPECT_LT(std::sqrt(squared_distance), 0.05);  // one image's noise: 0.02
+  EXPECT_LT(std::sqrt(squared_speed), 0.02);
+}
+
+// What a tracker finds in the noise of a covered lens, guided by the gyro: new features all over,
+// of which a tenth goes on by chance; and one that goes on for long, far away but creeping.
+class CoveredLens {
+ public:
+  explicit CoveredLens(Ride* ride) : ride_(*ride) {}
+  void Advance() {
+    VioTestWorld::Input input = ride_.world.Next();
+    std::uniform_real_distribution<double> uniform;
+    std::erase_if(noise_, [&](const Observation&) { return uniform(rng_) > 0.1; });
+    while (noise_.size() < 150) {
+      noise_.push_back(At(next_id_++, {20 + uniform(rng_) * (camera_.width - 40),
+                                       20 + uniform(rng_) * (camera_.height - 40)}));
+    }
+    input.frame.observations = noise_;
+    const ImuState truth = ride_.world.TruthAt(input.frame.utime);
+    const Eigen::Quaterniond q_cam_odom =
+        (truth.T_odom_body.q * ride_.world.true_T_body_cam().q).conjugate();
+    if (creeping_.isZero()) {
+      creeping_ = q_cam_odom.conjugate() * Vector3d::UnitZ();
+    }
+    creeping_ = ExpSo3({0, 0, 0.005}) * creeping_;
+    if (const auto pixel = camera_.Project(q_cam_odom * creeping_);
+        pixel && camera_.Contains(*pixel, 5)) {
+      input.frame.observations.push_back(At(kCreeping, *pixel));
+    }
+    ride_.Feed(input);
+  }
+
+ private:
+  static constexpr int32_t kCreeping = 1'000'000;
+  Observation At(int32_t id, const Eigen::Vector2d& pixel) const {
+    return {id, pixel.cast<float>(), *camera_.Unproject(pixel), 1.0};
+  }
+
+  Ride& ride_;
+  CameraModel camera_ = ride_.world.camera();
+  std::mt19937_64 rng_{1};
+  std::vector<Observation> noise_;
+  Vector3d creeping_ = Vector3d::Zero();
+  int32_t next_id_ = kCreeping + 1;
+};
+
+// The noise says nothing: the pose is that of a camera that sees nothing at all.
+TEST(Estimator, ACoveredLensIsBridged) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.imu_noise = {5e-4, 5e-5, 1e-2, 3e-3, 200};  // a phone's
+    Ride covered(options), blind(options);
+    covered.Advance(60);
+    blind.Advance(60);
+    ASSERT_EQ(covered.last.state, EstimatorState::kTracking) << covered.last.reason;
+    CoveredLens lens(&covered);
+    for (int i = 0; i < 30; ++i) {
+      lens.Advance();
+      VioTestWorld::Input nothing = blind.world.Next();
+      nothing.frame.observations.clear();
+      blind.Feed(nothing);
+    }
+    const Vector3d& p = covered.last.T_odom_body.t;
+    EXPECT_LT((p - blind.last.T_odom_body.t).norm(), 0.01) << "seed " << seed;
+    covered.Advance(20);
+    EXPECT_EQ(covered.last.state, EstimatorState::kTracking) << covered.last.reason;
+  }
+}
+
+TEST(Estimator, ALensCoveredForLongIsALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  CoveredLens lens(&ride);
+  int images = 0, keyframes = 0;
+  for (; images < 80 && ride.last.state == EstimatorState::kTracking; ++images) {
+    lens.Advance();
+    keyframes += ride.last.is_keyframe ? 1 : 0;
+  }
+  EXPECT_LE(keyframes, 1);     // nobody can do anything with a picture of noise
+  EXPECT_NEAR(images, 51, 2);  // 5 s
+  EXPECT_THAT(ride.last.reason, HasSubstr("nothing trackable"));
+}
+
+TEST(Estimator, AGapInTheImagesIsALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
+  VioTestWorld::Input gap;
+  for (int i = 0; i < 15; ++i) {  // 1.5 s of images never come, their samples do
+    const VioTestWorld::Input next = ride.world.Next();
+    gap.frame = next.frame;
+    gap.imu.insert(gap.imu.end(), next.imu.begin(), next.imu.end());
+  }
+  ride.Feed(gap);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("no images"));
+  ride.Advance(1);  // and stays one
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+}
+
+TEST(Estimator, AGapInTheInertialSamplesIsALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
+  for (int i = 0; i < 5; ++i) {
+    ride.world.Next();
+  }
+  VioTestWorld::Input late = ride.world.Next();
+  ride.Feed(late);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("inertial samples have a gap"));
+}
+
+TEST(Estimator, NoInertialSamplesAreALoss) {
+  Ride ride({});
+  ride.Advance(50);
+  VioTestWorld::Input none = ride.world.Next();
+  none.imu.clear();
+  ride.Feed(none);
+  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
+  EXPECT_THAT(ride.last.reason, HasSubstr("no inertial samples"));
+}
+
+TEST(Estimator, TheSameInputGivesTheSameOutput) {
+  Ride a({}), b({});
+  a.Advance(60);
+  b.Advance(60);
+  EXPECT_EQ(a.last.T_odom_body.t, b.last.T_odom_body.t);
+  EXPECT_EQ(a.last.T_odom_body.q.coeffs(), b.last.T_odom_body.q.coeffs());
+  EXPECT_EQ(a.finished.size(), b.finished.size());
+}
+
+TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
+  Mean edge, edge_position, edge_rotation, tilt, depth, preintegrated;
+  for (const Ride& ride : TenRides()) {
+    const uint64_t seed = ride.world.options().seed;
+    ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
+
+    // Every announced keyframe comes, in order, once.
+    std::vector<int64_t> announced, came;
+    for (const Ride::Frame& frame : ride.tracked) {
+      if (frame.result.is_keyframe) {
+        announced.push_back(frame.utime);
+      }
+    }
+    for (const FinishedKeyframe& keyframe : ride.finished) {
+      came.push_back(keyframe.utime);
+    }
+    EXPECT_EQ(came, announced) << "seed " << seed;
+    ASSERT_GT(ride.finished.size(), 5u);
+
+    const Rigid3 T_odom_truth = ride.T_odom_truth();
+    for (size_t k = 0; k < ride.finished.size(); ++k) {
+      const FinishedKeyframe& keyframe = ride.finished[k];
+      const ImuState truth = ride.world.TruthAt(keyframe.utime);
+      const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
+      const Vector3d turn = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
+      tilt.AddSquare(turn.head<2>(), keyframe.roll_pitch_covariance);
+      for (const LandmarkDepth& landmark : keyframe.landmarks) {
+        if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
+          const double e = landmark.inverse_depth - 1 / *z;
+          depth.Add(e * e / landmark.inverse_depth_var);
+        }
+      }
+      ASSERT_EQ(keyframe.edge.has_value(), k > 0);
+      ASSERT_EQ(keyframe.preintegration.has_value(), k > 0);
+      if (k == 0) {
+        continue;
+      }
+      // Edges chain to the published poses.
+      const FinishedKeyframe& previous = ride.finished[k - 1];
+      const Vector6d gap =
+          (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);
+      EXPECT_LT(gap.norm(), 1e-9);
+      const Rigid3 T_true_edge =
+          ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
+      const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
+      const Matrix6d& C = keyframe.edge->covariance;
+      edge.AddSquare(e, C);
+      edge_position.AddSquare(e.head<3>(), C.topLeftCorner<3, 3>());
+      edge_rotation.AddSquare(e.tail<3>(), C.bottomRightCorner<3, 3>());
+      // The inertial measurement of the same span, corrected for the true biases.
+      const ImuState before = ride.world.TruthAt(previous.utime);
+      const CorrectedDelta delta =
+          CorrectForBias(*keyframe.preintegration, before.gyro_bias, before.accel_bias);
+      const Eigen::Quaterniond dq = before.T_odom_body.q.conjugate() * truth.T_odom_body.q;
+      preintegrated.Add(LogSo3(delta.q.conjugate() * dq).norm());
+    }
+  }
+  std::cout << "normalised squares: edges " << edge.value() << " (position "
+            << edge_position.value() << ", rotation " << edge_rotation.value() << ", " << edge.count
+            << "), tilt " << tilt.value() << ", depths " << depth.value() << " (" << depth.count
+            << "); preintegrated rotation " << preintegrated.value() << " rad\n";
+  for (const Mean* mean : {&edge, &edge_position, &edge_rotation, &tilt, &depth}) {
+    EXPECT_GT(mean->value(), 0.3);
+    EXPECT_LT(mean->value(), 3.0);
+  }
+  EXPECT_LT(preintegrated.value(), 2e-3);
+}
+
+}  // namespace
+}  // namespace pangea::vio

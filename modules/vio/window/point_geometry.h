@@ -1,0 +1,71 @@
+#pragma once
+
+// Points seen from the window's frames: projection with its derivatives, triangulation. Rays are on
+// the plane z = 1; sigmas are in that plane's unit (pixel sigma times the angle of a pixel).
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "vio/window/window_state.h"
+
+namespace pangea::vio {
+
+// An observation of one point in one frame of the window.
+struct FrameRay {
+  int frame = 0;                                  // index into WindowState::frames
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // by the given intrinsics
+  double sigma = 0;
+  double row_s = 0;  // the row's exposure after the image's time (rolling shutter)
+  // d(ray)/d(WindowState::intrinsics), which are small: what the pixel's ray is by other ones.
+  Eigen::Matrix<double, 2, 3> J_intrinsics = Eigen::Matrix<double, 2, 3>::Zero();
+
+  Eigen::Vector2d RayBy(const WindowState& state) const {
+    return ray + J_intrinsics * state.intrinsics / (1 + state.intrinsics.x());
+  }
+  // The other way, of a ray near this one: what it is by the given intrinsics. The focal length
+  // acts on that ray, not on the measured one: with this one's noise in its derivative a longer
+  // focal length would make noise smaller, and be found (regression dilution).
+  Eigen::Vector2d AsGiven(const WindowState& state, const Eigen::Vector2d& predicted) const {
+    return predicted - J_intrinsics * state.intrinsics + state.intrinsics.x() * (predicted - ray);
+  }
+};
+
+// A point by its ray (alpha, beta, 1) and inverse depth rho in the camera that took its anchor's
+// row.
+struct AnchoredPoint {
+  int anchor = 0;  // index into WindowState::frames
+  double anchor_row_s = 0;
+  Eigen::Vector3d ray_rho = Eigen::Vector3d::Zero();
+  Eigen::Vector3d InCamera() const {
+    return {ray_rho.x() / ray_rho.z(), ray_rho.y() / ray_rho.z(), 1 / ray_rho.z()};
+  }
+};
+
+// Where a point should be seen by the given intrinsics, and d(ray) by the errors of the anchor's
+// pose, the seeing frame's pose, the calibration, and (alpha, beta, rho). In its own anchor the two
+// pose blocks cancel.
+struct PredictedRay {
+  Eigen::Vector2d ray;
+  Eigen::Matrix<double, 2, kPoseSize> J_anchor, J_frame;
+  Eigen::Matrix<double, 2, kCalibrationSize> J_calibration;
+  Eigen::Matrix<double, 2, 3> J_point;
+};
+// Nothing when the point is behind the camera.
+std::optional<Eigen::Vector2d> PredictRayOnly(const WindowState& state, const AnchoredPoint& point,
+                                              const FrameRay& seen);
+std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredPoint& point,
+                                       const FrameRay& seen);
+
+struct Triangulated {
+  AnchoredPoint point;
+  Eigen::Matrix3d covariance;  // of (alpha, beta, rho), poses taken as exact
+  double rms = 0;              // whitened residual
+};
+// From at least two rays; the anchor is `rays[anchor]`. Nothing when the depth is not determined or
+// out of range.
+std::optional<Triangulated> Triangulate(const WindowState& state, std::span<const FrameRay> rays,
+                                        size_t anchor);
+
+}  // namespace pangea::vio

@@ -1,0 +1,74 @@
+#include "vio/window/test_ride.h"
+
+namespace pangea::vio {
+namespace {
+
+EstimatorOptions Options() {
+  EstimatorOptions options;
+  options.pixel_sigma = VioTestWorldOptions{}.pixel_noise;
+  return options;
+}
+
+std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise) {
+  std::deque<Ride> rides;
+  for (uint64_t seed = 1; seed <= count; ++seed) {
+    VioTestWorldOptions options;
+    options.seed = seed;
+    options.imu_noise = noise;
+    options.extrinsics_rotation_sigma = 0.002;
+    options.extrinsics_position_sigma = 0.002;
+    options.focal_sigma = 0.001;
+    options.centre_sigma = 0.001;
+    Ride& ride = rides.emplace_back(options);
+    ride.Advance(150);
+    ride.Flush();
+  }
+  return rides;
+}
+
+}  // namespace
+
+Ride::Ride(const VioTestWorldOptions& options)
+    : world(options), estimator(Options(), world.camera(), options.imu_noise) {}
+
+void Ride::Feed(const VioTestWorld::Input& input) {
+  last = estimator.AddFrame(input.frame, input.imu);
+  world.Drop(last.outlier_landmarks);
+  finished.insert(finished.end(), last.finished.begin(), last.finished.end());
+  if (last.state == EstimatorState::kTracking) {
+    tracked.push_back({input.frame.utime, last, world.TruthAt(input.frame.utime)});
+    if (started_s < 0) {
+      started_s = 1e-6 * static_cast<double>(input.frame.utime - 1'000'000);
+    }
+  }
+}
+
+void Ride::Advance(int frames) {
+  for (int i = 0; i < frames; ++i) {
+    Feed(world.Next());
+  }
+}
+
+void Ride::Flush() {
+  const std::vector<FinishedKeyframe> rest = estimator.Flush();
+  finished.insert(finished.end(), rest.begin(), rest.end());
+}
+
+Rigid3 Ride::T_odom_truth() const {
+  const Frame& first = tracked.front();
+  const Rigid3 T = first.result.T_odom_body * first.truth.T_odom_body.Inverse();
+  const Eigen::Quaterniond q = YawRotation(YawOf(T.q));
+  return {q, first.result.T_odom_body.t - q * first.truth.T_odom_body.t};
+}
+
+const std::deque<Ride>& TenRides() {
+  static const std::deque<Ride> rides = MakeRides(10, ExactScales());
+  return rides;
+}
+
+const std::deque<Ride>& RidesOfAWrongImu() {
+  static const std::deque<Ride> rides = MakeRides(5, ImuNoise{});
+  return rides;
+}
+
+}  // namespace pangea::vio

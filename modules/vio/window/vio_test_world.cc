@@ -1,0 +1,208 @@
+#include "vio/window/vio_test_world.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "core/testing/test_cameras.h"
+#include "core/testing/test_random.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int64_t kImuStep_us = 5'000;
+constexpr double kDifference_s = 1e-4;  // for derivatives of the path
+constexpr size_t kTracks = 100;
+constexpr double kLossPerFrame = 0.02;
+const Vector3d kHall(16, 12, 4);
+const Vector3d kLongHall(200, 12, 4);
+constexpr double kSight_m = 30;
+
+double Seconds(int64_t utime) { return 1e-6 * static_cast<double>(utime); }
+
+// Time along the path: runs with t, but stands in [begin, end], with soft ends.
+double PathTime(double t, double begin, double end) {
+  constexpr double kSoft = 0.5;
+  if (t <= begin) {
+    return t;
+  }
+  const double u = std::min(1.0, (t - begin) / kSoft);
+  double s = begin + kSoft * (u - u * u * u + 0.5 * u * u * u * u);
+  if (t > end) {
+    const double w = std::min(1.0, (t - end) / kSoft);
+    s += kSoft * (w * w * w - 0.5 * w * w * w * w) + std::max(0.0, t - end - kSoft);
+  }
+  return s;
+}
+
+// Their own generator: a world is the same with an exact IMU and with another.
+ImuScales RandomScales(const ImuNoise& noise, uint64_t seed) {
+  std::mt19937_64 rng(seed);
+  ImuScales scales;
+  for (int k = 0; k < 3; ++k) {
+    scales.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
+    scales.accel.col(k) = RandomVector(rng, noise.axes_sigma);
+  }
+  scales.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
+  scales.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
+  return scales.OfGyroAxes();
+}
+
+}  // namespace
+
+VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
+    : options_(options), rng_(options.seed) {
+  camera_ = PinholeTestCamera(640, 480, 400);
+  camera_.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng_, 0.05)),
+                        RandomVector(rng_, 0.05)};
+  true_T_body_cam_.q =
+      ExpSo3(RandomVector(rng_, options.extrinsics_rotation_sigma)) * camera_.T_body_cam.q;
+  true_T_body_cam_.t = camera_.T_body_cam.t + RandomVector(rng_, options.extrinsics_position_sigma);
+  true_time_offset_s_ = RandomVector(rng_, options.time_offset_sigma).x();
+  true_intrinsics_ = camera_;
+  std::mt19937_64 intrinsics_rng(options.seed);  // of its own: the world stays as it is
+  const double longer = 1 + RandomVector(intrinsics_rng, options.focal_sigma).x();
+  const Vector3d centre = RandomVector(intrinsics_rng, options.centre_sigma);
+  true_intrinsics_.cx += camera_.fx * centre.x();
+  true_intrinsics_.cy += camera_.fy * centre.y();
+  true_intrinsics_.fx *= longer;
+  true_intrinsics_.fy *= longer;
+  true_imu_scales_ = RandomScales(options.imu_noise, options.seed + 1000);
+  phase_ = RandomVector(rng_, 2);
+  gyro_bias_ = RandomVector(rng_, 0.02);
+  accel_bias_ = RandomVector(rng_, 0.05);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  const Vector3d& hall = options.drive_mps > 0 ? kLongHall : kHall;
+  for (int i = 0; i < 1500; ++i) {
+    Vector3d p(uniform(rng_), uniform(rng_), uniform(rng_));
+    p[i % 3] = p[i % 3] < 0 ? -0.5 : 0.5;
+    points_.push_back(p.cwiseProduct(hall) + Vector3d(0, 0, 0.5 * hall.z()));
+  }
+}
+
+Rigid3 VioTestWorld::PoseAt(double t) const {
+  const double s = PathTime(t, options_.rest_begin_s, options_.rest_end_s);
+  const Vector3d walk(3 * std::sin(0.45 * s + phase_.x()), 2.2 * std::sin(0.6 * s + phase_.y()),
+                      1.6 + 0.25 * std::sin(0.8 * s + phase_.z()));
+  const Vector3d hand(0.02 * std::sin(9.1 * s), 0.02 * std::sin(7.7 * s + 1),
+                      0.03 * std::sin(11.3 * s + 2));
+  if (options_.drive_mps > 0) {
+    const Vector3d ahead(options_.drive_mps * s, 0.2 * std::sin(0.5 * s), 1.6);
+    return {ExpSo3(0.2 * hand), ahead + 0.3 * hand};
+  }
+  if (options_.spin_rps > 0) {
+    return {YawRotation(options_.spin_rps * s) * ExpSo3(2 * hand), Vector3d(1, 1, 1.6) + hand};
+  }
+  const Vector3d turn(0.08 * std::sin(1.3 * s + phase_.y()), 0.12 * std::sin(1.1 * s + phase_.z()),
+                      0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
+  const Eigen::Quaterniond q =
+      YawRotation(turn.z()) * ExpSo3(Vector3d(0, turn.y(), 0)) * ExpSo3(Vector3d(turn.x(), 0, 0));
+  return {q, walk + hand};
+}
+
+Vector3d VioTestWorld::VelocityAt(double t) const {
+  return (PoseAt(t + kDifference_s).t - PoseAt(t - kDifference_s).t) / (2 * kDifference_s);
+}
+
+ImuSample VioTestWorld::SampleAt(int64_t utime) {
+  const double t = Seconds(utime);
+  const Rigid3 before = PoseAt(t - kDifference_s), now = PoseAt(t),
+               after = PoseAt(t + kDifference_s);
+  const Vector3d omega = LogSo3(before.q.conjugate() * after.q) / (2 * kDifference_s);
+  const Vector3d accel = (after.t - 2 * now.t + before.t) / (kDifference_s * kDifference_s);
+  const ImuNoise& noise = options_.imu_noise;
+  const double dt = Seconds(kImuStep_us);
+  gyro_bias_ += RandomVector(rng_, noise.gyro_random_walk * std::sqrt(dt));
+  accel_bias_ += RandomVector(rng_, noise.accel_random_walk * std::sqrt(dt));
+  biases_[utime] = {gyro_bias_, accel_bias_};
+  const Vector3d gyro =
+      omega + gyro_bias_ + RandomVector(rng_, noise.gyro_noise_density / std::sqrt(dt));
+  const Vector3d force = now.q.conjugate() * (accel + Vector3d(0, 0, kGravity)) + accel_bias_ +
+                         RandomVector(rng_, noise.accel_noise_density / std::sqrt(dt));
+  const Matrix3d I = Matrix3d::Identity();
+  return {utime, (I + true_imu_scales_.gyro).inverse() * gyro,
+          (I + true_imu_scales_.accel).inverse() * force};
+}
+
+std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& T_odom_cam) const {
+  const Vector3d p_cam = T_odom_cam.Inverse() * point;
+  if (p_cam.z() < 0.3 || p_cam.z() > kSight_m) {
+    return std::nullopt;
+  }
+  const auto pixel = true_intrinsics_.Project(p_cam);
+  return pixel && camera_.Contains(*pixel, 5) ? pixel : std::nullopt;
+}
+
+TrackedFrame VioTestWorld::Observe(int64_t utime) {
+  const Rigid3 T_odom_cam = PoseAt(Seconds(utime) + true_time_offset_s_) * true_T_body_cam_;
+  std::uniform_real_distribution<double> uniform;
+  std::erase_if(tracks_, [&](const auto& item) {
+    return !Seen(item.second.point, T_odom_cam) || uniform(rng_) < kLossPerFrame;
+  });
+  for (int tries = 0; tracks_.size() < kTracks && tries < 5000; ++tries) {
+    const Vector3d& point = points_[rng_() % points_.size()];
+    const bool taken = std::any_of(tracks_.begin(), tracks_.end(),
+                                   [&](const auto& item) { return item.second.point == point; });
+    if (!taken && Seen(point, T_odom_cam)) {
+      Track track{point};
+      track.slides = uniform(rng_) < options_.outlier_share;
+      track.velocity = RandomVector(rng_, 2.0).head<2>();
+      tracks_[next_id_] = track;
+      all_tracks_[next_id_] = track;
+      ++next_id_;
+    }
+  }
+  TrackedFrame frame{utime, {}};
+  for (auto& [id, track] : tracks_) {
+    Vector2d pixel =
+        *Seen(track.point, T_odom_cam) + RandomVector(rng_, options_.pixel_noise).head<2>();
+    if (track.slides) {
+      track.slid += track.velocity;
+      pixel += track.slid;
+    }
+    frame.observations.push_back({id, pixel.cast<float>(), *camera_.Unproject(pixel), 1.0});
+  }
+  return frame;
+}
+
+VioTestWorld::Input VioTestWorld::Next() {
+  Input input;
+  do {
+    input.imu.push_back(SampleAt(next_imu_utime_));
+    next_imu_utime_ += kImuStep_us;
+  } while (input.imu.back().utime < next_frame_utime_);
+  input.frame = Observe(next_frame_utime_);
+  next_frame_utime_ += std::llround(1e6 / options_.frame_rate_hz);
+  return input;
+}
+
+void VioTestWorld::Drop(std::span<const int32_t> landmark_ids) {
+  for (const int32_t id : landmark_ids) {
+    tracks_.erase(id);
+  }
+}
+
+ImuState VioTestWorld::TruthAt(int64_t frame_utime) const {
+  const double t = Seconds(frame_utime) + true_time_offset_s_;
+  ImuState state;
+  state.T_odom_body = PoseAt(t);
+  state.v_odom_body = VelocityAt(t);
+  const auto bias = biases_.lower_bound(frame_utime);
+  std::tie(state.gyro_bias, state.accel_bias) =
+      bias == biases_.end() ? biases_.rbegin()->second : bias->second;
+  return state;
+}
+
+std::optional<double> VioTestWorld::TrueDepth(int32_t landmark_id, int64_t frame_utime) const {
+  const Track& track = all_tracks_.at(landmark_id);
+  if (track.slides) {
+    return std::nullopt;
+  }
+  return ((TruthAt(frame_utime).T_odom_body * true_T_body_cam_).Inverse() * track.point).z();
+}
+
+}  // namespace pangea::vio

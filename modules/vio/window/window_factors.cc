@@ -1,0 +1,264 @@
+#include "vio/window/window_factors.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// A ray this many sigmas off is pulled at with constant force (Huber, 1964).
+constexpr double kHuber = 2.0;
+// What a point behind a camera that saw it costs, as a ray this many sigmas off: nothing is gained
+// by throwing it there.
+constexpr double kBehind = 100;
+// A rest: what may pass for one within the noise of a hundred tracks together.
+constexpr double kRestVelocitySigma = 0.02;    // m/s
+constexpr double kRestPositionSigma = 0.002;   // m, between two frames of one rest
+constexpr double kRestRotationSigma = 0.0003;  // rad
+
+double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
+double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
+
+VectorXd PriorError(const WindowProblem& problem) {
+  WindowState state = problem.state;
+  state.frames.resize(problem.prior.at.frames.size());
+  return Difference(state, problem.prior.at);
+}
+
+// One landmark's part of the normal equations, before it is eliminated. Columns as in
+// NormalEquations::Elimination.
+struct LandmarkSystem {
+  double cost = 0;
+  MatrixXd H;
+  VectorXd g;
+  Matrix3d V = Matrix3d::Zero();
+  Eigen::Matrix<double, 3, Eigen::Dynamic> W;
+  Vector3d g_point = Vector3d::Zero();
+};
+
+void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int at_anchor,
+            int at_frame, LandmarkSystem* out) {
+  const Eigen::Matrix<double, 2, 3> J_point = scale * predicted.J_point;
+  out->V += J_point.transpose() * J_point;
+  out->g_point += J_point.transpose() * r;
+  const Eigen::Matrix<double, 2, kCalibrationSize> J_c = scale * predicted.J_calibration;
+  out->H.topLeftCorner<kCalibrationSize, kCalibrationSize>() += J_c.transpose() * J_c;
+  out->W.leftCols<kCalibrationSize>() += J_point.transpose() * J_c;
+  out->g.head<kCalibrationSize>() += J_c.transpose() * r;
+  if (at_anchor == at_frame) {
+    return;  // in its own anchor a point is where its ray is, wherever the frames are
+  }
+  const Eigen::Matrix<double, 2, kPoseSize> J_a =
+      scale * predicted.J_anchor;  // the frame's is -J_a
+  const Eigen::Matrix<double, kPoseSize, kPoseSize> A = J_a.transpose() * J_a;
+  const Eigen::Matrix<double, kCalibrationSize, kPoseSize> C = J_c.transpose() * J_a;
+  const Eigen::Matrix<double, 3, kPoseSize> W_a = J_point.transpose() * J_a;
+  const Eigen::Matrix<double, kPoseSize, 1> g_a = J_a.transpose() * r;
+  MatrixXd& H = out->H;
+  H.block<kCalibrationSize, kPoseSize>(0, at_anchor) += C;
+  H.block<kPoseSize, kCalibrationSize>(at_anchor, 0) += C.transpose();
+  H.block<kCalibrationSize, kPoseSize>(0, at_frame) -= C;
+  H.block<kPoseSize, kCalibrationSize>(at_frame, 0) -= C.transpose();
+  H.block<kPoseSize, kPoseSize>(at_anchor, at_anchor) += A;
+  H.block<kPoseSize, kPoseSize>(at_anchor, at_frame) -= A;
+  H.block<kPoseSize, kPoseSize>(at_frame, at_anchor) -= A;
+  H.block<kPoseSize, kPoseSize>(at_frame, at_frame) += A;
+  out->W.middleCols<kPoseSize>(at_anchor) += W_a;
+  out->W.middleCols<kPoseSize>(at_frame) -= W_a;
+  out->g.segment<kPoseSize>(at_anchor) += g_a;
+  out->g.segment<kPoseSize>(at_frame) -= g_a;
+}
+
+LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landmark) {
+  const int m = static_cast<int>(landmark.rays.size());
+  const int n = kCalibrationSize + kPoseSize * m;
+  LandmarkSystem out;
+  out.H.setZero(n, n);
+  out.g.setZero(n);
+  out.W.setZero(3, n);
+  int at_anchor = -1;
+  for (int j = 0; j < m; ++j) {
+    at_anchor = landmark.rays[j].frame == landmark.point.anchor ? kCalibrationSize + kPoseSize * j
+                                                                : at_anchor;
+  }
+  for (int j = 0; j < m; ++j) {
+    const FrameRay& seen = landmark.rays[j];
+    const auto predicted = PredictRay(state, landmark.point, seen);
+    if (!predicted) {
+      out.cost += HuberCost(kBehind);  // and no derivative: it says nothing of where to go
+      continue;
+    }
+    const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
+    const double e = r.norm();
+    const double root = std::sqrt(HuberWeight(e));
+    out.cost += HuberCost(e);
+    AddRay(*predicted, root * r, root / seen.sigma, at_anchor, kCalibrationSize + kPoseSize * j,
+           &out);
+  }
+  return out;
+}
+
+// From a landmark's own columns to the window's.
+void Scatter(const WindowState& state, const Landmark& landmark, const LandmarkSystem& part,
+             NormalEquations* out) {
+  std::vector<int> to;
+  for (const FrameRay& seen : landmark.rays) {
+    to.push_back(state.Offset(seen.frame));
+  }
+  constexpr int kC = kCalibrationSize, kP = kPoseSize;
+  out->H.topLeftCorner<kC, kC>() += part.H.topLeftCorner<kC, kC>();
+  out->g.head<kC>() += part.g.head<kC>();
+  for (int j = 0; j < static_cast<int>(to.size()); ++j) {
+    const int from_j = kC + kP * j;
+    out->g.segment<kP>(to[j]) += part.g.segment<kP>(from_j);
+    out->H.block<kC, kP>(0, to[j]) += part.H.block<kC, kP>(0, from_j);
+    out->H.block<kP, kC>(to[j], 0) += part.H.block<kP, kC>(from_j, 0);
+    for (int i = 0; i < static_cast<int>(to.size()); ++i) {
+      out->H.block<kP, kP>(to[i], to[j]) += part.H.block<kP, kP>(kC + kP * i, from_j);
+    }
+  }
+}
+
+Vector6d RestResidual(const WindowState& state, int to) {
+  const Rigid3 T =
+      state.frames[to - 1].imu.T_odom_body.Inverse() * state.frames[to].imu.T_odom_body;
+  Vector6d r;
+  r << LogSo3(T.q) / kRestRotationSigma, T.t / kRestPositionSigma;
+  return r;
+}
+
+}  // namespace
+
+void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
+                 NormalEquations* out) {
+  LandmarkSystem part = LineariseLandmark(state, landmark);
+  Matrix3d V = part.V;
+  V.diagonal() *= 1 + damping;
+  V.diagonal().array() += 1e-9;
+  const Matrix3d V_inverse = V.inverse();
+  NormalEquations::Elimination elimination;
+  elimination.offset = -V_inverse * part.g_point;
+  elimination.gain = -V_inverse * part.W;
+  part.H.noalias() += part.W.transpose() * elimination.gain;
+  part.g.noalias() += part.W.transpose() * elimination.offset;
+  out->cost += part.cost;
+  Scatter(state, landmark, part, out);
+  out->eliminations.push_back(std::move(elimination));
+}
+
+void AddLink(const WindowState& state, const InertialLink& link, int to, NormalEquations* out) {
+  const ImuState& from = state.frames[to - 1].imu;
+  const InertialResidual residual =
+      ComputeInertialResidual(At(link.span, state.imu_scales), from, state.frames[to].imu);
+  Eigen::Matrix<double, 15, 30> J;
+  J << residual.J_from, residual.J_to;
+  const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * link.information;
+  const int at = state.Offset(to - 1);  // the two frames are neighbours
+  out->H.block<30, 30>(at, at) += JtL * J;
+  out->g.segment<30>(at) += JtL * residual.r;
+  const Eigen::Matrix<double, 15, kScalesSize> J_scales =
+      ScalesJacobian(link.span, state.imu_scales, from.gyro_bias, residual.r.head<3>());
+  const Eigen::Matrix<double, kScalesSize, 15> JtL_scales = J_scales.transpose() * link.information;
+  const Eigen::Matrix<double, 30, kScalesSize> cross = JtL * J_scales;
+  out->H.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) += JtL_scales * J_scales;
+  out->H.block<30, kScalesSize>(at, kImuScales) += cross;
+  out->H.block<kScalesSize, 30>(kImuScales, at) += cross.transpose();
+  out->g.segment<kScalesSize>(kImuScales) += JtL_scales * residual.r;
+  out->cost += 0.5 * residual.r.dot(link.information * residual.r);
+}
+
+void AddRest(const WindowState& state, int frame, NormalEquations* out) {
+  // r = R^T v, so that a turn of all the frames leaves it as it is also when v is not yet zero; its
+  // derivative by xi_v is R^T.
+  const Vector3d& v = state.frames[frame].imu.v_odom_body;
+  const double information = 1 / (kRestVelocitySigma * kRestVelocitySigma);
+  const int at = state.Offset(frame) + kVelocity;
+  out->H.diagonal().segment<3>(at).array() += information;
+  out->g.segment<3>(at) += information * v;
+  out->cost += 0.5 * information * v.squaredNorm();
+}
+
+bool RestTogether(const WindowProblem& problem, int to) {
+  return problem.links[to] && problem.state.frames[to - 1].at_rest &&
+         problem.state.frames[to].at_rest;
+}
+
+void AddRestTogether(const WindowState& state, int to, NormalEquations* out) {
+  const Rigid3& T_i = state.frames[to - 1].imu.T_odom_body;
+  const Rigid3& T_j = state.frames[to].imu.T_odom_body;
+  const Vector6d r = RestResidual(state, to);
+  const Matrix3d R_i = T_i.R().transpose();
+  const Matrix3d turn = RightJacobianInverse(kRestRotationSigma * r.head<3>()) *
+                        T_j.R().transpose() / kRestRotationSigma;
+  Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();  // (pose i, pose j)
+  J.block<3, 3>(0, 0) = -turn;
+  J.block<3, 3>(0, 6) = turn;
+  J.block<3, 3>(3, 0) = R_i * Hat(T_j.t) / kRestPositionSigma;
+  J.block<3, 3>(3, 3) = -R_i / kRestPositionSigma;
+  J.block<3, 3>(3, 6) = -R_i * Hat(T_j.t) / kRestPositionSigma;
+  J.block<3, 3>(3, 9) = R_i / kRestPositionSigma;
+  const Eigen::Matrix<double, 12, 12> A = J.transpose() * J;
+  const Eigen::Matrix<double, 12, 1> b = J.transpose() * r;
+  const int at_i = state.Offset(to - 1), at_j = state.Offset(to);
+  out->H.block<6, 6>(at_i, at_i) += A.topLeftCorner<6, 6>();
+  out->H.block<6, 6>(at_i, at_j) += A.topRightCorner<6, 6>();
+  out->H.block<6, 6>(at_j, at_i) += A.bottomLeftCorner<6, 6>();
+  out->H.block<6, 6>(at_j, at_j) += A.bottomRightCorner<6, 6>();
+  out->g.segment<6>(at_i) += b.head<6>();
+  out->g.segment<6>(at_j) += b.tail<6>();
+  out->cost += 0.5 * r.squaredNorm();
+}
+
+void AddPrior(const WindowProblem& problem, NormalEquations* out) {
+  const WindowPrior& prior = problem.prior;
+  const VectorXd e = PriorError(problem);
+  const VectorXd He = prior.H * e;
+  // The prior's derivatives stay those of its own linearisation: the unobservable directions are
+  // the same here and there.
+  out->H.topLeftCorner(prior.H.rows(), prior.H.cols()) += prior.H;
+  out->g.head(prior.g.size()) += prior.g + He;
+  out->cost += prior.g.dot(e) + 0.5 * e.dot(He);
+}
+
+double Cost(const WindowProblem& problem) {
+  const WindowState& state = problem.state;
+  const VectorXd e = PriorError(problem);
+  double cost = problem.prior.g.dot(e) + 0.5 * e.dot(problem.prior.H * e);
+  for (int i = 1; i <= state.Newest(); ++i) {
+    if (problem.links[i]) {
+      const InertialLink& link = *problem.links[i];
+      const auto residual = ComputeInertialResidual(At(link.span, state.imu_scales),
+                                                    state.frames[i - 1].imu, state.frames[i].imu);
+      cost += 0.5 * residual.r.dot(link.information * residual.r);
+    }
+    if (RestTogether(problem, i)) {
+      cost += 0.5 * RestResidual(state, i).squaredNorm();
+    }
+  }
+  for (const WindowFrame& frame : state.frames) {
+    if (frame.at_rest) {
+      cost += 0.5 * frame.imu.v_odom_body.squaredNorm() / (kRestVelocitySigma * kRestVelocitySigma);
+    }
+  }
+  for (const Landmark& landmark : problem.landmarks) {
+    for (const FrameRay& seen : landmark.rays) {
+      const double error = RayError(state, landmark.point, seen);
+      cost += HuberCost(std::isfinite(error) ? error : kBehind);
+    }
+  }
+  return cost;
+}
+
+double RayError(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen) {
+  const auto ray = PredictRayOnly(state, point, seen);
+  return ray ? (*ray - seen.ray).norm() / seen.sigma : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,190 @@
+#include "vio/window/window_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "vio/window/window_factors.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kMinInverseDepth = 1e-4;  // 1/m
+// An iteration that promises less than this of the cost (a half is one sigma of one direction) is
+// the last.
+constexpr double kEnough = 0.02;
+constexpr int kMaxRetries = 6;
+
+void Step(WindowProblem& problem, const NormalEquations& equations, const VectorXd& step) {
+  for (size_t l = 0; l < problem.landmarks.size(); ++l) {
+    Landmark& landmark = problem.landmarks[l];
+    const NormalEquations::Elimination& elimination = equations.eliminations[l];
+    Vector3d d = elimination.offset +
+                 elimination.gain.leftCols<kCalibrationSize>() * step.head<kCalibrationSize>();
+    for (size_t j = 0; j < landmark.rays.size(); ++j) {
+      const int at = kCalibrationSize + kPoseSize * static_cast<int>(j);
+      d += elimination.gain.middleCols<kPoseSize>(at) *
+           step.segment<kPoseSize>(problem.state.Offset(landmark.rays[j].frame));
+    }
+    landmark.point.ray_rho += d;
+    landmark.point.ray_rho.z() = std::max(landmark.point.ray_rho.z(), kMinInverseDepth);
+  }
+  problem.state.Retract(step);
+}
+
+// x with (D^-1/2 H D^-1/2)(D^1/2 x) = D^-1/2 b: the units differ by orders of magnitude.
+template <typename Rhs>
+MatrixXd SolveScaled(const MatrixXd& H, const Rhs& b) {
+  const VectorXd scale = H.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+  const MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
+  const MatrixXd y = S.ldlt().solve(scale.asDiagonal() * MatrixXd(b));
+  return scale.asDiagonal() * y;
+}
+
+// All that is said of the oldest full frame.
+NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
+  const WindowState& state = problem.state;
+  NormalEquations out;
+  out.H.setZero(state.size(), state.size());
+  out.g.setZero(state.size());
+  AddPrior(problem, &out);
+  if (problem.links[oldest + 1]) {
+    AddLink(state, *problem.links[oldest + 1], oldest + 1, &out);
+  }
+  if (RestTogether(problem, oldest + 1)) {
+    AddRestTogether(state, oldest + 1, &out);
+  }
+  if (state.frames[oldest].at_rest) {
+    AddRest(state, oldest, &out);
+  }
+  for (const Landmark& landmark : problem.landmarks) {
+    if (landmark.point.anchor == oldest) {
+      AddLandmark(state, landmark, 0, &out);
+    }
+  }
+  return out;
+}
+
+void EraseFrame(WindowProblem& problem, int index) {
+  problem.state.frames.erase(problem.state.frames.begin() + index);
+  problem.links.erase(problem.links.begin() + index);
+  for (Landmark& landmark : problem.landmarks) {
+    landmark.point.anchor -= landmark.point.anchor > index ? 1 : 0;
+    std::erase_if(landmark.rays, [index](const FrameRay& ray) { return ray.frame == index; });
+    for (FrameRay& ray : landmark.rays) {
+      ray.frame -= ray.frame > index ? 1 : 0;
+    }
+  }
+}
+
+}  // namespace
+
+NormalEquations Linearise(const WindowProblem& problem, double damping) {
+  const int n = problem.state.size();
+  NormalEquations out;
+  out.H.setZero(n, n);
+  out.g.setZero(n);
+  AddPrior(problem, &out);
+  for (int i = 0; i <= problem.state.Newest(); ++i) {
+    if (problem.links[i]) {
+      AddLink(problem.state, *problem.links[i], i, &out);
+    }
+    if (RestTogether(problem, i)) {
+      AddRestTogether(problem.state, i, &out);
+    }
+    if (problem.state.frames[i].at_rest) {
+      AddRest(problem.state, i, &out);
+    }
+  }
+  for (const Landmark& landmark : problem.landmarks) {
+    AddLandmark(problem.state, landmark, damping, &out);
+  }
+  return out;
+}
+
+double Optimise(WindowProblem& problem, int max_iterations) {
+  double damping = 0;
+  double cost = 0;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    bool better = false;
+    double promised = 0;
+    for (int attempt = 0; attempt < kMaxRetries && !better; ++attempt) {
+      NormalEquations equations = Linearise(problem, damping);
+      cost = equations.cost;
+      equations.H.diagonal() *= 1 + damping;
+      const VectorXd step = -SolveScaled(equations.H, equations.g);
+      promised = -0.5 * equations.g.dot(step);
+      WindowProblem moved = problem;
+      if (step.allFinite()) {
+        Step(moved, equations, step);
+        const double new_cost = Cost(moved);
+        better = new_cost <= cost + 1e-6 * (1 + std::abs(cost));
+        cost = better ? new_cost : cost;
+      }
+      if (better) {
+        problem = std::move(moved);
+        damping = damping < 1e-5 ? 0 : 0.1 * damping;
+      } else {
+        damping = damping == 0 ? 1e-4 : 10 * damping;
+      }
+    }
+    if (!better || promised < kEnough) {
+      break;
+    }
+  }
+  return cost;
+}
+
+MatrixXd WindowCovariance(const WindowProblem& problem) {
+  const NormalEquations equations = Linearise(problem, 0);
+  const auto n = equations.H.rows();
+  const MatrixXd P = SolveScaled(equations.H, MatrixXd::Identity(n, n));
+  return 0.5 * (P + P.transpose());
+}
+
+void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
+  WindowState& state = problem.state;
+  const int oldest = state.frames.front().pose_only ? 1 : 0;
+  const NormalEquations equations = LineariseOldest(problem, oldest);
+  std::erase_if(problem.landmarks,
+                [oldest](const Landmark& landmark) { return landmark.point.anchor == oldest; });
+
+  // Which rows stay.
+  std::vector<int> stay, go;
+  const int at_oldest = state.Offset(oldest);
+  const bool drops_kept = oldest == 1 && what.drop_kept_pose;
+  for (int i = 0; i < state.size(); ++i) {
+    const bool of_kept = oldest == 1 && i >= kSharedSize && i < at_oldest;
+    const bool of_oldest = i >= at_oldest && i < at_oldest + kFrameSize;
+    const bool goes =
+        of_kept ? drops_kept : of_oldest && !(what.keep_pose && i < at_oldest + kPoseSize);
+    (goes ? go : stay).push_back(i);
+  }
+  const MatrixXd H_gs = equations.H(go, stay);
+  const MatrixXd gain = SolveScaled(equations.H(go, go), H_gs);
+  const VectorXd g_go = equations.g(go);
+  WindowPrior& prior = problem.prior;
+  prior.H = equations.H(stay, stay) - H_gs.transpose() * gain;
+  prior.H = 0.5 * (prior.H + prior.H.transpose()).eval();
+  prior.g = equations.g(stay) - gain.transpose() * g_go;
+
+  problem.links[oldest + 1].reset();
+  if (what.keep_pose) {
+    WindowFrame& kept = state.frames[oldest];
+    kept.pose_only = true;
+    kept.at_rest = false;
+    problem.links[oldest].reset();
+  } else {
+    EraseFrame(problem, oldest);
+  }
+  if (drops_kept) {
+    EraseFrame(problem, 0);
+  }
+  prior.at = state;
+}
+
+}  // namespace pangea::vio

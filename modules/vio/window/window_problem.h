@@ -1,0 +1,79 @@
+#pragma once
+
+// The sliding window as a least-squares problem: rays of landmarks, inertial measurements between
+// consecutive frames, rests, and a prior that holds what has left the window.
+//
+// Landmarks are eliminated one by one (Schur complement); the reduced system is small and dense.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/imu/inertial_factor.h"
+#include "vio/window/point_geometry.h"
+#include "vio/window/window_state.h"
+
+namespace pangea::vio {
+
+struct Landmark {
+  int32_t id = 0;
+  AnchoredPoint point;
+  std::vector<FrameRay> rays;  // at most one a frame; the anchor's own is among them
+};
+
+struct InertialLink {
+  ScaledPreintegration span;
+  Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
+};
+
+// 1/2 e^T H e + g^T e with e = Difference(state, at), over the calibration, the IMU's scales and
+// the first at.frames.size() frames of the window.
+struct WindowPrior {
+  WindowState at;
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+};
+
+struct WindowProblem {
+  WindowState state;
+  std::vector<std::optional<InertialLink>> links;  // links[i]: from frame i - 1 to frame i
+  std::vector<Landmark> landmarks;
+  WindowPrior prior;
+};
+
+// The cost and its derivatives by the window's error, landmarks eliminated:
+// cost(state (+) e) ~ cost + g^T e + 1/2 e^T H e.
+struct NormalEquations {
+  double cost = 0;
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  // What a step of the window means for each landmark: step = offset + gain * (step of its frames).
+  struct Elimination {
+    Eigen::Vector3d offset;
+    Eigen::Matrix<double, 3, Eigen::Dynamic> gain;  // columns: calibration, then each ray's frame
+  };
+  std::vector<Elimination> eliminations;
+};
+// `damping`: Levenberg-Marquardt's, a share of the diagonal.
+NormalEquations Linearise(const WindowProblem& problem, double damping);
+
+// Optimises state and landmarks in place; the final cost.
+double Optimise(WindowProblem& problem, int max_iterations);
+
+// Whitened distance of a ray from where it should be; infinite for a point behind the camera.
+double RayError(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen);
+
+// Marginal covariance of the window's error.
+Eigen::MatrixXd WindowCovariance(const WindowProblem& problem);
+
+// Takes the oldest full frame out of the window (all of it, or all but its pose), with the
+// landmarks anchored in it, the link to the next frame and what the prior says of it; what they
+// tell of the rest goes into the prior. A pose kept before goes too when `drop_kept_pose`.
+struct Marginalisation {
+  bool keep_pose = false;
+  bool drop_kept_pose = false;
+};
+void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what);
+
+}  // namespace pangea::vio

@@ -1,0 +1,87 @@
+#include "vio/window/window_start.h"
+
+#include <Eigen/Cholesky>
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Matrix15d = Eigen::Matrix<double, 15, 15>;
+
+// Prior uncertainty of the given calibration.
+constexpr double kExtrinsicsRotationSigma = 0.001;  // rad; walks' links need it (imu_scales.md)
+constexpr double kExtrinsicsPositionSigma = 0.005;  // m
+constexpr double kTimeOffsetSigma = 0.005;          // s
+constexpr double kFocalSigma = 0.001;               // of the focal length
+constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
+
+constexpr double kExactScale = 1e-5;  // what an exact IMU's scales and axes may still be off
+
+// Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
+constexpr double kTiltSigma = 0.5;        // rad
+constexpr double kVelocitySigma = 5;      // m/s
+constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
+constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
+
+// Each sensor has gains and axes of its own, the gyro's are the body's.
+Eigen::Matrix<double, kScalesSize, kScalesSize> ScalesCovariance(const ImuNoise& noise) {
+  ImuScales sigma;
+  sigma.gyro.setConstant(noise.axes_sigma);
+  sigma.gyro.diagonal().setConstant(noise.gyro_scale_sigma);
+  sigma.accel.setConstant(noise.axes_sigma);
+  sigma.accel.diagonal().setConstant(noise.accel_scale_sigma);
+  Eigen::Matrix<double, kScalesSize, kScalesSize> J;
+  for (int i = 0; i < kScalesSize; ++i) {
+    ImuScales one;
+    one.Add(Eigen::Matrix<double, kScalesSize, 1>::Unit(i));
+    J.col(i) = one.OfGyroAxes().Stacked();
+  }
+  Eigen::Matrix<double, kScalesSize, kScalesSize> P =
+      J * sigma.Stacked().cwiseAbs2().asDiagonal() * J.transpose();
+  P.diagonal().array() += kExactScale * kExactScale;
+  return P;
+}
+
+// From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
+Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
+  Matrix15d J = Matrix15d::Identity();
+  J.block<3, 3>(kPosition, kTheta) = Hat(imu.T_odom_body.t);
+  J.block<3, 3>(kVelocity, kTheta) = Hat(imu.v_odom_body);
+  return J * covariance * J.transpose();
+}
+
+}  // namespace
+
+WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
+                       const ImuNoise& noise) {
+  const int n = kSharedSize + kFrameSize;
+  MatrixXd P = MatrixXd::Zero(n, n);
+  Eigen::Matrix<double, kCalibrationSize, 1> sigma;
+  sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
+      Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
+      kCentreSigma;
+  P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
+  P.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) = ScalesCovariance(noise);
+  P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
+  // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
+  // invertible.
+  P.diagonal().segment<kPoseSize>(kSharedSize).array() += 1e-8;
+  WindowPrior prior;
+  prior.at = start;
+  prior.H = P.llt().solve(MatrixXd::Identity(n, n));
+  prior.g.setZero(n);
+  return prior;
+}
+
+WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise) {
+  Eigen::Matrix<double, 15, 1> sigma;
+  sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
+      Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
+      Vector3d::Constant(kAccelBiasSigma);
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), noise);
+  prior.at.frames[0].imu.accel_bias.setZero();
+  return prior;
+}
+
+}  // namespace pangea::vio

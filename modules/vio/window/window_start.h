@@ -1,0 +1,21 @@
+#pragma once
+
+// What is known of the window when it starts: the initialiser's state, the given calibration, and
+// what the IMU's may be off.
+
+#include <Eigen/Core>
+
+#include "vio/window/window_problem.h"
+
+namespace pangea::vio {
+
+// A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
+// frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
+WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise);
+
+// `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
+// the left, all differences plain (InitialState).
+WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
+                       const ImuNoise& noise);
+
+}  // namespace pangea::vio

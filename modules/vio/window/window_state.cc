@@ -1,0 +1,86 @@
+#include "vio/window/window_state.h"
+
+namespace pangea::vio {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+int WindowState::Offset(int frame) const {
+  int offset = kSharedSize;
+  for (int i = 0; i < frame; ++i) {
+    offset += frames[i].size();
+  }
+  return offset;
+}
+
+std::optional<int> WindowState::Find(int64_t utime) const {
+  for (int i = 0; i <= Newest(); ++i) {
+    if (frames[i].utime == utime) {
+      return i;
+    }
+  }
+  return std::nullopt;
+}
+
+CameraModel WindowState::Calibrated(CameraModel given) const {
+  given.T_body_cam = T_body_cam;
+  given.time_offset_s = time_offset_s;
+  given.cx += given.fx * intrinsics.y();
+  given.cy += given.fy * intrinsics.z();
+  given.fx *= 1 + intrinsics.x();
+  given.fy *= 1 + intrinsics.x();
+  return given;
+}
+
+Rigid3 WindowState::PoseAhead(int frame, double ahead_s) const {
+  const WindowFrame& f = frames[frame];
+  return {f.imu.T_odom_body.q * ExpSo3(ahead_s * f.omega_body),
+          f.imu.T_odom_body.t + ahead_s * f.imu.v_odom_body};
+}
+
+void WindowState::Retract(const VectorXd& error) {
+  T_body_cam.q = (ExpSo3(error.segment<3>(kExtrinsics)) * T_body_cam.q).normalized();
+  T_body_cam.t += error.segment<3>(kExtrinsics + 3);
+  time_offset_s += error[kTimeOffset];
+  intrinsics += error.segment<3>(kIntrinsics);
+  imu_scales.Add(error.segment<kScalesSize>(kImuScales));
+  int at = kSharedSize;
+  for (WindowFrame& frame : frames) {
+    const Quaterniond turn = ExpSo3(error.segment<3>(at + kTheta));
+    Rigid3& T = frame.imu.T_odom_body;
+    T = {(turn * T.q).normalized(), turn * T.t + error.segment<3>(at + kPosition)};
+    if (!frame.pose_only) {
+      frame.imu.v_odom_body = turn * frame.imu.v_odom_body + error.segment<3>(at + kVelocity);
+      frame.imu.gyro_bias += error.segment<3>(at + kGyroBias);
+      frame.imu.accel_bias += error.segment<3>(at + kAccelBias);
+    }
+    at += frame.size();
+  }
+}
+
+VectorXd Difference(const WindowState& a, const WindowState& b) {
+  VectorXd e(b.size());
+  e.segment<3>(kExtrinsics) = LogSo3(a.T_body_cam.q * b.T_body_cam.q.conjugate());
+  e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
+  e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
+  e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
+  e.segment<kScalesSize>(kImuScales) = a.imu_scales.Stacked() - b.imu_scales.Stacked();
+  int at = kSharedSize;
+  for (size_t i = 0; i < b.frames.size(); ++i) {
+    const ImuState& x = a.frames[i].imu;
+    const ImuState& y = b.frames[i].imu;
+    const Quaterniond turn = x.T_odom_body.q * y.T_odom_body.q.conjugate();
+    e.segment<3>(at + kTheta) = LogSo3(turn);
+    e.segment<3>(at + kPosition) = x.T_odom_body.t - turn * y.T_odom_body.t;
+    if (!b.frames[i].pose_only) {
+      e.segment<3>(at + kVelocity) = x.v_odom_body - turn * y.v_odom_body;
+      e.segment<3>(at + kGyroBias) = x.gyro_bias - y.gyro_bias;
+      e.segment<3>(at + kAccelBias) = x.accel_bias - y.accel_bias;
+    }
+    at += b.frames[i].size();
+  }
+  return e;
+}
+
+}  // namespace pangea::vio

@@ -1,0 +1,82 @@
+#pragma once
+
+// The variables of the sliding window, and how an error of them looks.
+//
+// Errors are right-invariant: a rotation error dtheta is on the LEFT (R = Exp(dtheta) R^) and every
+// vector that lives in odom is carried along by it (p = Exp(dtheta) p^ + xi). In these coordinates
+// the four directions that camera and IMU cannot observe, the global position and yaw, are the same
+// wherever a factor is linearised, so a prior linearised long ago gains no information about them
+// (Barrau & Bonnabel, "The invariant extended Kalman filter as a stable observer", 2017; Zhang et
+// al., RA-L 2017). Landmarks are anchored in a camera of the window and need no such care.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/camera_model.h"
+#include "core/imu/inertial_factor.h"
+#include "core/imu/preintegration.h"
+#include "core/rigid3.h"
+#include "vio/imu/imu_scales.h"
+
+namespace pangea::vio {
+
+// One frame's error is laid out as in core/imu/inertial_factor.h.
+inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
+// The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
+// intrinsics.
+inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
+inline constexpr int kCalibrationSize = 10;
+// Then the scales of the IMU, and then the frames.
+inline constexpr int kImuScales = kCalibrationSize;
+inline constexpr int kSharedSize = kCalibrationSize + kScalesSize;
+
+// A frame of the window: the body at the image's time as the time offset stood when it came.
+struct WindowFrame {
+  int64_t utime = 0;         // of its TrackedFrame
+  int64_t imu_utime = 0;     // utime + time_offset_s
+  double time_offset_s = 0;  // when it came
+  ImuState imu;
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate there, rad/s
+  bool stays = false;        // it holds its place; else the next frame replaces it
+  bool is_keyframe = false;  // it is, or will be, published
+  bool is_published = false;
+  bool pose_only = false;  // only its pose is left: the end of the next odometry edge
+  bool at_rest = false;
+  bool is_sight = true;  // its rays count: they are not mere noise
+
+  int size() const { return pose_only ? kPoseSize : kFrameSize; }
+};
+
+struct WindowState {
+  Rigid3 T_body_cam;
+  double time_offset_s = 0;  // t_imu = t_image + time_offset_s
+  // Of the given camera: how much longer its focal length is, as a share of it, and where its
+  // centre is, in focal lengths (x, y).
+  Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
+  ImuScales imu_scales;
+  std::vector<WindowFrame> frames;  // oldest first
+
+  int Offset(int frame) const;
+  int size() const { return Offset(static_cast<int>(frames.size())); }
+  int Newest() const { return static_cast<int>(frames.size()) - 1; }
+  std::optional<int> Find(int64_t utime) const;
+  // The given camera as it is thought to be: mount, time offset, focal length and centre.
+  CameraModel Calibrated(CameraModel given) const;
+
+  // The body when a row of a frame's image was exposed, that much after the image's time: the
+  // frame's pose, moved on at its velocity and turn rate.
+  double Ahead(int frame, double row_s) const {
+    return time_offset_s - frames[frame].time_offset_s + row_s;
+  }
+  Rigid3 PoseAhead(int frame, double ahead_s) const;
+
+  // state (+) error, in the coordinates above.
+  void Retract(const Eigen::VectorXd& error);
+};
+
+// a (-) b: b.Retract(Difference(a, b)) is a. Both have the same frames.
+Eigen::VectorXd Difference(const WindowState& a, const WindowState& b);
+
+}  // namespace pangea::vio

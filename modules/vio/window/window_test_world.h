@@ -1,0 +1,46 @@
+#pragma once
+
+// A small window to test on: frames that follow their inertial samples exactly, points that all of
+// them see.
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "vio/window/window_problem.h"
+
+namespace pangea::vio {
+
+struct WindowTestOptions {
+  uint64_t seed = 1;
+  int frames = 5;
+  int landmarks = 12;    // landmark i is anchored in frame i % (frames - 1), seen from there on
+  double ray_noise = 0;  // sigmas
+  double row_s = 0;      // rows are exposed up to this after the image's time
+  double late_s = 0;     // the time offset has moved by this since the frames came
+};
+
+// State and landmarks are true; the prior says nothing.
+WindowProblem TestWindow(const WindowTestOptions& options);
+
+// Inertial samples of a lively motion, upright by and large.
+std::vector<ImuSample> TestSamples(int count, int64_t first_utime, uint64_t seed);
+Preintegration Integrate(std::span<const ImuSample> samples, const ImuNoise& noise,
+                         const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias);
+
+// Makes the calibration and all of the first frame known: sigma of each of their errors.
+void HoldStart(WindowProblem* problem, double sigma);
+
+// Every error of the window at random.
+Eigen::VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed);
+
+// The four directions that camera and IMU cannot observe, as columns: a shift along odom's axes,
+// and a turn about its z axis.
+Eigen::MatrixXd UnobservableDirections(const WindowState& state);
+
+// Central differences along the window's error coordinates.
+Eigen::MatrixXd NumericJacobian(const WindowState& state,
+                                const std::function<Eigen::VectorXd(const WindowState&)>& f);
+
+}  // namespace pangea::vio
