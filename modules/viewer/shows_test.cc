@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
@@ -133,14 +136,34 @@ TEST(LogShow, KeepsTheImagesOfKeyframes) {
   EXPECT_EQ(image->utime, keyframe.utime + 10'000);
 }
 
-TEST(LogShow, SaysWhatIsWrongWithAFile) {
-  EXPECT_THROW(LogShow("no/such.lcm"), std::runtime_error);
+std::string WhyNot(const std::string& path) {
   try {
-    LogShow show(std::string(PANGEA_SOURCE_DIR) + "/README.md");
-    FAIL();
+    LogShow show(path);
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("README.md: holds nothing to show"));
+    return error.what();
   }
+  return "";
+}
+
+TEST(LogShow, SaysWhatIsWrongWithAFile) {
+  EXPECT_THAT(WhyNot("no/such.lcm"), testing::HasSubstr("there is no such log"));
+  EXPECT_THAT(WhyNot(std::string(PANGEA_SOURCE_DIR) + "/README.md"),
+              testing::HasSubstr("README.md: is no LCM log"));
+  const std::string path = testing::TempDir() + "other.lcm";
+  LogFileWriter(path).Write(1, "OTHER", {});
+  EXPECT_THAT(WhyNot(path), testing::HasSubstr("other.lcm: holds nothing to show"));
+}
+
+TEST(LogShow, ShowsWhatIsLeftOfADamagedLogAndSaysSo) {
+  const std::string path = testing::TempDir() + "damaged.lcm";
+  std::filesystem::copy_file(kLog, path, std::filesystem::copy_options::overwrite_existing);
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(996321).put(0);  // a CONSTRAINT's first byte
+  file.close();
+  LogShow show(path);
+  EXPECT_FALSE(show.readings().at(path).whole());
+  EXPECT_EQ(show.source(), "damaged.lcm (damaged: not all of it can be read)");
+  EXPECT_NEAR(show.clock().end_s, LogShow(kLog).clock().end_s, 0.1) << "not up to the damage";
 }
 
 class ViewerProcessTest : public testing::Test {
