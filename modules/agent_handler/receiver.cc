@@ -16,12 +16,12 @@ bool GoesBefore(const KeyframeId& a, const KeyframeId& b) {
 Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
 
-int32_t Receiver::Map::SkipRuns(int32_t seq) const {
+int32_t Receiver::ReceivedMap::SkipRuns(int32_t seq) const {
   const auto after = runs.upper_bound(seq);
   return after == runs.begin() ? seq : std::max(seq, std::prev(after)->second + 1);
 }
 
-int32_t Receiver::Map::MissingBefore(int32_t seq) const {
+int32_t Receiver::ReceivedMap::MissingBefore(int32_t seq) const {
   int32_t missing = seq - next;
   for (const auto& [first, last] : runs) {
     missing -= std::max(0, std::min(last + 1, seq) - std::max(first, next));
@@ -32,7 +32,7 @@ int32_t Receiver::Map::MissingBefore(int32_t seq) const {
 void Receiver::Resume(const MapId& map_id, int32_t journalled_seq,
                       const std::vector<SeqGap>& gaps) {
   const int32_t next = gaps.empty() ? journalled_seq + 1 : gaps.front().from_seq;
-  Map map{next, next - 1, false, false, true};
+  ReceivedMap map{next, next - 1, false, false, true};
   for (size_t i = 0; i < gaps.size(); ++i) {
     const int32_t last = i + 1 < gaps.size() ? gaps[i + 1].from_seq - 1 : journalled_seq;
     map.runs[gaps[i].to_seq + 1] = last;
@@ -52,7 +52,7 @@ void Receiver::OnHello(const LinkHello& hello) {
     map.in_hello = false;
   }
   for (const LinkMap& announced : hello.maps) {
-    Map& map = maps_[announced.map];
+    ReceivedMap& map = maps_[announced.map];
     map.announced = map.in_hello = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
       given_up_ += map.MissingBefore(announced.first_seq);
@@ -183,7 +183,7 @@ std::vector<uint8_t> Receiver::Joined(const Entry& entry) {
 std::vector<Receiver::Keyframe> Receiver::TakeReady() {
   std::vector<Keyframe> ready;
   for (auto& [id, entry] : cache_) {
-    Map& map = maps_.at(id.map);
+    ReceivedMap& map = maps_.at(id.map);
     if (id.seq == map.next && entry.whole()) {
       entry.taken = true;
       ready.push_back({id, Joined(entry)});

@@ -43,7 +43,7 @@ bool CheckedScan::Read() {
   waiting_bytes_ += next.bytes.size();
   const bool is_list = read->channel == channels::kChecksums;
   if (const auto checksums = is_list ? ChecksumsOf(next.bytes) : std::nullopt) {
-    Judge(*checksums);
+    Verify(*checksums);
     num_ready_ = waiting_.size();
   } else if (waiting_bytes_ > kMaxWaitingBytes) {
     num_ready_ = 1;
@@ -53,7 +53,7 @@ bool CheckedScan::Read() {
 
 // From the list backwards. Which of its events another is, its place says, and behind damage, which
 // may have taken any number of events, the event itself.
-void CheckedScan::Judge(const Checksums& checksums) {
+void CheckedScan::Verify(const Checksums& checksums) {
   int64_t expected = checksums.event_number() - 1;
   bool in_place = true;
   for (auto it = std::next(waiting_.rbegin());

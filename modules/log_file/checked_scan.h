@@ -43,7 +43,7 @@ class CheckedScan {
     std::vector<uint8_t> bytes;  // what `piece` looks into
   };
   bool Read();
-  void Judge(const Checksums& checksums);
+  void Verify(const Checksums& checksums);
 
   LogScan scan_;
   std::deque<Waiting> waiting_;

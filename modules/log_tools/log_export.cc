@@ -9,7 +9,7 @@
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 #include "report/report_pictures.h"
 #include "report/report_text.h"
 
@@ -86,9 +86,9 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
 
 void ExportPly(const std::string& log, const std::string& file, LogReadings* readings) {
   const CapturedSession session = ReadServerLog(log, readings);
-  const ReportFigures figures = ComputeFigures({.server_log = log}, session);
-  WriteTextFile(file, MapPly(session, figures,
-                             figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
+  const ReportMetrics metrics = ComputeMetrics({.server_log = log}, session);
+  WriteTextFile(file, MapPly(session, metrics,
+                             metrics.groups.empty() ? FinalGroup() : metrics.groups.front().group));
 }
 
 NamedGraph GraphOf(const std::string& log, LogReadings* readings) {

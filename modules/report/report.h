@@ -1,6 +1,6 @@
 #pragma once
 
-// From captured logs to the output directory: trajectories, map, figures, pictures. A pure function
+// From captured logs to the output directory: trajectories, map, metrics, pictures. A pure function
 // of its input, the same after a live run and after a replay; the same input gives the same bytes.
 //
 // Writes into `folder` (which must exist):
@@ -63,7 +63,7 @@ struct ReportInput {
   std::map<std::string, int> restarts = {};
   // what else a reader must know, e.g. warnings about a recording
   std::vector<std::string> notes = {};
-  // bounds on the figures, checked at the end of the report
+  // bounds on the metrics, checked at the end of the report
   Expectations expect = {};
 };
 
@@ -73,7 +73,7 @@ struct WrittenReport {
 };
 
 // Throws std::runtime_error when the server log cannot be read or the folder not written; a picture
-// that cannot be drawn is a note in the report. Of a damaged log the figures are of what can be
+// that cannot be drawn is a note in the report. Of a damaged log the metrics are of what can be
 // read, and the report says so at its top; what is lost is noted in `readings` (log_reader.h), and
 // the report tells that of the logs noted there already too, which this one was made from.
 WrittenReport WriteReport(const ReportInput& input, const std::string& folder,

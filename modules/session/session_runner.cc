@@ -27,8 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStartTimeout_s = 20;  // for the server processes to report
-constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
-constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStuckAfter_s =
+    300;                          // without a verification result, while the server is not idle
+constexpr double kQuiet_s = 2.5;  // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
@@ -281,7 +282,7 @@ class Runner {
       player.ended = Now();
       summary_.failures.push_back(
           fmt::format("agent {}: {}", player.script.id, player.child->LastLine()));
-      progress_.Say(summary_.failures.back());
+      progress_.PrintLine(summary_.failures.back());
     }
   }
 
@@ -291,9 +292,10 @@ class Runner {
         summary_.failures.push_back(fmt::format(
             "{} ended {} times and was given up ({}); its output is in {}", revived.name,
             revived.unexpected, revived.why, (options_.out / "logs").string()));
-        progress_.Say(summary_.failures.back());
+        progress_.PrintLine(summary_.failures.back());
       } else {
-        progress_.Say(fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
+        progress_.PrintLine(
+            fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
         summary_.restarted.push_back(revived.name);
       }
     }
@@ -347,21 +349,21 @@ class Runner {
     return names;
   }
 
-  // Until every process has worked off what has come. A server that goes on judging is slow, not
+  // Until every process has worked off what has come. A server that goes on verifying is slow, not
   // stuck: it is waited for.
   void Drain() {
     const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
     double deadline = Now() + patience_s;
-    int verdicts = monitor_.num_verdicts();
+    int results = monitor_.num_results();
     while (!monitor_.Idle(Working(), kQuiet_s)) {
-      if (!summary_.interrupted && monitor_.num_verdicts() > verdicts) {
-        verdicts = monitor_.num_verdicts();
+      if (!summary_.interrupted && monitor_.num_results() > results) {
+        results = monitor_.num_results();
         deadline = Now() + patience_s;
       }
       if (Now() > deadline) {
         if (!summary_.interrupted) {
-          summary_.failures.push_back(
-              fmt::format("the server is not at rest {} s after its last verdict", kStuckAfter_s));
+          summary_.failures.push_back(fmt::format(
+              "the server is not idle {} s after its last verification result", kStuckAfter_s));
         }
         return;
       }

@@ -145,11 +145,11 @@ TEST_F(DamagedJournal, MatchesAndVerdictsAreAskedFor) {
     }
     PublishMessage(server_bus, "PLACE_MATCH", ToMessage(match));
   }
-  Constraint verdict;
-  verdict.from = {kMap, 0};
-  verdict.to = {kMap, 3};
-  verdict.kind = PlaceKind::kIntra;
-  PublishMessage(server_bus, "CONSTRAINT", ToMessage(verdict));
+  Constraint result;
+  result.from = {kMap, 0};
+  result.to = {kMap, 3};
+  result.kind = PlaceKind::kIntra;
+  PublishMessage(server_bus, "CONSTRAINT", ToMessage(result));
   Run(3);
   KillHandler();
   Damage("PLACE_MATCH", {1});
@@ -162,16 +162,16 @@ TEST_F(DamagedJournal, MatchesAndVerdictsAreAskedFor) {
       matches_asked.push_back(request.from_seq);
     }
   });
-  std::vector<verdict_request_t> verdicts_asked;
+  std::vector<verdict_request_t> results_requested;
   server_bus.Subscribe("VERDICT_REQUEST", [&](const std::string&, Bytes data) {
-    ASSERT_TRUE(DecodeMessage(data, &verdicts_asked.emplace_back()));
+    ASSERT_TRUE(DecodeMessage(data, &results_requested.emplace_back()));
   });
   StartHandler();
   Run(8);
   EXPECT_THAT(matches_asked, testing::Contains(1));
   EXPECT_THAT(matches_asked, testing::Each(1));
-  ASSERT_FALSE(verdicts_asked.empty());
-  EXPECT_THAT(verdicts_asked[0].seq, testing::ElementsAre(3));
+  ASSERT_FALSE(results_requested.empty());
+  EXPECT_THAT(results_requested[0].seq, testing::ElementsAre(3));
 }
 
 }  // namespace

@@ -73,10 +73,10 @@ class JournalDamage : public testing::Test {
     return EncodeMessage(ToMessage(match));
   }
   File EncodeVerdict(int32_t seq) const {
-    Constraint verdict;
-    verdict.from = {map, 0};
-    verdict.to = {map, seq};
-    return EncodeMessage(ToMessage(verdict));
+    Constraint result;
+    result.from = {map, 0};
+    result.to = {map, seq};
+    return EncodeMessage(ToMessage(result));
   }
   Events Read(JournalMend* mend) const {
     Events read;

@@ -16,8 +16,8 @@ constexpr int64_t kNow = 1'700'000'000'000'000;
 // Stamps at 200 Hz from `begin` on until one is taken; how many were refused before.
 int RefusedUntilTaken(StampCheck* check, int64_t begin) {
   for (int i = 0; i < 1000; ++i) {
-    const Verdict verdict = check->Check(begin + i * kStep_us);
-    if (verdict == Verdict::kNext || verdict == Verdict::kWentBack) {
+    const Verdict result = check->Check(begin + i * kStep_us);
+    if (result == Verdict::kNext || result == Verdict::kWentBack) {
       return i;
     }
   }
@@ -49,11 +49,11 @@ TEST(StampCheck, AFirstOneThatIsFarOffDoesNotBlockForEver) {
 TEST(StampCheck, SaysWhenTheStreamWentBack) {
   StampCheck check(kMaxStep_us);
   check.Check(kNow);
-  Verdict verdict = Verdict::kNext;
+  Verdict result = Verdict::kNext;
   for (int i = 0; i <= 61; ++i) {
-    verdict = check.Check(i * kStep_us);
+    result = check.Check(i * kStep_us);
   }
-  EXPECT_EQ(verdict, Verdict::kWentBack);
+  EXPECT_EQ(result, Verdict::kWentBack);
   EXPECT_EQ(check.newest(), 61 * kStep_us);
 }
 
