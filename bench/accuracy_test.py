@@ -1,4 +1,4 @@
-"""What keeps or makes a product again, and what counts as a figure."""
+"""What keeps or makes a product again, and what counts as a value."""
 
 import argparse
 import contextlib
@@ -15,7 +15,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from accuracy_lib import anchors  # noqa: E402
-from accuracy_lib.figures import Measured, Sample, Series  # noqa: E402
+from accuracy_lib.metrics import Measured, Sample, Series  # noqa: E402
 from accuracy_lib.jobs import OUT, Command, Job, Runner  # noqa: E402
 from accuracy_lib.plan import Plan, RenderJob  # noqa: E402
 
@@ -130,7 +130,7 @@ class SeriesTest(unittest.TestCase):
         self.assertEqual(cell.remarks(), ["x, seed 1: coverage 0.80"])
 
     def test_too_few_that_count_pass_no_bar(self):
-        cell = self.series(Sample(0.01, ["2 maps"]), Sample(None, ["no figure"]), Sample(0.02))
+        cell = self.series(Sample(0.01, ["2 maps"]), Sample(None, ["no value"]), Sample(0.02))
         self.assertIsNone(cell.median())
         self.assertFalse(cell.at_most(1))
 
@@ -173,12 +173,12 @@ class MeasuredTest(unittest.TestCase):
 
     def test_nothing_made(self):
         measured = Measured(self.plan)
-        self.assertEqual(measured.joint("seed1", "MH_01+MH_02"), Sample(None, ["no figure"]))
-        self.assertEqual(measured.vio("seed1", "MH_01"), Sample(None, ["no figure"]))
+        self.assertEqual(measured.joint("seed1", "MH_01+MH_02"), Sample(None, ["no value"]))
+        self.assertEqual(measured.vio("seed1", "MH_01"), Sample(None, ["no value"]))
 
 
 class PaperTest(unittest.TestCase):
-    """A session's report compares with the paper too, and has no Python: its figures are these."""
+    """A session's report compares with the paper too, and has no Python: its metrics are these."""
 
     SOURCE = Path(__file__).resolve().parents[1] / "modules/report/metrics/report_paper.cc"
 

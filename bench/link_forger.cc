@@ -1,5 +1,5 @@
 // pangea-link-forger: floods a link bus with forged packets while a command (a session) runs, and
-// returns what the command returns. For bench/link and its figures only.
+// returns what the command returns. For bench/link and its metrics only.
 //
 // It knows no key. It makes up packets, repeats those it has overheard, late, changes them, turns
 // them back, and puts them under another agent's name.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from link_lib.figures import LCM_SYNC, Row, decode_status, events, keyframes, rungs, strangers, table  # noqa: E402
+from link_lib.metrics import LCM_SYNC, Row, decode_status, events, keyframes, rungs, strangers, table  # noqa: E402
 from link_lib.hosts_session import Watch  # noqa: E402
 from link_lib.plan import HOST_ROWS, ROWS, Agent, jobs_of, label, session_yaml  # noqa: E402
 
@@ -74,14 +74,14 @@ class LinkTest(unittest.TestCase):
         log.write_bytes(log.read_bytes()[:-1])
         self.assertEqual([seq for _, _, seq in keyframes(log)], list(range(9)))
 
-    def test_figures_of_a_session(self):
-        figures = self.row("perfect", range(10), 0.01).figures
-        self.assertEqual((figures["keyframes_sent"], figures["keyframes_journalled"]), (10, 10))
-        self.assertEqual((figures["late_median_s"], figures["fused_s"]), (0.03, 7.6))
-        self.assertEqual((figures["bytes_up"], figures["bytes_compressed"]), (2000, 1000))
-        self.assertEqual((figures["keyframes_over_compressed"], figures["packets_refused"]), (1.1, 7))
-        self.assertAlmostEqual(figures["keyframes_given_to_lcm_over_compressed"], (1100 - 46) / 1000)
-        self.assertEqual(figures["handler_cpu_s"], 1.5)
+    def test_metrics_of_a_session(self):
+        metrics = self.row("perfect", range(10), 0.01).metrics
+        self.assertEqual((metrics["keyframes_sent"], metrics["keyframes_journalled"]), (10, 10))
+        self.assertEqual((metrics["late_median_s"], metrics["fused_s"]), (0.03, 7.6))
+        self.assertEqual((metrics["bytes_up"], metrics["bytes_compressed"]), (2000, 1000))
+        self.assertEqual((metrics["keyframes_over_compressed"], metrics["packets_refused"]), (1.1, 7))
+        self.assertAlmostEqual(metrics["keyframes_given_to_lcm_over_compressed"], (1100 - 46) / 1000)
+        self.assertEqual(metrics["handler_cpu_s"], 1.5)
 
     def test_a_status_of_an_uplink(self):
         data = status("uplink_1", {"a reason": 9}, {"rung": 3, "bytes_up": 70_000})
@@ -107,7 +107,7 @@ class LinkTest(unittest.TestCase):
     def test_a_forged_packet_that_opens_is_a_failure(self):
         rows = [self.row("perfect", range(10), 0.010), self.row("forged", range(10), 0.010, opened=3)]
         self.assertTrue(rows[1].passes(rows))
-        rows[1].figures["packets_opened"] = 4
+        rows[1].metrics["packets_opened"] = 4
         self.assertFalse(rows[1].passes(rows))
 
     def test_the_forger_runs_the_session(self):
@@ -143,7 +143,7 @@ class LinkTest(unittest.TestCase):
                         event("STATUS_a", 2, status("a", {"resend_request_t does not decode": 2, "another": 5}, {})))
         self.assertEqual(strangers(log), {"strangers_heard_by_logger": 3, "strangers_taken": 2})
 
-    def test_a_session_rests_when_nobody_has_work_and_nothing_is_said(self):
+    def test_a_session_is_idle_when_nobody_has_work_and_nothing_is_sent(self):
         log, watch = self.work / "server.lcm", Watch()
         now = int(1e6 * time.time())
         watch.read[log] = 0

@@ -9,9 +9,9 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from link_lib.figures import keyframes  # noqa: E402
+from link_lib.metrics import keyframes  # noqa: E402
 from link_test import write_log  # noqa: E402
-from many_agents_lib.figures import figures, table  # noqa: E402
+from many_agents_lib.metrics import metrics, table  # noqa: E402
 from many_agents_lib.run import copy_for  # noqa: E402
 
 
@@ -25,7 +25,7 @@ class ManyAgentsTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.work = Path(folder.name)
 
-    def figures(self, seqs_of_2, late_us):
+    def metrics(self, seqs_of_2, late_us):
         parts = []
         for id, seqs in ((1, range(10)), (2, seqs_of_2), (3, range(5))):
             write_log(self.work / f"agent_{id}.lcm", id, range(10) if id < 3 else range(7))
@@ -35,10 +35,10 @@ class ManyAgentsTest(unittest.TestCase):
             join(parts, self.work / name)
         memory = [(0, 1, 10_000, [5_000]), (1, 3, 12_000, [5_000, 6_000, 7_000]), (2, 2, 13_000, [5_000, 6_000])]
         run = Namespace(work=self.work, ids=[1, 2, 3], stopped=2, killed=3, memory=memory, trouble=[2_000_000, 3_000_000])
-        return figures(run, Namespace(agents=3))
+        return metrics(run, Namespace(agents=3))
 
     def test_times_and_memory(self):
-        found = self.figures(range(10), 30_000)
+        found = self.metrics(range(10), 30_000)
         self.assertEqual((found["missing"], found["keyframes_sent"], found["keyframes_journalled"]), (0, 27, 25))
         self.assertEqual((found["calm"]["count"], found["while_one_is_stopped_and_one_dead"]["count"]), (7, 3))
         self.assertEqual((found["calm"]["median_ms"], found["stopped_agent"]["p99_ms"]), (30.0, 30.0))
@@ -46,7 +46,7 @@ class ManyAgentsTest(unittest.TestCase):
         self.assertIn("3 agents, 25 of 27 keyframes", table(found))
 
     def test_what_is_lost_of_an_agent_that_lives_is_missing(self):
-        self.assertEqual(self.figures(range(8), 30_000)["missing"], 2)
+        self.assertEqual(self.metrics(range(8), 30_000)["missing"], 2)
 
     def test_a_copy_is_another_agents(self):
         write_log(self.work / "one.lcm", 1, range(3))

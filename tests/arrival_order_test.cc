@@ -39,13 +39,14 @@ TEST(ArrivalOrder, OneMap) {
     ASSERT_EQ(report["groups"].size(), 1u) << replay.output;
     EXPECT_GE(report["constraints"]["accepted"].get<int>(), 30);
   }
-  // The two map frames are those of different agents: one turn and step for all keyframes is free.
+  // The two map frames are those of different agents: one rotation and step for all keyframes is
+  // free.
   std::vector<std::vector<PosePair>> agents;
   for (const char* name : {"agent_1.tum", "agent_2.tum"}) {
     agents.push_back(Associate(ReadTum((outs[0] / name).string(), nullptr),
                                ReadTum((outs[1] / name).string(), nullptr), 2'000'000));
   }
-  const auto joint = JointAbsoluteError(agents, AlignmentKind::kSe3);
+  const auto joint = JointAbsoluteError(agents, TrajectoryAlignmentKind::kSe3);
   ASSERT_TRUE(joint);
   EXPECT_EQ(joint->position_m.count, 63u);
   EXPECT_LT(joint->position_m.rmse, 0.01);

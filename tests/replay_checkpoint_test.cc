@@ -1,5 +1,5 @@
-// `replay --from-checkpoint`: up to a time the log's matches and verdicts count, then they are made
-// again.
+// `replay --from-checkpoint`: up to a time the log's matches and verification results count, then
+// they are made again.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,19 +26,19 @@ const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr double kCheckpoint_s = 6;
 constexpr float kMark_px = 77;
 
-// A log with a mark in every match and verdict that changes nothing else of the map.
+// A log with a mark in every match and verification result that changes nothing else of the map.
 void WriteMarked(const std::string& log, const std::string& marked) {
   LogFileWriter out(marked);
   ReadLog(log, [&out](const LogEvent& event) {
     place_match_t match{};
-    constraint_t verdict{};
+    constraint_t result{};
     if (event.channel == channels::kPlaceMatch && DecodeMessage(event.data, &match)) {
       match.rejected.emplace_back("marked");
       ++match.num_rejected;
       out.Write(event.utime, event.channel, EncodeMessage(match));
-    } else if (event.channel == channels::kConstraint && DecodeMessage(event.data, &verdict)) {
-      verdict.rms_px = kMark_px;
-      out.Write(event.utime, event.channel, EncodeMessage(verdict));
+    } else if (event.channel == channels::kConstraint && DecodeMessage(event.data, &result)) {
+      result.rms_px = kMark_px;
+      out.Write(event.utime, event.channel, EncodeMessage(result));
     } else {
       out.Write(event.utime, event.channel, event.data);
     }
@@ -57,9 +57,9 @@ struct Marks {
 };
 
 struct MarksOf {
-  Marks matches, verdicts;
+  Marks matches, results;
   int64_t candidates = 0;            // in the matches
-  std::set<int64_t> constraint_ids;  // of the verdicts
+  std::set<int64_t> constraint_ids;  // of the verification results
 };
 
 MarksOf ReadMarks(const std::string& log) {
@@ -69,13 +69,13 @@ MarksOf ReadMarks(const std::string& log) {
     begin = begin.value_or(event.utime);
     const double seconds = 1e-6 * static_cast<double>(event.utime - *begin);
     place_match_t match{};
-    constraint_t verdict{};
+    constraint_t result{};
     if (event.channel == channels::kPlaceMatch && DecodeMessage(event.data, &match)) {
       marks.candidates += match.num_candidates;
       marks.matches.Note(!match.rejected.empty() && match.rejected.back() == "marked", seconds);
-    } else if (event.channel == channels::kConstraint && DecodeMessage(event.data, &verdict)) {
-      marks.constraint_ids.insert(verdict.id);
-      marks.verdicts.Note(verdict.rms_px == kMark_px, seconds);
+    } else if (event.channel == channels::kConstraint && DecodeMessage(event.data, &result)) {
+      marks.constraint_ids.insert(result.id);
+      marks.results.Note(result.rms_px == kMark_px, seconds);
     }
   });
   return marks;
@@ -115,37 +115,38 @@ void ExpectMarkedUpToCheckpoint(const Marks& marks) {
   EXPECT_LT(marks.last_marked_s, marks.first_other_s);
 }
 
-// The bytes of the whole, though its beginning was not judged again.
+// The bytes of the whole, though its beginning was not verified again.
 TEST_F(ReplayCheckpoint, TheRestIsAsInTheWhole) {
   const Outcome rest = Replay(Log("whole"), "rest", "--from-checkpoint 6 --diff " + Log("whole"));
   EXPECT_EQ(rest.exit_code, 0) << rest.output;
-  EXPECT_THAT(rest.output, AllOf(HasSubstr("matches and verdicts of the first 6 s"),
+  EXPECT_THAT(rest.output, AllOf(HasSubstr("matches and verification results of the first 6 s"),
                                  HasSubstr("## Groups"), HasSubstr("no message differs")));
 }
 
-TEST_F(ReplayCheckpoint, UpToItTheLogsWordCounts) {
+TEST_F(ReplayCheckpoint, UpToItTheLogsMessagesCount) {
   const Outcome rest = Replay(Marked(), "of_all", "--from-checkpoint 6 --until 8");
   EXPECT_EQ(rest.exit_code, 0) << rest.output;
   const MarksOf marks = ReadMarks(Log("of_all"));
   ExpectMarkedUpToCheckpoint(marks.matches);
-  ExpectMarkedUpToCheckpoint(marks.verdicts);
+  ExpectMarkedUpToCheckpoint(marks.results);
 }
 
 TEST_F(ReplayCheckpoint, OfOneProcess) {
   const Outcome rest = Replay(Marked(), "of_one", "--from-checkpoint 6 --until 8 --only fusion");
   EXPECT_EQ(rest.exit_code, 2) << rest.output;  // it differs where it was made again
   const MarksOf marks = ReadMarks(Log("of_one"));
-  ExpectMarkedUpToCheckpoint(marks.verdicts);
+  ExpectMarkedUpToCheckpoint(marks.results);
   EXPECT_EQ(marks.matches.others, 0);
 }
 
-// A live session's verdicts come late: those that the log does not have at the checkpoint are made.
+// A live session's verification results come late: those that the log does not have at the
+// checkpoint are made.
 TEST_F(ReplayCheckpoint, OfALiveSessionNothingIsLostOrSaidTwice) {
   const Outcome rest = Replay(kSample, "live", "--from-checkpoint 6 --until 8");
   EXPECT_EQ(rest.exit_code, 0) << rest.output;
   const MarksOf marks = ReadMarks(Log("live"));
   EXPECT_GT(marks.candidates, 20);
-  EXPECT_EQ(marks.verdicts.others, marks.candidates);
+  EXPECT_EQ(marks.results.others, marks.candidates);
   EXPECT_EQ(std::ssize(marks.constraint_ids), marks.candidates);
 }
 
@@ -157,7 +158,7 @@ TEST_F(ReplayCheckpoint, NotWhereItCannotBe) {
     EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
     EXPECT_THAT(outcome.output, HasSubstr(why));
   };
-  expect_error(keyframes, "6", "no match and no verdict before the checkpoint");
+  expect_error(keyframes, "6", "no match and no verification result before the checkpoint");
   expect_error(kSample, "100", "no keyframe comes after it");
   expect_error(kSample + " " + keyframes, "6", "takes one log");
 }

@@ -23,9 +23,9 @@ class ReplayDebugging : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new fs::path(FreshFolder("replay_debugging"));
-    std::istringstream verdicts(RunCommand("pangea-log explain " + kSample).output);
+    std::istringstream results(RunCommand("pangea-log explain " + kSample).output);
     constraint_ = new std::string;
-    verdicts >> *constraint_;
+    results >> *constraint_;
     whole_ = new Outcome(Replay(kSample, "whole", "--explain " + *constraint_));
     ASSERT_EQ(whole_->exit_code, 0) << whole_->output;
   }
@@ -75,7 +75,8 @@ TEST_F(ReplayDebugging, APartOfTheLog) {
   const Outcome info = RunCommand("pangea-log info " + Log("part"));
   EXPECT_THAT(info.output, HasSubstr("KEYFRAME_1"));
   EXPECT_LT(fs::file_size(Log("part")), fs::file_size(Log("whole")));
-  // It ends with what waits for a quiet bus: there it parts from the whole, not in its verdicts.
+  // It ends with what waits for a quiet bus: there it parts from the whole, not in its verification
+  // results.
   EXPECT_EQ(part.exit_code, 2) << part.output;
   EXPECT_THAT(part.output, HasSubstr("they part at"));
   EXPECT_THAT(part.output.substr(part.output.find("they part at")),

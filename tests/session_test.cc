@@ -80,7 +80,7 @@ TEST_F(SessionTest, ReplayGivesTheSameBytesTwiceAndTheSameMap) {
   EXPECT_NEAR(live["ate_joint_m"].get<double>(), replayed["ate_joint_m"].get<double>(), 0.005);
 }
 
-TEST_F(SessionTest, ExpectationsAreTold) {
+TEST_F(SessionTest, ExpectationsAreReported) {
   const auto met = ReadJson(Out("report.json"))["expectations"];
   ASSERT_EQ(met.size(), 6u) << run_->output;
   for (const auto& expectation : met) {

@@ -53,24 +53,24 @@ def direction(rng):
     return [x / length for x in v]
 
 
-def turned(matrix, axis, angle):
-    """Rodrigues: the rotation in a row-major 4x4, turned on its left."""
+def rotated(matrix, axis, angle):
+    """Rodrigues: the rotation in a row-major 4x4, rotated from its left."""
     c, s = math.cos(angle), math.sin(angle)
     x, y, z = axis
-    turn = [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],
+    rotation = [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],
             [y * x * (1 - c) + z * s, c + y * y * (1 - c), y * z * (1 - c) - x * s],
             [z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c)]]
     made = list(matrix)
     for i in range(3):
         for j in range(3):
-            made[4 * i + j] = sum(turn[i][k] * matrix[4 * k + j] for k in range(3))
+            made[4 * i + j] = sum(rotation[i][k] * matrix[4 * k + j] for k in range(3))
     return made
 
 
 def worse_calibration(text, what, seed):
     if "extrinsics" in what:
         rng = random.Random(f"extrinsics {seed}")
-        matrix = turned(numbers(text, "data"), direction(rng), ROTATION_OFF)
+        matrix = rotated(numbers(text, "data"), direction(rng), ROTATION_OFF)
         for i, d in enumerate(direction(rng)):
             matrix[4 * i + 3] += TRANSLATION_OFF * d
         text = put(text, "data", matrix)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from ablation_lib.plan import RPE_DISTANCE_M
 from ablation_lib.rungs import ALONE, LADDER, RECORDED
 from accuracy_lib.anchors import MIN_COVERAGE
-from accuracy_lib.figures import read_json
+from accuracy_lib.metrics import read_json
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 
 @dataclass
-class Figures:
+class Metrics:
     """Of one run; None where there is none."""
 
     ate_m: float
@@ -23,7 +23,7 @@ class Figures:
     counts: bool  # one map over the whole recording
 
 
-def figures_of(job):
+def metrics_of(job):
     ate, rpe = read_json(job.folder / "ate.json"), read_json(job.folder / "rpe.json")
     if not ate or not rpe or not job.ended_well:
         return None
@@ -33,7 +33,7 @@ def figures_of(job):
         return None
     coverage = own["coverage"] or 0
     one_map = len(list(job.folder.glob("vio.tum*"))) == 1
-    return Figures(own["ate_m"]["rmse"], own["ate_m"]["median"], row["position_m"]["rmse"], row["rotation_deg"]["rmse"],
+    return Metrics(own["ate_m"]["rmse"], own["ate_m"]["median"], row["position_m"]["rmse"], row["rotation_deg"]["rmse"],
                    coverage >= MIN_COVERAGE and one_map)
 
 
@@ -46,7 +46,7 @@ def _spread(values, scale, digits):
 class Tables:
     def __init__(self, plan):
         self.plan = plan
-        self.figures = {key: [figures_of(job) for job in runs.values()] for key, runs in plan.runs.items()}
+        self.metrics = {key: [metrics_of(job) for job in runs.values()] for key, runs in plan.runs.items()}
 
     def text(self):
         scenes = self.plan.scenes()
@@ -63,7 +63,7 @@ class Tables:
         return "\n".join(lines) + "\n"
 
     def _cells(self, scene, rung):
-        runs = self.figures.get((scene, rung.name))
+        runs = self.metrics.get((scene, rung.name))
         if runs is None:
             return "", ""
         known = [run for run in runs if run]
@@ -75,7 +75,7 @@ class Tables:
 
     def json(self):
         return {f"{scene} {rung}": [vars(run) if run else None for run in runs]
-                for (scene, rung), runs in self.figures.items()}
+                for (scene, rung), runs in self.metrics.items()}
 
     def picture(self, path):
         """ATE down the ladder, a line a scene, the seeds' spread as bars; drawn by gnuplot."""
@@ -89,7 +89,7 @@ class Tables:
         for number, scene in enumerate(self.plan.scenes()):
             rows = []
             for i, rung in enumerate(rungs):
-                values = [1e3 * run.ate_m for run in self.figures.get((scene.name, rung.name), []) if run]
+                values = [1e3 * run.ate_m for run in self.metrics.get((scene.name, rung.name), []) if run]
                 if values:
                     # The last rung stands beside the ladder: no line leads to it.
                     gap = [""] if rung is RECORDED else []

@@ -52,7 +52,7 @@ class RenderJob(Job):
 
 @dataclass
 class Agent:
-    """One VIO run: what a server run reads, and what its figures are compared with."""
+    """One VIO run: what a server run reads, and what its metrics are compared with."""
 
     id: int
     name: str
@@ -72,16 +72,16 @@ class Plan:
         self.servers = {}  # (set, name): (Job, [Agent])
         wanted = set(options.only)
         everything = "all" in wanted
-        self.tables = {t for t in ("table2", "table3", "table4", "together", "hybrid") if everything or t in wanted}
+        self.tables = {t for t in ("table2", "table3", "table4", "together", "recorded_imu") if everything or t in wanted}
         if not options.groundtruth:
             self.tables = set()
 
     def make(self):
         for seed in self.options.seeds:
             self._rendered(seed)
-        if "hybrid" in self.tables and self.options.imu:
+        if "recorded_imu" in self.tables and self.options.imu:
             for seed in self.options.seeds:
-                self._hybrid(seed)
+                self._recorded_imu(seed)
         for folder in self.options.real:
             self._real(Path(folder).resolve())
         return self.jobs
@@ -95,8 +95,8 @@ class Plan:
     def sequences(self):
         return [s for s in anchors.SEQUENCES if s in self.options.sequences]
 
-    def hybrid_sequences(self):
-        return [s for s in anchors.HYBRID_SEQUENCES if s in self.options.sequences]
+    def recorded_imu_sequences(self):
+        return [s for s in anchors.RECORDED_IMU_SEQUENCES if s in self.options.sequences]
 
     def _has(self, sequences):
         return all(s in self.options.sequences for s in sequences)
@@ -104,7 +104,7 @@ class Plan:
     def _rendered(self, seed):
         where = f"seed{seed}"
         halves = "table3" in self.tables
-        for sequence in self.sequences() if self.tables - {"hybrid"} else []:
+        for sequence in self.sequences() if self.tables - {"recorded_imu"} else []:
             render = self._render(where, sequence, seed, [])
             full = self._vio(where, sequence, int(sequence[-1]), render, render.folder)
             if halves:
@@ -121,14 +121,14 @@ class Plan:
             for group in self.together(anchors.TOGETHER):
                 self._server(where, "+".join(group), [self.agents[where, s] for s in group])
 
-    def _hybrid(self, seed):
-        where = f"hybrid_seed{seed}"
+    def _recorded_imu(self, seed):
+        where = f"recorded_imu_seed{seed}"
         folder = Path(self.options.imu).resolve()
-        for sequence in self.hybrid_sequences():
+        for sequence in self.recorded_imu_sequences():
             imu, stamps = only(folder, f"{sequence}*.csv"), only(folder, f"{sequence}*stamps*.txt")
             render = self._render(where, sequence, seed, ["--imu", str(imu), "--stamps", str(stamps)])
             self._server(where, sequence, [self._vio(where, sequence, int(sequence[-1]), render, render.folder)])
-        for group in self.together(anchors.HYBRID_TOGETHER):
+        for group in self.together(anchors.RECORDED_IMU_TOGETHER):
             self._server(where, "+".join(group), [self.agents[where, s] for s in group])
 
     def _real(self, folder):
@@ -187,7 +187,7 @@ class Plan:
 
     def _eval(self, command, files):
         argv = [str(self.bin / "pangea-eval"), command, *files, "--json", f"{OUT}/ate.json"]
-        return Command(argv, optional=True)  # without ground truth, or with too few poses, there is no figure
+        return Command(argv, optional=True)  # without ground truth, or with too few poses, there is no value
 
 
 def run(jobs, options, logs):

@@ -1,13 +1,13 @@
-"""The tables and the verdicts, as Markdown and as JSON."""
+"""The tables and the checks, as Markdown and as JSON."""
 
 from dataclasses import dataclass
 
 from accuracy_lib import anchors
-from accuracy_lib.figures import Sample, Series
+from accuracy_lib.metrics import Sample, Series
 
 
 @dataclass
-class Verdict:
+class Check:
     text: str
     passed: bool
     bar: bool  # a bar fails the run, a goal does not
@@ -26,25 +26,25 @@ class Tables:
         self.plan = plan
         self.measured = measured
         self.lines = []
-        self.verdicts = []
+        self.checks = []
         self.json = {}
         self.seeds = plan.options.seeds
 
     def make(self):
         makers = {"table2": self._table2, "table3": self._table3, "table4": self._table4, "together": self._together,
-                  "hybrid": self._hybrid}
+                  "recorded_imu": self._recorded_imu}
         for name, maker in makers.items():
-            if name in self.plan.tables and (name != "hybrid" or self.plan.options.imu):
+            if name in self.plan.tables and (name != "recorded_imu" or self.plan.options.imu):
                 maker()
         if self.plan.options.real:
             self._real()
-        self._verdicts()
+        self._checks()
         return "\n".join(self.lines) + "\n"
 
     def failed_bars(self):
-        return [v.text for v in self.verdicts if v.bar and not v.passed]
+        return [v.text for v in self.checks if v.bar and not v.passed]
 
-    # One figure for each seed.
+    # One value for each seed.
     def _series(self, what, of_seed):
         return Series(what, {f"seed {seed}": of_seed(seed) for seed in self.seeds})
 
@@ -73,10 +73,10 @@ class Tables:
         self.json[key] = {row: {c: s.to_json() for c, s in columns.items()} for row, columns in series.items()}
 
     def _bar(self, text, passed):
-        self.verdicts.append(Verdict(text, bool(passed), True))
+        self.checks.append(Check(text, bool(passed), True))
 
     def _goal(self, text, passed):
-        self.verdicts.append(Verdict(text, bool(passed), False))
+        self.checks.append(Check(text, bool(passed), False))
 
     def _most(self, text, passes):
         """All but one of the five sequences; all of fewer."""
@@ -153,10 +153,10 @@ class Tables:
             second, alone = self._server("seed", name, pair[1]), self._server("seed", pair[1], pair[1])
             series[name] = {"joint": joint, "joint_sim3": self._server_sim3("seed", name), "second": second, "alone": alone}
             fused = self._fused("seed", name)
-            links = [self.measured.links(f"seed{seed}", name) for seed in self.seeds]
+            constraints = [self.measured.constraints(f"seed{seed}", name) for seed in self.seeds]
             fused_passes.append(fused == len(self.seeds))
             ate_passes.append(joint.at_most(bar))
-            rows.append([name, f"{fused} of {len(self.seeds)}", "–".join(map(str, sorted({min(links), max(links)}))), joint.text(), str(bar),
+            rows.append([name, f"{fused} of {len(self.seeds)}", "–".join(map(str, sorted({min(constraints), max(constraints)}))), joint.text(), str(bar),
                          _passed(fused_passes[-1] and ate_passes[-1]), series[name]["joint_sim3"].text(), second.text(),
                          alone.text(), *map(_metres, paper)])
             self._goal(f"{name}: second agent better than the paper's best, {min(paper)} m", second.at_most(min(paper)))
@@ -165,7 +165,7 @@ class Tables:
             self._goal(f"{name}: second agent at most {anchors.FUSING_COSTS_GOAL} m worse than alone",
                        known and together <= by_itself + anchors.FUSING_COSTS_GOAL)
         self._table("table4", "Table IV: two agents, ATE m",
-                    ["pair", "fused", "links accepted", "joint", "bar", "fused, joint ≤ bar", "joint Sim(3)",
+                    ["pair", "fused", "constraints accepted", "joint", "bar", "fused, joint ≤ bar", "joint Sim(3)",
                      "second agent in it", "second agent alone", "paper: second agent in it", "paper: alone",
                      "paper: VINS-Mono"], rows, series)
         self._bar(f"pairs fused, every seed: {sum(fused_passes)} of {len(fused_passes)}", all(fused_passes))
@@ -188,27 +188,27 @@ class Tables:
     def _together(self):
         self._groups("together", "All together", "seed", self.plan.together(anchors.TOGETHER), anchors.TOGETHER_GOAL)
 
-    def _hybrid(self):
+    def _recorded_imu(self):
         rows, series = [], {}
-        for s in self.plan.hybrid_sequences():
-            columns = {"vio": self._vio("hybrid_seed", s), "rendered_vio": self._vio("seed", s),
-                       "server": self._server("hybrid_seed", s, s), "rendered_server": self._server("seed", s, s)}
+        for s in self.plan.recorded_imu_sequences():
+            columns = {"vio": self._vio("recorded_imu_seed", s), "rendered_vio": self._vio("seed", s),
+                       "server": self._server("recorded_imu_seed", s, s), "rendered_server": self._server("seed", s, s)}
             series[s] = {c: cell for c, cell in columns.items() if c in ("vio", "server")}
             ratios = [self._ratio(columns[c], columns["rendered_" + c]) for c in ("vio", "server")]
             rows.append([s, columns["vio"].text(), columns["rendered_vio"].text(), ratios[0], columns["server"].text(),
                          columns["rendered_server"].text(), ratios[1], _metres(anchors.ORB_SLAM3_MONO_INERTIAL[s])])
-        self._table("hybrid", "Hybrid recordings: recorded IMU, rendered images, one agent, ATE m",
+        self._table("recorded_imu", "Recorded IMU, rendered images, one agent, ATE m",
                     ["recording", "VIO", "all rendered", "ratio", "with server", "all rendered", "ratio",
                      "ORB-SLAM3 mono-inertial"], rows, series)
-        self._mean_goals("hybrid, one agent with server", [series[s]["server"] for s in series], anchors.HYBRID_MEAN_GOAL)
-        self._groups("hybrid_together", "Hybrid recordings together", "hybrid_seed",
-                     self.plan.together(anchors.HYBRID_TOGETHER), anchors.HYBRID_TOGETHER_GOAL)
+        self._mean_goals("recorded IMU, one agent with server", [series[s]["server"] for s in series], anchors.RECORDED_IMU_MEAN_GOAL)
+        self._groups("recorded_imu_together", "Recorded IMU and rendered images together", "recorded_imu_seed",
+                     self.plan.together(anchors.RECORDED_IMU_TOGETHER), anchors.RECORDED_IMU_TOGETHER_GOAL)
 
-    def _ratio(self, hybrid, rendered):
-        a, b = hybrid.median(), rendered.median()
+    def _ratio(self, recorded, rendered):
+        a, b = recorded.median(), rendered.median()
         if a is None or not b:
             return "–"
-        factor = anchors.HYBRID_FACTOR
+        factor = anchors.RECORDED_IMU_FACTOR
         return f"{a / b:.2f}" + ("" if 1 / factor <= a / b <= factor else " (!)")
 
     def _real(self):
@@ -222,16 +222,16 @@ class Tables:
                        "server": one("server", self.measured.server("real", name, agent.id)),
                        "server_sim3": one("server", self.measured.server_sim3("real", name))}
             series[name] = columns
-            paper = [_metres(figures.get(name[:5])) for figures in
+            paper = [_metres(metrics.get(name[:5])) for metrics in
                      (anchors.PAPER_ALONE, anchors.PAPER_SERVER, anchors.ORB_SLAM3_MONO_INERTIAL)]
             rows.append([name, *[cell.text() for cell in columns.values()], *paper])
         self._table("real", "Real recordings: one agent, ATE m",
                     ["recording", "VIO", "VIO Sim(3)", "with server", "with server Sim(3)", "paper: phone alone",
                      "paper: with server", "ORB-SLAM3 mono-inertial"], rows, series)
 
-    def _verdicts(self):
+    def _checks(self):
         for title, bar in (("Bars", True), ("Goals", False)):
-            verdicts = [v for v in self.verdicts if v.bar == bar]
-            if verdicts:
-                self.lines += [f"## {title}", "", *[f"- {_passed(v.passed)}: {v.text}" for v in verdicts], ""]
-        self.json["verdicts"] = [{"text": v.text, "passed": v.passed, "bar": v.bar} for v in self.verdicts]
+            checks = [v for v in self.checks if v.bar == bar]
+            if checks:
+                self.lines += [f"## {title}", "", *[f"- {_passed(v.passed)}: {v.text}" for v in checks], ""]
+        self.json["checks"] = [{"text": v.text, "passed": v.passed, "bar": v.bar} for v in self.checks]

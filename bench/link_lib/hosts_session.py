@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from link_lib.figures import decode_status, events  # noqa: E402
+from link_lib.metrics import decode_status, events  # noqa: E402
 from link_lib.hosts import LINK, OWN_BUS, Hosts  # noqa: E402
 from link_lib.plan import SECOND_STARTS_AFTER_S  # noqa: E402
 
@@ -131,7 +131,7 @@ class Session:
     def run(self):
         self.start_server()
         self.play()
-        self.wait(QUIET_S, DRAIN_TIMEOUT_S, "the session did not come to rest")
+        self.wait(QUIET_S, DRAIN_TIMEOUT_S, "the session did not become idle")
         agents = [self.hosts[f"agent_{agent['id']}"] for agent in self.row["agents"]]
         counted = {"frame_bytes_up": sum(host.bytes_sent() for host in agents),
                    "frames_lost_up": self.hosts.net.lost_packets(),

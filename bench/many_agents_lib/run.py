@@ -6,7 +6,7 @@ import struct
 import subprocess
 import time
 
-from link_lib.figures import LCM_SYNC, events
+from link_lib.metrics import LCM_SYNC, events
 
 AGENT_ID_AT = 8  # in a keyframe's bytes, behind the type's fingerprint
 STEP_S = 0.2

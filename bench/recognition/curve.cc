@@ -12,11 +12,11 @@ class Count {
   explicit Count(const std::vector<KeyframeId>& with_overlap)
       : missing_(with_overlap.begin(), with_overlap.end()), with_overlap_(missing_.size()) {}
 
-  void Pass(const Judged& judged) {
+  void Pass(const Scored& scored) {
     ++sum_.passed;
-    if (judged.right) {
+    if (scored.right) {
       ++sum_.right;
-      sum_.found += missing_.erase(judged.query);
+      sum_.found += missing_.erase(scored.query);
     }
   }
 
@@ -39,10 +39,10 @@ class Count {
 
 }  // namespace
 
-PrecisionRecall AsDecided(const std::vector<Judged>& judged,
+PrecisionRecall AsDecided(const std::vector<Scored>& scored,
                           const std::vector<KeyframeId>& with_overlap) {
   Count count(with_overlap);
-  for (const Judged& one : judged) {
+  for (const Scored& one : scored) {
     if (one.passed) {
       count.Pass(one);
     }
@@ -50,15 +50,15 @@ PrecisionRecall AsDecided(const std::vector<Judged>& judged,
   return count.Now();
 }
 
-std::vector<PrecisionRecall> OverThresholds(std::vector<Judged> judged,
+std::vector<PrecisionRecall> OverThresholds(std::vector<Scored> scored,
                                             const std::vector<KeyframeId>& with_overlap) {
-  std::stable_sort(judged.begin(), judged.end(),
-                   [](const Judged& a, const Judged& b) { return a.score > b.score; });
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const Scored& a, const Scored& b) { return a.score > b.score; });
   Count count(with_overlap);
   std::vector<PrecisionRecall> curve;
-  for (size_t i = 0; i < judged.size(); ++i) {
-    count.Pass(judged[i]);
-    if (i + 1 == judged.size() || judged[i + 1].score < judged[i].score) {
+  for (size_t i = 0; i < scored.size(); ++i) {
+    count.Pass(scored[i]);
+    if (i + 1 == scored.size() || scored[i + 1].score < scored[i].score) {
       curve.push_back(count.Now());
     }
   }

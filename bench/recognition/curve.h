@@ -12,7 +12,7 @@
 namespace pangea::bench {
 
 // A candidate at one stage.
-struct Judged {
+struct Scored {
   KeyframeId query;
   double score = 0;  // the higher, the surer the stage is
   bool right = false;
@@ -28,11 +28,11 @@ struct PrecisionRecall {
 };
 
 // As the system decides. `with_overlap`: the keyframes that have a place to be recognised.
-PrecisionRecall AsDecided(const std::vector<Judged>& judged,
+PrecisionRecall AsDecided(const std::vector<Scored>& scored,
                           const std::vector<KeyframeId>& with_overlap);
 // If instead all passed whose score is at least a threshold: for each score that occurs, highest
 // first.
-std::vector<PrecisionRecall> OverThresholds(std::vector<Judged> judged,
+std::vector<PrecisionRecall> OverThresholds(std::vector<Scored> scored,
                                             const std::vector<KeyframeId>& with_overlap);
 
 }  // namespace pangea::bench

@@ -1,4 +1,4 @@
-// Precision and recall on hand-made judgements, overlap on known views, and the whole way on the
+// Precision and recall on hand-made answers, overlap on known views, and the whole way on the
 // captured session.
 
 #include <gtest/gtest.h>
@@ -18,13 +18,13 @@ KeyframeId Id(int32_t seq) { return {{1, 1000}, seq}; }
 
 // Keyframes 1 to 4 have a place; 5 has none, so nothing can be right about it.
 const std::vector<KeyframeId> kWithOverlap = {Id(1), Id(2), Id(3), Id(4)};
-const std::vector<Judged> kJudged = {
+const std::vector<Scored> kScored = {
     {Id(1), 0.9, true, true},  {Id(1), 0.8, true, true},   {Id(2), 0.8, false, true},
     {Id(2), 0.5, true, false}, {Id(3), 0.7, false, false}, {Id(5), 0.6, false, true},
 };
 
 TEST(Curve, CountsWhatTheSystemLetsPass) {
-  const PrecisionRecall decided = AsDecided(kJudged, kWithOverlap);
+  const PrecisionRecall decided = AsDecided(kScored, kWithOverlap);
   EXPECT_EQ(decided.passed, 4u);
   EXPECT_EQ(decided.right, 2u);
   EXPECT_EQ(decided.found, 1u);  // both right ones are keyframe 1's
@@ -33,20 +33,20 @@ TEST(Curve, CountsWhatTheSystemLetsPass) {
 }
 
 TEST(Curve, EqualScoresPassTogether) {
-  const std::vector<PrecisionRecall> curve = OverThresholds(kJudged, kWithOverlap);
+  const std::vector<PrecisionRecall> curve = OverThresholds(kScored, kWithOverlap);
   ASSERT_EQ(curve.size(), 5u);
   EXPECT_EQ(curve[0].passed, 1u);
   EXPECT_DOUBLE_EQ(curve[0].precision, 1);
   EXPECT_EQ(curve[1].passed, 3u);
   EXPECT_DOUBLE_EQ(curve[1].precision, 2.0 / 3);
   EXPECT_DOUBLE_EQ(curve[1].recall, 0.25);
-  EXPECT_EQ(curve.back().passed, kJudged.size());
+  EXPECT_EQ(curve.back().passed, kScored.size());
   EXPECT_DOUBLE_EQ(curve.back().recall, 0.5);
 }
 
-TEST(Curve, NothingIsNoFigure) {
+TEST(Curve, NothingIsNoValue) {
   EXPECT_EQ(AsDecided({}, kWithOverlap).recall, 0);
-  EXPECT_EQ(AsDecided(kJudged, {}).recall, 0);
+  EXPECT_EQ(AsDecided(kScored, {}).recall, 0);
   EXPECT_TRUE(OverThresholds({}, kWithOverlap).empty());
 }
 

@@ -21,12 +21,12 @@ Plot CurvesOf(const Outcome& outcome, Search search) {
   plot.x_label = "recall";
   plot.y_label = "precision";
   for (size_t stage = 0; stage < kStages.size(); ++stage) {
-    const std::vector<Judged> judged = AtStage(outcome, search, stage);
+    const std::vector<Scored> scored = AtStage(outcome, search, stage);
     PlotLine line{.label = kStages[stage], .colour = AgentColour(stage)};
-    for (const PrecisionRecall& point : OverThresholds(judged, with_overlap)) {
+    for (const PrecisionRecall& point : OverThresholds(scored, with_overlap)) {
       line.points.emplace_back(point.recall, point.precision);
     }
-    const PrecisionRecall decided = AsDecided(judged, with_overlap);
+    const PrecisionRecall decided = AsDecided(scored, with_overlap);
     PlotLine dot{.colour = line.colour, .mark_start = true};
     dot.points.emplace_back(decided.recall, decided.precision);
     plot.lines.push_back(std::move(line));
@@ -45,10 +45,10 @@ std::string Table(const Outcome& outcome) {
   for (const Search search : kSearches) {
     const std::vector<KeyframeId>& with_overlap = WithOverlap(outcome, search);
     for (size_t stage = 0; stage < kStages.size(); ++stage) {
-      const PrecisionRecall figures = AsDecided(AtStage(outcome, search, stage), with_overlap);
+      const PrecisionRecall decided = AsDecided(AtStage(outcome, search, stage), with_overlap);
       text += fmt::format("| {} | {} | {} | {} | {} | {} | {:.3f} | {:.3f} |\n", ToString(search),
-                          with_overlap.size(), kStages[stage], figures.passed, figures.right,
-                          figures.found, figures.precision, figures.recall);
+                          with_overlap.size(), kStages[stage], decided.passed, decided.right,
+                          decided.found, decided.precision, decided.recall);
     }
   }
   return text;
@@ -67,7 +67,7 @@ std::string Csv(const Outcome& outcome) {
   std::string text =
       "query,match,overlap,score,epipolar_inliers,verified,published,pnp_inliers,landmarks,"
       "accepted,error_m,error_rad\n";
-  for (const Looked& l : outcome.looked) {
+  for (const Retrieved& l : outcome.retrieved) {
     text += fmt::format("{},{},{:.3f},{:.4f},{},{:d},{:d},{},{},{:d},{:.3f},{:.4f}\n",
                         ToString(l.query), ToString(l.match), l.overlap, l.score,
                         l.epipolar_inliers, l.verified, l.published, l.pnp_inliers, l.landmarks,

@@ -38,7 +38,7 @@ class Stages {
     NoteTrueOverlaps(*query);
     for (const PlaceReport& place : places) {
       if (const auto other = known_.find(place.match); other != known_.end()) {
-        outcome_.looked.push_back(Follow(*query, other->second, place, match));
+        outcome_.retrieved.push_back(Follow(*query, other->second, place, match));
       }
     }
     known_.emplace(query->id, *query);
@@ -83,34 +83,35 @@ class Stages {
     }
   }
 
-  Looked Follow(const Known& query, const Known& other, const PlaceReport& place,
-                const PlaceMatch& match) {
-    Looked looked{.query = query.id, .match = other.id};
-    looked.overlap = Overlap(query.view, other.view);
-    looked.score = place.score;
-    looked.epipolar_inliers = place.inliers;
-    looked.verified = place.verified;
+  Retrieved Follow(const Known& query, const Known& other, const PlaceReport& place,
+                   const PlaceMatch& match) {
+    Retrieved retrieved{.query = query.id, .match = other.id};
+    retrieved.overlap = Overlap(query.view, other.view);
+    retrieved.score = place.score;
+    retrieved.epipolar_inliers = place.inliers;
+    retrieved.verified = place.verified;
     const auto candidate =
         std::find_if(match.candidates.begin(), match.candidates.end(),
                      [&](const PlaceCandidate& c) { return c.match == other.id; });
-    looked.published = candidate != match.candidates.end();
-    if (!looked.published) {
-      return looked;
+    retrieved.published = candidate != match.candidates.end();
+    if (!retrieved.published) {
+      return retrieved;
     }
-    PairJudge& judge = candidate->kind == PlaceKind::kIntra ? static_cast<PairJudge&>(intra_)
-                                                            : static_cast<PairJudge&>(inter_);
-    AlignmentReport report;
-    const Constraint constraint = judge.Judge(query.id, *candidate, &report);
-    looked.pnp_inliers = report.pnp_inliers;
-    looked.landmarks = report.landmarks;
-    looked.accepted = constraint.accepted;
-    if (looked.landmarks > 0) {
+    LoopVerifier& verifier = candidate->kind == PlaceKind::kIntra
+                                 ? static_cast<LoopVerifier&>(intra_)
+                                 : static_cast<LoopVerifier&>(inter_);
+    LoopVerificationReport report;
+    const Constraint constraint = verifier.Verify(query.id, *candidate, &report);
+    retrieved.pnp_inliers = report.pnp_inliers;
+    retrieved.landmarks = report.landmarks;
+    retrieved.accepted = constraint.accepted;
+    if (retrieved.landmarks > 0) {
       const Vector6d error =
           constraint.T_from_to.Minus(other.T_reference_body.Inverse() * query.T_reference_body);
-      looked.error_m = error.head<3>().norm();
-      looked.error_rad = error.tail<3>().norm();
+      retrieved.error_m = error.head<3>().norm();
+      retrieved.error_rad = error.tail<3>().norm();
     }
-    return looked;
+    return retrieved;
   }
 
   const std::map<int32_t, Trajectory>& truth_;
@@ -123,31 +124,31 @@ class Stages {
 };
 
 // Nothing for what did not come to the stage.
-std::optional<Judged> JudgedAt(const Looked& looked, size_t stage) {
-  const bool right = looked.overlap >= kRightOverlap;
-  const bool placed = looked.pnp_inliers >= AlignmentOptions{}.min_pnp_inliers;
+std::optional<Scored> ScoredAt(const Retrieved& retrieved, size_t stage) {
+  const bool right = retrieved.overlap >= kRightOverlap;
+  const bool placed = retrieved.pnp_inliers >= LoopVerificationOptions{}.min_pnp_inliers;
   switch (stage) {
     case 0:
-      return Judged{looked.query, looked.score, right, true};
+      return Scored{retrieved.query, retrieved.score, right, true};
     case 1:
-      return Judged{looked.query, static_cast<double>(looked.epipolar_inliers), right,
-                    looked.verified};
+      return Scored{retrieved.query, static_cast<double>(retrieved.epipolar_inliers), right,
+                    retrieved.verified};
     case 2:
-      return looked.published
-                 ? std::optional(
-                       Judged{looked.query, static_cast<double>(looked.pnp_inliers), right, placed})
+      return retrieved.published
+                 ? std::optional(Scored{retrieved.query, static_cast<double>(retrieved.pnp_inliers),
+                                        right, placed})
                  : std::nullopt;
     default:
-      return looked.published && placed
-                 ? std::optional(Judged{looked.query, static_cast<double>(looked.landmarks),
-                                        looked.right_pose(), looked.accepted})
+      return retrieved.published && placed
+                 ? std::optional(Scored{retrieved.query, static_cast<double>(retrieved.landmarks),
+                                        retrieved.right_pose(), retrieved.accepted})
                  : std::nullopt;
   }
 }
 
 }  // namespace
 
-bool Looked::right_pose() const {
+bool Retrieved::right_pose() const {
   return landmarks > 0 && error_m <= session::kWrongTranslation_m &&
          error_rad <= session::kWrongRotation_rad;
 }
@@ -163,16 +164,16 @@ Outcome RunStages(const std::vector<Keyframe>& keyframes,
   return stages.Take();
 }
 
-std::vector<Judged> AtStage(const Outcome& outcome, Search search, size_t stage) {
-  std::vector<Judged> judged;
-  for (const Looked& looked : outcome.looked) {
-    if ((looked.query.map == looked.match.map) == (search == Search::kOwnMap)) {
-      if (const auto one = JudgedAt(looked, stage)) {
-        judged.push_back(*one);
+std::vector<Scored> AtStage(const Outcome& outcome, Search search, size_t stage) {
+  std::vector<Scored> scored;
+  for (const Retrieved& retrieved : outcome.retrieved) {
+    if ((retrieved.query.map == retrieved.match.map) == (search == Search::kOwnMap)) {
+      if (const auto one = ScoredAt(retrieved, stage)) {
+        scored.push_back(*one);
       }
     }
   }
-  return judged;
+  return scored;
 }
 
 }  // namespace pangea::bench

@@ -1,6 +1,6 @@
 #pragma once
 
-// Place recognition and the two judges of its candidates run over keyframes in order, and every
+// Place recognition and the two verifiers of its candidates run over keyframes in order, and every
 // place looked at is followed through the four stages: retrieval, epipolar check, PnP, window BA.
 
 #include <array>
@@ -20,7 +20,7 @@ inline constexpr std::array kSearches = {Search::kOwnMap, Search::kOtherMaps};
 std::string ToString(Search search);
 
 // A place looked at for a keyframe, and how far it came.
-struct Looked {
+struct Retrieved {
   KeyframeId query, match;
   double overlap = 0;  // true (overlap.h)
   float score = 0;     // retrieval
@@ -40,7 +40,7 @@ struct Outcome {
   size_t keyframes = 0;  // with ground truth
   // Keyframes of which an earlier one truly shows the same, recent ones of their own map left out.
   std::map<Search, std::vector<KeyframeId>> with_overlap;
-  std::vector<Looked> looked;
+  std::vector<Retrieved> retrieved;
 };
 
 // `truth` is by agent, all of it in one frame; keyframes without a true pose are recognised but not
@@ -50,6 +50,6 @@ Outcome RunStages(const std::vector<Keyframe>& keyframes,
 
 // What a stage says of those that came to it; `score`: retrieval score, or its inliers.
 inline constexpr std::array kStages = {"retrieval", "epipolar", "PnP", "window BA"};
-std::vector<Judged> AtStage(const Outcome& outcome, Search search, size_t stage);
+std::vector<Scored> AtStage(const Outcome& outcome, Search search, size_t stage);
 
 }  // namespace pangea::bench

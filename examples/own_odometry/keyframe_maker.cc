@@ -5,7 +5,7 @@
 namespace pangea::example {
 namespace {
 
-constexpr size_t kMaxSights = 60;
+constexpr size_t kMaxObservations = 60;
 constexpr double kMinInverseDepth = 0.01;  // 1/m
 
 }  // namespace
@@ -26,18 +26,19 @@ std::optional<Keyframe> KeyframeMaker::Add(int64_t utime, const cv::Mat& image,
       last_ ? T_odom_cam.q.conjugate() * (last_->T_odom_body * camera_.T_body_cam).q
             : Eigen::Quaterniond::Identity();
   const vio::TrackedFrame& frame = tracker_.Track(utime, image, q_cam_lastcam);
-  std::map<int32_t, std::deque<Sight>> seen;  // tracks that ended are forgotten
+  std::map<int32_t, std::deque<Observation>> seen;  // tracks that ended are forgotten
   for (const vio::Observation& observation : frame.observations) {
-    auto& sights = seen[observation.landmark_id];
-    if (const auto known = sights_.find(observation.landmark_id); known != sights_.end()) {
-      sights = std::move(known->second);
+    auto& observations = seen[observation.landmark_id];
+    if (const auto known = observations_.find(observation.landmark_id);
+        known != observations_.end()) {
+      observations = std::move(known->second);
     }
-    sights.push_back({T_odom_cam, observation.ray});
-    if (sights.size() > kMaxSights) {
-      sights.pop_front();
+    observations.push_back({T_odom_cam, observation.ray});
+    if (observations.size() > kMaxObservations) {
+      observations.pop_front();
     }
   }
-  sights_ = std::move(seen);
+  observations_ = std::move(seen);
   std::optional<Keyframe> keyframe;
   if (IsDue(now)) {
     keyframe = Make(image, frame, now);
@@ -95,28 +96,28 @@ Keyframe KeyframeMaker::Make(const cv::Mat& image, const vio::TrackedFrame& fram
   return keyframe;
 }
 
-// Gauss-Newton in the inverse depth along the newest ray, from all earlier sights.
+// Gauss-Newton in the inverse depth along the newest ray, from all earlier observations.
 std::optional<MapPoint> KeyframeMaker::Triangulate(int corner, const Corner& of,
                                                    const Rigid3& T_odom_cam) const {
-  const auto found = sights_.find(of.landmark_id);
-  if (of.landmark_id == kNoLandmark || found == sights_.end() || found->second.size() < 3) {
+  const auto found = observations_.find(of.landmark_id);
+  if (of.landmark_id == kNoLandmark || found == observations_.end() || found->second.size() < 3) {
     return std::nullopt;
   }
-  const std::deque<Sight>& sights = found->second;
-  const Eigen::Vector3d ray = sights.back().ray.homogeneous();
+  const std::deque<Observation>& observations = found->second;
+  const Eigen::Vector3d ray = observations.back().ray.homogeneous();
   const double sigma = options_.triangulation_px * camera_.PixelAngle();
   double inverse_depth = 0.2, information = 0, error = 0;
   constexpr int kIterations = 8;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     double gradient = 0;
     information = error = 0;
-    for (size_t i = 0; i + 1 < sights.size(); ++i) {
-      const Rigid3 T = sights[i].T_odom_cam.Inverse() * T_odom_cam;
+    for (size_t i = 0; i + 1 < observations.size(); ++i) {
+      const Rigid3 T = observations[i].T_odom_cam.Inverse() * T_odom_cam;
       const Eigen::Vector3d p = T.q * ray + inverse_depth * T.t;  // up to scale
       if (p.z() < 1e-3) {
         return std::nullopt;
       }
-      const Eigen::Vector2d r = p.head<2>() / p.z() - sights[i].ray;
+      const Eigen::Vector2d r = p.head<2>() / p.z() - observations[i].ray;
       const Eigen::Vector2d J = (T.t.head<2>() - p.head<2>() / p.z() * T.t.z()) / p.z();
       gradient += J.dot(r) / (sigma * sigma);
       information += J.squaredNorm() / (sigma * sigma);
@@ -129,7 +130,7 @@ std::optional<MapPoint> KeyframeMaker::Triangulate(int corner, const Corner& of,
   }
   constexpr double kMaxMeanError = 4;  // of two dimensions: beyond is no static point
   const double deviation = 1 / std::sqrt(information);
-  if (error / static_cast<double>(sights.size() - 1) > kMaxMeanError ||
+  if (error / static_cast<double>(observations.size() - 1) > kMaxMeanError ||
       deviation > options_.max_relative_sigma * inverse_depth) {
     return std::nullopt;
   }

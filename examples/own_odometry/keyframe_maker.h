@@ -42,7 +42,7 @@ class KeyframeMaker {
   std::optional<Keyframe> Add(int64_t utime, const cv::Mat& image, const Rigid3& T_odom_body);
 
  private:
-  struct Sight {
+  struct Observation {
     Rigid3 T_odom_cam;
     Eigen::Vector2d ray;
   };
@@ -61,7 +61,7 @@ class KeyframeMaker {
   vio::Describer describer_;
   KeyframeId next_;
   std::optional<Step> last_, last_keyframe_;
-  std::map<int32_t, std::deque<Sight>> sights_;  // by landmark
+  std::map<int32_t, std::deque<Observation>> observations_;  // by landmark
 };
 
 }  // namespace pangea::example

@@ -118,9 +118,9 @@ void AgentHandler::Journalled(const KeyframeId& id) {
 }
 
 void AgentHandler::OnCorrection(const Correction& correction) {
-  Told& told = corrections_[correction.map];
-  if (told.correction.revision < correction.revision) {
-    told.correction = correction;
+  SentCorrection& sent = corrections_[correction.map];
+  if (sent.correction.revision < correction.revision) {
+    sent.correction = correction;
     ack_urgent_ = true;
   }
   if (corrections_.size() > kMaxCorrections) {

@@ -37,7 +37,7 @@ class AgentHandler {
   void Journalled(const KeyframeId& id);
   // The newest pose since the last call.
   std::optional<pose_t> TakePose() { return std::exchange(pose_, std::nullopt); }
-  // Told to the agent until it confirms; the highest revision of each submap wins.
+  // Sent to the agent until it confirms; the highest revision of each submap wins.
   void OnCorrection(const Correction& correction);
   // The acknowledgement due now, if one is. Its number is the session's to give.
   std::optional<LinkAck> TakeAck(int64_t now_us);
@@ -46,7 +46,7 @@ class AgentHandler {
   const Receiver& receiver() const { return receiver_; }
 
  private:
-  struct Told {
+  struct SentCorrection {
     Correction correction;
     int64_t confirmed_revision = 0;
   };
@@ -64,7 +64,7 @@ class AgentHandler {
   int64_t highest_number_ = 0;
   std::array<std::optional<MapId>, 256> slots_;  // of this run's hellos
   std::optional<pose_t> pose_;
-  std::map<MapId, Told> corrections_;
+  std::map<MapId, SentCorrection> corrections_;
   int64_t last_ack_us_ = 0;
   int pieces_since_ack_ = 0;
   bool hello_since_ack_ = false;

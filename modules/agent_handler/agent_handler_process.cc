@@ -246,7 +246,7 @@ void AgentHandlerProcess::Tick(int64_t now_utime) {
     next_have_utime_ = now_utime + kSecond_us;
     LookForKeys();
     archive_.PublishHave();
-    archive_.AskForOwed();
+    archive_.RequestOutstanding();
     for (const MapId& map : missing_corrections_.Due(now_utime)) {
       AskForState(node_, map);
     }

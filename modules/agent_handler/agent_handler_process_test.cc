@@ -225,7 +225,7 @@ TEST_F(LinkWorld, ACorrectionWaitsForItsAgentsHello) {
   EXPECT_FALSE(revisions.empty());
 }
 
-TEST_F(LinkWorld, JournalledKeyframesAreServedAgain) {
+TEST_F(LinkWorld, JournalledKeyframesAreRetransmitted) {
   PublishKeyframes(10);
   Run(3);
   std::vector<std::vector<uint8_t>> again;
@@ -254,7 +254,7 @@ TEST_F(LinkWorld, JournalledKeyframesAreServedAgain) {
   EXPECT_EQ(again, delivered);
 }
 
-TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
+TEST_F(LinkWorld, MatchesAndResultsAreJournalledOnceAndMissingOnesRequested) {
   PublishKeyframes(4);
   Run(3);
   std::vector<std::string> asked;
@@ -266,9 +266,9 @@ TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
                       std::to_string(request.to_seq));
     }
   });
-  std::vector<verdict_request_t> verdicts_asked;
+  std::vector<verdict_request_t> results_requested;
   server_bus.Subscribe("VERDICT_REQUEST", [&](const std::string&, Bytes data) {
-    ASSERT_TRUE(DecodeMessage(data, &verdicts_asked.emplace_back()));
+    ASSERT_TRUE(DecodeMessage(data, &results_requested.emplace_back()));
   });
   PlaceMatch match;
   for (const int seq : {0, 3, 3, 7}) {
@@ -280,8 +280,8 @@ TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
   }
   Run(8);
   EXPECT_THAT(asked, testing::Contains("PLACE_MATCH 1 2"));
-  ASSERT_FALSE(verdicts_asked.empty());
-  EXPECT_THAT(verdicts_asked[0].seq, testing::ElementsAre(3));
+  ASSERT_FALSE(results_requested.empty());
+  EXPECT_THAT(results_requested[0].seq, testing::ElementsAre(3));
   for (const int seq : {1, 2}) {
     match.query = {kMap, seq};
     match.candidates.clear();
@@ -291,18 +291,18 @@ TEST_F(LinkWorld, MatchesAndVerdictsAreJournalledOnceAndMissingOnesAskedFor) {
     again.num_bytes = static_cast<int32_t>(again.data.size());
     PublishMessage(server_bus, "AGAIN_agent_handler", again);
   }
-  Constraint verdict;
-  verdict.from = {kMap, 0};
-  verdict.to = {kMap, 3};
-  verdict.kind = PlaceKind::kIntra;
-  PublishMessage(server_bus, "CONSTRAINT", ToMessage(verdict));
-  PublishMessage(server_bus, "CONSTRAINT", ToMessage(verdict));
+  Constraint result;
+  result.from = {kMap, 0};
+  result.to = {kMap, 3};
+  result.kind = PlaceKind::kIntra;
+  PublishMessage(server_bus, "CONSTRAINT", ToMessage(result));
+  PublishMessage(server_bus, "CONSTRAINT", ToMessage(result));
   Run(10);
   asked.clear();
-  verdicts_asked.clear();
+  results_requested.clear();
   Run(100);
   EXPECT_THAT(asked, testing::IsEmpty());
-  EXPECT_TRUE(verdicts_asked.empty());
+  EXPECT_TRUE(results_requested.empty());
   KillHandler();
   std::map<std::string, int> channels;
   const Journal journal(journal_path, [&](const std::string& channel, Bytes, const JournalPlace&) {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "agent_handler/journal/owed_questions.h"
+#include "agent_handler/journal/outstanding_results.h"
 #include "agent_handler/journal/resend_queue.h"
 #include "link/compression.h"
 #include "messages/testing/test_keyframes.h"
@@ -91,7 +91,7 @@ TEST_F(AgentHandlerTest, AcknowledgesHellosAndPieces) {
 }
 
 // What only the journal knows is told in answer to a hello, not each time.
-TEST_F(AgentHandlerTest, OldMapsAreToldInAnswerToAHello) {
+TEST_F(AgentHandlerTest, OldMapsAreSentInAnswerToAHello) {
   const MapId old{1, 500};
   handler.Resume(old, 9);
   EXPECT_EQ(handler.TakeAck(kSecond).value().journalled_seq.at(old), 9);
@@ -141,64 +141,64 @@ PlaceMatch MatchOf(int32_t seq, int num_candidates) {
   return match;
 }
 
-TEST(JournalIndex, KnowsWhatIsOwed) {
+TEST(JournalIndex, KnowsWhatIsOutstanding) {
   JournalIndex index;
   for (int seq = 0; seq < 6; ++seq) {
     index.AddKeyframe({kMap, seq}, {seq, 1});
   }
-  EXPECT_EQ(index.Look(MatchOf(6, 0)), JournalIndex::Added::kUnknownKeyframe);
+  EXPECT_EQ(index.Check(MatchOf(6, 0)), JournalIndex::Added::kUnknownKeyframe);
   for (const int seq : {0, 1, 4}) {
-    EXPECT_EQ(index.Look(MatchOf(seq, 0)), JournalIndex::Added::kNew);
+    EXPECT_EQ(index.Check(MatchOf(seq, 0)), JournalIndex::Added::kNew);
     index.Add(MatchOf(seq, seq == 1 ? 2 : 0), {100 + seq, 1});
-    EXPECT_EQ(index.Look(MatchOf(seq, 0)), JournalIndex::Added::kRepeat);
+    EXPECT_EQ(index.Check(MatchOf(seq, 0)), JournalIndex::Added::kRepeat);
   }
   auto gap = index.MissingMatches(kMap, 5);
   ASSERT_TRUE(gap);
   EXPECT_EQ(gap->from_seq, 2);
   EXPECT_EQ(gap->to_seq, 3);
   EXPECT_FALSE(index.MissingMatches(kMap, 1));
-  EXPECT_EQ(index.num_missing_verdicts(), 2);
-  Constraint verdict;
-  verdict.from = {{2, 9}, 0};
-  verdict.to = {kMap, 1};
-  const VerdictNames owed = index.MissingVerdicts(kMap, 5);
-  ASSERT_EQ(owed.verdicts.size(), 2u);
-  EXPECT_THAT(owed.verdicts, testing::Contains(std::pair(1, verdict.Id())));
-  EXPECT_TRUE(index.MissingVerdicts(kMap, 0).verdicts.empty());
-  EXPECT_TRUE(index.Find(owed).empty());
-  EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kNew);
-  index.Add(verdict, {200, 1});
-  EXPECT_EQ(index.Look(verdict), JournalIndex::Added::kRepeat);
-  EXPECT_EQ(index.MissingVerdicts(kMap, 5).verdicts.size(), 1u);
-  ASSERT_EQ(index.Find(owed).size(), 1u);
-  EXPECT_EQ(index.Find(owed)[0].offset, 200);
-  verdict.from.seq = 1;
-  index.Add(verdict, {201, 1});
-  EXPECT_TRUE(index.MissingVerdicts(kMap, 5).verdicts.empty());
+  EXPECT_EQ(index.num_missing_results(), 2);
+  Constraint result;
+  result.from = {{2, 9}, 0};
+  result.to = {kMap, 1};
+  const ResultNames outstanding = index.MissingResults(kMap, 5);
+  ASSERT_EQ(outstanding.results.size(), 2u);
+  EXPECT_THAT(outstanding.results, testing::Contains(std::pair(1, result.Id())));
+  EXPECT_TRUE(index.MissingResults(kMap, 0).results.empty());
+  EXPECT_TRUE(index.Find(outstanding).empty());
+  EXPECT_EQ(index.Check(result), JournalIndex::Added::kNew);
+  index.Add(result, {200, 1});
+  EXPECT_EQ(index.Check(result), JournalIndex::Added::kRepeat);
+  EXPECT_EQ(index.MissingResults(kMap, 5).results.size(), 1u);
+  ASSERT_EQ(index.Find(outstanding).size(), 1u);
+  EXPECT_EQ(index.Find(outstanding)[0].offset, 200);
+  result.from.seq = 1;
+  index.Add(result, {201, 1});
+  EXPECT_TRUE(index.MissingResults(kMap, 5).results.empty());
   EXPECT_EQ(index.Find(JournalChannel::kConstraint, {kMap, 1}).size(), 2u);
 }
 
 // Nothing is asked on the first round (it may be on its way), then seldom, and ever more rarely
 // while the same is missing.
-TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
+TEST(OutstandingResults, AsksSeldomAndMoreSeldomWhileNothingComes) {
   JournalIndex index;
   for (int seq = 0; seq < 150; ++seq) {
     index.AddKeyframe({kMap, seq}, {seq, 1});
   }
   index.Add(MatchOf(140, 1), {1000, 1});
-  OwedQuestions owed;
-  const OwedQuestions::Questions at_first = owed.Due(index, kSecond);
-  EXPECT_TRUE(at_first.matches.empty() && at_first.verdicts.empty());
+  OutstandingResults outstanding;
+  const OutstandingResults::Requests at_first = outstanding.Due(index, kSecond);
+  EXPECT_TRUE(at_first.matches.empty() && at_first.results.empty());
   index.AddKeyframe({kMap, 150}, {150, 1});
-  std::vector<int64_t> asked_at, verdict_asked_at;
+  std::vector<int64_t> asked_at, result_requested_at;
   for (int64_t s = 2; s <= 200; ++s) {
-    const OwedQuestions::Questions questions = owed.Due(index, s * kSecond);
-    for (const VerdictNames& names : questions.verdicts) {
-      ASSERT_EQ(names.verdicts.size(), 1u);
-      EXPECT_EQ(names.verdicts[0].first, 140);
-      verdict_asked_at.push_back(s);
+    const OutstandingResults::Requests requests = outstanding.Due(index, s * kSecond);
+    for (const ResultNames& names : requests.results) {
+      ASSERT_EQ(names.results.size(), 1u);
+      EXPECT_EQ(names.results[0].first, 140);
+      result_requested_at.push_back(s);
     }
-    for (const SeqGap& gap : questions.matches) {
+    for (const SeqGap& gap : requests.matches) {
       EXPECT_EQ(gap.map, kMap);
       EXPECT_EQ(gap.from_seq, 0);
       EXPECT_EQ(gap.to_seq, 99) << "no more than so many at once";
@@ -206,13 +206,13 @@ TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
     }
   }
   EXPECT_THAT(asked_at, testing::ElementsAre(4, 7, 13, 25, 49, 97, 157));
-  EXPECT_EQ(verdict_asked_at, asked_at);
+  EXPECT_EQ(result_requested_at, asked_at);
   for (int seq = 0; seq < 140; ++seq) {
     index.Add(MatchOf(seq, 0), {2000 + seq, 1});
   }
   std::vector<int32_t> from;
   for (int64_t s = 201; s <= 230; ++s) {
-    for (const SeqGap& gap : owed.Due(index, s * kSecond).matches) {
+    for (const SeqGap& gap : outstanding.Due(index, s * kSecond).matches) {
       from.push_back(gap.from_seq);
     }
   }
@@ -220,16 +220,16 @@ TEST(OwedQuestions, AsksSeldomAndMoreSeldomWhileNothingComes) {
   EXPECT_GE(from.size(), 2u);
 }
 
-// A verdict that was journalled before its match is not owed any more.
-TEST(JournalIndex, VerdictBeforeItsMatch) {
+// A verification result that was journalled before its match is not outstanding any more.
+TEST(JournalIndex, ResultBeforeItsMatch) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});
-  Constraint verdict;
-  verdict.from = {{2, 9}, 0};
-  verdict.to = {kMap, 0};
-  index.Add(verdict, {});
+  Constraint result;
+  result.from = {{2, 9}, 0};
+  result.to = {kMap, 0};
+  index.Add(result, {});
   index.Add(MatchOf(0, 1), {});
-  EXPECT_EQ(index.num_missing_verdicts(), 0);
+  EXPECT_EQ(index.num_missing_results(), 0);
 }
 
 resend_request_t RequestOf(const std::string& requester, int32_t from, int32_t to) {
@@ -262,20 +262,20 @@ TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
                                    testing::Pair("fusion", 5), testing::Pair("posegraph", 5)));
 }
 
-// Of the verdicts that are asked for by name those that are there, and nothing else.
-TEST(ResendQueue, AnswersForTheVerdictsThatAreThere) {
+// Of the verification results that are asked for by name those that are there, and nothing else.
+TEST(ResendQueue, AnswersForTheResultsThatAreThere) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});
-  VerdictRequest request{"posegraph", {kMap, {}}};
+  VerificationRequest request{"posegraph", {kMap, {}}};
   for (int seq = 0; seq < 4; ++seq) {
-    Constraint verdict;
-    verdict.from = {{2, 9}, seq};
-    verdict.to = {kMap, 0};
+    Constraint result;
+    result.from = {{2, 9}, seq};
+    result.to = {kMap, 0};
     if (seq < 3) {
-      index.Add(verdict, {100 + seq, 1});
+      index.Add(result, {100 + seq, 1});
     }
     if (seq > 1) {
-      request.names.verdicts.emplace_back(0, verdict.Id());
+      request.names.results.emplace_back(0, result.Id());
     }
   }
   ResendQueue queue;
@@ -285,9 +285,9 @@ TEST(ResendQueue, AnswersForTheVerdictsThatAreThere) {
   EXPECT_EQ(answer->channel, "CONSTRAINT");
   ASSERT_EQ(answer->places.size(), 1u);
   EXPECT_EQ(answer->places[0].offset, 102);
-  request.names.verdicts.erase(request.names.verdicts.begin());
+  request.names.results.erase(request.names.results.begin());
   EXPECT_TRUE(queue.Add(request, index));
-  EXPECT_EQ(queue.waiting(), 0u) << "what is still to be judged needs no answer";
+  EXPECT_EQ(queue.waiting(), 0u) << "what is still to be verified needs no answer";
 }
 
 TEST(ResendQueue, RefusesTheAbsurdAndStaysBounded) {

@@ -52,10 +52,10 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
   publish(2, [](keyframe_t* m) { m->utime = 1; });
   publish(1, [](keyframe_t* m) { m->v_odom_body.x += 1; });
   PublishMessage(server_bus, "RESEND_REQUEST", resend_request_t{});
-  Constraint verdict;
-  verdict.from = {kMap, 0};
-  verdict.to = {kMap, 1};
-  constraint_t forged = ToMessage(verdict);
+  Constraint result;
+  result.from = {kMap, 0};
+  result.to = {kMap, 1};
+  constraint_t forged = ToMessage(result);
   forged.id += 1;
   PublishMessage(server_bus, "CONSTRAINT", forged);
   link_bus.Publish("LINK_UP_1", std::vector<uint8_t>(50, 7));

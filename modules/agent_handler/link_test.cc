@@ -334,7 +334,7 @@ TEST(Sender, WhatNobodyAnswersIsSentEverMoreRarely) {
 }
 
 // A packet that others have overtaken is not waited for, nor is it sent without end.
-TEST(Sender, WhatIsOvertakenIsSentAgainAtOnceButNotForEver) {
+TEST(Sender, WhatIsOvertakenIsRetransmittedAtOnceButNotForEver) {
   SenderOptions options;
   options.payload_bytes = kMinPayloadBytes;
   Sender sender(options);

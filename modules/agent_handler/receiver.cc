@@ -31,7 +31,7 @@ void Receiver::OnHello(const LinkHello& hello) {
     map.in_hello = false;
   }
   for (const LinkMap& announced : hello.maps) {
-    Map& map = maps_[announced.map];
+    ReceivedMap& map = maps_[announced.map];
     map.announced = map.in_hello = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
       given_up_ += announced.first_seq - map.next;
@@ -162,7 +162,7 @@ std::vector<uint8_t> Receiver::Joined(const Entry& entry) {
 std::vector<Receiver::Keyframe> Receiver::TakeReady() {
   std::vector<Keyframe> ready;
   for (auto& [id, entry] : cache_) {
-    Map& map = maps_.at(id.map);
+    ReceivedMap& map = maps_.at(id.map);
     if (id.seq == map.next && entry.whole()) {
       entry.taken = true;
       ready.push_back({id, Joined(entry)});

@@ -58,7 +58,7 @@ class Receiver {
   size_t num_maps() const { return maps_.size(); }
 
  private:
-  struct Map {
+  struct ReceivedMap {
     int32_t next = 0;  // to hand over
     int32_t journalled = -1;
     bool announced = false;  // by this run of the uplink
@@ -83,7 +83,7 @@ class Receiver {
 
   const ReceiverOptions options_;
   Check check_;
-  std::map<MapId, Map> maps_;
+  std::map<MapId, ReceivedMap> maps_;
   std::map<KeyframeId, Entry> cache_;
   int64_t cached_bytes_ = 0;
   int64_t given_up_ = 0;

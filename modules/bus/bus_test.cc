@@ -255,7 +255,7 @@ TEST(MissingMessages, TheLastOneIsMissedAndNoneBeyondIt) {
   EXPECT_TRUE(missing.Due(9'000'000).empty());
 }
 
-TEST(AskAllAgain, AsksForEachOnce) {
+TEST(RequestAllRetransmissions, AsksForEachOnce) {
   LocalBus bus;
   Node node(bus, "test");
   std::vector<std::pair<int32_t, int32_t>> ranges;
@@ -264,7 +264,7 @@ TEST(AskAllAgain, AsksForEachOnce) {
     ASSERT_TRUE(DecodeMessage(data, &request));
     ranges.emplace_back(request.from_seq, request.to_seq);
   });
-  AskAllAgain(node, "CONSTRAINT", {1, 100}, 1000);
+  RequestAllRetransmissions(node, "CONSTRAINT", {1, 100}, 1000);
   bus.Drain();
   EXPECT_THAT(ranges, testing::ElementsAre(testing::Pair(0, 499), testing::Pair(500, 999),
                                            testing::Pair(1000, 1000)));

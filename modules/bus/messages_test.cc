@@ -230,7 +230,7 @@ TEST(Messages, HaveAndResendRequestAreBounded) {
   }
 }
 
-TEST(Messages, VerdictRequestIsBounded) {
+TEST(Messages, VerificationRequestIsBounded) {
   verdict_request_t request{};
   request.requester = "posegraph";
   request.map = ToMessage(MapId{1, 100});
@@ -241,7 +241,7 @@ TEST(Messages, VerdictRequestIsBounded) {
   ASSERT_TRUE(parsed.value) << parsed.refused;
   EXPECT_EQ(parsed.value->requester, "posegraph");
   EXPECT_EQ(parsed.value->names.map, (MapId{1, 100}));
-  EXPECT_EQ(parsed.value->names.verdicts.at(0), std::pair(7, int64_t{-5}));
+  EXPECT_EQ(parsed.value->names.results.at(0), std::pair(7, int64_t{-5}));
   const std::vector<std::function<void(verdict_request_t*)>> damages = {
       [](verdict_request_t* m) { m->requester = "a b"; },
       [](verdict_request_t* m) { m->map.agent_id = 0; },

@@ -75,7 +75,7 @@ Vector6d Rigid3::Minus(const Rigid3& other) const {
 
 Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const Rigid3& T_b_c,
                            const Matrix6d& cov_b_c) {
-  // t_ac = R_ab t_bc + t_ab: the left factor's rotation error turns the lever R_ab t_bc.
+  // t_ac = R_ab t_bc + t_ab: the left factor's rotation error rotates the lever R_ab t_bc.
   Matrix6d J_left = Matrix6d::Identity();
   J_left.topRightCorner<3, 3>() = -Hat(T_a_b.q * T_b_c.t);
   Matrix6d J_right = Matrix6d::Zero();

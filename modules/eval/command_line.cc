@@ -75,7 +75,7 @@ void EvalCommandLine::AddCommon(CLI::App& command) {
                   "seconds between reference poses across which it is still interpolated")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command.add_option("--json", json_path_, "write the figures to this file");
+  command.add_option("--json", json_path_, "write the metrics to this file");
 }
 
 void EvalCommandLine::Run() { chosen_(); }

@@ -91,8 +91,9 @@ AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, 
     evaluation.coverage.push_back(Coverage(input.estimate, input.reference));
     pairs.push_back(PairsOf(input, max_gap_s));
   }
-  for (const AlignmentKind kind :
-       {AlignmentKind::kSe3, AlignmentKind::kYaw, AlignmentKind::kSim3}) {
+  for (const TrajectoryAlignmentKind kind :
+       {TrajectoryAlignmentKind::kSe3, TrajectoryAlignmentKind::kYaw,
+        TrajectoryAlignmentKind::kSim3}) {
     auto joint = JointAbsoluteError(pairs, kind);
     if (!joint) {
       throw std::runtime_error(
@@ -126,7 +127,7 @@ std::string ToText(const AbsoluteEvaluation& evaluation) {
 ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
   ordered_json json;
   for (const auto& [kind, joint] : evaluation.by_alignment) {
-    const Alignment& a = joint.alignment;
+    const TrajectoryAlignment& a = joint.alignment;
     const Rigid3& T = a.T_reference_estimate;
     ordered_json& entry = json[ToString(kind)];
     entry["scale"] = a.scale;
@@ -173,7 +174,8 @@ ordered_json ToJson(const RelativeEvaluation& evaluation) {
           {"over_time", RowsJson(evaluation.over_time_s, "duration_s")}};
 }
 
-std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory, const Alignment& alignment) {
+std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
+                                     const TrajectoryAlignment& alignment) {
   std::vector<Eigen::Vector2d> points;
   for (size_t i = 0; i < trajectory.size(); ++i) {
     if (i > 0 && trajectory[i].utime - trajectory[i - 1].utime > kLineBreakUs) {
@@ -196,13 +198,13 @@ std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors,
 }
 
 Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
-                    const Alignment& alignment) {
+                    const TrajectoryAlignment& alignment) {
   Plot plot{.title = title, .x_label = "x [m]", .y_label = "y [m]", .equal_axes = true};
   for (const EvaluationInput& input : inputs) {
     plot.lines.push_back({.label = plot.lines.empty() ? "ground truth" : "",
                           .colour = kGroundTruthColour,
                           .width = 5,
-                          .points = TopView(input.reference, Alignment())});
+                          .points = TopView(input.reference, TrajectoryAlignment())});
   }
   for (size_t i = 0; i < inputs.size(); ++i) {
     plot.lines.push_back({.label = inputs[i].name,

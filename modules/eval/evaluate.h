@@ -23,7 +23,7 @@ struct EvaluationInput {
 struct AbsoluteEvaluation {
   std::vector<std::string> names;
   std::vector<std::optional<double>> coverage;
-  std::vector<std::pair<AlignmentKind, JointAte>> by_alignment;
+  std::vector<std::pair<TrajectoryAlignmentKind, JointAte>> by_alignment;
 };
 // Throws std::runtime_error when too few poses have ground truth.
 AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s);
@@ -47,13 +47,14 @@ nlohmann::ordered_json ToJson(const RelativeEvaluation& evaluation);
 
 // Top view (x, y of the reference frame), ground truth in grey, each input under `alignment`.
 Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
-                    const Alignment& alignment);
+                    const TrajectoryAlignment& alignment);
 // Position error over each input's own time since its reference's beginning.
 Plot ErrorPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
                const JointAte& joint);
 
 // The line of a trajectory in top view, broken where poses are more than a second apart.
-std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory, const Alignment& alignment);
+std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
+                                     const TrajectoryAlignment& alignment);
 std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin);
 
 }  // namespace pangea

@@ -59,7 +59,7 @@ TEST(Evaluate, NoCommonTimeIsAnError) {
 
 TEST(Evaluate, LinesBreakAtHoles) {
   const Trajectory trajectory = {{0, {}}, {500'000, {}}, {5'000'000, {}}};
-  const auto points = TopView(trajectory, Alignment());
+  const auto points = TopView(trajectory, TrajectoryAlignment());
   ASSERT_EQ(points.size(), 4U);
   EXPECT_FALSE(points[2].allFinite());
 }

@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-Ate ErrorsUnder(const Alignment& alignment, const std::vector<PosePair>& pairs) {
+Ate ErrorsUnder(const TrajectoryAlignment& alignment, const std::vector<PosePair>& pairs) {
   Ate ate;
   ate.alignment = alignment;
   std::vector<double> position_m;
@@ -84,13 +84,13 @@ Statistics StatisticsOf(std::vector<double> values) {
   return s;
 }
 
-std::optional<Ate> AbsoluteError(const std::vector<PosePair>& pairs, AlignmentKind kind) {
+std::optional<Ate> AbsoluteError(const std::vector<PosePair>& pairs, TrajectoryAlignmentKind kind) {
   auto joint = JointAbsoluteError({pairs}, kind);
   return joint ? std::optional(std::move(joint->agents.front())) : std::nullopt;
 }
 
 std::optional<JointAte> JointAbsoluteError(const std::vector<std::vector<PosePair>>& agents,
-                                           AlignmentKind kind) {
+                                           TrajectoryAlignmentKind kind) {
   std::vector<Eigen::Vector3d> estimate;
   std::vector<Eigen::Vector3d> reference;
   for (const std::vector<PosePair>& pairs : agents) {
@@ -103,7 +103,7 @@ std::optional<JointAte> JointAbsoluteError(const std::vector<std::vector<PosePai
     return std::nullopt;
   }
   JointAte joint;
-  joint.alignment = Align(estimate, reference, kind);
+  joint.alignment = AlignTrajectories(estimate, reference, kind);
   std::vector<double> position_m;
   for (const std::vector<PosePair>& pairs : agents) {
     joint.agents.push_back(ErrorsUnder(joint.alignment, pairs));

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "eval/alignment.h"
+#include "eval/trajectory_alignment.h"
 #include "recording/trajectory.h"
 
 namespace pangea {
@@ -42,7 +42,7 @@ struct PoseError {
 };
 
 struct Ate {
-  Alignment alignment;
+  TrajectoryAlignment alignment;
   Statistics position_m;
   Statistics rotation_rad;
   std::vector<PoseError> errors;
@@ -52,17 +52,17 @@ struct Ate {
 inline constexpr size_t kMinPairs = 3;
 
 // Nothing with fewer than kMinPairs pairs.
-std::optional<Ate> AbsoluteError(const std::vector<PosePair>& pairs, AlignmentKind kind);
+std::optional<Ate> AbsoluteError(const std::vector<PosePair>& pairs, TrajectoryAlignmentKind kind);
 
 struct JointAte {
-  Alignment alignment;      // the one alignment for all agents
-  Statistics position_m;    // over all their poses
-  std::vector<Ate> agents;  // each under that alignment, in the order given
+  TrajectoryAlignment alignment;  // the one alignment for all agents
+  Statistics position_m;          // over all their poses
+  std::vector<Ate> agents;        // each under that alignment, in the order given
 };
 
 // Nothing with fewer than kMinPairs pairs altogether.
 std::optional<JointAte> JointAbsoluteError(const std::vector<std::vector<PosePair>>& agents,
-                                           AlignmentKind kind);
+                                           TrajectoryAlignmentKind kind);
 
 struct Rpe {
   Statistics position_m;

@@ -17,7 +17,7 @@ class MetricsTest : public ::testing::Test {
   Rigid3 Transform() { return {ExpSo3(Vector(1.5)), Vector(20)}; }
   Rigid3 YawTransform() { return {YawRotation(Vector(2).x()), Vector(20)}; }
 
-  // A curving path with turning attitude, 20 Hz.
+  // A curving path with rotating attitude, 20 Hz.
   static Trajectory Path(int count = 400) {
     Trajectory path;
     for (int i = 0; i < count; ++i) {
@@ -49,7 +49,8 @@ class MetricsTest : public ::testing::Test {
 TEST_F(MetricsTest, AnyRigidMoveIsRecoveredBySe3) {
   for (int i = 0; i < 50; ++i) {
     const Rigid3 T = Transform();
-    const auto ate = AbsoluteError(Associate(Moved(Path(), 1, T), Path()), AlignmentKind::kSe3);
+    const auto ate =
+        AbsoluteError(Associate(Moved(Path(), 1, T), Path()), TrajectoryAlignmentKind::kSe3);
     ASSERT_TRUE(ate);
     EXPECT_LT(ate->position_m.max, 1e-9);
     EXPECT_LT(ate->rotation_rad.max, 1e-7);
@@ -61,12 +62,12 @@ TEST_F(MetricsTest, AnyRigidMoveIsRecoveredBySe3) {
 
 TEST_F(MetricsTest, YawAlignmentRecoversYawAndNothingElse) {
   for (int i = 0; i < 50; ++i) {
-    const auto yawed =
-        AbsoluteError(Associate(Moved(Path(), 1, YawTransform()), Path()), AlignmentKind::kYaw);
+    const auto yawed = AbsoluteError(Associate(Moved(Path(), 1, YawTransform()), Path()),
+                                     TrajectoryAlignmentKind::kYaw);
     EXPECT_LT(yawed->position_m.max, 1e-9);
     const Rigid3 tilt(ExpSo3({0.1, 0, 0}), Eigen::Vector3d::Zero());
     const auto tilted = AbsoluteError(Associate(Moved(Path(), 1, tilt * YawTransform()), Path()),
-                                      AlignmentKind::kYaw);
+                                      TrajectoryAlignmentKind::kYaw);
     EXPECT_GT(tilted->position_m.rmse, 0.05);
   }
 }
@@ -74,10 +75,10 @@ TEST_F(MetricsTest, YawAlignmentRecoversYawAndNothingElse) {
 TEST_F(MetricsTest, OnlySim3RecoversScale) {
   for (const double scale : {0.2, 0.97, 1.0, 5.0}) {
     const auto pairs = Associate(Moved(Path(), scale, Transform()), Path());
-    const auto sim3 = AbsoluteError(pairs, AlignmentKind::kSim3);
+    const auto sim3 = AbsoluteError(pairs, TrajectoryAlignmentKind::kSim3);
     EXPECT_NEAR(sim3->alignment.scale, 1 / scale, 1e-9);
     EXPECT_LT(sim3->position_m.max, 1e-9);
-    const auto se3 = AbsoluteError(pairs, AlignmentKind::kSe3);
+    const auto se3 = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
     // Without scale what is left is |1 - scale| times the points' spread about their mean.
     std::vector<Eigen::Vector3d> points;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -98,7 +99,7 @@ TEST_F(MetricsTest, AMirroredPathIsNotReflectedBack) {
   for (StampedPose& pose : mirrored) {
     pose.T.t.x() = -pose.T.t.x();
   }
-  const auto ate = AbsoluteError(Associate(mirrored, Path()), AlignmentKind::kSe3);
+  const auto ate = AbsoluteError(Associate(mirrored, Path()), TrajectoryAlignmentKind::kSe3);
   EXPECT_NEAR(ate->alignment.T_reference_estimate.R().determinant(), 1.0, 1e-9);
   EXPECT_GT(ate->position_m.rmse, 0.1);
 }
@@ -106,7 +107,7 @@ TEST_F(MetricsTest, AMirroredPathIsNotReflectedBack) {
 TEST_F(MetricsTest, NoiseLevelIsMeasured) {
   for (const double sigma : {0.001, 0.05, 0.5}) {
     const auto ate = AbsoluteError(Associate(Moved(Noisy(Path(), sigma), 1, Transform()), Path()),
-                                   AlignmentKind::kSe3);
+                                   TrajectoryAlignmentKind::kSe3);
     // 400 points of 3 coordinates: 3 % is about 1.5 standard deviations of the estimate.
     EXPECT_NEAR(ate->position_m.rmse / (std::sqrt(3.0) * sigma), 1.0, 0.06);
   }
@@ -115,18 +116,19 @@ TEST_F(MetricsTest, NoiseLevelIsMeasured) {
 TEST_F(MetricsTest, EachAlignmentIsTheLeastSquaresOptimum) {
   const Trajectory estimate = Moved(Noisy(Path(), 0.2), 1.1, YawTransform());
   const auto pairs = Associate(estimate, Path());
-  for (const AlignmentKind kind :
-       {AlignmentKind::kSe3, AlignmentKind::kYaw, AlignmentKind::kSim3}) {
+  for (const TrajectoryAlignmentKind kind :
+       {TrajectoryAlignmentKind::kSe3, TrajectoryAlignmentKind::kYaw,
+        TrajectoryAlignmentKind::kSim3}) {
     const auto best = AbsoluteError(pairs, kind);
     for (int i = 0; i < 30; ++i) {
-      Alignment other = best->alignment;
+      TrajectoryAlignment other = best->alignment;
       Vector6d xi;
       xi << Vector(0.01), Vector(0.01);
-      if (kind == AlignmentKind::kYaw) {
+      if (kind == TrajectoryAlignmentKind::kYaw) {
         xi(3) = xi(4) = 0;
       }
       other.T_reference_estimate = other.T_reference_estimate.Plus(xi);
-      if (kind == AlignmentKind::kSim3) {
+      if (kind == TrajectoryAlignmentKind::kSim3) {
         other.scale *= 1 + Vector(0.01).x();
       }
       double sum = 0;
@@ -143,16 +145,17 @@ TEST_F(MetricsTest, StandingStillHasAnErrorOfItsNoiseOnly) {
   for (int i = 0; i < 100; ++i) {
     still.push_back({i * int64_t{50'000}, Rigid3()});
   }
-  const auto ate = AbsoluteError(Associate(Noisy(still, 0.01), still), AlignmentKind::kSim3);
+  const auto ate =
+      AbsoluteError(Associate(Noisy(still, 0.01), still), TrajectoryAlignmentKind::kSim3);
   ASSERT_TRUE(ate);
   EXPECT_LT(ate->position_m.rmse, 0.02);
   EXPECT_TRUE(std::isfinite(ate->rotation_rad.rmse));
 }
 
 TEST_F(MetricsTest, TooFewPairsHaveNoError) {
-  EXPECT_FALSE(AbsoluteError(Associate(Path(2), Path()), AlignmentKind::kSe3));
-  EXPECT_TRUE(AbsoluteError(Associate(Path(3), Path()), AlignmentKind::kSe3));
-  EXPECT_FALSE(AbsoluteError({}, AlignmentKind::kSe3));
+  EXPECT_FALSE(AbsoluteError(Associate(Path(2), Path()), TrajectoryAlignmentKind::kSe3));
+  EXPECT_TRUE(AbsoluteError(Associate(Path(3), Path()), TrajectoryAlignmentKind::kSe3));
+  EXPECT_FALSE(AbsoluteError({}, TrajectoryAlignmentKind::kSe3));
 }
 
 TEST_F(MetricsTest, AssociationSkipsHolesAndWhatIsOutside) {
@@ -175,14 +178,14 @@ TEST_F(MetricsTest, JointErrorSeesTheTransformBetweenAgentsThatSingleErrorsHide)
   const Trajectory second = Moved(Path(), 1, T * Rigid3({1, 0, 0, 0}, {0.1, 0, 0}));
   const auto a = Associate(first, Path());
   const auto b = Associate(second, Path());
-  EXPECT_LT(AbsoluteError(b, AlignmentKind::kSe3)->position_m.rmse, 1e-9);
-  const auto joint = JointAbsoluteError({a, b}, AlignmentKind::kSe3);
+  EXPECT_LT(AbsoluteError(b, TrajectoryAlignmentKind::kSe3)->position_m.rmse, 1e-9);
+  const auto joint = JointAbsoluteError({a, b}, TrajectoryAlignmentKind::kSe3);
   ASSERT_TRUE(joint);
   EXPECT_NEAR(joint->position_m.rmse, 0.05, 1e-6);
   ASSERT_EQ(joint->agents.size(), 2U);
   EXPECT_EQ(joint->position_m.count, 800U);
   EXPECT_NEAR(joint->agents[0].position_m.rmse, 0.05, 1e-6);
-  EXPECT_LT(JointAbsoluteError({a, a}, AlignmentKind::kSe3)->position_m.rmse, 1e-9);
+  EXPECT_LT(JointAbsoluteError({a, a}, TrajectoryAlignmentKind::kSe3)->position_m.rmse, 1e-9);
 }
 
 TEST_F(MetricsTest, StatisticsByHand) {
@@ -196,7 +199,7 @@ TEST_F(MetricsTest, StatisticsByHand) {
   EXPECT_EQ(StatisticsOf({}).count, 0U);
 }
 
-TEST_F(MetricsTest, RelativeErrorIsBlindToTheFrameAndSeesScaleAndTurnDrift) {
+TEST_F(MetricsTest, RelativeErrorIsBlindToTheFrameAndSeesScaleAndYawDrift) {
   Trajectory line;
   for (int i = 0; i <= 200; ++i) {
     line.push_back({i * int64_t{50'000}, Rigid3({1, 0, 0, 0}, {0.1 * i, 0, 0})});
@@ -207,12 +210,12 @@ TEST_F(MetricsTest, RelativeErrorIsBlindToTheFrameAndSeesScaleAndTurnDrift) {
   const auto scaled = RelativeErrorOverDistance(Associate(Moved(line, 1.02, Rigid3()), line), 4.99);
   EXPECT_NEAR(scaled->position_m.rmse, 0.1, 1e-9);
   EXPECT_EQ(scaled->position_m.count, 151U);
-  Trajectory turning = line;
-  for (size_t i = 0; i < turning.size(); ++i) {
-    turning[i].T.q = YawRotation(0.001 * static_cast<double>(i));
+  Trajectory yawing = line;
+  for (size_t i = 0; i < yawing.size(); ++i) {
+    yawing[i].T.q = YawRotation(0.001 * static_cast<double>(i));
   }
-  const auto turned = RelativeErrorOverTime(Associate(turning, line), 1.0);
-  EXPECT_NEAR(turned->rotation_rad.median, 0.02, 1e-9);
+  const auto rotated = RelativeErrorOverTime(Associate(yawing, line), 1.0);
+  EXPECT_NEAR(rotated->rotation_rad.median, 0.02, 1e-9);
   EXPECT_FALSE(RelativeErrorOverDistance(Associate(line, line), 21));
   EXPECT_FALSE(RelativeErrorOverTime({}, 1));
 }

@@ -33,7 +33,7 @@ std::string Quoted(const std::string& text) {
 Eigen::Vector2i CanvasSize(const Plot& plot) {
   constexpr int kWidth = 1400;
   constexpr int kMargins = 150;  // title, legend, axis labels
-  constexpr int kSides = 165;    // the y axis' figures and label, a margin
+  constexpr int kSides = 165;    // the y axis' numbers and label, a margin
   Eigen::AlignedBox2d box;
   for (const PlotLine& line : plot.lines) {
     for (const Eigen::Vector2d& p : line.points) {

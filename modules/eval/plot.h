@@ -31,7 +31,7 @@ struct Plot {
   bool equal_axes = false;  // one unit is as long on both axes
   bool y_from_zero = false;
   int height = 1000;  // pixels, of a width of 1400; with equal axes what is drawn decides
-  // In place of figures at y = 1, 2, ...
+  // In place of numbers at y = 1, 2, ...
   std::vector<std::string> y_names = {};
   std::vector<PlotLine> lines = {};  // later ones are drawn above earlier ones
 };

@@ -77,7 +77,7 @@ TEST(TableTest, WhatIsNoUtf8IsReplaced) {
   EXPECT_EQ(EscapeHtml(std::string("\0\x01", 2)), replaced + replaced);
 }
 
-TEST_F(PlotTest, FailuresAreToldWithTheMend) {
+TEST_F(PlotTest, FailuresAreReportedWithTheMend) {
   EXPECT_THROW(WritePng(Circle(), "/nonexistent/folder/a.png"), std::runtime_error);
   const std::string path = std::getenv("PATH");
   setenv("PATH", "/nonexistent", 1);

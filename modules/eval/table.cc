@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-bool IsFigure(const std::string& cell) {
+bool IsNumber(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.,+-% ") == std::string::npos;
 }
 
@@ -58,8 +58,8 @@ std::string Table::Html() const {
     html += "<tr>";
     for (const std::string& cell : rows_[r]) {
       const char* const tag = r == 0 ? "th" : "td";
-      const char* const figure = r > 0 && IsFigure(cell) ? " class=\"n\"" : "";
-      html += fmt::format("<{0}{1}>{2}</{0}>", tag, figure, EscapeHtml(cell));
+      const char* const number = r > 0 && IsNumber(cell) ? " class=\"n\"" : "";
+      html += fmt::format("<{0}{1}>{2}</{0}>", tag, number, EscapeHtml(cell));
     }
     html += "</tr>\n";
   }

@@ -16,7 +16,7 @@ class Table {
   // Nothing but the header.
   bool empty() const { return rows_.size() == 1; }
   std::string Text() const;
-  // Cells that are figures have the class "n".
+  // Cells that are numbers have the class "n".
   std::string Html() const;
 
  private:

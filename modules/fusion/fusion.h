@@ -1,24 +1,25 @@
 #pragma once
 
-// Visual fusion of maps (the paper, section IV.D): candidates of kind inter, one verdict each.
+// Visual fusion of maps (the paper, section IV.D): candidates of kind inter, one verification
+// result each.
 //
 // In: keyframes of all maps; candidates (query K_c of map c, match K_m of map m). Out: a Constraint
 // between the two bodies with its covariance, or the reason it was refused. Which maps form a
 // group follows from the constraints and is the posegraph's to say: nothing is glued here.
 
-#include "loop_verification/pair_judge.h"
+#include "loop_verification/loop_verifier.h"
 
 namespace pangea {
 
 struct FusionOptions {
-  AlignmentOptions alignment;
+  LoopVerificationOptions alignment;
   // For a candidate within one map that is in a group with others.
   DriftGateOptions drift;
 };
 
-class Fusion : public PairJudge {
+class Fusion : public LoopVerifier {
  public:
-  explicit Fusion(const FusionOptions& options) : PairJudge(options.alignment, options.drift) {}
+  explicit Fusion(const FusionOptions& options) : LoopVerifier(options.alignment, options.drift) {}
 };
 
 }  // namespace pangea

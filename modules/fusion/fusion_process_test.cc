@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "inter_map_ba/inter_map_ba_process.h"
-#include "loop_verification/alignment_test_world.h"
+#include "loop_verification/loop_verification_test_world.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
@@ -15,9 +15,9 @@ namespace {
 constexpr int64_t kSecond = 1'000'000;
 
 // Two agents in one room on a LocalBus with both processes; what they say is kept.
-class VerdictProcesses : public testing::Test {
+class VerificationProcesses : public testing::Test {
  protected:
-  VerdictProcesses() {
+  VerificationProcesses() {
     TestAgentOptions first, second;
     first.num_keyframes = 12;
     second.map = {2, 2000};
@@ -66,11 +66,11 @@ class VerdictProcesses : public testing::Test {
   status_t status_{};
 };
 
-TEST_F(VerdictProcesses, OneVerdictFromTheProcessOfItsKind) {
+TEST_F(VerificationProcesses, OneResultFromTheProcessOfItsKind) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
   SendMatch(PlaceKind::kInter);
-  SendMatch(PlaceKind::kInter);  // a repeat gives no second verdict
+  SendMatch(PlaceKind::kInter);  // a repeat gives no second verification result
   ASSERT_EQ(constraints_.size(), 1u);
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
   EXPECT_EQ(constraints_[0].from, agent_m_.keyframes[10].id);
@@ -78,15 +78,15 @@ TEST_F(VerdictProcesses, OneVerdictFromTheProcessOfItsKind) {
   EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
 }
 
-// The journal's owner is told again what it names, once it was said; of what is still to be judged
-// nothing is said.
-TEST_F(VerdictProcesses, SaysAVerdictAgainThatTheJournalLacks) {
+// The journal's owner gets what it names retransmitted, once it was sent; of what is still to be
+// verified nothing is said.
+TEST_F(VerificationProcesses, RetransmitsAResultThatTheJournalLacks) {
   std::vector<Constraint> again;
   listener_.Subscribe<again_t>(
       "AGAIN_agent_handler", [&](const std::string&, const again_t& message) {
         EXPECT_EQ(message.channel, "CONSTRAINT");
-        TakeAgain<constraint_t>(listener_, message,
-                                [&](const Constraint& verdict) { again.push_back(verdict); });
+        TakeRetransmission<constraint_t>(
+            listener_, message, [&](const Constraint& result) { again.push_back(result); });
       });
   Constraint wanted;
   wanted.from = agent_m_.keyframes[10].id;
@@ -105,7 +105,7 @@ TEST_F(VerdictProcesses, SaysAVerdictAgainThatTheJournalLacks) {
   SendKeyframes(agent_m_, 0, 12);
   SendMatch(PlaceKind::kInter);
   ask("agent_handler", wanted.Id());
-  EXPECT_TRUE(again.empty()) << "still to be judged";
+  EXPECT_TRUE(again.empty()) << "still to be verified";
   SendKeyframes(agent_c_, 0, 12);
   ask("agent_handler", wanted.Id() + 1);
   ask("posegraph", wanted.Id());  // whom the journal's owner answers
@@ -115,7 +115,7 @@ TEST_F(VerdictProcesses, SaysAVerdictAgainThatTheJournalLacks) {
   EXPECT_EQ(again[0].Id(), wanted.Id());
 }
 
-TEST_F(VerdictProcesses, IntraOfTwoMapsIsRefusedByInterMapBa) {
+TEST_F(VerificationProcesses, IntraOfTwoMapsIsRefusedByInterMapBa) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
   SendMatch(PlaceKind::kIntra);
@@ -124,9 +124,9 @@ TEST_F(VerdictProcesses, IntraOfTwoMapsIsRefusedByInterMapBa) {
   EXPECT_EQ(constraints_[0].reason, "intra, but of two maps");
 }
 
-// The verdict is the same whether the match comes after the keyframes, before them, or before
-// keyframes that come in another order.
-TEST_F(VerdictProcesses, VerdictDoesNotDependOnArrival) {
+// The verification result is the same whether the match comes after the keyframes, before them, or
+// before keyframes that come in another order.
+TEST_F(VerificationProcesses, ResultDoesNotDependOnArrival) {
   SendMatch(PlaceKind::kInter);
   SendKeyframes(agent_c_, 4, 12);
   SendKeyframes(agent_m_, 9, 12);
@@ -146,12 +146,12 @@ TEST_F(VerdictProcesses, VerdictDoesNotDependOnArrival) {
     }
   }
   PlaceCandidate candidate = MakeTestCandidate(agent_c_, 9, agent_m_, 10, 40, 10);
-  const Constraint direct = fusion.Judge(agent_c_.keyframes[9].id, candidate);
+  const Constraint direct = fusion.Verify(agent_c_.keyframes[9].id, candidate);
   EXPECT_EQ(direct.T_from_to.t, constraints_[0].T_from_to.t);
   EXPECT_TRUE(direct.covariance.isApprox(constraints_[0].covariance, 1e-12));
 }
 
-TEST_F(VerdictProcesses, AsksForAGapThatStays) {
+TEST_F(VerificationProcesses, AsksForAGapThatStays) {
   SendKeyframes(agent_m_, 0, 3);
   SendKeyframes(agent_m_, 5, 8);
   fusion_.Tick(10 * kSecond);
@@ -182,7 +182,7 @@ TEST_F(VerdictProcesses, AsksForAGapThatStays) {
   EXPECT_EQ(requests_.size(), 1u);
 }
 
-TEST_F(VerdictProcesses, AfterARestartKnownVerdictsAreNotRepeated) {
+TEST_F(VerificationProcesses, AfterARestartKnownResultsAreNotRepeated) {
   have_t have{};
   have.num_maps = 1;
   have.maps = {ToMessage(agent_c_.keyframes[0].id.map)};
@@ -211,7 +211,7 @@ TEST_F(VerdictProcesses, AfterARestartKnownVerdictsAreNotRepeated) {
 }
 
 // What nobody has any more is not waited for: the windows end there.
-TEST_F(VerdictProcesses, WhatIsLostIsNotWaitedFor) {
+TEST_F(VerificationProcesses, WhatIsLostIsNotWaitedFor) {
   SendKeyframes(agent_m_, 4, 12);
   SendKeyframes(agent_c_, 3, 12);
   SendMatch(PlaceKind::kInter);
@@ -229,9 +229,10 @@ TEST_F(VerdictProcesses, WhatIsLostIsNotWaitedFor) {
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
 }
 
-// Live: all that came is known, and told as pending, before it is judged; verdicts come in the
-// order in which the candidates came, and what comes meanwhile is heard between two of them.
-TEST(FusionProcess, LiveItHearsBeforeItJudges) {
+// Live: all that came is known, and told as pending, before it is verified; verification results
+// come in the order in which the candidates came, and what comes meanwhile is heard between two of
+// them.
+TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   const auto room = MakeTestRoom({.seed = 5});
   TestAgentOptions first, second;
   first.num_keyframes = second.num_keyframes = 12;
@@ -243,12 +244,12 @@ TEST(FusionProcess, LiveItHearsBeforeItJudges) {
   FusionProcess fusion(bus, FusionOptions{});
   Node listener(bus, "listener");
   status_t status{};
-  std::vector<int32_t> judged;
+  std::vector<int32_t> verified;
   listener.Subscribe<status_t>("STATUS_fusion",
                                [&](const std::string&, const status_t& said) { status = said; });
   listener.Subscribe<constraint_t>(
       "CONSTRAINT",
-      [&](const std::string&, const constraint_t& verdict) { judged.push_back(verdict.to.seq); });
+      [&](const std::string&, const constraint_t& result) { verified.push_back(result.to.seq); });
   for (const TestAgent* agent : {&agent_m, &agent_c}) {
     for (const Keyframe& keyframe : agent->keyframes) {
       PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
@@ -262,21 +263,21 @@ TEST(FusionProcess, LiveItHearsBeforeItJudges) {
   while (bus.MoreWaits()) {
     bus.Handle(0);
   }
-  EXPECT_TRUE(judged.empty());
+  EXPECT_TRUE(verified.empty());
   fusion.Tick(kSecond);
   bus.Handle(0);
   EXPECT_EQ(status.pending, 3);
-  bus.Handle(0);  // one verdict
+  bus.Handle(0);  // one verification result
   fusion.Tick(2 * kSecond);
   bus.Handle(0);
   bus.Handle(0);
   EXPECT_EQ(status.pending, 2);
   while (bus.Handle(0)) {
   }
-  EXPECT_EQ(judged, (std::vector<int32_t>{11, 9, 10}));
+  EXPECT_EQ(verified, (std::vector<int32_t>{11, 9, 10}));
 }
 
-TEST_F(VerdictProcesses, ACornerThatDoesNotExistIsRefused) {
+TEST_F(VerificationProcesses, ACornerThatDoesNotExistIsRefused) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
   PlaceMatch match{

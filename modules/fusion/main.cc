@@ -1,6 +1,6 @@
 #include "bus/process_main.h"
 #include "fusion/fusion_process.h"
-#include "loop_verification/alignment_yaml.h"
+#include "loop_verification/loop_verification_yaml.h"
 
 // KEYFRAME_*, PLACE_MATCH --> FusionProcess --> CONSTRAINT
 int main(int argc, char** argv) {
@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   pangea::Bind(yaml.Section("drift"), options.drift);
   return pangea::ProcessMain(
       argc, argv,
-      {"pangea-fusion", "Aligns maps: a verdict for every place match between two maps", &yaml},
+      {"pangea-fusion", "Aligns maps: a verification result for every place match between two maps",
+       &yaml},
       [&](pangea::Bus& bus) { return std::make_unique<pangea::FusionProcess>(bus, options); });
 }

@@ -18,8 +18,8 @@ Eigen::Map<RowMajor<kRows, kColumns>> AsMatrix(double* jacobian) {
   return Eigen::Map<RowMajor<kRows, kColumns>>(jacobian);
 }
 
-// From the errors of a state's blocks to those of the inertial residual (right-invariant): a turn
-// carries position and velocity along, e_p = dp + p x dtheta.
+// From the errors of a state's blocks to those of the inertial residual (right-invariant): a
+// rotation carries position and velocity along, e_p = dp + p x dtheta.
 RowMajor<15, 7> PoseJacobian(const Eigen::Matrix<double, 15, 15>& J, const ImuState& state) {
   RowMajor<15, 7> J_pose;
   J_pose.leftCols<3>() = J.middleCols<3>(kPosition);
@@ -74,11 +74,11 @@ bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals
   return true;
 }
 
-InertialFactor::InertialFactor(const Preintegration& measured, const ImuNoise& noise)
+ImuFactorTest::ImuFactorTest(const Preintegration& measured, const ImuNoise& noise)
     : measured_(measured), sqrt_info_(InertialInformation(measured, noise).llt().matrixU()) {}
 
-bool InertialFactor::Evaluate(double const* const* parameters, double* residuals,
-                              double** jacobians) const {
+bool ImuFactorTest::Evaluate(double const* const* parameters, double* residuals,
+                             double** jacobians) const {
   const ImuState from = StateFromBlocks(parameters[0], parameters[1]);
   const ImuState to = StateFromBlocks(parameters[2], parameters[3]);
   const InertialResidual residual = ComputeInertialResidual(measured_, from, to);

@@ -9,7 +9,7 @@
 
 #include <ceres/sized_cost_function.h>
 
-#include "core/imu/inertial_factor.h"
+#include "core/imu/imu_factor.h"
 
 namespace pangea {
 
@@ -34,11 +34,11 @@ class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
 };
 
 // The preintegrated motion between two keyframes, and biases that wander
-// (core/imu/inertial_factor.h). Blocks: pose and motion of the first, pose and motion of the
+// (core/imu/imu_factor.h). Blocks: pose and motion of the first, pose and motion of the
 // second.
-class InertialFactor : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
+class ImuFactorTest : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
-  InertialFactor(const Preintegration& measured, const ImuNoise& noise);
+  ImuFactorTest(const Preintegration& measured, const ImuNoise& noise);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 

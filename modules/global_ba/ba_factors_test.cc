@@ -106,12 +106,12 @@ TEST(CameraPriorFactor, DerivativesMatchDifferences) {
   EXPECT_LT((J.leftCols<6>() - numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
-TEST(InertialFactor, DerivativesMatchDifferencesInEveryBlock) {
+TEST(ImuFactorTest, DerivativesMatchDifferencesInEveryBlock) {
   const BaTestWorld world = MakeBaTestWorld({.agents = 1, .keyframes = 8, .landmarks = 1});
   for (size_t i = 1; i < world.start.keyframes.size(); ++i) {
     const BaKeyframe& to = world.start.keyframes[i];
     const Blocks first(world.start.keyframes[i - 1].imu), second(to.imu);
-    const InertialFactor factor(*to.preintegration, ImuNoise{});
+    const ImuFactorTest factor(*to.preintegration, ImuNoise{});
     double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
     const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
       first.Write(offset.head<15>(), pose_a, motion_a);
@@ -139,7 +139,7 @@ TEST(InertialFactor, DerivativesMatchDifferencesInEveryBlock) {
 
 // Noisy samples, wandering biases: at the truth the whitened residual is what it claims, 15 degrees
 // of freedom a span. In long spans most of it is what the biases wander within them.
-TEST(InertialFactor, IsChiSquaredAtTheTruth) {
+TEST(ImuFactorTest, IsChiSquaredAtTheTruth) {
   for (const double step_s : {0.5, 2.0}) {
     double sum = 0, degrees = 0;
     for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -155,7 +155,7 @@ TEST(InertialFactor, IsChiSquaredAtTheTruth) {
         const double* const blocks[] = {pose_a, motion_a, pose_b, motion_b};
         VectorXd r(15);
         EXPECT_TRUE(
-            InertialFactor(*to.preintegration, ImuNoise{}).Evaluate(blocks, r.data(), nullptr));
+            ImuFactorTest(*to.preintegration, ImuNoise{}).Evaluate(blocks, r.data(), nullptr));
         sum += r.squaredNorm();
         degrees += 15;
       }

@@ -99,7 +99,7 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
     options.linear_solver_ordering->AddElementToGroup(Pose(i), 1);
     options.linear_solver_ordering->AddElementToGroup(Motion(i), 1);
     if (keyframe.previous >= 0 && keyframe.preintegration) {
-      problem.AddResidualBlock(new InertialFactor(*keyframe.preintegration, ba.imu),
+      problem.AddResidualBlock(new ImuFactorTest(*keyframe.preintegration, ba.imu),
                                Weight(keyframe.edge ? 1 - ba.edge_weight : 1),
                                Pose(keyframe.previous), Motion(keyframe.previous), Pose(i),
                                Motion(i));

@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "core/ids.h"
-#include "core/imu/inertial_factor.h"
+#include "core/imu/imu_factor.h"
 
 namespace pangea {
 
@@ -76,7 +76,7 @@ struct BaOptions {
   double camera_position_sigma = 0.005;  // m
   double camera_rotation_sigma = 0.005;  // rad
   double loss_scale = 2.0;               // sigmas
-  double edge_weight = 0.5;              // w above; the inertial factor beside an edge has the rest
+  double edge_weight = 0.5;              // w above; the IMU factor beside an edge has the rest
   double edge_scale_sigma = 0.01;        // share by which all edges of a map may be too long
   double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
   int iterations_a_piece = 2;

@@ -118,7 +118,7 @@ TEST(BaProblem, TheSameStartGivesTheSameBytes) {
 }
 
 // By their rotation; of their position these flights say less than the prior does.
-TEST(BaProblem, FindsHowTheCamerasAreTurned) {
+TEST(BaProblem, FindsHowTheCamerasAreRotated) {
   BaTestWorld world = MakeBaTestWorld({});
   const Eigen::Quaterniond off = ExpSo3({0.004, -0.003, 0.003});
   for (Rigid3& T_body_cam : world.start.T_body_cam) {

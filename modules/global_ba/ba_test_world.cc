@@ -231,10 +231,10 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
 double WorstError(const BaWorld& world, const BaWorld& truth) {
   const Rigid3& first = world.keyframes[0].imu.T_odom_body;
   const Rigid3& true_first = truth.keyframes[0].imu.T_odom_body;
-  const Eigen::Quaterniond turn = YawRotation(YawOf(true_first.q * first.q.conjugate()));
+  const Eigen::Quaterniond rotation = YawRotation(YawOf(true_first.q * first.q.conjugate()));
   double worst = 0;
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
-    const Vector3d p = turn * (world.keyframes[i].imu.T_odom_body.t - first.t);
+    const Vector3d p = rotation * (world.keyframes[i].imu.T_odom_body.t - first.t);
     worst = std::max(worst, (p - (truth.keyframes[i].imu.T_odom_body.t - true_first.t)).norm());
   }
   return worst;

@@ -35,8 +35,9 @@ struct BaTestWorld {
 
 BaTestWorld MakeBaTestWorld(const BaTestOptions& options);
 
-// The same as the server gets it: keyframes whose odometry is the start's, one match and verdict
-// between the k-th keyframes of two agents, and the group's state, which is the start again.
+// The same as the server gets it: keyframes whose odometry is the start's, one match and
+// verification result between the k-th keyframes of two agents, and the group's state, which is the
+// start again.
 struct BaTestMessages {
   std::vector<Keyframe> keyframes;
   std::vector<PlaceMatch> matches;

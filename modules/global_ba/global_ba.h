@@ -3,15 +3,16 @@
 // Global visual-inertial bundle adjustment of fused groups (ORB-SLAM3's and COVINS' last step:
 // Campos et al., TRO 2021; Schmuck et al., ISMAR 2021).
 //
-// In: keyframes, place matches, verdicts, group states, in any order. Out: the refined state of a
-// group: every keyframe's pose from all rays and all inertial measurements of all its agents at
-// once. The pose graph's edges and loops carry each odometry's own scale; here one adjustment finds
-// it from the whole flight, and landmarks that several agents see make it theirs together.
+// In: keyframes, place matches, verification results, group states, in any order. Out: the refined
+// state of a group: every keyframe's pose from all rays and all inertial measurements of all its
+// agents at once. The pose graph's edges and loops carry each odometry's own scale; here one
+// adjustment finds it from the whole flight, and landmarks that several agents see make it theirs
+// together.
 //
 // A group is due when its loops or keyframes are not those of its last refinement, or when the pose
 // graph has forgotten that one (it was started again). Work goes in
-// pieces, and is dropped when news of its maps is taken. Map frame: the state's. One thread, no
-// clock: the same calls in the same order give the same bytes.
+// pieces, and is dropped when a message of its maps is taken. Map frame: the state's. One thread,
+// no clock: the same calls in the same order give the same bytes.
 
 #include <cstdint>
 #include <map>
@@ -38,7 +39,7 @@ class GlobalBa {
  public:
   struct Counters {
     int64_t begun = 0;
-    int64_t dropped = 0;  // because of news
+    int64_t dropped = 0;  // because of a message
     int64_t finished = 0;
   };
 

@@ -31,23 +31,23 @@ GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options)
   node_.Listen<have_t>(channels::kHave, std::bind_front(&GlobalBaProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
 }
 
 void GlobalBaProcess::OnKeyframe(Keyframe keyframe) {
-  ++num_news_;
+  ++num_inputs_;
   keyframes_.Note(keyframe.id.map, keyframe.id.seq);
   global_ba_.Take(std::move(keyframe));
 }
 
 void GlobalBaProcess::OnPlaceMatch(const PlaceMatch& match) {
-  ++num_news_;
+  ++num_inputs_;
   matches_.Note(match.query.map, match.query.seq);
   global_ba_.Take(match);
 }
 
 void GlobalBaProcess::OnConstraint(const Constraint& constraint) {
-  ++num_news_;
+  ++num_inputs_;
   global_ba_.Take(constraint);
 }
 
@@ -63,22 +63,22 @@ void GlobalBaProcess::OnHave(const Have& have) {
     if (keyframes_.Lacks(map, 0)) {
       missing_states_.Announce(map);
     }
-    // What was judged before this process started.
-    if (verdicts_asked_.insert(map).second) {
-      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
+    // What was verified before this process started.
+    if (results_requested_.insert(map).second) {
+      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
     }
   }
   keyframes_.Announce(have);
   matches_.Announce(have);
 }
 
-void GlobalBaProcess::OnAgain(const again_t& message) {
-  const bool known =
-      TakeAgain<keyframe_t>(node_, message, std::bind_front(&GlobalBaProcess::OnKeyframe, this)) ||
-      TakeAgain<place_match_t>(node_, message,
-                               std::bind_front(&GlobalBaProcess::OnPlaceMatch, this)) ||
-      TakeAgain<constraint_t>(node_, message,
-                              std::bind_front(&GlobalBaProcess::OnConstraint, this));
+void GlobalBaProcess::OnRetransmission(const again_t& message) {
+  const bool known = TakeRetransmission<keyframe_t>(
+                         node_, message, std::bind_front(&GlobalBaProcess::OnKeyframe, this)) ||
+                     TakeRetransmission<place_match_t>(
+                         node_, message, std::bind_front(&GlobalBaProcess::OnPlaceMatch, this)) ||
+                     TakeRetransmission<constraint_t>(
+                         node_, message, std::bind_front(&GlobalBaProcess::OnConstraint, this));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }
@@ -100,23 +100,23 @@ void GlobalBaProcess::Finish() {
 
 void GlobalBaProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
   for (const SeqGap& gap : matches_.Due(now_utime)) {
-    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+    RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
   }
   for (const MapId& map : missing_states_.Due(now_utime)) {
     AskForState(node_, map);
   }
-  if (num_news_ != num_news_at_change_) {
-    num_news_at_change_ = num_news_;
-    last_news_utime_ = now_utime;
+  if (num_inputs_ != num_inputs_at_change_) {
+    num_inputs_at_change_ = num_inputs_;
+    last_input_utime_ = now_utime;
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
     PublishStatus(now_utime);
   }
-  if (now_utime >= last_news_utime_ + kQuiet_us && !node_.bus().MoreWaits() &&
+  if (now_utime >= last_input_utime_ + kQuiet_us && !node_.bus().MoreWaits() &&
       global_ba_.HasWork()) {
     Advance();
   }

@@ -2,14 +2,14 @@
 
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE in; REFINEMENT, STATUS_global_ba out.
 //
-// Works while the bus is quiet: three seconds after the last news a group is adjusted, in pieces
-// between which messages are handled, and dropped when they are news. So it takes no time from a
-// session that runs; a replay calls Finish.
+// Works while the bus is quiet: three seconds after the last message a group is adjusted, in pieces
+// between which messages are handled, and dropped when they change anything. So it takes no time
+// from a session that runs; a replay calls Finish.
 //
 // What is missing is asked for at ticks (RESEND_REQUEST, answers on AGAIN_global_ba): keyframes and
-// matches that a gap or HAVE tells of, once per map the verdicts of a former run, and the states
-// that were said before this process came. A verdict that is lost later costs its matches, nothing
-// else.
+// matches that a gap or HAVE tells of, once per map the verification results of a former run, and
+// the states that were said before this process came. A verification result that is lost later
+// costs its matches, nothing else.
 
 #include <set>
 
@@ -38,7 +38,7 @@ class GlobalBaProcess : public Process {
   void OnConstraint(const Constraint& constraint);
   void OnMapState(MapState state, const map_state_t& message);
   void OnHave(const Have& have);
-  void OnAgain(const again_t& message);
+  void OnRetransmission(const again_t& message);
 
   void Advance();
   void PublishStatus(int64_t now_utime);
@@ -49,10 +49,11 @@ class GlobalBaProcess : public Process {
   MissingMessages keyframes_;
   MissingMessages matches_;
   MissingStates missing_states_;
-  std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
-  int64_t num_news_ = 0;
-  int64_t num_news_at_change_ = 0;
-  int64_t last_news_utime_ = 0;
+  std::set<MapId>
+      results_requested_;  // maps whose verification results of a former run were asked for
+  int64_t num_inputs_ = 0;
+  int64_t num_inputs_at_change_ = 0;
+  int64_t last_input_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

@@ -76,7 +76,7 @@ TEST(GlobalBaProcess, RefinesWhenItIsQuietAndOnlyOnce) {
   EXPECT_EQ(server.status.pending, 0);
 }
 
-TEST(GlobalBaProcess, NewsPutsItOff) {
+TEST(GlobalBaProcess, AMessagePutsItOff) {
   const BaTestMessages messages = SmallWorld();
   Server server;
   server.SendAll(messages);

@@ -54,7 +54,7 @@ TEST(GlobalBa, RefinesAGroup) {
   EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth), 0.2 * before);
 }
 
-TEST(GlobalBa, TheOrderOfNewsDoesNotMatter) {
+TEST(GlobalBa, TheOrderOfMessagesDoesNotMatter) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto in_order = Server(messages).Finish();
   std::mt19937_64 rng(1);
@@ -68,7 +68,7 @@ TEST(GlobalBa, TheOrderOfNewsDoesNotMatter) {
   }
 }
 
-TEST(GlobalBa, NewsOfTheGroupDropsTheWorkAndOtherNewsDoesNot) {
+TEST(GlobalBa, AMessageOfTheGroupDropsTheWorkAndOtherMessagesDoNot) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   Server server(messages);
   server.ba.Advance();
@@ -121,7 +121,7 @@ TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
   EXPECT_FALSE(Server(messages).ba.HasWork());
 }
 
-// Maps that were taken apart since: the state of both is old news.
+// Maps that were taken apart since: the state of both is out of date.
 TEST(GlobalBa, AGroupThatIsNoMoreIsNotDue) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   Server server(messages);

@@ -213,16 +213,16 @@ TEST(Landmarks, ParallelRaysMakeNone) {
 
 TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
   Group group;
-  const Rigid3 turned(YawRotation(0.5), {1, 2, 3});
+  const Rigid3 rotated(YawRotation(0.5), {1, 2, 3});
   for (KeyframePose& pose : group.messages.state.keyframes) {
-    pose.T_map_body = turned * pose.T_map_body;
+    pose.T_map_body = rotated * pose.T_map_body;
   }
   const BaWorld world = group.World();
   ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes);
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
     const ImuState& got = world.keyframes[i].imu;
     const ImuState& odometry = group.truth.start.keyframes[i].imu;
-    EXPECT_LT((got.v_odom_body - turned.q * odometry.v_odom_body).norm(), 1e-9);
+    EXPECT_LT((got.v_odom_body - rotated.q * odometry.v_odom_body).norm(), 1e-9);
     EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframes != 0);
   }
 }

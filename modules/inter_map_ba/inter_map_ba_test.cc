@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <numbers>
 
-#include "loop_verification/alignment_test_world.h"
+#include "loop_verification/loop_verification_test_world.h"
 
 namespace pangea {
 namespace {
@@ -22,15 +22,15 @@ TestAgent RoundTrip(uint64_t seed, double edge_sigma_m) {
   return RunTestAgent(MakeTestRoom({.seed = seed}), walk);
 }
 
-Constraint Judge(const InterMapBaOptions& options, const TestAgent& agent, int query, int match) {
-  InterMapBa judge(options);
+Constraint Verify(const InterMapBaOptions& options, const TestAgent& agent, int query, int match) {
+  InterMapBa verifier(options);
   for (const Keyframe& keyframe : agent.keyframes) {
-    judge.Add(keyframe);
+    verifier.Add(keyframe);
   }
   const KeyframeId id = agent.keyframes[query].id;
   const PlaceCandidate candidate = MakeTestCandidateByDescriptor(agent, query, agent, match);
-  EXPECT_TRUE(judge.Ready(id, candidate));
-  return judge.Judge(id, candidate);
+  EXPECT_TRUE(verifier.Ready(id, candidate));
+  return verifier.Verify(id, candidate);
 }
 
 TEST(InterMapBa, ClosesALoopBetterThanOdometry) {
@@ -38,7 +38,7 @@ TEST(InterMapBa, ClosesALoopBetterThanOdometry) {
   constexpr int kRuns = 5;
   for (int run = 0; run < kRuns; ++run) {
     const TestAgent agent = RoundTrip(20 + run, 0.01);
-    const Constraint loop = Judge({}, agent, kRound + 10, 11);
+    const Constraint loop = Verify({}, agent, kRound + 10, 11);
     ASSERT_TRUE(loop.accepted) << loop.reason;
     EXPECT_EQ(loop.kind, PlaceKind::kIntra);
     const Rigid3 truth = agent.T_room_body[11].Inverse() * agent.T_room_body[kRound + 10];
@@ -54,30 +54,30 @@ TEST(InterMapBa, ClosesALoopBetterThanOdometry) {
 TEST(InterMapBa, RefusesMoreDriftThanOdometryMakes) {
   InterMapBaOptions options;
   options.drift.max_drift_m = options.drift.max_drift_share = 0;
-  const Constraint loop = Judge(options, RoundTrip(30, 0.01), kRound + 10, 11);
+  const Constraint loop = Verify(options, RoundTrip(30, 0.01), kRound + 10, 11);
   EXPECT_FALSE(loop.accepted);
   EXPECT_EQ(loop.reason, "more drift than odometry makes");
 }
 
 TEST(InterMapBa, RefusesNeighbours) {
-  const Constraint loop = Judge({}, RoundTrip(31, 0.01), 20, 14);
+  const Constraint loop = Verify({}, RoundTrip(31, 0.01), 20, 14);
   EXPECT_FALSE(loop.accepted);
   EXPECT_EQ(loop.reason, "the two keyframes are neighbours");
 }
 
 TEST(InterMapBa, IsReadyOnlyWithTheWholeWay) {
   const TestAgent agent = RoundTrip(32, 0.01);
-  InterMapBa judge({});
+  InterMapBa verifier({});
   const PlaceCandidate candidate{agent.keyframes[11].id, PlaceKind::kIntra, 0.5f, {}};
   const KeyframeId query = agent.keyframes[kRound + 10].id;
   for (const Keyframe& keyframe : agent.keyframes) {
     if (keyframe.id.seq != 40) {
-      judge.Add(keyframe);
+      verifier.Add(keyframe);
     }
   }
-  EXPECT_FALSE(judge.Ready(query, candidate));
-  judge.Add(agent.keyframes[40]);
-  EXPECT_TRUE(judge.Ready(query, candidate));
+  EXPECT_FALSE(verifier.Ready(query, candidate));
+  verifier.Add(agent.keyframes[40]);
+  EXPECT_TRUE(verifier.Ready(query, candidate));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "bus/process_main.h"
 #include "inter_map_ba/inter_map_ba_process.h"
-#include "loop_verification/alignment_yaml.h"
+#include "loop_verification/loop_verification_yaml.h"
 
 // KEYFRAME_*, PLACE_MATCH --> InterMapBaProcess --> CONSTRAINT
 int main(int argc, char** argv) {
@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   pangea::Bind(yaml.Section("drift"), options.drift);
   return pangea::ProcessMain(
       argc, argv,
-      {"pangea-inter-map-ba", "Closes loops: a verdict for every place match within one map",
-       &yaml},
+      {"pangea-inter-map-ba",
+       "Closes loops: a verification result for every place match within one map", &yaml},
       [&](pangea::Bus& bus) { return std::make_unique<pangea::InterMapBaProcess>(bus, options); });
 }

@@ -5,7 +5,7 @@
 namespace pangea {
 namespace {
 
-// Each keyframe carries the camera of its moment. Odometries refine mounting, time offset, focal
+// Each keyframe carries the camera of its moment. Odometries refine extrinsics, time offset, focal
 // length and centre as they go, and a focusing lens moves the latter two: from infinity to 10 cm, a
 // phone's 7 mm lens by 7 per cent. Another lens, another size of image or a zoom is another camera.
 constexpr double kMaxChange = 0.1;  // of the focal length
@@ -21,7 +21,7 @@ bool SameCamera(const CameraModel& a, const CameraModel& b) {
 }  // namespace
 
 std::string MapContinuity::Check(const Keyframe& keyframe, size_t contents) {
-  const auto map = maps_.try_emplace(keyframe.id.map, Map{keyframe.camera, {}}).first;
+  const auto map = maps_.try_emplace(keyframe.id.map, OpenMap{keyframe.camera, {}}).first;
   if (!SameCamera(map->second.camera, keyframe.camera)) {
     return "keyframe with another camera than its map's";
   }

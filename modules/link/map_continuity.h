@@ -27,11 +27,11 @@ class MapContinuity {
     int64_t utime = 0;
     size_t contents = 0;
   };
-  struct Map {
+  struct OpenMap {
     CameraModel camera;
     std::map<int32_t, Seen> seen;  // by seq
   };
-  std::map<MapId, Map> maps_;
+  std::map<MapId, OpenMap> maps_;
 };
 
 }  // namespace pangea

@@ -19,7 +19,7 @@ class Pacer {
     }
     last_us_ = now_us;
   }
-  // A message larger than the burst goes out too: the bucket then owes.
+  // A message larger than the burst goes out too: the bucket is then overdrawn.
   bool Ready() const { return tokens_ > 0; }
   void Take(int64_t bytes) { tokens_ -= static_cast<double>(bytes); }
 

@@ -25,7 +25,7 @@ auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
   return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
 }
 
-Constraint FindVerdict(const std::string& log, int64_t id) {
+Constraint FindResult(const std::string& log, int64_t id) {
   std::optional<Constraint> found;
   ReadLog(log, [&](const LogEvent& event) {
     if (event.channel == channels::kConstraint) {
@@ -83,7 +83,7 @@ double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 }  // namespace
 
-std::string ListVerdicts(const std::string& log) {
+std::string ListResults(const std::string& log) {
   std::string text;
   ReadLog(log, [&text](const LogEvent& event) {
     if (event.channel != channels::kConstraint) {
@@ -100,13 +100,13 @@ std::string ListVerdicts(const std::string& log) {
 
 Explanation Explain(const std::string& log, int64_t constraint_id) {
   Explanation explanation;
-  explanation.said = FindVerdict(log, constraint_id);
+  explanation.said = FindResult(log, constraint_id);
   explanation.candidate = FindCandidate(log, explanation.said);
-  std::unique_ptr<PairJudge> judge;
+  std::unique_ptr<LoopVerifier> verifier;
   if (explanation.said.kind == PlaceKind::kIntra) {
-    judge = std::make_unique<InterMapBa>(InterMapBaOptions{});
+    verifier = std::make_unique<InterMapBa>(InterMapBaOptions{});
   } else {
-    judge = std::make_unique<Fusion>(FusionOptions{});
+    verifier = std::make_unique<Fusion>(FusionOptions{});
   }
   bool from = false, to = false;
   ReadLog(log, [&](const LogEvent& event) {
@@ -124,31 +124,32 @@ Explanation Explain(const std::string& log, int64_t constraint_id) {
       explanation.to = *keyframe;
       to = true;
     }
-    judge->Add(std::move(*keyframe));
+    verifier->Add(std::move(*keyframe));
   });
   if (!from || !to) {
     throw std::runtime_error(
         fmt::format("{}: keyframe {} is not in this log", log,
                     ToString(from ? explanation.said.to : explanation.said.from)));
   }
-  explanation.again = judge->Judge(explanation.said.to, explanation.candidate, &explanation.report);
+  explanation.again =
+      verifier->Verify(explanation.said.to, explanation.candidate, &explanation.report);
   return explanation;
 }
 
 std::string ToText(const Explanation& e) {
-  const AlignmentReport& report = e.report;
-  const AlignmentOptions limits;
-  const auto verdict = [](const Constraint& c) { return c.accepted ? "accepted" : c.reason; };
+  const LoopVerificationReport& report = e.report;
+  const LoopVerificationOptions limits;
+  const auto result = [](const Constraint& c) { return c.accepted ? "accepted" : c.reason; };
   std::string text = fmt::format(
-      "{} (query) in {} (match), {}\nverdict in the log: {}\nmade again:         {}\n\n",
+      "{} (query) in {} (match), {}\nresult in the log: {}\nmade again:        {}\n\n",
       ToString(e.said.to), ToString(e.said.from),
-      e.said.from.map == e.said.to.map ? "one map" : "two maps", verdict(e.said), verdict(e.again));
+      e.said.from.map == e.said.to.map ? "one map" : "two maps", result(e.said), result(e.again));
   text += fmt::format("candidate      {} corners matched, score {:.4f}\n",
                       e.candidate.corner_matches.size(), e.candidate.score);
   text += fmt::format("PnP            {}, {} landmarks (at least {})\n", CountOf(report.first),
                       report.pnp_inliers, limits.min_pnp_inliers);
   text += fmt::format(
-      "surroundings   {} points ought to be seen (at least {}), {:.0f} % found (at least {:.0f}), "
+      "visibility     {} points ought to be seen (at least {}), {:.0f} % found (at least {:.0f}), "
       "in "
       "{:.0f} % of the view (at least {:.0f})\n",
       report.comparable, limits.min_comparable, 100 * report.found_share,

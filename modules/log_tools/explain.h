@@ -1,7 +1,8 @@
 #pragma once
 
-// Why a constraint was accepted or refused: the verdict made again from the log's keyframes and the
-// candidate that asked for it, step by step, as text and as a picture of both keyframes.
+// Why a constraint was accepted or refused: the verification result made again from the log's
+// keyframes and the candidate that asked for it, step by step, as text and as a picture of both
+// keyframes.
 
 #include <map>
 #include <string>
@@ -16,19 +17,20 @@ struct Explanation {
   PlaceCandidate candidate;
   Constraint said;   // as the log has it
   Constraint again;  // made again from the same keyframes
-  AlignmentReport report;
+  LoopVerificationReport report;
   Keyframe from, to;
 };
 
-// Every verdict of the log, a line each.
-std::string ListVerdicts(const std::string& log);
-// Throws std::runtime_error when the log lacks the verdict, its candidate or a keyframe.
+// Every verification result of the log, a line each.
+std::string ListResults(const std::string& log);
+// Throws std::runtime_error when the log lacks the verification result, its candidate or a
+// keyframe.
 Explanation Explain(const std::string& log, int64_t constraint_id);
 
 std::string ToText(const Explanation& explanation);
 // Rows of the match on the left and the query on the right: the candidate's corners, PnP, and where
-// it got so far the window BA; below them the verdict. `recordings`: folders by agent; where there
-// is none, corners on a dark ground.
+// it got so far the window BA; below them the verification result. `recordings`: folders by agent;
+// where there is none, corners on a dark ground.
 void WriteExplanationPng(const Explanation& explanation,
                          const std::map<int32_t, std::string>& recordings, const std::string& path);
 

@@ -111,12 +111,12 @@ cv::Mat MatchesRow(const std::vector<ShownMatch>& matches, const Pair& images) {
   return row.canvas();
 }
 
-// With what most verdicts hang on.
-std::string VerdictOf(const Explanation& explanation) {
-  const Constraint& verdict = explanation.again;
-  const AlignmentReport& report = explanation.report;
+// With what most verification results hang on.
+std::string ResultOf(const Explanation& explanation) {
+  const Constraint& result = explanation.again;
+  const LoopVerificationReport& report = explanation.report;
   std::string text = fmt::format("{}   ({:.0f} % found of {} points that ought to be seen",
-                                 verdict.accepted ? "ACCEPTED" : "REFUSED: " + verdict.reason,
+                                 result.accepted ? "ACCEPTED" : "REFUSED: " + result.reason,
                                  100 * report.found_share, report.comparable);
   if (report.landmarks > 0) {
     text +=
@@ -135,7 +135,7 @@ void WriteExplanationPng(const Explanation& explanation,
   }
   const Pair images{ImageOf(explanation.from, recordings), ImageOf(explanation.to, recordings)};
   const int width = images.width();
-  const AlignmentReport& report = explanation.report;
+  const LoopVerificationReport& report = explanation.report;
   std::vector<cv::Mat> parts = {
       Caption(fmt::format("{} (match) and {} (query): {} corners look alike",
                           ToString(explanation.from.id), ToString(explanation.to.id),
@@ -149,8 +149,7 @@ void WriteExplanationPng(const Explanation& explanation,
         "points found by projection: inliers of the window BA green, the rest orange", width));
     parts.push_back(MatchesRow(report.found, images));
   }
-  parts.push_back(
-      Caption(VerdictOf(explanation), width, explanation.again.accepted ? kGood : kBad));
+  parts.push_back(Caption(ResultOf(explanation), width, explanation.again.accepted ? kGood : kBad));
   cv::Mat picture;
   cv::vconcat(parts, picture);
   if (!cv::imwrite(path, picture)) {

@@ -9,7 +9,7 @@
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "recording/text_file.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 #include "report/report_pictures.h"
 #include "report/report_text.h"
 
@@ -84,9 +84,9 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
 
 void ExportPly(const std::string& log, const std::string& file) {
   const CapturedSession session = ReadServerLog(log);
-  const ReportFigures figures = ComputeFigures({.server_log = log}, session);
-  WriteTextFile(file, MapPly(session, figures,
-                             figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
+  const ReportMetrics metrics = ComputeMetrics({.server_log = log}, session);
+  WriteTextFile(file, MapPly(session, metrics,
+                             metrics.groups.empty() ? FinalGroup() : metrics.groups.front().group));
 }
 
 NamedGraph GraphOf(const std::string& log) {

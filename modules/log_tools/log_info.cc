@@ -26,10 +26,10 @@ void AddKeyframe(Bytes data, LogSummary* summary) {
   }
 }
 
-void AddVerdict(Bytes data, LogSummary* summary) {
+void AddResult(Bytes data, LogSummary* summary) {
   constraint_t message{};
   if (DecodeMessage(data, &message)) {
-    ++summary->verdicts[message.accepted ? "accepted" : message.reason];
+    ++summary->results[message.accepted ? "accepted" : message.reason];
   }
 }
 
@@ -87,7 +87,7 @@ LogSummary Summarise(const std::string& log) {
     if (event.channel.starts_with(channels::kKeyframePrefix)) {
       AddKeyframe(event.data, &summary);
     } else if (event.channel == channels::kConstraint) {
-      AddVerdict(event.data, &summary);
+      AddResult(event.data, &summary);
     }
   });
   summary.unread_bytes = static_cast<int64_t>(std::filesystem::file_size(log)) - summary.bytes;
@@ -112,9 +112,9 @@ std::string ToText(const LogSummary& summary, const std::string& log) {
       text += fmt::format("{:<26} {:>9}  {}\n", ToString(map), seqs.size(), Ranges(seqs));
     }
   }
-  if (!summary.verdicts.empty()) {
-    text += "\nverdicts\n";
-    for (const auto& [reason, count] : summary.verdicts) {
+  if (!summary.results.empty()) {
+    text += "\nverification results\n";
+    for (const auto& [reason, count] : summary.results) {
       text += fmt::format("{:>8}  {}\n", count, reason);
     }
   }

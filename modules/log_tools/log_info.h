@@ -24,7 +24,7 @@ struct LogSummary {
   int64_t first_utime = 0, last_utime = 0;  // of capture
   std::map<std::string, ChannelSummary> channels;
   std::map<MapId, std::set<int32_t>> keyframes;  // seqs by map
-  std::map<std::string, int64_t> verdicts;       // constraints by reason; "accepted"
+  std::map<std::string, int64_t> results;        // constraints by reason; "accepted"
 };
 
 // Throws std::runtime_error when the log cannot be read.

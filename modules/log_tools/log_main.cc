@@ -16,7 +16,7 @@
 #include "log_tools/log_info.h"
 #include "log_tools/recording_arguments.h"
 #include "recording/text_file.h"
-#include "report/remembered.h"
+#include "report/session_record.h"
 
 namespace pangea::session {
 namespace {
@@ -58,17 +58,17 @@ void Export(const Arguments& arguments) {
   }
 }
 
-void ExplainVerdict(const Arguments& arguments) {
+void ExplainResult(const Arguments& arguments) {
   const std::string& log = arguments.logs.front();
   if (!arguments.constraint) {
-    std::cout << ListVerdicts(log);
+    std::cout << ListResults(log);
     return;
   }
   const Explanation explanation = Explain(log, *arguments.constraint);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
     std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
-    recordings.merge(RecordingsAtHand(ReadRemembered({log})));
+    recordings.merge(RecordingsAtHand(ReadSessionRecord({log})));
     WriteExplanationPng(explanation, recordings, arguments.out);
   }
 }
@@ -104,7 +104,7 @@ void AddCutOptions(CLI::App& command, Arguments* arguments) {
 }  // namespace
 
 void AddCommands(CLI::App& app, Arguments* arguments) {
-  AddCommand(app, "info", "Channels, keyframes and verdicts in a log", arguments, 1)
+  AddCommand(app, "info", "Channels, keyframes and verification results in a log", arguments, 1)
       ->callback([arguments] {
         const std::string& log = arguments->logs.front();
         std::cout << ToText(Summarise(log), log);
@@ -169,7 +169,7 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   explain->add_option("--recording", arguments->recordings,
                       "ID=FOLDER: an agent's recording, for its images (default: as the session "
                       "remembers it beside its log)");
-  explain->callback([arguments] { ExplainVerdict(*arguments); });
+  explain->callback([arguments] { ExplainResult(*arguments); });
   CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
   cost->callback([arguments] {

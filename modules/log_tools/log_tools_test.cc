@@ -92,7 +92,7 @@ double CostByG2o(const std::string& path) {
   return cost;
 }
 
-TEST_F(LogToolsTest, InfoNamesChannelsMapsAndVerdicts) {
+TEST_F(LogToolsTest, InfoNamesChannelsMapsAndResults) {
   const LogSummary summary = Summarise(kSample);
   EXPECT_EQ(summary.unread_bytes, 0);
   ASSERT_EQ(summary.keyframes.size(), 2U);
@@ -101,7 +101,7 @@ TEST_F(LogToolsTest, InfoNamesChannelsMapsAndVerdicts) {
     keyframes += seqs.size();
   }
   EXPECT_EQ(keyframes, 63U);
-  EXPECT_GT(summary.verdicts.at("accepted"), 0);
+  EXPECT_GT(summary.results.at("accepted"), 0);
   const std::string text = ToText(summary, "sample");
   EXPECT_NE(text.find("KEYFRAME_1"), std::string::npos);
   EXPECT_NE(text.find("0-"), std::string::npos);
@@ -229,20 +229,20 @@ TEST_F(LogToolsTest, TrajectoriesAndPoints) {
   EXPECT_GT(fs::file_size(Path("map.ply")), 10000U);
 }
 
-// Verdicts made again from the log say what the log says, but for a few: acceptance was laxer when
-// the sample was captured.
-TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedVerdicts) {
-  std::istringstream verdicts(ListVerdicts(kSample));
+// Verification results made again from the log say what the log says, but for a few: acceptance was
+// laxer when the sample was captured.
+TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedResults) {
+  std::istringstream results(ListResults(kSample));
   std::map<std::string, Explanation> same;  // by reason
-  int num_verdicts = 0, num_same = 0;
-  for (std::string line; std::getline(verdicts, line); ++num_verdicts) {
+  int num_results = 0, num_same = 0;
+  for (std::string line; std::getline(results, line); ++num_results) {
     const Explanation explanation = Explain(kSample, std::stoll(line));
     if (explanation.again.reason == explanation.said.reason) {
       ++num_same;
       same.emplace(explanation.said.reason, explanation);
     }
   }
-  EXPECT_GT(num_same, 0.9 * num_verdicts);
+  EXPECT_GT(num_same, 0.9 * num_results);
   EXPECT_GE(same.size(), 3U);
   for (const auto& [reason, explanation] : same) {
     EXPECT_NE(ToText(explanation).find(reason), std::string::npos);

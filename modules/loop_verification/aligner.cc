@@ -30,7 +30,7 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
 // One candidate on its way through the steps; each returns why it is refused, or an empty string.
 class Alignment {
  public:
-  Alignment(const AlignmentOptions& options, const KeyframeWindow& frames_m,
+  Alignment(const LoopVerificationOptions& options, const KeyframeWindow& frames_m,
             const KeyframeWindow& frames_c)
       : options_(options),
         frames_m_(frames_m),
@@ -71,10 +71,10 @@ class Alignment {
   }
 
   std::string CheckViews() const {
-    const Eigen::Vector3d sight_m = window_m_.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d sight_c =
+    const Eigen::Vector3d axis_m = window_m_.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d axis_c =
         pose_.T_m_c.q * (window_c_.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
-    const double angle = std::acos(std::clamp(sight_m.dot(sight_c), -1.0, 1.0));
+    const double angle = std::acos(std::clamp(axis_m.dot(axis_c), -1.0, 1.0));
     if (angle > options_.max_view_angle || pose_.T_m_c.t.norm() > options_.max_distance_m) {
       return "views do not overlap";
     }
@@ -83,26 +83,26 @@ class Alignment {
 
   // Looks for the points around the guess in the two keyframes themselves, and counts what should
   // be there and is not.
-  std::string CheckSurroundings() {
+  std::string CheckVisibility() {
     std::vector<PointMatch> matches;
     // The second round looks again from the refined pose.
     for (int round = 0; round < 2; ++round) {
       matches.clear();
-      Surroundings surroundings;
+      VisibilityCheck visibility;
       for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
         const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
         const SearchResult result = SearchByProjection(window_m_, window_c_, direction,
                                                        observer.newest(), pose_, options_.search);
         matches.insert(matches.end(), result.matches.begin(), result.matches.end());
-        surroundings.Add(observer.keyframe(observer.newest()).camera, result);
+        visibility.Add(observer.keyframe(observer.newest()).camera, result);
       }
       if (static_cast<int>(matches.size()) < options_.min_found) {
         return "too few points found by projection";
       }
       pose_ = RefinePose(Observations(matches), pose_.T_m_c, guess_tilt_sigma_);
-      report_.comparable = surroundings.comparable();
-      report_.found_share = surroundings.found_share();
-      report_.first_supported_share = surroundings.supported_share();
+      report_.comparable = visibility.comparable();
+      report_.found_share = visibility.found_share();
+      report_.first_supported_share = visibility.supported_share();
     }
     if (report_.comparable < options_.min_comparable) {
       return "too few points ought to be seen from both";
@@ -137,20 +137,19 @@ class Alignment {
 
   // The same count along the way to the two keyframes, where more than the object before them is in
   // view.
-  std::string CheckWiderSurroundings() {
+  std::string CheckWiderVisibility() {
     const Window wide_m = MakeWindow(frames_m_, options_.window);
     const Window wide_c = MakeWindow(frames_c_, options_.window);
     const PoseEstimate pose{ba_->T_m_c, pose_.covariance};
-    Surroundings surroundings;
+    VisibilityCheck visibility;
     for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
       const Window& observer = direction == Direction::kForward ? wide_c : wide_m;
-      for (int frame = observer.newest(); frame >= 0; frame -= options_.surroundings_stride) {
-        surroundings.Add(
-            observer.keyframe(frame).camera,
-            SearchByProjection(wide_m, wide_c, direction, frame, pose, options_.search));
+      for (int frame = observer.newest(); frame >= 0; frame -= options_.visibility_stride) {
+        visibility.Add(observer.keyframe(frame).camera,
+                       SearchByProjection(wide_m, wide_c, direction, frame, pose, options_.search));
       }
     }
-    report_.supported_share = surroundings.supported_share();
+    report_.supported_share = visibility.supported_share();
     return report_.supported_share < options_.min_supported_share ? "the surroundings contradict"
                                                                   : "";
   }
@@ -212,11 +211,11 @@ class Alignment {
     return HangsOnVagueMatches() ? "hangs on vague matches" : "";
   }
 
-  // The left and the right half of what both see, each solved alone. A turn of the view and a step
-  // to the side look alike over a narrow field; matches that are a little off then give a pose far
-  // off, which gravity does not contradict and the residuals do not show. But it differs from half
-  // to half. What both halves take from the odometries counts twice: the test lets pass too much
-  // rather than too little.
+  // The left and the right half of what both see, each solved alone. A rotation of the view and a
+  // step to the side look alike over a narrow field; matches that are a little off then give a pose
+  // far off, which gravity does not contradict and the residuals do not show. But it differs from
+  // half to half. What both halves take from the odometries counts twice: the test lets pass too
+  // much rather than too little.
   std::string CheckHalves() {
     std::vector<PointMatch> inliers;
     for (size_t i = 0; i < matches_.size(); ++i) {
@@ -245,8 +244,8 @@ class Alignment {
     return T_odom_m * (ba_ ? ba_->T_m_c : pose_.T_m_c) * T_odom_c.Inverse();
   }
 
-  AlignmentReport Report() const {
-    AlignmentReport report = report_;
+  LoopVerificationReport Report() const {
+    LoopVerificationReport report = report_;
     std::vector<bool> inlier(first_matches_.size(), false);
     for (const int i : pnp_ ? pnp_->inliers : std::vector<int>()) {
       inlier[i] = true;
@@ -340,14 +339,14 @@ class Alignment {
     return observations;
   }
 
-  const AlignmentOptions& options_;
+  const LoopVerificationOptions& options_;
   const KeyframeWindow& frames_m_;
   const KeyframeWindow& frames_c_;
   Window window_m_;
   Window window_c_;
   double guess_tilt_sigma_ = 0;  // radians, of roll and pitch between the windows
   PoseEstimate pose_;
-  AlignmentReport report_;
+  LoopVerificationReport report_;
   std::vector<PointMatch> first_matches_;
   std::optional<UprightPnpResult> pnp_;
   std::vector<PointMatch> matches_;
@@ -357,8 +356,8 @@ class Alignment {
 }  // namespace
 
 Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                          const PlaceCandidate& candidate, const AlignmentGate& gate,
-                          AlignmentReport* report) const {
+                          const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+                          LoopVerificationReport* report) const {
   Constraint constraint;
   constraint.from = candidate.match;
   constraint.to = frames_c.back()->keyframe().id;
@@ -374,14 +373,14 @@ Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& 
   };
   step([&] { return alignment.CheckViews(); });
   step([&] { return gate(alignment.OdomAlignment()); });
-  step([&] { return alignment.CheckSurroundings(); });
+  step([&] { return alignment.CheckVisibility(); });
   step([&] { return alignment.Optimise(); });
   alignment.FillIn(&constraint);
   step([&] { return alignment.CheckGravity(); });
   step([&] { return alignment.CheckViews(); });
   step([&] { return gate(alignment.OdomAlignment()); });
   step([&] { return alignment.Accept(); });
-  step([&] { return alignment.CheckWiderSurroundings(); });
+  step([&] { return alignment.CheckWiderVisibility(); });
   step([&] { return alignment.CheckHalves(); });
   constraint.accepted = constraint.reason.empty();
   if (report != nullptr) {

@@ -1,14 +1,14 @@
 #pragma once
 
-// From a candidate pair of keyframes to a verdict: the geometry that inter_map_ba and fusion share
-// (the paper, section IV.D).
+// From a candidate pair of keyframes to a verification result: the geometry that inter_map_ba and
+// fusion share (the paper, section IV.D).
 //
 // In: the windows of keyframes up to the match (m) and up to the query (c), and the candidate's
 // matched corners. Out: a Constraint between the two bodies, accepted with its covariance or
-// refused with the reason. The same input gives the same verdict.
+// refused with the reason. The same input gives the same verification result.
 //
 //   candidate's corners + nearest descriptors -> upright PnP RANSAC -> views and gravity gates
-//   -> projection search in the two keyframes -> surroundings gate
+//   -> projection search in the two keyframes -> visibility check
 //   -> projection search in all keyframes, fundamental matrix -> joint BA -> acceptance (inliers,
 //   covariance, no landmark that decides alone) -> projection search along the way
 //   -> the two halves of the view
@@ -24,13 +24,13 @@
 #include "loop_verification/correspondences/match_sets.h"
 #include "loop_verification/correspondences/projection_search.h"
 #include "loop_verification/joint_ba/joint_ba.h"
-#include "loop_verification/surroundings.h"
 #include "loop_verification/upright_pnp.h"
+#include "loop_verification/visibility_check.h"
 #include "loop_verification/window.h"
 
 namespace pangea {
 
-struct AlignmentOptions {
+struct LoopVerificationOptions {
   WindowOptions window;
   UprightPnpOptions pnp;
   SearchOptions search;
@@ -42,7 +42,7 @@ struct AlignmentOptions {
   int min_pnp_inliers = 6;
 
   // Two keyframes that see the same: the angle between their lines of sight (for level cameras the
-  // paper's yaw; a camera that looks down may be turned any way), and their distance.
+  // paper's yaw; a camera that looks down may be rotated any way), and their distance.
   double max_view_angle = 1.3;  // radians
   double max_distance_m = 15;
 
@@ -56,16 +56,16 @@ struct AlignmentOptions {
   double max_tilt_chi2 = 9.2;
   double max_tilt = 0.06;  // radians, whatever the odometries say
 
-  // Surroundings, first in the two keyframes, then along the way to them: of the points that ought
-  // to be seen the share that is found, and the share of the view where they are
-  // (surroundings.h).
+  // Visibility check, first in the two keyframes, then along the way to them: of the points that
+  // ought to be seen the share that is found, and the share of the view where they are
+  // (visibility_check.h).
   int min_found = 10;
   int min_comparable = 15;
   double min_found_share = 0.08;
   double min_first_supported_share = 0.3;
   double min_supported_share = 0.55;
-  int surroundings_keyframes = 10;  // up to each of the two; not fewer than the window
-  int surroundings_stride = 3;      // every third of these is looked into
+  int visibility_keyframes = 10;  // up to each of the two; not fewer than the window
+  int visibility_stride = 3;      // every third of these is looked into
 
   // Acceptance.
   int min_inliers = 16;           // distinct landmarks
@@ -80,8 +80,9 @@ struct AlignmentOptions {
   double max_halves_chi2 = 16.8;
 };
 
-// What the steps saw, beside the verdict: for tests, for choosing the options, and for people.
-struct AlignmentReport {
+// What the steps saw, beside the verification result: for tests, for choosing the options, and for
+// people.
+struct LoopVerificationReport {
   int pnp_inliers = 0;
   int comparable = 0;  // points that ought to be found in the two keyframes
   double found_share = 0;
@@ -100,25 +101,25 @@ struct AlignmentReport {
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
 // alignment of the two maps' odom frames.
-using AlignmentGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
+using LoopVerificationGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
 
 class Aligner {
  public:
-  explicit Aligner(AlignmentOptions options) : options_(options) {}
+  explicit Aligner(LoopVerificationOptions options) : options_(options) {}
 
-  // Keyframes a verdict depends on: that many up to each of the two.
+  // Keyframes a verification result depends on: that many up to each of the two.
   int num_keyframes() const {
-    return std::max(options_.window.num_keyframes, options_.surroundings_keyframes);
+    return std::max(options_.window.num_keyframes, options_.visibility_keyframes);
   }
 
   // `frames_m` ends with the candidate's match, `frames_c` with the query; num_keyframes() each, or
   // fewer where their map begins.
   Constraint Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                   const PlaceCandidate& candidate, const AlignmentGate& gate,
-                   AlignmentReport* report = nullptr) const;
+                   const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+                   LoopVerificationReport* report = nullptr) const;
 
  private:
-  AlignmentOptions options_;
+  LoopVerificationOptions options_;
 };
 
 }  // namespace pangea

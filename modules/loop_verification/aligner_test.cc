@@ -9,16 +9,16 @@
 #include <numbers>
 #include <random>
 
-#include "loop_verification/alignment_test_world.h"
 #include "loop_verification/drift_gate.h"
+#include "loop_verification/loop_verification_test_world.h"
 
 namespace pangea {
 namespace {
 
-const AlignmentGate kNoGate = [](const Rigid3&) { return std::string(); };
+const LoopVerificationGate kNoGate = [](const Rigid3&) { return std::string(); };
 
 Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match_agent, int match,
-                 const PlaceCandidate& candidate, const AlignmentOptions& options = {}) {
+                 const PlaceCandidate& candidate, const LoopVerificationOptions& options = {}) {
   SubmapStore store;
   for (const TestAgent* agent : {&query_agent, &match_agent}) {
     for (const Keyframe& keyframe : agent->keyframes) {
@@ -26,8 +26,8 @@ Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match
     }
   }
   return Aligner(options).Align(
-      store.WindowUpTo(match_agent.keyframes[match].id, options.surroundings_keyframes),
-      store.WindowUpTo(query_agent.keyframes[query].id, options.surroundings_keyframes), candidate,
+      store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
+      store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes), candidate,
       kNoGate);
 }
 
@@ -56,7 +56,7 @@ TEST(AlignerTest, ErrorsAreWhatTheCovarianceSays) {
   double nees = 0, error_m = 0;
   int accepted = 0;
   constexpr int kRuns = 40;
-  AlignmentOptions options;
+  LoopVerificationOptions options;
   options.ba.systematic_px = 0;  // this world has no such errors
   std::mt19937_64 random(1);
   std::normal_distribution<double> log_scale(0, options.ba.scale_sigma);
@@ -83,7 +83,7 @@ TEST(AlignerTest, ErrorsAreWhatTheCovarianceSays) {
   EXPECT_LT(error_m / accepted, 0.02);
 }
 
-TEST(AlignerTest, SameInputSameVerdict) {
+TEST(AlignerTest, SameInputSameResult) {
   const auto room = MakeTestRoom({.seed = 3});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
   const TestAgent c = RunTestAgent(room, SecondAgent(0));
@@ -188,11 +188,11 @@ TEST(AlignerTest, RefusesWhatContradictsGravity) {
 }
 
 // The images' tilt is weighed by how well they know it about that axis: about the line of sight
-// they know a turn less well than about the others.
+// they know a rotation less well than about the others.
 TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   const auto room = MakeTestRoom({.seed = 6});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
-  AlignmentOptions options;
+  LoopVerificationOptions options;
   options.gravity_floor = 0;
   options.max_tilt_chi2 = 1e9;
   TestAgentOptions tilted = SecondAgent(0);
@@ -205,9 +205,9 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
       store.Add(keyframe);
     }
   }
-  const auto frames_m = store.WindowUpTo(m.keyframes[10].id, options.surroundings_keyframes);
-  const auto frames_c = store.WindowUpTo(c.keyframes[9].id, options.surroundings_keyframes);
-  AlignmentReport report;
+  const auto frames_m = store.WindowUpTo(m.keyframes[10].id, options.visibility_keyframes);
+  const auto frames_c = store.WindowUpTo(c.keyframes[9].id, options.visibility_keyframes);
+  LoopVerificationReport report;
   const Constraint constraint = Aligner(options).Align(
       frames_m, frames_c, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);
   ASSERT_TRUE(constraint.accepted) << constraint.reason;
@@ -215,15 +215,15 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   const Eigen::Quaterniond q_m = m.keyframes[10].T_odom_body.q, q_c = c.keyframes[9].T_odom_body.q;
   const Eigen::Quaterniond q_m_c = q_m * constraint.T_from_to.q * q_c.conjugate();
   const Eigen::Vector3d up = q_m_c * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d turn =
+  const Eigen::Vector3d rotation =
       LogSo3(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up));
-  const Eigen::Matrix3d of_turn =
+  const Eigen::Matrix3d of_rotation =
       q_m * constraint.covariance.bottomRightCorner<3, 3>() * q_m.conjugate();
-  const Eigen::Matrix2d information = of_turn.topLeftCorner<2, 2>().inverse();
-  const double chi2 = turn.head<2>().dot(information * turn.head<2>());
-  EXPECT_NEAR(report.tilt, turn.norm(), 1e-4);
+  const Eigen::Matrix2d information = of_rotation.topLeftCorner<2, 2>().inverse();
+  const double chi2 = rotation.head<2>().dot(information * rotation.head<2>());
+  EXPECT_NEAR(report.tilt, rotation.norm(), 1e-4);
   EXPECT_NEAR(report.tilt_chi2 / chi2, 1, 0.01);
-  const Eigen::Vector2d across(-turn.y(), turn.x());
+  const Eigen::Vector2d across(-rotation.y(), rotation.x());
   EXPECT_GT(std::abs(across.dot(information * across) / chi2 - 1), 0.1) << "then axes would matter";
 }
 
@@ -237,8 +237,8 @@ TEST(AlignerTest, RefusesTooFewPoints) {
 }
 
 // Accepted is a promise of half a metre and five degrees. A narrow piece of a far wall in view:
-// with few points a turn and a step to the side cannot be told apart well enough to keep it, with
-// many they can.
+// with few points a rotation and a step to the side cannot be told apart well enough to keep it,
+// with many they can.
 TEST(AlignerTest, RefusesWhatIsTooUncertain) {
   for (const int num_points : {60, 250}) {
     std::mt19937_64 random(9);
@@ -345,11 +345,11 @@ TEST(AlignerTest, EachBarIsObeyed) {
   const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
   ASSERT_TRUE(Align(c, 9, m, 10, candidate).accepted);
   const auto reason = [&](const auto& set) {
-    AlignmentOptions options;
+    LoopVerificationOptions options;
     set(&options);
     return Align(c, 9, m, 10, candidate, options).reason;
   };
-  using Options = AlignmentOptions;
+  using Options = LoopVerificationOptions;
   EXPECT_EQ(reason([](Options* o) { o->max_view_angle = 0.05; }), "views do not overlap");
   EXPECT_EQ(reason([](Options* o) { o->max_distance_m = 0.1; }), "views do not overlap");
   EXPECT_EQ(reason([](Options* o) { o->min_inlier_ratio = 1.1; }), "too many outliers");

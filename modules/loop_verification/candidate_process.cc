@@ -16,8 +16,8 @@ constexpr char kJournalOwner[] = "agent_handler";
 }  // namespace
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                                   std::unique_ptr<PairJudge> judge)
-    : node_(bus, name), kind_(kind), judge_(std::move(judge)) {
+                                   std::unique_ptr<LoopVerifier> verifier)
+    : node_(bus, name), kind_(kind), verifier_(std::move(verifier)) {
   node_.Listen<keyframe_t>(channels::kAllKeyframes,
                            std::bind_front(&CandidateProcess::OnKeyframe, this));
   node_.Listen<place_match_t>(channels::kPlaceMatch,
@@ -25,14 +25,14 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
   node_.Listen<have_t>(channels::kHave, std::bind_front(&CandidateProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(name),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
-  node_.Listen<verdict_request_t>(channels::kVerdictRequest,
-                                  std::bind_front(&CandidateProcess::OnVerdictRequest, this));
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
+  node_.Listen<verdict_request_t>(channels::kVerificationRequest,
+                                  std::bind_front(&CandidateProcess::OnVerificationRequest, this));
 }
 
 void CandidateProcess::OnKeyframe(Keyframe keyframe) {
   keyframes_.Note(keyframe.id.map, keyframe.id.seq);
-  judge_->Add(std::move(keyframe));
+  verifier_->Add(std::move(keyframe));
   CollectReady();
 }
 
@@ -50,7 +50,7 @@ void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
     constraint.from = candidate.match;
     constraint.to = match.query;
     constraint.kind = candidate.kind;
-    if (candidate.kind == kind_ && !judged_.contains(constraint.Id())) {
+    if (candidate.kind == kind_ && !verified_.contains(constraint.Id())) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }
@@ -59,46 +59,47 @@ void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
 
 void CandidateProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
-    // Verdicts of a former run: no need to repeat them.
-    if (verdicts_asked_.insert(map).second) {
-      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
+    // Verification results of a former run: no need to repeat them.
+    if (results_requested_.insert(map).second) {
+      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
     }
   }
   keyframes_.Announce(have);
   matches_.Announce(have);
   for (const SeqGap& gap : have.gaps) {
-    judge_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
+    verifier_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
   }
   if (!have.gaps.empty()) {
     CollectReady();
   }
 }
 
-void CandidateProcess::OnAgain(const again_t& message) {
+void CandidateProcess::OnRetransmission(const again_t& message) {
   const bool known =
-      TakeAgain<keyframe_t>(node_, message, std::bind_front(&CandidateProcess::OnKeyframe, this)) ||
-      TakeAgain<place_match_t>(node_, message,
-                               std::bind_front(&CandidateProcess::OnPlaceMatch, this)) ||
-      TakeAgain<constraint_t>(node_, message,
-                              [this](const Constraint& verdict) { judged_.insert(verdict.Id()); });
+      TakeRetransmission<keyframe_t>(node_, message,
+                                     std::bind_front(&CandidateProcess::OnKeyframe, this)) ||
+      TakeRetransmission<place_match_t>(node_, message,
+                                        std::bind_front(&CandidateProcess::OnPlaceMatch, this)) ||
+      TakeRetransmission<constraint_t>(
+          node_, message, [this](const Constraint& result) { verified_.insert(result.Id()); });
   if (!known) {
     node_.Refuse("again: neither keyframe, match nor constraint");
   }
 }
 
-void CandidateProcess::OnVerdictRequest(const VerdictRequest& request) {
+void CandidateProcess::OnVerificationRequest(const VerificationRequest& request) {
   if (request.requester != kJournalOwner) {
     return;
   }
   std::set<int64_t> asked;
-  for (const auto& [seq, constraint_id] : request.names.verdicts) {
+  for (const auto& [seq, constraint_id] : request.names.results) {
     asked.insert(constraint_id);
   }
   for (const Constraint& constraint : sent_) {
     if (asked.contains(constraint.Id())) {
-      TellAgain(node_, request.requester, std::string(channels::kConstraint),
-                ToMessage(constraint));
-      node_.Count("said_again");
+      Retransmit(node_, request.requester, std::string(channels::kConstraint),
+                 ToMessage(constraint));
+      node_.Count("retransmitted");
     }
   }
 }
@@ -106,7 +107,7 @@ void CandidateProcess::OnVerdictRequest(const VerdictRequest& request) {
 void CandidateProcess::CollectReady() {
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     const KeyframeId& query = it->first.first;
-    if (judge_->Ready(query, it->second)) {
+    if (verifier_->Ready(query, it->second)) {
       ready_.emplace_back(query, std::move(it->second));
       it = waiting_.erase(it);
     } else {
@@ -114,17 +115,17 @@ void CandidateProcess::CollectReady() {
     }
   }
   if (!ready_.empty()) {
-    node_.WorkWhenIdle([this] { return JudgeNext(); });
+    node_.WorkWhenIdle([this] { return VerifyNext(); });
   }
 }
 
-bool CandidateProcess::JudgeNext() {
+bool CandidateProcess::VerifyNext() {
   const auto [query, candidate] = std::move(ready_.front());
   ready_.pop_front();
-  // A verdict of a former run may come after its match.
-  if (!judged_.contains(RefusedConstraint(query, candidate, "").Id())) {
-    const Constraint constraint = judge_->Judge(query, candidate);
-    judged_.insert(constraint.Id());
+  // A verification result of a former run may come after its match.
+  if (!verified_.contains(RefusedConstraint(query, candidate, "").Id())) {
+    const Constraint constraint = verifier_->Verify(query, candidate);
+    verified_.insert(constraint.Id());
     node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
     sent_.push_back(constraint);
     if (sent_.size() > kMaxSent) {
@@ -142,11 +143,11 @@ bool CandidateProcess::JudgeNext() {
 
 void CandidateProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
   if (num_pending() <= kMaxWaiting / 2) {
     for (const SeqGap& gap : matches_.Due(now_utime)) {
-      AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+      RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
     }
   }
   if (now_utime >= next_status_utime_) {
@@ -160,7 +161,7 @@ void CandidateProcess::PublishStatus(int64_t now_utime) {
       now_utime, static_cast<int64_t>(num_pending()),
       fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes, {} for their "
                   "turn",
-                  num_accepted_, judged_.size(), waiting_.size(), ready_.size()));
+                  num_accepted_, verified_.size(), waiting_.size(), ready_.size()));
 }
 
 }  // namespace pangea

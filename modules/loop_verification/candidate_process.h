@@ -1,19 +1,20 @@
 #pragma once
 
-// The process around a PairJudge: KEYFRAME_* and PLACE_MATCH in, CONSTRAINT out, exactly one a
+// The process around a LoopVerifier: KEYFRAME_* and PLACE_MATCH in, CONSTRAINT out, exactly one a
 // candidate of its kind. A candidate about a keyframe not seen yet waits for it; what is missing is
-// asked for at ticks (RESEND_REQUEST, answers on AGAIN_<name>). Verdicts of this run that the
-// journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which everyone else
-// asks; of those that are still to be made nothing is said, they will come. A verdict
-// depends on the keyframes alone, not on when they came: live and replay agree, and a restart that
-// repeats one repeats it exactly.
+// asked for at ticks (RESEND_REQUEST, answers on AGAIN_<name>). Verification results of this run
+// that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
+// everyone else asks; of those that are still to be made nothing is said, they will come. A
+// verification result depends on the keyframes alone, not on when they came: live and replay agree,
+// and a restart that repeats one repeats it exactly.
 //
-// A verdict takes long (tens of milliseconds), so live they are made one at a time, in the order in
-// which the candidates became ready, when no message waits: all that came is known, told as pending
-// and answered for, however far behind the verdicts are.
+// A verification result takes long (tens of milliseconds), so live they are made one at a time, in
+// the order in which the candidates became ready, when no message waits: all that came is known,
+// told as pending and answered for, however far behind the verification results are.
 //
 // Bounds: at most kMaxWaiting candidates wait; beyond that a match is not taken, and asked for
-// again once half of them are judged. The newest kMaxSent verdicts are kept to be said again.
+// again once half of them are verified. The newest kMaxSent verification results are kept to be
+// retransmitted.
 
 #include <cstdint>
 #include <deque>
@@ -27,7 +28,7 @@
 #include "bus/node.h"
 #include "bus/process.h"
 #include "bus/retransmission/missing.h"
-#include "loop_verification/pair_judge.h"
+#include "loop_verification/loop_verifier.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 
@@ -36,7 +37,7 @@ namespace pangea {
 class CandidateProcess : public Process {
  public:
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                   std::unique_ptr<PairJudge> judge);
+                   std::unique_ptr<LoopVerifier> verifier);
   void Tick(int64_t now_utime) override;
 
  private:
@@ -46,25 +47,25 @@ class CandidateProcess : public Process {
   void OnKeyframe(Keyframe keyframe);
   void OnPlaceMatch(const PlaceMatch& match);
   void OnHave(const Have& have);
-  void OnAgain(const again_t& message);
-  void OnVerdictRequest(const VerdictRequest& request);
+  void OnRetransmission(const again_t& message);
+  void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();
   // The first that is ready; whether some are left.
-  bool JudgeNext();
+  bool VerifyNext();
   void PublishStatus(int64_t now_utime);
   size_t num_pending() const { return waiting_.size() + ready_.size(); }
 
   Node node_;
   PlaceKind kind_;
-  std::unique_ptr<PairJudge> judge_;
+  std::unique_ptr<LoopVerifier> verifier_;
   MissingMessages keyframes_;
   MissingMessages matches_;
   // Which wait for keyframes, by (query, match); and with the query, which wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;
   std::deque<std::pair<KeyframeId, PlaceCandidate>> ready_;
-  std::set<int64_t> judged_;     // constraint ids
-  std::deque<Constraint> sent_;  // newest verdicts, to repeat
-  std::set<MapId> verdicts_asked_;
+  std::set<int64_t> verified_;   // constraint ids
+  std::deque<Constraint> sent_;  // newest verification results, to repeat
+  std::set<MapId> results_requested_;
   int64_t next_status_utime_ = 0;
   int64_t num_accepted_ = 0;
 };

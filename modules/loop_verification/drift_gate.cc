@@ -4,8 +4,8 @@
 
 namespace pangea {
 
-AlignmentGate MakeDriftGate(const DriftGateOptions& options, double path_m,
-                            const Eigen::Vector3d& p_odom) {
+LoopVerificationGate MakeDriftGate(const DriftGateOptions& options, double path_m,
+                                   const Eigen::Vector3d& p_odom) {
   return [=](const Rigid3& T_odom_odom) -> std::string {
     const double drift_m = (T_odom_odom * p_odom - p_odom).norm();
     const double yaw = std::abs(YawOf(T_odom_odom.q));

@@ -17,7 +17,7 @@ struct DriftGateOptions {
 };
 
 // For keyframes `path_m` apart along the odometry; `p_odom` is where the newer one is.
-AlignmentGate MakeDriftGate(const DriftGateOptions& options, double path_m,
-                            const Eigen::Vector3d& p_odom);
+LoopVerificationGate MakeDriftGate(const DriftGateOptions& options, double path_m,
+                                   const Eigen::Vector3d& p_odom);
 
 }  // namespace pangea

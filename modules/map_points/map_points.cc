@@ -120,11 +120,15 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent, con
 class MapPoints::Selection {
  public:
   Selection(const MapPointsOptions& options, const Group& group, const Outlook& outlook,
-            SubmapStore* store, Told* told)
-      : options_(options), group_(group), outlook_(outlook), store_(store), told_(told) {
-    ++told_->messages;
-    std::erase_if(told_->tracks, [&](const auto& track) {
-      return track.second.message + options_.repeat_after < told_->messages;
+            SubmapStore* store, SentPoints* sent_points)
+      : options_(options),
+        group_(group),
+        outlook_(outlook),
+        store_(store),
+        sent_points_(sent_points) {
+    ++sent_points_->messages;
+    std::erase_if(sent_points_->tracks, [&](const auto& track) {
+      return track.second.message + options_.repeat_after < sent_points_->messages;
     });
   }
 
@@ -167,14 +171,14 @@ class MapPoints::Selection {
       return std::nullopt;
     }
     const auto point = PointOfTrack(group_.poses, view, corner, options_.track, store_);
-    const auto sent = told_->tracks.find(track);
-    if (!point || (sent != told_->tracks.end() &&
+    const auto sent = sent_points_->tracks.find(track);
+    if (!point || (sent != sent_points_->tracks.end() &&
                    (sent->second.p_map - point->p_map).norm() < options_.moved_m)) {
       return std::nullopt;
     }
     ++in_cell;
     taken_.insert(track);
-    told_->tracks[track] = {told_->messages, point->p_map};
+    sent_points_->tracks[track] = {sent_points_->messages, point->p_map};
     const Vector3d along = (point->p_map - source.T_map_cam.t).normalized();
     const double variance = along.dot(point->covariance * along);
     MapLandmark landmark;
@@ -191,7 +195,7 @@ class MapPoints::Selection {
   const Group& group_;
   const Outlook& outlook_;
   SubmapStore* store_;
-  Told* told_;
+  SentPoints* sent_points_;
   MapLandmarks message_;
   std::set<Track> taken_;
   std::map<std::pair<int, int>, int> in_cell_;
@@ -204,7 +208,7 @@ std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
     return std::nullopt;
   }
   const std::vector<Source> sources = SourcesFor(agent, *group->second, *outlook);
-  Selection selection(options_, *group->second, *outlook, &store_, &told_[agent.map]);
+  Selection selection(options_, *group->second, *outlook, &store_, &sent_points_[agent.map]);
   for (const Source& source : sources) {
     if (selection.IsFull() || selection.HasAllSources()) {
       break;

@@ -86,7 +86,7 @@ class MapPoints {
     int64_t message = 0;
     Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
   };
-  struct Told {
+  struct SentPoints {
     int64_t messages = 0;
     std::map<Track, Sent> tracks;
   };
@@ -101,7 +101,7 @@ class MapPoints {
   SubmapStore store_{{.max_views = 512}};
   std::map<MapId, std::shared_ptr<const Group>> groups_;  // of each map
   std::set<KeyframeId> refined_;
-  std::map<MapId, Told> told_;
+  std::map<MapId, SentPoints> sent_points_;
 };
 
 }  // namespace pangea

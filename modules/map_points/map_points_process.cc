@@ -31,7 +31,7 @@ MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options)
   node_.Listen<have_t>(channels::kHave, [this](const Have& have) { keyframes_.Announce(have); });
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
 }
 
 void MapPointsProcess::OnKeyframe(Keyframe keyframe) {
@@ -66,11 +66,12 @@ void MapPointsProcess::OnPose(const pose_t& message) {
     node_.Refuse("pose: invalid map, pose, velocity or time");
     return;
   }
-  const auto told = told_utime_.find(map.value->agent_id);
-  if (told != told_utime_.end() && std::abs(message.utime - told->second) < kInterval_us) {
+  const auto sent_points = sent_utime_.find(map.value->agent_id);
+  if (sent_points != sent_utime_.end() &&
+      std::abs(message.utime - sent_points->second) < kInterval_us) {
     return;
   }
-  told_utime_[map.value->agent_id] = message.utime;
+  sent_utime_[map.value->agent_id] = message.utime;
   const Eigen::Quaterniond q_map_odom = T_map_body.value->q * T_odom_body.value->q.conjugate();
   if (const auto landmarks = points_.Choose({*map.value, *T_map_body.value, q_map_odom * v})) {
     node_.Publish(channels::Landmarks(map.value->agent_id), ToMessage(*landmarks));
@@ -78,16 +79,16 @@ void MapPointsProcess::OnPose(const pose_t& message) {
   }
 }
 
-void MapPointsProcess::OnAgain(const again_t& message) {
-  if (!TakeAgain<keyframe_t>(node_, message,
-                             std::bind_front(&MapPointsProcess::OnKeyframe, this))) {
+void MapPointsProcess::OnRetransmission(const again_t& message) {
+  if (!TakeRetransmission<keyframe_t>(node_, message,
+                                      std::bind_front(&MapPointsProcess::OnKeyframe, this))) {
     node_.Refuse("again: not what was asked for");
   }
 }
 
 void MapPointsProcess::Tick(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;

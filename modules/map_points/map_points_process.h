@@ -3,7 +3,7 @@
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE in; LANDMARKS_k, STATUS_map_points out.
 //
 // At most two messages a second to each agent that is in a group, 1200 bytes each: 2.4 kB/s. Best
-// effort: what is lost is told again when the agent still looks there.
+// effort: what is lost is sent again when the agent still looks there.
 
 #include <cstdint>
 #include <map>
@@ -32,7 +32,7 @@ class MapPointsProcess : public Process {
   void OnMapState(MapState state, const map_state_t& message);
   void OnRefinement(MapState state, const map_state_t& message);
   void OnPose(const pose_t& message);
-  void OnAgain(const again_t& message);
+  void OnRetransmission(const again_t& message);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
@@ -40,7 +40,7 @@ class MapPointsProcess : public Process {
   StateChunks states_;
   StateChunks refinements_;
   MissingMessages keyframes_;
-  std::map<int32_t, int64_t> told_utime_;  // by agent: its pose's, at its last message
+  std::map<int32_t, int64_t> sent_utime_;  // by agent: its pose's, at its last message
   int64_t next_status_utime_ = 0;
 };
 

@@ -112,12 +112,12 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
 TEST_F(MapPointsTest, DoesNotRepeatItselfAtOnce) {
   MapPoints points = Filled();
   points.TakeRefined(state_);
-  std::set<int32_t> told;
+  std::set<int32_t> sent_points;
   for (int i = 0; i < 5; ++i) {
     const auto message = points.Choose(PoseAt(0));
     ASSERT_TRUE(message) << i;
     for (const MapLandmark& landmark : message->landmarks) {
-      EXPECT_TRUE(told.insert(landmark.landmark_id).second);
+      EXPECT_TRUE(sent_points.insert(landmark.landmark_id).second);
     }
   }
   // A map that has moved is told again.
@@ -130,7 +130,7 @@ TEST_F(MapPointsTest, DoesNotRepeatItselfAtOnce) {
   moved.T_map_body.t.z() += 0.02;
   const auto message = points.Choose(moved);
   ASSERT_TRUE(message);
-  EXPECT_TRUE(told.contains(message->landmarks.front().landmark_id));
+  EXPECT_TRUE(sent_points.contains(message->landmarks.front().landmark_id));
 }
 
 TEST_F(MapPointsTest, OnlyAdjustedKeyframesOfTheGroupAreSources) {
@@ -140,17 +140,17 @@ TEST_F(MapPointsTest, OnlyAdjustedKeyframesOfTheGroupAreSources) {
   EXPECT_TRUE(points.Choose(PoseAt(0)));
   EXPECT_FALSE(points.Choose({{9, 9}, PoseAt(0).T_map_body}));  // a stranger
   EXPECT_FALSE(points.Choose(PoseAt(50)));                      // nothing is near
-  AgentPose turned = PoseAt(0);
-  turned.T_map_body.q = YawRotation(3.14);
-  EXPECT_FALSE(points.Choose(turned));
+  AgentPose rotated = PoseAt(0);
+  rotated.T_map_body.q = YawRotation(3.14);
+  EXPECT_FALSE(points.Choose(rotated));
 }
 
 TEST_F(MapPointsTest, ProcessAnswersPosesAtMostTwiceASecond) {
   LocalBus bus;
   MapPointsProcess process(bus, MapPointsOptions{});
-  std::vector<landmarks_t> told;
+  std::vector<landmarks_t> sent_points;
   bus.Subscribe(channels::Landmarks(kAgent.agent_id), [&](const std::string&, Bytes data) {
-    ASSERT_TRUE(DecodeMessage(data, &told.emplace_back()));
+    ASSERT_TRUE(DecodeMessage(data, &sent_points.emplace_back()));
   });
   for (const Keyframe& keyframe : keyframes_) {
     PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
@@ -172,17 +172,17 @@ TEST_F(MapPointsTest, ProcessAnswersPosesAtMostTwiceASecond) {
     bus.Drain();
   };
   send(1'000'000, 0);  // knows of no group yet
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(sent_points.empty());
   for (int i = 0; i < 20; ++i) {
     send(2'000'000 + 50'000 * i, 5);
   }
-  EXPECT_EQ(told.size(), 2u);
-  EXPECT_TRUE(Parse(told.front()).value);
+  EXPECT_EQ(sent_points.size(), 2u);
+  EXPECT_TRUE(Parse(sent_points.front()).value);
   pose.T_map_body.translation.x = NAN;
   send(9'000'000, 5);
   pose.T_map_body.translation.x = 0;
   send(std::numeric_limits<int64_t>::min(), 5);
-  EXPECT_EQ(told.size(), 2u);
+  EXPECT_EQ(sent_points.size(), 2u);
 }
 
 }  // namespace

@@ -63,17 +63,17 @@ Parsed<ResendRequest> Parse(const resend_request_t& m) {
       ""};
 }
 
-Parsed<VerdictRequest> Parse(const verdict_request_t& m) {
+Parsed<VerificationRequest> Parse(const verdict_request_t& m) {
   const auto map = Parse(m.map);
-  if (!IsProcessName(m.requester) || !map.value || m.num_verdicts > int{VerdictNames::kMax}) {
-    return Refused<VerdictRequest>("verdict request: requester, map or count is invalid");
+  if (!IsProcessName(m.requester) || !map.value || m.num_verdicts > int{ResultNames::kMax}) {
+    return Refused<VerificationRequest>("verification request: requester, map or count is invalid");
   }
-  VerdictRequest request{m.requester, {*map.value, {}}};
+  VerificationRequest request{m.requester, {*map.value, {}}};
   for (int i = 0; i < m.num_verdicts; ++i) {
     if (m.seq[i] < 0 || m.seq[i] > kMaxSeq) {
-      return Refused<VerdictRequest>("verdict request: seq out of range");
+      return Refused<VerificationRequest>("verification request: seq out of range");
     }
-    request.names.verdicts.emplace_back(m.seq[i], m.constraint_id[i]);
+    request.names.results.emplace_back(m.seq[i], m.constraint_id[i]);
   }
   return {std::move(request), ""};
 }

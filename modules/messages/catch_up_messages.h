@@ -27,21 +27,22 @@ struct ResendRequest {
   SeqGap range;
 };
 
-// Verdicts on candidates of one map's keyframes: the keyframe's seq, the constraint's id.
-struct VerdictNames {
+// Verification results on candidates of one map's keyframes: the keyframe's seq, the constraint's
+// id.
+struct ResultNames {
   static constexpr size_t kMax = 500;
 
   MapId map;
-  std::vector<std::pair<int32_t, int64_t>> verdicts;  // at most kMax
+  std::vector<std::pair<int32_t, int64_t>> results;  // at most kMax
 };
 
-struct VerdictRequest {
+struct VerificationRequest {
   std::string requester;
-  VerdictNames names;
+  ResultNames names;
 };
 
 Parsed<Have> Parse(const have_t& message);
 Parsed<ResendRequest> Parse(const resend_request_t& message);
-Parsed<VerdictRequest> Parse(const verdict_request_t& message);
+Parsed<VerificationRequest> Parse(const verdict_request_t& message);
 
 }  // namespace pangea

@@ -16,7 +16,7 @@ inline constexpr std::string_view kMapState = "MAP_STATE";
 inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
-inline constexpr std::string_view kVerdictRequest = "VERDICT_REQUEST";
+inline constexpr std::string_view kVerificationRequest = "VERDICT_REQUEST";
 
 // LCM subscriptions are anchored regular expressions without grouping of alternatives.
 inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";

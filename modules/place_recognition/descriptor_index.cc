@@ -78,12 +78,12 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
 }
 
 template <typename Visit>
-void DescriptorIndex::Probe(const Descriptor& descriptor, size_t turn, Visit visit) const {
+void DescriptorIndex::Probe(const Descriptor& descriptor, size_t phase, Visit visit) const {
   for (const Table& table : tables_) {
     const uint32_t signature = table.Signature(descriptor);
     const std::vector<Posting>& postings = table.Postings(descriptor);
     const size_t stride = 1 + postings.size() / kMaxPostingsPerWord;
-    for (size_t i = turn % stride; i < postings.size(); i += stride) {
+    for (size_t i = phase % stride; i < postings.size(); i += stride) {
       visit(postings[i], signature);
     }
   }

@@ -62,9 +62,9 @@ class DescriptorIndex {
     // Of the descriptor's word.
     const std::vector<Posting>& Postings(const Descriptor& descriptor) const;
   };
-  // Calls visit(posting, signature) for each posting a corner meets; `turn` rotates the sample.
+  // Calls visit(posting, signature) for each posting a corner meets; `phase` rotates the sample.
   template <typename Visit>
-  void Probe(const Descriptor& descriptor, size_t turn, Visit visit) const;
+  void Probe(const Descriptor& descriptor, size_t phase, Visit visit) const;
 
   std::array<Table, kTables> tables_;
   std::vector<int> num_corners_;  // of each keyframe

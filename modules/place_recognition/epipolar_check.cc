@@ -151,7 +151,7 @@ void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, double grav
     const Eigen::Vector3d w = R * a.direction;
     const Eigen::Vector3d v_cross_t = b.direction.cross(t);
     const Eigen::Vector3d w_cross_t = w.cross(t);
-    // e = b . (t x w); its noise is a's turned by (b x t) and b's by (t x w), across the rays.
+    // e = b . (t x w); its noise is a's rotated by (b x t) and b's by (t x w), across the rays.
     const double e = v_cross_t.dot(w);
     const double variance = a.sigma * a.sigma * w.cross(v_cross_t).squaredNorm() +
                             b.sigma * b.sigma * b.direction.cross(w_cross_t).squaredNorm();

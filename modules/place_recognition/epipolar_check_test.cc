@@ -102,9 +102,9 @@ TEST(CheckEpipolar, GravityMayBeOffByADegree) {
 TEST(CheckEpipolar, PlanesAndRotationsInPlaceAreNotRefused) {
   const Rigid3 moved(YawRotation(0.2), Eigen::Vector3d(0.1, -0.8, 0.1));
   EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, moved, true, 1.0, 5).pairs, 7, {}).accepted);
-  const Rigid3 turned(YawRotation(0.3), Eigen::Vector3d::Zero());
-  EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, turned, false, 1.0, 6).pairs, 7, {}).accepted);
-  EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, turned, true, 1.0, 7).pairs, 7, {}).accepted);
+  const Rigid3 rotated(YawRotation(0.3), Eigen::Vector3d::Zero());
+  EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, rotated, false, 1.0, 6).pairs, 7, {}).accepted);
+  EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, rotated, true, 1.0, 7).pairs, 7, {}).accepted);
   EXPECT_TRUE(CheckEpipolar(MakeScene(30, 20, {}, false, 1.0, 8).pairs, 7, {}).accepted);
 }
 

@@ -13,11 +13,11 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kAskAgainAfter_us = 500'000;
+constexpr int64_t kRetransmissionTimeout_us = 500'000;
 constexpr int64_t kStatusInterval_us = 1'000'000;
 // At 28 kB a keyframe a request's answers fit the receive buffer.
 constexpr int32_t kMaxKeyframesPerRequest = 50;
-// Bounds: of matches kept to be sent again (then the oldest go), and of what waits in a catch-up
+// Bounds: of matches kept to be retransmitted (then the oldest go), and of what waits in a catch-up
 // or for its turn (then the first is worked off at once).
 constexpr size_t kMaxSentPerMap = 2000;
 constexpr size_t kMaxHeld = 2000;
@@ -36,7 +36,7 @@ PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitio
   node_.Listen<have_t>(channels::kHave, std::bind_front(&PlaceRecognitionProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&PlaceRecognitionProcess::OnResendRequest, this));
 }
@@ -140,12 +140,12 @@ void PlaceRecognitionProcess::OnHave(const Have& have) {
   }
 }
 
-void PlaceRecognitionProcess::OnAgain(const again_t& message) {
+void PlaceRecognitionProcess::OnRetransmission(const again_t& message) {
   const bool known =
-      TakeAgain<place_match_t>(node_, message,
-                               std::bind_front(&PlaceRecognitionProcess::OnKnownMatch, this)) ||
-      TakeAgain<keyframe_t>(node_, message,
-                            std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this));
+      TakeRetransmission<place_match_t>(
+          node_, message, std::bind_front(&PlaceRecognitionProcess::OnKnownMatch, this)) ||
+      TakeRetransmission<keyframe_t>(node_, message,
+                                     std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this));
   if (!known) {
     node_.Refuse("again: neither match nor keyframe");
   }
@@ -175,23 +175,23 @@ void PlaceRecognitionProcess::OnResendRequest(const ResendRequest& request) {
   }
   for (auto it = sent->second.lower_bound(range.from_seq);
        it != sent->second.end() && it->first <= range.to_seq; ++it) {
-    TellAgain(node_, request.requester, request.channel, it->second);
+    Retransmit(node_, request.requester, request.channel, it->second);
   }
 }
 
 void PlaceRecognitionProcess::AskForGaps(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Gaps()) {
     Asked& asked = asked_[gap.map];
-    if (asked.next == gap.from_seq && now_utime < asked.utime + kAskAgainAfter_us) {
+    if (asked.next == gap.from_seq && now_utime < asked.utime + kRetransmissionTimeout_us) {
       continue;
     }
     asked = {gap.from_seq, now_utime};
     const SeqGap part{gap.map, gap.from_seq,
                       std::min(gap.to_seq, gap.from_seq + kMaxKeyframesPerRequest - 1)};
     if (catching_up_) {  // first, so that they are here when the keyframes come
-      AskAgain(node_, std::string(channels::kPlaceMatch), part);
+      RequestRetransmission(node_, std::string(channels::kPlaceMatch), part);
     }
-    AskAgain(node_, channels::Keyframe(gap.map.agent_id), part);
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), part);
   }
 }
 

@@ -42,7 +42,7 @@ class PlaceRecognitionProcess : public Process {
 
   void OnKeyframe(Keyframe keyframe);
   void OnHave(const Have& have);
-  void OnAgain(const again_t& message);
+  void OnRetransmission(const again_t& message);
   void OnKnownMatch(PlaceMatch match);
   void OnMapState(const MapState& state);
   void OnResendRequest(const ResendRequest& request);

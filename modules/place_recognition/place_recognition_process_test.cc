@@ -282,7 +282,7 @@ TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
   EXPECT_EQ(kind(alone), place_candidate_t::KIND_INTRA);
 }
 
-TEST(PlaceRecognitionProcess, SendsItsMatchesAgainAsTheyWere) {
+TEST(PlaceRecognitionProcess, RetransmitsItsMatchesAsTheyWere) {
   test::TestWorld world(6);
   Server server;
   for (const keyframe_t& keyframe : Round(world, kMapA, 3)) {

@@ -15,7 +15,7 @@ const MapId kMapA{1, 1000};
 const MapId kMapB{2, 2000};
 const Rigid3 kOdomB(YawRotation(1.1), Eigen::Vector3d(3, -2, 0.5));
 
-// A body turning on a small circle: one round is 63 keyframes.
+// A body rotating on a small circle: one round is 63 keyframes.
 Keyframe OnTheRound(test::TestWorld& world, const MapId& map, int seq, const Rigid3& T_odom_world,
                     int offset = 0) {
   const double yaw = kStepYaw * (seq + offset);

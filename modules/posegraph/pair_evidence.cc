@@ -9,12 +9,12 @@
 namespace pangea {
 namespace {
 
-// Beyond this many a pair's verdict stands on what it has: agreement takes a pass over all.
+// Beyond this many a pair's decision stands on what it has: agreement takes a pass over all.
 constexpr size_t kMaxCandidates = 600;
 constexpr size_t kMaxSeeds = 10;
 constexpr size_t kMaxCompared = 40;
 
-Matrix4d TurnAxes(const Matrix4d& covariance, double yaw) {
+Matrix4d RotateAxes(const Matrix4d& covariance, double yaw) {
   Matrix4d R = Matrix4d::Identity();
   R.topLeftCorner<3, 3>() = YawRotation(yaw).toRotationMatrix();
   return R * covariance * R.transpose();
@@ -24,8 +24,8 @@ bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l,
                const MergeOptions& options) {
   const Eigen::Vector3d view_k = (k.scene_odom - k.T_odom_body.t).normalized();
   const Eigen::Vector3d view_l = (l.scene_odom - l.T_odom_body.t).normalized();
-  return (k.T_odom_body.t - l.T_odom_body.t).norm() > options.look_distance_m ||
-         view_k.dot(view_l) < std::cos(options.look_angle);
+  return (k.T_odom_body.t - l.T_odom_body.t).norm() > options.viewpoint_distance_m ||
+         view_k.dot(view_l) < std::cos(options.viewpoint_angle);
 }
 
 }  // namespace
@@ -52,7 +52,7 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
   innovation.measurement = k.relative.covariance + CovarianceAt(l.relative.covariance, p_a - to_l);
   innovation.odometry =
       BelievableDrift(*a_, k.node_a, l.node_a, p_a, drift) +
-      TurnAxes(BelievableDrift(*b_, l.node_b, k.node_b, p_b, drift), l.relative.yaw);
+      RotateAxes(BelievableDrift(*b_, l.node_b, k.node_b, p_b, drift), l.relative.yaw);
   return innovation;
 }
 
@@ -80,7 +80,7 @@ void PairEvidence::Add(int64_t id, int node_a, int node_b, const Relative4& rela
     candidate.agrees.push_back(Agree(candidate, earlier) && Agree(earlier, candidate));
   }
   candidates_.push_back(std::move(candidate));
-  Judge();
+  Decide();
 }
 
 std::vector<int> PairEvidence::LargestAgreeing(std::vector<int> among) const {
@@ -108,25 +108,26 @@ std::vector<int> PairEvidence::LargestAgreeing(std::vector<int> among) const {
   return largest;
 }
 
-bool PairEvidence::DifferentLook(const Candidate& k, const Candidate& l) const {
+bool PairEvidence::DifferentViewpoint(const Candidate& k, const Candidate& l) const {
   return Elsewhere((*a_)[k.node_a], (*a_)[l.node_a], options_) ||
          Elsewhere((*b_)[k.node_b], (*b_)[l.node_b], options_);
 }
 
-std::vector<int> PairEvidence::Looks(const std::vector<int>& candidates) const {
+std::vector<int> PairEvidence::Viewpoints(const std::vector<int>& candidates) const {
   std::vector<int> sorted = candidates;
   std::ranges::sort(sorted, [&](int k, int l) {
     return std::pair(-candidates_[k].num_inliers, candidates_[k].id) <
            std::pair(-candidates_[l].num_inliers, candidates_[l].id);
   });
-  std::vector<int> looks;
+  std::vector<int> viewpoints;
   for (const int k : sorted) {
-    if (std::ranges::all_of(looks,
-                            [&](int l) { return DifferentLook(candidates_[k], candidates_[l]); })) {
-      looks.push_back(k);
+    if (std::ranges::all_of(viewpoints, [&](int l) {
+          return DifferentViewpoint(candidates_[k], candidates_[l]);
+        })) {
+      viewpoints.push_back(k);
     }
   }
-  return looks;
+  return viewpoints;
 }
 
 double PairEvidence::SceneExtent(const std::vector<int>& candidates) const {
@@ -143,16 +144,16 @@ double PairEvidence::SceneExtent(const std::vector<int>& candidates) const {
   return std::min(extent_a, extent_b);
 }
 
-bool PairEvidence::Enough(const std::vector<int>& looks, int rival_looks) const {
+bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoints) const {
   const auto strong = std::ranges::count_if(
-      looks, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
-  const int count = static_cast<int>(looks.size());
-  if (SceneExtent(looks) < options_.min_scene_extent_m) {
-    return count >= options_.min_looks_at_one_spot &&
-           rival_looks <= options_.max_rival_share_at_one_spot * count;
+      viewpoints, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
+  const int count = static_cast<int>(viewpoints.size());
+  if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
+    return count >= options_.min_viewpoints_at_one_spot &&
+           rival_viewpoints <= options_.max_rival_share_at_one_spot * count;
   }
-  return (count >= options_.min_looks || strong >= options_.min_strong_looks) &&
-         rival_looks <= options_.max_rival_share * count;
+  return (count >= options_.min_viewpoints || strong >= options_.min_strong_viewpoints) &&
+         rival_viewpoints <= options_.max_rival_share * count;
 }
 
 int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
@@ -206,7 +207,7 @@ Pose4 PairEvidence::Alignment() const {
   return T;
 }
 
-void PairEvidence::Judge() {
+void PairEvidence::Decide() {
   std::vector<int> all;
   for (size_t k = 0; k < candidates_.size(); ++k) {
     all.push_back(static_cast<int>(k));
@@ -217,15 +218,15 @@ void PairEvidence::Judge() {
     const auto agrees = std::ranges::count_if(agreeing_, [&](int l) { return AgreeAt(k, l); });
     return 2 * agrees >= static_cast<int64_t>(agreeing_.size());
   });
-  const std::vector<int> looks = Looks(agreeing_);
-  verdict_ = {};
-  verdict_.looks = static_cast<int>(looks.size());
-  verdict_.rival_looks = static_cast<int>(Looks(LargestAgreeing(all)).size());
-  verdict_.merge = Enough(looks, verdict_.rival_looks);
+  const std::vector<int> viewpoints = Viewpoints(agreeing_);
+  decision_ = {};
+  decision_.viewpoints = static_cast<int>(viewpoints.size());
+  decision_.rival_viewpoints = static_cast<int>(Viewpoints(LargestAgreeing(all)).size());
+  decision_.merge = Enough(viewpoints, decision_.rival_viewpoints);
   for (const int k : agreeing_) {
-    verdict_.agreeing.push_back(candidates_[k].id);
+    decision_.agreeing.push_back(candidates_[k].id);
   }
-  std::ranges::sort(verdict_.agreeing);
+  std::ranges::sort(decision_.agreeing);
 }
 
 std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {

@@ -1,13 +1,13 @@
 #pragma once
 
-// Are two maps one place? The evidence for one pair of maps, and the verdict.
+// Are two maps one place? The evidence for one pair of maps, and the decision.
 //
 // Each accepted constraint between the maps is a candidate alignment T_odom_a_odom_b. Two
 // candidates agree when the cycle through them and both maps' odometry closes within its covariance
 // (pairwise consistency: Mangelson et al., ICRA 2018; Mahalanobis distance, four degrees of
 // freedom). The largest set that agrees mutually carries the merge if it is large enough, was not
-// all won by one look, and its best rival is clearly smaller. A pure function of the evidence: not
-// of its order, and a merge once made is unmade when a rival grows.
+// all won by one viewpoint, and its best rival is clearly smaller. A pure function of the evidence:
+// not of its order, and a merge once made is unmade when a rival grows.
 
 #include <cstdint>
 #include <optional>
@@ -19,21 +19,21 @@
 namespace pangea {
 
 struct MergeOptions {
-  // Looks that must agree: constraints that differ by a keyframe elsewhere, in either map.
-  int min_looks = 3;
+  // Viewpoints that must agree: constraints that differ by a keyframe elsewhere, in either map.
+  int min_viewpoints = 3;
   // So few are enough if each has this many inliers.
-  int min_strong_looks = 2;
+  int min_strong_viewpoints = 2;
   int strong_inliers = 80;
-  // A keyframe is elsewhere by this distance or this turn of the view.
-  double look_distance_m = 0.25;
-  double look_angle = 0.15;
-  // What the agreeing looks see must not be one spot: an object has a look-alike somewhere. Agents
-  // that only ever looked at one spot need this many looks, and next to no rival: look-alikes
-  // standing elsewhere would each be one.
+  // A keyframe is elsewhere by this distance or this rotation of the view.
+  double viewpoint_distance_m = 0.25;
+  double viewpoint_angle = 0.15;
+  // What the agreeing viewpoints see must not be one spot: an object has a look-alike somewhere.
+  // Agents that only ever looked at one spot need this many viewpoints, and next to no rival:
+  // look-alikes standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
-  int min_looks_at_one_spot = 6;
+  int min_viewpoints_at_one_spot = 6;
   double max_rival_share_at_one_spot = 0.25;
-  // The largest rival may have this share of the looks.
+  // The largest rival may have this share of the viewpoints.
   double max_rival_share = 0.5;
   double agree_chi2 = 18.47;  // chi-squared(4): 0.999
   // Odometry that claims less drift than this is not believed while maps are compared (it is no
@@ -55,14 +55,14 @@ class PairEvidence {
   // `relative` from node_a of map a to node_b of map b.
   void Add(int64_t id, int node_a, int node_b, const Relative4& relative, int num_inliers);
 
-  struct Verdict {
+  struct Decision {
     bool merge = false;
     std::vector<int64_t> agreeing;  // constraint ids, ascending
-    int looks = 0;
-    int rival_looks = 0;
+    int viewpoints = 0;
+    int rival_viewpoints = 0;
   };
-  const Verdict& verdict() const { return verdict_; }
-  // Averaged over the agreeing candidates; only after a verdict to merge.
+  const Decision& decision() const { return decision_; }
+  // Averaged over the agreeing candidates; only after a decision to merge.
   Pose4 Alignment() const;
 
   // What the agreeing candidates say of the odometry: the error of each against the one half of
@@ -90,19 +90,19 @@ class PairEvidence {
   bool AgreeAt(int k, int l) const;
   // Greedy largest set of mutually agreeing candidates among `among`.
   std::vector<int> LargestAgreeing(std::vector<int> among) const;
-  std::vector<int> Looks(const std::vector<int>& candidates) const;
+  std::vector<int> Viewpoints(const std::vector<int>& candidates) const;
   double SceneExtent(const std::vector<int>& candidates) const;
-  bool Enough(const std::vector<int>& looks, int rival_looks) const;
-  bool DifferentLook(const Candidate& k, const Candidate& l) const;
+  bool Enough(const std::vector<int>& viewpoints, int rival_viewpoints) const;
+  bool DifferentViewpoint(const Candidate& k, const Candidate& l) const;
   int BestMember(const std::vector<int>& agreeing) const;
-  void Judge();
+  void Decide();
 
   const OdometryChain* a_;
   const OdometryChain* b_;
   MergeOptions options_;
   std::vector<Candidate> candidates_;  // in the order they came
   std::vector<int> agreeing_;
-  Verdict verdict_;
+  Decision decision_;
 };
 
 }  // namespace pangea

@@ -26,7 +26,7 @@ int PoseGraph::MapNumber(const MapId& id) {
   return it->second;
 }
 
-void PoseGraph::PublishAgain(const MapId& map) {
+void PoseGraph::Republish(const MapId& map) {
   if (const auto number = numbers_.find(map); number != numbers_.end()) {
     Group& group = GroupOf(number->second);
     group.unpublished = group.publish_now = true;
@@ -45,7 +45,7 @@ PoseGraphUpdate PoseGraph::AddConstraint(const Constraint& constraint) {
 
 void PoseGraph::Take(const Keyframe& keyframe) {
   const int number = MapNumber(keyframe.id.map);
-  Map& map = maps_[number];
+  MapChain& map = maps_[number];
   if (!map.chain.Add(keyframe)) {
     return;
   }
@@ -136,7 +136,7 @@ void PoseGraph::Regroup() {
     return map;
   };
   for (const auto& [pair, evidence] : pairs_) {
-    if (evidence.verdict().merge && !undone_.contains(pair)) {
+    if (evidence.decision().merge && !undone_.contains(pair)) {
       const auto [older, newer] = std::minmax({find(pair.first), find(pair.second)});
       root[newer] = older;
     }
@@ -210,7 +210,7 @@ bool PoseGraph::UndoMerges(const Group& group) {
   for (const auto& [pair, evidence] : pairs_) {
     const auto [a, b] = std::minmax(pair.first, pair.second);
     const bool here = group_of_[a] == group.maps.front() && group_of_[b] == group.maps.front();
-    if (here && evidence.verdict().merge && !undone_.contains(pair) &&
+    if (here && evidence.decision().merge && !undone_.contains(pair) &&
         in_force[{a, b}] < kMinLoopsInForce) {
       undone_.insert(pair);
       any = true;
@@ -267,7 +267,7 @@ std::map<int, RefinedMap> PoseGraph::RefinedMaps(const Group& group) const {
     if (nodes.empty()) {
       continue;
     }
-    const Rigid3 T_map_refined = AlignUpright(positions).ToRigid3();
+    const Rigid3 T_map_refined = FitYawAndShift(positions).ToRigid3();
     for (const auto& [node, pose] : nodes) {
       maps.at(node.map).Add(node.node, T_map_refined * pose);
     }
@@ -281,7 +281,7 @@ MapState PoseGraph::StateOf(const Group& group) const {
   state.group = maps_[group.maps.front()].id;
   state.revision = next_revision_;
   for (const int number : group.maps) {
-    const Map& map = maps_[number];
+    const MapChain& map = maps_[number];
     state.maps.push_back(map.id);
     for (size_t i = 0; i < map.chain.size(); ++i) {
       const OdometryChain::Node& node = map.chain[i];
@@ -308,7 +308,7 @@ void PoseGraph::Publish(Group* group, PoseGraphUpdate* update) {
   ++next_revision_;
   const std::map<int, RefinedMap> told = RefinedMaps(*group);
   for (const int number : group->maps) {
-    Map& map = maps_[number];
+    MapChain& map = maps_[number];
     // Alone and never corrected, a map is where its odometry says.
     if (map.newest_solved < 0 && !map.corrected) {
       continue;
@@ -351,7 +351,7 @@ PoseGraph::Counters PoseGraph::counters() const {
     ++(!used ? counters.unused : loop.on ? counters.in_force : counters.switched_off);
   }
   counters.solves = num_solves_;
-  for (const Map& map : maps_) {
+  for (const MapChain& map : maps_) {
     counters.bridged += map.chain.num_bridged();
   }
   counters.parked = static_cast<int64_t>(parked_.size());

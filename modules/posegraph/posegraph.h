@@ -3,12 +3,12 @@
 // The pose graph of all maps (the paper, section IV.D, "optimization of pose graph"; design,
 // section 5): which maps are one, and where every keyframe is.
 //
-// In: keyframes of any maps, each map's in ascending seq, and verdicts (constraints). Out: after
-// each solve the corrections (T_map_odom of each map) and the group's state. A node is (x, y, z,
-// yaw); roll and pitch are the odometry's. Maps are grouped by the constraints in force: a pair is
-// merged once several candidate alignments agree (pair_evidence.h), loops that contradict the rest
-// are switched off by graduated non-convexity (group_solver.h), and a merge they no longer carry is
-// undone. Map frame: the odom of the group's map that was seen first.
+// In: keyframes of any maps, each map's in ascending seq, and verification results (constraints).
+// Out: after each solve the corrections (T_map_odom of each map) and the group's state. A node is
+// (x, y, z, yaw); roll and pitch are the odometry's. Maps are grouped by the constraints in force:
+// a pair is merged once several candidate alignments agree (pair_evidence.h), loops that contradict
+// the rest are switched off by graduated non-convexity (group_solver.h), and a merge they no longer
+// carry is undone. Map frame: the odom of the group's map that was seen first.
 //
 // Odometry that claims too much: weights come from covariances, but when the loops' innovations
 // show that a group's odometry drifts more than it says, all its covariances are multiplied by one
@@ -93,7 +93,7 @@ class PoseGraph {
   void NoteMap(const MapId& map) { MapNumber(map); }
 
   // The map's group is published again with the next solve, or by Settle alone.
-  void PublishAgain(const MapId& map);
+  void Republish(const MapId& map);
 
   Counters counters() const;
   // As the next state would say it.
@@ -102,7 +102,7 @@ class PoseGraph {
  private:
   static constexpr size_t kMaxParked = 5000;
 
-  struct Map {
+  struct MapChain {
     MapId id;
     OdometryChain chain;
     std::vector<Pose4> poses;  // of each node, in the map frame
@@ -154,7 +154,7 @@ class PoseGraph {
 
   PoseGraphOptions options_;
   int64_t next_revision_;
-  std::deque<Map> maps_;  // in the order they were first seen
+  std::deque<MapChain> maps_;  // in the order they were first seen
   std::map<MapId, int> numbers_;
   std::deque<Loop> loops_;
   std::map<Pair, PairEvidence> pairs_;

@@ -46,7 +46,7 @@ TEST(PoseGraphMissing, AGapThatNobodyFillsIsBridged) {
   EXPECT_EQ(server.process.graph().counters().bridged, 1);
 }
 
-TEST(PoseGraphMissing, AsksForVerdictsThatWerePromised) {
+TEST(PoseGraphMissing, RequestsResultsThatWerePromised) {
   const SyntheticWorld world = MakeWorld(10);
   Server server;
   PlaceMatch match;
@@ -60,20 +60,20 @@ TEST(PoseGraphMissing, AsksForVerdictsThatWerePromised) {
   PublishMessage(server.bus, "PLACE_MATCH", ToMessage(match));
   server.bus.Drain();
   server.Tick(15);
-  EXPECT_TRUE(server.verdict_requests.empty());
+  EXPECT_TRUE(server.verification_requests.empty());
   Constraint refused;
   refused.from = match.candidates[0].match;
   refused.to = match.query;
   refused.reason = "too few inliers";
   server.Tick(10);
-  ASSERT_EQ(server.verdict_requests.size(), 1u);
-  EXPECT_EQ(server.verdict_requests[0].seq, std::vector<int32_t>{3});
-  EXPECT_EQ(server.verdict_requests[0].constraint_id, std::vector<int64_t>{refused.Id()});
+  ASSERT_EQ(server.verification_requests.size(), 1u);
+  EXPECT_EQ(server.verification_requests[0].seq, std::vector<int32_t>{3});
+  EXPECT_EQ(server.verification_requests[0].constraint_id, std::vector<int64_t>{refused.Id()});
   server.Tick(650);  // it may take its time: asked for ever more rarely
-  EXPECT_EQ(server.verdict_requests.size(), 5u);
+  EXPECT_EQ(server.verification_requests.size(), 5u);
   server.Send(refused);
   server.Tick(700);
-  EXPECT_EQ(server.verdict_requests.size(), 5u);
+  EXPECT_EQ(server.verification_requests.size(), 5u);
   EXPECT_TRUE(server.requests.empty());
 }
 
@@ -82,12 +82,12 @@ TEST(PoseGraphMissing, AfterARestartItAsksForWhatTheJournalHas) {
   Server server(1'000'000);
   server.Have(world);
   server.Tick(12);
-  int verdicts = 0, keyframes = 0;
+  int results = 0, keyframes = 0;
   for (const resend_request_t& request : server.requests) {
-    verdicts += request.channel == "CONSTRAINT" ? 1 : 0;
+    results += request.channel == "CONSTRAINT" ? 1 : 0;
     keyframes += request.channel.starts_with("KEYFRAME_") ? 1 : 0;
   }
-  EXPECT_EQ(verdicts, 2);
+  EXPECT_EQ(results, 2);
   EXPECT_EQ(keyframes, 2);
   EXPECT_EQ(server.status.pending, 20 + 2);  // keyframes, and both maps' matches
   // Half of it says nothing of the whole.
@@ -125,18 +125,19 @@ TEST(PoseGraphMissing, DoesNotWaitForWhatNobodyHas) {
   EXPECT_FALSE(server.states.empty());
 }
 
-// Fusion is behind: its verdicts come slowly, one by one, and the journal does not have them.
-TEST(PoseGraphMissing, DoesNotWaitForWhatIsStillToBeJudged) {
+// Fusion is behind: its verification results come slowly, one by one, and the journal does not have
+// them.
+TEST(PoseGraphMissing, DoesNotWaitForWhatIsStillToBeVerified) {
   const SyntheticWorld world = MakeWorld();
   Server server;
   server.Have(world);
-  std::vector<Constraint> owed;
+  std::vector<Constraint> outstanding;
   for (const SyntheticAgent& agent : world.agents) {
     for (const Keyframe& keyframe : agent.keyframes) {
       PlaceMatch match;
       match.query = keyframe.id;
       if (&agent == &world.agents[1]) {
-        Constraint& refused = owed.emplace_back();
+        Constraint& refused = outstanding.emplace_back();
         refused.from = world.agents[0].keyframes[0].id;
         refused.to = keyframe.id;
         refused.kind = PlaceKind::kInter;
@@ -147,17 +148,17 @@ TEST(PoseGraphMissing, DoesNotWaitForWhatIsStillToBeJudged) {
       server.Send(keyframe);
     }
   }
-  ASSERT_GT(owed.size(), 12u);
+  ASSERT_GT(outstanding.size(), 12u);
   int seconds = 0;
   for (; seconds < 12 && server.states.empty(); ++seconds) {
-    server.Send(owed[static_cast<size_t>(seconds)]);
+    server.Send(outstanding[static_cast<size_t>(seconds)]);
     server.Tick(10);
   }
   EXPECT_GT(seconds, 4) << "the journal has time to answer";
   EXPECT_LT(seconds, 9);
 }
 
-// It would ask for two thousand million verdicts, and never come to an end.
+// It would ask for two thousand million verification results, and never come to an end.
 TEST(PoseGraphMissing, AnAbsurdHaveIsRefused) {
   Server server;
   have_t have{};

@@ -15,9 +15,9 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
-constexpr int64_t kAskAgainAfter_us = kSecond;
-constexpr int64_t kVerdictAfter_us = 2 * kSecond;
-constexpr int64_t kMaxVerdictAfter_us = 60 * kSecond;
+constexpr int64_t kRetransmissionTimeout_us = kSecond;
+constexpr int64_t kResultAfter_us = 2 * kSecond;
+constexpr int64_t kMaxResultAfter_us = 60 * kSecond;
 constexpr int64_t kGiveUpCatchingUp_us = 5 * kSecond;
 // One request's answers must fit the receive buffer: a keyframe is about 28 kB.
 constexpr int32_t kMaxKeyframesAsked = 50;
@@ -40,7 +40,7 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
   node_.Listen<have_t>(channels::kHave, std::bind_front(&PoseGraphProcess::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&PoseGraphProcess::OnResendRequest, this));
 }
@@ -74,11 +74,11 @@ void PoseGraphProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
 void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
   const int64_t id = constraint.Id();
   due_.erase(id);
-  if (verdicts_.insert(id).second) {
+  if (results_.insert(id).second) {
     ++num_arrived_;
-    node_.Count(constraint.accepted ? "verdicts_accepted" : "verdicts_refused");
+    node_.Count(constraint.accepted ? "results_accepted" : "results_refused");
   } else {
-    node_.Count("verdicts_repeated");
+    node_.Count("results_repeated");
   }
   graph_.Take(constraint);
   ++num_unsettled_;
@@ -93,8 +93,8 @@ void PoseGraphProcess::OnPlaceMatch(const PlaceMatch& match) {
     promised.from = candidate.match;
     promised.to = query;
     promised.kind = candidate.kind;
-    if (!verdicts_.contains(promised.Id()) && due_.size() < kMaxDue) {
-      due_.try_emplace(promised.Id(), Due{query, now_utime_ + kVerdictAfter_us, kVerdictAfter_us});
+    if (!results_.contains(promised.Id()) && due_.size() < kMaxDue) {
+      due_.try_emplace(promised.Id(), Due{query, now_utime_ + kResultAfter_us, kResultAfter_us});
     }
   }
   SettleUnlessMoreWaits();
@@ -113,20 +113,20 @@ void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) 
 void PoseGraphProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
     graph_.NoteMap(map);
-    // What was judged before this process started.
-    if (verdicts_asked_.insert(map).second) {
-      AskAllAgain(node_, std::string(channels::kConstraint), map, highest_seq);
+    // What was verified before this process started.
+    if (results_requested_.insert(map).second) {
+      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
     }
     keyframes_.Announce(map, highest_seq);
-    if (!have_heard_ && keyframes_.next(map) == 0) {
+    if (!have_received_ && keyframes_.next(map) == 0) {
       catching_up_to_[map] = highest_seq;
     }
   }
   matches_.Announce(have);
-  have_heard_ = true;
+  have_received_ = true;
 }
 
-// Keyframes and matches' maps and verdicts of the journal that are still to come.
+// Keyframes and matches' maps and verification results of the journal that are still to come.
 int64_t PoseGraphProcess::NumToCatchUp() const {
   int64_t count = 0;
   for (const auto& [map, seq] : catching_up_to_) {
@@ -135,8 +135,8 @@ int64_t PoseGraphProcess::NumToCatchUp() const {
   for (const auto& [id, due] : due_) {
     const auto goal = catching_up_to_.find(due.query.map);
     const bool of_journal = goal != catching_up_to_.end() && due.query.seq <= goal->second;
-    // Asked for twice by its name: the journal does not have it, it is still to be judged.
-    count += of_journal && due.wait_us < 4 * kVerdictAfter_us ? 1 : 0;
+    // Asked for twice by its name: the journal does not have it, it is still to be verified.
+    count += of_journal && due.wait_us < 4 * kResultAfter_us ? 1 : 0;
   }
   return count;
 }
@@ -154,19 +154,19 @@ void PoseGraphProcess::CatchUp(int64_t now_utime) {
 
 void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
   if (request.channel == channels::kMapState) {
-    graph_.PublishAgain(request.range.map);
+    graph_.Republish(request.range.map);
     ++num_unsettled_;
     SettleUnlessMoreWaits();
   }
 }
 
-void PoseGraphProcess::OnAgain(const again_t& message) {
-  const bool known =
-      TakeAgain<keyframe_t>(node_, message, std::bind_front(&PoseGraphProcess::OnKeyframe, this)) ||
-      TakeAgain<place_match_t>(node_, message,
-                               std::bind_front(&PoseGraphProcess::OnPlaceMatch, this)) ||
-      TakeAgain<constraint_t>(node_, message,
-                              std::bind_front(&PoseGraphProcess::OnConstraint, this));
+void PoseGraphProcess::OnRetransmission(const again_t& message) {
+  const bool known = TakeRetransmission<keyframe_t>(
+                         node_, message, std::bind_front(&PoseGraphProcess::OnKeyframe, this)) ||
+                     TakeRetransmission<place_match_t>(
+                         node_, message, std::bind_front(&PoseGraphProcess::OnPlaceMatch, this)) ||
+                     TakeRetransmission<constraint_t>(
+                         node_, message, std::bind_front(&PoseGraphProcess::OnConstraint, this));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }
@@ -204,9 +204,9 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   SettleUnlessMoreWaits();
   AskForKeyframes(now_utime);
   for (const SeqGap& gap : matches_.Due(now_utime)) {
-    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+    RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
   }
-  AskForDueVerdicts(now_utime);
+  RequestDueResults(now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
     last_change_utime_ = now_utime;
@@ -225,37 +225,37 @@ void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Gaps()) {
     Asked& asked = keyframes_asked_[gap.map];
     if (asked.from_seq != gap.from_seq) {
-      asked = {gap.from_seq, now_utime + kAskAgainAfter_us / 2, 0};
+      asked = {gap.from_seq, now_utime + kRetransmissionTimeout_us / 2, 0};
     } else if (now_utime >= asked.next_utime && asked.times >= kMaxTimesAsked) {
       Enqueue(gap.map, gap.from_seq, std::nullopt);
     } else if (now_utime >= asked.next_utime) {
-      asked.next_utime = now_utime + kAskAgainAfter_us;
+      asked.next_utime = now_utime + kRetransmissionTimeout_us;
       ++asked.times;
-      AskAgain(
+      RequestRetransmission(
           node_, channels::Keyframe(gap.map.agent_id),
           {gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1)});
     }
   }
 }
 
-void PoseGraphProcess::AskForDueVerdicts(int64_t now_utime) {
-  if (now_utime < next_verdicts_utime_) {
+void PoseGraphProcess::RequestDueResults(int64_t now_utime) {
+  if (now_utime < next_results_utime_) {
     return;
   }
-  next_verdicts_utime_ = now_utime + kSecond;
-  std::map<MapId, VerdictNames> overdue;
+  next_results_utime_ = now_utime + kSecond;
+  std::map<MapId, ResultNames> overdue;
   for (auto& [id, due] : due_) {
-    VerdictNames& names =
-        overdue.try_emplace(due.query.map, VerdictNames{due.query.map, {}}).first->second;
-    if (now_utime >= due.next_ask_utime && names.verdicts.size() < VerdictNames::kMax) {
-      due.wait_us = std::min(2 * due.wait_us, kMaxVerdictAfter_us);
+    ResultNames& names =
+        overdue.try_emplace(due.query.map, ResultNames{due.query.map, {}}).first->second;
+    if (now_utime >= due.next_ask_utime && names.results.size() < ResultNames::kMax) {
+      due.wait_us = std::min(2 * due.wait_us, kMaxResultAfter_us);
       due.next_ask_utime = now_utime + due.wait_us;
-      names.verdicts.emplace_back(due.query.seq, id);
+      names.results.emplace_back(due.query.seq, id);
     }
   }
   for (const auto& [map, names] : overdue) {
-    if (!names.verdicts.empty()) {
-      AskForVerdicts(node_, names);
+    if (!names.results.empty()) {
+      RequestResults(node_, names);
     }
   }
 }
@@ -270,7 +270,7 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   node_.Set("solves", counters.solves);
   node_.Set("edges_bridged", counters.bridged);
   node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
-  node_.Set("verdicts_due", static_cast<int64_t>(due_.size()));
+  node_.Set("results_due", static_cast<int64_t>(due_.size()));
   if (!catching_up_to_.empty()) {
     return node_.PublishStatus(
         now_utime, num_to_catch_up_,

@@ -5,23 +5,23 @@
 //
 // Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
 // (RESEND_REQUEST, VERDICT_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of,
-// verdicts that a PLACE_MATCH promised and that did not come in two seconds (then ever more rarely:
-// it may only take its time, and a candidate of a match that the journal does not have may never be
-// judged), and after a restart all of them.
-// Live, when nothing has come for a second, and at the end of a replay (Finish) every group is
-// solved from the beginning and published in full.
+// verification results that a PLACE_MATCH promised and that did not come in two seconds (then ever
+// more rarely: it may only take its time, and a candidate of a match that the journal does not have
+// may never be verified), and after a restart all of them. Live, when nothing has come for a
+// second, and at the end of a replay (Finish) every group is solved from the beginning and
+// published in full.
 //
-// After a restart nothing is told until the journal's keyframes and verdicts are in, or for five
-// seconds none of them came: half a map would be taken for what became of the whole. A verdict that
-// the journal does not have either is not waited for: fusion may be behind by minutes. Whoever
-// comes late asks for MAP_STATE, and the group is told again.
+// After a restart nothing is told until the journal's keyframes and verification results are in, or
+// for five seconds none of them came: half a map would be taken for what became of the whole. A
+// verification result that the journal does not have either is not waited for: fusion may be behind
+// by minutes. Whoever comes late asks for MAP_STATE, and the group is told again.
 //
 // What already waits on the bus is taken before anything is solved (at most kMaxUnsettled of it): a
-// solve costs the same after one verdict as after ten, and verdicts that come faster than solves
-// would make every correction late.
+// solve costs the same after one verification result as after ten, and verification results that
+// come faster than solves would make every correction late.
 //
-// Bounds: InOrder's for keyframes, kMaxDue promised verdicts (then no more are watched), the pose
-// graph's own for constraints that wait for keyframes.
+// Bounds: InOrder's for keyframes, kMaxDue promised verification results (then no more are
+// watched), the pose graph's own for constraints that wait for keyframes.
 
 #include <map>
 #include <optional>
@@ -73,7 +73,7 @@ class PoseGraphProcess : public Process {
   void OnPlaceMatch(const PlaceMatch& match);
   void OnRefinement(MapState state, const map_state_t& message);
   void OnHave(const Have& have);
-  void OnAgain(const again_t& message);
+  void OnRetransmission(const again_t& message);
   void OnResendRequest(const ResendRequest& request);
 
   int64_t NumToCatchUp() const;
@@ -82,7 +82,7 @@ class PoseGraphProcess : public Process {
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
   void AskForKeyframes(int64_t now_utime);
-  void AskForDueVerdicts(int64_t now_utime);
+  void RequestDueResults(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
@@ -91,21 +91,22 @@ class PoseGraphProcess : public Process {
   MissingMessages matches_;
   StateChunks refinements_;
   std::map<MapId, Asked> keyframes_asked_;
-  std::map<int64_t, Due> due_;      // promised verdicts, by constraint id
-  std::set<int64_t> verdicts_;      // that came
-  std::set<MapId> verdicts_asked_;  // maps whose verdicts of a former run were asked for
-  bool have_heard_ = false;
+  std::map<int64_t, Due> due_;  // promised verification results, by constraint id
+  std::set<int64_t> results_;   // that came
+  std::set<MapId>
+      results_requested_;  // maps whose verification results of a former run were asked for
+  bool have_received_ = false;
   // What the journal had of each map when this process came, until that is in.
   std::map<MapId, int32_t> catching_up_to_;
   int64_t num_to_catch_up_ = 0;
   int64_t caught_up_utime_ = 0;  // when that fell last
   int64_t now_utime_ = 0;        // of the newest tick
-  int64_t num_arrived_ = 0;      // keyframes, verdicts
+  int64_t num_arrived_ = 0;      // keyframes, verification results
   int num_unsettled_ = 0;        // of them: taken since the last solve
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish
-  int64_t next_verdicts_utime_ = 0;
+  int64_t next_results_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

@@ -128,7 +128,7 @@ TEST(PoseGraphProcess, WhenNothingComesForASecondAllIsPublished) {
   EXPECT_EQ(server.states.size(), states);
 }
 
-TEST(PoseGraphProcess, WhoComesLateIsToldTheStateAgain) {
+TEST(PoseGraphProcess, WhoComesLateGetsTheStateRetransmitted) {
   const SyntheticWorld world = MakeWorld();
   Server server;
   SendAll(world, MakeConstraints(world), &server);

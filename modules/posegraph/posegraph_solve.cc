@@ -52,7 +52,7 @@ std::vector<PairEvidence::Innovation> PoseGraph::Innovations(
          loop->relative.covariance, chain.DriftBetween(loop->from.node, loop->to.node, p_to)});
   }
   for (const auto& [pair, evidence] : pairs_) {
-    if (evidence.verdict().merge && group_of_[pair.first] == group.maps.front() &&
+    if (evidence.decision().merge && group_of_[pair.first] == group.maps.front() &&
         group_of_[pair.second] == group.maps.front()) {
       const auto more = evidence.Innovations();
       innovations.insert(innovations.end(), more.begin(), more.end());
@@ -69,7 +69,7 @@ std::vector<PairEvidence::Innovation> PoseGraph::Innovations(
 double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const {
   const auto innovations = Innovations(group, loops);
   // Loops at one place share one drift, so their median counts as a single sample: the likeliest
-  // factor brings it to its mean. Nowhere a jump, which would let the shape hang on one verdict.
+  // factor brings it to its mean. Nowhere a jump, which would let the shape hang on one constraint.
   if (innovations.empty() || MedianDistance(innovations, 1) < kMeanChi2) {
     return 1;
   }
@@ -83,7 +83,7 @@ double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>&
 }
 
 void PoseGraph::Place(const Group& group) {
-  // Along the merges with most agreeing looks, from the oldest map on.
+  // Along the merges with most agreeing viewpoints, from the oldest map on.
   std::set<int> placed = {group.maps.front()};
   maps_[group.maps.front()].T_map_odom = {};
   while (placed.size() < group.maps.size()) {
@@ -92,9 +92,9 @@ void PoseGraph::Place(const Group& group) {
       const auto& [pair, evidence] = entry;
       const bool leads_on = placed.contains(pair.first) != placed.contains(pair.second) &&
                             group_of_[pair.first] == group_of_[pair.second];
-      const bool merged = evidence.verdict().merge && !undone_.contains(pair);
+      const bool merged = evidence.decision().merge && !undone_.contains(pair);
       const auto rank = [this](const std::pair<const Pair, PairEvidence>& e) {
-        return std::tuple(-e.second.verdict().looks, maps_[e.first.first].id,
+        return std::tuple(-e.second.decision().viewpoints, maps_[e.first.first].id,
                           maps_[e.first.second].id);
       };
       if (leads_on && merged && (best == nullptr || rank(entry) < rank(*best))) {
@@ -112,7 +112,7 @@ void PoseGraph::Place(const Group& group) {
     }
   }
   for (const int number : group.maps) {
-    Map& map = maps_[number];
+    MapChain& map = maps_[number];
     for (size_t i = 0; i < map.chain.size(); ++i) {
       map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
     }
@@ -125,7 +125,7 @@ void PoseGraph::ResetLoops(const Group& group, const std::vector<Loop*>& loops) 
   std::set<int64_t> agreeing;
   for (const auto& [pair, evidence] : pairs_) {
     if (group_of_[pair.first] == group.maps.front()) {
-      agreeing.insert(evidence.verdict().agreeing.begin(), evidence.verdict().agreeing.end());
+      agreeing.insert(evidence.decision().agreeing.begin(), evidence.decision().agreeing.end());
     }
   }
   for (Loop* loop : loops) {
@@ -213,7 +213,7 @@ void PoseGraph::Apply(const GroupSolver& solver, const std::map<int, Pair>& scop
   const std::vector<Matrix4d> marginals = solver.Marginals(newest);
   size_t index = 0;
   for (const auto& [number, range] : scope) {
-    Map& map = maps_[number];
+    MapChain& map = maps_[number];
     for (int i = range.first; i <= range.second; ++i) {
       map.poses[i] = solver.pose(offset.at(number) + i);
     }

@@ -63,7 +63,7 @@ PoseGraphUpdate Solve(const SyntheticWorld& world, const std::vector<Constraint>
   return graph->Finish();
 }
 
-// RMSE of positions after the best turn about z and shift: the joint ATE of a group.
+// RMSE of positions after the best rotation about z and shift: the joint ATE of a group.
 double JointAte(const SyntheticWorld& world, const MapState& state) {
   Eigen::Vector3d mean_map = Eigen::Vector3d::Zero(), mean_hall = Eigen::Vector3d::Zero();
   const auto count = static_cast<double>(state.keyframes.size());
@@ -127,7 +127,7 @@ TEST(PoseGraph, LoopsInALoneMapTakeItsDriftAway) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.3 * OdometryAte(world, 0));
 }
 
-TEST(PoseGraph, OneMatchDoesNotMergeThreeLooksDo) {
+TEST(PoseGraph, OneMatchDoesNotMergeThreeViewpointsDo) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
   PoseGraph graph({});
   AddKeyframes(world, &graph);
@@ -143,8 +143,8 @@ TEST(PoseGraph, OneMatchDoesNotMergeThreeLooksDo) {
   EXPECT_LT(JointAte(world, states[0]), 0.1);
 }
 
-// The same three matches again and again are one look, however many keyframes stand there.
-TEST(PoseGraph, ManyMatchesOfOneLookDoNotMerge) {
+// The same three matches again and again are one viewpoint, however many keyframes stand there.
+TEST(PoseGraph, ManyMatchesOfOneViewpointDoNotMerge) {
   SyntheticWorldOptions options = PosesOnly(2, 60);
   options.step_m = 0.003;
   options.start_apart = 0;
@@ -284,9 +284,9 @@ TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.5 * OdometryAte(world, 0));
 }
 
-// Odometry drifts four times what it claims. Whether one more link is among the verdicts, right but
-// vague, decides neither what the odometry is worth nor which links are believed.
-TEST(PoseGraph, OneVagueLinkDecidesNothing) {
+// Odometry drifts four times what it claims. Whether one more constraint is among the results,
+// right but vague, decides neither what the odometry is worth nor which constraints are believed.
+TEST(PoseGraph, OneVagueConstraintDecidesNothing) {
   SyntheticWorldOptions options = PosesOnly(2, 150);
   options.edge_sigma_m = 0.02;
   options.edge_sigma_yaw = 0.003;

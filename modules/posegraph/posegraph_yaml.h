@@ -14,13 +14,13 @@ inline void Bind(YamlOptions& yaml, PoseGraphOptions& options) {
   yaml.Add("max_keyframes_waiting", &options.max_keyframes_waiting);
   yaml.Add("state_every", &options.state_every);
   YamlOptions& merge = yaml.Section("merge");
-  merge.Add("min_looks", &options.merge.min_looks);
-  merge.Add("min_strong_looks", &options.merge.min_strong_looks);
+  merge.Add("min_viewpoints", &options.merge.min_viewpoints);
+  merge.Add("min_strong_viewpoints", &options.merge.min_strong_viewpoints);
   merge.Add("strong_inliers", &options.merge.strong_inliers);
-  merge.Add("look_distance_m", &options.merge.look_distance_m);
-  merge.Add("look_angle", &options.merge.look_angle);
+  merge.Add("viewpoint_distance_m", &options.merge.viewpoint_distance_m);
+  merge.Add("viewpoint_angle", &options.merge.viewpoint_angle);
   merge.Add("min_scene_extent_m", &options.merge.min_scene_extent_m);
-  merge.Add("min_looks_at_one_spot", &options.merge.min_looks_at_one_spot);
+  merge.Add("min_viewpoints_at_one_spot", &options.merge.min_viewpoints_at_one_spot);
   merge.Add("max_rival_share_at_one_spot", &options.merge.max_rival_share_at_one_spot);
   merge.Add("max_rival_share", &options.merge.max_rival_share);
   merge.Add("agree_chi2", &options.merge.agree_chi2);

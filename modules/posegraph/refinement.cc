@@ -18,7 +18,7 @@ bool Refinement::SharesMapWith(const Refinement& other) const {
       maps_, [&](const MapId& map) { return std::ranges::binary_search(other.maps_, map); });
 }
 
-Pose4 AlignUpright(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& pairs) {
+Pose4 FitYawAndShift(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& pairs) {
   Eigen::Vector3d to_mean = Eigen::Vector3d::Zero(), from_mean = Eigen::Vector3d::Zero();
   const auto count = static_cast<double>(pairs.size());
   for (const auto& [to, from] : pairs) {
@@ -49,8 +49,8 @@ Pose4 RefinedMap::Shift(int node) const {
     return {};
   }
   const auto& [index, T_map_body] = *refined;
-  const Eigen::Quaterniond turn = T_map_body.q * chain_[index].T_odom_body.q.conjugate();
-  const Pose4 pose{T_map_body.t, 2 * std::atan2(turn.z(), turn.w())};
+  const Eigen::Quaterniond rotation = T_map_body.q * chain_[index].T_odom_body.q.conjugate();
+  const Pose4 pose{T_map_body.t, 2 * std::atan2(rotation.z(), rotation.w())};
   return pose * solved_[index].Inverse();
 }
 

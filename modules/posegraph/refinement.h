@@ -4,7 +4,7 @@
 //
 // The graph goes on solving as if there were none: no measurement counts twice, and what it decides
 // (groups, loops in force) does not depend on when a refinement comes. Where poses are told, those
-// of refined keyframes are the refinement's, as a whole turned about z and shifted to lie best on
+// of refined keyframes are the refinement's, as a whole rotated about z and shifted to lie best on
 // the solution, and other keyframes keep their place in the solution relative to the refined one
 // before them. A newer refinement replaces an older one of the same maps; one whose maps are no
 // longer in one group is not used.
@@ -35,8 +35,8 @@ class Refinement {
   std::map<KeyframeId, Rigid3> poses_;
 };
 
-// The turn about z and the shift that lay the second points of the pairs best on the first.
-Pose4 AlignUpright(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& pairs);
+// The rotation about z and the shift that lay the second points of the pairs best on the first.
+Pose4 FitYawAndShift(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& pairs);
 
 // One map's poses as they are told.
 class RefinedMap {

@@ -13,7 +13,7 @@ namespace {
 
 using Positions = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
 
-TEST(AlignUpright, FindsTurnAndShift) {
+TEST(FitYawAndShift, FindsYawAndShift) {
   const Pose4 T{{1, -2, 3}, 2.5};
   std::mt19937_64 rng(1);
   std::normal_distribution<double> normal(0, 1);
@@ -22,13 +22,13 @@ TEST(AlignUpright, FindsTurnAndShift) {
     const Eigen::Vector3d p(normal(rng), normal(rng), normal(rng));
     pairs.emplace_back(T * p, p);
   }
-  const Pose4 found = AlignUpright(pairs);
+  const Pose4 found = FitYawAndShift(pairs);
   EXPECT_NEAR(WrapAngle(found.yaw - T.yaw), 0, 1e-12);
   EXPECT_LT((found.p - T.p).norm(), 1e-12);
 }
 
-TEST(AlignUpright, OnePairIsAShift) {
-  const Pose4 found = AlignUpright({{{1, 2, 3}, {0, 0, 1}}});
+TEST(FitYawAndShift, OnePairIsAShift) {
+  const Pose4 found = FitYawAndShift({{{1, 2, 3}, {0, 0, 1}}});
   EXPECT_EQ(found.yaw, 0);
   EXPECT_EQ(found.p, Eigen::Vector3d(1, 2, 2));
 }

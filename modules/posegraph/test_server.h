@@ -56,7 +56,7 @@ struct Server {
       } else if (channel == "RESEND_REQUEST") {
         DecodeMessage(data, &requests.emplace_back());
       } else if (channel == "VERDICT_REQUEST") {
-        DecodeMessage(data, &verdict_requests.emplace_back());
+        DecodeMessage(data, &verification_requests.emplace_back());
       } else if (channel == "STATUS_posegraph") {
         DecodeMessage(data, &status);
       }
@@ -96,7 +96,7 @@ struct Server {
   std::vector<map_state_t> states;
   std::vector<correction_t> corrections;
   std::vector<resend_request_t> requests;
-  std::vector<verdict_request_t> verdict_requests;
+  std::vector<verdict_request_t> verification_requests;
   std::vector<uint8_t> said;
   status_t status{};
   int64_t now = 0;

@@ -97,7 +97,7 @@ void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
 }
 
 // A message of a log that is replayed for some processes.
-struct LoggedWord {
+struct LoggedMessage {
   int64_t utime = 0;
   double elapsed_s = 0;  // since the log's first event
   std::string channel;
@@ -110,12 +110,12 @@ bool IsKeyframe(const std::string& channel) {
 }
 
 // What place_recognition, inter_map_ba and fusion say, once each.
-bool IsJudgement(const std::string& channel) {
+bool IsMatchOrResult(const std::string& channel) {
   return channel == channels::kPlaceMatch || channel == channels::kConstraint;
 }
 
-bool IsNews(const LoggedWord& word) {
-  return !word.own && (IsKeyframe(word.channel) || IsJudgement(word.channel));
+bool IsInput(const LoggedMessage& message) {
+  return !message.own && (IsKeyframe(message.channel) || IsMatchOrResult(message.channel));
 }
 
 // Who says so; empty for agents.
@@ -138,57 +138,57 @@ std::string Speaker(const LogEvent& event) {
 }
 
 // What says something of the map; not who has what and asks for what again.
-std::vector<LoggedWord> ReadWords(const std::set<std::string>& processes, const fs::path& log,
-                                  double until_s) {
-  std::vector<LoggedWord> words;
+std::vector<LoggedMessage> ReadMessages(const std::set<std::string>& processes, const fs::path& log,
+                                        double until_s) {
+  std::vector<LoggedMessage> messages;
   std::optional<int64_t> begin;
   ReadLog(log.string(), [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
     const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
     const std::string speaker = Speaker(event);
     if ((!speaker.empty() || IsKeyframe(event.channel)) && elapsed_s <= until_s) {
-      words.push_back({event.utime,
-                       elapsed_s,
-                       event.channel,
-                       {event.data.begin(), event.data.end()},
-                       processes.contains(speaker)});
+      messages.push_back({event.utime,
+                          elapsed_s,
+                          event.channel,
+                          {event.data.begin(), event.data.end()},
+                          processes.contains(speaker)});
     }
   });
-  return words;
+  return messages;
 }
 
 // What comes before the first keyframe that is later than `checkpoint_s`: so of each keyframe all
 // that was said is taken over, or nothing.
-std::span<LoggedWord> Past(std::vector<LoggedWord>& words, double checkpoint_s) {
-  const auto end = std::ranges::find_if(words, [checkpoint_s](const LoggedWord& word) {
-    return IsKeyframe(word.channel) && word.elapsed_s > checkpoint_s;
+std::span<LoggedMessage> Past(std::vector<LoggedMessage>& messages, double checkpoint_s) {
+  const auto end = std::ranges::find_if(messages, [checkpoint_s](const LoggedMessage& message) {
+    return IsKeyframe(message.channel) && message.elapsed_s > checkpoint_s;
   });
-  if (end == words.end()) {
+  if (end == messages.end()) {
     throw std::runtime_error(fmt::format(
         "--from-checkpoint {:g}: no keyframe comes after it, nothing is to be run", checkpoint_s));
   }
-  return {words.begin(), end};
+  return {messages.begin(), end};
 }
 
-// Those who judge learn what they said, as a process that was started again learns it from the
-// journal; the log says it in their place. Returns how much that is.
-int64_t TakeOver(std::span<LoggedWord> past, LocalBus& bus) {
+// Those who match and verify learn what they sent, as a process that was started again learns it
+// from the journal; the log says it in their place. Returns how much that is.
+int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
   int64_t count = 0;
-  for (LoggedWord& word : past) {
-    if (!IsJudgement(word.channel)) {
+  for (LoggedMessage& message : past) {
+    if (!IsMatchOrResult(message.channel)) {
       continue;
     }
     again_t again{};
-    again.channel = word.channel;
-    again.num_bytes = static_cast<int32_t>(word.data.size());
-    again.data = word.data;
-    if (word.channel == channels::kPlaceMatch) {
+    again.channel = message.channel;
+    again.num_bytes = static_cast<int32_t>(message.data.size());
+    again.data = message.data;
+    if (message.channel == channels::kPlaceMatch) {
       PublishMessage(bus, channels::Again("place_recognition"), again);
     } else {
       PublishMessage(bus, channels::Again("inter_map_ba"), again);
       PublishMessage(bus, channels::Again("fusion"), again);
     }
-    word.own = false;
+    message.own = false;
     ++count;
   }
   bus.Drain();
@@ -229,33 +229,34 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs
 int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log) {
   UseOneThread();
   ReadKeyframeLog(log);  // throws if keyframes are missing
-  std::vector<LoggedWord> words = ReadWords(part.processes, log, part.until_s);
+  std::vector<LoggedMessage> messages = ReadMessages(part.processes, log, part.until_s);
   LocalBus bus;
   Server server(bus, part.processes);
   int64_t taken_over = 0;
   if (part.checkpoint_s) {
-    taken_over = TakeOver(Past(words, *part.checkpoint_s), bus);
+    taken_over = TakeOver(Past(messages, *part.checkpoint_s), bus);
     if (taken_over == 0) {
-      throw std::runtime_error(fmt::format(
-          "{}: no match and no verdict before the checkpoint; --from-checkpoint goes on from a log "
-          "that has them: a replay's or a session's session.lcm, or a journal.lcm",
-          log.string()));
+      throw std::runtime_error(
+          fmt::format("{}: no match and no verification result before the checkpoint; "
+                      "--from-checkpoint goes on from a log "
+                      "that has them: a replay's or a session's session.lcm, or a journal.lcm",
+                      log.string()));
     }
   }
 
-  size_t after_news = words.size();
-  while (after_news > 0 && !IsNews(words[after_news - 1])) {
-    --after_news;
+  size_t after_input = messages.size();
+  while (after_input > 0 && !IsInput(messages[after_input - 1])) {
+    --after_input;
   }
   Recorder recorder(bus, out_log);
   bool finished = false;
-  for (size_t i = 0; i < words.size(); ++i) {
-    recorder.SetTime(words[i].utime);
-    if (!words[i].own) {
-      bus.Publish(words[i].channel, words[i].data);
+  for (size_t i = 0; i < messages.size(); ++i) {
+    recorder.SetTime(messages[i].utime);
+    if (!messages[i].own) {
+      bus.Publish(messages[i].channel, messages[i].data);
       bus.Drain();
-    } else if (i >= after_news && !finished) {
-      // There is no news any more, and yet one of them spoke: it took the time for what waits.
+    } else if (i >= after_input && !finished) {
+      // No input is left, and yet one of them sent something: it took the time for what waits.
       server.Finish();
       finished = true;
     }

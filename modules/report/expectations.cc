@@ -17,18 +17,18 @@ using nlohmann::ordered_json;
 
 enum class Relation : uint8_t { kExactly, kAtMost, kAtLeast };
 
-// A figure of the session, or one of each agent.
-struct Figure {
+// A value of the session, or one of each agent.
+struct Value {
   std::string of;  // "agent 2: "; empty for the session's
   std::optional<double> value;
 };
-using Figures = std::vector<Figure>;
+using Values = std::vector<Value>;
 
 std::optional<double> Number(const ordered_json& value) {
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
-Figures Groups(const ordered_json& report) {
+Values Groups(const ordered_json& report) {
   return {{"", static_cast<double>(report.at("groups").size())}};
 }
 
@@ -37,7 +37,7 @@ std::set<int32_t> Agents(const ordered_json& group) {
 }
 
 // The first fusion that all agents were in, and have not left since.
-Figures FusedBy(const ordered_json& report) {
+Values FusedBy(const ordered_json& report) {
   std::set<int32_t> all;
   for (const ordered_json& agent : report.at("agents")) {
     all.insert(agent.at("id").get<int32_t>());
@@ -55,28 +55,28 @@ Figures FusedBy(const ordered_json& report) {
 }
 
 template <typename Of>
-Figures OfEach(const ordered_json& report, Of of) {
-  Figures figures;
+Values OfEach(const ordered_json& report, Of of) {
+  Values metrics;
   for (const ordered_json& agent : report.at("agents")) {
-    figures.push_back({fmt::format("agent {}: ", agent.at("id").get<int32_t>()), of(agent)});
+    metrics.push_back({fmt::format("agent {}: ", agent.at("id").get<int32_t>()), of(agent)});
   }
-  return figures;
+  return metrics;
 }
 
-Figures Maps(const ordered_json& report) {
+Values Maps(const ordered_json& report) {
   return OfEach(report, [](const ordered_json& agent) {
     return std::optional(static_cast<double>(agent.at("map_ids").size()));
   });
 }
 
 template <const char* kKey>
-Figures Each(const ordered_json& report) {
+Values Each(const ordered_json& report) {
   return OfEach(report, [](const ordered_json& agent) { return Number(agent.at(kKey)); });
 }
 
-Figures Joint(const ordered_json& report) { return {{"", Number(report.at("ate_joint_m"))}}; }
+Values Joint(const ordered_json& report) { return {{"", Number(report.at("ate_joint_m"))}}; }
 
-Figures Wrong(const ordered_json& report) {
+Values Wrong(const ordered_json& report) {
   const ordered_json& truth = report.at("constraints_truth");
   // Nothing was checked: nothing is known.
   const bool any = truth.at("checked").get<int64_t>() > 0;
@@ -91,7 +91,7 @@ struct Kind {
   std::string_view name;
   Relation relation;
   std::string_view unit;
-  Figures (*figures)(const ordered_json& report);
+  Values (*metrics)(const ordered_json& report);
 };
 
 constexpr std::array kKinds = {
@@ -124,16 +124,16 @@ std::string BoundText(const Kind& kind, double bound) {
   return fmt::format("{}{:g}{}", relation, bound, kind.unit);
 }
 
-CheckedExpectation CheckOne(const Kind& kind, double bound, const Figures& figures) {
+CheckedExpectation CheckOne(const Kind& kind, double bound, const Values& metrics) {
   CheckedExpectation checked{std::string(kind.name), bound, BoundText(kind, bound), "", true};
-  for (const Figure& figure : figures) {
-    checked.figure +=
-        fmt::format("{}{}{}", checked.figure.empty() ? "" : ", ", figure.of,
-                    figure.value ? fmt::format("{:.4g}{}", *figure.value, kind.unit) : "none");
-    checked.met &= figure.value && Met(kind.relation, bound, *figure.value);
+  for (const Value& value : metrics) {
+    checked.value +=
+        fmt::format("{}{}{}", checked.value.empty() ? "" : ", ", value.of,
+                    value.value ? fmt::format("{:.4g}{}", *value.value, kind.unit) : "none");
+    checked.met &= value.value && Met(kind.relation, bound, *value.value);
   }
-  if (figures.empty()) {
-    checked.figure = "none";
+  if (metrics.empty()) {
+    checked.value = "none";
     checked.met = false;
   }
   return checked;
@@ -168,16 +168,16 @@ std::vector<CheckedExpectation> Check(const Expectations& expectations,
   std::vector<CheckedExpectation> checked;
   for (const Kind& kind : kKinds) {
     if (const auto given = expectations.find(std::string(kind.name)); given != expectations.end()) {
-      checked.push_back(CheckOne(kind, given->second, kind.figures(report)));
+      checked.push_back(CheckOne(kind, given->second, kind.metrics(report)));
     }
   }
   return checked;
 }
 
 Table ToTable(const std::vector<CheckedExpectation>& checked) {
-  Table table({"expected", "bound", "figure", "result"});
+  Table table({"expected", "bound", "value", "result"});
   for (const CheckedExpectation& one : checked) {
-    table.Add({one.name, one.text, one.figure, one.met ? "met" : "MISSED"});
+    table.Add({one.name, one.text, one.value, one.met ? "met" : "MISSED"});
   }
   return table;
 }
@@ -186,7 +186,7 @@ ordered_json ToJson(const std::vector<CheckedExpectation>& checked) {
   ordered_json json = ordered_json::array();
   for (const CheckedExpectation& one : checked) {
     json.push_back(
-        {{"name", one.name}, {"bound", one.bound}, {"figure", one.figure}, {"met", one.met}});
+        {{"name", one.name}, {"bound", one.bound}, {"value", one.value}, {"met", one.met}});
   }
   return json;
 }

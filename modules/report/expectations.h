@@ -1,6 +1,6 @@
 #pragma once
 
-// What a session must come to: bounds on figures of its report, so that a session is a test with an
+// What a session must come to: bounds on metrics of its report, so that a session is a test with an
 // exit code.
 //
 //   expect: {groups: 1, fused_by: 40, ate_joint_m: 0.1}
@@ -14,7 +14,7 @@
 //   ate_joint_m         at most
 //   wrong_constraints   at most: accepted, and not so by the ground truth
 //
-// Figures are report.json's (docs/report.md). One that is not there, because there is no ground
+// Metrics are report.json's (docs/report.md). One that is not there, because there is no ground
 // truth or no fusion, misses its bound. All of them are in a replay's report too.
 
 #include <map>
@@ -45,8 +45,8 @@ class ExpectationsSection {
 struct CheckedExpectation {
   std::string name;
   double bound = 0;
-  std::string text;    // "at most 40 s"
-  std::string figure;  // "21.3 s"; "agent 1: 0.02, agent 2: none"
+  std::string text;   // "at most 40 s"
+  std::string value;  // "21.3 s"; "agent 1: 0.02, agent 2: none"
   bool met = false;
 };
 

@@ -63,10 +63,10 @@ TEST(Expectations, FusedIsForGood) {
   EXPECT_FALSE(Met("fused_by", 1000, apart));
 }
 
-TEST(Expectations, AFigureThatIsNotThereMisses) {
+TEST(Expectations, AMetricThatIsNotThereMisses) {
   const CheckedExpectation server = Only({{"ate_server_m", 1}}, Report());
   EXPECT_FALSE(server.met);
-  EXPECT_EQ(server.figure, "agent 1: 0.02 m, agent 2: none");
+  EXPECT_EQ(server.value, "agent 1: 0.02 m, agent 2: none");
   ordered_json nothing = Report();
   nothing["agents"] = ordered_json::array();
   nothing["groups"] = ordered_json::array();
@@ -77,7 +77,7 @@ TEST(Expectations, AFigureThatIsNotThereMisses) {
   }
 }
 
-TEST(Expectations, AreToldWithTheirFigures) {
+TEST(Expectations, AreShownWithTheirValues) {
   const auto checked = Check({{"fused_by", 40}, {"coverage", 0.9}}, Report());
   const std::string text = ToTable(checked).Text();
   EXPECT_THAT(text, HasSubstr("| fused_by | at most 40 s "));

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures>& groups,
+void WriteTrajectories(const AgentMetrics& agent, const std::vector<GroupMetrics>& groups,
                        const std::string& folder) {
   const std::string prefix = fmt::format("{}/agent_{}", folder, agent.id);
   for (const auto& [map, odometry] : agent.odometry) {
@@ -42,28 +42,28 @@ void WriteTrajectories(const AgentFigures& agent, const std::vector<GroupFigures
 
 WrittenReport WriteReport(const ReportInput& input, const std::string& folder) {
   const CapturedSession session = ReadServerLog(input.server_log);
-  ReportFigures figures = ComputeFigures(input, session);
-  for (const AgentFigures& agent : figures.agents) {
-    WriteTrajectories(agent, figures.groups, folder);
+  ReportMetrics metrics = ComputeMetrics(input, session);
+  for (const AgentMetrics& agent : metrics.agents) {
+    WriteTrajectories(agent, metrics.groups, folder);
   }
   WriteTextFile(folder + "/map.ply",
-                MapPly(session, figures,
-                       figures.groups.empty() ? FinalGroup() : figures.groups.front().group));
-  for (size_t i = 1; i < figures.groups.size(); ++i) {
-    const FinalGroup& group = figures.groups[i].group;
+                MapPly(session, metrics,
+                       metrics.groups.empty() ? FinalGroup() : metrics.groups.front().group));
+  for (size_t i = 1; i < metrics.groups.size(); ++i) {
+    const FinalGroup& group = metrics.groups[i].group;
     WriteTextFile(fmt::format("{}/map.{}.ply", folder, FileName(group.frame)),
-                  MapPly(session, figures, group));
+                  MapPly(session, metrics, group));
   }
   try {
-    for (const Picture& picture : Pictures(figures)) {
+    for (const Picture& picture : Pictures(metrics)) {
       WritePng(picture.plot, folder + "/" + picture.file);
     }
   } catch (const std::runtime_error& error) {
-    figures.notes.emplace_back(error.what());
+    metrics.notes.emplace_back(error.what());
   }
-  ordered_json json = ReportJson(input, session, figures);
-  std::string markdown = ReportMarkdown(input, session, figures);
-  std::string html = ReportHtml(input, session, figures);
+  ordered_json json = ReportJson(input, session, metrics);
+  std::string markdown = ReportMarkdown(input, session, metrics);
+  std::string html = ReportHtml(input, session, metrics);
   std::vector<CheckedExpectation> checked = Check(input.expect, json);
   if (!checked.empty()) {
     const Table table = ToTable(checked);

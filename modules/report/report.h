@@ -1,6 +1,6 @@
 #pragma once
 
-// From captured logs to the output directory: trajectories, map, figures, pictures. A pure function
+// From captured logs to the output directory: trajectories, map, metrics, pictures. A pure function
 // of its input, the same after a live run and after a replay; the same input gives the same bytes.
 //
 // Writes into `folder` (which must exist):
@@ -62,7 +62,7 @@ struct ReportInput {
   std::map<std::string, int> restarts = {};
   // what else a reader must know, e.g. warnings about a recording
   std::vector<std::string> notes = {};
-  // bounds on the figures, checked at the end of the report
+  // bounds on the metrics, checked at the end of the report
   Expectations expect = {};
 };
 

@@ -125,7 +125,7 @@ TEST_F(ReportFilesTest, RubbishInTheLogIsCountedAndNamed) {
   EXPECT_THAT(markdown_, HasSubstr("1 messages on KEYFRAME_1 could not be read"));
 }
 
-TEST_F(ReportFilesTest, ProcessesAndRestartsAreTold) {
+TEST_F(ReportFilesTest, ProcessesAndRestartsAreReported) {
   LogBoth();
   status_t status{};
   status.process = "fusion";

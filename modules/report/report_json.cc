@@ -59,7 +59,7 @@ ordered_json LinkJson(const AgentRun& run) {
           {"packets_down", run.link->packets_down}};
 }
 
-ordered_json AgentJson(const AgentFigures& agent) {
+ordered_json AgentJson(const AgentMetrics& agent) {
   const AgentRun& run = agent.run;
   return {{"id", agent.id},
           {"map_ids", MapIds(agent.maps)},
@@ -79,18 +79,18 @@ ordered_json AgentJson(const AgentFigures& agent) {
           {"realtime_factor", Number(run.realtime_factor)}};
 }
 
-ordered_json JointJson(const GroupFigures& group) {
+ordered_json JointJson(const GroupMetrics& group) {
   return group.joint ? Number(group.joint->position_m.rmse) : ordered_json();
 }
 
-ordered_json ChangeJson(const GroupChange& change, const ReportFigures& figures) {
+ordered_json ChangeJson(const GroupChange& change, const ReportMetrics& metrics) {
   ordered_json json = {{"change", change.fused ? "fused" : "taken apart"},
                        {"session_s", Number(change.session_s)}};
   json["agents"] = FinalGroup{{}, change.maps, {}, 0}.Agents();
   json["map_ids"] = MapIds(change.maps);
   json["recording_s"] = ordered_json::object();
   for (const auto& [agent, utime] : change.newest_utime) {
-    json["recording_s"][fmt::format("{}", agent)] = Number(RecordingSeconds(figures, agent, utime));
+    json["recording_s"][fmt::format("{}", agent)] = Number(RecordingSeconds(metrics, agent, utime));
   }
   return json;
 }
@@ -122,14 +122,14 @@ ordered_json ProcessesJson(const ReportInput& input, const CapturedSession& sess
 }  // namespace
 
 ordered_json ReportJson(const ReportInput& input, const CapturedSession& session,
-                        const ReportFigures& figures) {
+                        const ReportMetrics& metrics) {
   ordered_json json;
   json["agents"] = ordered_json::array();
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     json["agents"].push_back(AgentJson(agent));
   }
   json["groups"] = ordered_json::array();
-  for (const GroupFigures& group : figures.groups) {
+  for (const GroupMetrics& group : metrics.groups) {
     json["groups"].push_back({{"agents", group.group.Agents()},
                               {"map_ids", MapIds(group.group.maps)},
                               {"keyframes", group.group.keyframes.size()},
@@ -137,22 +137,22 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
                               {"ate_joint_m", JointJson(group)}});
   }
   // The first group has most agents.
-  json["ate_joint_m"] = figures.groups.empty() ? ordered_json() : JointJson(figures.groups.front());
+  json["ate_joint_m"] = metrics.groups.empty() ? ordered_json() : JointJson(metrics.groups.front());
   const ConstraintCounts counts = CountConstraints(session);
   json["constraints"] = {{"accepted", counts.accepted_inter + counts.accepted_intra},
                          {"accepted_inter", counts.accepted_inter},
                          {"accepted_intra", counts.accepted_intra},
                          {"refused", counts.num_refused},
                          {"refused_by_reason", counts.refused}};
-  json["constraints_truth"] = TruthJson(figures.all_constraints);
-  json["constraints_truth"]["inter"] = TruthJson(figures.inter_constraints);
-  json["constraints_truth"]["intra"] = TruthJson(figures.intra_constraints);
+  json["constraints_truth"] = TruthJson(metrics.all_constraints);
+  json["constraints_truth"]["inter"] = TruthJson(metrics.inter_constraints);
+  json["constraints_truth"]["intra"] = TruthJson(metrics.intra_constraints);
   json["fused_at"] = ordered_json::array();
   for (const GroupChange& change : session.changes) {
-    json["fused_at"].push_back(ChangeJson(change, figures));
+    json["fused_at"].push_back(ChangeJson(change, metrics));
   }
   json["processes"] = ProcessesJson(input, session);
-  json["notes"] = figures.notes;
+  json["notes"] = metrics.notes;
   return json;
 }
 

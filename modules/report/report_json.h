@@ -1,14 +1,14 @@
 #pragma once
 
-// report.json, but for what was expected of the session: that is checked against these figures.
+// report.json, but for what was expected of the session: that is checked against these metrics.
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
 nlohmann::ordered_json ReportJson(const ReportInput& input, const CapturedSession& session,
-                                  const ReportFigures& figures);
+                                  const ReportMetrics& metrics);
 
 }  // namespace pangea::session

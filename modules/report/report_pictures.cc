@@ -56,10 +56,11 @@ std::array<int, 3> Rgb(const std::string& colour) {
   return {value >> 16, (value >> 8) & 255, value & 255};
 }
 
-void AddGroup(const ReportFigures& figures, const GroupFigures& group, Plot* plot) {
-  const Alignment alignment = group.joint ? group.joint->alignment : Alignment();
+void AddGroup(const ReportMetrics& metrics, const GroupMetrics& group, Plot* plot) {
+  const TrajectoryAlignment alignment =
+      group.joint ? group.joint->alignment : TrajectoryAlignment();
   for (const int32_t agent_id : group.group.Agents()) {
-    const size_t index = figures.IndexOf(agent_id);
+    const size_t index = metrics.IndexOf(agent_id);
     const Trajectory keyframes = group.group.TrajectoryOf(agent_id);
     std::string label = fmt::format("agent {}", agent_id);
     const auto with_truth = std::ranges::find(group.joint_agents, agent_id);
@@ -79,43 +80,43 @@ Plot TopViewPlot(const std::string& title) {
   return {.title = title, .x_label = "x [m]", .y_label = "y [m]", .equal_axes = true};
 }
 
-std::string GroupTitle(const GroupFigures& group) {
+std::string GroupTitle(const GroupMetrics& group) {
   const std::vector<int32_t> agents = group.group.Agents();
   return agents.size() == 1 ? fmt::format("agent {}", agents.front())
                             : fmt::format("agents {} fused", fmt::join(agents, ", "));
 }
 
-Picture AllWithGroundTruth(const ReportFigures& figures) {
+Picture AllWithGroundTruth(const ReportMetrics& metrics) {
   Picture picture{"trajectory.png", TopViewPlot("")};
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     if (!agent.ground_truth.empty()) {
       picture.plot.lines.push_back({.label = picture.plot.lines.empty() ? "ground truth" : "",
                                     .name = "ground truth",
                                     .colour = kGroundTruthColour,
                                     .width = 5,
-                                    .points = TopView(agent.ground_truth, Alignment())});
+                                    .points = TopView(agent.ground_truth, TrajectoryAlignment())});
     }
   }
   std::string title;
-  for (const GroupFigures& group : figures.groups) {
+  for (const GroupMetrics& group : metrics.groups) {
     if (group.joint) {
       title += fmt::format("{}{}: ATE {:.3f} m", title.empty() ? "" : "; ", GroupTitle(group),
                            group.joint->position_m.rmse);
-      AddGroup(figures, group, &picture.plot);
+      AddGroup(metrics, group, &picture.plot);
     }
   }
   picture.plot.title = title;
   return picture;
 }
 
-Picture ErrorPicture(const ReportFigures& figures) {
+Picture ErrorPicture(const ReportMetrics& metrics) {
   Picture picture{"error.png",
                   {.title = "position error",
                    .x_label = "time since the ground truth's beginning [s]",
                    .y_label = "position error [m]",
                    .y_from_zero = true}};
-  for (size_t i = 0; i < figures.agents.size(); ++i) {
-    const AgentFigures& agent = figures.agents[i];
+  for (size_t i = 0; i < metrics.agents.size(); ++i) {
+    const AgentMetrics& agent = metrics.agents[i];
     if (agent.ground_truth.empty()) {
       continue;
     }
@@ -144,12 +145,12 @@ Picture ErrorPicture(const ReportFigures& figures) {
 
 }  // namespace
 
-std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
+std::string MapPly(const CapturedSession& session, const ReportMetrics& metrics,
                    const FinalGroup& group) {
   std::string body;
   size_t count = 0;
   for (const MapId& map : group.maps) {
-    const auto [red, green, blue] = Rgb(AgentColour(figures.IndexOf(map.agent_id)));
+    const auto [red, green, blue] = Rgb(AgentColour(metrics.IndexOf(map.agent_id)));
     for (const Eigen::Vector3d& p : PointsOf(session, group, map)) {
       body += fmt::format("{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), red, green, blue);
       ++count;
@@ -162,23 +163,23 @@ std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
       ToString(group.frame), count, body);
 }
 
-std::vector<Picture> Pictures(const ReportFigures& figures) {
+std::vector<Picture> Pictures(const ReportMetrics& metrics) {
   std::vector<Picture> pictures;
   const bool any_placed = std::ranges::any_of(
-      figures.groups, [](const GroupFigures& g) { return g.joint.has_value(); });
-  if (any_placed || figures.groups.empty()) {
-    pictures.push_back(AllWithGroundTruth(figures));
+      metrics.groups, [](const GroupMetrics& g) { return g.joint.has_value(); });
+  if (any_placed || metrics.groups.empty()) {
+    pictures.push_back(AllWithGroundTruth(metrics));
   }
-  for (const GroupFigures& group : figures.groups) {
+  for (const GroupMetrics& group : metrics.groups) {
     if (!group.joint) {
       const std::string file = pictures.empty()
                                    ? "trajectory.png"
                                    : fmt::format("trajectory.{}.png", FileName(group.group.frame));
       pictures.push_back({file, TopViewPlot(GroupTitle(group) + ", in its own map frame")});
-      AddGroup(figures, group, &pictures.back().plot);
+      AddGroup(metrics, group, &pictures.back().plot);
     }
   }
-  pictures.push_back(ErrorPicture(figures));
+  pictures.push_back(ErrorPicture(metrics));
   return pictures;
 }
 

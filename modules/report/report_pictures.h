@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "eval/plot.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
 // ASCII PLY of the group's map points in its map frame; a landmark seen by several keyframes of a
 // map counts once, from where its depth is known best.
-std::string MapPly(const CapturedSession& session, const ReportFigures& figures,
+std::string MapPly(const CapturedSession& session, const ReportMetrics& metrics,
                    const FinalGroup& group);
 
 struct Picture {
@@ -21,6 +21,6 @@ struct Picture {
 };
 
 // One top view of everything ground truth places; each further group in its own.
-std::vector<Picture> Pictures(const ReportFigures& figures);
+std::vector<Picture> Pictures(const ReportMetrics& metrics);
 
 }  // namespace pangea::session

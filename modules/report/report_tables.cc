@@ -41,10 +41,10 @@ void AddTruth(const char* name, const ConstraintsTruth& truth, Table* table) {
 
 }  // namespace
 
-Table AgentTable(const ReportFigures& figures) {
+Table AgentTable(const ReportMetrics& metrics) {
   Table table({"agent", "maps", "keyframes", "initialised s", "path m", "ATE VIO m", "ATE server m",
                "coverage", "counts", "up kB/s", "down kB", "realtime"});
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     const AgentRun& run = agent.run;
     table.Add({fmt::format("{}", agent.id), fmt::format("{}", agent.maps.size()),
                fmt::format("{}", agent.keyframes), Cell(agent.initialised_s, 2),
@@ -56,10 +56,10 @@ Table AgentTable(const ReportFigures& figures) {
   return table;
 }
 
-Table GroupTable(const ReportFigures& figures) {
+Table GroupTable(const ReportMetrics& metrics) {
   Table table({"group", "agents", "keyframes", "joint ATE m", "switched off", "maps"});
-  for (size_t i = 0; i < figures.groups.size(); ++i) {
-    const GroupFigures& group = figures.groups[i];
+  for (size_t i = 0; i < metrics.groups.size(); ++i) {
+    const GroupMetrics& group = metrics.groups[i];
     table.Add({fmt::format("{}", i + 1), fmt::format("{}", fmt::join(group.group.Agents(), ", ")),
                fmt::format("{}", group.group.keyframes.size()),
                group.joint ? fmt::format("{:.3f}", group.joint->position_m.rmse) : "-",
@@ -68,25 +68,25 @@ Table GroupTable(const ReportFigures& figures) {
   return table;
 }
 
-Table LiveTable(const ReportFigures& figures) {
+Table LiveTable(const ReportMetrics& metrics) {
   Table table({"agent", "live ATE m", "raw ATE m", "largest jump m"});
   const bool any = std::ranges::any_of(
-      figures.agents, [](const AgentFigures& a) { return a.live.jump_max_m.has_value(); });
-  for (size_t i = 0; any && i < figures.agents.size(); ++i) {
-    const AgentFigures& agent = figures.agents[i];
+      metrics.agents, [](const AgentMetrics& a) { return a.live.jump_max_m.has_value(); });
+  for (size_t i = 0; any && i < metrics.agents.size(); ++i) {
+    const AgentMetrics& agent = metrics.agents[i];
     table.Add({fmt::format("{}", agent.id), Cell(agent.live.ate_m, 3),
                Cell(agent.live.ate_raw_m, 3), Cell(agent.live.jump_max_m, 3)});
   }
   return table;
 }
 
-Table LinksTable(const ReportFigures& figures) {
+Table LinksTable(const ReportMetrics& metrics) {
   Table table({"agent", "link", "packets up", "delivered", "packets down", "delivered"});
   const auto cell = [](const std::map<std::string, int64_t>& packets, const char* name) {
     const auto count = packets.find(name);
     return count == packets.end() ? std::string("-") : fmt::format("{}", count->second);
   };
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     if (const auto& link = agent.run.link) {
       table.Add({fmt::format("{}", agent.id), link->conditions, cell(link->packets_up, "taken"),
                  cell(link->packets_up, "delivered"), cell(link->packets_down, "taken"),
@@ -104,12 +104,12 @@ Table RefusedTable(const CapturedSession& session) {
   return table;
 }
 
-Table TruthTable(const ReportFigures& figures) {
+Table TruthTable(const ReportMetrics& metrics) {
   Table table({"against ground truth", "checked", "wrong", "NEES / dim", "median", "> 99 %",
                "position", "yaw", "error median m", "p95 m"});
-  AddTruth("all", figures.all_constraints, &table);
-  AddTruth("between maps", figures.inter_constraints, &table);
-  AddTruth("within one", figures.intra_constraints, &table);
+  AddTruth("all", metrics.all_constraints, &table);
+  AddTruth("between maps", metrics.inter_constraints, &table);
+  AddTruth("within one", metrics.intra_constraints, &table);
   return table;
 }
 
@@ -150,9 +150,9 @@ Table ProcessTable(const ReportInput& input, const CapturedSession& session) {
   return table;
 }
 
-Table TrafficTable(const ReportFigures& figures) {
+Table TrafficTable(const ReportMetrics& metrics) {
   Table table({"agent", "sent kB", "kB/s on average", "received kB"});
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     if (agent.run.bytes_up) {
       table.Add({fmt::format("{}", agent.id), Kilobytes(agent.run.bytes_up),
                  Cell(KilobytesPerSecondUp(agent), 1), Kilobytes(agent.run.bytes_down)});
@@ -164,13 +164,13 @@ Table TrafficTable(const ReportFigures& figures) {
   return table;
 }
 
-std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportFigures& figures) {
+std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics) {
   std::vector<std::string> lines;
   for (const GroupChange& change : session.changes) {
     std::string times;
     for (const auto& [agent, utime] : change.newest_utime) {
       times += fmt::format("{}agent {} at {:.1f} s of its recording", times.empty() ? "" : ", ",
-                           agent, RecordingSeconds(figures, agent, utime));
+                           agent, RecordingSeconds(metrics, agent, utime));
     }
     lines.push_back(fmt::format("{:.1f} s: {} {} ({})", change.session_s,
                                 change.fused ? "fused into one group:" : "taken apart, leaving",

@@ -7,24 +7,24 @@
 #include <vector>
 
 #include "eval/table.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
-Table AgentTable(const ReportFigures& figures);
-Table GroupTable(const ReportFigures& figures);
-Table LiveTable(const ReportFigures& figures);       // what agents showed
-Table LinksTable(const ReportFigures& figures);      // links that the session made bad
+Table AgentTable(const ReportMetrics& metrics);
+Table GroupTable(const ReportMetrics& metrics);
+Table LiveTable(const ReportMetrics& metrics);       // what agents showed
+Table LinksTable(const ReportMetrics& metrics);      // links that the session made bad
 Table RefusedTable(const CapturedSession& session);  // constraints, by reason
-Table TruthTable(const ReportFigures& figures);      // accepted constraints against ground truth
+Table TruthTable(const ReportMetrics& metrics);      // accepted constraints against ground truth
 Table ProcessTable(const ReportInput& input, const CapturedSession& session);
-Table TrafficTable(const ReportFigures& figures);  // on the link, beside the paper's
+Table TrafficTable(const ReportMetrics& metrics);  // on the link, beside the paper's
 
 inline constexpr const char* kNeesExplained =
     "NEES: squared error / covariance, per dimension; 1 when the covariance is honest.";
 
 // When maps became one or were taken apart, a line each.
-std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportFigures& figures);
+std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics);
 // How many constraints were accepted and refused.
 std::string ConstraintsLine(const CapturedSession& session);
 

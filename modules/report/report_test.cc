@@ -1,4 +1,4 @@
-// What the report says of two agents' maps: figures, groups, poses.
+// What the report says of two agents' maps: metrics, groups, poses.
 
 #include "report/report.h"
 
@@ -65,7 +65,7 @@ TEST_F(ReportTest, TwoAgentsFused) {
   EXPECT_EQ(report["groups"][0]["agents"], json::array({1, 2}));
   EXPECT_EQ(report["groups"][0]["map_ids"].size(), 2U);
   EXPECT_EQ(report["groups"][0]["constraints_switched_off"], 3);
-  // One agent is 0.1 m off the other; the joint alignment halves it, and turns a little.
+  // One agent is 0.1 m off the other; the joint alignment halves it, and rotates a little.
   EXPECT_NEAR(report["ate_joint_m"].get<double>(), 0.05, 0.01);
   EXPECT_EQ(report["groups"][0]["ate_joint_m"], report["ate_joint_m"]);
   EXPECT_EQ(report["constraints"]["accepted"], 1);

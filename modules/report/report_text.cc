@@ -11,38 +11,38 @@ std::string FileName(const MapId& map) {
 }
 
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
-                           const ReportFigures& figures) {
+                           const ReportMetrics& metrics) {
   std::string text = fmt::format(
       "# Session report\n\n{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
       "counts "
       "with coverage of at least 0.95 and one map.\n",
-      AgentTable(figures).Text());
-  if (const Table links = LinksTable(figures); !links.empty()) {
+      AgentTable(metrics).Text());
+  if (const Table links = LinksTable(metrics); !links.empty()) {
     text += fmt::format("\n{}\nDelivered counts doubled packets twice.\n", links.Text());
   }
-  if (const Table live = LiveTable(figures); !live.empty()) {
+  if (const Table live = LiveTable(metrics); !live.empty()) {
     text += fmt::format(
         "\nWhat each agent showed while the session ran, from its first fusion on:\n\n{}",
         live.Text());
   }
   text +=
       fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n",
-                  GroupTable(figures).Text());
-  const std::vector<std::string> changes = ChangeLines(session, figures);
+                  GroupTable(metrics).Text());
+  const std::vector<std::string> changes = ChangeLines(session, metrics);
   text +=
       changes.empty() ? "No maps were fused.\n" : fmt::format("- {}\n", fmt::join(changes, "\n- "));
   text += fmt::format("\n## Constraints\n\n{}\n", ConstraintsLine(session));
   if (const Table refused = RefusedTable(session); !refused.empty()) {
     text += fmt::format("\n{}", refused.Text());
   }
-  if (const Table truth = TruthTable(figures); !truth.empty()) {
+  if (const Table truth = TruthTable(metrics); !truth.empty()) {
     text += fmt::format("\n{}\n{}\n", truth.Text(), kNeesExplained);
   }
   if (const Table processes = ProcessTable(input, session); !processes.empty()) {
     text += fmt::format("\n## Processes\n\n{}", processes.Text());
   }
-  if (!figures.notes.empty()) {
-    text += fmt::format("\n## Notes\n\n- {}\n", fmt::join(figures.notes, "\n- "));
+  if (!metrics.notes.empty()) {
+    text += fmt::format("\n## Notes\n\n- {}\n", fmt::join(metrics.notes, "\n- "));
   }
   return text;
 }

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
@@ -12,6 +12,6 @@ namespace pangea::session {
 std::string FileName(const MapId& map);
 
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
-                           const ReportFigures& figures);
+                           const ReportMetrics& metrics);
 
 }  // namespace pangea::session

@@ -13,7 +13,7 @@
 #include "log_tools/log_diff.h"
 #include "log_tools/recording_arguments.h"
 #include "replay/replay.h"
-#include "report/remembered.h"
+#include "report/session_record.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
 #include "session/session_report.h"
@@ -48,7 +48,7 @@ constexpr int kFailed = 1;
 constexpr int kMissed = 2;
 
 // Prints the report; the exit code of a session that was played.
-int Tell(const ReportOutcome& outcome) {
+int Print(const ReportOutcome& outcome) {
   std::cout << outcome.text << std::flush;
   for (const std::string& missed : outcome.missed) {
     std::cerr << fmt::format("pangea-session: {}\n", missed);
@@ -84,7 +84,7 @@ int Run(const RunArguments& arguments) {
   PrepareOut(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
-  const int exit_code = Tell(ReportRun(script, summary, options.out));
+  const int exit_code = Print(ReportRun(script, summary, options.out));
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
   }
@@ -100,8 +100,8 @@ struct LogArguments {
 };
 
 // What is given on the command line goes before what the capture remembers.
-Remembered KnownOf(const LogArguments& arguments) {
-  Remembered known = ReadRemembered({arguments.logs.begin(), arguments.logs.end()});
+SessionRecord KnownOf(const LogArguments& arguments) {
+  SessionRecord known = ReadSessionRecord({arguments.logs.begin(), arguments.logs.end()});
   if (!arguments.expect.empty()) {
     known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
   }
@@ -123,7 +123,7 @@ struct ReplayArguments : LogArguments {
   std::optional<int64_t> explain;
 };
 
-int TellDiff(const std::string& a, const std::string& b, double until_s) {
+int PrintDiff(const std::string& a, const std::string& b, double until_s) {
   const LogDiff diff = DiffLogs(a, b, until_s);
   std::cout << fmt::format("first: {}, second: {}\n\n{}", a, b, ToText(diff)) << std::flush;
   return diff.First() == nullptr ? 0 : kMissed;
@@ -133,7 +133,7 @@ int TellDiff(const std::string& a, const std::string& b, double until_s) {
 void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log) {
   if (arguments.logs.size() != 1) {
     throw std::runtime_error(
-        fmt::format("{}: takes one log, which has what is not to be said again",
+        fmt::format("{}: takes one log, which has what is not to be retransmitted",
                     arguments.only.empty() ? "--from-checkpoint" : "--only"));
   }
   const std::string& log = arguments.logs.front();
@@ -145,8 +145,9 @@ void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log)
   part.checkpoint_s = arguments.checkpoint_s;
   const int64_t taken_over = ReplayPart(log, part, out_log);
   if (arguments.checkpoint_s) {
-    std::cout << fmt::format("{} matches and verdicts of the first {:g} s: taken from {}\n",
-                             taken_over, *arguments.checkpoint_s, log);
+    std::cout << fmt::format(
+        "{} matches and verification results of the first {:g} s: taken from {}\n", taken_over,
+        *arguments.checkpoint_s, log);
   }
 }
 
@@ -155,11 +156,11 @@ int RunReplayOnly(const ReplayArguments& arguments) {
   const std::string log = fs::path(arguments.out) / "session.lcm";
   PrepareOut(arguments.out);
   RunReplayPart(arguments, log);
-  return TellDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
-                  arguments.until_s);
+  return PrintDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
+                   arguments.until_s);
 }
 
-void ExplainInto(const fs::path& out, int64_t constraint, const Remembered& known) {
+void ExplainInto(const fs::path& out, int64_t constraint, const SessionRecord& known) {
   const Explanation explanation = Explain(out / "session.lcm", constraint);
   const fs::path picture = out / fmt::format("constraint_{}.png", constraint);
   WriteExplanationPng(explanation, RecordingsAtHand(known), picture);
@@ -177,7 +178,7 @@ int RunReplay(const ReplayArguments& arguments) {
   if (!arguments.only.empty()) {
     return RunReplayOnly(arguments);
   }
-  const Remembered known = KnownOf(arguments);
+  const SessionRecord known = KnownOf(arguments);
   PrepareOut(out);
   if (arguments.checkpoint_s) {
     RunReplayPart(arguments, out / "session.lcm");
@@ -187,13 +188,13 @@ int RunReplay(const ReplayArguments& arguments) {
     std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                              summary.agent_ids.size());
   }
-  int exit_code = Tell(ReportLog(out / "session.lcm", known, out));
+  int exit_code = Print(ReportLog(out / "session.lcm", known, out));
   if (arguments.explain) {
     ExplainInto(out, *arguments.explain, known);
   }
   if (!arguments.diff.empty()) {
     exit_code =
-        std::max(exit_code, TellDiff(arguments.diff, out / "session.lcm", arguments.until_s));
+        std::max(exit_code, PrintDiff(arguments.diff, out / "session.lcm", arguments.until_s));
   }
   return exit_code;
 }
@@ -204,7 +205,7 @@ int RunReport(const LogArguments& arguments) {
         "--out {}: holds a session and its own report; give another folder", arguments.out));
   }
   fs::create_directories(arguments.out);
-  return Tell(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out));
+  return Print(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out));
 }
 
 void AddResultOptions(CLI::App& command, LogArguments* arguments) {
@@ -291,13 +292,14 @@ void AddReplayCommand(CLI::App& app, int* exit_code) {
       ->check(CLI::PositiveNumber);
   replay
       ->add_option("--from-checkpoint", arguments->checkpoint_s,
-                   "The matches and verdicts of the first so many seconds are taken from the log, "
+                   "The matches and verification results of the first so many seconds are taken "
+                   "from the log, "
                    "not made again")
       ->check(CLI::PositiveNumber);
   replay
       ->add_option("--only", arguments->only,
                    "These processes alone (a,b,...), fed with what the others said in the log, and "
-                   "where their words part from those in the log; no report")
+                   "where their messages differ from those in the log; no report")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(kReplayed), std::end(kReplayed))));

@@ -158,7 +158,7 @@ void SessionMonitor::OnStatus(Bytes data) {
       progress.keyframes = CounterOf(message, "keyframes").value_or(0);
     }
   }
-  status_heard_[message.process] = WallUtime();
+  status_received_[message.process] = WallUtime();
   statuses_[message.process] = std::move(message);
 }
 
@@ -189,7 +189,7 @@ bool SessionMonitor::Idle(const std::vector<std::string>& processes, double quie
          std::all_of(processes.begin(), processes.end(), [&](const std::string& name) {
            const auto status = statuses_.find(name);
            return status != statuses_.end() && status->second.pending == 0 &&
-                  now - status_heard_.at(name) < kStatusFresh_us;
+                  now - status_received_.at(name) < kStatusFresh_us;
          });
 }
 

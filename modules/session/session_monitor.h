@@ -47,12 +47,12 @@ class SessionMonitor {
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
   int constraints_accepted() const { return accepted_; }
   int constraints_refused() const { return refused_; }
-  int num_verdicts() const { return accepted_ + refused_; }
+  int num_results() const { return accepted_ + refused_; }
 
   // Every named process reported within the last 3 s that nothing is pending, and the server bus
   // has carried no work for `quiet_s`.
   bool Idle(const std::vector<std::string>& processes, double quiet_s) const;
-  // No word of work on the server bus for this long, seconds.
+  // No message of work on the server bus for this long, seconds.
   double QuietSeconds() const;
 
  private:
@@ -72,8 +72,8 @@ class SessionMonitor {
   std::map<MapId, std::pair<int64_t, std::vector<MapId>>>
       groups_;  // revision and maps, by each map
   std::map<std::string, status_t> statuses_;
-  std::map<std::string, int64_t> status_heard_;  // wall clock
-  int64_t last_work_ = 0;                        // wall clock
+  std::map<std::string, int64_t> status_received_;  // wall clock
+  int64_t last_work_ = 0;                           // wall clock
   int accepted_ = 0;
   int refused_ = 0;
 };

@@ -51,7 +51,7 @@ void SessionProgress::Update(const std::vector<AgentLine>& agents, const Session
   lines_drawn_ = lines.size();
 }
 
-void SessionProgress::Say(const std::string& line) {
+void SessionProgress::PrintLine(const std::string& line) {
   std::cout << line << (is_terminal_ ? "\033[K" : "") << std::endl;
   lines_drawn_ = 0;
 }

@@ -25,7 +25,7 @@ class SessionProgress {
   void Update(const std::vector<AgentLine>& agents, const SessionMonitor& monitor,
               double elapsed_s);
   // A line that stays.
-  void Say(const std::string& line);
+  void PrintLine(const std::string& line);
   void Finish();
 
  private:

@@ -51,7 +51,7 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out) {
   for (const CheckedExpectation& one : report.checked) {
     if (!one.met) {
       outcome.missed.push_back(
-          fmt::format("expected {} {}, got {}", one.name, one.text, one.figure));
+          fmt::format("expected {} {}, got {}", one.name, one.text, one.value));
     }
   }
   return outcome;
@@ -98,7 +98,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
   return OutcomeOf(input, out);
 }
 
-ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::path& out) {
+ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const fs::path& out) {
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
@@ -111,11 +111,11 @@ ReportOutcome ReportLog(const fs::path& log, const Remembered& known, const fs::
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
-  Remembered session{{}, script.expect};
+  SessionRecord session{{}, script.expect};
   for (const AgentScript& agent : script.agents) {
     session.agents.push_back(RunOf(agent));
   }
-  WriteRemembered(session, out);
+  WriteSessionRecord(session, out);
 }
 
 }  // namespace pangea::session

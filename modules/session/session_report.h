@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "report/remembered.h"
 #include "report/report.h"
+#include "report/session_record.h"
 #include "session/session_file.h"
 #include "session/session_runner.h"
 
@@ -24,10 +24,10 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
                         const std::filesystem::path& out);
 
 // The same for any log of a server bus. `known` may lack agents of the log.
-ReportOutcome ReportLog(const std::filesystem::path& log, const Remembered& known,
+ReportOutcome ReportLog(const std::filesystem::path& log, const SessionRecord& known,
                         const std::filesystem::path& out);
 
-// What is remembered of the session beside its log.
+// What is kept of the session beside its log.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);
 
 }  // namespace pangea::session

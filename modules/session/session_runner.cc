@@ -26,8 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStartTimeout_s = 20;  // for the server processes to report
-constexpr double kStuckAfter_s = 300;   // without a verdict, while the server is not at rest
-constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStuckAfter_s =
+    300;                          // without a verification result, while the server is not idle
+constexpr double kQuiet_s = 2.5;  // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
 
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
@@ -266,13 +267,14 @@ class Runner {
       player.ended = Now();
       summary_.failures.push_back(
           fmt::format("agent {}: {}", player.script.id, player.child->LastLine()));
-      progress_.Say(summary_.failures.back());
+      progress_.PrintLine(summary_.failures.back());
     }
   }
 
   void Revive() {
     for (const KeptProcesses::Revived& revived : kept_.Revive()) {
-      progress_.Say(fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
+      progress_.PrintLine(
+          fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
       summary_.restarted.push_back(revived.name);
       if (revived.last) {
         summary_.failures.push_back(
@@ -319,7 +321,7 @@ class Runner {
     progress_.Update(lines, monitor_, Now() - begin_);
   }
 
-  // Until every process has worked off what has come. A server that goes on judging is slow, not
+  // Until every process has worked off what has come. A server that goes on verifying is slow, not
   // stuck: it is waited for.
   void Drain() {
     std::vector<std::string> names = server_names_;
@@ -328,16 +330,16 @@ class Runner {
     }
     const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
     double deadline = Now() + patience_s;
-    int verdicts = monitor_.num_verdicts();
+    int results = monitor_.num_results();
     while (!monitor_.Idle(names, kQuiet_s)) {
-      if (!summary_.interrupted && monitor_.num_verdicts() > verdicts) {
-        verdicts = monitor_.num_verdicts();
+      if (!summary_.interrupted && monitor_.num_results() > results) {
+        results = monitor_.num_results();
         deadline = Now() + patience_s;
       }
       if (Now() > deadline) {
         if (!summary_.interrupted) {
-          summary_.failures.push_back(
-              fmt::format("the server is not at rest {} s after its last verdict", kStuckAfter_s));
+          summary_.failures.push_back(fmt::format(
+              "the server is not idle {} s after its last verification result", kStuckAfter_s));
         }
         return;
       }

@@ -52,12 +52,12 @@ Uplink::Uplink(const UplinkOptions& options, Sender::Load load)
     : options_(WithinBudget(options)), sender_(options_.sender, std::move(load)) {}
 
 void Uplink::SetStored(const KeyframeId& id) {
-  Map& map = FindOrAdd(id.map);
+  OutgoingMap& map = FindOrAdd(id.map);
   map.highest = std::max(map.highest, id.seq);
   sender_.SetStored(id);
 }
 
-Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
+Uplink::OutgoingMap& Uplink::FindOrAdd(const MapId& id) {
   const auto [it, added] = maps_.try_emplace(id);
   if (added) {
     hello_due_ = true;
@@ -72,9 +72,9 @@ Uplink::Map& Uplink::FindOrAdd(const MapId& id) {
   return it->second;
 }
 
-bool Uplink::Hear(const KeyframeId& id, int64_t now_us) {
-  Map& map = FindOrAdd(id.map);
-  map.heard_us = now_us;
+bool Uplink::NoteReceived(const KeyframeId& id, int64_t now_us) {
+  OutgoingMap& map = FindOrAdd(id.map);
+  map.received_us = now_us;
   map.probes = id.seq > map.highest ? 0 : map.probes;
   map.highest = std::max(map.highest, id.seq);
   return id.seq >= map.next && !sender_.Has(id);
@@ -82,7 +82,7 @@ bool Uplink::Hear(const KeyframeId& id, int64_t now_us) {
 
 Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes,
                                   int64_t now_us) {
-  if (!Hear(id, now_us)) {
+  if (!NoteReceived(id, now_us)) {
     return Taken::kRepeat;
   }
   return sender_.Add(id, std::move(bytes)) ? Taken::kNew : Taken::kSpoolFull;
@@ -94,7 +94,7 @@ void Uplink::AddPose(const MapId& map_id, int64_t group_revision, std::vector<ui
   FindOrAdd(map_id).applied_revision = group_revision;
 }
 
-void Uplink::SetNext(const MapId& id, Map* map, int32_t next) {
+void Uplink::SetNext(const MapId& id, OutgoingMap* map, int32_t next) {
   map->next = std::max(next, map->given_up);
   map->highest = std::max(map->highest, map->next - 1);
   if (map->listed && map->slot) {
@@ -122,16 +122,16 @@ void Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
   const size_t spooled = sender_.spooled();
   sender_.OnAck(ack, now_us);
   for (const auto& [id, seq] : ack.journalled_seq) {
-    Map& map = FindOrAdd(id);
+    OutgoingMap& map = FindOrAdd(id);
     map.listed = true;
     SetNext(id, &map, seq + 1);
   }
   keyframes_acked_ += static_cast<int64_t>(spooled - sender_.spooled());
   for (const Correction& correction : ack.corrections) {
-    Map& map = FindOrAdd(correction.map);
+    OutgoingMap& map = FindOrAdd(correction.map);
     if (!map.correction || map.correction->revision < correction.revision) {
       map.correction = correction;
-      map.told_us = 0;
+      map.sent_us = 0;
     }
     hello_due_ = true;  // confirms it
   }
@@ -166,7 +166,7 @@ void Uplink::GiveSlots(const std::vector<MapId>& announced) {
     while (!taken.insert(next_slot_).second) {
       ++next_slot_;
     }
-    Map& map = maps_.at(id);
+    OutgoingMap& map = maps_.at(id);
     map.slot = next_slot_++;
     SetNext(id, &map, map.next);
   }
@@ -176,7 +176,7 @@ void Uplink::GiveSlots(const std::vector<MapId>& announced) {
 bool Uplink::LacksSlot() const {
   const std::vector<MapId> announced = Announced();
   return std::ranges::any_of(announced, [&](const MapId& id) {
-    const Map& map = maps_.at(id);
+    const OutgoingMap& map = maps_.at(id);
     return map.listed && !map.slot;
   });
 }
@@ -187,7 +187,7 @@ std::vector<uint8_t> Uplink::Hello() {
   const std::vector<MapId> announced = Announced();
   GiveSlots(announced);
   for (const MapId& id : announced) {
-    const Map& map = maps_.at(id);
+    const OutgoingMap& map = maps_.at(id);
     hello.maps.push_back(
         {id, map.given_up, map.correction ? map.correction->revision : 0, *map.slot});
   }
@@ -228,7 +228,7 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
 }
 
 // The first seqs of a map that were published but are neither acknowledged nor in the spool.
-std::optional<SeqGap> Uplink::Missing(const MapId& id, const Map& map) const {
+std::optional<SeqGap> Uplink::Missing(const MapId& id, const OutgoingMap& map) const {
   if (sender_.spooled(id) == map.highest + 1 - map.next) {
     return std::nullopt;  // none is lost: all that are spooled lie between these two
   }
@@ -240,7 +240,7 @@ std::optional<SeqGap> Uplink::Missing(const MapId& id, const Map& map) const {
   return SeqGap{id, from, present ? *present - 1 : map.highest};
 }
 
-bool Uplink::GiveUp(const MapId& id, Map* map, const SeqGap& gap) {
+bool Uplink::GiveUp(const MapId& id, OutgoingMap* map, const SeqGap& gap) {
   const bool first = gap.from_seq == map->next;
   if (map->unanswered < kMaxUnanswered || !first || !map->listed || gap.to_seq >= map->highest) {
     return false;
@@ -262,7 +262,7 @@ std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
       continue;
     }
     auto gap = Missing(id, map);
-    if (!gap && newest && now_us - std::max(map.heard_us, map.asked_us) > kProbeInterval_us) {
+    if (!gap && newest && now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us) {
       // Nothing is known to be missing; but after a restart, or a lost last datagram, nothing
       // would be known. Silence is the usual answer.
       map.asked_us = now_us;
@@ -299,7 +299,7 @@ std::optional<SeqGap> Uplink::ProbeOlder(int64_t now_us) {
   };
   for (auto it = std::next(maps_.rbegin()); it != maps_.rend(); ++it) {
     auto& [id, map] = *it;
-    const bool due = now_us - std::max(map.heard_us, map.asked_us) > kProbeInterval_us;
+    const bool due = now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us;
     if (map.probes < kMaxProbes && due && !Missing(id, map)) {
       map.asked_us = now_us;
       return probe(id, map.highest + 1, &map.probes);
@@ -317,9 +317,9 @@ std::vector<Correction> Uplink::TakeCorrections(int64_t now_us) {
     const bool applied = map.correction && map.applied_revision >= map.correction->revision;
     const bool newest = id == maps_.rbegin()->first;
     if (map.correction && !applied &&
-        (map.told_us == 0 || (newest && now_us - map.told_us >= kSecond_us))) {
+        (map.sent_us == 0 || (newest && now_us - map.sent_us >= kSecond_us))) {
       due.push_back(*map.correction);
-      map.told_us = now_us;
+      map.sent_us = now_us;
     }
   }
   return due;

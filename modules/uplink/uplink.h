@@ -37,7 +37,7 @@ class Uplink {
   explicit Uplink(const UplinkOptions& options, Sender::Load load = nullptr);
 
   // The agent has published it; whether it is still to be taken.
-  bool Hear(const KeyframeId& id, int64_t now_us);
+  bool NoteReceived(const KeyframeId& id, int64_t now_us);
   enum class Taken { kNew, kRepeat, kSpoolFull };
   // A keyframe_t that has passed Parse, encoded and compressed.
   Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);
@@ -69,7 +69,7 @@ class Uplink {
   int64_t keyframes_lost() const { return keyframes_lost_; }
 
  private:
-  struct Map {
+  struct OutgoingMap {
     int32_t next = 0;             // the first that is not journalled (or given up)
     int32_t given_up = 0;         // those before are lost for good, unless they are journalled
     int32_t highest = -1;         // the highest the agent is known to have published
@@ -78,21 +78,21 @@ class Uplink {
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
-    int probes = 0;        // since it was last heard of, while there is a newer one
-    int64_t heard_us = 0;  // when the newest keyframe came
+    int probes = 0;           // since it was last heard of, while there is a newer one
+    int64_t received_us = 0;  // when the newest keyframe came
     std::optional<Correction> correction;
     int64_t applied_revision = 0;  // as the agent's poses say
-    int64_t told_us = 0;
+    int64_t sent_us = 0;
   };
 
-  Map& FindOrAdd(const MapId& id);
-  void SetNext(const MapId& id, Map* map, int32_t next);
-  std::optional<SeqGap> Missing(const MapId& id, const Map& map) const;
+  OutgoingMap& FindOrAdd(const MapId& id);
+  void SetNext(const MapId& id, OutgoingMap* map, int32_t next);
+  std::optional<SeqGap> Missing(const MapId& id, const OutgoingMap& map) const;
   // What may have come after the last known keyframe of a map that is not the newest, or before the
   // first known map; now and then, a few times.
   std::optional<SeqGap> ProbeOlder(int64_t now_us);
   bool HelloIsUrgent(int64_t now_us) const;
-  bool GiveUp(const MapId& id, Map* map, const SeqGap& gap);
+  bool GiveUp(const MapId& id, OutgoingMap* map, const SeqGap& gap);
   // The maps of the next hello, the newest last.
   std::vector<MapId> Announced() const;
   // Those that have no slot yet, or one that another of them has, get one.
@@ -103,7 +103,7 @@ class Uplink {
 
   const UplinkOptions options_;
   Sender sender_;
-  std::map<MapId, Map> maps_;
+  std::map<MapId, OutgoingMap> maps_;
   uint8_t next_slot_ = 0;
   int probes_of_start_ = 0;
   int64_t probed_older_us_ = 0;

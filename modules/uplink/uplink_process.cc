@@ -53,7 +53,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
   node_.Subscribe<again_t>(channels::Again(node_.name()),
                            [this](const std::string&, const again_t& again) {
                              if (again.channel == channels::Keyframe(agent_id_)) {
-                               node_.Count("keyframes_again");
+                               node_.Count("keyframes_retransmitted");
                                OnKeyframe(again.data);
                              }
                            });

@@ -52,9 +52,9 @@ void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
 
 void ViewerProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
-    if (verdicts_asked_.size() < Scene::kMaxMaps && verdicts_asked_.insert(map).second) {
-      AskAllAgain(node_, std::string(channels::kConstraint), map,
-                  std::min(highest_seq, kMaxSeqAsked));
+    if (results_requested_.size() < Scene::kMaxMaps && results_requested_.insert(map).second) {
+      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map,
+                                std::min(highest_seq, kMaxSeqAsked));
     }
   }
   keyframes_.Announce(have);
@@ -62,7 +62,7 @@ void ViewerProcess::OnHave(const Have& have) {
 
 void ViewerProcess::AskForMissing(int64_t now_utime) {
   for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    AskAgain(node_, channels::Keyframe(gap.map.agent_id), gap);
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
   }
 }
 
@@ -74,10 +74,10 @@ void ViewerProcess::Tick(int64_t now_utime) {
     next_status_utime_ = now_utime + kSecond;
     node_.Set("keyframes", static_cast<int64_t>(scene_.keyframes().size()));
     node_.Set("left_out", scene_.num_left_out());
-    node_.PublishStatus(
-        now_utime, 0,
-        fmt::format("{} agents, {} keyframes, {} verdicts shown", scene_.agents().size(),
-                    scene_.keyframes().size(), scene_.constraints().size()));
+    node_.PublishStatus(now_utime, 0,
+                        fmt::format("{} agents, {} keyframes, {} verification results shown",
+                                    scene_.agents().size(), scene_.keyframes().size(),
+                                    scene_.constraints().size()));
   }
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 // A live bus as a show: everything people may want to see of it in, STATUS_viewer out. A viewer
-// that starts late asks for the keyframes and verdicts it missed, as any process does.
+// that starts late asks for the keyframes and verification results it missed, as any process does.
 
 #include <set>
 #include <string>
@@ -42,7 +42,7 @@ class ViewerProcess : public Process, public Show {
   SceneEvents events_;
   ShowClock clock_;
   MissingMessages keyframes_;
-  std::set<MapId> verdicts_asked_;  // maps whose verdicts of before were asked for
+  std::set<MapId> results_requested_;  // maps whose verification results of before were asked for
   int64_t next_status_utime_ = 0;
 };
 

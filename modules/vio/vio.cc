@@ -40,13 +40,13 @@ int64_t Vio::ImuTimeOf(int64_t image_utime) const {
   return image_utime + std::llround(1e6 * offset_s);
 }
 
-// The gyroscope's rotation between the last image and this one, as a turn of the camera.
-Eigen::Quaterniond Vio::CameraTurn(int64_t utime) {
+// The gyroscope's rotation between the last image and this one, as a rotation of the camera.
+Eigen::Quaterniond Vio::CameraRotation(int64_t utime) {
   Eigen::Quaterniond q_last_now = Eigen::Quaterniond::Identity();
   const int64_t end = ImuTimeOf(utime);
   if (last_utime_) {
     int64_t at = ImuTimeOf(*last_utime_);
-    for (const ImuSample& sample : turn_imu_) {
+    for (const ImuSample& sample : rotation_imu_) {
       const int64_t until = std::min(sample.utime, end);
       if (until > at) {
         const double dt = 1e-6 * static_cast<double>(until - at);
@@ -55,15 +55,15 @@ Eigen::Quaterniond Vio::CameraTurn(int64_t utime) {
       }
     }
   }
-  std::erase_if(turn_imu_, [end](const ImuSample& sample) { return sample.utime <= end; });
+  std::erase_if(rotation_imu_, [end](const ImuSample& sample) { return sample.utime <= end; });
   last_utime_ = utime;
   const Eigen::Quaterniond& q_body_cam = camera_.T_body_cam.q;
   return (q_body_cam.conjugate() * q_last_now.conjugate() * q_body_cam).normalized();
 }
 
 VioOutput Vio::AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu) {
-  turn_imu_.insert(turn_imu_.end(), imu.begin(), imu.end());
-  return Estimate(tracker_.Track(utime, image, CameraTurn(utime)), image, imu);
+  rotation_imu_.insert(rotation_imu_.end(), imu.begin(), imu.end());
+  return Estimate(tracker_.Track(utime, image, CameraRotation(utime)), image, imu);
 }
 
 VioOutput Vio::AddTracks(const TrackedFrame& frame, const cv::Mat& image,

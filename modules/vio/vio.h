@@ -38,7 +38,7 @@ struct VioOutput {
   MapId map;
   Rigid3 T_odom_body;  // valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
   int num_tracked = 0;
   bool is_keyframe = false;         // it was described, and will be finished as a keyframe later
   std::vector<Keyframe> keyframes;  // finished by this image
@@ -77,7 +77,7 @@ class Vio {
 
  private:
   void OpenNewMap();
-  Eigen::Quaterniond CameraTurn(int64_t utime);
+  Eigen::Quaterniond CameraRotation(int64_t utime);
   VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
                      std::span<const ImuSample> imu);
   std::vector<Keyframe> Complete(const std::vector<FinishedKeyframe>& finished);
@@ -98,7 +98,7 @@ class Vio {
   int32_t next_seq_ = 0;
   int64_t group_revision_ = 0;
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
-  std::vector<ImuSample> turn_imu_;  // samples the next turn of the camera needs
+  std::vector<ImuSample> rotation_imu_;  // samples the next rotation of the camera needs
   std::optional<int64_t> last_utime_;
   std::map<int64_t, std::vector<Corner>> described_;  // keyframes in the window, by utime
 };

@@ -87,7 +87,7 @@ void VioProcess::Handle(const VioOutput& output) {
     node_.Count("lost");
   }
   FollowMaps(output);
-  Align(output);
+  Localize(output);
   PublishPose(output);
   for (const Keyframe& keyframe : output.keyframes) {
     PublishKeyframe(keyframe);
@@ -101,24 +101,24 @@ void VioProcess::FollowMaps(const VioOutput& output) {
   if (output.map != shown_map_) {
     shown_map_ = output.map;
     shown_.Reset(output.map);
-    alignment_.Reset(output.map);
+    localization_.Reset(output.map);
   }
   for (const Keyframe& keyframe : output.keyframes) {
-    alignment_.NotePublished(keyframe);
+    localization_.NotePublished(keyframe);
   }
 }
 
 // Looks for the map's landmarks in a new keyframe. Without any the window is not even looked at.
-void VioProcess::Align(const VioOutput& output) {
-  if (!output.is_keyframe || !alignment_.HasLandmarks()) {
+void VioProcess::Localize(const VioOutput& output) {
+  if (!output.is_keyframe || !localization_.HasLandmarks()) {
     return;
   }
   const Vio::View view = vio_->NewestKeyframe(output);
-  alignment_.AddKeyframe(view.camera, view.corners, view.window);
-  shown_.Sharpen(*alignment_.T_map_odom());
-  const LiveAlignment::Counters& counters = alignment_.counters();
-  node_.Set("keyframes_aligned", counters.aligned);
-  node_.Set("keyframes_not_aligned", counters.not_aligned);
+  localization_.AddKeyframe(view.camera, view.corners, view.window);
+  shown_.Sharpen(*localization_.T_map_odom());
+  const MapLocalization::Counters& counters = localization_.counters();
+  node_.Set("keyframes_localized", counters.localized);
+  node_.Set("keyframes_not_localized", counters.not_localized);
   node_.Set("landmarks_seen", counters.seen);
 }
 
@@ -191,13 +191,13 @@ void VioProcess::OnCorrection(const Correction& correction) {
   if (shown_.Correct(correction)) {
     node_.Count("corrections");
     vio_->set_group_revision(shown_.revision());
-    alignment_.Correct(correction);
-    shown_.Sharpen(*alignment_.T_map_odom());
+    localization_.Correct(correction);
+    shown_.Sharpen(*localization_.T_map_odom());
   }
 }
 
 void VioProcess::OnLandmarks(const MapLandmarks& landmarks) {
-  node_.Count(alignment_.Take(landmarks) ? "landmark_messages" : "landmark_messages_unused");
+  node_.Count(localization_.Take(landmarks) ? "landmark_messages" : "landmark_messages_unused");
 }
 
 }  // namespace pangea::vio

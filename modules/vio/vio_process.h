@@ -20,7 +20,7 @@
 #include "bus/retransmission/keyframe_outlet.h"
 #include "log_file/log_writer.h"
 #include "recording/euroc.h"
-#include "vio/live/live_alignment.h"
+#include "vio/live/map_localization.h"
 #include "vio/live/shown_pose.h"
 #include "vio/vio.h"
 
@@ -71,7 +71,7 @@ class VioProcess : public Process {
   void OnCorrection(const Correction& correction);
   void OnLandmarks(const MapLandmarks& landmarks);
   void FollowMaps(const VioOutput& output);
-  void Align(const VioOutput& output);
+  void Localize(const VioOutput& output);
   void Handle(const VioOutput& output);
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
@@ -83,7 +83,7 @@ class VioProcess : public Process {
   KeyframeOutlet outlet_;
   std::optional<Vio> vio_;
   ShownPose shown_;
-  LiveAlignment alignment_;
+  MapLocalization localization_;
   MapId shown_map_;
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;

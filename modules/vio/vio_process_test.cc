@@ -251,7 +251,7 @@ TEST_F(VioProcessTest, LandmarksDoNotReachTheOdometry) {
   }
   EXPECT_EQ(Counter("landmark_messages"), 1);
   EXPECT_EQ(status_.num_refused, 1);
-  EXPECT_GT(Counter("keyframes_aligned") + Counter("keyframes_not_aligned"), 0);
+  EXPECT_GT(Counter("keyframes_localized") + Counter("keyframes_not_localized"), 0);
   EXPECT_EQ(published[0], published[1]);
 }
 
@@ -263,7 +263,7 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   bus_.Drain();
   ASSERT_GE(keyframes_.size(), 4u);
   EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
-  EXPECT_FALSE(process.outlet().uplink_ever_heard());
+  EXPECT_FALSE(process.outlet().uplink_ever_seen());
   have_t have{};
   have.num_maps = 1;
   have.maps.push_back(ToMessage(keyframes_[0].id.map));
@@ -280,7 +280,7 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   PublishMessage(bus_, "RESEND_REQUEST", request);
   bus_.Drain();
   EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
-  EXPECT_TRUE(process.outlet().uplink_ever_heard());
+  EXPECT_TRUE(process.outlet().uplink_ever_seen());
   ASSERT_EQ(again_.size(), 2u);
   keyframe_t keyframe{};
   ASSERT_TRUE(DecodeMessage(again_[0].data, &keyframe));

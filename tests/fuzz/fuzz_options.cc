@@ -6,7 +6,7 @@
 #include "fuzz.h"
 #include "global_ba/global_ba_yaml.h"
 #include "link/agent_key.h"
-#include "loop_verification/alignment_yaml.h"
+#include "loop_verification/loop_verification_yaml.h"
 #include "map_points/map_points_yaml.h"
 #include "posegraph/posegraph_yaml.h"
 #include "session/session_file.h"
@@ -50,7 +50,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   void (*const targets[])(const std::string&) = {
       fuzz::ReadSession,
       fuzz::ReadOptions<vio::VioFileOptions>,
-      fuzz::ReadOptions<AlignmentOptions>,
+      fuzz::ReadOptions<LoopVerificationOptions>,
       fuzz::ReadOptions<PoseGraphOptions>,
       fuzz::ReadOptions<GlobalBaOptions>,
       fuzz::ReadOptions<MapPointsOptions>,

@@ -19,7 +19,7 @@
 #include "link/compression.h"
 #include "link_channels.h"
 #include "log_file/log_reader.h"
-#include "loop_verification/alignment_yaml.h"
+#include "loop_verification/loop_verification_yaml.h"
 #include "map_points/map_points_yaml.h"
 #include "messages/messages.h"
 #include "pangea_schemas.h"
@@ -109,7 +109,7 @@ Payload Landmarks(const MapId& map) {
   return EncodeMessage(ToMessage(landmarks));
 }
 
-Payload Verdicts(const MapId& map) {
+Payload Results(const MapId& map) {
   verdict_request_t request{};
   request.requester = "posegraph";
   request.map = ToMessage(map);
@@ -150,7 +150,7 @@ void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
       {"pose", EncodePose(pose)},
       {"compressed", Compress(first)},
       {"landmarks", Landmarks(map)},
-      {"verdict_request", Verdicts(map)},
+      {"verdict_request", Results(map)},
   };
   for (size_t i = 0; i < seeds.size(); ++i) {
     Payload bytes{static_cast<uint8_t>(i)};
@@ -280,7 +280,7 @@ void OptionFiles(const Corpus& corpus) {
   const std::vector<std::pair<std::string, std::string>> seeds = {
       {"session", session},
       {"vio", Printed<vio::VioFileOptions>()},
-      {"alignment", Printed<AlignmentOptions>()},
+      {"alignment", Printed<LoopVerificationOptions>()},
       {"posegraph", Printed<PoseGraphOptions>()},
       {"global_ba", Printed<GlobalBaOptions>()},
       {"map_points", Printed<MapPointsOptions>()},

@@ -70,11 +70,11 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
   node_.Subscribe<resend_request_t>(
       std::string(channels::kResendRequest),
       [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
-  node_.Listen<verdict_request_t>(channels::kVerdictRequest,
-                                  std::bind_front(&Archive::OnVerdictRequest, this));
+  node_.Listen<verdict_request_t>(channels::kVerificationRequest,
+                                  std::bind_front(&Archive::OnVerificationRequest, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnAgain(message); });
+      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
 }
 
 void Archive::OnResendRequest(const resend_request_t& message) {
@@ -87,13 +87,13 @@ void Archive::OnResendRequest(const resend_request_t& message) {
   }
 }
 
-void Archive::OnVerdictRequest(const VerdictRequest& request) {
+void Archive::OnVerificationRequest(const VerificationRequest& request) {
   if (request.requester != node_.name() && !resend_queue_.Add(request, index_)) {
     node_.Refuse("too many resend requests are waiting");
   }
 }
 
-void Archive::OnAgain(const again_t& message) {
+void Archive::OnRetransmission(const again_t& message) {
   if (message.channel == channels::kPlaceMatch) {
     OnAnswer<place_match_t>(message.channel, message.data);
   } else if (message.channel == channels::kConstraint) {
@@ -139,7 +139,7 @@ bool Archive::LoadAnswer(Bytes data, const JournalPlace& place) {
     node_.Count("journal_events_unreadable");
     return !IsDamaged<Message>(data);
   }
-  if (index_.Look(*answer.value) == JournalIndex::Added::kNew) {
+  if (index_.Check(*answer.value) == JournalIndex::Added::kNew) {
     index_.Add(*answer.value, place);
   }
   return true;
@@ -184,7 +184,7 @@ void Archive::OnAnswer(const std::string& channel, Bytes data) {
   if (data.size() > kMaxJournalledBytes) {
     return node_.Refuse(channel + " is too large");
   }
-  const JournalIndex::Added added = index_.Look(*answer.value);
+  const JournalIndex::Added added = index_.Check(*answer.value);
   if (added == JournalIndex::Added::kUnknownKeyframe) {
     return node_.Refuse(channel + " of a keyframe that is not journalled");
   }
@@ -194,7 +194,7 @@ void Archive::OnAnswer(const std::string& channel, Bytes data) {
 }
 
 void Archive::AnswerResendRequests() {
-  // Also bounds the work of one call when keyframes have no match or verdict to send.
+  // Also bounds the work of one call when keyframes have no match or verification result to send.
   constexpr int kMaxKeyframes = 200;
   resend_pacer_.Refill(now_us_);
   for (int i = 0; i < kMaxKeyframes && resend_pacer_.Ready(); ++i) {
@@ -212,7 +212,7 @@ void Archive::AnswerResendRequests() {
         continue;
       }
       node_.Publish(channels::Again(answer->requester), again);
-      node_.Count("sent_again");
+      node_.Count("retransmitted");
       resend_pacer_.Take(again.num_bytes);
     }
   }
@@ -237,13 +237,13 @@ void Archive::PublishHave() {
   } while (it != by_age_.end());
 }
 
-void Archive::AskForOwed() {
-  const OwedQuestions::Questions questions = owed_.Due(index_, now_utime_);
-  for (const SeqGap& gap : questions.matches) {
-    AskAgain(node_, std::string(channels::kPlaceMatch), gap);
+void Archive::RequestOutstanding() {
+  const OutstandingResults::Requests requests = outstanding_.Due(index_, now_utime_);
+  for (const SeqGap& gap : requests.matches) {
+    RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
   }
-  for (const VerdictNames& names : questions.verdicts) {
-    AskForVerdicts(node_, names);
+  for (const ResultNames& names : requests.results) {
+    RequestResults(node_, names);
   }
 }
 
@@ -252,7 +252,7 @@ void Archive::SetCounters() {
   node_.Set("journal_keyframes", index_.num_keyframes());
   node_.Set("journal_matches", index_.num_matches());
   node_.Set("journal_constraints", index_.num_constraints());
-  node_.Set("verdicts_missing", index_.num_missing_verdicts());
+  node_.Set("results_missing", index_.num_missing_results());
 }
 
 }  // namespace pangea

@@ -1,7 +1,8 @@
 #pragma once
 
-// What the server has on its disk, towards the server bus: keyframes, place matches and verdicts,
-// each journalled once, told about (HAVE) and sent again to whoever lacks them.
+// What the server has on its disk, towards the server bus: keyframes, place matches and
+// verification results, each journalled once, told about (HAVE) and sent again to whoever lacks
+// them.
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
 //               VERDICT_REQUEST out;
 //               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name> in
@@ -15,7 +16,7 @@
 #include <vector>
 
 #include "agent_handler/journal/journal.h"
-#include "agent_handler/journal/owed_questions.h"
+#include "agent_handler/journal/outstanding_results.h"
 #include "agent_handler/journal/resend_queue.h"
 #include "bus/node.h"
 #include "link/pacer.h"
@@ -47,8 +48,8 @@ class Archive {
   std::vector<KeyframeId> Sync();
   void AnswerResendRequests();
   void PublishHave();
-  // Asks for the matches and verdicts that keyframes should have by now.
-  void AskForOwed();
+  // Asks for the matches and verification results that keyframes should have by now.
+  void RequestOutstanding();
   void SetCounters();
 
   // The highest seq on the disk of each map; the maps in the journal's order.
@@ -69,8 +70,8 @@ class Archive {
   };
 
   void OnResendRequest(const resend_request_t& message);
-  void OnVerdictRequest(const VerdictRequest& request);
-  void OnAgain(const again_t& message);
+  void OnVerificationRequest(const VerificationRequest& request);
+  void OnRetransmission(const again_t& message);
   void NoteJournalled(const KeyframeId& id);
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
@@ -87,7 +88,7 @@ class Archive {
   int64_t oldest_unsynced_us_ = 0;
   std::map<MapId, int32_t> have_;
   std::vector<MapId> by_age_;
-  OwedQuestions owed_;
+  OutstandingResults outstanding_;
   ResendQueue resend_queue_;
   Pacer resend_pacer_;
   int64_t now_us_ = 0;

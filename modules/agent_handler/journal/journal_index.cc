@@ -4,7 +4,7 @@
 
 namespace pangea {
 
-const JournalIndex::Map* JournalIndex::FindMap(const MapId& id) const {
+const JournalIndex::MapIndex* JournalIndex::FindMap(const MapId& id) const {
   const auto it = maps_.find(id);
   return it == maps_.end() ? nullptr : &it->second;
 }
@@ -15,42 +15,42 @@ JournalIndex::Added JournalIndex::AddKeyframe(const KeyframeId& id, const Journa
   return added ? Added::kNew : Added::kRepeat;
 }
 
-JournalIndex::Added JournalIndex::Look(const PlaceMatch& match) const {
-  const Map* map = FindMap(match.query.map);
+JournalIndex::Added JournalIndex::Check(const PlaceMatch& match) const {
+  const MapIndex* map = FindMap(match.query.map);
   if (map == nullptr || !map->keyframes.contains(match.query.seq)) {
     return Added::kUnknownKeyframe;
   }
   return map->matches.contains(match.query.seq) ? Added::kRepeat : Added::kNew;
 }
 
-JournalIndex::Added JournalIndex::Look(const Constraint& constraint) const {
-  const Map* map = FindMap(constraint.to.map);
+JournalIndex::Added JournalIndex::Check(const Constraint& constraint) const {
+  const MapIndex* map = FindMap(constraint.to.map);
   if (map == nullptr || !map->keyframes.contains(constraint.to.seq)) {
     return Added::kUnknownKeyframe;
   }
-  const auto verdicts = map->verdicts.find(constraint.to.seq);
-  if (verdicts == map->verdicts.end()) {
+  const auto results = map->results.find(constraint.to.seq);
+  if (results == map->results.end()) {
     return Added::kNew;
   }
-  const bool known = verdicts->second.contains(constraint.Id());
-  return known || verdicts->second.size() >= kMaxVerdicts ? Added::kRepeat : Added::kNew;
+  const bool known = results->second.contains(constraint.Id());
+  return known || results->second.size() >= kMaxResults ? Added::kRepeat : Added::kNew;
 }
 
 void JournalIndex::Add(const PlaceMatch& match, const JournalPlace& place) {
-  Map& map = maps_[match.query.map];
+  MapIndex& map = maps_[match.query.map];
   if (!map.matches.emplace(match.query.seq, place).second) {
     return;
   }
   ++num_matches_;
-  const auto verdicts = map.verdicts.find(match.query.seq);
+  const auto results = map.results.find(match.query.seq);
   for (const PlaceCandidate& candidate : match.candidates) {
     Constraint expected;
     expected.from = candidate.match;
     expected.to = match.query;
     expected.kind = candidate.kind;
-    const bool known = verdicts != map.verdicts.end() && verdicts->second.contains(expected.Id());
-    if (!known && map.missing_verdicts[match.query.seq].insert(expected.Id()).second) {
-      ++num_missing_verdicts_;
+    const bool known = results != map.results.end() && results->second.contains(expected.Id());
+    if (!known && map.missing_results[match.query.seq].insert(expected.Id()).second) {
+      ++num_missing_results_;
     }
   }
   while (map.matches.contains(map.matched_below)) {
@@ -59,27 +59,27 @@ void JournalIndex::Add(const PlaceMatch& match, const JournalPlace& place) {
 }
 
 void JournalIndex::Add(const Constraint& constraint, const JournalPlace& place) {
-  Map& map = maps_[constraint.to.map];
-  const bool added = map.verdicts[constraint.to.seq].emplace(constraint.Id(), place).second;
+  MapIndex& map = maps_[constraint.to.map];
+  const bool added = map.results[constraint.to.seq].emplace(constraint.Id(), place).second;
   num_constraints_ += added ? 1 : 0;
-  const auto missing = map.missing_verdicts.find(constraint.to.seq);
-  if (missing != map.missing_verdicts.end() && missing->second.erase(constraint.Id()) > 0) {
-    --num_missing_verdicts_;
+  const auto missing = map.missing_results.find(constraint.to.seq);
+  if (missing != map.missing_results.end() && missing->second.erase(constraint.Id()) > 0) {
+    --num_missing_results_;
     if (missing->second.empty()) {
-      map.missing_verdicts.erase(missing);
+      map.missing_results.erase(missing);
     }
   }
 }
 
 std::vector<JournalPlace> JournalIndex::Find(JournalChannel channel, const KeyframeId& id) const {
-  const Map* map = FindMap(id.map);
+  const MapIndex* map = FindMap(id.map);
   if (map == nullptr) {
     return {};
   }
   std::vector<JournalPlace> places;
   if (channel == JournalChannel::kConstraint) {
-    const auto it = map->verdicts.find(id.seq);
-    if (it != map->verdicts.end()) {
+    const auto it = map->results.find(id.seq);
+    if (it != map->results.end()) {
       for (const auto& [constraint_id, place] : it->second) {
         places.push_back(place);
       }
@@ -94,27 +94,27 @@ std::vector<JournalPlace> JournalIndex::Find(JournalChannel channel, const Keyfr
   return places;
 }
 
-std::vector<JournalPlace> JournalIndex::Find(const VerdictNames& names) const {
+std::vector<JournalPlace> JournalIndex::Find(const ResultNames& names) const {
   std::vector<JournalPlace> places;
-  const Map* map = FindMap(names.map);
+  const MapIndex* map = FindMap(names.map);
   if (map == nullptr) {
     return places;
   }
-  for (const auto& [seq, constraint_id] : names.verdicts) {
-    const auto of_keyframe = map->verdicts.find(seq);
-    if (of_keyframe == map->verdicts.end()) {
+  for (const auto& [seq, constraint_id] : names.results) {
+    const auto of_keyframe = map->results.find(seq);
+    if (of_keyframe == map->results.end()) {
       continue;
     }
-    const auto verdict = of_keyframe->second.find(constraint_id);
-    if (verdict != of_keyframe->second.end()) {
-      places.push_back(verdict->second);
+    const auto result = of_keyframe->second.find(constraint_id);
+    if (result != of_keyframe->second.end()) {
+      places.push_back(result->second);
     }
   }
   return places;
 }
 
 int32_t JournalIndex::Highest(const MapId& id) const {
-  const Map* map = FindMap(id);
+  const MapIndex* map = FindMap(id);
   return map == nullptr || map->keyframes.empty() ? -1 : map->keyframes.rbegin()->first;
 }
 
@@ -127,7 +127,7 @@ std::vector<MapId> JournalIndex::Maps() const {
 }
 
 std::vector<SeqGap> JournalIndex::Gaps(const MapId& id) const {
-  const Map* map = FindMap(id);
+  const MapIndex* map = FindMap(id);
   std::vector<SeqGap> gaps;
   if (map == nullptr || static_cast<int64_t>(map->keyframes.size()) == Highest(id) + 1) {
     return gaps;
@@ -143,7 +143,7 @@ std::vector<SeqGap> JournalIndex::Gaps(const MapId& id) const {
 }
 
 std::optional<SeqGap> JournalIndex::MissingMatches(const MapId& id, int32_t up_to) const {
-  const Map* map = FindMap(id);
+  const MapIndex* map = FindMap(id);
   if (map == nullptr) {
     return std::nullopt;
   }
@@ -158,18 +158,18 @@ std::optional<SeqGap> JournalIndex::MissingMatches(const MapId& id, int32_t up_t
   return std::nullopt;
 }
 
-VerdictNames JournalIndex::MissingVerdicts(const MapId& id, int32_t up_to) const {
-  VerdictNames names{id, {}};
-  const Map* map = FindMap(id);
+ResultNames JournalIndex::MissingResults(const MapId& id, int32_t up_to) const {
+  ResultNames names{id, {}};
+  const MapIndex* map = FindMap(id);
   if (map == nullptr) {
     return names;
   }
-  for (const auto& [seq, constraint_ids] : map->missing_verdicts) {
+  for (const auto& [seq, constraint_ids] : map->missing_results) {
     for (const int64_t constraint_id : constraint_ids) {
-      if (seq > up_to || names.verdicts.size() == VerdictNames::kMax) {
+      if (seq > up_to || names.results.size() == ResultNames::kMax) {
         return names;
       }
-      names.verdicts.emplace_back(seq, constraint_id);
+      names.results.emplace_back(seq, constraint_id);
     }
   }
   return names;

@@ -44,7 +44,7 @@ std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex
   return "";
 }
 
-bool ResendQueue::Add(const VerdictRequest& request, const JournalIndex& index) {
+bool ResendQueue::Add(const VerificationRequest& request, const JournalIndex& index) {
   std::vector<JournalPlace> places = index.Find(request.names);
   if (!places.empty() && waiting() >= kMaxRequests) {
     return false;

@@ -21,8 +21,9 @@ class ResendQueue {
 
   // Why it was refused, or an empty string.
   std::string Add(const resend_request_t& request, const JournalIndex& index);
-  // For the verdicts that are journalled; the others will come. False when too many requests wait.
-  bool Add(const VerdictRequest& request, const JournalIndex& index);
+  // For the verification results that are journalled; the others will come. False when too many
+  // requests wait.
+  bool Add(const VerificationRequest& request, const JournalIndex& index);
 
   struct Answer {
     std::string requester;
@@ -42,7 +43,7 @@ class ResendQueue {
     int32_t to_seq;
   };
   std::deque<Request> requests_;
-  std::deque<Answer> named_;  // answers to requests that name verdicts
+  std::deque<Answer> named_;  // answers to requests that name verification results
 };
 
 }  // namespace pangea

@@ -10,7 +10,7 @@ void JournalFirstBus::Subscribe(const std::string& channel_regex, Handler handle
   const Handler* kept = &handlers_.emplace_back(std::move(handler));
   bus_.Subscribe(channel_regex, [this, kept](const std::string& channel, Bytes data) {
     if (open_ || channel == channels::kHave) {
-      have_heard_ = have_heard_ || channel == channels::kHave;
+      have_received_ = have_received_ || channel == channels::kHave;
       (*kept)(channel, data);
     } else if (waiting_.size() < kMaxWaiting) {
       waiting_.push_back({kept, channel, {data.begin(), data.end()}});
@@ -19,7 +19,7 @@ void JournalFirstBus::Subscribe(const std::string& channel_regex, Handler handle
 }
 
 void JournalFirstBus::Poll(int64_t now_utime) {
-  if (open_ || (!have_heard_ && now_utime < begin_utime_ + kLongest_us)) {
+  if (open_ || (!have_received_ && now_utime < begin_utime_ + kLongest_us)) {
     return;
   }
   open_ = true;

@@ -42,7 +42,7 @@ class JournalFirstBus : public Bus {
   Bus& bus_;
   const int64_t begin_utime_;
   bool open_ = false;
-  bool have_heard_ = false;
+  bool have_received_ = false;
   std::deque<Handler> handlers_;
   std::deque<Waiting> waiting_;
 };

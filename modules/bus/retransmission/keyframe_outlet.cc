@@ -10,7 +10,7 @@
 
 namespace pangea {
 KeyframeOutlet::KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime)
-    : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_heard_utime_(now_utime) {
+    : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_seen_utime_(now_utime) {
   node_.Listen<have_t>(channels::kHave, std::bind_front(&KeyframeOutlet::OnHave, this));
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&KeyframeOutlet::OnResendRequest, this));
@@ -28,9 +28,9 @@ void KeyframeOutlet::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
 }
 
 void KeyframeOutlet::Tick(int64_t now_utime) {
-  if (uplink_heard_) {
-    uplink_heard_utime_ = now_utime;
-    uplink_heard_ = false;
+  if (uplink_seen_) {
+    uplink_seen_utime_ = now_utime;
+    uplink_seen_ = false;
   }
 }
 
@@ -44,8 +44,8 @@ int64_t KeyframeOutlet::Unacknowledged() const {
 }
 
 void KeyframeOutlet::OnHave(const Have& have) {
-  uplink_heard_ = true;
-  uplink_ever_heard_ = true;
+  uplink_seen_ = true;
+  uplink_ever_seen_ = true;
   for (const auto& [map, highest_seq] : have.highest_seq) {
     if (map.agent_id == agent_id_) {
       int32_t& acknowledged = acknowledged_[map];

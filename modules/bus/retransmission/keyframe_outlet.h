@@ -34,8 +34,8 @@ class KeyframeOutlet {
   // Keyframes published and not yet acknowledged, as far as HAVE says.
   int64_t Unacknowledged() const;
   // When the uplink last spoke, wall clock; the start before it ever did.
-  int64_t uplink_heard_utime() const { return uplink_heard_utime_; }
-  bool uplink_ever_heard() const { return uplink_ever_heard_; }
+  int64_t uplink_seen_utime() const { return uplink_seen_utime_; }
+  bool uplink_ever_seen() const { return uplink_ever_seen_; }
 
  private:
   struct KeptKeyframe {
@@ -53,9 +53,9 @@ class KeyframeOutlet {
   std::deque<KeptKeyframe> kept_;
   std::map<MapId, int32_t> published_;     // keyframes of each map
   std::map<MapId, int32_t> acknowledged_;  // of each map, how many
-  int64_t uplink_heard_utime_ = 0;
-  bool uplink_ever_heard_ = false;
-  bool uplink_heard_ = false;  // since the last tick
+  int64_t uplink_seen_utime_ = 0;
+  bool uplink_ever_seen_ = false;
+  bool uplink_seen_ = false;  // since the last tick
 };
 
 }  // namespace pangea

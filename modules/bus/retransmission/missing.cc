@@ -15,7 +15,7 @@ constexpr int32_t kMaxSmallAsked = 500;
 
 }  // namespace
 
-void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
+void RequestRetransmission(Node& node, const std::string& channel, const SeqGap& gap) {
   resend_request_t request{};
   request.requester = node.name();
   request.channel = channel;
@@ -26,27 +26,29 @@ void AskAgain(Node& node, const std::string& channel, const SeqGap& gap) {
   node.NoteResendAsked();
 }
 
-void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq) {
+void RequestAllRetransmissions(Node& node, const std::string& channel, const MapId& map,
+                               int32_t highest_seq) {
   for (int32_t seq = 0; seq <= highest_seq; seq += kMaxSmallAsked) {
-    AskAgain(node, channel, {map, seq, std::min(seq + kMaxSmallAsked - 1, highest_seq)});
+    RequestRetransmission(node, channel,
+                          {map, seq, std::min(seq + kMaxSmallAsked - 1, highest_seq)});
   }
 }
 
-void AskForVerdicts(Node& node, const VerdictNames& names) {
+void RequestResults(Node& node, const ResultNames& names) {
   verdict_request_t request{};
   request.requester = node.name();
   request.map = ToMessage(names.map);
-  for (const auto& [seq, constraint_id] : names.verdicts) {
+  for (const auto& [seq, constraint_id] : names.results) {
     request.seq.push_back(seq);
     request.constraint_id.push_back(constraint_id);
   }
   request.num_verdicts = static_cast<int16_t>(request.seq.size());
-  node.Publish(std::string(channels::kVerdictRequest), request);
+  node.Publish(std::string(channels::kVerificationRequest), request);
   node.NoteResendAsked();
 }
 
 void AskForState(Node& node, const MapId& map) {
-  AskAgain(node, std::string(channels::kMapState), {map, 0, 0});
+  RequestRetransmission(node, std::string(channels::kMapState), {map, 0, 0});
 }
 
 void MissingMessages::Announce(const Have& have) {

@@ -17,18 +17,19 @@
 namespace pangea {
 
 // RESEND_REQUEST for the gap's messages of a channel; the answers come on AGAIN_<node's name>.
-void AskAgain(Node& node, const std::string& channel, const SeqGap& gap);
+void RequestRetransmission(Node& node, const std::string& channel, const SeqGap& gap);
 // The same for all the messages from a map's first keyframe to its `highest_seq`th, in several
 // requests; for small messages.
-void AskAllAgain(Node& node, const std::string& channel, const MapId& map, int32_t highest_seq);
+void RequestAllRetransmissions(Node& node, const std::string& channel, const MapId& map,
+                               int32_t highest_seq);
 
-// VERDICT_REQUEST for the verdicts of these names (at most VerdictNames::kMax).
-void AskForVerdicts(Node& node, const VerdictNames& names);
+// VERDICT_REQUEST for the verification results of these names (at most ResultNames::kMax).
+void RequestResults(Node& node, const ResultNames& names);
 
 // The answer to such a request.
 template <typename Message>
-void TellAgain(Node& node, const std::string& requester, const std::string& channel,
-               const Message& message) {
+void Retransmit(Node& node, const std::string& requester, const std::string& channel,
+                const Message& message) {
   again_t again{};
   again.channel = channel;
   again.data = EncodeMessage(message);
@@ -39,7 +40,7 @@ void TellAgain(Node& node, const std::string& requester, const std::string& chan
 // Gives what an answer holds to `handler`, as Node::Listen would, if it is such a message (LCM's
 // fingerprint tells); whether it is.
 template <typename Message, typename Handler>
-bool TakeAgain(Node& node, const again_t& again, const Handler& handler) {
+bool TakeRetransmission(Node& node, const again_t& again, const Handler& handler) {
   Message message{};
   const bool is_one = DecodeMessage(Bytes(again.data.data(), again.data.size()), &message);
   if (is_one) {

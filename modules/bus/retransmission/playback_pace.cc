@@ -38,7 +38,7 @@ void PlaybackPace::WaitForAcknowledgements() {
   int64_t unacknowledged = outlet_.Unacknowledged();
   int64_t progress_utime = WallUtime();
   while (bus_ != nullptr && !StopRequested() && outlet_.Unacknowledged() > kMaxAhead &&
-         WallUtime() - outlet_.uplink_heard_utime() < kUplinkSilence_us &&
+         WallUtime() - outlet_.uplink_seen_utime() < kUplinkSilence_us &&
          WallUtime() - progress_utime < kNoProgress_us) {
     Serve(50);
     if (outlet_.Unacknowledged() < unacknowledged) {
@@ -51,7 +51,7 @@ void PlaybackPace::WaitForAcknowledgements() {
 void PlaybackPace::WaitAtTheEnd() {
   const int64_t begin = WallUtime();
   while (bus_ != nullptr && outlet_.Unacknowledged() > 0 && !StopRequested() &&
-         WallUtime() - begin < (outlet_.uplink_ever_heard() ? kLastWait_us : kLastWaitAlone_us)) {
+         WallUtime() - begin < (outlet_.uplink_ever_seen() ? kLastWait_us : kLastWaitAlone_us)) {
     Serve(50);
   }
 }

@@ -13,7 +13,7 @@ constexpr double kGravity = 9.81;
 struct ImuSample {
   int64_t utime = 0;                               // microseconds, sensor clock
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  // rad/s, body
-  // Specific force, m/s^2, body: at rest it points up with length kGravity.
+  // Specific force, m/s^2, body: of a stationary one it points up with length kGravity.
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 };
 
@@ -23,8 +23,8 @@ struct ImuNoise {
   double accel_noise_density = 2.0000e-3;  // m/s^2/sqrt(Hz)
   double accel_random_walk = 3.0000e-3;    // m/s^3/sqrt(Hz)
   double rate_hz = 200;
-  // What calibration leaves of scales (a share) and axes (rad), standard deviations. 0: it is
-  // exact.
+  // What calibration leaves of scale factors (a share) and axes (rad), standard deviations. 0: it
+  // is exact.
   double gyro_scale_sigma = 0.002;
   double accel_scale_sigma = 0.001;
   double axes_sigma = 0.002;

@@ -21,7 +21,7 @@ Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   }
   Preintegration& p = result_;
   const Eigen::Vector3d omega = 0.5 * (a.gyro + b.gyro) - p.gyro_bias;
-  // Specific force at the middle of the interval, turned by half of its rotation.
+  // Specific force at the middle of the interval, rotated by half of its rotation.
   const Eigen::Vector3d accel = 0.5 * (a.accel + b.accel) - p.accel_bias;
   const Eigen::Quaterniond half = ExpSo3(0.5 * dt * omega);
   const Eigen::Matrix3d R_mid = (p.delta_q * half).toRotationMatrix();

@@ -127,7 +127,7 @@ class AgentWalk {
   // Position and yaw drift by a random walk; the tilt error wanders but stays bounded.
   void Odometry(int k, Keyframe* keyframe) {
     const Rigid3& T_hall_body = agent_.T_hall_body[k];
-    constexpr double kStays = 0.95;  // of the tilt error from keyframe to keyframe
+    constexpr double kKept = 0.95;  // of the tilt error from keyframe to keyframe
     const Eigen::Vector3d fresh(Normal(random_, options_.tilt_sigma),
                                 Normal(random_, options_.tilt_sigma), 0);
     Eigen::Vector3d p_odom(Uniform(random_, -9, 9), Uniform(random_, -9, 9), 0.4);
@@ -140,7 +140,7 @@ class AgentWalk {
       p_odom = last.T_odom_body.t + ExpSo3(tilt_) * (YawRotation(yaw_odom_hall_) * step_hall) +
                NormalVector(random_, options_.edge_sigma_m);
       yaw_odom_hall_ += Normal(random_, options_.edge_sigma_yaw);
-      tilt = kStays * tilt_ + std::sqrt(1 - kStays * kStays) * fresh;
+      tilt = kKept * tilt_ + std::sqrt(1 - kKept * kKept) * fresh;
     }
     tilt_ = tilt;
     keyframe->T_odom_body = {

@@ -82,11 +82,11 @@ test("the newest state has every keyframe of either agent", async () => {
   }
 });
 
-test("verdicts say why", async () => {
-  const verdicts = await messagesOf("/verdicts");
-  assert.equal(verdicts.length, events.filter(({ channel }) => channel === "CONSTRAINT").length);
-  assert.ok(verdicts.some(({ message }) => message.level === 2 && message.message.endsWith("accepted")));
-  assert.ok(verdicts.some(({ message }) => message.level === 3 && message.message.includes("the surroundings contradict")));
+test("verification results say why", async () => {
+  const results = await messagesOf("/verification_results");
+  assert.equal(results.length, events.filter(({ channel }) => channel === "CONSTRAINT").length);
+  assert.ok(results.some(({ message }) => message.level === 2 && message.message.endsWith("accepted")));
+  assert.ok(results.some(({ message }) => message.level === 3 && message.message.includes("the surroundings contradict")));
 });
 
 test("what Foxglove knows has the fields that its schemas want, and no others", async () => {

@@ -4,7 +4,7 @@
 //   /scene          foxglove.SceneUpdate     of each group: its agents' trajectories, its constraints
 //   /points/<map>   foxglove.PointCloud      the map points in the end, from the log's beginning on
 //   /tf             foxglove.FrameTransform  where a fused map's own frame lies in its group's; each agent's body, to follow it
-//   /verdicts       foxglove.Log             every constraint, accepted or why it was refused
+//   /verification_results       foxglove.Log             every constraint, accepted or why it was refused
 // A frame is a map's or its group's, "map 1/1700000000000000" after the map whose odom frame it is, or an agent's: "body 1".
 
 const TRACKING = 2; // pose_t.STATE_TRACKING
@@ -75,7 +75,7 @@ export class Drawn {
       case "correction_t": return this.#correction(timestamp, message);
       case "pose_t": return this.#pose(timestamp, message, channel.slice("POSE_".length));
       case "map_state_t": return channel === "MAP_STATE" ? this.#state(timestamp, message) : [];
-      case "constraint_t": return this.#verdict(timestamp, message);
+      case "constraint_t": return this.#verificationResult(timestamp, message);
       default: return [];
     }
   }
@@ -129,10 +129,10 @@ export class Drawn {
     return { deletions: [...gone].map((id) => ({ timestamp, type: 0, id })), entities };
   }
 
-  #verdict(timestamp, constraint) {
+  #verificationResult(timestamp, constraint) {
     this.#constraints.push(constraint);
     const { id, from, to, kind, accepted, reason } = constraint;
-    return [["/verdicts", "foxglove.Log", {
+    return [["/verification_results", "foxglove.Log", {
       timestamp, level: accepted ? INFO : WARNING, name: kind === INTRA ? "inter_map_ba" : "fusion",
       message: `${id}: ${keyOf(to)} in ${keyOf(from)}: ${accepted ? "accepted" : reason}`, file: "", line: 0,
     }]];

@@ -102,14 +102,14 @@ std::array<std::vector<PointMatch>, 2> HalvesOfView(const Window& window_m, cons
                                                     const std::vector<PointMatch>& matches,
                                                     const Rigid3& T_m_c) {
   const Rigid3& T_w_cam = window_m.T_w_cam.back();
-  const Eigen::Vector3d sight = T_w_cam.q * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d across = sight.cross(Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d view_ray = T_w_cam.q * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d across = view_ray.cross(Eigen::Vector3d::UnitZ());
   std::vector<double> sides;
   for (const PointMatch& match : matches) {
     const bool forward = match.direction == Direction::kForward;
     const Eigen::Vector3d& p_w = (forward ? window_m : window_c).landmarks[match.landmark].p_w;
     const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(T_m_c * p_w)) - T_w_cam.t;
-    sides.push_back(ray.dot(across) / ray.dot(sight));
+    sides.push_back(ray.dot(across) / ray.dot(view_ray));
   }
   const double middle = Median(sides);
   std::array<std::vector<PointMatch>, 2> halves;

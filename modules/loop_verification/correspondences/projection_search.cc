@@ -91,11 +91,12 @@ std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& la
     return std::nullopt;
   }
   // The two lines of sight, in the observing window.
-  const Eigen::Vector3d sight = y - T_w_cam.t;
-  const Eigen::Vector3d host_sight = y - T_observer_holder * holder.T_w_cam[landmark.host.frame].t;
-  const double scale = std::abs(std::log(sight.norm() / host_sight.norm()));
+  const Eigen::Vector3d view_ray = y - T_w_cam.t;
+  const Eigen::Vector3d host_view_ray =
+      y - T_observer_holder * holder.T_w_cam[landmark.host.frame].t;
+  const double scale = std::abs(std::log(view_ray.norm() / host_view_ray.norm()));
   const double angle =
-      std::acos(std::clamp(sight.normalized().dot(host_sight.normalized()), -1.0, 1.0));
+      std::acos(std::clamp(view_ray.normalized().dot(host_view_ray.normalized()), -1.0, 1.0));
   if (angle > options.max_view_angle || scale > std::log(options.max_scale)) {
     return std::nullopt;
   }

@@ -60,19 +60,20 @@ std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& 
   result.T_m_c = T_w_Kc * window_c.T_w_body.back().Inverse();
   result.T_Km_Kc = T_w_Km.Inverse() * T_w_Kc;
   // From the window's axes to Km's; its origin is Km's already.
-  Matrix6d turn = Matrix6d::Zero();
-  turn.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
-  turn.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
-  const double turn_floor =
+  Matrix6d rotation = Matrix6d::Zero();
+  rotation.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
+  rotation.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
+  const double rotation_floor =
       options.systematic_px * window_c.keyframe(window_c.newest()).camera.PixelAngle();
-  const double step_floor = turn_floor * MedianDistance(window_m, window_c, matches, result.inlier);
+  const double step_floor =
+      rotation_floor * MedianDistance(window_m, window_c, matches, result.inlier);
   Vector6d floor;
-  floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(turn_floor);
+  floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(rotation_floor);
   const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {
     // Never smaller than the residuals say.
-    Matrix6d turned = std::max(1.0, variance) * turn * covariance * turn.transpose();
-    turned.diagonal() += floor.cwiseAbs2();
-    return turned;
+    Matrix6d rotated = std::max(1.0, variance) * rotation * covariance * rotation.transpose();
+    rotated.diagonal() += floor.cwiseAbs2();
+    return rotated;
   };
   result.covariance = in_Km(marginals->all);
   result.covariance_without_one = in_Km(marginals->without_one);

@@ -21,7 +21,7 @@ namespace pangea {
 struct JointBaOptions {
   double pixel_sigma = 1.0;  // of a corner on octave 0
   // What all corners of a view share and no number of them averages out: calibration, blur, the
-  // correlated errors of one odometry's depths. A turn by so many pixels, and the sideways step
+  // correlated errors of one odometry's depths. A rotation by so many pixels, and the sideways step
   // that looks the same at the points' median distance.
   double systematic_px = 0.2;
   double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says

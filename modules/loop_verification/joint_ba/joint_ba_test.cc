@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "loop_verification/alignment_test_world.h"
 #include "loop_verification/correspondences/projection_search.h"
+#include "loop_verification/loop_verification_test_world.h"
 
 namespace pangea {
 namespace {
@@ -137,8 +137,8 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   EXPECT_FALSE(none->covariance_of_sure);
 }
 
-// What no number of corners averages out: a turn, and the step that looks the same at the points'
-// distance, the same in every direction.
+// What no number of corners averages out: a rotation, and the step that looks the same at the
+// points' distance, the same in every direction.
 TEST_F(JointBaTest, SystematicErrorsAreAdded) {
   options_.systematic_px = 0;
   const auto without = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
@@ -146,12 +146,13 @@ TEST_F(JointBaTest, SystematicErrorsAreAdded) {
   const auto with = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
   ASSERT_TRUE(without && with);
   const Matrix6d added = with->covariance - without->covariance;
-  const double turn = 0.5 * c_.keyframe(c_.newest()).camera.PixelAngle();
-  EXPECT_LT((added.bottomRightCorner<3, 3>() - turn * turn * Eigen::Matrix3d::Identity()).norm(),
-            1e-6 * turn * turn);
+  const double rotation = 0.5 * c_.keyframe(c_.newest()).camera.PixelAngle();
+  EXPECT_LT(
+      (added.bottomRightCorner<3, 3>() - rotation * rotation * Eigen::Matrix3d::Identity()).norm(),
+      1e-6 * rotation * rotation);
   const double step = std::sqrt(added(0, 0));
-  EXPECT_GT(step / turn, 2);  // the room is 4 to 6 m wide
-  EXPECT_LT(step / turn, 6);
+  EXPECT_GT(step / rotation, 2);  // the room is 4 to 6 m wide
+  EXPECT_LT(step / rotation, 6);
   EXPECT_LT((added.topLeftCorner<3, 3>() - step * step * Eigen::Matrix3d::Identity()).norm(),
             1e-6 * step * step);
 }

@@ -7,7 +7,7 @@ namespace pangea {
 namespace {
 
 // z x v.
-Eigen::Vector3d TurnedByZ(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
+Eigen::Vector3d RotatedByZ(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
 
 Matrix4d BlockRotation(double yaw) {
   Matrix4d R = Matrix4d::Identity();
@@ -23,7 +23,7 @@ Relative4 Relative4::Inverse() const {
   inverse.t = -(YawRotation(-yaw) * t);
   inverse.yaw = -yaw;
   Matrix4d J = -BlockRotation(-yaw);
-  J.topRightCorner<3, 1>() = -TurnedByZ(inverse.t);
+  J.topRightCorner<3, 1>() = -RotatedByZ(inverse.t);
   inverse.covariance = J * covariance * J.transpose();
   return inverse;
 }
@@ -34,9 +34,10 @@ Relative4 MakeRelative4(const Rigid3& T_from_to, const Matrix6d& covariance,
                         const Eigen::Quaterniond& q_odom_to) {
   Relative4 relative;
   relative.t = q_odom_from * T_from_to.t;
-  // The turn about z that is nearest to the rotation between the two odom axes (swing and twist).
-  const Eigen::Quaterniond turn = q_odom_from * T_from_to.q * q_odom_to.conjugate();
-  relative.yaw = WrapAngle(2 * std::atan2(turn.z(), turn.w()));
+  // The rotation about z that is nearest to the rotation between the two odom axes (swing and
+  // twist).
+  const Eigen::Quaterniond rotation = q_odom_from * T_from_to.q * q_odom_to.conjugate();
+  relative.yaw = WrapAngle(2 * std::atan2(rotation.z(), rotation.w()));
 
   Matrix6d R = Matrix6d::Zero();
   R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = q_odom_from.toRotationMatrix();
@@ -70,7 +71,7 @@ Matrix4d Whitening(const Matrix4d& covariance) {
 
 Matrix4d CovarianceAt(const Matrix4d& covariance, const Eigen::Vector3d& lever) {
   Matrix4d J = Matrix4d::Identity();
-  J.topRightCorner<3, 1>() = TurnedByZ(lever);
+  J.topRightCorner<3, 1>() = RotatedByZ(lever);
   return J * covariance * J.transpose();
 }
 

@@ -4,9 +4,10 @@
 // Qin et al., VINS-Mono, TRO 2018, section VIII).
 //
 // Gravity makes roll and pitch observable, so a keyframe keeps those of its odometry. What is left
-// is where its body is in the map and by how much its odom axes are turned about z:
+// is where its body is in the map and by how much its odom axes are rotated about z:
 //   T_map_body = (Rz(yaw) q_odom_body, p).
-// Using the turn of the odom axes instead of the body's own yaw has no singularity at any attitude.
+// Using the rotation of the odom axes instead of the body's own yaw has no singularity at any
+// attitude.
 
 #include <Eigen/Core>
 
@@ -31,7 +32,7 @@ struct Pose4 {
   Rigid3 ToRigid3() const { return {YawRotation(yaw), p}; }
 };
 
-// Where keyframe `to` is, seen from `from`: t in from's odom axes, yaw = turn of to's odom axes
+// Where keyframe `to` is, seen from `from`: t in from's odom axes, yaw = rotation of to's odom axes
 // against from's. Covariance of (t, yaw), a perturbation of each in from's odom axes.
 struct Relative4 {
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
@@ -42,9 +43,9 @@ struct Relative4 {
 };
 
 // Of a relative pose between bodies, with its 6x6 covariance in from's body frame
-// (docs/conventions.md). The covariance is turned into from's odom axes, where dtheta.z is yaw, and
-// its (x, y, z, yaw) block taken: roll and pitch are marginalised, not conditioned. The tilt error
-// of from's own attitude moves t too and is added.
+// (docs/conventions.md). The covariance is rotated into from's odom axes, where dtheta.z is yaw,
+// and its (x, y, z, yaw) block taken: roll and pitch are marginalised, not conditioned. The tilt
+// error of from's own attitude moves t too and is added.
 Relative4 MakeRelative4(const Rigid3& T_from_to, const Matrix6d& covariance,
                         const Eigen::Quaterniond& q_odom_from,
                         const Eigen::Matrix2d& roll_pitch_covariance_from,
@@ -57,7 +58,7 @@ Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured)
 // one). Variances below 1e-10 and above 1e6 are beyond what a solve can use and are bounded.
 Matrix4d Whitening(const Matrix4d& covariance);
 
-// How a small error (dt, dyaw) of a pose at `at` moves a point that hangs on it, and turns it.
+// How a small error (dt, dyaw) of a pose at `at` moves a point that hangs on it, and rotates it.
 Matrix4d CovarianceAt(const Matrix4d& covariance, const Eigen::Vector3d& lever);
 
 }  // namespace pangea

@@ -71,11 +71,11 @@ void AddBar(const Bar& bar, double to_s, Plot* plot) {
                          .points = {{bar.from_s, bar.y}, {to_s, bar.y}}});
 }
 
-std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportFigures& figures) {
+std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportMetrics& metrics) {
   std::map<MapId, Bar> bars;
   for (const auto& [id, keyframe] : session.keyframes) {
     const auto [bar, is_new] = bars.try_emplace(
-        id.map, Bar{0, keyframe.session_s, keyframe.session_s, figures.IndexOf(id.map.agent_id)});
+        id.map, Bar{0, keyframe.session_s, keyframe.session_s, metrics.IndexOf(id.map.agent_id)});
     bar->second.from_s = std::min(bar->second.from_s, keyframe.session_s);
     bar->second.to_s = std::max(bar->second.to_s, keyframe.session_s);
   }
@@ -88,10 +88,10 @@ std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportFigures& f
 
 }  // namespace
 
-Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
+Plot FusionChart(const CapturedSession& session, const ReportMetrics& metrics) {
   Plot plot = Chart("which maps were one", "");
   plot.y_from_zero = false;
-  std::map<MapId, Bar> bars = Bars(session, figures);
+  std::map<MapId, Bar> bars = Bars(session, metrics);
   std::map<int32_t, int> maps_of_agent;
   for (auto& [map, bar] : bars) {
     const int nth = ++maps_of_agent[map.agent_id];
@@ -107,7 +107,7 @@ Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
     const auto frame = bars.find(change.frame);
     for (const MapId& map : change.maps) {
       const auto bar = bars.find(map);
-      const size_t colour = figures.IndexOf(change.frame.agent_id);
+      const size_t colour = metrics.IndexOf(change.frame.agent_id);
       if (bar == bars.end() || frame == bars.end() || bar->second.colour == colour) {
         continue;
       }
@@ -129,19 +129,19 @@ Plot FusionChart(const CapturedSession& session, const ReportFigures& figures) {
   return plot;
 }
 
-Plot LoadChart(const CapturedSession& session, const ReportFigures& figures) {
+Plot LoadChart(const CapturedSession& session, const ReportMetrics& metrics) {
   Plot plot = Chart("load of each process", "CPU [% of one core]");
   AddLoad(session, session.samples, &plot);
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     AddLoad(session, agent.samples, &plot);
   }
   return plot;
 }
 
-Plot TrafficChart(const CapturedSession& session, const ReportFigures& figures) {
+Plot TrafficChart(const CapturedSession& session, const ReportMetrics& metrics) {
   Plot plot = Chart("bytes on the link, per second", "kB/s");
-  for (size_t i = 0; i < figures.agents.size(); ++i) {
-    const AgentFigures& agent = figures.agents[i];
+  for (size_t i = 0; i < metrics.agents.size(); ++i) {
+    const AgentMetrics& agent = metrics.agents[i];
     const auto uplink = agent.samples.find(fmt::format("uplink_{}", agent.id));
     if (uplink == agent.samples.end()) {
       continue;

@@ -123,17 +123,17 @@ std::string TableOr(const Table& table, const std::string& otherwise) {
   return table.empty() ? Paragraph(otherwise) : table.Html();
 }
 
-std::string Tile(const std::string& figure, const std::string& what) {
-  return fmt::format("<li><b>{}</b>{}</li>\n", EscapeHtml(figure), EscapeHtml(what));
+std::string Tile(const std::string& value, const std::string& what) {
+  return fmt::format("<li><b>{}</b>{}</li>\n", EscapeHtml(value), EscapeHtml(what));
 }
 
-std::string Tiles(const CapturedSession& session, const ReportFigures& figures) {
-  std::string tiles = Tile(fmt::format("{}", figures.agents.size()), "agents");
-  const size_t num_maps = figures.groups.size();
+std::string Tiles(const CapturedSession& session, const ReportMetrics& metrics) {
+  std::string tiles = Tile(fmt::format("{}", metrics.agents.size()), "agents");
+  const size_t num_maps = metrics.groups.size();
   tiles += Tile(fmt::format("{}", num_maps), num_maps == 1 ? "map in the end" : "maps in the end");
   tiles += Tile(fmt::format("{}", session.keyframes.size()), "keyframes");
-  if (!figures.groups.empty() && figures.groups.front().joint) {
-    tiles += Tile(fmt::format("{:.3f} m", figures.groups.front().joint->position_m.rmse),
+  if (!metrics.groups.empty() && metrics.groups.front().joint) {
+    tiles += Tile(fmt::format("{:.3f} m", metrics.groups.front().joint->position_m.rmse),
                   "joint ATE of the largest map");
   }
   for (const GroupChange& change : session.changes) {
@@ -153,41 +153,41 @@ std::string Trajectories(const std::vector<Picture>& pictures) {
   return html + Aside("Top view; a dot is where an agent begins.");
 }
 
-std::string Fusions(const CapturedSession& session, const ReportFigures& figures) {
-  const std::vector<std::string> changes = ChangeLines(session, figures);
-  return GroupTable(figures).Html() +
-         ChartOr(FusionChart(session, figures), "When maps became one",
+std::string Fusions(const CapturedSession& session, const ReportMetrics& metrics) {
+  const std::vector<std::string> changes = ChangeLines(session, metrics);
+  return GroupTable(metrics).Html() +
+         ChartOr(FusionChart(session, metrics), "When maps became one",
                  "No keyframes were captured.") +
          Aside("A bar is a map; it takes the colour of the agent in whose map frame it is.") +
          (changes.empty() ? Paragraph("No maps were fused.") : List(changes));
 }
 
-std::string Constraints(const CapturedSession& session, const ReportFigures& figures) {
+std::string Constraints(const CapturedSession& session, const ReportMetrics& metrics) {
   std::string html = Paragraph(ConstraintsLine(session));
   if (const Table refused = RefusedTable(session); !refused.empty()) {
     html += refused.Html();
   }
-  if (const Table truth = TruthTable(figures); !truth.empty()) {
+  if (const Table truth = TruthTable(metrics); !truth.empty()) {
     html += truth.Html() + Aside(kNeesExplained);
   }
   return html;
 }
 
-std::string Traffic(const CapturedSession& session, const ReportFigures& figures) {
-  std::string html = ChartOr(TrafficChart(session, figures), "kB per second on the link",
+std::string Traffic(const CapturedSession& session, const ReportMetrics& metrics) {
+  std::string html = ChartOr(TrafficChart(session, metrics), "kB per second on the link",
                              "Not measured second by second: there is no link in a replay, and in "
                              "a log of the server's bus alone.");
-  html += TableOr(TrafficTable(figures), "No bytes were counted.");
-  if (const Table links = LinksTable(figures); !links.empty()) {
+  html += TableOr(TrafficTable(metrics), "No bytes were counted.");
+  if (const Table links = LinksTable(metrics); !links.empty()) {
     html += Paragraph("Links that the session made bad:") + links.Html() +
             Aside("Delivered counts doubled packets twice.");
   }
   return html;
 }
 
-std::string Paper(const ReportFigures& figures) {
+std::string Paper(const ReportMetrics& metrics) {
   std::string html;
-  for (const PaperTable& table : PaperTables(figures)) {
+  for (const PaperTable& table : PaperTables(metrics)) {
     html += Paragraph(table.title) + table.table.Html();
   }
   return html.empty() ? Paragraph(
@@ -201,32 +201,32 @@ std::string Paper(const ReportFigures& figures) {
 }  // namespace
 
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
-                       const ReportFigures& figures) {
-  const std::vector<Picture> pictures = Pictures(figures);
+                       const ReportMetrics& metrics) {
+  const std::vector<Picture> pictures = Pictures(metrics);
   std::string html = Head();
-  html += "<h1>Session report</h1>\n" + Tiles(session, figures);
+  html += "<h1>Session report</h1>\n" + Tiles(session, metrics);
   html += Section("agents", "Agents",
-                  AgentTable(figures).Html() +
+                  AgentTable(metrics).Html() +
                       Aside("ATE: RMSE of positions after SE(3) alignment without scale; it counts "
                             "with coverage of at least 0.95 and one map."));
   html += Section("trajectories", "Trajectories", Trajectories(pictures));
   std::string error = ChartOr(pictures.back().plot, "Position error over time",
                               "No ground truth is known, so no error.");
-  if (const Table live = LiveTable(figures); !live.empty()) {
+  if (const Table live = LiveTable(metrics); !live.empty()) {
     error += Paragraph("What each agent showed while the session ran, from its first fusion on:") +
              live.Html();
   }
   html += Section("error", "Error over time", error);
-  html += Section("fusions", "Fusions", Fusions(session, figures));
-  html += Section("constraints", "Constraints", Constraints(session, figures));
+  html += Section("fusions", "Fusions", Fusions(session, metrics));
+  html += Section("constraints", "Constraints", Constraints(session, metrics));
   html += Section("load", "Load",
-                  ChartOr(LoadChart(session, figures), "CPU of each process over the session",
+                  ChartOr(LoadChart(session, metrics), "CPU of each process over the session",
                           "No process said anything: a replay has none.") +
                       TableOr(ProcessTable(input, session), "No process was captured."));
-  html += Section("traffic", "Traffic", Traffic(session, figures));
-  html += Section("paper", "Beside the paper", Paper(figures));
+  html += Section("traffic", "Traffic", Traffic(session, metrics));
+  html += Section("paper", "Beside the paper", Paper(metrics));
   html +=
-      Section("notes", "Notes", figures.notes.empty() ? Paragraph("None.") : List(figures.notes));
+      Section("notes", "Notes", metrics.notes.empty() ? Paragraph("None.") : List(metrics.notes));
   return html + "<script>" + kChartScript + "</script>\n" + kEnd;
 }
 

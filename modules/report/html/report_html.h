@@ -5,12 +5,12 @@
 #include <string>
 
 #include "eval/table.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
-                       const ReportFigures& figures);
+                       const ReportMetrics& metrics);
 
 // The page with one more section at its end.
 std::string WithSection(std::string page, const std::string& id, const std::string& title,

@@ -84,7 +84,7 @@ TEST_F(ReportHtmlTest, ParsesAndHasEverySection) {
 
 TEST_F(ReportHtmlTest, ASectionMayBeAddedAtItsEnd) {
   Page();
-  Table table({"expected", "figure"});
+  Table table({"expected", "value"});
   table.Add({"ate_joint_m", "0.1 < 0.2"});
   std::istringstream stream(WithSection(html_, "expectations", "Expectations", table));
   ptree page;
@@ -134,19 +134,19 @@ CapturedSession SessionOfTwoMaps() {
   return session;
 }
 
-ReportFigures FiguresOfTwoAgents() {
-  ReportFigures figures;
+ReportMetrics MetricsOfTwoAgents() {
+  ReportMetrics metrics;
   for (const int32_t agent : {1, 2}) {
-    figures.agents.emplace_back();
-    figures.agents.back().id = agent;
+    metrics.agents.emplace_back();
+    metrics.agents.back().id = agent;
   }
-  return figures;
+  return metrics;
 }
 
 TEST(ReportCharts, AMapTakesTheColourOfItsGroup) {
   CapturedSession session = SessionOfTwoMaps();
   session.changes.push_back({true, 4.0, 1, {1, 5}, {{1, 5}, {2, 5}}, {}});
-  const Plot plot = FusionChart(session, FiguresOfTwoAgents());
+  const Plot plot = FusionChart(session, MetricsOfTwoAgents());
   EXPECT_THAT(plot.y_names, ElementsAre("agent 2", "agent 1"));
   ASSERT_EQ(plot.lines.size(), 4U) << "agent 2 before, both after, and what joins them";
   EXPECT_EQ(plot.lines[0].colour, AgentColour(1));
@@ -166,7 +166,7 @@ TEST(ReportCharts, LoadIsCpuTimePerSecondAndARestartBreaksTheLine) {
        {std::pair{2'000'000, 1.0}, {3'000'000, 1.5}, {5'000'000, 2.5}, {6'000'000, 0.1}}) {
     session.samples["fusion"].push_back({utime, cpu_s, {}, {}});
   }
-  const Plot plot = LoadChart(session, FiguresOfTwoAgents());
+  const Plot plot = LoadChart(session, MetricsOfTwoAgents());
   ASSERT_EQ(plot.lines.size(), 1U);
   ASSERT_EQ(plot.lines[0].points.size(), 3U);
   EXPECT_LT((plot.lines[0].points[0] - Eigen::Vector2d(2, 50)).norm(), 1e-9);
@@ -175,16 +175,16 @@ TEST(ReportCharts, LoadIsCpuTimePerSecondAndARestartBreaksTheLine) {
 }
 
 TEST(ReportCharts, TrafficIsTheUplinksCountersPerSecond) {
-  ReportFigures figures = FiguresOfTwoAgents();
-  figures.agents[1].samples["uplink_2"] = {{2'000'000, 0, 1'000, 10}, {4'000'000, 0, 61'000, 210}};
-  figures.agents[1].samples["vio_2"] = {{2'000'000, 0, {}, {}}, {4'000'000, 1, {}, {}}};
-  const Plot plot = TrafficChart(SessionOfTwoMaps(), figures);
+  ReportMetrics metrics = MetricsOfTwoAgents();
+  metrics.agents[1].samples["uplink_2"] = {{2'000'000, 0, 1'000, 10}, {4'000'000, 0, 61'000, 210}};
+  metrics.agents[1].samples["vio_2"] = {{2'000'000, 0, {}, {}}, {4'000'000, 1, {}, {}}};
+  const Plot plot = TrafficChart(SessionOfTwoMaps(), metrics);
   ASSERT_EQ(plot.lines.size(), 2U);
   EXPECT_EQ(plot.lines[0].label, "agent 2 sends");
   EXPECT_LT((plot.lines[0].points[0] - Eigen::Vector2d(3, 30)).norm(), 1e-9);
   EXPECT_EQ(plot.lines[1].label, "agent 2 receives");
   EXPECT_LT((plot.lines[1].points[0] - Eigen::Vector2d(3, 0.1)).norm(), 1e-9);
-  EXPECT_TRUE(TrafficChart(SessionOfTwoMaps(), FiguresOfTwoAgents()).lines.empty());
+  EXPECT_TRUE(TrafficChart(SessionOfTwoMaps(), MetricsOfTwoAgents()).lines.empty());
 }
 
 TEST(ReportPaper, SequencesAreKnownByTheirFolder) {
@@ -198,20 +198,20 @@ TEST(ReportPaper, SequencesAreKnownByTheirFolder) {
 }
 
 // Two agents in one map; `duration_s` as their recordings were played.
-ReportFigures Played(const std::string& first, const std::string& second,
+ReportMetrics Played(const std::string& first, const std::string& second,
                      std::optional<double> duration_s) {
-  ReportFigures figures = FiguresOfTwoAgents();
-  figures.groups.emplace_back();
-  figures.groups[0].joint.emplace();
-  figures.groups[0].joint->position_m.rmse = 0.0333;
-  for (AgentFigures& agent : figures.agents) {
+  ReportMetrics metrics = MetricsOfTwoAgents();
+  metrics.groups.emplace_back();
+  metrics.groups[0].joint.emplace();
+  metrics.groups[0].joint->position_m.rmse = 0.0333;
+  for (AgentMetrics& agent : metrics.agents) {
     agent.run.recording = agent.id == 1 ? first : second;
     agent.run.duration_s = duration_s;
     agent.server.emplace();
     agent.server->position_m.rmse = 0.011 * agent.id;
-    figures.groups[0].group.keyframes.push_back({{{agent.id, 5}, 0}, 0, {}});
+    metrics.groups[0].group.keyframes.push_back({{{agent.id, 5}, 0}, 0, {}});
   }
-  return figures;
+  return metrics;
 }
 
 TEST(ReportPaper, TwoSequencesStandInTablesIIAndIV) {

@@ -14,10 +14,10 @@ namespace {
 
 constexpr double kWidth = 1000;
 constexpr double kPlotUnit = 1.4;  // Plot's sizes are of a width of 1400
-constexpr double kLeft = 90;       // figures and names of the y axis
+constexpr double kLeft = 90;       // numbers and names of the y axis
 constexpr double kRight = 15;
 constexpr double kTop = 12;
-constexpr double kBottom = 48;  // figures and name of the x axis
+constexpr double kBottom = 48;  // numbers and name of the x axis
 
 // The smallest of 1, 2, 5 times a power of ten that is at least `least`.
 double NiceStep(double least) {
@@ -36,7 +36,7 @@ struct Axis {
   double step = 1;
 
   double At(double value) const { return from + (value - low) / (high - low) * (to - from); }
-  std::string Figure(double value) const {
+  std::string Label(double value) const {
     const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
     return fmt::format("{:.{}f}", std::abs(value) < step / 2 ? 0 : value, decimals);
   }
@@ -125,7 +125,7 @@ std::string XAxis(const Plot& plot, const Canvas& canvas) {
        i * canvas.x.step <= canvas.x.high + 1e-9 * canvas.x.step; ++i) {
     const double x = canvas.x.At(i * canvas.x.step);
     svg += Rule(x, canvas.y.from, x, canvas.y.to) +
-           Text(x, canvas.y.from + 18, "middle", canvas.x.Figure(i * canvas.x.step));
+           Text(x, canvas.y.from + 18, "middle", canvas.x.Label(i * canvas.x.step));
   }
   return svg;
 }
@@ -142,7 +142,7 @@ std::string YAxis(const Plot& plot, const Canvas& canvas) {
   }
   for (double i = std::ceil(canvas.y.low / canvas.y.step - 1e-9);
        plot.y_names.empty() && i * canvas.y.step <= canvas.y.high + 1e-9 * canvas.y.step; ++i) {
-    tick(i * canvas.y.step, canvas.y.Figure(i * canvas.y.step));
+    tick(i * canvas.y.step, canvas.y.Label(i * canvas.y.step));
   }
   return svg;
 }

@@ -11,7 +11,7 @@ struct Span {
 };
 
 // From the first pose of its odometry to the last, sensor clock.
-std::optional<Span> OdometrySpan(const AgentFigures& agent) {
+std::optional<Span> OdometrySpan(const AgentMetrics& agent) {
   std::optional<Span> span;
   for (const auto& [map, odometry] : agent.odometry) {
     if (!odometry.empty()) {
@@ -24,15 +24,15 @@ std::optional<Span> OdometrySpan(const AgentFigures& agent) {
 }
 
 // Recording time played: of its link bytes, what a second of it costs.
-std::optional<double> PlayedSeconds(const AgentFigures& agent) {
+std::optional<double> PlayedSeconds(const AgentMetrics& agent) {
   const Span span = OdometrySpan(agent).value_or(Span());
   const double seconds = 1e-6 * static_cast<double>(span.end - span.begin) +
                          std::max(0.0, agent.initialised_s.value_or(0));
   return seconds > 0 ? std::optional(seconds) : std::nullopt;
 }
 
-// Refused for the same reason, whatever the figures in it.
-std::string WithoutFigures(const std::string& reason) {
+// Refused for the same reason, whatever the numbers in it.
+std::string WithoutNumbers(const std::string& reason) {
   std::string text;
   for (size_t i = 0; i < reason.size(); ++i) {
     const bool digit = std::isdigit(static_cast<unsigned char>(reason[i])) != 0;
@@ -55,7 +55,7 @@ ConstraintCounts CountConstraints(const CapturedSession& session) {
   for (const auto& [id, constraint] : session.constraints) {
     if (!constraint.accepted) {
       ++counts.num_refused;
-      ++counts.refused[WithoutFigures(constraint.reason)];
+      ++counts.refused[WithoutNumbers(constraint.reason)];
     } else if (constraint.kind == PlaceKind::kIntra) {
       ++counts.accepted_intra;
     } else {
@@ -65,7 +65,7 @@ ConstraintCounts CountConstraints(const CapturedSession& session) {
   return counts;
 }
 
-std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
+std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent) {
   const auto seconds = PlayedSeconds(agent);
   if (!seconds || !agent.run.bytes_up) {
     return std::nullopt;
@@ -73,8 +73,8 @@ std::optional<double> KilobytesPerSecondUp(const AgentFigures& agent) {
   return 1e-3 * static_cast<double>(*agent.run.bytes_up) / *seconds;
 }
 
-double RecordingSeconds(const ReportFigures& figures, int32_t agent_id, int64_t utime) {
-  for (const AgentFigures& agent : figures.agents) {
+double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime) {
+  for (const AgentMetrics& agent : metrics.agents) {
     if (const auto span = agent.id == agent_id ? OdometrySpan(agent) : std::nullopt) {
       return 1e-6 * static_cast<double>(utime - span->begin) + agent.initialised_s.value_or(0);
     }

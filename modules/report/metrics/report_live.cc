@@ -28,7 +28,8 @@ Iterator Begin(const std::vector<LivePose>& poses, const std::map<MapId, int64_t
 class PooledAte {
  public:
   void Add(const Trajectory& stretch, const Trajectory& ground_truth) {
-    if (const auto ate = AbsoluteError(Associate(stretch, ground_truth), AlignmentKind::kSe3)) {
+    if (const auto ate =
+            AbsoluteError(Associate(stretch, ground_truth), TrajectoryAlignmentKind::kSe3)) {
       for (const PoseError& error : ate->errors) {
         errors_.push_back(error.position_m);
       }
@@ -62,7 +63,7 @@ std::optional<double> JumpMax(const std::vector<LivePose>& poses) {
 
 }  // namespace
 
-LiveFigures LiveFiguresOf(const std::vector<LivePose>& poses,
+LiveMetrics LiveMetricsOf(const std::vector<LivePose>& poses,
                           const std::map<MapId, int64_t>& fused_revision,
                           const Trajectory& ground_truth) {
   PooledAte corrected;

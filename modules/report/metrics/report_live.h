@@ -11,7 +11,7 @@
 
 namespace pangea::session {
 
-struct LiveFigures {
+struct LiveMetrics {
   std::optional<double> ate_m;       // of the corrected pose
   std::optional<double> ate_raw_m;   // of the raw odometry, over the same stretch
   std::optional<double> jump_max_m;  // of the corrected pose, against the odometry's own motion
@@ -26,7 +26,7 @@ struct LiveFigures {
 // odometry did not see, metres, within one frame of reference.
 //
 // `fused_revision`: the first revision at which each map is in one group with another.
-LiveFigures LiveFiguresOf(const std::vector<LivePose>& poses,
+LiveMetrics LiveMetricsOf(const std::vector<LivePose>& poses,
                           const std::map<MapId, int64_t>& fused_revision,
                           const Trajectory& ground_truth);
 

@@ -41,50 +41,50 @@ struct Shown {
   }
 };
 
-TEST(LiveFigures, TheErrorIsThatOfWhatWasShownSinceTheFusion) {
+TEST(LiveMetrics, TheErrorIsThatOfWhatWasShownSinceTheFusion) {
   const Shown shown(0.02);
-  const LiveFigures figures = LiveFiguresOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
-  EXPECT_NEAR(*figures.ate_m, 0.02, 0.002);
-  EXPECT_GT(*figures.ate_raw_m, 0.04);
-  EXPECT_LT(*figures.ate_raw_m, 0.15);
+  const LiveMetrics metrics = LiveMetricsOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
+  EXPECT_NEAR(*metrics.ate_m, 0.02, 0.002);
+  EXPECT_GT(*metrics.ate_raw_m, 0.04);
+  EXPECT_LT(*metrics.ate_raw_m, 0.15);
 }
 
-TEST(LiveFigures, WithoutAFusionTheFirstCorrectionBegins) {
+TEST(LiveMetrics, WithoutAFusionTheFirstCorrectionBegins) {
   const Shown shown(0);
-  const LiveFigures figures = LiveFiguresOf(shown.poses, {}, shown.ground_truth);
+  const LiveMetrics metrics = LiveMetricsOf(shown.poses, {}, shown.ground_truth);
   // A quarter to a half of the stretch is shown as the raw odometry, in a frame of its own.
-  EXPECT_GT(*figures.ate_m, 0.01);
-  EXPECT_LT(*figures.ate_m, *figures.ate_raw_m);
+  EXPECT_GT(*metrics.ate_m, 0.01);
+  EXPECT_LT(*metrics.ate_m, *metrics.ate_raw_m);
 }
 
-TEST(LiveFigures, TheJumpIsWhatTheOdometryDidNotSee) {
+TEST(LiveMetrics, TheJumpIsWhatTheOdometryDidNotSee) {
   Shown shown(0);
   for (LivePose& pose : shown.poses) {
     pose.T_map_body = kMapFromOdom * pose.T_odom_body;
   }
-  EXPECT_NEAR(*LiveFiguresOf(shown.poses, {}, {}).jump_max_m, 0, 1e-9)
-      << "a new frame, and a turned one, are no jump";
+  EXPECT_NEAR(*LiveMetricsOf(shown.poses, {}, {}).jump_max_m, 0, 1e-9)
+      << "a new frame, and a rotated one, are no jump";
   for (size_t i = 300; i < shown.poses.size(); ++i) {
     shown.poses[i].T_map_body.t += Eigen::Vector3d(0.03, 0, 0.04);
   }
-  EXPECT_NEAR(*LiveFiguresOf(shown.poses, {}, {}).jump_max_m, 0.05, 1e-9);
+  EXPECT_NEAR(*LiveMetricsOf(shown.poses, {}, {}).jump_max_m, 0.05, 1e-9);
 }
 
-TEST(LiveFigures, NothingShownNothingSaid) {
+TEST(LiveMetrics, NothingShownNothingSaid) {
   const Shown shown(0);
-  const LiveFigures none = LiveFiguresOf({}, {{kMap, 6}}, shown.ground_truth);
+  const LiveMetrics none = LiveMetricsOf({}, {{kMap, 6}}, shown.ground_truth);
   EXPECT_FALSE(none.ate_m || none.ate_raw_m || none.jump_max_m);
-  const LiveFigures untrue = LiveFiguresOf(shown.poses, {{kMap, 6}}, {});
+  const LiveMetrics untrue = LiveMetricsOf(shown.poses, {{kMap, 6}}, {});
   EXPECT_FALSE(untrue.ate_m || untrue.ate_raw_m);
   EXPECT_TRUE(untrue.jump_max_m);
 }
 
-TEST(LiveFigures, UncorrectedPosesHaveNoError) {
+TEST(LiveMetrics, UncorrectedPosesHaveNoError) {
   Shown shown(0);
   shown.poses.resize(100);
-  const LiveFigures figures = LiveFiguresOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
-  EXPECT_FALSE(figures.ate_m || figures.ate_raw_m);
-  EXPECT_NEAR(*figures.jump_max_m, 0, 1e-12);
+  const LiveMetrics metrics = LiveMetricsOf(shown.poses, {{kMap, 6}}, shown.ground_truth);
+  EXPECT_FALSE(metrics.ate_m || metrics.ate_raw_m);
+  EXPECT_NEAR(*metrics.jump_max_m, 0, 1e-12);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace pangea::session {
 namespace {
 
-// The same figures as in bench/accuracy_lib/anchors.py, by bench/accuracy_test.py.
+// The same metrics as in bench/accuracy_lib/anchors.py, by bench/accuracy_test.py.
 //
 // Table II, ATE in metres: VINS-Mobile2 alone and with the server (the better phone of the two),
 // VINS-Mono. Table III: the second half fused into the first, the first into the second, one agent
@@ -45,14 +45,14 @@ constexpr std::array<PaperPair, 7> kPairs = {{
 }};
 
 struct PlayedSequence {
-  const AgentFigures* agent;
+  const AgentMetrics* agent;
   const PaperSequence* paper;
   bool whole;
 };
 
-std::vector<PlayedSequence> PlayedSequences(const ReportFigures& figures) {
+std::vector<PlayedSequence> PlayedSequences(const ReportMetrics& metrics) {
   std::vector<PlayedSequence> played;
-  for (const AgentFigures& agent : figures.agents) {
+  for (const AgentMetrics& agent : metrics.agents) {
     const auto name = SequenceOf(agent.run.recording);
     if (name && agent.server) {
       const auto* const paper = std::ranges::find(kSequences, *name, &PaperSequence::name);
@@ -67,9 +67,9 @@ std::string Metres(const std::optional<Ate>& ate) {
   return ate ? Metres(ate->position_m.rmse) : "-";
 }
 
-bool Fused(const ReportFigures& figures, const AgentFigures& a, const AgentFigures& b) {
-  return a.group == b.group && figures.groups[a.group].group.CountOf(a.id) > 0 &&
-         figures.groups[a.group].group.CountOf(b.id) > 0;
+bool Fused(const ReportMetrics& metrics, const AgentMetrics& a, const AgentMetrics& b) {
+  return a.group == b.group && metrics.groups[a.group].group.CountOf(a.id) > 0 &&
+         metrics.groups[a.group].group.CountOf(b.id) > 0;
 }
 
 PaperTable SingleAgents(const std::vector<PlayedSequence>& played) {
@@ -85,16 +85,16 @@ PaperTable SingleAgents(const std::vector<PlayedSequence>& played) {
   return single;
 }
 
-PaperTable Halves(const ReportFigures& figures, const std::vector<PlayedSequence>& played) {
+PaperTable Halves(const ReportMetrics& metrics, const std::vector<PlayedSequence>& played) {
   PaperTable halves{"Table III: two parts of one recording as two agents, joint ATE m",
                     Table({"recording", "fused", "paper: 1st-2nd", "paper: 2nd-1st",
                            "paper: one agent, all of it"})};
   for (size_t i = 0; i + 1 < played.size(); ++i) {
     const auto& [agent, paper, whole] = played[i];
     const auto& other = played[i + 1];
-    const auto& joint = figures.groups[agent->group].joint;
+    const auto& joint = metrics.groups[agent->group].joint;
     if (paper == other.paper && !whole && !other.whole && joint &&
-        Fused(figures, *agent, *other.agent)) {
+        Fused(metrics, *agent, *other.agent)) {
       halves.table.Add({std::string(paper->name), Metres(joint->position_m.rmse),
                         Metres(paper->first_second), Metres(paper->second_first),
                         Metres(paper->whole)});
@@ -103,7 +103,7 @@ PaperTable Halves(const ReportFigures& figures, const std::vector<PlayedSequence
   return halves;
 }
 
-PaperTable TwoAgents(const ReportFigures& figures, const std::vector<PlayedSequence>& played) {
+PaperTable TwoAgents(const ReportMetrics& metrics, const std::vector<PlayedSequence>& played) {
   PaperTable pairs{"Table IV: the second of two agents, ATE m",
                    Table({"first", "second", "fused", "paper: fused",
                           "paper: alone with the server", "VINS-Mono multi-session"})};
@@ -111,7 +111,7 @@ PaperTable TwoAgents(const ReportFigures& figures, const std::vector<PlayedSeque
     for (const PlayedSequence& first : played) {
       for (const PlayedSequence& second : played) {
         if (first.paper->name == pair.first && second.paper->name == pair.second && first.whole &&
-            second.whole && Fused(figures, *first.agent, *second.agent)) {
+            second.whole && Fused(metrics, *first.agent, *second.agent)) {
           pairs.table.Add({std::string(pair.first), std::string(pair.second),
                            Metres(second.agent->server), Metres(pair.fused), Metres(pair.alone),
                            Metres(pair.vins_mono)});
@@ -137,10 +137,10 @@ std::optional<std::string> SequenceOf(const std::string& recording) {
   return known ? std::optional(name) : std::nullopt;
 }
 
-std::vector<PaperTable> PaperTables(const ReportFigures& figures) {
-  const std::vector<PlayedSequence> played = PlayedSequences(figures);
-  std::vector<PaperTable> tables = {SingleAgents(played), Halves(figures, played),
-                                    TwoAgents(figures, played)};
+std::vector<PaperTable> PaperTables(const ReportMetrics& metrics) {
+  const std::vector<PlayedSequence> played = PlayedSequences(metrics);
+  std::vector<PaperTable> tables = {SingleAgents(played), Halves(metrics, played),
+                                    TwoAgents(metrics, played)};
   std::erase_if(tables, [](const PaperTable& table) { return table.table.empty(); });
   return tables;
 }

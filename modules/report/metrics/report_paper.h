@@ -1,13 +1,13 @@
 #pragma once
 
-// The paper's tables II to IV beside this session's figures, where its recordings are EuRoC's.
+// The paper's tables II to IV beside this session's metrics, where its recordings are EuRoC's.
 
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "eval/table.h"
-#include "report/metrics/report_figures.h"
+#include "report/metrics/report_metrics.h"
 
 namespace pangea::session {
 
@@ -20,6 +20,6 @@ struct PaperTable {
 };
 
 // Those that have something of this session, each with at least one row.
-std::vector<PaperTable> PaperTables(const ReportFigures& figures);
+std::vector<PaperTable> PaperTables(const ReportMetrics& metrics);
 
 }  // namespace pangea::session

@@ -81,7 +81,7 @@ ConstraintsTruth CheckConstraints(const std::vector<ConstraintWithTruth>& constr
     const Eigen::Matrix3d position_covariance = covariance.topLeftCorner<3, 3>();
     pose.push_back(error.dot(covariance.ldlt().solve(error)));
     position.push_back(dp.dot(position_covariance.ldlt().solve(dp)));
-    // Turned into axes with z up, where dtheta.z is yaw.
+    // Rotated into axes with z up, where dtheta.z is yaw.
     const Eigen::Vector3d up = q_odom_from.conjugate() * Eigen::Vector3d::UnitZ();
     const double dyaw = up.dot(error.tail<3>());
     yaw.push_back(dyaw * dyaw / up.dot(covariance.bottomRightCorner<3, 3>() * up));

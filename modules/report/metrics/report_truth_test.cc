@@ -76,8 +76,8 @@ TEST(ConstraintsTruth, AnOverconfidentCovarianceShows) {
 TEST(ConstraintsTruth, WrongOnesAreCountedByTranslationAndByRotation) {
   auto constraints = Noisy(10, 0);
   constraints[3].constraint.T_from_to.t.x() += 0.51;
-  auto& turned = constraints[7].constraint.T_from_to;
-  turned.q = ExpSo3({0, 0, 0.09}) * turned.q;
+  auto& rotated = constraints[7].constraint.T_from_to;
+  rotated.q = ExpSo3({0, 0, 0.09}) * rotated.q;
   constraints[8].constraint.T_from_to.t.y() += 0.49;
   const ConstraintsTruth truth = CheckConstraints(constraints);
   EXPECT_EQ(truth.wrong, 2U);

@@ -93,7 +93,7 @@ class Traveller {
   Wander tremble_{1.5, 5.0, &rng_};
 };
 
-// Camera with z forward, x right, y down, at rest level with yaw 0 looking along +x.
+// Camera with z forward, x right, y down, level and with yaw 0 while stationary, looking along +x.
 Eigen::Quaterniond LevelCamera() {
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;

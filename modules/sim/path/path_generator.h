@@ -18,7 +18,7 @@ struct GeneratedPathOptions {
   SceneKind scene = SceneKind::kHall;
   uint64_t seed = 1;
   double duration_s = 60;
-  double static_start_s = 0;  // at rest this long first; 0: moving from the first frame
+  double static_start_s = 0;  // stationary this long first; 0: moving from the first frame
   Eigen::Quaterniond q_body_cam = Eigen::Quaterniond::Identity();  // the camera looks ahead
 };
 

@@ -37,8 +37,8 @@ TEST(SplinePath, VelocityAccelerationAndRateAreItsDerivatives) {
     // Central differences: error of third derivatives times h^2, and rounding over h.
     EXPECT_LT(((after.T_ref_body.t - before.T_ref_body.t) / (2 * h) - at.v_ref_body).norm(), 1e-6);
     EXPECT_LT(((after.v_ref_body - before.v_ref_body) / (2 * h) - at.a_ref_body).norm(), 1e-5);
-    const Vector3d turn = LogSo3(before.T_ref_body.q.conjugate() * after.T_ref_body.q);
-    EXPECT_LT((turn / (2 * h) - at.omega_body).norm(), 1e-6);
+    const Vector3d rotation = LogSo3(before.T_ref_body.q.conjugate() * after.T_ref_body.q);
+    EXPECT_LT((rotation / (2 * h) - at.omega_body).norm(), 1e-6);
   }
 }
 

@@ -127,8 +127,8 @@ SplinePath::SplinePath(const Trajectory& trajectory, const SplinePathOptions& op
 
 PathState SplinePath::AtSeconds(double time_s) const {
   PathState state;
-  // q = s / |s| turns with omega_body = 2 vec(conj(s) ds) / |s|^2: the change of |s| is along s and
-  // contributes to the real part alone.
+  // q = s / |s| rotates with omega_body = 2 vec(conj(s) ds) / |s|^2: the change of |s| is along s
+  // and contributes to the real part alone.
   const Eigen::Quaterniond s{Eigen::Vector4d(rotation_.At(time_s, 0))};
   const Eigen::Quaterniond ds{Eigen::Vector4d(rotation_.At(time_s, 1))};
   state.omega_body = 2.0 / s.squaredNorm() * (s.conjugate() * ds).vec();

@@ -22,9 +22,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Looks along +x of the reference, turned by a small rotation of the camera.
-Rigid3 LookAlongX(const Vector3d& turn, const Vector3d& at) {
-  return {LookingAhead() * ExpSo3(turn), at};
+// Looks along +x of the reference, rotated by a small rotation of the camera.
+Rigid3 LookAlongX(const Vector3d& rotation, const Vector3d& at) {
+  return {LookingAhead() * ExpSo3(rotation), at};
 }
 
 // The window around a pixel, less its background (the grey at its corner).
@@ -100,9 +100,9 @@ TEST(Renderer, AKnownPointAppearsWhereTheCameraModelSays) {
     const Renderer renderer(scene, camera);
     Rng rng(4, "poses");
     for (int i = 0; i < 4; ++i) {
-      const Vector3d turn(rng.Uniform(-0.3, 0.3), rng.Uniform(-0.3, 0.3), rng.Uniform(-1, 1));
+      const Vector3d rotation(rng.Uniform(-0.3, 0.3), rng.Uniform(-0.3, 0.3), rng.Uniform(-1, 1));
       const Vector3d at(rng.Uniform(-1, 2), rng.Uniform(-1, 1), rng.Uniform(-1, 1));
-      const Rigid3 T_ref_cam = LookAlongX(turn, at);
+      const Rigid3 T_ref_cam = LookAlongX(rotation, at);
       const auto expected = camera.Project(T_ref_cam.Inverse() * kDisc);
       if (!expected || !camera.Contains(*expected, 30)) {
         continue;
@@ -122,8 +122,8 @@ TEST(Renderer, SubpixelMotionMovesTheImageSmoothly) {
   const CameraModel camera = Shrunk(EurocCamera(), 2);
   const Renderer renderer(scene, camera);
   for (int i = 0; i < 8; ++i) {
-    const Vector3d turn(0, 0.3 * i * camera.PixelAngle(), 0);
-    const Rigid3 T_ref_cam = LookAlongX(turn, Vector3d::Zero());
+    const Vector3d rotation(0, 0.3 * i * camera.PixelAngle(), 0);
+    const Rigid3 T_ref_cam = LookAlongX(rotation, Vector3d::Zero());
     const RenderedView view = renderer.Render({T_ref_cam});
     const Vector2d expected = *camera.Project(T_ref_cam.Inverse() * kDisc);
     EXPECT_LT((BlobNear(view.grey, expected).centre - expected).norm(), 0.08);

@@ -177,15 +177,16 @@ RenderedView Renderer::Render(const std::vector<Rigid3>& T_ref_cam) const {
     state.rows.push_back({T.R().cast<float>(), T.t.cast<float>()});
   }
   const RowPose& middle = state.Row(camera_.height / 2);
-  float turn = 0;
+  float rotation = 0;
   float move = 0;
   for (const RowPose& row : state.rows) {
     move = std::max(move, (row.p_ref_cam - middle.p_ref_cam).norm());
-    turn = std::max(turn, (row.R_ref_cam - middle.R_ref_cam).norm());
+    rotation = std::max(rotation, (row.R_ref_cam - middle.R_ref_cam).norm());
   }
   for (const Primitive& primitive : scene_.primitives) {
     state.centres.emplace_back(middle.R_ref_cam.transpose() * (primitive.p_ref - middle.p_ref_cam));
-    state.slack.push_back(primitive.BoundingRadius() + move + turn * state.centres.back().norm());
+    state.slack.push_back(primitive.BoundingRadius() + move +
+                          rotation * state.centres.back().norm());
   }
   state.keys.resize(rays_.size());
   state.candidates.resize(tiles_.size());

@@ -66,7 +66,7 @@ Sensor::Sensor(const CameraModel& camera, const SensorOptions& options)
 
 cv::Mat Sensor::Blurred(const RenderedView& view, const CameraRates& rates) const {
   cv::Mat blurred(view.grey.size(), CV_32F);
-  const Vector3f turn = (options_.exposure_s * rates.omega_cam).cast<float>();
+  const Vector3f rotation = (options_.exposure_s * rates.omega_cam).cast<float>();
   const Vector3f move = (options_.exposure_s * rates.v_cam).cast<float>();
   size_t i = 0;
   for (int y = 0; y < blurred.rows; ++y) {
@@ -74,8 +74,8 @@ cv::Mat Sensor::Blurred(const RenderedView& view, const CameraRates& rates) cons
     const float* range = view.range.ptr<float>(y);
     float* out = blurred.ptr<float>(y);
     for (int x = 0; x < blurred.cols; ++x, ++i) {
-      // A resting point p moves by -(omega x p + v) in the camera's frame; with p = range * ray.
-      const Vector3f shift = -turn.cross(ray_[i]) - move / range[x];
+      // A stationary point p moves by -(omega x p + v) in the camera's frame; with p = range * ray.
+      const Vector3f shift = -rotation.cross(ray_[i]) - move / range[x];
       const Eigen::Vector2f flow = J_pixel_ray_[i] * shift;
       const float length = flow.norm();
       if (length < 0.25f) {

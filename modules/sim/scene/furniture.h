@@ -25,7 +25,7 @@ Piece RandomSmallPiece(Rng* rng);    // fits into a cube of 0.8 m
 Piece RandomWallPiece(Rng* rng);     // boxes and pipes along x
 Piece RandomCeilingPiece(Rng* rng);  // ducts and beams along x
 
-// The piece turned about z and moved.
+// The piece rotated about z and moved.
 std::vector<Part> Placed(const Piece& piece, const Eigen::Vector3d& at, double yaw);
 
 enum class Marks { kMany, kFew };  // few: bare walls, whitewashed

@@ -109,10 +109,10 @@ void PaintPanels(Sheet* sheet, const cv::Rect& panel, double panel_m) {
 void PaintPolygon(Sheet* sheet, double size_m) {
   const cv::Point centre = sheet->RandomPoint();
   const int corners = 3 + sheet->rng->Index(3);
-  const double turn = sheet->rng->Uniform(0, 2 * M_PI);
+  const double rotation = sheet->rng->Uniform(0, 2 * M_PI);
   std::vector<cv::Point> points;
   for (int i = 0; i < corners; ++i) {
-    const double angle = turn + 2 * M_PI * (i + sheet->rng->Uniform(-0.3, 0.3)) / corners;
+    const double angle = rotation + 2 * M_PI * (i + sheet->rng->Uniform(-0.3, 0.3)) / corners;
     const double radius = sheet->rng->Uniform(0.4, 1.0) * size_m / sheet->texel_m;
     points.emplace_back(centre.x + static_cast<int>(radius * std::cos(angle)),
                         centre.y + static_cast<int>(radius * std::sin(angle)));
@@ -176,8 +176,8 @@ void PaintSpot(Sheet* sheet, double radius_m) {
   const cv::Size axes(sheet->Texels(radius_m), sheet->Texels(radius_m * flat));
   const int thickness = sheet->rng->Chance(0.6) ? cv::FILLED : sheet->Texels(0.2 * radius_m);
   const cv::Point centre = sheet->RandomPoint();
-  const double turn = sheet->rng->Uniform(0, 180);
-  cv::ellipse(sheet->image, centre, axes, turn, 0, 360, sheet->Mark(), thickness);
+  const double rotation = sheet->rng->Uniform(0, 180);
+  cv::ellipse(sheet->image, centre, axes, rotation, 0, 360, sheet->Mark(), thickness);
 }
 
 }  // namespace

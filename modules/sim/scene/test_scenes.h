@@ -41,7 +41,7 @@ inline Scene RoomWithDisc(int grey, int disc_grey) {
   return scene;
 }
 
-// A lively path of the body, at 200 Hz: circles, bobbing and turning about all axes.
+// A lively path of the body, at 200 Hz: circles, bobbing and rotating about all axes.
 inline Trajectory LivelyPath(double duration_s) {
   Trajectory trajectory;
   for (int i = 0; i <= static_cast<int>(200 * duration_s); ++i) {

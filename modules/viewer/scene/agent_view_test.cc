@@ -41,7 +41,7 @@ TEST(AgentView, TracksGoBackAsFarAsTheyAreUnbroken) {
   EXPECT_THAT(tracks[2], ElementsAre(Eigen::Vector2f(302, 3)));
 }
 
-TEST(AgentView, WhatIsAskedForAgainChangesNothing) {
+TEST(AgentView, WhatIsRetransmittedChangesNothing) {
   AgentView view;
   view.Take(Corners(4, 1, 1));
   const int64_t number = view.number();

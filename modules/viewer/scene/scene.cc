@@ -8,10 +8,10 @@ namespace {
 
 // A solve that moves a keyframe by less than both is not worth telling a page.
 constexpr double kLeastMove_m = 5e-4;
-constexpr double kLeastTurn_rad = 5e-4;
+constexpr double kLeastRotation_rad = 5e-4;
 
 bool Moved(const Rigid3& from, const Rigid3& to) {
-  return (from.t - to.t).norm() > kLeastMove_m || from.q.angularDistance(to.q) > kLeastTurn_rad;
+  return (from.t - to.t).norm() > kLeastMove_m || from.q.angularDistance(to.q) > kLeastRotation_rad;
 }
 
 // The index of `key`, given a new one by `append` if there are fewer than `limit`; else -1.

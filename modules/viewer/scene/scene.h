@@ -1,8 +1,9 @@
 #pragma once
 
-// What is there to see: maps, keyframes with their points, solved poses, verdicts, agents, the
-// health of processes, fusions. Domain messages in, in any order and repeated as they like; state
-// and the order in which it changed out. Knows no page, no socket and no clock: the time is told.
+// What is there to see: maps, keyframes with their points, solved poses, verification results,
+// agents, the health of processes, fusions. Domain messages in, in any order and repeated as they
+// like; state and the order in which it changed out. Knows no page, no socket and no clock: the
+// time is told.
 //
 // Bounded (kMax...): what comes beyond is not shown, and counted.
 

@@ -75,7 +75,7 @@ TEST(Scene, AnOldStateChangesNothing) {
   EXPECT_EQ(scene.maps()[1].group, kOne);
 }
 
-TEST(Scene, OnlyWhatMovedIsToldAgain) {
+TEST(Scene, OnlyWhatMovedIsSentAgain) {
   Scene scene;
   MapState state = TestState({kOne}, 2, 1);
   scene.Take(state);
@@ -119,7 +119,7 @@ TEST(Scene, FusionsAndSplitsAreNotedOnceWithTheirTime) {
   EXPECT_EQ(scene.fusions()[1].time_s, 4);
 }
 
-TEST(Scene, TheNewestVerdictOnACandidateCounts) {
+TEST(Scene, TheNewestResultOnACandidateCounts) {
   Scene scene;
   scene.Take(TestConstraint({kOne, 0}, {kTwo, 3}, false));
   scene.Take(TestConstraint({kOne, 0}, {kTwo, 3}, true));

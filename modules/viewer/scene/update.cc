@@ -269,7 +269,7 @@ const SceneAgent* NewView(const Show& show, const Seen& seen) {
 
 }  // namespace
 
-bool HasNews(const Show& show, const Seen& seen) {
+bool HasUpdate(const Show& show, const Seen& seen) {
   const ShowClock clock = show.clock();
   return seen.epoch != show.epoch() || seen.version < show.scene().changes().version() ||
          clock.playing != seen.clock.playing || clock.speed != seen.clock.speed ||

@@ -13,14 +13,14 @@ constexpr uint64_t kMaxAgent = 100'000;
 }  // namespace
 
 std::optional<std::vector<uint8_t>> PageLink::Next() {
-  if (under_way_ || !HasNews(show_, seen_)) {
+  if (under_way_ || !HasUpdate(show_, seen_)) {
     return std::nullopt;
   }
   under_way_ = true;
   return EncodeUpdate(show_, kBudget, &seen_);
 }
 
-bool PageLink::Hear(std::string_view text) {
+bool PageLink::Receive(std::string_view text) {
   if (text.size() > kMaxText) {
     return false;
   }

@@ -21,12 +21,12 @@ class PageLink {
 
   explicit PageLink(Show& show) : show_(show) {}
 
-  // What to send now; nothing while the last one is under way or when there is no news.
+  // What to send now; nothing while the last one is under way or when there is no update.
   std::optional<std::vector<uint8_t>> Next();
 
   // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT}.
   // False for anything else: no page of ours says it.
-  bool Hear(std::string_view text);
+  bool Receive(std::string_view text);
 
  private:
   Show& show_;

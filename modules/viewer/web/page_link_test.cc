@@ -39,7 +39,7 @@ std::vector<json> TakeAll(PageLink& link) {
   std::vector<json> updates;
   while (const auto bytes = link.Next()) {
     updates.push_back(JsonOf(*bytes));
-    EXPECT_TRUE(link.Hear(R"({"taken": 1})"));
+    EXPECT_TRUE(link.Receive(R"({"taken": 1})"));
   }
   return updates;
 }
@@ -73,9 +73,9 @@ TEST(PageLink, OneUpdateIsUnderWayAtATime) {
   EXPECT_TRUE(link.Next().has_value());
   show.scene_.Take(TestKeyframe(kOne, 1));
   EXPECT_FALSE(link.Next().has_value());
-  EXPECT_TRUE(link.Hear(R"({"taken": 1})"));
+  EXPECT_TRUE(link.Receive(R"({"taken": 1})"));
   EXPECT_TRUE(link.Next().has_value());
-  EXPECT_TRUE(link.Hear(R"({"taken": 2})"));
+  EXPECT_TRUE(link.Receive(R"({"taken": 2})"));
   EXPECT_FALSE(link.Next().has_value()) << "nothing is new";
 }
 
@@ -146,9 +146,9 @@ TEST(PageLink, OnlyTheWatchedCameraIsSent) {
   show.scene_.Take(keyframe);
   PageLink link(show);
   EXPECT_FALSE(TakeAll(link)[0].contains("view"));
-  EXPECT_TRUE(link.Hear(R"({"watch": 2})"));
+  EXPECT_TRUE(link.Receive(R"({"watch": 2})"));
   EXPECT_FALSE(link.Next().has_value());
-  EXPECT_TRUE(link.Hear(R"({"watch": 1})"));
+  EXPECT_TRUE(link.Receive(R"({"watch": 1})"));
   const std::vector<uint8_t> bytes = link.Next().value();
   EXPECT_EQ(JsonOf(bytes)["view"]["width"], 752);
   const size_t view = 4 + WordAt(bytes, 0);
@@ -158,7 +158,7 @@ TEST(PageLink, OnlyTheWatchedCameraIsSent) {
   EXPECT_EQ(FloatAt(bytes, view + 12), 40.0F);
   EXPECT_EQ(WordAt(bytes, view + 16), 0U);  // bytes of the image
   EXPECT_EQ(bytes.size(), view + 20);
-  EXPECT_TRUE(link.Hear(R"({"taken": 1})"));
+  EXPECT_TRUE(link.Receive(R"({"taken": 1})"));
   EXPECT_FALSE(link.Next().has_value()) << "seen already";
 
   auto image = std::make_shared<ShownImage>(ShownImage{1, 0, 1, 3, 1, {1, 2, 3}});
@@ -174,9 +174,9 @@ TEST(PageLink, OnlyTheWatchedCameraIsSent) {
 TEST(PageLink, HearsTheControls) {
   TestShow show;
   PageLink link(show);
-  EXPECT_TRUE(link.Hear(R"({"seek": 4.5})"));
-  EXPECT_TRUE(link.Hear(R"({"play": false})"));
-  EXPECT_TRUE(link.Hear(R"({"speed": 20})"));
+  EXPECT_TRUE(link.Receive(R"({"seek": 4.5})"));
+  EXPECT_TRUE(link.Receive(R"({"play": false})"));
+  EXPECT_TRUE(link.Receive(R"({"speed": 20})"));
   EXPECT_EQ(show.clock_.now_s, 4.5);
   EXPECT_FALSE(show.clock_.playing);
   EXPECT_EQ(show.clock_.speed, 20);
@@ -188,7 +188,7 @@ TEST(PageLink, ControlsReachEveryPage) {
   PageLink other(show);
   TakeAll(one);
   TakeAll(other);
-  EXPECT_TRUE(one.Hear(R"({"play": false})"));
+  EXPECT_TRUE(one.Receive(R"({"play": false})"));
   const std::vector<json> updates = TakeAll(other);
   ASSERT_EQ(updates.size(), 1U);
   EXPECT_EQ(updates[0]["playing"], false);
@@ -202,9 +202,9 @@ TEST(PageLink, NoPageOfOursSaysThis) {
         R"({"speed": -1})", R"({"speed": 1e9})", R"({"play": 1})", R"({"taken": -1})",
         R"({"watch": -1})", R"({"watch": 1e9})", R"({"seek": 1, "play": true})",
         R"({"shutdown": true})"}) {
-    EXPECT_FALSE(link.Hear(text)) << text;
+    EXPECT_FALSE(link.Receive(text)) << text;
   }
-  EXPECT_FALSE(link.Hear(std::string(PageLink::kMaxText + 1, ' ')));
+  EXPECT_FALSE(link.Receive(std::string(PageLink::kMaxText + 1, ' ')));
   EXPECT_EQ(show.clock_.now_s, 0);
 }
 

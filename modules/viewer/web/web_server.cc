@@ -49,15 +49,15 @@ class Browser : public std::enable_shared_from_this<Browser> {
     });
   }
 
-  void SendNews() {
+  void SendUpdate() {
     if (!open_ || sending_) {
       return;
     }
-    auto news = link_.Next();
-    if (!news) {
+    auto update = link_.Next();
+    if (!update) {
       return;
     }
-    update_ = std::move(*news);
+    update_ = std::move(*update);
     sending_ = true;
     socket_.async_write(asio::buffer(update_),
                         [self = shared_from_this()](beast::error_code error, size_t) {
@@ -75,7 +75,7 @@ class Browser : public std::enable_shared_from_this<Browser> {
       }
       const auto data = self->buffer_.cdata();
       const bool understood =
-          self->link_.Hear({static_cast<const char*>(data.data()), data.size()});
+          self->link_.Receive({static_cast<const char*>(data.data()), data.size()});
       self->buffer_.clear();
       if (understood) {
         self->Read();
@@ -104,7 +104,7 @@ struct WebServer::Impl {
 
   void Listen();
   void Accept();
-  void SendNews();
+  void SendUpdate();
 
   WebOptions options;
   std::map<std::string, PageFile> page;
@@ -245,11 +245,11 @@ void WebServer::Impl::Accept() {
   });
 }
 
-void WebServer::Impl::SendNews() {
+void WebServer::Impl::SendUpdate() {
   browsers.remove_if([](const std::weak_ptr<Browser>& browser) { return browser.expired(); });
   for (const std::weak_ptr<Browser>& browser : browsers) {
     if (const auto alive = browser.lock()) {
-      alive->SendNews();
+      alive->SendUpdate();
     }
   }
 }
@@ -265,7 +265,7 @@ WebServer::~WebServer() = default;
 uint16_t WebServer::port() const { return impl_->acceptor.local_endpoint().port(); }
 
 void WebServer::Serve(int timeout_ms) {
-  impl_->SendNews();
+  impl_->SendUpdate();
   impl_->io.restart();
   impl_->io.run_for(std::chrono::milliseconds(timeout_ms));
 }

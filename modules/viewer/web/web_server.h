@@ -32,7 +32,7 @@ class WebServer {
   ~WebServer();
 
   uint16_t port() const;
-  // Sends every page its news and handles what browsers ask, for `timeout_ms`.
+  // Sends every page its update and handles what browsers ask, for `timeout_ms`.
   void Serve(int timeout_ms);
 
   struct Impl;

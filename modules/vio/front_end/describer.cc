@@ -16,8 +16,8 @@ constexpr float kPatchSize = 31.F;
 // How far, on its octave, a tracked landmark may lie from the corner it is described at.
 constexpr float kSnapRadius = 2.F;
 
-// Half width of each row of the disc, the same in both directions so that turning the patch turns
-// the centroid.
+// Half width of each row of the disc, the same in both directions so that rotating the patch
+// rotates the centroid.
 std::array<int, kPatchRadius + 1> DiscHalfWidths() {
   std::array<int, kPatchRadius + 1> widths{};
   for (int v = 0; v <= kPatchRadius; ++v) {
@@ -245,11 +245,12 @@ std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame
     share_sum += 1.0 / scale;
   }
   std::vector<Candidate> others;
-  double owed = 0;  // what coarser octaves could not use goes to the finer ones
+  double carried_over = 0;  // what coarser octaves could not use goes to the finer ones
   for (int octave = static_cast<int>(scales_.size()) - 1; octave >= 0; --octave) {
-    owed += wanted / scales_[octave] / share_sum;
-    const auto found = FindCorners(octave, std::max(0, static_cast<int>(std::lround(owed))));
-    owed -= static_cast<double>(found.size());
+    carried_over += wanted / scales_[octave] / share_sum;
+    const auto found =
+        FindCorners(octave, std::max(0, static_cast<int>(std::lround(carried_over))));
+    carried_over -= static_cast<double>(found.size());
     others.insert(others.end(), found.begin(), found.end());
   }
   candidates.insert(candidates.end(), others.begin(), others.end());

@@ -83,7 +83,7 @@ TEST(Describer, DescriptorsSurviveARollOfThirtyDegrees) {
   const cv::Mat image = RandomTexture(752, 480, 3);
   const Eigen::Quaterniond roll = ExpSo3({0, 0, 0.52});
   int matches = 0;
-  EXPECT_GT(CorrectShare(image, TurnedView(image, PlainCamera(), roll), roll, &matches), 0.9);
+  EXPECT_GT(CorrectShare(image, RotatedView(image, PlainCamera(), roll), roll, &matches), 0.9);
   EXPECT_GT(matches, 120);
 }
 

@@ -24,11 +24,11 @@ cv::Mat Waves(const Eigen::Matrix2f& a, const Eigen::Vector2f& shift) {
       const Eigen::Vector2f p = a_inverse * (seen - kAt - shift);
       double value = 128;
       for (int wave = 0; wave < 12; ++wave) {
-        const double turn = 2.4 * wave;
+        const double rotation = 2.4 * wave;
         const double length_px = 12 + 4 * wave;
-        value +=
-            12 * std::sin(6.28318 / length_px * (std::cos(turn) * p.x() + std::sin(turn) * p.y()) +
-                          wave * wave);
+        value += 12 * std::sin(6.28318 / length_px *
+                                   (std::cos(rotation) * p.x() + std::sin(rotation) * p.y()) +
+                               wave * wave);
       }
       image.at<uchar>(y, x) = cv::saturate_cast<uchar>(value);
     }
@@ -38,18 +38,18 @@ cv::Mat Waves(const Eigen::Matrix2f& a, const Eigen::Vector2f& shift) {
 
 const Eigen::Matrix2f kAsItWas = Eigen::Matrix2f::Identity();
 
-Eigen::Matrix2f TurnAndStretch(float angle, float stretch) {
+Eigen::Matrix2f RotateAndStretch(float angle, float stretch) {
   Eigen::Matrix2f a;
   a << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
   return stretch * a;
 }
 
-TEST(ReferencePatch, FindsItselfMovedTurnedStretchedAndDarker) {
+TEST(ReferencePatch, FindsItselfMovedRotatedStretchedAndDarker) {
   auto patch = ReferencePatch::Take(Waves(kAsItWas, {0, 0}), kAt);
   ASSERT_TRUE(patch);
   const Eigen::Vector2f shift(0.4F, -0.7F);
   cv::Mat seen;
-  Waves(TurnAndStretch(0.05F, 1.06F), shift).convertTo(seen, CV_8U, 0.6, 12);
+  Waves(RotateAndStretch(0.05F, 1.06F), shift).convertTo(seen, CV_8U, 0.6, 12);
   const auto found = patch->Find(seen, kAt);
   ASSERT_TRUE(found);
   EXPECT_LT((*found - kAt - shift).norm(), 0.03);
@@ -81,7 +81,7 @@ TEST(ReferencePatch, FollowsASlowGrowthUntilItIsWornOut) {
   float stretch = 1;
   while (!patch->IsWornOut() && images < 60) {
     stretch *= 1.02F;
-    const auto found = patch->Find(Waves(TurnAndStretch(0, stretch), {0, 0}), kAt);
+    const auto found = patch->Find(Waves(RotateAndStretch(0, stretch), {0, 0}), kAt);
     ASSERT_TRUE(found) << "stretched by " << stretch;
     EXPECT_LT((*found - kAt).norm(), 0.1) << "stretched by " << stretch;
     ++images;

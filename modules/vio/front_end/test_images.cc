@@ -23,8 +23,8 @@ cv::Mat RandomTexture(int width, int height, uint64_t seed) {
 
 CameraModel PlainCamera() { return PinholeTestCamera(752, 480, 460); }
 
-cv::Mat TurnedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q) {
-  cv::Mat map_x(image.size(), CV_32F), map_y(image.size(), CV_32F), turned;
+cv::Mat RotatedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q) {
+  cv::Mat map_x(image.size(), CV_32F), map_y(image.size(), CV_32F), rotated;
   const Eigen::Matrix3d R_before_after = q.conjugate().toRotationMatrix();
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
@@ -34,8 +34,8 @@ cv::Mat TurnedView(const cv::Mat& image, const CameraModel& camera, const Eigen:
       map_y.at<float>(y, x) = static_cast<float>(camera.fy * before.y() / before.z() + camera.cy);
     }
   }
-  cv::remap(image, turned, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REFLECT_101);
-  return turned;
+  cv::remap(image, rotated, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REFLECT_101);
+  return rotated;
 }
 
 }  // namespace pangea::vio

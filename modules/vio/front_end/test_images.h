@@ -1,6 +1,6 @@
 #pragma once
 
-// Images for the front end's tests: a textured plane at infinity, seen by a turning camera.
+// Images for the front end's tests: a textured plane at infinity, seen by a rotating camera.
 
 #include <cstdint>
 #include <opencv2/core.hpp>
@@ -15,8 +15,8 @@ cv::Mat RandomTexture(int width, int height, uint64_t seed);
 // 752 x 480 without distortion.
 CameraModel PlainCamera();
 
-// What the camera sees after turning, when it saw `image` before: directions d_after = q *
+// What the camera sees after rotating, when it saw `image` before: directions d_after = q *
 // d_before.
-cv::Mat TurnedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q);
+cv::Mat RotatedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q);
 
 }  // namespace pangea::vio

@@ -45,7 +45,7 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
   if (!features_.empty()) {
     const std::vector<Bearing> before = Bearings();
     TrackFeatures(q_cam_lastcam);
-    AlignWithPatches(image);
+    RefineWithPatches(image);
     RejectOutliers(q_cam_lastcam, before);
   }
   statistics_.tracked = static_cast<int>(features_.size());
@@ -123,7 +123,7 @@ void Tracker::TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam) {
 }
 
 // Image-to-image tracking has brought each feature to within a pixel or so.
-void Tracker::AlignWithPatches(const cv::Mat& image) {
+void Tracker::RefineWithPatches(const cv::Mat& image) {
   for (Feature& feature : features_) {
     if (!feature.patch) {
       continue;

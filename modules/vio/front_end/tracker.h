@@ -79,7 +79,7 @@ class Tracker {
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
   void TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam);
-  void AlignWithPatches(const cv::Mat& image);
+  void RefineWithPatches(const cv::Mat& image);
   void TakePatches(const cv::Mat& image);
   void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
   void AddFeatures();

@@ -28,13 +28,13 @@ struct Outcome {
   double worst_px = 0;
 };
 
-// How well features found in `image` are found again where the turn takes them.
-Outcome TrackOnce(const cv::Mat& image, const cv::Mat& turned, const Eigen::Quaterniond& truth,
+// How well features found in `image` are found again where the rotation takes them.
+Outcome TrackOnce(const cv::Mat& image, const cv::Mat& rotated, const Eigen::Quaterniond& truth,
                   const Eigen::Quaterniond& guess) {
   const CameraModel camera = PlainCamera();
   Tracker tracker(camera, {});
   const auto before = ById(tracker.Track(0, image, Eigen::Quaterniond::Identity()));
-  const auto after = ById(tracker.Track(50'000, turned, guess));
+  const auto after = ById(tracker.Track(50'000, rotated, guess));
   Outcome outcome;
   for (const auto& [id, observation] : after) {
     const auto found = before.find(id);
@@ -68,32 +68,32 @@ TEST(Tracker, SpreadsFeaturesWithUniqueIds) {
   EXPECT_GE(cells.size(), 44u) << "of 48 parts of the image";
 }
 
-TEST(Tracker, FollowsASmallTurnToSubpixel) {
+TEST(Tracker, TracksASmallRotationToSubpixel) {
   const cv::Mat image = RandomTexture(752, 480, 2);
   const Eigen::Quaterniond q = ExpSo3({0.004, -0.006, 0.01});
   const Outcome outcome =
-      TrackOnce(image, TurnedView(image, PlainCamera(), q), q, Eigen::Quaterniond::Identity());
+      TrackOnce(image, RotatedView(image, PlainCamera(), q), q, Eigen::Quaterniond::Identity());
   EXPECT_GE(outcome.tracked, 110);
   EXPECT_LT(outcome.rms_px, 0.1);
 }
 
-TEST(Tracker, TheGyroCarriesItOverAFastTurn) {
+TEST(Tracker, TheGyroCarriesItOverAFastRotation) {
   const cv::Mat image = RandomTexture(752, 480, 3);
   // 9 degrees between two images, about a third of it roll: 180 degrees a second at 20 Hz.
   const Eigen::Quaterniond q = ExpSo3({0.03, 0.14, 0.06});
-  const cv::Mat turned = TurnedView(image, PlainCamera(), q);
+  const cv::Mat rotated = RotatedView(image, PlainCamera(), q);
   // The gyro's own error: a bias of 0.08 rad/s.
   const Eigen::Quaterniond guess = ExpSo3({0, 0.004, 0}) * q;
-  const Outcome outcome = TrackOnce(image, turned, q, guess);
+  const Outcome outcome = TrackOnce(image, rotated, q, guess);
   EXPECT_GE(outcome.tracked, 70) << "a fifth of the image has left the view";
-  EXPECT_LT(outcome.rms_px, 0.5);  // the patches themselves are turned and foreshortened
+  EXPECT_LT(outcome.rms_px, 0.5);  // the patches themselves are rotated and foreshortened
 }
 
 TEST(Tracker, SurvivesAChangeOfExposure) {
   const cv::Mat image = RandomTexture(752, 480, 4);
   const Eigen::Quaterniond q = ExpSo3({0.004, -0.006, 0.0});
   cv::Mat darker;
-  TurnedView(image, PlainCamera(), q).convertTo(darker, CV_8U, 0.7, -10);
+  RotatedView(image, PlainCamera(), q).convertTo(darker, CV_8U, 0.7, -10);
   const Outcome outcome = TrackOnce(image, darker, q, q);
   EXPECT_GE(outcome.tracked, 100);
   EXPECT_LT(outcome.rms_px, 0.25);
@@ -107,12 +107,12 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
   Eigen::Quaterniond q_now_first = Eigen::Quaterniond::Identity();
   std::map<int32_t, Observation> last;
   for (int i = 1; i <= 60; ++i) {
-    // Slow turns to and fro, with roll: the patches turn by up to 8 degrees.
+    // Slow rotations to and fro, with roll: the patches rotate by up to 8 degrees.
     const double phase = 0.2 * i;
     const Eigen::Quaterniond q =
         ExpSo3({0.006 * std::sin(phase), 0.008 * std::sin(0.7 * phase), 0.015 * std::cos(phase)});
     q_now_first = q * q_now_first;
-    cv::Mat view = TurnedView(image, PlainCamera(), q_now_first);
+    cv::Mat view = RotatedView(image, PlainCamera(), q_now_first);
     cv::Mat noise(view.size(), CV_16S);
     cv::theRNG().state = static_cast<uint64_t>(i);
     cv::randn(noise, 0, 3);
@@ -154,12 +154,12 @@ TEST(Tracker, ABlankImageHasNoFeaturesAndIdsGoOn) {
 TEST(Tracker, IsDeterministic) {
   const cv::Mat image = RandomTexture(752, 480, 8);
   const Eigen::Quaterniond q = ExpSo3({0.01, 0.02, 0.0});
-  const cv::Mat turned = TurnedView(image, PlainCamera(), q);
+  const cv::Mat rotated = RotatedView(image, PlainCamera(), q);
   Tracker one(PlainCamera(), {}), two(PlainCamera(), {});
   one.Track(0, image, q);
   two.Track(0, image, q);
-  const auto a = one.Track(1, turned, q).observations;
-  const auto b = two.Track(1, turned, q).observations;
+  const auto a = one.Track(1, rotated, q).observations;
+  const auto b = two.Track(1, rotated, q).observations;
   ASSERT_EQ(a.size(), b.size());
   for (size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].landmark_id, b[i].landmark_id);

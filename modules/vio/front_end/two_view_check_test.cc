@@ -45,7 +45,7 @@ struct Rates {
   double kept_wrong = 0;
 };
 
-Rates Judge(const World& world, const TwoViewResult& result) {
+Rates RatesOf(const World& world, const TwoViewResult& result) {
   double good = 0, wrong = 0, kept_good = 0, kept_wrong = 0;
   for (size_t i = 0; i < world.good.size(); ++i) {
     (world.good[i] ? good : wrong) += 1;
@@ -54,13 +54,14 @@ Rates Judge(const World& world, const TwoViewResult& result) {
   return {kept_good / good, wrong > 0 ? kept_wrong / wrong : 0};
 }
 
-const Eigen::Quaterniond kTurn = ExpSo3({0.02, -0.03, 0.05});
+const Eigen::Quaterniond kRotation = ExpSo3({0.02, -0.03, 0.05});
 // The gyro's bias over 50 ms, before anybody knows it.
 const Eigen::Quaterniond kBias = ExpSo3({0.001, 0.002, -0.004});
 
 TEST(TwoViewCheck, SeparatesOutliersWhenMoving) {
-  const World world = MakeWorld(kTurn, {0.1, 0.02, 0.05}, 36, 1);
-  const Rates rates = Judge(world, CheckTwoView(world.a, world.b, kBias * kTurn, kPixelAngle, {}));
+  const World world = MakeWorld(kRotation, {0.1, 0.02, 0.05}, 36, 1);
+  const Rates rates =
+      RatesOf(world, CheckTwoView(world.a, world.b, kBias * kRotation, kPixelAngle, {}));
   EXPECT_GT(rates.kept_good, 0.95);
   // A third of wrong tracks may run along its epipolar line, where two views cannot tell.
   EXPECT_LT(rates.kept_wrong, 0.35);
@@ -68,18 +69,18 @@ TEST(TwoViewCheck, SeparatesOutliersWhenMoving) {
 
 TEST(TwoViewCheck, KeepsEverythingGoodAtStandstill) {
   const World world = MakeWorld(Eigen::Quaterniond::Identity(), {0, 0, 0}, 20, 2);
-  const Rates rates =
-      Judge(world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
+  const Rates rates = RatesOf(
+      world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
   EXPECT_GT(rates.kept_good, 0.97);
   EXPECT_LT(rates.kept_wrong, 0.4);
 }
 
 TEST(TwoViewCheck, KeepsEverythingGoodInPureRotation) {
-  const World world = MakeWorld(kTurn, {0, 0, 0}, 0, 3);
-  const TwoViewResult result = CheckTwoView(world.a, world.b, kBias * kTurn, kPixelAngle, {});
-  EXPECT_GT(Judge(world, result).kept_good, 0.97);
+  const World world = MakeWorld(kRotation, {0, 0, 0}, 0, 3);
+  const TwoViewResult result = CheckTwoView(world.a, world.b, kBias * kRotation, kPixelAngle, {});
+  EXPECT_GT(RatesOf(world, result).kept_good, 0.97);
   // The bias is seen: the rotation is the true one, not the gyro's.
-  EXPECT_LT(result.q_b_a.angularDistance(kTurn), 3e-4);
+  EXPECT_LT(result.q_b_a.angularDistance(kRotation), 3e-4);
 }
 
 TEST(TwoViewCheck, RejectsPointsThatRunBackwards) {
@@ -88,18 +89,18 @@ TEST(TwoViewCheck, RejectsPointsThatRunBackwards) {
     world.b[i] = world.a[i] - (world.b[i] - world.a[i]);
     world.good[i] = false;
   }
-  const Rates rates =
-      Judge(world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
+  const Rates rates = RatesOf(
+      world, CheckTwoView(world.a, world.b, Eigen::Quaterniond::Identity(), kPixelAngle, {}));
   EXPECT_GT(rates.kept_good, 0.95);
   EXPECT_LT(rates.kept_wrong, 0.1);
 }
 
 TEST(TwoViewCheck, AHandfulOfTracksIsKept) {
-  const World world = MakeWorld(kTurn, {0.1, 0, 0}, 0, 5);
+  const World world = MakeWorld(kRotation, {0.1, 0, 0}, 0, 5);
   const std::vector<Eigen::Vector2d> a(world.a.begin(), world.a.begin() + 4);
   const std::vector<Eigen::Vector2d> b(world.b.begin(), world.b.begin() + 4);
-  EXPECT_EQ(CheckTwoView(a, b, kTurn, kPixelAngle, {}).num_inliers, 4);
-  EXPECT_EQ(CheckTwoView({}, {}, kTurn, kPixelAngle, {}).num_inliers, 0);
+  EXPECT_EQ(CheckTwoView(a, b, kRotation, kPixelAngle, {}).num_inliers, 4);
+  EXPECT_EQ(CheckTwoView({}, {}, kRotation, kPixelAngle, {}).num_inliers, 0);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int64_t kMaxGap_us = 300'000;
 constexpr int64_t kMargin_us = 50'000;  // for changes of the time offset
-constexpr size_t kMinKept = 100;        // to tell a rest, or the noise, by
+constexpr size_t kMinKept = 100;        // to tell whether it is stationary, or the noise, by
 constexpr std::ptrdiff_t kNoiseSamples = 100;
 
 }  // namespace
@@ -49,11 +49,12 @@ std::optional<std::string> ImuBuffer::Gap(int64_t from_utime, int64_t to_utime) 
 }
 
 ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
-                                          const ImuScales& scales, const Eigen::Vector3d& gyro_bias,
+                                          const ImuIntrinsics& intrinsics,
+                                          const Eigen::Vector3d& gyro_bias,
                                           const Eigen::Vector3d& accel_bias) const {
   // The time offset may want a little more than has come: the last sample holds.
   return IntegrateScaled(SamplesBetween(samples_, from_utime, to_utime),
-                         NoiseAround(from_utime, to_utime), scales, gyro_bias, accel_bias);
+                         NoiseAround(from_utime, to_utime), intrinsics, gyro_bias, accel_bias);
 }
 
 // Measured on the span, or on as much before its end as tells the noise.

@@ -10,7 +10,7 @@
 
 #include "core/imu/imu.h"
 #include "core/imu/preintegration.h"
-#include "vio/imu/imu_scales.h"
+#include "vio/imu/imu_intrinsics.h"
 
 namespace pangea::vio {
 
@@ -25,8 +25,8 @@ class ImuBuffer {
   // What is missing for a span of time, in words; nothing when it is covered.
   std::optional<std::string> Gap(int64_t from_utime, int64_t to_utime) const;
   // With the noise that the samples show, not less than the data sheet's (imu_noise.h).
-  ScaledPreintegration Integrate(int64_t from_utime, int64_t to_utime, const ImuScales& scales,
-                                 const Eigen::Vector3d& gyro_bias,
+  ScaledPreintegration Integrate(int64_t from_utime, int64_t to_utime,
+                                 const ImuIntrinsics& intrinsics, const Eigen::Vector3d& gyro_bias,
                                  const Eigen::Vector3d& accel_bias) const;
   // The first at or after this time, else the last of all. There must be one.
   const ImuSample& At(int64_t utime) const;

@@ -110,7 +110,7 @@ std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Ri
 }
 
 // The gyro's rotation over a span of time that the samples cover; no bias taken off.
-Quaterniond Turn(std::span<const ImuSample> samples, int64_t from_utime, int64_t to_utime) {
+Quaterniond Rotation(std::span<const ImuSample> samples, int64_t from_utime, int64_t to_utime) {
   Quaterniond q = Quaterniond::Identity();
   for (size_t i = 0; i + 1 < samples.size(); ++i) {
     const int64_t begin = std::max(samples[i].utime, from_utime);
@@ -216,7 +216,7 @@ std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const 
   for (int k = -kSteps; k <= kSteps; ++k) {
     const int64_t shift = max_us * k / kSteps;
     for (RotationPair& pair : pairs) {
-      pair.delta_q = Turn(samples, pair.from_utime + shift, pair.to_utime + shift);
+      pair.delta_q = Rotation(samples, pair.from_utime + shift, pair.to_utime + shift);
     }
     const FoundBias found = FindBias(pairs, bias, 0.01);
     bias = found.bias;

@@ -29,9 +29,9 @@ TEST(SolveTimeOffset, SaysNothingWhenNothingIsGained) {
   EXPECT_FALSE(OffsetOf(Record(Lively, 0.001, kRaySigma)));
 }
 
-// At a constant turn rate every offset explains the rotations as well.
-TEST(SolveTimeOffset, SaysNothingWhenTheTurnRateDoesNotVary) {
-  EXPECT_FALSE(OffsetOf(Record(TurningEvenly, 0.03, kRaySigma)));
+// At a constant rotation rate every offset explains the rotations as well.
+TEST(SolveTimeOffset, SaysNothingWhenTheRotationRateDoesNotVary) {
+  EXPECT_FALSE(OffsetOf(Record(RotatingEvenly, 0.03, kRaySigma)));
 }
 
 TEST(SolveTimeOffset, SaysNothingBeyondWhatItSearches) {

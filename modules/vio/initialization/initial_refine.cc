@@ -37,16 +37,17 @@ void AddStates(const Quaterniond& q_odom_first, const LinearStart& start, StartP
   }
 }
 
-void AddLinks(std::span<const StartFrame> frames, const ImuNoise& noise, StartProblem* problem) {
+void AddImuFactors(std::span<const StartFrame> frames, const ImuNoise& noise,
+                   StartProblem* problem) {
   for (size_t k = 1; k < frames.size(); ++k) {
     Preintegrator integrator(noise, problem->expected_gyro_bias, Vector3d::Zero());
     integrator.Add(frames[k].imu);
-    StartLink link{integrator.result(), {}};
+    StartImuFactor factor{integrator.result(), {}};
     // Keeps a span of a single sample invertible: positions to 1 micrometre.
-    link.measured.covariance.diagonal().array() += 1e-12;
-    link.information =
-        link.measured.covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity());
-    problem->links.push_back(link);
+    factor.measured.covariance.diagonal().array() += 1e-12;
+    factor.information =
+        factor.measured.covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity());
+    problem->imu_factors.push_back(factor);
   }
 }
 
@@ -109,7 +110,7 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   problem.expected_gyro_bias = gyro_bias;
   const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
   AddStates(q_odom_first, start, &problem);
-  AddLinks(frames, noise, &problem);
+  AddImuFactors(frames, noise, &problem);
   const int rays = AddPoints(frames, q_odom_first, start, &problem);
   RefinedStart out;
   int before_camera = 0;

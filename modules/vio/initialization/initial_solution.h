@@ -28,7 +28,7 @@ std::optional<Eigen::Vector3d> SolveGyroBias(std::span<const StartFrame> frames,
 
 // How much later than supposed the images were taken (seconds, on the IMU's clock), from rotations
 // alone: what makes them epipolar with the gyro's. `samples` span the frames and a little more.
-// Nothing when the turn rate does not vary enough to tell, or nothing is gained.
+// Nothing when the rotation rate does not vary enough to tell, or nothing is gained.
 std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                       std::span<const ImuSample> samples, const ImuNoise& noise);
 

@@ -23,11 +23,12 @@ constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgo
 constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
 constexpr size_t kMinTracks = 20;
 
-// At rest: the image stands, the accelerometer and the gyro are quiet.
-constexpr double kRestSpan_s = 1.0;
-constexpr double kRestSigmas = 2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
-constexpr double kRestAccel = 0.25;  // m/s^2, standard deviation
-constexpr double kRestGyro = 0.03;   // rad/s
+// Stationary: the image stands, the accelerometer and the gyro are quiet.
+constexpr double kStationarySpan_s = 1.0;
+constexpr double kStationarySigmas =
+    2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
+constexpr double kStationaryAccel = 0.25;  // m/s^2, standard deviation
+constexpr double kStationaryGyro = 0.03;   // rad/s
 
 // A moving start must be at least this certain and explain this much.
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
@@ -80,35 +81,36 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
   if (span < kMinSpan_s) {
     return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
   }
-  if (auto at_rest = TryAtRest()) {
-    return {at_rest, ""};
+  if (auto stationary = TryStationary()) {
+    return {stationary, ""};
   }
   return TryMoving();
 }
 
-std::optional<InitialState> Initialiser::TryAtRest() const {
+std::optional<InitialState> Initialiser::TryStationary() const {
   const int64_t now = frames_.back().utime;
   const auto oldest = std::find_if(frames_.begin(), frames_.end(), [now](const TrackedFrame& one) {
-    return SpanSeconds(one.utime, now) <= kRestSpan_s + kFrameSpacing_s;
+    return SpanSeconds(one.utime, now) <= kStationarySpan_s + kFrameSpacing_s;
   });
   const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
   size_t shared = 0;
   const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);
-  if (samples.size() < 20 || shared < kMinTracks || moved > kRestSigmas * pixel_sigma_) {
+  if (samples.size() < 20 || shared < kMinTracks || moved > kStationarySigmas * pixel_sigma_) {
     return std::nullopt;
   }
   const SampleMoments moments = MomentsOf(samples);
-  if (moments.accel_variance > kRestAccel * kRestAccel ||
-      moments.gyro_variance > kRestGyro * kRestGyro) {
+  if (moments.accel_variance > kStationaryAccel * kStationaryAccel ||
+      moments.gyro_variance > kStationaryGyro * kStationaryGyro) {
     return std::nullopt;
   }
   InitialState state;
-  state.at_rest = true;
+  state.stationary = true;
   ImuState imu;
   imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
   imu.gyro_bias = moments.gyro_mean;
   state.frames.push_back({frames_.back(), imu});
-  // An accelerometer bias and a tilt look alike at rest: the tilt is as uncertain as the bias.
+  // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
+  // the bias.
   Eigen::Matrix<double, 15, 1> sigma;
   constexpr double kAccelBiasSigma = 0.1;
   sigma << Vector3d(kAccelBiasSigma / kGravity, kAccelBiasSigma / kGravity, 1e-4),

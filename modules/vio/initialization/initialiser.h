@@ -2,7 +2,7 @@
 
 // The first state of a map, from a second or two of tracks and inertial samples.
 //
-// At rest: gravity from the accelerometer, gyro bias from the gyro. Moving: the gyro bias that
+// Stationary: gravity from the accelerometer, gyro bias from the gyro. Moving: the gyro bias that
 // makes every pair of images epipolar (Kneip & Lynen, ICCV 2013; He et al., CVPR 2023), then
 // velocity and gravity in closed form with |g| known (Dong-Si & Mourikis, IROS 2012), then bundle
 // adjustment with preintegrated IMU. A solution that is not well determined, or does not explain
@@ -25,14 +25,14 @@ namespace pangea::vio {
 
 // odom: z up, origin at the body now, yaw free.
 struct InitialState {
-  // The frames the start was found from, oldest first, the newest last; one if it was at rest.
+  // The frames the start was found from, oldest first, the newest last; one if it was stationary.
   struct Frame {
     TrackedFrame tracked;  // its utime is the IMU's
     ImuState imu;
   };
   std::vector<Frame> frames;
-  bool at_rest = false;
-  // Of the one at rest: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
+  bool stationary = false;
+  // Of the stationary start: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
   double time_offset_change_s = 0;  // the images were taken this much later than their utime says
 };
@@ -52,7 +52,7 @@ class Initialiser {
   InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
 
  private:
-  std::optional<InitialState> TryAtRest() const;
+  std::optional<InitialState> TryStationary() const;
   InitialResult TryMoving();
   InitialResult TryMoving(const std::vector<StartFrame>& frames) const;
   std::vector<StartFrame> StartFrames() const;

@@ -153,10 +153,10 @@ void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* po
   }
 }
 
-void AddLink(const StartProblem& problem, int from, Equations* out) {
-  const StartLink& link = problem.links[from];
+void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
+  const StartImuFactor& factor = problem.imu_factors[from];
   const InertialResidual residual =
-      ComputeInertialResidual(link.measured, problem.states[from], problem.states[from + 1]);
+      ComputeInertialResidual(factor.measured, problem.states[from], problem.states[from + 1]);
   constexpr int kColumns = 24;
   Eigen::Matrix<double, 9, kColumns> J;
   J << residual.J_from.block<9, 6>(0, kGyroBias), residual.J_from.block<9, kPoseSize>(0, kTheta),
@@ -166,7 +166,7 @@ void AddLink(const StartProblem& problem, int from, Equations* out) {
   std::iota(columns.begin(), columns.begin() + 6, 0);
   std::iota(columns.begin() + 6, columns.begin() + 18, problem.PoseColumn(from));
   std::iota(columns.begin() + 18, columns.end(), problem.VelocityColumn(from));
-  const Eigen::Matrix<double, kColumns, 9> JtL = J.transpose() * link.information;
+  const Eigen::Matrix<double, kColumns, 9> JtL = J.transpose() * factor.information;
   out->H(columns, columns) += JtL * J;
   out->g(columns) += JtL * residual.r.head<9>();
 }
@@ -177,10 +177,10 @@ double StartProblem::Cost() const {
   double cost = 0.5 * (states[0].gyro_bias - expected_gyro_bias).squaredNorm() /
                     (kGyroBiasSigma * kGyroBiasSigma) +
                 0.5 * states[0].accel_bias.squaredNorm() / (kAccelBiasSigma * kAccelBiasSigma);
-  for (size_t i = 0; i < links.size(); ++i) {
+  for (size_t i = 0; i < imu_factors.size(); ++i) {
     const Eigen::Matrix<double, 9, 1> r =
-        ComputeInertialResidual(links[i].measured, states[i], states[i + 1]).r.head<9>();
-    cost += 0.5 * r.dot(links[i].information * r);
+        ComputeInertialResidual(imu_factors[i].measured, states[i], states[i + 1]).r.head<9>();
+    cost += 0.5 * r.dot(imu_factors[i].information * r);
   }
   for (const StartPoint& point : points) {
     cost += PointCost(*this, point, point.p_odom);
@@ -201,8 +201,8 @@ Equations StartProblem::Linearise(double damping) const {
   out.g.head<3>() = (states[0].gyro_bias - expected_gyro_bias) / (kGyroBiasSigma * kGyroBiasSigma);
   out.g.segment<3>(3) = states[0].accel_bias / (kAccelBiasSigma * kAccelBiasSigma);
   out.H.diagonal().segment<4>(PoseColumn(0) + 2).setConstant(1 / kHeld);
-  for (int i = 0; i < static_cast<int>(links.size()); ++i) {
-    AddLink(*this, i, &out);
+  for (int i = 0; i < static_cast<int>(imu_factors.size()); ++i) {
+    AddImuFactor(*this, i, &out);
   }
   for (const StartPoint& point : points) {
     out.eliminations.push_back(AddPoint(*this, point, damping, &out));
@@ -213,10 +213,11 @@ Equations StartProblem::Linearise(double damping) const {
 void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
   for (int i = 0; i < static_cast<int>(states.size()); ++i) {
     ImuState& state = states[i];
-    const Eigen::Quaterniond turn = ExpSo3(step.segment<3>(PoseColumn(i) + kTheta));
-    state.T_odom_body.q = (turn * state.T_odom_body.q).normalized();
-    state.T_odom_body.t = turn * state.T_odom_body.t + step.segment<3>(PoseColumn(i) + kPosition);
-    state.v_odom_body = turn * state.v_odom_body + step.segment<3>(VelocityColumn(i));
+    const Eigen::Quaterniond rotation = ExpSo3(step.segment<3>(PoseColumn(i) + kTheta));
+    state.T_odom_body.q = (rotation * state.T_odom_body.q).normalized();
+    state.T_odom_body.t =
+        rotation * state.T_odom_body.t + step.segment<3>(PoseColumn(i) + kPosition);
+    state.v_odom_body = rotation * state.v_odom_body + step.segment<3>(VelocityColumn(i));
     state.gyro_bias += step.head<3>();
     state.accel_bias += step.segment<3>(3);
   }

@@ -33,7 +33,7 @@ struct StartPoint {
   std::vector<StartRay> rays;                          // frames in order
 };
 
-struct StartLink {
+struct StartImuFactor {
   Preintegration measured;
   Eigen::Matrix<double, 9, 9> information;  // order (rotation, velocity, position)
 };
@@ -42,8 +42,8 @@ class StartProblem {
  public:
   Rigid3 T_body_cam;
   double ray_sigma = 0;
-  std::vector<ImuState> states;  // all with one pair of biases
-  std::vector<StartLink> links;  // links[i]: from frame i to frame i + 1
+  std::vector<ImuState> states;             // all with one pair of biases
+  std::vector<StartImuFactor> imu_factors;  // imu_factors[i]: from frame i to frame i + 1
   std::vector<StartPoint> points;
   Eigen::Vector3d expected_gyro_bias = Eigen::Vector3d::Zero();
 

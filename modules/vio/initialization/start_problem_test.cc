@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 
 constexpr int kFrames = 6, kPoints = 12;
 
-// No residual at all: rays without noise, and links that say what the states do.
+// No residual at all: rays without noise, and IMU factors that say what the states do.
 StartProblem ExactProblem() {
   std::mt19937_64 rng(3);
   StartProblem problem;
@@ -51,7 +51,7 @@ StartProblem ExactProblem() {
     measured.delta_v = q_body_odom * (to.v_odom_body - from.v_odom_body - dt * gravity);
     measured.delta_p = q_body_odom * (to.T_odom_body.t - from.T_odom_body.t -
                                       dt * from.v_odom_body - 0.5 * dt * dt * gravity);
-    problem.links.push_back(
+    problem.imu_factors.push_back(
         {measured, measured.covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity())});
   }
   for (int k = 0; k < kPoints; ++k) {

@@ -14,7 +14,7 @@ Rigid3 Lively(double t) {
   return {ExpSo3({0.3 * std::sin(2 * t), 0.25 * std::sin(1.6 * t + 1), 0.4 * std::sin(1.2 * t)}),
           {0.5 * std::sin(1.3 * t), 0.6 * std::sin(1.7 * t), 0.2 * std::sin(2.1 * t)}};
 }
-Rigid3 TurningEvenly(double t) {
+Rigid3 RotatingEvenly(double t) {
   return {ExpSo3({0, 0, 0.4 * t}), {0.5 * std::sin(1.3 * t), 0.6 * std::sin(1.7 * t), 0}};
 }
 

@@ -17,7 +17,7 @@ inline const Rigid3 kT_body_cam{LookingAhead() * ExpSo3({0.05, -0.03, 0.02}), {0
 
 using Path = std::function<Rigid3(double)>;
 Rigid3 Lively(double t);
-Rigid3 TurningEvenly(double t);
+Rigid3 RotatingEvenly(double t);
 Eigen::Vector3d VelocityAt(const Path& path, double t);
 
 struct StartWorld {

@@ -6,7 +6,7 @@
 namespace pangea::vio {
 namespace {
 
-constexpr double kRestTrackShare = 0.5;
+constexpr double kStationaryTrackShare = 0.5;
 constexpr double kAnyParallax = std::numeric_limits<double>::infinity();
 
 // Whether the newest image has changed enough since another frame of the window.
@@ -32,9 +32,10 @@ bool HasMoved(const WindowState& state, const TrackHistory& history, int64_t sin
 bool FrameChoice::IsWorthAPlace(const WindowState& state, const TrackHistory& history) const {
   const WindowFrame& newest = state.frames.back();
   const WindowFrame& last = state.frames[state.Newest() - 1];
-  if (newest.at_rest) {
-    // A rest is held by the frame it began with, and handed on before its tracks run out.
-    return !last.at_rest || HasMoved(state, history, last.utime, kAnyParallax, kRestTrackShare);
+  if (newest.stationary) {
+    // Standing still is held by the frame it began with, and handed on before its tracks run out.
+    return !last.stationary ||
+           HasMoved(state, history, last.utime, kAnyParallax, kStationaryTrackShare);
   }
   return HasMoved(state, history, last.utime, options_.window_parallax_px * pixel_angle_,
                   options_.window_track_share);
@@ -45,13 +46,14 @@ void FrameChoice::Choose(const TrackHistory& history, WindowState* state) {
   const double elapsed_s = 1e-6 * static_cast<double>(newest.utime - last_keyframe_utime_);
   newest.is_keyframe =
       last_keyframe_utime_ == 0 || elapsed_s >= options_.keyframe_interval_s ||
-      (elapsed_s >= options_.keyframe_min_interval_s && !newest.at_rest && newest.is_sight &&
+      (elapsed_s >= options_.keyframe_min_interval_s && !newest.stationary && newest.is_tracked &&
        HasMoved(*state, history, last_keyframe_utime_, options_.keyframe_parallax_px * pixel_angle_,
                 options_.keyframe_track_share));
   if (newest.is_keyframe) {
     last_keyframe_utime_ = newest.utime;
   }
-  newest.stays = newest.is_keyframe || state->frames.size() == 1 || IsWorthAPlace(*state, history);
+  newest.is_window_keyframe =
+      newest.is_keyframe || state->frames.size() == 1 || IsWorthAPlace(*state, history);
 }
 
 }  // namespace pangea::vio

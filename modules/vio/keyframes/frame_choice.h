@@ -2,7 +2,7 @@
 
 // Which frames hold a place in the window, and which are keyframes: by how far the image has moved,
 // rotation taken out, and by how many tracks are left. The newest frame of the window is the one
-// that is judged.
+// that is decided on.
 
 #include <cstdint>
 
@@ -19,7 +19,7 @@ class FrameChoice {
 
   // Whether the newest frame is worth a place beside the one before it.
   bool IsWorthAPlace(const WindowState& state, const TrackHistory& history) const;
-  // Decides whether the newest frame is a keyframe, and whether it stays.
+  // Decides whether the newest frame is a keyframe, and whether it is a window keyframe.
   void Choose(const TrackHistory& history, WindowState* state);
 
  private:

@@ -47,14 +47,15 @@ struct Pair {
 TEST(FrameChoice, TheFirstFrameIsAKeyframe) {
   const Pair pair;
   EXPECT_TRUE(pair.state.frames[0].is_keyframe);
-  EXPECT_TRUE(pair.state.frames[0].stays);
+  EXPECT_TRUE(pair.state.frames[0].is_window_keyframe);
 }
 
-TEST(FrameChoice, AFrameStaysWhenTheImageHasMoved) {
-  EXPECT_FALSE(Pair().Second(0.1, 14).stays);
-  EXPECT_TRUE(Pair().Second(0.1, 16).stays);
-  EXPECT_TRUE(Pair().Second(0.1, 0, 13).stays) << "less than 0.7 of the tracks are left";
-  EXPECT_FALSE(Pair().Second(0.1, 0, 14).stays);
+TEST(FrameChoice, AFrameIsAWindowKeyframeWhenTheImageHasMoved) {
+  EXPECT_FALSE(Pair().Second(0.1, 14).is_window_keyframe);
+  EXPECT_TRUE(Pair().Second(0.1, 16).is_window_keyframe);
+  EXPECT_TRUE(Pair().Second(0.1, 0, 13).is_window_keyframe)
+      << "less than 0.7 of the tracks are left";
+  EXPECT_FALSE(Pair().Second(0.1, 0, 14).is_window_keyframe);
 }
 
 TEST(FrameChoice, AKeyframeWantsMoreAndATimeApart) {
@@ -63,7 +64,7 @@ TEST(FrameChoice, AKeyframeWantsMoreAndATimeApart) {
   EXPECT_FALSE(Pair().Second(0.1, 21).is_keyframe) << "too soon";
   EXPECT_TRUE(Pair().Second(0.3, 0, 9).is_keyframe) << "less than half of the tracks are left";
   EXPECT_TRUE(Pair().Second(5.1, 0).is_keyframe) << "after so long in any case";
-  EXPECT_TRUE(Pair().Second(5.1, 0).stays);
+  EXPECT_TRUE(Pair().Second(5.1, 0).is_window_keyframe);
 }
 
 TEST(FrameChoice, RotationIsTakenOut) {
@@ -73,29 +74,29 @@ TEST(FrameChoice, RotationIsTakenOut) {
   // alike.
   frame.imu.T_odom_body.q = ExpSo3({0, -30 * pair.camera.PixelAngle(), 0});
   pair.choice.Choose(pair.history, &pair.state);
-  EXPECT_FALSE(pair.state.frames[1].stays);
+  EXPECT_FALSE(pair.state.frames[1].is_window_keyframe);
   EXPECT_FALSE(pair.state.frames[1].is_keyframe);
 }
 
-TEST(FrameChoice, ARestIsHeldByTheFrameItBeganWith) {
-  const auto stays = [](bool first_rests, int tracks) {
+TEST(FrameChoice, StandingStillIsHeldByTheFrameItBeganWith) {
+  const auto is_window_keyframe = [](bool first_stationary, int tracks) {
     Pair pair;
-    pair.state.frames[0].at_rest = first_rests;
-    pair.Add(0.3, 25, tracks).at_rest = true;
+    pair.state.frames[0].stationary = first_stationary;
+    pair.Add(0.3, 25, tracks).stationary = true;
     pair.choice.Choose(pair.history, &pair.state);
     EXPECT_FALSE(pair.state.frames[1].is_keyframe);
-    return pair.state.frames[1].stays;
+    return pair.state.frames[1].is_window_keyframe;
   };
-  EXPECT_TRUE(stays(false, kTracks));
-  EXPECT_FALSE(stays(true, kTracks));
-  EXPECT_FALSE(stays(true, 10));
-  EXPECT_TRUE(stays(true, 9)) << "handed on before its tracks run out";
+  EXPECT_TRUE(is_window_keyframe(false, kTracks));
+  EXPECT_FALSE(is_window_keyframe(true, kTracks));
+  EXPECT_FALSE(is_window_keyframe(true, 10));
+  EXPECT_TRUE(is_window_keyframe(true, 9)) << "handed on before its tracks run out";
 }
 
-TEST(FrameChoice, WithNothingInCommonAFrameStays) {
+TEST(FrameChoice, WithNothingInCommonAFrameIsAWindowKeyframe) {
   Pair pair;
   pair.state.frames[0].pose_only = true;
-  EXPECT_TRUE(pair.Second(0.1, 0).stays);
+  EXPECT_TRUE(pair.Second(0.1, 0).is_window_keyframe);
 }
 
 }  // namespace

@@ -81,7 +81,7 @@ Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, 
       P_window.block<6, 6>(at_j, at_i), P_window.block<6, 6>(at_j, at_j);
   Matrix6d covariance = J * P * J.transpose();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  // At rest two poses are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
+  // Two poses of a stationary body are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
   Eigen::Matrix<double, 6, 1> floor;
   floor << Vector3d::Constant(1e-8), Vector3d::Constant(1e-10);
   covariance.diagonal() += floor;

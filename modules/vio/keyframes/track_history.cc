@@ -61,7 +61,7 @@ std::vector<FrameRay> TrackHistory::RaysOf(int32_t landmark_id, const WindowStat
   for (int i = 0; i <= state.Newest(); ++i) {
     const WindowFrame& in_window = state.frames[i];
     const auto frame = frames_.find(in_window.utime);
-    if (in_window.pose_only || !in_window.is_sight || in_window.utime < from_utime ||
+    if (in_window.pose_only || !in_window.is_tracked || in_window.utime < from_utime ||
         frame == frames_.end()) {
       continue;
     }
@@ -101,9 +101,9 @@ TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_ut
   for (const auto& [id, ray] : Frame(from_utime)) {
     const auto other = to.find(id);
     if (other != to.end()) {
-      const Eigen::Vector3d turned = q_to_from * Eigen::Vector3d(ray.ray.x(), ray.ray.y(), 1);
-      if (turned.z() > 0.1) {
-        shifts.push_back((turned.head<2>() / turned.z() - other->second.ray).norm());
+      const Eigen::Vector3d rotated = q_to_from * Eigen::Vector3d(ray.ray.x(), ray.ray.y(), 1);
+      if (rotated.z() > 0.1) {
+        shifts.push_back((rotated.head<2>() / rotated.z() - other->second.ray).norm());
       }
     }
   }

@@ -21,7 +21,7 @@ class TrackHistory {
   void RemoveFrame(int64_t utime) { frames_.erase(utime); }
   void RemoveLandmark(int32_t landmark_id);
 
-  // All of one landmark's rays in the window's full frames from `from_utime` on that are a sight,
+  // All of one landmark's rays in the window's full frames from `from_utime` on that are tracked,
   // oldest first.
   std::vector<FrameRay> RaysOf(int32_t landmark_id, const WindowState& state,
                                int64_t from_utime) const;

@@ -26,15 +26,15 @@ bool ShownPose::Correct(const Correction& correction) {
 Rigid3 ShownPose::Show(int64_t utime, const Rigid3& T_odom_body) {
   const double dt = last_utime_ ? 1e-6 * static_cast<double>(utime - *last_utime_) : 0.0;
   last_utime_ = utime;
-  // The rest of the correction as it acts on the body: turned about the body, then moved, so that a
-  // far origin is no lever.
+  // The rest of the correction as it acts on the body: rotated about the body, then moved, so that
+  // a far origin is no lever.
   const Rigid3 now = shown_ * T_odom_body;
   const Rigid3 wanted = target_ * T_odom_body;
-  const Eigen::Vector3d turn = LogSo3(wanted.q * now.q.conjugate());
+  const Eigen::Vector3d rotation = LogSo3(wanted.q * now.q.conjugate());
   const Eigen::Vector3d move = wanted.t - now.t;
-  const double turn_share = std::min(1.0, kMaxYawRate * dt / std::max(turn.norm(), 1e-12));
+  const double rotation_share = std::min(1.0, kMaxYawRate * dt / std::max(rotation.norm(), 1e-12));
   const double move_share = std::min(1.0, kMaxSpeed * dt / std::max(move.norm(), 1e-12));
-  Rigid3 shown{(ExpSo3(turn_share * turn) * now.q).normalized(), now.t + move_share * move};
+  Rigid3 shown{(ExpSo3(rotation_share * rotation) * now.q).normalized(), now.t + move_share * move};
   shown_ = shown * T_odom_body.Inverse();
   return shown;
 }

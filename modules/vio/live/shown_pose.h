@@ -3,10 +3,10 @@
 // The pose an agent shows in the fused map: its odometry under the server's newest correction.
 //
 // A new correction of the same map frame is blended in, so that what is shown never jumps: the
-// correction moves the shown position at most at kMaxSpeed and turns it at most at kMaxYawRate: at
-// 20 Hz, 15 mm from one image to the next. It turns about the body, wherever the odom origin is.
-// When the group's frame itself changes (the map was fused into another), coordinates before and
-// after have nothing to do with each other, and the correction holds at once.
+// correction moves the shown position at most at kMaxSpeed and rotates it at most at kMaxYawRate:
+// at 20 Hz, 15 mm from one image to the next. It rotates about the body, wherever the odom origin
+// is. When the group's frame itself changes (the map was fused into another), coordinates before
+// and after have nothing to do with each other, and the correction holds at once.
 
 #include <cstdint>
 #include <optional>

@@ -72,12 +72,12 @@ TEST(ShownPose, AYawCorrectionFarFromTheOriginMovesThePositionAtTheBoundedSpeed)
   EXPECT_LT(error.Minus(Rigid3{}).norm(), 1e-6);
 }
 
-TEST(ShownPose, ATurnAboutTheBodyDoesNotMoveIt) {
+TEST(ShownPose, ARotationAboutTheBodyDoesNotMoveIt) {
   const Rigid3 to_body{Eigen::Quaterniond::Identity(), {640, 480, 1}};
-  const Rigid3 turn = to_body * Rigid3{YawRotation(0.1), {0, 0, 0}} * to_body.Inverse();
+  const Rigid3 rotation = to_body * Rigid3{YawRotation(0.1), {0, 0, 0}} * to_body.Inverse();
   Rigid3 error;
-  // While it turns, for a second, the body walks on: 0.1 rad across 6 cm an image.
-  EXPECT_LE(LargestJump(turn, &error), 0.1 * 0.06 + 1e-9);
+  // While it rotates, for a second, the body walks on: 0.1 rad across 6 cm an image.
+  EXPECT_LE(LargestJump(rotation, &error), 0.1 * 0.06 + 1e-9);
   EXPECT_LT(error.Minus(Rigid3{}).norm(), 1e-6);
 }
 

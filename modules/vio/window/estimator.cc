@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "vio/imu/imu_buffer.h"
-#include "vio/imu/rest_detector.h"
+#include "vio/imu/stationary_detector.h"
 #include "vio/initialization/initialiser.h"
 #include "vio/keyframes/frame_choice.h"
 #include "vio/keyframes/keyframe_finisher.h"
@@ -23,7 +23,7 @@ using Eigen::MatrixXd;
 constexpr double kMaxFrameGap_s = 1.0;
 constexpr int64_t kStartSpan_us = 4'000'000;  // samples a start may ask for
 constexpr double kMaxBlind_s = 5;             // with nothing to go by but inertial samples: lost
-// An image is a sight when this many tracks, and this share of those before, go on in it. In the
+// An image is tracked when this many tracks, and this share of those before, go on in it. In the
 // mere noise of a covered lens a tenth does.
 constexpr size_t kMinTracks = 4;
 constexpr double kMinTrackShare = 0.3;
@@ -76,7 +76,7 @@ struct Estimator::Impl {
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
         initialiser(c, n, o.pixel_sigma),
         imu_samples(n),
-        rest(c, ray_sigma),
+        stationary_detector(c, ray_sigma),
         choice(o, c) {
     problem.state.T_body_cam = c.T_body_cam;
     problem.state.time_offset_s = c.time_offset_s;
@@ -86,10 +86,10 @@ struct Estimator::Impl {
   std::vector<FinishedKeyframe> Flush();
 
   void Start(const InitialState& initial);
-  InertialLink Link(const WindowFrame& from, int64_t to_imu_utime) const;
-  void Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link);
+  ImuFactor MakeImuFactor(const WindowFrame& from, int64_t to_imu_utime) const;
+  void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
-  void DropPassing();
+  void DropNonKeyframe();
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
   void FoldLandmarks(int frame);
@@ -101,9 +101,9 @@ struct Estimator::Impl {
     return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
   }
   WindowFrame& Newest() { return problem.state.frames.back(); }
-  const WindowFrame& LastStaying() const {
+  const WindowFrame& LastWindowKeyframe() const {
     const auto& frames = problem.state.frames;
-    return frames.back().stays ? frames.back() : frames[frames.size() - 2];
+    return frames.back().is_window_keyframe ? frames.back() : frames[frames.size() - 2];
   }
 
   EstimatorOptions options;
@@ -116,16 +116,16 @@ struct Estimator::Impl {
   TrackHistory history;
   LandmarkStore landmarks;
   ImuBuffer imu_samples;  // since the last published keyframe
-  RestDetector rest;
+  StationaryDetector stationary_detector;
   FrameChoice choice;
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
-  int64_t last_sight = 0;                           // utime of the newest image that is one
+  int64_t last_tracked = 0;                         // utime of the newest image that is one
   bool lost = false;
 };
 
 // The window takes over the frames the start was found from: they go on being refined. All of them,
-// and what is too much is marginalised: of somebody who turns on the spot hardly two are apart
+// and what is too much is marginalised: of somebody who rotates on the spot hardly two are apart
 // enough to be worth a place, and those two know neither speed nor tilt.
 void Estimator::Impl::Start(const InitialState& initial) {
   const int64_t offset_us = ImuTime(0);  // as it was when the initialiser got the frames
@@ -136,43 +136,43 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      problem.prior = initial.at_rest ? StartPrior(problem.state, initial.covariance, noise)
-                                      : MovingStartPrior(problem.state, noise);
+      problem.prior = initial.stationary ? StartPrior(problem.state, initial.covariance, noise)
+                                         : MovingStartPrior(problem.state, noise);
     } else {
-      Append(tracked.utime, from.imu, Link(Newest(), ImuTime(tracked.utime)));
+      Append(tracked.utime, from.imu, MakeImuFactor(Newest(), ImuTime(tracked.utime)));
     }
-    Newest().stays = true;
+    Newest().is_window_keyframe = true;
   }
   started = true;
 }
 
-InertialLink Estimator::Impl::Link(const WindowFrame& from, int64_t to_imu_utime) const {
-  InertialLink link;
-  link.span = imu_samples.Integrate(from.imu_utime, to_imu_utime, problem.state.imu_scales,
-                                    from.imu.gyro_bias, from.imu.accel_bias);
-  link.information = InertialInformation(link.span.measured, noise);
-  return link;
+ImuFactor Estimator::Impl::MakeImuFactor(const WindowFrame& from, int64_t to_imu_utime) const {
+  ImuFactor factor;
+  factor.span = imu_samples.Integrate(from.imu_utime, to_imu_utime, problem.state.imu_intrinsics,
+                                      from.imu.gyro_bias, from.imu.accel_bias);
+  factor.information = InertialInformation(factor.span.measured, noise);
+  return factor;
 }
 
-void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<InertialLink> link) {
+void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor) {
   WindowFrame frame;
   frame.utime = utime;
   frame.imu_utime = ImuTime(utime);
   frame.time_offset_s = problem.state.time_offset_s;
   frame.imu = imu;
   frame.omega_body =
-      problem.state.imu_scales.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
+      problem.state.imu_intrinsics.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
   problem.state.frames.push_back(frame);
-  problem.links.push_back(std::move(link));
+  problem.imu_factors.push_back(std::move(factor));
 }
 
-// A frame that does not stay makes room for the next one: its rays go, its inertial samples are
-// measured again as part of the longer span.
-void Estimator::Impl::DropPassing() {
-  if (!Newest().stays) {
+// A frame that is no window keyframe makes room for the next one: its rays go, its inertial samples
+// are measured again as part of the longer span.
+void Estimator::Impl::DropNonKeyframe() {
+  if (!Newest().is_window_keyframe) {
     history.RemoveFrame(Newest().utime);
     problem.state.frames.pop_back();
-    problem.links.pop_back();
+    problem.imu_factors.pop_back();
   }
 }
 
@@ -184,16 +184,17 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
   }
   history.AddFrame(frame, camera, ray_sigma);
   const std::optional<double> shift =
-      LastStaying().at_rest
-          ? std::optional(history.MedianShiftSigmas(LastStaying().utime, frame.utime))
+      LastWindowKeyframe().stationary
+          ? std::optional(history.MedianShiftSigmas(LastWindowKeyframe().utime, frame.utime))
           : std::nullopt;
-  const bool at_rest = rest.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
-  const bool is_sight = TracksGoOn(Newest().utime, frame.utime);
-  DropPassing();
-  const InertialLink link = Link(Newest(), imu_utime);
-  Append(frame.utime, Predict(link.span.measured, Newest().imu), link);
-  Newest().at_rest = at_rest;
-  Newest().is_sight = is_sight;
+  const bool stationary =
+      stationary_detector.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
+  const bool is_tracked = TracksGoOn(Newest().utime, frame.utime);
+  DropNonKeyframe();
+  const ImuFactor factor = MakeImuFactor(Newest(), imu_utime);
+  Append(frame.utime, Predict(factor.span.measured, Newest().imu), factor);
+  Newest().stationary = stationary;
+  Newest().is_tracked = is_tracked;
   return std::nullopt;
 }
 
@@ -223,7 +224,7 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
     return true;
   });
   landmarks.Keep(problem);
-  last_sight = Newest().is_sight ? Newest().utime : last_sight;
+  last_tracked = Newest().is_tracked ? Newest().utime : last_tracked;
   return outliers;
 }
 
@@ -240,8 +241,8 @@ FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
         CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
                              previous->T_odom_body, keyframe.T_odom_body);
     ScaledPreintegration span =
-        imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime), state.imu_scales,
-                              previous->gyro_bias, previous->accel_bias);
+        imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime),
+                              state.imu_intrinsics, previous->gyro_bias, previous->accel_bias);
     if (span.measured.duration_s > 0) {
       span.measured.covariance.diagonal().array() += 1e-14;
       keyframe.preintegration = span.measured;
@@ -274,7 +275,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
     due = Seconds(Newest().utime - state.frames[i].utime) > options.keyframe_interval_s ? i : due;
   }
   PublishUpTo(due, finished);
-  while (Newest().stays) {
+  while (Newest().is_window_keyframe) {
     const int oldest = state.frames.front().pose_only ? 1 : 0;
     if (state.Newest() + 1 - oldest <= options.window) {
       break;
@@ -319,7 +320,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
   if (imu.gyro_bias.norm() > kMaxGyroBias || imu.accel_bias.norm() > kMaxAccelBias) {
     return "the estimated biases are implausible";
   }
-  const double blind_s = Seconds(problem.state.frames.back().utime - last_sight);
+  const double blind_s = Seconds(problem.state.frames.back().utime - last_tracked);
   if (blind_s > kMaxBlind_s) {
     return fmt::format("nothing trackable for {:.1f} s", blind_s);
   }

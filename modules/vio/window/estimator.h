@@ -3,7 +3,7 @@
 // Visual-inertial odometry of one map: tracked features and inertial samples in, poses and finished
 // keyframes out.
 //
-// Starts by itself, at rest or moving (initialiser.h), then optimises over a sliding window of
+// Starts by itself, stationary or moving (initialiser.h), then optimises over a sliding window of
 // frames; what leaves it stays behind as a prior (window_problem.h). Frames: odom is
 // gravity-aligned (z up), its origin and yaw are those of the first pose. No threads, no clock, no
 // files: the same input gives the same output.
@@ -26,9 +26,9 @@
 namespace pangea::vio {
 
 struct EstimatorOptions {
-  int window = 12;  // frames that stay in the window
-  // A frame stays when the image has moved this far (rotation taken out) since the last one that
-  // stayed, or when this share of that one's tracks is left.
+  int window = 12;  // keyframes in the window
+  // A frame is a window keyframe when the image has moved this far (rotation taken out) since the
+  // last one that stayed, or when this share of that one's tracks is left.
   double window_parallax_px = 15;
   double window_track_share = 0.7;
   double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels
@@ -54,7 +54,7 @@ struct FinishedKeyframe {
   int64_t utime = 0;  // of its TrackedFrame
   Rigid3 T_odom_body;
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y
@@ -75,7 +75,7 @@ struct FrameResult {
   std::string reason;  // why it is not tracking
   Rigid3 T_odom_body;  // at this frame; valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   bool is_keyframe = false;  // this frame will be finished as a keyframe later

@@ -18,23 +18,24 @@ using Eigen::Vector3d;
 std::vector<ImuState> TruthOf(const Ride& ride) {
   const FinishedKeyframe& first = ride.finished.front();
   const Rigid3 T_first = ride.world.TruthAt(first.utime).T_odom_body;
-  const Eigen::Quaterniond turn = YawRotation(YawOf(first.T_odom_body.q * T_first.q.conjugate()));
+  const Eigen::Quaterniond rotation =
+      YawRotation(YawOf(first.T_odom_body.q * T_first.q.conjugate()));
   std::vector<ImuState> truths;
   for (const FinishedKeyframe& keyframe : ride.finished) {
     ImuState& truth = truths.emplace_back(ride.world.TruthAt(keyframe.utime));
-    truth.T_odom_body = {turn * truth.T_odom_body.q,
-                         turn * (truth.T_odom_body.t - T_first.t) + first.T_odom_body.t};
-    truth.v_odom_body = turn * truth.v_odom_body;
+    truth.T_odom_body = {rotation * truth.T_odom_body.q,
+                         rotation * (truth.T_odom_body.t - T_first.t) + first.T_odom_body.t};
+    truth.v_odom_body = rotation * truth.v_odom_body;
   }
   return truths;
 }
 
 // In the window's coordinates (window_state.h).
 Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const ImuState& truth) {
-  const Eigen::Quaterniond turn = truth.T_odom_body.q * keyframe.T_odom_body.q.conjugate();
+  const Eigen::Quaterniond rotation = truth.T_odom_body.q * keyframe.T_odom_body.q.conjugate();
   Eigen::Matrix<double, 15, 1> e;
-  e << LogSo3(turn), truth.T_odom_body.t - turn * keyframe.T_odom_body.t,
-      truth.v_odom_body - turn * keyframe.v_odom_body, truth.gyro_bias - keyframe.gyro_bias,
+  e << LogSo3(rotation), truth.T_odom_body.t - rotation * keyframe.T_odom_body.t,
+      truth.v_odom_body - rotation * keyframe.v_odom_body, truth.gyro_bias - keyframe.gyro_bias,
       truth.accel_bias - keyframe.accel_bias;
   return e;
 }
@@ -43,7 +44,7 @@ Vector6d EdgeErrorOf(const FinishedKeyframe& keyframe, const ImuState& from, con
   return (from.T_odom_body.Inverse() * to.T_odom_body).Minus(keyframe.edge->T_previous_this);
 }
 
-// Of the position itself, p - p^ = xi_p + theta x p^, not of what is left of it after the turn.
+// Of the position itself, p - p^ = xi_p + theta x p^, not of what is left of it after the rotation.
 struct PositionError {
   Eigen::Vector3d error;
   Eigen::Matrix3d covariance;
@@ -55,8 +56,8 @@ PositionError PositionErrorOf(const FinishedKeyframe& keyframe, const ImuState& 
           J * keyframe.covariance.topLeftCorner<6, 6>() * J.transpose()};
 }
 
-// What is known of a shift along odom's axes and of a turn about its z axis. Not the variances of
-// position and yaw: the start's position depends on velocity and tilt, of which more is learnt.
+// What is known of a shift along odom's axes and of a rotation about its z axis. Not the variances
+// of position and yaw: the start's position depends on velocity and tilt, of which more is learnt.
 Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& covariance) {
   Eigen::Matrix<double, 15, 4> N = Eigen::Matrix<double, 15, 4>::Zero();
   N.block<3, 3>(kPosition, 0).setIdentity();
@@ -79,23 +80,23 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
       // The gauge: the start's prior holds origin and yaw there, and the truth is laid onto them.
       if (k > 0) {
         const PositionError p = PositionErrorOf(keyframe, truth[k]);
-        position.AddSquare(p.error, p.covariance);
-        yaw.AddSquare(e.segment<1>(kTheta + 2), P.block<1, 1>(kTheta + 2, kTheta + 2));
+        position.AddNees(p.error, p.covariance);
+        yaw.AddNees(e.segment<1>(kTheta + 2), P.block<1, 1>(kTheta + 2, kTheta + 2));
       }
-      tilt.AddSquare(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
-      velocity.AddSquare(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
-      gyro_bias.AddSquare(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
-      accel_bias.AddSquare(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
+      tilt.AddNees(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+      velocity.AddNees(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+      gyro_bias.AddNees(e.segment<3>(kGyroBias), P.block<3, 3>(kGyroBias, kGyroBias));
+      accel_bias.AddNees(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
       // Position and yaw cannot be observed: nobody ever knows more of them than the start did.
       const Eigen::Matrix4d gained = UnobservableInformation(P) - at_start;
       EXPECT_LT(gained.eigenvalues().real().maxCoeff(), 1e-3 * at_start.diagonal().minCoeff())
           << "seed " << seed << ", keyframe " << k;
     }
   }
-  std::cout << "normalised squares of " << tilt.count << " keyframes: position " << position.value()
-            << ", yaw " << yaw.value() << ", tilt " << tilt.value() << ", velocity "
-            << velocity.value() << ", gyro bias " << gyro_bias.value() << ", accelerometer bias "
-            << accel_bias.value() << "\n";
+  std::cout << "NEES of " << tilt.count << " keyframes: position " << position.value() << ", yaw "
+            << yaw.value() << ", tilt " << tilt.value() << ", velocity " << velocity.value()
+            << ", gyro bias " << gyro_bias.value() << ", accelerometer bias " << accel_bias.value()
+            << "\n";
   for (const Mean* mean : {&position, &yaw, &tilt, &velocity, &gyro_bias, &accel_bias}) {
     EXPECT_GT(mean->value(), 0.3);
     EXPECT_LT(mean->value(), 3.0);
@@ -103,7 +104,7 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
 }
 
 // Believed to be exact, these IMUs have tilt at 3.5, velocity at 1.5 and edges at 2.
-TEST(EstimatorConsistency, AnImuWithWrongScalesAndAxesIsBelievedNoMore) {
+TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
   Mean tilt, velocity, edges;
   for (const Ride& ride : RidesOfAWrongImu()) {
     ASSERT_GT(ride.finished.size(), 10u) << "seed " << ride.world.options().seed;
@@ -112,15 +113,15 @@ TEST(EstimatorConsistency, AnImuWithWrongScalesAndAxesIsBelievedNoMore) {
       const FinishedKeyframe& keyframe = ride.finished[k];
       const auto& P = keyframe.covariance;
       const auto e = ErrorOf(keyframe, truth[k]);
-      tilt.AddSquare(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
-      velocity.AddSquare(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+      tilt.AddNees(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+      velocity.AddNees(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
       if (keyframe.edge) {
-        edges.AddSquare(EdgeErrorOf(keyframe, truth[k - 1], truth[k]), keyframe.edge->covariance);
+        edges.AddNees(EdgeErrorOf(keyframe, truth[k - 1], truth[k]), keyframe.edge->covariance);
       }
     }
   }
-  std::cout << "normalised squares with a wrong IMU: tilt " << tilt.value() << ", velocity "
-            << velocity.value() << ", edges " << edges.value() << "\n";
+  std::cout << "NEES with a wrong IMU: tilt " << tilt.value() << ", velocity " << velocity.value()
+            << ", edges " << edges.value() << "\n";
   for (const Mean* mean : {&tilt, &velocity, &edges}) {
     EXPECT_GT(mean->value(), 0.5);
     EXPECT_LT(mean->value(), 2.0);

@@ -78,7 +78,7 @@ TEST(Estimator, ADrivesStartIsNotTooSmall) {
 }
 
 // Hardly two images are apart enough for a place in the window; what the start found must stay.
-TEST(Estimator, StartsTurningOnTheSpot) {
+TEST(Estimator, StartsRotatingOnTheSpot) {
   double squares = 0;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     VioTestWorldOptions options;
@@ -101,11 +101,11 @@ TEST(Estimator, StartsTurningOnTheSpot) {
   EXPECT_LT(std::sqrt(squares), 0.055);
 }
 
-TEST(Estimator, StartsAtRest) {
+TEST(Estimator, StartsStationary) {
   VioTestWorldOptions options;
   options.pixel_noise = 0.2;  // a standing image is tracked better than a moving one
-  options.rest_begin_s = -1;
-  options.rest_end_s = 4;
+  options.stationary_begin_s = -1;
+  options.stationary_end_s = 4;
   Ride ride(options);
   ride.Advance(80);
   ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
@@ -124,7 +124,7 @@ TEST(Estimator, StartsAtRest) {
 TEST(Estimator, FollowsThePathForHalfAMinute) {
   VioTestWorldOptions options;
   options.seed = 3;
-  // A mount that is further off than the estimator supposes, by three times.
+  // Extrinsics that are further off than the estimator supposes, by three times.
   options.extrinsics_rotation_sigma = 0.003;
   options.extrinsics_position_sigma = 0.003;
   options.time_offset_sigma = 0.002;
@@ -182,10 +182,10 @@ TEST(Estimator, StandsStillWithoutDrift) {
   for (const uint64_t seed : {4, 5}) {
     VioTestWorldOptions options;
     options.seed = seed;
-    options.rest_begin_s = 5;
-    options.rest_end_s = 17;
+    options.stationary_begin_s = 5;
+    options.stationary_end_s = 17;
     Ride ride(options);
-    ride.Advance(60);  // t = 6.9: at rest for 1.4 s
+    ride.Advance(60);  // t = 6.9: stationary for 1.4 s
     ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
     const Rigid3 before = ride.last.T_odom_body;
     ride.Advance(100);
@@ -356,8 +356,8 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
       const FinishedKeyframe& keyframe = ride.finished[k];
       const ImuState truth = ride.world.TruthAt(keyframe.utime);
       const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
-      const Vector3d turn = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
-      tilt.AddSquare(turn.head<2>(), keyframe.roll_pitch_covariance);
+      const Vector3d rotation = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
+      tilt.AddNees(rotation.head<2>(), keyframe.roll_pitch_covariance);
       for (const LandmarkDepth& landmark : keyframe.landmarks) {
         if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
           const double e = landmark.inverse_depth - 1 / *z;
@@ -378,9 +378,9 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
           ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
       const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
       const Matrix6d& C = keyframe.edge->covariance;
-      edge.AddSquare(e, C);
-      edge_position.AddSquare(e.head<3>(), C.topLeftCorner<3, 3>());
-      edge_rotation.AddSquare(e.tail<3>(), C.bottomRightCorner<3, 3>());
+      edge.AddNees(e, C);
+      edge_position.AddNees(e.head<3>(), C.topLeftCorner<3, 3>());
+      edge_rotation.AddNees(e.tail<3>(), C.bottomRightCorner<3, 3>());
       // The inertial measurement of the same span, corrected for the true biases.
       const ImuState before = ride.world.TruthAt(previous.utime);
       const CorrectedDelta delta =
@@ -389,9 +389,9 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
       preintegrated.Add(LogSo3(delta.q.conjugate() * dq).norm());
     }
   }
-  std::cout << "normalised squares: edges " << edge.value() << " (position "
-            << edge_position.value() << ", rotation " << edge_rotation.value() << ", " << edge.count
-            << "), tilt " << tilt.value() << ", depths " << depth.value() << " (" << depth.count
+  std::cout << "NEES: edges " << edge.value() << " (position " << edge_position.value()
+            << ", rotation " << edge_rotation.value() << ", " << edge.count << "), tilt "
+            << tilt.value() << ", depths " << depth.value() << " (" << depth.count
             << "); preintegrated rotation " << preintegrated.value() << " rad\n";
   for (const Mean* mean : {&edge, &edge_position, &edge_rotation, &tilt, &depth}) {
     EXPECT_GT(mean->value(), 0.3);

@@ -62,7 +62,7 @@ Rigid3 Ride::T_odom_truth() const {
 }
 
 const std::deque<Ride>& TenRides() {
-  static const std::deque<Ride> rides = MakeRides(10, ExactScales());
+  static const std::deque<Ride> rides = MakeRides(10, ExactImuIntrinsics());
   return rides;
 }
 

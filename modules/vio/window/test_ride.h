@@ -34,7 +34,8 @@ struct Ride {
 
 // Rides of 15 s to their end, with a calibration that is slightly off; made once.
 const std::deque<Ride>& TenRides();
-// Five of them with an IMU whose scales and axes are off, drawn from what the estimator is told.
+// Five of them with an IMU whose scale factors and axes are off, drawn from what the estimator is
+// told.
 const std::deque<Ride>& RidesOfAWrongImu();
 
 }  // namespace pangea::vio

@@ -40,16 +40,16 @@ double PathTime(double t, double begin, double end) {
 }
 
 // Their own generator: a world is the same with an exact IMU and with another.
-ImuScales RandomScales(const ImuNoise& noise, uint64_t seed) {
+ImuIntrinsics RandomImuIntrinsics(const ImuNoise& noise, uint64_t seed) {
   std::mt19937_64 rng(seed);
-  ImuScales scales;
+  ImuIntrinsics intrinsics;
   for (int k = 0; k < 3; ++k) {
-    scales.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
-    scales.accel.col(k) = RandomVector(rng, noise.axes_sigma);
+    intrinsics.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
+    intrinsics.accel.col(k) = RandomVector(rng, noise.axes_sigma);
   }
-  scales.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
-  scales.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
-  return scales.OfGyroAxes();
+  intrinsics.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
+  intrinsics.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
+  return intrinsics.OfGyroAxes();
 }
 
 }  // namespace
@@ -71,7 +71,7 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   true_intrinsics_.cy += camera_.fy * centre.y();
   true_intrinsics_.fx *= longer;
   true_intrinsics_.fy *= longer;
-  true_imu_scales_ = RandomScales(options.imu_noise, options.seed + 1000);
+  true_imu_intrinsics_ = RandomImuIntrinsics(options.imu_noise, options.seed + 1000);
   phase_ = RandomVector(rng_, 2);
   gyro_bias_ = RandomVector(rng_, 0.02);
   accel_bias_ = RandomVector(rng_, 0.05);
@@ -85,7 +85,7 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
 }
 
 Rigid3 VioTestWorld::PoseAt(double t) const {
-  const double s = PathTime(t, options_.rest_begin_s, options_.rest_end_s);
+  const double s = PathTime(t, options_.stationary_begin_s, options_.stationary_end_s);
   const Vector3d walk(3 * std::sin(0.45 * s + phase_.x()), 2.2 * std::sin(0.6 * s + phase_.y()),
                       1.6 + 0.25 * std::sin(0.8 * s + phase_.z()));
   const Vector3d hand(0.02 * std::sin(9.1 * s), 0.02 * std::sin(7.7 * s + 1),
@@ -97,10 +97,11 @@ Rigid3 VioTestWorld::PoseAt(double t) const {
   if (options_.spin_rps > 0) {
     return {YawRotation(options_.spin_rps * s) * ExpSo3(2 * hand), Vector3d(1, 1, 1.6) + hand};
   }
-  const Vector3d turn(0.08 * std::sin(1.3 * s + phase_.y()), 0.12 * std::sin(1.1 * s + phase_.z()),
-                      0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
-  const Eigen::Quaterniond q =
-      YawRotation(turn.z()) * ExpSo3(Vector3d(0, turn.y(), 0)) * ExpSo3(Vector3d(turn.x(), 0, 0));
+  const Vector3d rotation(0.08 * std::sin(1.3 * s + phase_.y()),
+                          0.12 * std::sin(1.1 * s + phase_.z()),
+                          0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
+  const Eigen::Quaterniond q = YawRotation(rotation.z()) * ExpSo3(Vector3d(0, rotation.y(), 0)) *
+                               ExpSo3(Vector3d(rotation.x(), 0, 0));
   return {q, walk + hand};
 }
 
@@ -124,8 +125,8 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
   const Vector3d force = now.q.conjugate() * (accel + Vector3d(0, 0, kGravity)) + accel_bias_ +
                          RandomVector(rng_, noise.accel_noise_density / std::sqrt(dt));
   const Matrix3d I = Matrix3d::Identity();
-  return {utime, (I + true_imu_scales_.gyro).inverse() * gyro,
-          (I + true_imu_scales_.accel).inverse() * force};
+  return {utime, (I + true_imu_intrinsics_.gyro).inverse() * gyro,
+          (I + true_imu_intrinsics_.accel).inverse() * force};
 }
 
 std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& T_odom_cam) const {

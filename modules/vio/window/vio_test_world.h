@@ -19,7 +19,7 @@
 
 namespace pangea::vio {
 
-// A mean, of normalised squares by their dimension for instance: then 1 is honest.
+// A mean, of NEES by their dimension for instance: then 1 is honest.
 struct Mean {
   double sum = 0;
   int count = 0;
@@ -27,13 +27,13 @@ struct Mean {
     sum += value;
     ++count;
   }
-  void AddSquare(const Eigen::VectorXd& e, const Eigen::MatrixXd& covariance) {
+  void AddNees(const Eigen::VectorXd& e, const Eigen::MatrixXd& covariance) {
     Add(e.dot(covariance.llt().solve(e)) / static_cast<double>(e.size()));
   }
   double value() const { return sum / count; }
 };
 
-inline ImuNoise ExactScales() {
+inline ImuNoise ExactImuIntrinsics() {
   ImuNoise noise;
   noise.gyro_scale_sigma = noise.accel_scale_sigma = noise.axes_sigma = 0;
   return noise;
@@ -43,13 +43,13 @@ struct VioTestWorldOptions {
   uint64_t seed = 1;
   double frame_rate_hz = 10;
   double pixel_noise = 0.7;
-  double outlier_share = 0.03;         // of the tracks: they slide off their point
-  ImuNoise imu_noise = ExactScales();  // EuRoC's white noise and walk
+  double outlier_share = 0.03;                // of the tracks: they slide off their point
+  ImuNoise imu_noise = ExactImuIntrinsics();  // EuRoC's white noise and walk
   // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
   double drive_mps = 0;
-  double spin_rps = 0;  // above 0: it turns about on the spot, rad/s
+  double spin_rps = 0;  // above 0: it rotates on the spot, rad/s
   // The body stands still in between, seconds.
-  double rest_begin_s = -10, rest_end_s = -10;
+  double stationary_begin_s = -10, stationary_end_s = -10;
   // Errors of the calibration the estimator is given.
   double extrinsics_rotation_sigma = 0;  // rad
   double extrinsics_position_sigma = 0;  // m
@@ -99,7 +99,7 @@ class VioTestWorld {
   CameraModel true_intrinsics_;
   Rigid3 true_T_body_cam_;
   double true_time_offset_s_ = 0;
-  ImuScales true_imu_scales_;
+  ImuIntrinsics true_imu_intrinsics_;
   Eigen::Vector3d phase_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> points_;
   std::map<int32_t, Track> tracks_;  // those in sight

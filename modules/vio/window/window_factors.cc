@@ -18,10 +18,10 @@ constexpr double kHuber = 2.0;
 // What a point behind a camera that saw it costs, as a ray this many sigmas off: nothing is gained
 // by throwing it there.
 constexpr double kBehind = 100;
-// A rest: what may pass for one within the noise of a hundred tracks together.
-constexpr double kRestVelocitySigma = 0.02;    // m/s
-constexpr double kRestPositionSigma = 0.002;   // m, between two frames of one rest
-constexpr double kRestRotationSigma = 0.0003;  // rad
+// Stationary: what may pass for it within the noise of a hundred tracks together.
+constexpr double kStationaryVelocitySigma = 0.02;    // m/s
+constexpr double kStationaryPositionSigma = 0.002;   // m, between two stationary frames
+constexpr double kStationaryRotationSigma = 0.0003;  // rad
 
 double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
 double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
@@ -126,11 +126,11 @@ void Scatter(const WindowState& state, const Landmark& landmark, const LandmarkS
   }
 }
 
-Vector6d RestResidual(const WindowState& state, int to) {
+Vector6d ZeroMotionResidual(const WindowState& state, int to) {
   const Rigid3 T =
       state.frames[to - 1].imu.T_odom_body.Inverse() * state.frames[to].imu.T_odom_body;
   Vector6d r;
-  r << LogSo3(T.q) / kRestRotationSigma, T.t / kRestPositionSigma;
+  r << LogSo3(T.q) / kStationaryRotationSigma, T.t / kStationaryPositionSigma;
   return r;
 }
 
@@ -153,57 +153,59 @@ void AddLandmark(const WindowState& state, const Landmark& landmark, double damp
   out->eliminations.push_back(std::move(elimination));
 }
 
-void AddLink(const WindowState& state, const InertialLink& link, int to, NormalEquations* out) {
+void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
   const ImuState& from = state.frames[to - 1].imu;
   const InertialResidual residual =
-      ComputeInertialResidual(At(link.span, state.imu_scales), from, state.frames[to].imu);
+      ComputeInertialResidual(At(factor.span, state.imu_intrinsics), from, state.frames[to].imu);
   Eigen::Matrix<double, 15, 30> J;
   J << residual.J_from, residual.J_to;
-  const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * link.information;
+  const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * factor.information;
   const int at = state.Offset(to - 1);  // the two frames are neighbours
   out->H.block<30, 30>(at, at) += JtL * J;
   out->g.segment<30>(at) += JtL * residual.r;
-  const Eigen::Matrix<double, 15, kScalesSize> J_scales =
-      ScalesJacobian(link.span, state.imu_scales, from.gyro_bias, residual.r.head<3>());
-  const Eigen::Matrix<double, kScalesSize, 15> JtL_scales = J_scales.transpose() * link.information;
-  const Eigen::Matrix<double, 30, kScalesSize> cross = JtL * J_scales;
-  out->H.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) += JtL_scales * J_scales;
-  out->H.block<30, kScalesSize>(at, kImuScales) += cross;
-  out->H.block<kScalesSize, 30>(kImuScales, at) += cross.transpose();
-  out->g.segment<kScalesSize>(kImuScales) += JtL_scales * residual.r;
-  out->cost += 0.5 * residual.r.dot(link.information * residual.r);
+  const Eigen::Matrix<double, 15, kImuIntrinsicsSize> J_intrinsics = ImuIntrinsicsJacobian(
+      factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>());
+  const Eigen::Matrix<double, kImuIntrinsicsSize, 15> JtL_intrinsics =
+      J_intrinsics.transpose() * factor.information;
+  const Eigen::Matrix<double, 30, kImuIntrinsicsSize> cross = JtL * J_intrinsics;
+  out->H.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) +=
+      JtL_intrinsics * J_intrinsics;
+  out->H.block<30, kImuIntrinsicsSize>(at, kImuIntrinsics) += cross;
+  out->H.block<kImuIntrinsicsSize, 30>(kImuIntrinsics, at) += cross.transpose();
+  out->g.segment<kImuIntrinsicsSize>(kImuIntrinsics) += JtL_intrinsics * residual.r;
+  out->cost += 0.5 * residual.r.dot(factor.information * residual.r);
 }
 
-void AddRest(const WindowState& state, int frame, NormalEquations* out) {
-  // r = R^T v, so that a turn of all the frames leaves it as it is also when v is not yet zero; its
-  // derivative by xi_v is R^T.
+void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations* out) {
+  // r = R^T v, so that a rotation of all the frames leaves it as it is also when v is not yet zero;
+  // its derivative by xi_v is R^T.
   const Vector3d& v = state.frames[frame].imu.v_odom_body;
-  const double information = 1 / (kRestVelocitySigma * kRestVelocitySigma);
+  const double information = 1 / (kStationaryVelocitySigma * kStationaryVelocitySigma);
   const int at = state.Offset(frame) + kVelocity;
   out->H.diagonal().segment<3>(at).array() += information;
   out->g.segment<3>(at) += information * v;
   out->cost += 0.5 * information * v.squaredNorm();
 }
 
-bool RestTogether(const WindowProblem& problem, int to) {
-  return problem.links[to] && problem.state.frames[to - 1].at_rest &&
-         problem.state.frames[to].at_rest;
+bool StationaryTogether(const WindowProblem& problem, int to) {
+  return problem.imu_factors[to] && problem.state.frames[to - 1].stationary &&
+         problem.state.frames[to].stationary;
 }
 
-void AddRestTogether(const WindowState& state, int to, NormalEquations* out) {
+void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out) {
   const Rigid3& T_i = state.frames[to - 1].imu.T_odom_body;
   const Rigid3& T_j = state.frames[to].imu.T_odom_body;
-  const Vector6d r = RestResidual(state, to);
+  const Vector6d r = ZeroMotionResidual(state, to);
   const Matrix3d R_i = T_i.R().transpose();
-  const Matrix3d turn = RightJacobianInverse(kRestRotationSigma * r.head<3>()) *
-                        T_j.R().transpose() / kRestRotationSigma;
+  const Matrix3d rotation = RightJacobianInverse(kStationaryRotationSigma * r.head<3>()) *
+                            T_j.R().transpose() / kStationaryRotationSigma;
   Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();  // (pose i, pose j)
-  J.block<3, 3>(0, 0) = -turn;
-  J.block<3, 3>(0, 6) = turn;
-  J.block<3, 3>(3, 0) = R_i * Hat(T_j.t) / kRestPositionSigma;
-  J.block<3, 3>(3, 3) = -R_i / kRestPositionSigma;
-  J.block<3, 3>(3, 6) = -R_i * Hat(T_j.t) / kRestPositionSigma;
-  J.block<3, 3>(3, 9) = R_i / kRestPositionSigma;
+  J.block<3, 3>(0, 0) = -rotation;
+  J.block<3, 3>(0, 6) = rotation;
+  J.block<3, 3>(3, 0) = R_i * Hat(T_j.t) / kStationaryPositionSigma;
+  J.block<3, 3>(3, 3) = -R_i / kStationaryPositionSigma;
+  J.block<3, 3>(3, 6) = -R_i * Hat(T_j.t) / kStationaryPositionSigma;
+  J.block<3, 3>(3, 9) = R_i / kStationaryPositionSigma;
   const Eigen::Matrix<double, 12, 12> A = J.transpose() * J;
   const Eigen::Matrix<double, 12, 1> b = J.transpose() * r;
   const int at_i = state.Offset(to - 1), at_j = state.Offset(to);
@@ -232,19 +234,20 @@ double Cost(const WindowProblem& problem) {
   const VectorXd e = PriorError(problem);
   double cost = problem.prior.g.dot(e) + 0.5 * e.dot(problem.prior.H * e);
   for (int i = 1; i <= state.Newest(); ++i) {
-    if (problem.links[i]) {
-      const InertialLink& link = *problem.links[i];
-      const auto residual = ComputeInertialResidual(At(link.span, state.imu_scales),
+    if (problem.imu_factors[i]) {
+      const ImuFactor& factor = *problem.imu_factors[i];
+      const auto residual = ComputeInertialResidual(At(factor.span, state.imu_intrinsics),
                                                     state.frames[i - 1].imu, state.frames[i].imu);
-      cost += 0.5 * residual.r.dot(link.information * residual.r);
+      cost += 0.5 * residual.r.dot(factor.information * residual.r);
     }
-    if (RestTogether(problem, i)) {
-      cost += 0.5 * RestResidual(state, i).squaredNorm();
+    if (StationaryTogether(problem, i)) {
+      cost += 0.5 * ZeroMotionResidual(state, i).squaredNorm();
     }
   }
   for (const WindowFrame& frame : state.frames) {
-    if (frame.at_rest) {
-      cost += 0.5 * frame.imu.v_odom_body.squaredNorm() / (kRestVelocitySigma * kRestVelocitySigma);
+    if (frame.stationary) {
+      cost += 0.5 * frame.imu.v_odom_body.squaredNorm() /
+              (kStationaryVelocitySigma * kStationaryVelocitySigma);
     }
   }
   for (const Landmark& landmark : problem.landmarks) {

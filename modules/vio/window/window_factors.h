@@ -1,7 +1,7 @@
 #pragma once
 
 // The terms of the window's cost, each added to the normal equations with its derivatives
-// (docs/maths_vio.md). None of them changes when all frames are shifted together, or turned
+// (docs/maths_vio.md). None of them changes when all frames are shifted together, or rotated
 // together about the vertical.
 
 #include "vio/window/window_problem.h"
@@ -13,12 +13,12 @@ namespace pangea::vio {
 void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
                  NormalEquations* out);
 // The inertial measurement between frames to - 1 and to.
-void AddLink(const WindowState& state, const InertialLink& link, int to, NormalEquations* out);
-// The velocity of a resting frame is zero.
-void AddRest(const WindowState& state, int frame, NormalEquations* out);
-// Two neighbours that both rest have one pose: r = (Log(R_i^T R_j), R_i^T (p_j - p_i)).
-bool RestTogether(const WindowProblem& problem, int to);
-void AddRestTogether(const WindowState& state, int to, NormalEquations* out);
+void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out);
+// The velocity of a stationary frame is zero.
+void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations* out);
+// Two neighbours that are both stationary have one pose: r = (Log(R_i^T R_j), R_i^T (p_j - p_i)).
+bool StationaryTogether(const WindowProblem& problem, int to);
+void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out);
 void AddPrior(const WindowProblem& problem, NormalEquations* out);
 
 // The sum of them all, without derivatives.

@@ -23,7 +23,7 @@ constexpr double kSpread = 0.01;     // of every error of the window, each time 
 constexpr double kRaySigma = 0.002;  // 0.8 px
 
 // A ride as one long window at its true state: inertial samples between its images, rays with
-// noise, and a prior that says nothing but of the IMU's axes: turned together with body and camera
+// noise, and a prior that says nothing but of the IMU's axes: rotated together with body and camera
 // they are another body.
 WindowProblem Ride(uint64_t seed) {
   VioTestWorldOptions options;
@@ -40,17 +40,17 @@ WindowProblem Ride(uint64_t seed) {
     frame.utime = frame.imu_utime = input.frame.utime;
     frame.imu = world.TruthAt(frame.utime);
     frame.omega_body = input.imu.back().gyro - frame.imu.gyro_bias;
-    std::optional<InertialLink> link;
+    std::optional<ImuFactor> factor;
     if (i > 0) {
       const ImuState& from = problem.state.frames.back().imu;
       input.imu.insert(input.imu.begin(), last_sample);
-      link.emplace();
-      link->span = IntegrateScaled(input.imu, ImuNoise{}, {}, from.gyro_bias, from.accel_bias);
-      link->information = InertialInformation(link->span.measured, ImuNoise{});
+      factor.emplace();
+      factor->span = IntegrateScaled(input.imu, ImuNoise{}, {}, from.gyro_bias, from.accel_bias);
+      factor->information = InertialInformation(factor->span.measured, ImuNoise{});
     }
     last_sample = input.imu.back();
     problem.state.frames.push_back(frame);
-    problem.links.push_back(link);
+    problem.imu_factors.push_back(factor);
     for (const Observation& seen : input.frame.observations) {
       Landmark& landmark = open[seen.landmark_id];
       if (landmark.rays.size() == kViews) {
@@ -72,7 +72,7 @@ WindowProblem Ride(uint64_t seed) {
   problem.prior.at = problem.state;
   problem.prior.H.setZero(problem.state.size(), problem.state.size());
   problem.prior.g.setZero(problem.state.size());
-  problem.prior.H.diagonal().segment<kScalesSize>(kImuScales).setConstant(1e4);
+  problem.prior.H.diagonal().segment<kImuIntrinsicsSize>(kImuIntrinsics).setConstant(1e4);
   return problem;
 }
 
@@ -110,7 +110,7 @@ WindowPrior Marginalised(WindowProblem problem, bool plain_errors) {
   return problem.prior;
 }
 
-// Information, each row in units of what it alone would know: the most about a shift or a turn
+// Information, each row in units of what it alone would know: the most about a shift or a rotation
 // about the vertical, and the least about any direction across these.
 struct Knowledge {
   double of_gauge = 0;

@@ -52,14 +52,14 @@ NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
   out.H.setZero(state.size(), state.size());
   out.g.setZero(state.size());
   AddPrior(problem, &out);
-  if (problem.links[oldest + 1]) {
-    AddLink(state, *problem.links[oldest + 1], oldest + 1, &out);
+  if (problem.imu_factors[oldest + 1]) {
+    AddImuFactor(state, *problem.imu_factors[oldest + 1], oldest + 1, &out);
   }
-  if (RestTogether(problem, oldest + 1)) {
-    AddRestTogether(state, oldest + 1, &out);
+  if (StationaryTogether(problem, oldest + 1)) {
+    AddZeroMotionUpdate(state, oldest + 1, &out);
   }
-  if (state.frames[oldest].at_rest) {
-    AddRest(state, oldest, &out);
+  if (state.frames[oldest].stationary) {
+    AddZeroVelocityUpdate(state, oldest, &out);
   }
   for (const Landmark& landmark : problem.landmarks) {
     if (landmark.point.anchor == oldest) {
@@ -71,7 +71,7 @@ NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
 
 void EraseFrame(WindowProblem& problem, int index) {
   problem.state.frames.erase(problem.state.frames.begin() + index);
-  problem.links.erase(problem.links.begin() + index);
+  problem.imu_factors.erase(problem.imu_factors.begin() + index);
   for (Landmark& landmark : problem.landmarks) {
     landmark.point.anchor -= landmark.point.anchor > index ? 1 : 0;
     std::erase_if(landmark.rays, [index](const FrameRay& ray) { return ray.frame == index; });
@@ -90,14 +90,14 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
   out.g.setZero(n);
   AddPrior(problem, &out);
   for (int i = 0; i <= problem.state.Newest(); ++i) {
-    if (problem.links[i]) {
-      AddLink(problem.state, *problem.links[i], i, &out);
+    if (problem.imu_factors[i]) {
+      AddImuFactor(problem.state, *problem.imu_factors[i], i, &out);
     }
-    if (RestTogether(problem, i)) {
-      AddRestTogether(problem.state, i, &out);
+    if (StationaryTogether(problem, i)) {
+      AddZeroMotionUpdate(problem.state, i, &out);
     }
-    if (problem.state.frames[i].at_rest) {
-      AddRest(problem.state, i, &out);
+    if (problem.state.frames[i].stationary) {
+      AddZeroVelocityUpdate(problem.state, i, &out);
     }
   }
   for (const Landmark& landmark : problem.landmarks) {
@@ -172,12 +172,12 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
   prior.H = 0.5 * (prior.H + prior.H.transpose()).eval();
   prior.g = equations.g(stay) - gain.transpose() * g_go;
 
-  problem.links[oldest + 1].reset();
+  problem.imu_factors[oldest + 1].reset();
   if (what.keep_pose) {
     WindowFrame& kept = state.frames[oldest];
     kept.pose_only = true;
-    kept.at_rest = false;
-    problem.links[oldest].reset();
+    kept.stationary = false;
+    problem.imu_factors[oldest].reset();
   } else {
     EraseFrame(problem, oldest);
   }

@@ -1,7 +1,7 @@
 #pragma once
 
 // The sliding window as a least-squares problem: rays of landmarks, inertial measurements between
-// consecutive frames, rests, and a prior that holds what has left the window.
+// consecutive frames, zero-velocity updates, and a prior that holds what has left the window.
 //
 // Landmarks are eliminated one by one (Schur complement); the reduced system is small and dense.
 
@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/imu/inertial_factor.h"
+#include "core/imu/imu_factor.h"
 #include "vio/window/point_geometry.h"
 #include "vio/window/window_state.h"
 
@@ -22,7 +22,7 @@ struct Landmark {
   std::vector<FrameRay> rays;  // at most one a frame; the anchor's own is among them
 };
 
-struct InertialLink {
+struct ImuFactor {
   ScaledPreintegration span;
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };
@@ -37,7 +37,7 @@ struct WindowPrior {
 
 struct WindowProblem {
   WindowState state;
-  std::vector<std::optional<InertialLink>> links;  // links[i]: from frame i - 1 to frame i
+  std::vector<std::optional<ImuFactor>> imu_factors;  // imu_factors[i]: from frame i - 1 to frame i
   std::vector<Landmark> landmarks;
   WindowPrior prior;
 };
@@ -68,8 +68,8 @@ double RayError(const WindowState& state, const AnchoredPoint& point, const Fram
 Eigen::MatrixXd WindowCovariance(const WindowProblem& problem);
 
 // Takes the oldest full frame out of the window (all of it, or all but its pose), with the
-// landmarks anchored in it, the link to the next frame and what the prior says of it; what they
-// tell of the rest goes into the prior. A pose kept before goes too when `drop_kept_pose`.
+// landmarks anchored in it, the IMU factor to the next frame and what the prior says of it; what
+// they tell of the rest goes into the prior. A pose kept before goes too when `drop_kept_pose`.
 struct Marginalisation {
   bool keep_pose = false;
   bool drop_kept_pose = false;

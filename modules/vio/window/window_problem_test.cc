@@ -17,13 +17,13 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Noisy rays, and every second frame pair at rest as far as the factors are concerned.
+// Noisy rays, and every second frame pair stationary as far as the factors are concerned.
 WindowProblem NoisyWindow(uint64_t seed) {
   WindowTestOptions options;
   options.seed = seed;
   options.ray_noise = 1;
   WindowProblem problem = TestWindow(options);
-  problem.state.frames[1].at_rest = problem.state.frames[2].at_rest = true;
+  problem.state.frames[1].stationary = problem.state.frames[2].stationary = true;
   return problem;
 }
 
@@ -82,21 +82,21 @@ TEST(WindowProblem, TheGradientMatchesDifferences) {
 // Where all residuals vanish Gauss and Newton agree: H is the derivative of the reduced gradient.
 TEST(WindowProblem, TheInformationMatchesDifferences) {
   WindowProblem problem = TestWindow({});
-  // A window that rests: zero residual there, too.
+  // A stationary window: zero residual there, too.
   for (WindowFrame& frame : problem.state.frames) {
-    frame.at_rest = true;
+    frame.stationary = true;
     frame.imu = problem.state.frames[0].imu;
     frame.imu.v_odom_body.setZero();
   }
-  for (auto& link : problem.links) {
-    link.reset();
+  for (auto& factor : problem.imu_factors) {
+    factor.reset();
   }
   problem.landmarks.clear();
-  problem.links[1] = InertialLink{};  // says nothing, but the two frames are neighbours
-  problem.links[1]->information.setZero();
-  const WindowProblem resting = problem;
+  problem.imu_factors[1] = ImuFactor{};  // says nothing, but the two frames are neighbours
+  problem.imu_factors[1]->information.setZero();
+  const WindowProblem standing = problem;
   const WindowProblem moving = TestWindow({});
-  for (const WindowProblem& each : {resting, moving}) {
+  for (const WindowProblem& each : {standing, moving}) {
     const NormalEquations equations = Linearise(each, 0);
     const MatrixXd numeric = NumericJacobian(each.state, [&](const WindowState& state) -> VectorXd {
       WindowProblem moved = each;
@@ -199,21 +199,21 @@ TEST(WindowProblem, WhatIsLeftKnowsAsMuchAsTheWhole) {
   }
 }
 
-TEST(WindowProblem, FramesLinksAndRaysFollowAMarginalisation) {
+TEST(WindowProblem, FramesImuFactorsAndRaysFollowAMarginalisation) {
   WindowProblem problem = TestWindow({});
   const WindowProblem before = problem;
   MarginaliseOldest(problem, {.keep_pose = true});
   ASSERT_EQ(problem.state.frames.size(), 5u);
   EXPECT_TRUE(problem.state.frames[0].pose_only);
-  EXPECT_FALSE(problem.links[0] || problem.links[1]);
-  EXPECT_TRUE(problem.links[2]);
+  EXPECT_FALSE(problem.imu_factors[0] || problem.imu_factors[1]);
+  EXPECT_TRUE(problem.imu_factors[2]);
   EXPECT_EQ(problem.landmarks.size(), 9u);  // a quarter was anchored in the frame that left
 
   MarginaliseOldest(problem, {.drop_kept_pose = true});
   ASSERT_EQ(problem.state.frames.size(), 3u);
-  ASSERT_EQ(problem.links.size(), 3u);
+  ASSERT_EQ(problem.imu_factors.size(), 3u);
   EXPECT_EQ(problem.state.frames[0].utime, before.state.frames[2].utime);
-  EXPECT_FALSE(problem.links[0]);
+  EXPECT_FALSE(problem.imu_factors[0]);
   ASSERT_EQ(problem.landmarks.size(), 6u);
   for (const Landmark& landmark : problem.landmarks) {
     const Landmark& as_before = before.landmarks[landmark.id];
@@ -288,11 +288,11 @@ TEST(Optimise, DampsWhenTheFullStepIsWorse) {
   int worse = 0;
   for (uint64_t seed = 1; seed <= 50; ++seed) {
     Perturbed window = Perturb(seed, 0.1, 0.1);
-    std::fill(window.problem.links.begin(), window.problem.links.end(), std::nullopt);
+    std::fill(window.problem.imu_factors.begin(), window.problem.imu_factors.end(), std::nullopt);
     window.problem.prior.H =
         100 * MatrixXd::Identity(window.problem.state.size(), window.problem.state.size());
     window.problem.state.intrinsics = window.truth.state.intrinsics;  // they are known
-    window.problem.state.imu_scales = window.truth.state.imu_scales;
+    window.problem.state.imu_intrinsics = window.truth.state.imu_intrinsics;
     window.problem.prior.H.diagonal().segment<3>(kIntrinsics).setConstant(1e8);
     const double start = Cost(window.problem);
     worse += Cost(FullStep(window.problem)) > start ? 1 : 0;
@@ -328,15 +328,16 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   });
   const MatrixXd expected = J * plain * J.transpose();
   EXPECT_LT((P.bottomRightCorner(15, 15) - expected).cwiseAbs().maxCoeff(), 1e-5);
-  EXPECT_NEAR(std::sqrt(P(kImuScales, kImuScales)), 0.002, 1e-7);          // the gyro's x by x
-  EXPECT_NEAR(std::sqrt(P(kImuScales + 9, kImuScales + 9)), 0.001, 1e-7);  // the accelerometer's
-  // The gyro's y by x and x by y are the same: it is not turned against the body. What they were
-  // before turns the accelerometer.
+  EXPECT_NEAR(std::sqrt(P(kImuIntrinsics, kImuIntrinsics)), 0.002, 1e-7);  // the gyro's x by x
+  EXPECT_NEAR(std::sqrt(P(kImuIntrinsics + 9, kImuIntrinsics + 9)), 0.001,
+              1e-7);  // the accelerometer's
+  // The gyro's y by x and x by y are the same: it is not rotated against the body. What they were
+  // before rotates the accelerometer.
   const double variance = 0.002 * 0.002;
-  EXPECT_NEAR(P(kImuScales + 1, kImuScales + 1), 0.5 * variance, 1e-9);
-  EXPECT_NEAR(P(kImuScales + 1, kImuScales + 3), 0.5 * variance, 1e-9);
-  EXPECT_NEAR(P(kImuScales + 10, kImuScales + 10), 1.5 * variance, 1e-9);
-  EXPECT_NEAR(P(kImuScales + 10, kImuScales + 12), -0.5 * variance, 1e-9);
+  EXPECT_NEAR(P(kImuIntrinsics + 1, kImuIntrinsics + 1), 0.5 * variance, 1e-9);
+  EXPECT_NEAR(P(kImuIntrinsics + 1, kImuIntrinsics + 3), 0.5 * variance, 1e-9);
+  EXPECT_NEAR(P(kImuIntrinsics + 10, kImuIntrinsics + 10), 1.5 * variance, 1e-9);
+  EXPECT_NEAR(P(kImuIntrinsics + 10, kImuIntrinsics + 12), -0.5 * variance, 1e-9);
   EXPECT_NEAR(std::sqrt(P(kExtrinsics, kExtrinsics)), 0.001, 1e-9);
   EXPECT_NEAR(std::sqrt(P(kTimeOffset, kTimeOffset)), 0.005, 1e-9);
 }

@@ -10,13 +10,14 @@ using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 // Prior uncertainty of the given calibration.
-constexpr double kExtrinsicsRotationSigma = 0.001;  // rad; walks' links need it (imu_scales.md)
+constexpr double kExtrinsicsRotationSigma =
+    0.001;  // rad; constraints of walks need it (imu_intrinsics.md)
 constexpr double kExtrinsicsPositionSigma = 0.005;  // m
 constexpr double kTimeOffsetSigma = 0.005;          // s
 constexpr double kFocalSigma = 0.001;               // of the focal length
 constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
 
-constexpr double kExactScale = 1e-5;  // what an exact IMU's scales and axes may still be off
+constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
 
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
 constexpr double kTiltSigma = 0.5;        // rad
@@ -25,19 +26,20 @@ constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
 
 // Each sensor has gains and axes of its own, the gyro's are the body's.
-Eigen::Matrix<double, kScalesSize, kScalesSize> ScalesCovariance(const ImuNoise& noise) {
-  ImuScales sigma;
+Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> ImuIntrinsicsCovariance(
+    const ImuNoise& noise) {
+  ImuIntrinsics sigma;
   sigma.gyro.setConstant(noise.axes_sigma);
   sigma.gyro.diagonal().setConstant(noise.gyro_scale_sigma);
   sigma.accel.setConstant(noise.axes_sigma);
   sigma.accel.diagonal().setConstant(noise.accel_scale_sigma);
-  Eigen::Matrix<double, kScalesSize, kScalesSize> J;
-  for (int i = 0; i < kScalesSize; ++i) {
-    ImuScales one;
-    one.Add(Eigen::Matrix<double, kScalesSize, 1>::Unit(i));
+  Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> J;
+  for (int i = 0; i < kImuIntrinsicsSize; ++i) {
+    ImuIntrinsics one;
+    one.Add(Eigen::Matrix<double, kImuIntrinsicsSize, 1>::Unit(i));
     J.col(i) = one.OfGyroAxes().Stacked();
   }
-  Eigen::Matrix<double, kScalesSize, kScalesSize> P =
+  Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> P =
       J * sigma.Stacked().cwiseAbs2().asDiagonal() * J.transpose();
   P.diagonal().array() += kExactScale * kExactScale;
   return P;
@@ -62,7 +64,8 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
       Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
       kCentreSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
-  P.block<kScalesSize, kScalesSize>(kImuScales, kImuScales) = ScalesCovariance(noise);
+  P.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) =
+      ImuIntrinsicsCovariance(noise);
   P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
   // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
   // invertible.

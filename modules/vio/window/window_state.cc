@@ -44,14 +44,14 @@ void WindowState::Retract(const VectorXd& error) {
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
   intrinsics += error.segment<3>(kIntrinsics);
-  imu_scales.Add(error.segment<kScalesSize>(kImuScales));
+  imu_intrinsics.Add(error.segment<kImuIntrinsicsSize>(kImuIntrinsics));
   int at = kSharedSize;
   for (WindowFrame& frame : frames) {
-    const Quaterniond turn = ExpSo3(error.segment<3>(at + kTheta));
+    const Quaterniond rotation = ExpSo3(error.segment<3>(at + kTheta));
     Rigid3& T = frame.imu.T_odom_body;
-    T = {(turn * T.q).normalized(), turn * T.t + error.segment<3>(at + kPosition)};
+    T = {(rotation * T.q).normalized(), rotation * T.t + error.segment<3>(at + kPosition)};
     if (!frame.pose_only) {
-      frame.imu.v_odom_body = turn * frame.imu.v_odom_body + error.segment<3>(at + kVelocity);
+      frame.imu.v_odom_body = rotation * frame.imu.v_odom_body + error.segment<3>(at + kVelocity);
       frame.imu.gyro_bias += error.segment<3>(at + kGyroBias);
       frame.imu.accel_bias += error.segment<3>(at + kAccelBias);
     }
@@ -65,16 +65,17 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
   e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
   e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
   e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
-  e.segment<kScalesSize>(kImuScales) = a.imu_scales.Stacked() - b.imu_scales.Stacked();
+  e.segment<kImuIntrinsicsSize>(kImuIntrinsics) =
+      a.imu_intrinsics.Stacked() - b.imu_intrinsics.Stacked();
   int at = kSharedSize;
   for (size_t i = 0; i < b.frames.size(); ++i) {
     const ImuState& x = a.frames[i].imu;
     const ImuState& y = b.frames[i].imu;
-    const Quaterniond turn = x.T_odom_body.q * y.T_odom_body.q.conjugate();
-    e.segment<3>(at + kTheta) = LogSo3(turn);
-    e.segment<3>(at + kPosition) = x.T_odom_body.t - turn * y.T_odom_body.t;
+    const Quaterniond rotation = x.T_odom_body.q * y.T_odom_body.q.conjugate();
+    e.segment<3>(at + kTheta) = LogSo3(rotation);
+    e.segment<3>(at + kPosition) = x.T_odom_body.t - rotation * y.T_odom_body.t;
     if (!b.frames[i].pose_only) {
-      e.segment<3>(at + kVelocity) = x.v_odom_body - turn * y.v_odom_body;
+      e.segment<3>(at + kVelocity) = x.v_odom_body - rotation * y.v_odom_body;
       e.segment<3>(at + kGyroBias) = x.gyro_bias - y.gyro_bias;
       e.segment<3>(at + kAccelBias) = x.accel_bias - y.accel_bias;
     }

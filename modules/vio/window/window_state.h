@@ -15,22 +15,22 @@
 #include <vector>
 
 #include "core/camera_model.h"
-#include "core/imu/inertial_factor.h"
+#include "core/imu/imu_factor.h"
 #include "core/imu/preintegration.h"
 #include "core/rigid3.h"
-#include "vio/imu/imu_scales.h"
+#include "vio/imu/imu_intrinsics.h"
 
 namespace pangea::vio {
 
-// One frame's error is laid out as in core/imu/inertial_factor.h.
+// One frame's error is laid out as in core/imu/imu_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
 // intrinsics.
 inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
 inline constexpr int kCalibrationSize = 10;
-// Then the scales of the IMU, and then the frames.
-inline constexpr int kImuScales = kCalibrationSize;
-inline constexpr int kSharedSize = kCalibrationSize + kScalesSize;
+// Then the IMU intrinsics, and then the frames.
+inline constexpr int kImuIntrinsics = kCalibrationSize;
+inline constexpr int kSharedSize = kCalibrationSize + kImuIntrinsicsSize;
 
 // A frame of the window: the body at the image's time as the time offset stood when it came.
 struct WindowFrame {
@@ -38,13 +38,13 @@ struct WindowFrame {
   int64_t imu_utime = 0;     // utime + time_offset_s
   double time_offset_s = 0;  // when it came
   ImuState imu;
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // turn rate there, rad/s
-  bool stays = false;        // it holds its place; else the next frame replaces it
-  bool is_keyframe = false;  // it is, or will be, published
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate there, rad/s
+  bool is_window_keyframe = false;  // it holds its place; else the next frame replaces it
+  bool is_keyframe = false;         // it is, or will be, published
   bool is_published = false;
   bool pose_only = false;  // only its pose is left: the end of the next odometry edge
-  bool at_rest = false;
-  bool is_sight = true;  // its rays count: they are not mere noise
+  bool stationary = false;
+  bool is_tracked = true;  // its rays count: they are not mere noise
 
   int size() const { return pose_only ? kPoseSize : kFrameSize; }
 };
@@ -55,18 +55,18 @@ struct WindowState {
   // Of the given camera: how much longer its focal length is, as a share of it, and where its
   // centre is, in focal lengths (x, y).
   Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
-  ImuScales imu_scales;
+  ImuIntrinsics imu_intrinsics;
   std::vector<WindowFrame> frames;  // oldest first
 
   int Offset(int frame) const;
   int size() const { return Offset(static_cast<int>(frames.size())); }
   int Newest() const { return static_cast<int>(frames.size()) - 1; }
   std::optional<int> Find(int64_t utime) const;
-  // The given camera as it is thought to be: mount, time offset, focal length and centre.
+  // The given camera as it is thought to be: extrinsics, time offset, focal length and centre.
   CameraModel Calibrated(CameraModel given) const;
 
   // The body when a row of a frame's image was exposed, that much after the image's time: the
-  // frame's pose, moved on at its velocity and turn rate.
+  // frame's pose, moved on at its velocity and rotation rate.
   double Ahead(int frame, double row_s) const {
     return time_offset_s - frames[frame].time_offset_s + row_s;
   }

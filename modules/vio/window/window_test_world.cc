@@ -11,7 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr int kSamplesPerLink = 40;
+constexpr int kSamplesPerImuFactor = 40;
 constexpr int64_t kSampleStep_us = 5'000;
 constexpr double kRaySigma = 2e-3;
 
@@ -27,13 +27,14 @@ WindowFrame FirstFrame(double time_offset_s, std::mt19937_64& rng) {
   return frame;
 }
 
-Eigen::Matrix<double, kScalesSize, 1> RandomScales(double sigma, std::mt19937_64& rng) {
+Eigen::Matrix<double, kImuIntrinsicsSize, 1> RandomImuIntrinsics(double sigma,
+                                                                 std::mt19937_64& rng) {
   std::normal_distribution<double> normal(0, sigma);
-  Eigen::Matrix<double, kScalesSize, 1> scales;
-  for (double& value : scales) {
+  Eigen::Matrix<double, kImuIntrinsicsSize, 1> intrinsics;
+  for (double& value : intrinsics) {
     value = normal(rng);
   }
-  return scales;
+  return intrinsics;
 }
 
 Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions& options,
@@ -95,30 +96,30 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
   state.intrinsics = RandomVector(rng, 0.01);
-  state.imu_scales.Add(RandomScales(0.01, rng));
+  state.imu_intrinsics.Add(RandomImuIntrinsics(0.01, rng));
   state.frames = {FirstFrame(0.002, rng)};
-  problem.links.resize(1);
+  problem.imu_factors.resize(1);
   for (int i = 0; i < options.frames; ++i) {
     if (i > 0) {
       const WindowFrame& last = state.frames.back();
-      const auto samples = TestSamples(kSamplesPerLink + 1, last.imu_utime, rng());
-      InertialLink link;
-      ImuScales scales = state.imu_scales;
-      scales.Add(RandomScales(1e-3, rng));
-      link.span =
-          IntegrateScaled(samples, ImuNoise{}, scales, last.imu.gyro_bias + RandomVector(rng, 1e-3),
-                          last.imu.accel_bias + RandomVector(rng, 1e-2));
-      link.information = InertialInformation(link.span.measured, ImuNoise{});
+      const auto samples = TestSamples(kSamplesPerImuFactor + 1, last.imu_utime, rng());
+      ImuFactor factor;
+      ImuIntrinsics intrinsics = state.imu_intrinsics;
+      intrinsics.Add(RandomImuIntrinsics(1e-3, rng));
+      factor.span = IntegrateScaled(samples, ImuNoise{}, intrinsics,
+                                    last.imu.gyro_bias + RandomVector(rng, 1e-3),
+                                    last.imu.accel_bias + RandomVector(rng, 1e-2));
+      factor.information = InertialInformation(factor.span.measured, ImuNoise{});
       WindowFrame next = last;
-      next.imu = Predict(At(link.span, state.imu_scales), last.imu);
+      next.imu = Predict(At(factor.span, state.imu_intrinsics), last.imu);
       state.frames.push_back(next);
-      problem.links.emplace_back(link);
+      problem.imu_factors.emplace_back(factor);
     }
     WindowFrame& frame = state.frames.back();
-    frame.imu_utime = 1'000'000 + kSampleStep_us * kSamplesPerLink * i;
+    frame.imu_utime = 1'000'000 + kSampleStep_us * kSamplesPerImuFactor * i;
     frame.utime = frame.imu_utime - 2'000;
     frame.omega_body = RandomVector(rng, 0.3);
-    frame.stays = true;
+    frame.is_window_keyframe = true;
   }
   for (int i = 0; i < options.landmarks; ++i) {
     problem.landmarks.push_back(SeenLandmark(state, i, options, rng));

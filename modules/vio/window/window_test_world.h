@@ -36,7 +36,7 @@ void HoldStart(WindowProblem* problem, double sigma);
 Eigen::VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed);
 
 // The four directions that camera and IMU cannot observe, as columns: a shift along odom's axes,
-// and a turn about its z axis.
+// and a rotation about its z axis.
 Eigen::MatrixXd UnobservableDirections(const WindowState& state);
 
 // Central differences along the window's error coordinates.

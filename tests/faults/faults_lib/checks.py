@@ -1,11 +1,11 @@
-"""What a disturbed session must have in common with the undisturbed one, as rows: claim, figure, whether it holds."""
+"""What a disturbed session must have in common with the undisturbed one, as rows: claim, value, whether it holds."""
 
 import struct
 from collections import Counter
 from dataclasses import dataclass
 
 from faults_lib.session import played, rms_m, same_files, whole_keyframes
-from link_lib.figures import events
+from link_lib.metrics import events
 
 MAX_CHANGE_M = 0.005
 
@@ -13,7 +13,7 @@ MAX_CHANGE_M = 0.005
 @dataclass
 class Row:
     claim: str
-    figure: str
+    value: str
     holds: bool
 
 
@@ -90,5 +90,5 @@ def kills(session, planned):
 def print_rows(title, rows):
     print(f"\n{title}")
     for row in rows:
-        print(f"  {'pass' if row.holds else 'MISSED':7} {row.claim}: {row.figure}", flush=True)
+        print(f"  {'pass' if row.holds else 'MISSED':7} {row.claim}: {row.value}", flush=True)
     return all(row.holds for row in rows)

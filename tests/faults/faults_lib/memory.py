@@ -6,7 +6,7 @@ import time
 from faults_lib.checks import Row, print_rows
 from faults_lib.offline import Link, copies, memory_mb
 from faults_lib.session import Session, whole_keyframes
-from link_lib.figures import keyframes, statuses
+from link_lib.metrics import keyframes, statuses
 
 LINK_KEYFRAMES = 20000  # four hours' walk
 PLAYED_PER_S = 100
@@ -49,7 +49,7 @@ def flat(name, process):
 
 
 def whole_session(options):
-    """The server's processes need memory for the map; it is told, not judged."""
+    """The server's processes need memory for the map; it is shown, and has no bound."""
     folder = options.work / "memory"
     shutil.rmtree(folder, ignore_errors=True)
     session = Session(folder, options.bin, options.agents, (), options.seconds).run()

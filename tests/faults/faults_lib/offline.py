@@ -10,7 +10,7 @@ from collections import Counter
 
 from faults_lib.checks import Row, print_rows
 from faults_lib.session import whole_keyframes
-from link_lib.figures import LCM_SYNC
+from link_lib.metrics import LCM_SYNC
 
 OFFLINE_KEYFRAMES = 5000  # an hour's walk
 PLAYED_PER_S = 100

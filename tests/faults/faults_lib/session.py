@@ -8,7 +8,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from link_lib.figures import events, statuses
+from link_lib.metrics import events, statuses
 
 SERVER = ("agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba", "map_points")
 SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal

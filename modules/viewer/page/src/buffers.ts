@@ -1,4 +1,5 @@
-// Buffers on the graphics card that grow as points and lines arrive; what is there is not sent again.
+// Buffers on the graphics card that grow as points and lines arrive; what is there is not sent
+// again.
 
 import {
   BufferAttribute, BufferGeometry, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, Points,
@@ -78,7 +79,7 @@ export class PointCloud {
   }
 }
 
-// Straight lines between keyframes, each a rectangle turned to the eye.
+// Straight lines between keyframes, each a rectangle rotated to the eye.
 export class Lines {
   readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
   private readonly growing: Growing;

@@ -132,11 +132,11 @@ let measuring = false;
 let secondBegan = performance.now();
 let bytesBefore = 0;
 
-function showFigures(now: number) {
+function showMetrics(now: number) {
   const seconds = (now - secondBegan) / 1000;
   if (seconds < 1) return;
   const rate = (connection.bytes - bytesBefore) / 1000 / seconds;
-  byId("figures").textContent =
+  byId("metrics").textContent =
     `${model.numPoints.toLocaleString("en")} points · ${rate.toFixed(rate < 10 ? 1 : 0)} kB/s`;
   secondBegan = now;
   bytesBefore = connection.bytes;
@@ -148,7 +148,7 @@ function frame(now: number) {
     drawPanels();
   }
   if (stage.frame(now, measuring)) ++frames;
-  showFigures(now);
+  showMetrics(now);
   requestAnimationFrame(frame);
 }
 requestAnimationFrame(frame);

@@ -4,7 +4,8 @@ import type { Model } from "./model";
 import type { ConstraintSaid, ProcessSaid } from "./protocol";
 import { agentColour, colours } from "./palette";
 
-// A process that was not heard for this long, or an agent, is marked. Processes speak once a second.
+// A process that was not heard for this long, or an agent, is marked. Processes speak once a
+// second.
 const kSilent_s = 3.5;
 const kNamed = 5; // of an agent's company; more are counted
 const kFullCards = 6; // of more agents a card says less, so that twelve have room
@@ -21,8 +22,8 @@ function element(tag: string, className: string, text = ""): HTMLElement {
   return made;
 }
 
-// The children of `parent`, one a key and in their order. Those that are there stay, so that what people point at,
-// press or read is not taken from under them ten times a second.
+// The children of `parent`, one a key and in their order. Those that are there stay, so that what
+// people point at, press or read is not taken from under them ten times a second.
 function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLElement): HTMLElement[] {
   const known = new Map([...parent.children].map((child) => [(child as HTMLElement).dataset.key, child]));
   const children = keys.map((key) => {
@@ -110,7 +111,7 @@ function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: s
   return process.pending > 0 ? { mark: "◐", state: "busy" } : { mark: "●", state: "idle" };
 }
 
-// Messages that made no sense, and verdicts against a candidate.
+// Messages that made no sense, and verification results against a candidate.
 const refusalsOf = (process: ProcessSaid) =>
   process.refused.reduce((sum, [, count]) => sum + count, 0);
 

@@ -1,5 +1,5 @@
 // How fast the page draws, what a frame costs it besides the drawing, and how much it is sent: on a synthetic log
-// (pangea-viewer-bench-log) given as --log. Prints lines of figures; bench/README.md says what they are of.
+// (pangea-viewer-bench-log) given as --log. Prints lines of metrics; bench/README.md says what they are of.
 
 import { launch, openPage, options, run, startViewer } from "./harness.mjs";
 
@@ -106,7 +106,7 @@ async function play(page, name, measure) {
   await say("playing, all fused and solved twice a second");
   await page.waitForFunction((t) => pangea.model.now_s >= t - 0.1, end, { timeout: 60000 });
   await page.waitForTimeout(3000);
-  await say("at rest, every frame drawn");
+  await say("nothing moving, every frame drawn");
 }
 
 await run(async () => {

@@ -16,7 +16,7 @@ async function seek(page, share) {
 
 // Once nothing moves any more.
 const settled = (page) =>
-  becomes(page, "the maps come to rest", () => pangea.model.keyframes.every(
+  becomes(page, "the maps stop moving", () => pangea.model.keyframes.every(
     (k) => !k.arrived || k.shown.t.distanceTo(k.target.t) < 1e-2));
 
 async function testLog(browser) {
@@ -72,7 +72,7 @@ async function testLog(browser) {
   viewer.kill();
 }
 
-// A constraint's line tells its verdict. Not every line has a place of its own: any of them will do.
+// A constraint's line tells its verification result. Not every line has a place of its own: any of them will do.
 async function testHover(page, accepted) {
   const spots = await page.evaluate((wanted) => {
     const { model, stage } = pangea;

@@ -1,0 +1,189 @@
+#!/usr/bin/env python3
+"""Makes a recording out of another one, with what goes wrong between a sensor and a folder. Images that stay are links to the other's."""
+
+import argparse
+import math
+import random
+import shutil
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from ablation_lib.recording import direction, numbers, put, rotated  # noqa: E402
+from generalization_lib import pictures  # noqa: E402
+
+NS = 1_000_000_000
+# A phone's IMU: white noise and walks several times EuRoC's, 100 Hz (densities of the order of the BMI160's).
+PHONE = {"gyroscope_noise_density": 5e-4, "gyroscope_random_walk": 5e-5, "accelerometer_noise_density": 1e-2,
+         "accelerometer_random_walk": 3e-3}
+
+
+class Recording:
+    """Rows of the two tables, as text, the two sensor.yaml, and images to be painted over: file -> what its pixels become."""
+
+    def __init__(self, mav0):
+        self.painted = {}
+        self.images = self._rows(mav0 / "cam0/data.csv")
+        self.imu = self._rows(mav0 / "imu0/data.csv")
+        self.camera_yaml = (mav0 / "cam0/sensor.yaml").read_text()
+        self.imu_yaml = (mav0 / "imu0/sensor.yaml").read_text()
+
+    @staticmethod
+    def _rows(csv):
+        return [line.split(",") for line in csv.read_text().splitlines() if line and line[0] != "#"]
+
+    def stamp(self, row):
+        return int(row[0]) - int(self.images[0][0])
+
+    def write(self, mav0):
+        for name, yaml, rows in (("cam0", self.camera_yaml, self.images), ("imu0", self.imu_yaml, self.imu)):
+            (mav0 / name).mkdir(parents=True)
+            (mav0 / name / "sensor.yaml").write_text(yaml)
+            (mav0 / name / "data.csv").write_text("#\n" + "\n".join(",".join(row) for row in rows) + "\n")
+
+
+    def write_images(self, source, folder):
+        """Those that are painted over, and links to the others."""
+        if not self.painted:
+            folder.symlink_to(source.resolve())
+            return
+        folder.mkdir()
+        for name in {row[1] for row in self.images}:
+            if name in self.painted:
+                width, pixels = pictures.read(source / name)
+                pictures.write(folder / name, width, self.painted[name](pixels))
+            else:
+                (folder / name).symlink_to((source / name).resolve())
+
+
+def in_gap(ns, every_s, gap_s):
+    """Whether a time lies in a gap at the end of every so many seconds."""
+    return ns % int(every_s * NS) >= int((every_s - gap_s) * NS)
+
+
+def image_gaps(recording):
+    """0.3 s of images missing every 5 s."""
+    first = recording.images[0]
+    recording.images = [row for row in recording.images if row is first or not in_gap(recording.stamp(row), 5, 0.3)]
+
+
+def lone_images(recording):
+    """Every tenth image missing, at random."""
+    rng = random.Random("lone images")
+    recording.images = [row for row in recording.images if rng.random() > 0.1]
+
+
+def half_rate(recording):
+    """Every second image."""
+    recording.images = recording.images[::2]
+
+
+def imu_gaps(recording):
+    """50 ms of IMU samples missing every 3 s."""
+    recording.imu = [row for row in recording.imu if not in_gap(recording.stamp(row), 3, 0.05)]
+
+
+def disorder(recording):
+    """Rows twice, and rows swapped with their neighbours."""
+    for rows in (recording.images, recording.imu):
+        for i in range(50, len(rows) - 1, 97):
+            rows[i], rows[i + 1] = rows[i + 1], rows[i]
+        for i in reversed(range(30, len(rows), 71)):
+            rows.insert(i, list(rows[i]))
+
+
+def focal_length(recording):
+    """Focal length 0.5 % too long."""
+    fx, fy, cx, cy = numbers(recording.camera_yaml, "intrinsics")
+    recording.camera_yaml = put(recording.camera_yaml, "intrinsics", [1.005 * fx, 1.005 * fy, cx, cy])
+
+
+def extrinsics(recording):
+    """Camera rotated by 0.5 degrees against the IMU."""
+    matrix = rotated(numbers(recording.camera_yaml, "data"), direction(random.Random("extrinsics")), math.radians(0.5))
+    recording.camera_yaml = put(recording.camera_yaml, "data", matrix)
+
+
+def late_images(recording):
+    """The IMU's clock 40 ms ahead of the camera's: t_imu = t_image + 0.04 s."""
+    for row in recording.imu:
+        row[0] = str(int(row[0]) + 40_000_000)
+
+
+def phone_imu(recording):
+    """Every second sample, with a phone's noise, which the data sheet knows."""
+    rng, rate = random.Random("phone imu"), 100
+    density = [PHONE["gyroscope_noise_density"]] * 3 + [PHONE["accelerometer_noise_density"]] * 3
+    walk = [PHONE["gyroscope_random_walk"]] * 3 + [PHONE["accelerometer_random_walk"]] * 3
+    bias = [0.0] * 6
+    recording.imu = recording.imu[::2]
+    for row in recording.imu:
+        for i in range(6):
+            row[1 + i] = f"{float(row[1 + i]) + bias[i] + rng.gauss(0, density[i] * math.sqrt(rate)):.10f}"
+            bias[i] += rng.gauss(0, walk[i] / math.sqrt(rate))
+    lines = [line for line in recording.imu_yaml.splitlines() if line.split(":")[0] not in (*PHONE, "rate_hz")]
+    recording.imu_yaml = "\n".join([*lines, f"rate_hz: {rate}", *(f"{key}: {value}" for key, value in PHONE.items())]) + "\n"
+
+
+def jitter(recording):
+    """Stamps of images off by 2 ms (standard deviation), as where software stamps them."""
+    rng = random.Random("jitter")
+    for row in recording.images:
+        row[0] = str(int(row[0]) + int(rng.gauss(0, 2_000_000)))
+
+
+def accel_bias(recording):
+    """0.3 m/s^2 more along the first axis, as of an uncalibrated phone."""
+    for row in recording.imu:
+        row[4] = f"{float(row[4]) + 0.3:.10f}"
+
+
+def cover(recording, *spans):
+    """Nothing but noise from one second to another one."""
+    rng = random.Random("cover")
+    noise = bytes(max(0, min(255, round(6 + rng.gauss(0, 2)))) for _ in range(256))
+    for row in recording.images:
+        if any(begin <= recording.stamp(row) / NS < end for begin, end in spans):
+            recording.painted[row[1]] = lambda pixels: rng.randbytes(len(pixels)).translate(noise)
+
+
+def covered(recording):
+    """A hand over the lens, for 1 s and for 2 s."""
+    cover(recording, (10, 11), (25, 27))
+
+
+def pocket(recording):
+    """Nothing to be seen for 8 s."""
+    cover(recording, (15, 23))
+
+
+def exposure_steps(recording):
+    """Every 3 s the exposure jumps, to 0.4 times, to 1.8 times, and back."""
+    for row in recording.images:
+        gain = (1, 0.4, 1.8)[recording.stamp(row) // (3 * NS) % 3]
+        table = bytes(min(255, round(gain * grey)) for grey in range(256))
+        if gain != 1:
+            recording.painted[row[1]] = lambda pixels, table=table: pixels.translate(table)
+
+
+SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
+                                    jitter, accel_bias, phone_imu, covered, pocket, exposure_steps)}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("source", type=Path, metavar="RECORDING")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--what", nargs="+", required=True, choices=list(SPOILERS))
+    options = parser.parse_args()
+    source, out = options.source / "mav0", options.out / "mav0"
+    recording = Recording(source)
+    for what in options.what:
+        SPOILERS[what](recording)
+    recording.write(out)
+    recording.write_images(source / "cam0/data", out / "cam0/data")
+    shutil.copytree(source / "state_groundtruth_estimate0", out / "state_groundtruth_estimate0")
+
+
+if __name__ == "__main__":
+    main()

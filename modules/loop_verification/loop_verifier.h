@@ -1,0 +1,43 @@
+#pragma once
+
+// The core that inter_map_ba and fusion build on: keyframes in, one verification result a candidate
+// out. A verification result depends on the two keyframes, those just before each and, within one
+// map, the odometry edges between them; so it is the same whatever the order of arrival. Not thread
+// safe.
+
+#include "core/submap_store.h"
+#include "loop_verification/aligner.h"
+#include "loop_verification/drift_gate.h"
+
+namespace pangea {
+
+class LoopVerifier {
+ public:
+  LoopVerifier(const LoopVerificationOptions& alignment, const DriftGateOptions& drift)
+      : drift_(drift), aligner_(alignment) {}
+  virtual ~LoopVerifier() = default;
+
+  // In any order; a repeat changes nothing.
+  void Add(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
+  // Nobody has these any more: nothing waits for them.
+  void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
+    store_.NoteLost(map, from_seq, to_seq);
+  }
+  // Whether every keyframe the verification result depends on is there.
+  bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
+  // Only when ready. Keyframes of one map pass the drift gate too; two maps' odom frames lie
+  // anyhow to each other.
+  virtual Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
+                            LoopVerificationReport* report = nullptr);
+
+ private:
+  DriftGateOptions drift_;
+  Aligner aligner_;
+  SubmapStore store_;
+};
+
+// A verification result without an alignment.
+Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& candidate,
+                             const std::string& reason);
+
+}  // namespace pangea

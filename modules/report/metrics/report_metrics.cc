@@ -1,0 +1,239 @@
+#include "report/metrics/report_metrics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <stdexcept>
+
+#include "recording/euroc.h"
+
+namespace pangea::session {
+namespace {
+
+std::map<int32_t, AgentRun> Runs(const ReportInput& input, const CapturedSession& session) {
+  std::map<int32_t, AgentRun> runs;
+  for (const AgentRun& run : input.agents) {
+    runs[run.id] = run;
+  }
+  for (const auto& [id, keyframe] : session.keyframes) {
+    runs[id.map.agent_id].id = id.map.agent_id;
+  }
+  return runs;
+}
+
+// First image that was played; nothing without a recording that can be read.
+std::optional<int64_t> PlayedFrom(const AgentRun& run) {
+  const auto first = run.recording.empty() ? std::nullopt : FirstImageUtimeOf(run.recording);
+  return first ? std::optional(*first + std::llround(1e6 * run.start_s)) : std::nullopt;
+}
+
+void ReadGroundTruth(const AgentRun& run, AgentMetrics* agent, std::vector<std::string>* notes) {
+  if (run.recording.empty()) {
+    notes->push_back(fmt::format("agent {}: no recording is known, so no error", run.id));
+    return;
+  }
+  std::vector<std::string> warnings;
+  try {
+    agent->ground_truth = ReadEurocGroundTruthOf(run.recording, &warnings);
+  } catch (const std::runtime_error& error) {
+    warnings.emplace_back(error.what());
+  }
+  for (const std::string& warning : warnings) {
+    notes->push_back(fmt::format("agent {}: {}", run.id, warning));
+  }
+  if (agent->ground_truth.empty()) {
+    notes->push_back(
+        fmt::format("agent {}: {} has no ground truth, so no error", run.id, run.recording));
+    return;
+  }
+  const auto from = PlayedFrom(run);
+  if (from && (run.start_s > 0 || run.duration_s)) {
+    const int64_t to = run.duration_s ? *from + std::llround(1e6 * *run.duration_s)
+                                      : agent->ground_truth.back().utime;
+    std::erase_if(agent->ground_truth,
+                  [&](const StampedPose& p) { return p.utime < *from || p.utime > to; });
+  }
+}
+
+std::map<MapId, int64_t> FusedRevisions(const CapturedSession& session) {
+  std::map<MapId, int64_t> revisions;
+  for (const GroupChange& change : session.changes) {
+    for (const MapId& map : change.maps) {
+      if (change.maps.size() > 1) {
+        const auto known = revisions.try_emplace(map, change.revision).first;
+        known->second = std::min(known->second, change.revision);
+      }
+    }
+  }
+  return revisions;
+}
+
+void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentMetrics* agent,
+                  std::vector<std::string>* notes) {
+  PoseTrack track;
+  if (!run.bus_log.empty() && std::filesystem::exists(run.bus_log)) {
+    track = ReadPoses(run.bus_log, run.id);
+  }
+  agent->odometry = std::move(track.odometry);
+  agent->samples = std::move(track.samples);
+  agent->live = LiveMetricsOf(track.live, FusedRevisions(session), agent->ground_truth);
+  agent->odometry_at_camera_rate = !agent->odometry.empty();
+  std::optional<int64_t> first_pose = track.first_tracking_utime;
+  if (!agent->odometry_at_camera_rate) {
+    for (const auto& [id, keyframe] : session.keyframes) {
+      if (id.map.agent_id == run.id) {
+        agent->odometry[id.map].push_back({keyframe.utime, keyframe.T_odom_body});
+        first_pose = std::min(first_pose.value_or(keyframe.utime), keyframe.utime);
+      }
+    }
+    for (auto& [map, odometry] : agent->odometry) {
+      SortByTime(&odometry);
+    }
+    notes->push_back(fmt::format(
+        "agent {}: no camera-rate poses were captured; its odometry is that of its keyframes",
+        run.id));
+  }
+  for (const auto& [map, odometry] : agent->odometry) {
+    agent->path_m += PathLength(odometry);
+  }
+  const auto from = PlayedFrom(run);
+  const auto begin = from ? from : track.first_utime;
+  if (begin && first_pose) {
+    agent->initialised_s = 1e-6 * static_cast<double>(*first_pose - *begin);
+  }
+}
+
+void ChooseMain(const std::vector<GroupMetrics>& groups, const CapturedSession& session,
+                AgentMetrics* agent) {
+  size_t most = 0;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    const size_t count = groups[i].group.CountOf(agent->id);
+    if (count > most) {
+      most = count;
+      agent->group = i;
+    }
+    agent->keyframes += count;
+  }
+  std::set<MapId> maps;
+  for (const auto& [map, odometry] : agent->odometry) {
+    maps.insert(map);
+  }
+  for (const auto& [id, keyframe] : session.keyframes) {
+    if (id.map.agent_id == agent->id) {
+      maps.insert(id.map);
+    }
+  }
+  agent->maps.assign(maps.begin(), maps.end());
+  size_t longest = 0;
+  for (size_t i = 0; most > 0 && i < agent->maps.size(); ++i) {
+    const size_t length = groups[agent->group].group.TrajectoryOf(agent->maps[i]).size();
+    if (length > longest) {
+      longest = length;
+      agent->main_map = agent->maps[i];
+    }
+  }
+  if (most == 0 && !agent->maps.empty()) {  // no keyframe arrived
+    agent->main_map = agent->maps.front();
+  }
+}
+
+// What the agent's uplink said last, where nobody counted for the report.
+void CountBytes(AgentMetrics* agent) {
+  const auto uplink = agent->samples.find(fmt::format("uplink_{}", agent->id));
+  if (uplink != agent->samples.end() && !agent->run.bytes_up) {
+    agent->run.bytes_up = uplink->second.back().bytes_up;
+    agent->run.bytes_down = uplink->second.back().bytes_down;
+  }
+}
+
+AgentMetrics MetricsOf(const AgentRun& run, const CapturedSession& session,
+                       const std::vector<GroupMetrics>& groups, std::vector<std::string>* notes) {
+  AgentMetrics agent;
+  agent.id = run.id;
+  agent.run = run;
+  ReadGroundTruth(run, &agent, notes);
+  ReadOdometry(run, session, &agent, notes);
+  CountBytes(&agent);
+  ChooseMain(groups, session, &agent);
+  const Trajectory keyframes =
+      groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id);
+  if (!agent.ground_truth.empty()) {
+    agent.vio = AbsoluteError(Associate(agent.odometry[agent.main_map], agent.ground_truth),
+                              TrajectoryAlignmentKind::kSe3);
+    agent.server =
+        AbsoluteError(Associate(keyframes, agent.ground_truth), TrajectoryAlignmentKind::kSe3);
+    agent.coverage = Coverage(keyframes, agent.ground_truth);
+  }
+  return agent;
+}
+
+void AddJoint(const std::vector<AgentMetrics>& agents, GroupMetrics* metrics) {
+  std::vector<std::vector<PosePair>> pairs;
+  for (const AgentMetrics& agent : agents) {
+    auto with_truth = Associate(metrics->group.TrajectoryOf(agent.id), agent.ground_truth);
+    if (!with_truth.empty()) {
+      pairs.push_back(std::move(with_truth));
+      metrics->joint_agents.push_back(agent.id);
+    }
+  }
+  metrics->joint = JointAbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
+}
+
+void AddConstraints(const CapturedSession& session, ReportMetrics* metrics) {
+  std::map<int32_t, Trajectory> ground_truth;
+  for (const AgentMetrics& agent : metrics->agents) {
+    ground_truth[agent.id] = agent.ground_truth;
+  }
+  const auto all = ConstraintsWithTruth(session, ground_truth);
+  std::vector<ConstraintWithTruth> inter;
+  std::vector<ConstraintWithTruth> intra;
+  for (const ConstraintWithTruth& known : all) {
+    (known.constraint.from.map == known.constraint.to.map ? intra : inter).push_back(known);
+  }
+  metrics->all_constraints = CheckConstraints(all);
+  metrics->inter_constraints = CheckConstraints(inter);
+  metrics->intra_constraints = CheckConstraints(intra);
+}
+
+}  // namespace
+
+bool AgentMetrics::AteCounts() const {
+  return server && coverage && *coverage >= 0.95 && maps.size() == 1;
+}
+
+size_t ReportMetrics::IndexOf(int32_t agent_id) const {
+  return static_cast<size_t>(std::ranges::find(agents, agent_id, &AgentMetrics::id) -
+                             agents.begin());
+}
+
+ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& session) {
+  ReportMetrics metrics;
+  metrics.notes = input.notes;
+  for (const auto& [channel, count] : session.unreadable) {
+    metrics.notes.push_back(
+        fmt::format("{} messages on {} could not be read; ignored", count, channel));
+  }
+  if (session.incomplete_states > 0) {
+    metrics.notes.push_back(
+        fmt::format("{} MAP_STATE lack a chunk in the log; ignored", session.incomplete_states));
+  }
+  for (const auto& [process, count] : input.restarts) {
+    metrics.notes.push_back(fmt::format("{} died and was restarted, {} times", process, count));
+  }
+  for (FinalGroup& group : FinalGroups(session)) {
+    metrics.groups.push_back({std::move(group), std::nullopt, {}});
+  }
+  for (const auto& [id, run] : Runs(input, session)) {
+    metrics.agents.push_back(MetricsOf(run, session, metrics.groups, &metrics.notes));
+  }
+  for (GroupMetrics& group : metrics.groups) {
+    AddJoint(metrics.agents, &group);
+  }
+  AddConstraints(session, &metrics);
+  return metrics;
+}
+
+}  // namespace pangea::session

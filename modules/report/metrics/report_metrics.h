@@ -1,0 +1,60 @@
+#pragma once
+
+// The metrics of a report, from what was captured and the recordings' ground truth.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "eval/metrics.h"
+#include "report/metrics/report_groups.h"
+#include "report/metrics/report_live.h"
+#include "report/metrics/report_truth.h"
+#include "report/report.h"
+#include "report/report_log.h"
+
+namespace pangea::session {
+
+struct AgentMetrics {
+  int32_t id = 0;
+  std::vector<MapId> maps;
+  size_t keyframes = 0;                  // of all its maps
+  size_t group = 0;                      // its main group: index into ReportMetrics::groups
+  MapId main_map;                        // the map with most keyframes in that group
+  std::map<MapId, Trajectory> odometry;  // T_odom_body; at camera rate if odometry_at_camera_rate
+  bool odometry_at_camera_rate = false;
+  Trajectory ground_truth;              // of the part that was played; empty for none
+  std::optional<double> initialised_s;  // from the first image played to the first pose
+  double path_m = 0;                    // length of the odometry's track, all maps
+  std::optional<Ate> vio;               // odometry of the main map, SE(3)
+  std::optional<Ate> server;            // its keyframes in the main group, SE(3)
+  std::optional<double> coverage;
+  LiveMetrics live;        // of what it showed while the session ran
+  ProcessSamples samples;  // of the processes on its bus
+  AgentRun run;
+
+  // Only then does an error say something (coverage >= 0.95 and one map).
+  bool AteCounts() const;
+};
+
+struct GroupMetrics {
+  FinalGroup group;
+  std::optional<JointAte> joint;      // one SE(3) alignment for all its agents
+  std::vector<int32_t> joint_agents;  // those with ground truth, in the order of joint->agents
+};
+
+struct ReportMetrics {
+  std::vector<AgentMetrics> agents;  // ascending id
+  std::vector<GroupMetrics> groups;  // as FinalGroups orders them
+  ConstraintsTruth all_constraints;
+  ConstraintsTruth inter_constraints;
+  ConstraintsTruth intra_constraints;
+  std::vector<std::string> notes;
+
+  // The agent's place in `agents`, which gives it its colour.
+  size_t IndexOf(int32_t agent_id) const;
+};
+
+ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& session);
+
+}  // namespace pangea::session

@@ -1,0 +1,30 @@
+#pragma once
+
+// What a session keeps beside its log (recordings.json), so that a later replay or explanation
+// finds ground truth and images: what each agent played, and what was expected.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "report/expectations.h"
+#include "report/report.h"
+
+namespace pangea::session {
+
+struct SessionRecord {
+  std::vector<AgentRun> agents;  // id, recording and the part of it that was played
+  Expectations expect;
+};
+
+// Both throw std::runtime_error when the file cannot be written, or read.
+void WriteSessionRecord(const SessionRecord& session, const std::filesystem::path& folder);
+// Of the folders that hold `logs`; empty where there is none.
+SessionRecord ReadSessionRecord(const std::vector<std::filesystem::path>& logs);
+
+// Those recordings that are still there, folders by agent.
+std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
+
+}  // namespace pangea::session

@@ -1,0 +1,37 @@
+#pragma once
+
+// Tells whether the body is stationary: the image has not moved by more than its noise since the
+// body came to a stand began or for a while, and the IMU is quiet.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "core/camera_model.h"
+#include "vio/front_end/tracks.h"
+#include "vio/imu/imu_buffer.h"
+#include "vio/keyframes/track_history.h"
+
+namespace pangea::vio {
+
+class StationaryDetector {
+ public:
+  // `ray_sigma`: of an observation with sigma_px 1.
+  StationaryDetector(const CameraModel& camera, double ray_sigma)
+      : camera_(camera), ray_sigma_(ray_sigma) {}
+
+  // Frames in time order; whether the body is stationary at this one. `shift_sigmas`: how far the
+  // image has moved since a frame of the present stand, if there is one
+  // (TrackHistory::MedianShiftSigmas).
+  bool AddFrame(const TrackedFrame& frame, std::optional<double> shift_sigmas, const ImuBuffer& imu,
+                const Eigen::Vector3d& gyro_bias);
+
+ private:
+  CameraModel camera_;
+  double ray_sigma_;
+  TrackHistory recent_;
+  std::deque<int64_t> recent_utimes_;
+};
+
+}  // namespace pangea::vio

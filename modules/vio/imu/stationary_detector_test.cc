@@ -1,0 +1,143 @@
+#include "vio/imu/stationary_detector.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/testing/test_cameras.h"
+#include "core/testing/test_random.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kFrames = 30;
+constexpr double kFrameRate_hz = 20;
+constexpr double kRate_hz = 200;
+constexpr int kSilent = 10;  // frames of the first half second
+
+// A body that rotates and moves evenly, in front of points 3 to 5 m away.
+struct Ride {
+  double pixel_noise = 0.7;
+  double sigma_px = 1;  // of each observation, in units of the detector's
+  int landmarks = 100;
+  Vector3d omega = Vector3d::Zero();       // of the body, rad/s
+  Vector3d v = Vector3d::Zero();           // m/s
+  Vector3d seen_omega = Vector3d::Zero();  // what the gyro reads besides
+  Vector3d gyro_bias = Vector3d::Zero();   // what the estimator takes it to be
+  double accel_sigma = 0.03;               // m/s^2, each axis
+};
+
+struct Said {
+  int stationary = 0;  // frames after the first half second
+  int early = 0;       // before
+};
+
+ImuSample SampleAt(const Ride& ride, int i, std::mt19937_64& rng) {
+  const double t = i / kRate_hz;
+  const Vector3d gravity = ExpSo3(t * ride.omega).conjugate() * Vector3d(0, 0, kGravity);
+  return {std::llround(1e6 * t), ride.omega + ride.seen_omega + RandomVector(rng, 2e-3),
+          gravity + RandomVector(rng, ride.accel_sigma)};
+}
+
+TrackedFrame FrameAt(const Ride& ride, const CameraModel& camera, double t,
+                     const std::vector<Vector3d>& points, std::mt19937_64& rng) {
+  const Rigid3 T_start_cam =
+      Rigid3(ExpSo3(t * ride.omega), t * ride.v) * Rigid3(LookingAhead(), Vector3d::Zero());
+  TrackedFrame frame;
+  frame.utime = std::llround(1e6 * t);
+  for (int id = 0; id < ride.landmarks; ++id) {
+    const Eigen::Vector2d pixel = camera.Project(T_start_cam.Inverse() * points[id]).value() +
+                                  RandomVector(rng, ride.sigma_px * ride.pixel_noise).head<2>();
+    frame.observations.push_back(
+        {id, pixel.cast<float>(), camera.Unproject(pixel).value(), ride.sigma_px});
+  }
+  return frame;
+}
+
+// `shift_sigmas`: the same at each frame.
+Said Watch(const Ride& ride, std::optional<double> shift_sigmas = std::nullopt) {
+  std::mt19937_64 rng(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const CameraModel camera = PinholeTestCamera(640, 480, 400);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < ride.landmarks; ++i) {
+    points.emplace_back(4 + uniform(rng), 2 * uniform(rng), 1.5 * uniform(rng));
+  }
+  StationaryDetector detector(camera, ride.pixel_noise * camera.PixelAngle());
+  ImuBuffer imu(ImuNoise{});
+  Said said;
+  int samples = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    const double t = i / kFrameRate_hz;
+    for (; samples <= t * kRate_hz; ++samples) {
+      const ImuSample sample = SampleAt(ride, samples, rng);
+      imu.Add({&sample, 1});
+    }
+    const bool stationary =
+        detector.AddFrame(FrameAt(ride, camera, t, points, rng), shift_sigmas, imu, ride.gyro_bias);
+    (i < kSilent ? said.early : said.stationary) += stationary ? 1 : 0;
+  }
+  return said;
+}
+
+constexpr int kAll = kFrames - kSilent;
+
+TEST(StationaryDetector, FindsItStationaryWhateverThePixelsNoise) {
+  for (const double pixel_noise : {0.1, 0.7, 3.0}) {
+    for (const double sigma_px : {1.0, 2.5}) {
+      const Said said = Watch({.pixel_noise = pixel_noise, .sigma_px = sigma_px});
+      EXPECT_EQ(said.stationary, kAll) << pixel_noise << " px, " << sigma_px << " sigmas";
+      EXPECT_EQ(said.early, 0) << "half a second is needed to tell";
+    }
+  }
+}
+
+// Slower than the gyro alone could tell from a bias: 6 pixels in half a second.
+TEST(StationaryDetector, ASlowRotationIsNotStationary) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Said said = Watch({.omega = 0.03 * Vector3d::Unit(axis)});
+    EXPECT_EQ(said.stationary, 0) << "axis " << axis;
+  }
+}
+
+// Nothing an IMU could feel: 5 pixels in half a second across, 3 at the rim ahead.
+TEST(StationaryDetector, ASlowMotionIsNotStationary) {
+  EXPECT_EQ(Watch({.v = {0, 0.1, 0}}).stationary, 0);
+  EXPECT_EQ(Watch({.v = {0, 0, -0.1}}).stationary, 0);
+  EXPECT_EQ(Watch({.v = {0.3, 0, 0}}).stationary, 0);
+}
+
+// In half a second it is less than the noise; since it came to a stand it is not.
+TEST(StationaryDetector, WhatHasMovedSinceItStoodStillIsNotStationary) {
+  const Ride creeping{.v = {0, 0.004, 0}};
+  EXPECT_EQ(Watch(creeping).stationary, kAll);
+  EXPECT_EQ(Watch(creeping, 3.0).stationary, 0);
+  const Said standing = Watch({}, 1.7);
+  EXPECT_EQ(standing.stationary, kAll);
+  EXPECT_EQ(standing.early, kSilent) << "being stationary still is told at once";
+}
+
+// The images of a lift's cabin stand while the IMU does not.
+TEST(StationaryDetector, TheImuMustBeQuietToo) {
+  const Said rotating = Watch({.seen_omega = {0, 0.08, 0}});
+  EXPECT_EQ(rotating.stationary, 0);
+  const Said shaken = Watch({.accel_sigma = 0.25});
+  EXPECT_EQ(shaken.stationary, 0);
+}
+
+TEST(StationaryDetector, AKnownGyroBiasIsNoRotation) {
+  const Vector3d bias(0.06, -0.05, 0.04);
+  EXPECT_EQ(Watch({.seen_omega = bias, .gyro_bias = bias}).stationary, kAll);
+  EXPECT_EQ(Watch({.gyro_bias = bias}).stationary, 0);
+}
+
+TEST(StationaryDetector, AFewLandmarksTellNothing) {
+  EXPECT_EQ(Watch({.landmarks = 14}).stationary, 0);
+  EXPECT_GT(Watch({.landmarks = 40}).stationary, kAll / 2);
+}
+
+}  // namespace
+}  // namespace pangea::vio

@@ -1,0 +1,111 @@
+#pragma once
+
+// The agent's place in the fused map: the server's correction, sharpened by landmarks of the map
+// that the agent's own keyframes see.
+//
+// In: corrections, landmarks, the agent's published keyframes, and each new keyframe of the window
+// as soon as it is described. Out: T_map_odom. Nothing here reaches the odometry: the edges that
+// the agent publishes know nothing of what the server said, or the server would count its own
+// information twice. Without landmarks, or when too few are found or they contradict the
+// correction, the answer is the correction's.
+//
+// A landmark is found again by projection and descriptor, once in each keyframe. Memory is bounded:
+// kMaxLandmarks landmarks, kMaxPublished odometry edges, the window's rays. No thread, no clock.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/keyframe.h"
+#include "core/map_landmarks.h"
+#include "core/matching.h"
+#include "core/server_messages.h"
+#include "vio/live/window_localization.h"
+
+namespace pangea::vio {
+
+struct MapLocalizationOptions {
+  LocalizationOptions localization;
+  // A landmark is looked for this far around where it should be, pixels.
+  double search_radius_px = 15;
+  MatchingOptions matching;
+  double pixel_sigma = 1.5;  // of a corner found again, at octave 0
+};
+
+class MapLocalization {
+ public:
+  static constexpr size_t kMaxLandmarks = 400;
+  static constexpr size_t kMaxPublished = 200;
+
+  explicit MapLocalization(const MapLocalizationOptions& options = {}) : options_(options) {}
+
+  // A new map of the agent.
+  void Reset(const MapId& map);
+  // False for another map's, and for one that is not newer.
+  bool Correct(const Correction& correction);
+  // False when they are in another frame than the newest correction.
+  bool Take(const MapLandmarks& landmarks);
+  void NotePublished(const Keyframe& keyframe);
+  bool HasLandmarks() const { return !known_.empty(); }
+  size_t num_landmarks() const { return known_.size(); }
+  // The newest pose of the window is a keyframe's. `corners`: as a global shutter saw them.
+  void AddKeyframe(const CameraModel& camera, const std::vector<Corner>& corners,
+                   const WindowPoses& window);
+
+  // Nothing before the first correction.
+  std::optional<Rigid3> T_map_odom() const;
+
+  struct Counters {
+    int64_t localized = 0;      // keyframes
+    int64_t not_localized = 0;  // too few landmarks, or in contradiction
+    int64_t seen = 0;           // landmarks, in all keyframes
+  };
+  const Counters& counters() const { return counters_; }
+
+ private:
+  using LandmarkKey = std::pair<MapId, int32_t>;
+  struct Known {
+    KeyframeId source;
+    Eigen::Vector3d p_source;  // its camera, in the map
+    Eigen::Vector3d p_map;
+    Eigen::Matrix3d covariance;
+    Descriptor descriptor;
+    int64_t arrival;
+  };
+  struct Match {
+    LandmarkKey landmark;
+    Eigen::Vector2d ray;
+    double sigma;
+  };
+  struct Published {
+    int32_t seq;
+    int64_t utime;
+    Rigid3 T_odom_body;
+    std::optional<OdometryEdge> edge;
+  };
+  struct Seen {
+    std::vector<Eigen::Vector3d> sources;
+    std::vector<SeenLandmark> landmarks;
+  };
+
+  void ForgetOldest();
+  std::optional<LocalizationPrior> PriorAt(const WindowPoses& window) const;
+  std::vector<Match> FindIn(const CameraModel& camera, const std::vector<Corner>& corners,
+                            const Rigid3& T_map_cam) const;
+  Seen SeenIn(const WindowPoses& window) const;
+
+  MapLocalizationOptions options_;
+  MapId map_;
+  std::optional<Correction> correction_;
+  std::map<LandmarkKey, Known> known_;
+  int64_t arrivals_ = 0;
+  std::deque<Published> published_;
+  std::map<int64_t, std::vector<Match>> matches_;  // by the keyframe's utime
+  std::optional<LocalizationResult> localized_;
+  Counters counters_;
+};
+
+}  // namespace pangea::vio
