@@ -42,14 +42,14 @@ double PathTime(double t, double begin, double end) {
 // Their own generator: a world is the same with an exact IMU and with another.
 ImuIntrinsics RandomImuIntrinsics(const ImuNoise& noise, uint64_t seed) {
   std::mt19937_64 rng(seed);
-  ImuIntrinsics intrinsics;
+  ImuIntrinsics imu_intrinsics;
   for (int k = 0; k < 3; ++k) {
-    intrinsics.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
-    intrinsics.accel.col(k) = RandomVector(rng, noise.axes_sigma);
+    imu_intrinsics.gyro.col(k) = RandomVector(rng, noise.axes_sigma);
+    imu_intrinsics.accel.col(k) = RandomVector(rng, noise.axes_sigma);
   }
-  intrinsics.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
-  intrinsics.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
-  return intrinsics.OfGyroAxes();
+  imu_intrinsics.gyro.diagonal() = RandomVector(rng, noise.gyro_scale_sigma);
+  imu_intrinsics.accel.diagonal() = RandomVector(rng, noise.accel_scale_sigma);
+  return imu_intrinsics.OfGyroAxes();
 }
 
 }  // namespace

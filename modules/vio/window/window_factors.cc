@@ -163,16 +163,16 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   const int at = state.Offset(to - 1);  // the two frames are neighbours
   out->H.block<30, 30>(at, at) += JtL * J;
   out->g.segment<30>(at) += JtL * residual.r;
-  const Eigen::Matrix<double, 15, kImuIntrinsicsSize> J_intrinsics = ImuIntrinsicsJacobian(
+  const Eigen::Matrix<double, 15, kImuIntrinsicsSize> J_imu_intrinsics = ImuIntrinsicsJacobian(
       factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>());
-  const Eigen::Matrix<double, kImuIntrinsicsSize, 15> JtL_intrinsics =
-      J_intrinsics.transpose() * factor.information;
-  const Eigen::Matrix<double, 30, kImuIntrinsicsSize> cross = JtL * J_intrinsics;
+  const Eigen::Matrix<double, kImuIntrinsicsSize, 15> JtL_imu_intrinsics =
+      J_imu_intrinsics.transpose() * factor.information;
+  const Eigen::Matrix<double, 30, kImuIntrinsicsSize> cross = JtL * J_imu_intrinsics;
   out->H.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) +=
-      JtL_intrinsics * J_intrinsics;
+      JtL_imu_intrinsics * J_imu_intrinsics;
   out->H.block<30, kImuIntrinsicsSize>(at, kImuIntrinsics) += cross;
   out->H.block<kImuIntrinsicsSize, 30>(kImuIntrinsics, at) += cross.transpose();
-  out->g.segment<kImuIntrinsicsSize>(kImuIntrinsics) += JtL_intrinsics * residual.r;
+  out->g.segment<kImuIntrinsicsSize>(kImuIntrinsics) += JtL_imu_intrinsics * residual.r;
   out->cost += 0.5 * residual.r.dot(factor.information * residual.r);
 }
 

@@ -104,9 +104,9 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
       const WindowFrame& last = state.frames.back();
       const auto samples = TestSamples(kSamplesPerImuFactor + 1, last.imu_utime, rng());
       ImuFactor factor;
-      ImuIntrinsics intrinsics = state.imu_intrinsics;
-      intrinsics.Add(RandomImuIntrinsics(1e-3, rng));
-      factor.span = IntegrateScaled(samples, ImuNoise{}, intrinsics,
+      ImuIntrinsics imu_intrinsics = state.imu_intrinsics;
+      imu_intrinsics.Add(RandomImuIntrinsics(1e-3, rng));
+      factor.span = IntegrateScaled(samples, ImuNoise{}, imu_intrinsics,
                                     last.imu.gyro_bias + RandomVector(rng, 1e-3),
                                     last.imu.accel_bias + RandomVector(rng, 1e-2));
       factor.information = InertialInformation(factor.span.measured, ImuNoise{});
