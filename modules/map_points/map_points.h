@@ -37,7 +37,7 @@ struct MapPointsOptions {
   double max_angle_rad = 0.4;  // between the two lines of sight to a landmark
   double max_scale = 1.4;      // of the two distances to it
   int own_recent = 15;         // newest keyframes of the agent's own map, no sources
-  // A landmark is told again after so many messages to the agent, or when it has moved so far.
+  // A landmark is sent again after so many messages to the agent, or when it has moved so far.
   int repeat_after = 20;
   double moved_m = 0.005;
   TrackPointOptions track;

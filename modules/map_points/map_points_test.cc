@@ -120,7 +120,7 @@ TEST_F(MapPointsTest, DoesNotRepeatItselfAtOnce) {
       EXPECT_TRUE(sent_points.insert(landmark.landmark_id).second);
     }
   }
-  // A map that has moved is told again.
+  // A map that has moved is sent again.
   for (KeyframePose& pose : state_.keyframes) {
     pose.T_map_body.t.z() += 0.02;
   }

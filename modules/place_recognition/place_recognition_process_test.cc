@@ -57,7 +57,7 @@ struct Server {
     PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), keyframe);
     bus.Drain();
   }
-  void Again(const std::string& channel, const Payload& payload) {
+  void Retransmit(const std::string& channel, const Payload& payload) {
     again_t again{};
     again.channel = channel;
     again.data.assign(payload.begin(), payload.end());
@@ -160,13 +160,13 @@ TEST(PlaceRecognitionProcess, AsksForAGapAndForALostTail) {
   EXPECT_EQ(server.requests[0].from_seq, 1);
   EXPECT_EQ(server.requests[0].to_seq, 1);
   EXPECT_EQ(server.status.pending, 1);
-  server.Again("KEYFRAME_1", Encode(keyframes[1]));
+  server.Retransmit("KEYFRAME_1", Encode(keyframes[1]));
   EXPECT_EQ(server.matches.size(), 3u);
   server.Have({{kMapA, 3}});
   server.Tick();
   ASSERT_EQ(server.requests.size(), 2u);
   EXPECT_EQ(server.requests[1].from_seq, 3);
-  server.Again("KEYFRAME_1", Encode(keyframes[3]));
+  server.Retransmit("KEYFRAME_1", Encode(keyframes[3]));
   server.Tick();
   EXPECT_EQ(server.matches.size(), 4u);
   EXPECT_EQ(server.requests.size(), 2u);
@@ -227,14 +227,14 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   EXPECT_EQ(after.requests[4].channel, "MAP_STATE");  // who is in a group decides on the kind
   EXPECT_EQ(after.requests[5].channel, "MAP_STATE");
   for (const Payload& match : before.matches) {
-    after.Again("PLACE_MATCH", match);
+    after.Retransmit("PLACE_MATCH", match);
   }
   for (const keyframe_t& keyframe : a) {
-    after.Again("KEYFRAME_1", Encode(keyframe));
+    after.Retransmit("KEYFRAME_1", Encode(keyframe));
   }
   EXPECT_TRUE(after.matches.empty());  // a#3 waits for map B
   for (const keyframe_t& keyframe : b) {
-    after.Again("KEYFRAME_2", Encode(keyframe));
+    after.Retransmit("KEYFRAME_2", Encode(keyframe));
   }
   EXPECT_TRUE(after.matches.empty());  // the groups are still to come
   after.Fused({kMapA});
@@ -258,10 +258,10 @@ TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
     after.Have({{kMapA, kRound + 4}});
     after.Tick();
     for (const Payload& match : before.matches) {
-      after.Again("PLACE_MATCH", match);
+      after.Retransmit("PLACE_MATCH", match);
     }
     for (const keyframe_t& keyframe : keyframes) {
-      after.Again("KEYFRAME_1", Encode(keyframe));
+      after.Retransmit("KEYFRAME_1", Encode(keyframe));
     }
     EXPECT_TRUE(after.matches.empty());
   };
@@ -342,8 +342,8 @@ TEST(PlaceRecognitionProcess, GarbageIsCountedNotObeyed) {
   server.Send(keyframe);
   const Payload junk(50, 0xAB);
   server.bus.Publish("KEYFRAME_1", junk);
-  server.Again("KEYFRAME_1", junk);
-  server.Again("PLACE_MATCH", junk);
+  server.Retransmit("KEYFRAME_1", junk);
+  server.Retransmit("PLACE_MATCH", junk);
   server.Tick();
   EXPECT_TRUE(server.matches.empty());
   EXPECT_GE(server.status.num_refused, 3);

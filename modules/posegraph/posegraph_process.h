@@ -14,7 +14,7 @@
 // After a restart nothing is told until the journal's keyframes and verification results are in, or
 // for five seconds none of them came: half a map would be taken for what became of the whole. A
 // verification result that the journal does not have either is not waited for: fusion may be behind
-// by minutes. Whoever comes late asks for MAP_STATE, and the group is told again.
+// by minutes. Whoever comes late asks for MAP_STATE, and the group is sent again.
 //
 // What already waits on the bus is taken before anything is solved (at most kMaxUnsettled of it): a
 // solve costs the same after one verification result as after ten, and verification results that

@@ -300,7 +300,7 @@ void OptionFiles(const Corpus& corpus) {
   const std::vector<std::pair<std::string, std::string>> seeds = {
       {"session", session},
       {"vio", Printed<vio::VioFileOptions>()},
-      {"alignment", Printed<LoopVerificationOptions>()},
+      {"loop_verification", Printed<LoopVerificationOptions>()},
       {"posegraph", Printed<PoseGraphOptions>()},
       {"global_ba", Printed<GlobalBaOptions>()},
       {"map_points", Printed<MapPointsOptions>()},

@@ -2,7 +2,7 @@
 
 // What is outstanding from the other processes for the journal: exactly one match per keyframe and
 // one verification result per candidate. They may only be slow, so it is asked seldom, and more
-// seldom while nothing comes. No bus, no clock: time goes in (microseconds), questions come out.
+// seldom while nothing comes. No bus, no clock: time goes in (microseconds), requests come out.
 
 #include <cstdint>
 #include <map>
@@ -20,7 +20,7 @@ class OutstandingResults {
   };
   static constexpr int32_t kMaxAsked = 100;
 
-  // The questions to ask now.
+  // The requests to make now.
   Requests Due(const JournalIndex& index, int64_t now_us);
 
  private:

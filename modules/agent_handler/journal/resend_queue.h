@@ -2,7 +2,7 @@
 
 // Requests for old messages, answered one after the other so that a restarted process catches up
 // without flooding the bus. Bounded: kMaxRequests wait; one that is covered by a waiting one is
-// dropped, and so is one beyond the bound (who still misses something asks again).
+// dropped, and so is one beyond the bound (who still misses something repeats the request).
 
 #include <cstdint>
 #include <deque>

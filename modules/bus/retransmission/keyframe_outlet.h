@@ -21,7 +21,7 @@ namespace pangea {
 
 class KeyframeOutlet {
  public:
-  static constexpr int kMaxAnswers = 30;  // keyframes per request: the asker asks again
+  static constexpr int kMaxAnswers = 30;  // keyframes per request: the rest by another request
 
   // `now_utime`: wall clock.
   KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime);

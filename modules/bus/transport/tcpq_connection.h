@@ -6,7 +6,7 @@
 // kinds of message, is spoken here.
 //
 // What is published while there is no relay, or more than kMaxUnsent bytes behind it, is dropped,
-// as multicast would; who needs it asks again. One thread, but Publish from any.
+// as multicast would; who needs it requests it. One thread, but Publish from any.
 
 #include <netinet/in.h>
 

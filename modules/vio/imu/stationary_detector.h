@@ -1,7 +1,7 @@
 #pragma once
 
 // Tells whether the body is stationary: the image has not moved by more than its noise since the
-// body came to a stand began or for a while, and the IMU is quiet.
+// body came to a stand, or for a while, and the IMU is quiet.
 
 #include <Eigen/Core>
 #include <cstdint>

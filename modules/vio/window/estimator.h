@@ -28,7 +28,7 @@ namespace pangea::vio {
 struct EstimatorOptions {
   int window = 12;  // keyframes in the window
   // A frame is a window keyframe when the image has moved this far (rotation taken out) since the
-  // last one that stayed, or when this share of that one's tracks is left.
+  // last such frame, or when this share of that one's tracks is left.
   double window_parallax_px = 15;
   double window_track_share = 0.7;
   double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels

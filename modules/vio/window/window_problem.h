@@ -27,8 +27,8 @@ struct ImuFactor {
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };
 
-// 1/2 e^T H e + g^T e with e = Difference(state, at), over the calibration, the IMU's scales and
-// the first at.frames.size() frames of the window.
+// 1/2 e^T H e + g^T e with e = Difference(state, at), over the calibration, the IMU's scale factors
+// and the first at.frames.size() frames of the window.
 struct WindowPrior {
   WindowState at;
   Eigen::MatrixXd H;

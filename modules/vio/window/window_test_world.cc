@@ -30,11 +30,11 @@ WindowFrame FirstFrame(double time_offset_s, std::mt19937_64& rng) {
 Eigen::Matrix<double, kImuIntrinsicsSize, 1> RandomImuIntrinsics(double sigma,
                                                                  std::mt19937_64& rng) {
   std::normal_distribution<double> normal(0, sigma);
-  Eigen::Matrix<double, kImuIntrinsicsSize, 1> imu_intrinsics;
-  for (double& value : imu_intrinsics) {
+  Eigen::Matrix<double, kImuIntrinsicsSize, 1> intrinsics;
+  for (double& value : intrinsics) {
     value = normal(rng);
   }
-  return imu_intrinsics;
+  return intrinsics;
 }
 
 Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions& options,

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""One word for one thing, the field's: the words that this project once invented stand nowhere any more.
+
+`words_test.py --all` also lists what documentation outside DOCS_KEPT still says.
+"""
+
+import re
+import sys
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# What the words stood for is said beside them; capitals count.
+WORDS = [
+    (r"(?i)verdict", "verification result"),
+    (r"\b[Jj]udg(e[sd]?|ing|ements?)\b|[a-z]Judg|judge_", "(loop) verifier, to verify"),
+    (r"InertialLink|\bStartLink\b|\bAddLink|\blinks? (of|between) (keyframes|maps)\b|\b(loop|odometry|inter|intra) links?\b"
+     r"|\blinks? accepted|\baccepted links?\b|\bvague link", "constraint, loop closure, IMU factor; link is the network's"),
+    (r"\bnormali[sz]ed squares\b|\bsquares (a|per) dimension\b|\| squares \||AddSquare\b", "NEES"),
+    (r"\b[Tt]urn[ _]rate\b|\b(a|A|the|one|this|[Ee]ach|best|slow|fast|small) turn\b(?! comes)|[a-z]Turn(?!On|Comes|edBack)[A-Z(]"
+     r"|\b\w+_turn\b|\bturn_(?!on\b)\w+|\bTurned|\b[Tt]urn\(|\bturn [=*]|\bturned? (about|by) ", "rotation, yaw"),
+    (r"\b[Mm]ounts\b|\bMOUNTS\b|\b(the|a|camera) mount\b|\bmounting\b", "extrinsics"),
+    (r"\b[Aa]t[ _]rest\b|AtRest|RestDetector|rest_detector|AddRest|kRest[A-Z]|RestTogether|RestResidual|\bbody rests\b"
+     r"|\bresting\b|\ba rest\b", "stationary, zero-velocity update"),
+    (r"\b(is|last|a)_sight\b|\.stays\b|\bstays = |DropPassing|LastStaying|\bis a sight\b|\bpassing frames?\b|\bframes? that stays?\b"
+     r"|\ba frame stays\b", "keyframe, tracked, non-keyframe"),
+    (r"(?i)surrounding", "visibility check"),
+    (r"AskAgain|AskAllAgain|TellAgain|TakeAgain|OnAgain|PublishAgain|\b(said|sent|told|keyframes)_again\b"
+     r"|\b(ask|asks|tell|tells|told) (it )?again\b", "retransmission request, retransmission"),
+    (r"\b[Oo]w(e|es|ed|ing)\b|Owed|_owed\b|\bowed_", "outstanding"),
+    (r"\b[Nn]ews\b|News[A-Z(]|[a-z]News\b|_news_?\b|LoggedWord|ReadWords", "message, update"),
+    (r"(?<![<\w/.\"'])[Ff]igures?\b(?! (of eight|\d))|Figures[A-Z(]?\b|[a-z]Figures", "metric, value"),
+    (r"(?i)imu_?scales|kScalesSize|ScalesVector|ScalesJacobian|ScalesCovariance|\bthe IMU's scales\b", "IMU intrinsics"),
+    (r"\bmeetings?\b|MEETINGS|meetings_|other[_ ]worlds|(?i:hybrid)", "what the bench measures"),
+    (r"AlignmentOptions|LiveAlignment|MapAlignment|alignment_yaml|(?<!Trajectory)AlignmentKind|AlignmentPrior",
+     "loop verification, localization; alignment is the transform between two maps"),
+    (r"\b(struct|class) Map\b", "a name that says which map"),
+    (r"\bmin_\w*looks|\bLooks\(|DifferentLook|\blook_(angle|distance)", "viewpoint"),
+]
+
+# What has been shipped keeps its name: logs and programs of others have it.
+FROZEN = [
+    r"verdict_request(_t)?\b", r"\bnum_verdicts\b", r"VERDICT_REQUEST", r"\bagain_t\b", r"AGAIN_", r"kAgainPrefix",
+    r"the surroundings contradict",  # constraint_t.reason in every log there is
+]
+# A word of the table that means something else there.
+ALLOWED = {
+    "modules/report/html/report_script.cc": [r"\bfigure\b"],  # the HTML element
+    "modules/report/html/report_svg.h": [r"\bfigure\b"],
+    "modules/report/html/report_svg.cc": [r"\bfigure\b"],
+}
+
+CODE = ["modules", "bench", "tests", "examples", "scripts", "sessions", "cmake", "packaging", "CMakeLists.txt"]
+CODE_SUFFIXES = {"", ".cc", ".h", ".py", ".ts", ".js", ".mjs", ".html", ".css", ".cmake", ".in", ".txt", ".yaml", ".conf", ".service"}
+SKIPPED = re.compile(r"^tests/fuzz/corpus/|^tests/words_test\.py$|node_modules/|package-lock\.json$|/build/|__pycache__")
+
+DOCS = ["README.md", "docs", "modules", "bench", "examples", "lcmtypes", "logs", "sessions", "tests"]
+# Documentation that is held to the words: files, or folders with all that is in them.
+DOCS_KEPT = []
+
+
+def files(roots, suffixes):
+    for root in roots:
+        path = ROOT / root
+        for file in [path] if path.is_file() else sorted(path.rglob("*")):
+            name = str(file.relative_to(ROOT))
+            if file.is_file() and not file.is_symlink() and file.suffix in suffixes and not SKIPPED.search(name):
+                yield name, file
+
+
+def without(text, expressions):
+    return re.sub("|".join(expressions), "", text)
+
+
+def found(roots, suffixes):
+    """Every word of the table: file:line: the word, and what to say."""
+    out = []
+    words = [(re.compile(expression), say) for expression, say in WORDS]
+    for name, file in files(roots, suffixes):
+        try:
+            text = without(file.read_text(), FROZEN + ALLOWED.get(name, []))
+        except UnicodeDecodeError:
+            continue  # no text
+        for word, say in words:
+            out += [f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: '{hit.group(0)}': say {say}" for hit in word.finditer(text)]
+    return sorted(out)
+
+
+class Words(unittest.TestCase):
+    def test_code(self):
+        hits = found(CODE, CODE_SUFFIXES)
+        self.assertFalse(hits, "\n" + "\n".join(hits))
+
+    def test_docs(self):
+        hits = found(DOCS_KEPT, {".md"})
+        self.assertFalse(hits, "\n" + "\n".join(hits))
+
+    def test_the_table_finds_its_words(self):
+        for line in ["the verdicts on it", "void Judge();", "InertialLink link;", "at rest", "state.at_rest", "the surroundings check",
+                     "AskAgain(node)", "what is owed", "there is no news", "ReportFigures", "kImuScales", "struct Map {", "hybrid"]:
+            self.assertTrue(any(re.search(expression, without(line, FROZEN)) for expression, _ in WORDS), line)
+        for line in ["verdict_request_t request", "channels::Again(name)", "the rest of the bytes", "the uplink's link", "in turn",
+                     "its turn comes", "<figure class", "a figure of eight", "returns", "least squares", "the keys stay"]:
+            self.assertFalse(any(re.search(expression, without(line, FROZEN)) for expression, _ in WORDS), line)
+
+
+if __name__ == "__main__":
+    if "--all" in sys.argv:
+        print("\n".join(found(DOCS, {".md"})))
+    else:
+        unittest.main()
