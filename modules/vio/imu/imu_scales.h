@@ -22,7 +22,7 @@ struct ImuScales {
   Eigen::Matrix<double, kScalesSize, 1> Stacked() const;
   void Add(const Eigen::Matrix<double, kScalesSize, 1>& error);
   // Of the body whose axes are the gyro's: what turned the gyro turns the accelerometer (to first
-  // order; docs/decisions/imu_intrinsics.md).
+  // order; docs/decisions/imu_scales.md).
   ImuScales OfGyroAxes() const;
 };
 
