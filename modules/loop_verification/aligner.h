@@ -50,7 +50,7 @@ struct LoopVerificationOptions {
   // Guesses are led by it loosely, so that a wrong one is not bent into what gravity allows; what
   // the images alone say in the end must agree with it: 99 % of 2 degrees of freedom. The
   // odometries' claims do not count how well each knows its camera's rotation in its body; real
-  // ones know it to a quarter of a degree (docs/decisions/alignment.md).
+  // ones know it to a quarter of a degree (docs/decisions/loop_verification.md).
   double guess_tilt_floor = 0.006;  // radians, of each odometry
   double gravity_floor = 0.005;     // radians, the same at the end
   double max_tilt_chi2 = 9.2;
