@@ -76,7 +76,7 @@ void UplinkProcess::OnKeyframe(Bytes data) {
       !reason.empty()) {
     return node_.Refuse(reason);
   }
-  if (!uplink_.Hear(keyframe.value->id, now_us_)) {
+  if (!uplink_.NoteReceived(keyframe.value->id, now_us_)) {
     return node_.Count("keyframes_repeated");
   }
   const std::vector<uint8_t> bytes = FitBudget(*keyframe.value, data);
