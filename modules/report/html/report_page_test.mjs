@@ -3,7 +3,7 @@
 
 import { execFileSync } from "node:child_process";
 import { pathToFileURL } from "node:url";
-import { becomes, check, launch, openPage, options, run } from "../viewer/page/test/harness.mjs";
+import { becomes, check, launch, openPage, options, run } from "../../viewer/page/test/harness.mjs";
 
 const textOf = (locator) => locator.evaluate((node) => node.innerText.replace(/\s+/g, " "));
 
