@@ -26,12 +26,20 @@ def quoted(text):
 SUBSCRIPTION = re.compile(r"(?:Subscribe|Listen)<(\w+)>\(\s*(?:std::string\()?channels::(\w+)")
 
 
-def plain(name):
-    """KEYFRAME_k, kAllKeyframes and Keyframe() are one; singular, for kAllPoses is POSE_k's."""
-    bare = re.sub(r"_(k|<process>)$|^kAll|^k(?=[A-Z])", "", name)
-    return bare.replace("_", "").lower().rstrip("s")
+def channels_in_code():
+    """Of modules/messages/channels.h, constants and functions: the channel each stands for, spelt as in the document."""
+    header = (ROOT / "modules/messages/channels.h").read_text()
+    constants = dict(re.findall(r'\bstd::string_view (k\w+) = "([^"]+)";', header))
+    functions = re.findall(r"\bstd::string (\w+)\([\w:]+ (agent_id|process)\) \{\s*return [^;]*\b(k\w+Prefix)\b", header)
+    spelt = {name: value.replace("[0-9]+", "k").replace(".*", "<process>") for name, value in constants.items()
+             if not name.endswith("Prefix")}
+    spelt |= {name: constants[prefix] + {"agent_id": "k", "process": "<process>"}[kind] for name, kind, prefix in functions}
+    unused = {name for name in constants if name.endswith("Prefix")} - {prefix for _, _, prefix in functions}
+    assert not unused, unused
+    return spelt
 
 
+CHANNEL_OF = channels_in_code()
 CHANNELS = [(quoted(row[0])[0], row) for row in table("Channels")]
 
 
@@ -73,10 +81,7 @@ class BusDoc(unittest.TestCase):
             self.assertEqual(described[name], members, name)
 
     def test_every_channel(self):
-        header = (ROOT / "modules/messages/channels.h").read_text()
-        named = set(re.findall(r'"([A-Z_]+_)\{\}"', header)) | set(re.findall(r' = "([A-Z_]+)";', header))
-        in_doc = {re.sub(r"_(k|<process>)$", "_", name) for name, _ in CHANNELS}
-        self.assertEqual(in_doc, named)
+        self.assertEqual({name for name, _ in CHANNELS}, set(CHANNEL_OF.values()))
 
     def test_subscriptions_in_the_code(self):
         """Each has the type of a documented row, and its module stands there."""
@@ -85,8 +90,8 @@ class BusDoc(unittest.TestCase):
             if path.name.endswith("_test.cc") or "node_modules" in path.parts:
                 continue
             for type_name, symbol in SUBSCRIPTION.findall(path.read_text()):
-                rows = [row for name, row in CHANNELS if plain(name) == plain(symbol)]
-                self.assertTrue(rows, f"{path.name}: channels::{symbol}")
+                rows = [row for name, row in CHANNELS if name == CHANNEL_OF[symbol]]
+                self.assertTrue(rows, f"{path.name}: channels::{symbol} is {CHANNEL_OF[symbol]}")
                 self.assertEqual({quoted(row[1])[0] for row in rows}, {type_name}, symbol)
                 module = path.relative_to(ROOT / "modules").parts[0]
                 if module not in ("bus", "loop_verification"):  # helpers of several processes
