@@ -24,8 +24,8 @@ using testing::Not;
 
 const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr int kEvents = 629;
-constexpr size_t kVerdict = 314;  // a CONSTRAINT
-constexpr size_t kPose = 400;     // 4 kB from here reach into a KEYFRAME_2
+constexpr size_t kConstraint = 314;  // a CONSTRAINT
+constexpr size_t kPose = 400;        // 4 kB from here reach into a KEYFRAME_2
 
 std::vector<LogPiece> Pieces(const std::string& log) {
   const int fd = open(log.c_str(), O_RDONLY | O_CLOEXEC);
@@ -46,7 +46,7 @@ class DamagedLog : public ::testing::Test {
     const std::vector<LogPiece> events = Pieces(kSample);
     ASSERT_EQ(events.size(), kEvents);
     std::string bytes = whole;
-    bytes[static_cast<size_t>(events[kVerdict].offset)] ^= 4;
+    bytes[static_cast<size_t>(events[kConstraint].offset)] ^= 4;
     Write("bit.lcm", bytes);
     bytes = whole;
     bytes.replace(static_cast<size_t>(events[kPose].offset), 4096, 4096, '\0');

@@ -134,7 +134,7 @@ TEST_F(DamagedJournal, WhatNobodyHasIsGivenUpAndTheRestIsBack) {
   EXPECT_THAT(delivered, testing::IsEmpty());
 }
 
-TEST_F(DamagedJournal, MatchesAndVerdictsAreAskedFor) {
+TEST_F(DamagedJournal, MatchesAndConstraintsAreAskedFor) {
   PublishKeyframes(4);
   Run(3);
   for (const int seq : {0, 1, 2, 3}) {

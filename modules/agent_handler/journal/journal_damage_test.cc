@@ -49,7 +49,7 @@ class JournalDamage : public testing::Test {
       for (int32_t seq = 0; seq < 20; ++seq) {
         Append(&journal, "KEYFRAME_1", EncodeTestKeyframe({map, seq}));
         Append(&journal, "PLACE_MATCH", EncodeMatch(seq));
-        Append(&journal, "CONSTRAINT", EncodeVerdict(seq));
+        Append(&journal, "CONSTRAINT", EncodeConstraint(seq));
       }
     }
     good = Slurp(path());
@@ -72,7 +72,7 @@ class JournalDamage : public testing::Test {
     match.candidates = {{{map, 0}, PlaceKind::kIntra, 1.0f, {}}};
     return EncodeMessage(ToMessage(match));
   }
-  File EncodeVerdict(int32_t seq) const {
+  File EncodeConstraint(int32_t seq) const {
     Constraint result;
     result.from = {map, 0};
     result.to = {map, seq};

@@ -84,18 +84,18 @@ void LiveInput::OnImu(const imu_t& message) {
 // Whether it is the stream's, which may go on from an earlier time than before.
 bool LiveInput::TakeStamp(StampCheck* stamps, const std::string& what, int64_t utime) {
   switch (stamps->Check(utime)) {
-    case StampCheck::Verdict::kNext:
+    case StampCheck::Decision::kNext:
       return true;
-    case StampCheck::Verdict::kWentBack:
+    case StampCheck::Decision::kWentBack:
       StartAnew();
       return true;
-    case StampCheck::Verdict::kNotAfter:
+    case StampCheck::Decision::kNotAfter:
       process_.node().Refuse(what + "not after the last one");
       return false;
-    case StampCheck::Verdict::kFarAhead:
+    case StampCheck::Decision::kFarAhead:
       process_.node().Refuse(what + "far ahead of the last one");
       return false;
-    case StampCheck::Verdict::kOutOfRange:
+    case StampCheck::Decision::kOutOfRange:
       process_.node().Refuse(what + "stamp out of range");
       return false;
   }

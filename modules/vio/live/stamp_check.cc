@@ -2,18 +2,18 @@
 
 namespace pangea::vio {
 
-StampCheck::Verdict StampCheck::Check(int64_t utime) {
+StampCheck::Decision StampCheck::Check(int64_t utime) {
   if (utime > kMaxUtime || utime < -kMaxUtime) {
-    return Verdict::kOutOfRange;
+    return Decision::kOutOfRange;
   }
   const bool is_after = !newest_ || utime > *newest_;
   const bool is_next = is_after && (!newest_ || utime - *newest_ <= max_step_us_);
   if (!is_next && !Agrees(utime)) {
-    return is_after ? Verdict::kFarAhead : Verdict::kNotAfter;
+    return is_after ? Decision::kFarAhead : Decision::kNotAfter;
   }
   newest_ = utime;
   refused_ = 0;
-  return is_after ? Verdict::kNext : Verdict::kWentBack;
+  return is_after ? Decision::kNext : Decision::kWentBack;
 }
 
 // A repeat of the last one, as a bus may deliver it, says nothing.

@@ -18,7 +18,7 @@ class StampCheck {
   // differences of such stamps do not overflow.
   static constexpr int64_t kMaxUtime = 9'223'372'036'854'775;
 
-  enum class Verdict {
+  enum class Decision {
     kNext,
     kWentBack,  // the stream goes on from here, and here is not after what was taken before
     kNotAfter,  // refused, as all below
@@ -29,7 +29,7 @@ class StampCheck {
   // `max_step_us`: the longest hole that whoever takes the stream could bridge.
   explicit StampCheck(int64_t max_step_us) : max_step_us_(max_step_us) {}
 
-  Verdict Check(int64_t utime);
+  Decision Check(int64_t utime);
   // The last that was taken.
   const std::optional<int64_t>& newest() const { return newest_; }
 
