@@ -11,7 +11,7 @@
 namespace pangea {
 namespace {
 
-constexpr size_t kOwnBytes = 4;  // the message's last field
+constexpr std::ptrdiff_t kOwnBytes = 4;  // the message's last field
 
 }  // namespace
 
@@ -29,7 +29,7 @@ void AppendChecksumsEvent(const Checksums& checksums, int64_t utime, std::vector
   const size_t begin = out->size();
   AppendLogEvent(checksums.event_number(), utime, std::string(channels::kChecksums),
                  EncodeMessage(message), out);
-  out->resize(out->size() - kOwnBytes);
+  out->erase(out->end() - kOwnBytes, out->end());
   PutBigEndian(EventChecksum(Bytes(*out).subspan(begin)), kOwnBytes, out);
 }
 
@@ -40,7 +40,7 @@ std::optional<Checksums> ChecksumsOf(Bytes event) {
       !DecodeMessage(event.last(static_cast<size_t>(header->data_bytes)), &message)) {
     return std::nullopt;
   }
-  const uint32_t own = EventChecksum(event.first(event.size() - kOwnBytes));
+  const uint32_t own = EventChecksum(event.first(event.size() - size_t{kOwnBytes}));
   const bool in_place =
       message.first_event >= 0 && header->number >= message.first_event &&
       header->number - message.first_event == static_cast<int64_t>(message.crc32.size());
