@@ -314,6 +314,43 @@ TEST_F(LinkWorld, MatchesAndResultsAreJournalledOnceAndMissingOnesRequested) {
                                    testing::Pair("PLACE_MATCH", 4)));
 }
 
+// Each start that brings other options is one event; who repeats them, and who starts again with
+// the same, is none.
+TEST_F(LinkWorld, TheOptionsInForceAreJournalled) {
+  const auto say = [this](const std::string& process, int64_t started, const std::string& yaml) {
+    options_t message{};
+    message.process = process;
+    message.utime = started;
+    message.yaml = yaml;
+    PublishMessage(server_bus, "OPTIONS_" + process, message);
+    Run(0.2);
+  };
+  for (int i = 0; i < 3; ++i) {
+    say("fusion", kWall, "min_inliers: 20\n");
+    say("posegraph", kWall, "scope: all\n");
+  }
+  KillHandler();
+  StartHandler();
+  say("fusion", kWall, "min_inliers: 20\n");
+  say("fusion", kWall + 1, "min_inliers: 20\n");
+  say("posegraph", kWall + 1, "scope: paper\n");
+  say("posegraph", kWall, "scope: all\n");  // of one that has ended
+  say("not a name", kWall, "");
+  Run(1);
+  KillHandler();
+  std::vector<std::string> journalled;
+  const Journal journal(journal_path,
+                        [&](const std::string& channel, Bytes data, const JournalPlace&) {
+                          options_t message{};
+                          EXPECT_TRUE(DecodeMessage(data, &message)) << channel;
+                          journalled.push_back(channel + " " + message.yaml);
+                          return true;
+                        });
+  EXPECT_THAT(journalled, testing::ElementsAre("OPTIONS_fusion min_inliers: 20\n",
+                                               "OPTIONS_posegraph scope: all\n",
+                                               "OPTIONS_posegraph scope: paper\n"));
+}
+
 // A budget costs corners, never a keyframe: the chain of poses has no gap.
 TEST_F(LinkWorld, UnderABudgetKeyframesAreThinnedAndAllArrive) {
   KillUplink();

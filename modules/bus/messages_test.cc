@@ -316,5 +316,23 @@ TEST(Messages, RefusesHostileLandmarks) {
   }));
 }
 
+TEST(Messages, OptionsAreBoundedAndNamed) {
+  options_t message{};
+  message.process = "inter_map_ba";
+  message.utime = 7;
+  message.yaml = "min_inliers: 20\n";
+  const auto parsed = Parse(ThroughBytes(message));
+  ASSERT_TRUE(parsed.value) << parsed.refused;
+  EXPECT_EQ(parsed.value->yaml, message.yaml);
+  EXPECT_EQ(parsed.value->utime, 7);
+  for (const std::string& name : {std::string(), std::string("../fusion"), std::string(51, 'a')}) {
+    options_t bad = message;
+    bad.process = name;
+    EXPECT_FALSE(Parse(bad).value) << name;
+  }
+  message.yaml.assign(16'001, 'x');
+  EXPECT_FALSE(Parse(message).value);
+}
+
 }  // namespace
 }  // namespace pangea

@@ -3,11 +3,39 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 
+#include "bus/options_announcer.h"
 #include "bus/retransmission/journal_first.h"
 
 namespace pangea {
+namespace {
+
+// "pangea-global-ba" is global_ba.
+std::string NameOnTheBus(const std::string& program) {
+  std::string name = program.substr(std::string("pangea-").size());
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+// A process that tells its options beside what it does.
+class WithOptions : public Process {
+ public:
+  WithOptions(std::unique_ptr<Process> process, OptionsAnnouncer announcer)
+      : process_(std::move(process)), announcer_(std::move(announcer)) {}
+
+  void Tick(int64_t now_utime) override {
+    announcer_.Tick(now_utime);
+    process_->Tick(now_utime);
+  }
+
+ private:
+  std::unique_ptr<Process> process_;
+  OptionsAnnouncer announcer_;
+};
+
+}  // namespace
 
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory) {
@@ -16,24 +44,25 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
   std::string options_file;
   bool print_options = false;
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
-  if (description.options != nullptr) {
-    app.add_option("--options", options_file, "YAML file with options");
-    app.add_flag("--print-options", print_options, "print the default options and exit");
-  }
+  app.add_option("--options", options_file, "YAML file with options");
+  app.add_flag("--print-options", print_options,
+               "print the options in force, those of --options included, and exit");
   CLI11_PARSE(app, argc, argv);
-  if (print_options) {
-    std::cout << description.options->Print();
-    return 0;
-  }
   try {
     if (!options_file.empty()) {
-      description.options->ReadFile(options_file);
+      description.options.ReadFile(options_file);
+    }
+    if (print_options) {
+      std::cout << description.options.Print();
+      return 0;
     }
     UseOneThread();
     LcmBus bus(url);
     JournalFirstBus journal_first(bus, WallUtime());
-    const std::unique_ptr<Process> process = factory(journal_first);
-    return RunProcess(bus, *process, &journal_first);
+    WithOptions process(factory(journal_first),
+                        OptionsAnnouncer(bus, NameOnTheBus(description.name),
+                                         description.options.PrintWithoutHelp()));
+    return RunProcess(bus, process, &journal_first);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("{}: {}\n", description.name, error.what());
     return 1;

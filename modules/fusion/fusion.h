@@ -15,6 +15,13 @@ struct FusionOptions {
   LoopVerificationOptions alignment;
   // For a candidate within one map that is in a group with others.
   DriftGateOptions drift;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
+    archive.Section("drift", &drift,
+                    "the odometry's drift that a constraint within one map may claim");
+  }
 };
 
 class Fusion : public LoopVerifier {

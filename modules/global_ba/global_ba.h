@@ -33,6 +33,14 @@ struct GlobalBaOptions {
   GroupWorldOptions world;
   BaOptions ba;
   int min_keyframes = 10;  // of a group
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("min_keyframes", &min_keyframes, {2, 1000000}, "", "of a group that is adjusted");
+    archive.Section("landmarks", &world.landmarks, "tracks and matches joined to landmarks");
+    archive.Section("redundancy", &world.redundancy, "keyframes that are left out");
+    archive.Section("ba", &ba, "bundle adjustment");
+  }
 };
 
 class GlobalBa {

@@ -25,6 +25,16 @@ struct LandmarkOptions {
   double match_sigma_px = 1.5;   // at octave 0; grows by 1.2 with each octave
   double min_parallax = 0.02;    // radians between two rays of the track
   double max_start_sigmas = 10;  // of any ray from where it is at first
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("track_sigma_px", &track_sigma_px, {0.01, 20}, "px", "of a tracked corner");
+    archive.Add("match_sigma_px", &match_sigma_px, {0.01, 20}, "px",
+                "of a matched corner on octave 0");
+    archive.Add("min_parallax", &min_parallax, {0, 3.15}, "rad", "between two rays of the track");
+    archive.Add("max_start_sigmas", &max_start_sigmas, {0.1, 1000}, "",
+                "of any ray from where the landmark is at first");
+  }
 };
 
 // Corners of two keyframes of the world that show the same.

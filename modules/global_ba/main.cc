@@ -2,16 +2,15 @@
 
 #include "bus/process_main.h"
 #include "global_ba/global_ba_process.h"
-#include "global_ba/global_ba_yaml.h"
 
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE --> GlobalBaProcess --> REFINEMENT
 int main(int argc, char** argv) {
   pangea::GlobalBaOptions options;
   pangea::YamlOptions yaml;
-  pangea::Bind(yaml, options);
+  options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-global-ba",
-       "Adjusts all keyframes and landmarks of a group at once while it is quiet", &yaml},
+       "Adjusts all keyframes and landmarks of a group at once while it is quiet", yaml},
       [&](pangea::Bus& bus) { return std::make_unique<pangea::GlobalBaProcess>(bus, options); });
 }

@@ -17,6 +17,13 @@ struct RedundancyOptions {
   double share = 0.9;  // of a keyframe's landmarks
   int observers = 3;   // other keyframes that see one
   double max_gap_s = 1.0;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("share", &share, {0, 1}, "", "of a redundant keyframe's landmarks that others see");
+    archive.Add("observers", &observers, {1, 1000}, "", "other keyframes that see one");
+    archive.Add("max_gap_s", &max_gap_s, {0, 1000}, "s", "between keyframes that are kept");
+  }
 };
 
 // The world without its redundant keyframes, looked at in their order; `needed` has one entry a

@@ -15,6 +15,13 @@ namespace pangea {
 struct InterMapBaOptions {
   LoopVerificationOptions alignment;
   DriftGateOptions drift;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
+    archive.Section("drift", &drift,
+                    "the odometry's drift that a constraint within one map may claim");
+  }
 };
 
 class InterMapBa : public LoopVerifier {

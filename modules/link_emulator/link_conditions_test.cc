@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "link_emulator/link_conditions_yaml.h"
+#include "options/yaml_options.h"
 
 namespace pangea {
 namespace {
@@ -18,7 +18,7 @@ TEST(LinkConditions, EveryNumberHasItsRange) {
   const auto complaint = [](const std::string& text) -> std::string {
     LinkConditions conditions;
     YamlOptions yaml;
-    Bind(yaml, conditions);
+    conditions.Visit(yaml);
     try {
       yaml.ReadText(text, "link.yaml");
     } catch (const std::runtime_error& error) {
@@ -43,14 +43,14 @@ TEST(LinkConditions, EveryNumberHasItsRange) {
 TEST(LinkConditions, ReadFromYamlAndDescribed) {
   LinkConditions conditions;
   YamlOptions yaml;
-  Bind(yaml, conditions);
+  conditions.Visit(yaml);
   yaml.ReadText("{loss: 0.05, delay_ms: 50, partitions: [{at: 30, seconds: 60}], seed: 7}", "test");
   EXPECT_EQ(conditions.seed, 7u);
   EXPECT_EQ(Describe(conditions), "loss 5 %, delay 50 ms, cut at 30 s for 60 s");
 
   LinkConditions again;
   YamlOptions yaml_again;
-  Bind(yaml_again, again);
+  again.Visit(yaml_again);
   yaml_again.ReadText(yaml.Print(), "printed");
   EXPECT_EQ(Describe(again), Describe(conditions));
 }

@@ -5,8 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
-#include "link_emulator/link_conditions_yaml.h"
 #include "link_emulator/link_emulator_process.h"
+#include "options/yaml_options.h"
 
 int main(int argc, char** argv) {
   CLI::App app(
@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   try {
     pangea::LinkConditions conditions;
     pangea::YamlOptions yaml;
-    pangea::Bind(yaml, conditions);
+    conditions.Visit(yaml);
     if (!file.empty()) {
       yaml.ReadFile(file);
     }

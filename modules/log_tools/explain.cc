@@ -15,6 +15,7 @@
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
+#include "server_options/server_options.h"
 
 namespace pangea::session {
 namespace {
@@ -82,6 +83,29 @@ std::string CountOf(const std::vector<ShownMatch>& matches) {
   return fmt::format("{} of {} inliers", inliers, matches.size());
 }
 
+// Those of its process that differ from the defaults, or why they are defaults.
+std::vector<std::string> NotesOf(const LoggedOptions& logged, const std::string& process) {
+  std::vector<std::string> notes = logged.notes;
+  for (const std::string& other : OtherThanDefault(logged.options)) {
+    if (other.starts_with(process + ".")) {
+      notes.push_back(fmt::format("options of the log: {}", other));
+    }
+  }
+  return notes;
+}
+
+std::unique_ptr<LoopVerifier> VerifierOf(PlaceKind kind, const LoggedOptions& logged,
+                                         Explanation* explanation) {
+  if (kind == PlaceKind::kIntra) {
+    explanation->limits = logged.options.inter_map_ba.alignment;
+    explanation->options_notes = NotesOf(logged, "inter_map_ba");
+    return std::make_unique<InterMapBa>(logged.options.inter_map_ba);
+  }
+  explanation->limits = logged.options.fusion.alignment;
+  explanation->options_notes = NotesOf(logged, "fusion");
+  return std::make_unique<Fusion>(logged.options.fusion);
+}
+
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 }  // namespace
@@ -106,12 +130,8 @@ Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* 
   Explanation explanation;
   explanation.said = FindResult(log, constraint_id, readings);
   explanation.candidate = FindCandidate(log, explanation.said, readings);
-  std::unique_ptr<LoopVerifier> verifier;
-  if (explanation.said.kind == PlaceKind::kIntra) {
-    verifier = std::make_unique<InterMapBa>(InterMapBaOptions{});
-  } else {
-    verifier = std::make_unique<Fusion>(FusionOptions{});
-  }
+  const std::unique_ptr<LoopVerifier> verifier =
+      VerifierOf(explanation.said.kind, ReadLoggedOptions({log}, readings), &explanation);
   bool from = false, to = false;
   const auto add = [&](const LogEvent& event) {
     auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
@@ -143,12 +163,15 @@ Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* 
 
 std::string ToText(const Explanation& e) {
   const LoopVerificationReport& report = e.report;
-  const LoopVerificationOptions limits;
+  const LoopVerificationOptions& limits = e.limits;
   const auto result = [](const Constraint& c) { return c.accepted ? "accepted" : c.reason; };
   std::string text = fmt::format(
       "{} (query) in {} (match), {}\nresult in the log: {}\nmade again:        {}\n\n",
       ToString(e.said.to), ToString(e.said.from),
       e.said.from.map == e.said.to.map ? "one map" : "two maps", result(e.said), result(e.again));
+  for (const std::string& note : e.options_notes) {
+    text += note + "\n";
+  }
   text += fmt::format("candidate      {} corners matched, score {:.4f}\n",
                       e.candidate.corner_matches.size(), e.candidate.score);
   text += fmt::format("PnP            {}, {} landmarks (at least {})\n", CountOf(report.first),

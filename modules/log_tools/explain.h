@@ -20,11 +20,14 @@ struct Explanation {
   Constraint again;  // made again from the same keyframes
   LoopVerificationReport report;
   Keyframe from, to;
+  LoopVerificationOptions limits;          // that it was made again with
+  std::vector<std::string> options_notes;  // for people: where these are from
 };
 
 // Every verification result of the log, a line each. What of the log is lost is noted in `readings`
 // (log_reader.h), here and below.
 std::string ListResults(const std::string& log, LogReadings* readings = nullptr);
+// Made again with the options of the log (OPTIONS_*), or the defaults where it has none.
 // Throws std::runtime_error when the log lacks the verification result, its candidate or a
 // keyframe.
 Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings = nullptr);

@@ -21,7 +21,8 @@ using Channels = std::map<std::string, std::vector<Message>>;
 
 bool TellsOfTheRun(const std::string& channel) {
   return channel.starts_with(channels::kStatusPrefix) ||
-         channel.starts_with(channels::kAgainPrefix) || channel == channels::kHave ||
+         channel.starts_with(channels::kAgainPrefix) ||
+         channel.starts_with(channels::kOptionsPrefix) || channel == channels::kHave ||
          channel == channels::kResendRequest || channel == channels::kVerificationRequest ||
          channel == "LCM_SELF_TEST";
 }

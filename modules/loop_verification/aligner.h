@@ -78,6 +78,52 @@ struct LoopVerificationOptions {
   double max_sigma_rad = 0.0175;
   // Between the poses of the view's two halves: 99 % of 6 degrees of freedom.
   double max_halves_chi2 = 16.8;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("window", &window, "the local windows that are aligned");
+    archive.Section("pnp", &pnp, "upright PnP");
+    archive.Section("search", &search, "projection search");
+    archive.Section("ba", &ba, "joint bundle adjustment of both windows");
+    archive.Add("first_max_hamming", &first_max_hamming, {0, 256}, "bits",
+                "between descriptors matched without a prediction");
+    archive.Add("first_max_ratio", &first_max_ratio, {0.01, 1}, "",
+                "best to second-best Hamming distance there");
+    archive.Add("min_pnp_inliers", &min_pnp_inliers, {3, 10000}, "", "of PnP");
+    archive.Add("max_view_angle", &max_view_angle, {0.01, 3.15}, "rad",
+                "between the two lines of sight");
+    archive.Add("max_distance_m", &max_distance_m, {0.01, 10000}, "m", "between the two keyframes");
+    archive.Add("guess_tilt_floor", &guess_tilt_floor, {0, 1}, "rad",
+                "sigma of each gravity, at least, while guessing");
+    archive.Add("gravity_floor", &gravity_floor, {0, 1}, "rad",
+                "sigma of each gravity, at least, at the end");
+    archive.Add("max_tilt_chi2", &max_tilt_chi2, {0.1, 1000}, "",
+                "of the tilt between the two gravities, 2 degrees of freedom");
+    archive.Add("max_tilt", &max_tilt, {0.001, 3.15}, "rad",
+                "between the two gravities, whatever the odometries say");
+    archive.Add("min_found", &min_found, {0, 100000}, "", "points found in the two keyframes");
+    archive.Add("min_comparable", &min_comparable, {0, 100000}, "",
+                "points that ought to be seen in the two keyframes");
+    archive.Add("min_found_share", &min_found_share, {0, 1}, "",
+                "of the points that ought to be seen");
+    archive.Add("min_first_supported_share", &min_first_supported_share, {0, 1}, "",
+                "of the view, in the two keyframes");
+    archive.Add("min_supported_share", &min_supported_share, {0, 1}, "",
+                "of the view, along the way to them");
+    archive.Add("visibility_keyframes", &visibility_keyframes, {1, 1000}, "",
+                "up to each of the two");
+    archive.Add("visibility_stride", &visibility_stride, {1, 1000}, "",
+                "every so many of these is looked into");
+    archive.Add("min_inliers", &min_inliers, {4, 100000}, "", "distinct landmarks");
+    archive.Add("min_inlier_ratio", &min_inlier_ratio, {0, 1}, "",
+                "of the matches that the BA used");
+    archive.Add("min_occupied_cells", &min_occupied_cells, {0, 24}, "",
+                "of 6 x 4, in one of the two keyframes");
+    archive.Add("max_sigma_m", &max_sigma_m, {0.001, 100}, "m", "of the worst direction");
+    archive.Add("max_sigma_rad", &max_sigma_rad, {0.0001, 3.15}, "rad", "of the worst direction");
+    archive.Add("max_halves_chi2", &max_halves_chi2, {0.1, 100000}, "",
+                "between the poses of the view's two halves, 6 degrees of freedom");
+  }
 };
 
 // What the steps saw, beside the verification result: for tests, for choosing the options, and for

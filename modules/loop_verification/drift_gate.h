@@ -14,6 +14,15 @@ struct DriftGateOptions {
   double max_drift_share = 0.1;  // of the path between the keyframes
   double max_yaw = 0.15;         // radians, however short the path
   double max_yaw_per_m = 0.01;   // radians a metre of path
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("max_drift_m", &max_drift_m, {0, 10000}, "m", "however short the path");
+    archive.Add("max_drift_share", &max_drift_share, {0, 10}, "",
+                "of the path between the keyframes");
+    archive.Add("max_yaw", &max_yaw, {0, 3.15}, "rad", "however short the path");
+    archive.Add("max_yaw_per_m", &max_yaw_per_m, {0, 3.15}, "rad/m", "of path");
+  }
 };
 
 // For keyframes `path_m` apart along the odometry; `p_odom` is where the newer one is.

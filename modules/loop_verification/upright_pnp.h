@@ -31,6 +31,13 @@ struct RayPair {
 struct UprightPnpOptions {
   int iterations = 300;
   double max_chi2 = 16.0;  // of a match, 2 degrees of freedom: 4 sigma, wrong ones lie far outside
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("iterations", &iterations, {1, 100000}, "", "samples drawn");
+    archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "",
+                "of a match that is an inlier, 2 degrees of freedom");
+  }
 };
 
 struct UprightPnpResult {

@@ -17,6 +17,13 @@ struct WindowOptions {
   int num_keyframes = 5;  // M: the keyframe and M - 1 before it
   // Inverse depths less certain than this share of themselves are no map points.
   double max_relative_depth_sigma = 0.4;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("num_keyframes", &num_keyframes, {1, 50}, "", "the keyframe and those before it");
+    archive.Add("max_relative_depth_sigma", &max_relative_depth_sigma, {0.01, 2}, "",
+                "share of itself by which the inverse depth of a map point may be uncertain");
+  }
 };
 
 struct CornerRef {

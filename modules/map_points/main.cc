@@ -2,16 +2,15 @@
 
 #include "bus/process_main.h"
 #include "map_points/map_points_process.h"
-#include "map_points/map_points_yaml.h"
 
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_* --> MapPointsProcess --> LANDMARKS_k
 int main(int argc, char** argv) {
   pangea::MapPointsOptions options;
   pangea::YamlOptions yaml;
-  pangea::Bind(yaml, options);
+  options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
-       &yaml},
+       yaml},
       [&](pangea::Bus& bus) { return std::make_unique<pangea::MapPointsProcess>(bus, options); });
 }

@@ -41,6 +41,25 @@ struct MapPointsOptions {
   int repeat_after = 20;
   double moved_m = 0.005;
   TrackPointOptions track;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("max_landmarks", &max_landmarks, {1, 18}, "",
+                "in one message of at most 1200 bytes");
+    archive.Add("max_sources", &max_sources, {1, 4}, "", "keyframes they come from");
+    archive.Add("ahead_s", &ahead_s, {0, 10}, "s", "by which the agent's motion is led on");
+    archive.Add("max_distance_m", &max_distance_m, {0.1, 1000}, "m", "from the agent to a source");
+    archive.Add("max_angle_rad", &max_angle_rad, {0.01, 3.15}, "rad",
+                "between the two lines of sight to a landmark");
+    archive.Add("max_scale", &max_scale, {1, 100}, "", "ratio of the two distances to it");
+    archive.Add("own_recent", &own_recent, {0, 100000}, "",
+                "newest keyframes of the agent's own map, no sources");
+    archive.Add("repeat_after", &repeat_after, {1, 100000}, "",
+                "messages after which a landmark is sent again");
+    archive.Add("moved_m", &moved_m, {0, 100}, "m",
+                "by which a landmark has moved that is sent again");
+    archive.Section("track", &track, "a landmark from the rays of its track");
+  }
 };
 
 // What an agent says of itself (POSE_k).

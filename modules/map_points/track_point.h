@@ -16,6 +16,14 @@ struct TrackPointOptions {
   double sigma_px = 1.0;  // of a tracked corner, with what neighbouring poses add
   int min_rays = 3;
   double max_relative_sigma = 0.1;  // of the distance
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("sigma_px", &sigma_px, {0.01, 20}, "px",
+                "of a tracked corner, with what neighbouring poses add");
+    archive.Add("min_rays", &min_rays, {2, 1000}, "", "of a landmark");
+    archive.Add("max_relative_sigma", &max_relative_sigma, {0.001, 1}, "", "of the distance");
+  }
 };
 
 struct TrackPoint {

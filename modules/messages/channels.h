@@ -29,6 +29,7 @@ inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 inline constexpr std::string_view kAllLinkUps = "LINK_UP_[0-9]+";
 inline constexpr std::string_view kAllStatus = "STATUS_.*";
+inline constexpr std::string_view kAllOptions = "OPTIONS_.*";
 
 // Each agent has a channel of its own: the prefix and its id.
 inline constexpr std::string_view kImuPrefix = "IMU_";
@@ -43,6 +44,7 @@ inline constexpr std::string_view kLinkDownPrefix = "LINK_DOWN_";
 // And each process.
 inline constexpr std::string_view kStatusPrefix = "STATUS_";
 inline constexpr std::string_view kAgainPrefix = "AGAIN_";
+inline constexpr std::string_view kOptionsPrefix = "OPTIONS_";
 
 inline std::string OfAgent(std::string_view prefix, int32_t agent_id) {
   return fmt::format("{}{}", prefix, agent_id);
@@ -58,6 +60,9 @@ inline std::string LinkUp(int32_t agent_id) { return OfAgent(kLinkUpPrefix, agen
 inline std::string LinkDown(int32_t agent_id) { return OfAgent(kLinkDownPrefix, agent_id); }
 inline std::string Status(std::string_view process) {
   return fmt::format("{}{}", kStatusPrefix, process);
+}
+inline std::string Options(std::string_view process) {
+  return fmt::format("{}{}", kOptionsPrefix, process);
 }
 inline std::string Again(std::string_view process) {
   return fmt::format("{}{}", kAgainPrefix, process);

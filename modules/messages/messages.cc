@@ -290,6 +290,22 @@ Parsed<Correction> Parse(const correction_t& m) {
           ""};
 }
 
+Parsed<ProcessOptions> Parse(const options_t& m) {
+  constexpr size_t kMaxName = 50;
+  constexpr size_t kMaxYaml = 16'000;
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  if (m.process.empty() || m.process.size() > kMaxName ||
+      !std::ranges::all_of(m.process, is_plain)) {
+    return Refused<ProcessOptions>("options: no name of a process");
+  }
+  if (m.yaml.size() > kMaxYaml) {
+    return Refused<ProcessOptions>("options: too long");
+  }
+  return {ProcessOptions{m.process, m.utime, m.yaml}, ""};
+}
+
 Parsed<MapState> Parse(const map_state_t& m) {
   const auto group = Parse(m.group);
   if (!group.value || m.revision < 1 || m.chunk < 0 || m.num_chunks > kMaxChunks ||

@@ -16,6 +16,7 @@
 #include "pangea/keyframe_t.hpp"
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
+#include "pangea/options_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/rigid3_t.hpp"
 
@@ -25,6 +26,13 @@ template <typename T>
 struct Parsed {
   std::optional<T> value;
   std::string refused;  // why there is no value
+};
+
+// What a process runs with: the text is read as options, and checked, by who knows them.
+struct ProcessOptions {
+  std::string process;
+  int64_t utime = 0;  // wall clock of the process' start
+  std::string yaml;
 };
 
 map_id_t ToMessage(const MapId& id);
@@ -49,6 +57,7 @@ Parsed<PlaceMatch> Parse(const place_match_t& message);
 Parsed<Constraint> Parse(const constraint_t& message);
 Parsed<Correction> Parse(const correction_t& message);
 Parsed<MapLandmarks> Parse(const landmarks_t& message);
+Parsed<ProcessOptions> Parse(const options_t& message);
 // One chunk as a MapState of its own.
 Parsed<MapState> Parse(const map_state_t& message);
 

@@ -18,8 +18,9 @@ struct YamlOptions::Entry {
   bool required = false;
   // (node, file, path of the key for messages)
   std::function<void(const YAML::Node&, const std::string&, const std::string&)> read;
-  // What stands behind "key:", newline included, for an indentation of so many blanks.
-  std::function<std::string(int)> print;
+  // What stands behind "key:", newline included; " # help" comes before the first newline.
+  std::function<std::string(const Style&)> print;
+  std::string help;  // with bounds and unit; empty for none
   std::unique_ptr<YamlOptions> section;
 };
 
@@ -86,8 +87,27 @@ std::string RangeText(const std::string& of, double low, double high) {
   return fmt::format("{} from {} to {}", of, low, high);
 }
 
+// "0.001 to 100 m: of the worst direction".
+std::string HelpText(const OptionBounds& bounds, const std::string& unit, const std::string& help) {
+  return fmt::format("{} to {}{}{}{}{}", bounds.low, bounds.high, unit.empty() ? "" : " ", unit,
+                     help.empty() ? "" : ": ", help);
+}
+
 std::function<bool(double)> Between(double low, double high) {
   return [low, high](double value) { return value >= low && value <= high; };
+}
+
+// The right name in the wrong section is the likeliest slip; else a slip in the name itself.
+std::string PathHint(const std::string& path, const std::string& key, const std::string& above,
+                     const std::vector<std::string>& keys,
+                     const std::map<std::string, std::string>& values) {
+  const std::string name = fmt::format(".{}", path.substr(path.rfind('.') + 1));
+  for (const auto& [known, value] : values) {
+    if (known.starts_with(above) && known.ends_with(name)) {
+      return fmt::format("; did you mean '{}'?", known);
+    }
+  }
+  return NearestWordHint(key.substr(0, key.find('.')), keys, above);
 }
 
 }  // namespace
@@ -97,8 +117,41 @@ YamlOptions::~YamlOptions() = default;
 YamlOptions::YamlOptions(YamlOptions&&) noexcept = default;
 YamlOptions& YamlOptions::operator=(YamlOptions&&) noexcept = default;
 
+YamlOptions::Entry* YamlOptions::Find(const std::string& key) const {
+  const auto entry = std::ranges::find(entries_, key, &Entry::key);
+  return entry == entries_.end() ? nullptr : entry->get();
+}
+
+std::vector<std::string> YamlOptions::Keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : entries_) {
+    keys.push_back(entry->key);
+  }
+  return keys;
+}
+
+std::map<std::string, std::string> YamlOptions::Values() const {
+  std::map<std::string, std::string> values;
+  for (const auto& entry : entries_) {
+    if (!entry->section) {
+      const std::string text = entry->print({.help = false});  // " 16\n"
+      values[entry->key] = text.substr(1, text.size() - 2);
+      continue;
+    }
+    for (const auto& [path, value] : entry->section->Values()) {
+      values[fmt::format("{}.{}", entry->key, path)] = value;
+    }
+  }
+  return values;
+}
+
+YamlOptions* YamlOptions::FindSection(const std::string& key) {
+  Entry* const entry = Find(key);
+  return entry == nullptr ? nullptr : entry->section.get();
+}
+
 YamlOptions::Entry& YamlOptions::NewEntry(const std::string& key) {
-  if (std::ranges::any_of(entries_, [&](const auto& entry) { return entry->key == key; })) {
+  if (Find(key) != nullptr) {
     throw std::logic_error(fmt::format("option '{}' is bound twice", key));
   }
   entries_.push_back(std::make_unique<Entry>());
@@ -113,7 +166,7 @@ void YamlOptions::AddScalar(const std::string& key, const std::string& type, T* 
                              const std::string& path) {
     *value = ScalarValue<T>(node, file, path, type);
   };
-  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+  entry.print = [value](const Style&) { return fmt::format(" {}\n", ScalarText(*value)); };
 }
 
 void YamlOptions::AddWithin(const std::string& key, const std::string& type,
@@ -123,7 +176,7 @@ void YamlOptions::AddWithin(const std::string& key, const std::string& type,
                                         const std::string& path) {
     *value = ValueWithin<double>(node, file, path, type, is_within);
   };
-  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+  entry.print = [value](const Style&) { return fmt::format(" {}\n", ScalarText(*value)); };
 }
 
 void YamlOptions::AddBetween(const std::string& key, double low, double high, double* value) {
@@ -136,7 +189,7 @@ void YamlOptions::AddBetween(const std::string& key, int32_t low, int32_t high, 
     *value = ValueWithin<int32_t>(node, file, path, RangeText("a whole number", low, high),
                                   Between(low, high));
   };
-  entry.print = [value](int) { return fmt::format(" {}\n", ScalarText(*value)); };
+  entry.print = [value](const Style&) { return fmt::format(" {}\n", ScalarText(*value)); };
 }
 
 void YamlOptions::AddBetween(const std::string& key, double low, double high,
@@ -160,7 +213,7 @@ void YamlOptions::Add(const std::string& key, std::optional<double>* value) {
       *value = ScalarValue<double>(node, file, path, "a number");
     }
   };
-  entry.print = [value](int) {
+  entry.print = [value](const Style&) {
     return fmt::format(" {}\n", value->has_value() ? ScalarText(**value) : "~");
   };
 }
@@ -180,7 +233,7 @@ void YamlOptions::AddScalars(const std::string& key, const std::string& type,
     }
     *value = std::move(items);
   };
-  entry.print = [value](int) {
+  entry.print = [value](const Style&) {
     std::string text;
     for (const T& item : *value) {
       text += fmt::format("{}{}", text.empty() ? "" : ", ", ScalarText(item));
@@ -189,9 +242,23 @@ void YamlOptions::AddScalars(const std::string& key, const std::string& type,
   };
 }
 
-void YamlOptions::Add(const std::string& key, bool* value) {
+void YamlOptions::Add(const std::string& key, bool* value, const std::string& help) {
   AddScalar(key, "true or false", value);
+  entries_.back()->help = help;
 }
+
+void YamlOptions::Add(const std::string& key, int32_t* value, const OptionBounds& bounds,
+                      const std::string& unit, const std::string& help) {
+  AddBetween(key, static_cast<int32_t>(bounds.low), static_cast<int32_t>(bounds.high), value);
+  entries_.back()->help = HelpText(bounds, unit, help);
+}
+
+void YamlOptions::Add(const std::string& key, double* value, const OptionBounds& bounds,
+                      const std::string& unit, const std::string& help) {
+  AddBetween(key, bounds.low, bounds.high, value);
+  entries_.back()->help = HelpText(bounds, unit, help);
+}
+
 void YamlOptions::Add(const std::string& key, int32_t* value) {
   AddScalar(key, "a whole number", value);
 }
@@ -223,8 +290,9 @@ void YamlOptions::Add(const std::string& key, std::vector<std::string>* value) {
 
 void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string>& names,
                            const std::function<void(size_t)>& set,
-                           const std::function<size_t()>& get) {
+                           const std::function<size_t()>& get, const std::string& help) {
   Entry& entry = NewEntry(key);
+  entry.help = help.empty() ? "" : fmt::format("{}: {}", fmt::join(names, ", "), help);
   entry.read = [names, set](const YAML::Node& node, const std::string& file,
                             const std::string& path) {
     const auto found = node.IsScalar() ? std::ranges::find(names, node.Scalar()) : names.end();
@@ -233,18 +301,19 @@ void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string
     }
     set(static_cast<size_t>(found - names.begin()));
   };
-  entry.print = [names, get](int) { return fmt::format(" {}\n", names[get()]); };
+  entry.print = [names, get](const Style&) { return fmt::format(" {}\n", names[get()]); };
 }
 
-YamlOptions& YamlOptions::Section(const std::string& key) {
+YamlOptions& YamlOptions::Section(const std::string& key, const std::string& help) {
   Entry& entry = NewEntry(key);
+  entry.help = help;
   entry.section = std::make_unique<YamlOptions>();
   YamlOptions* section = entry.section.get();
   entry.read = [section](const YAML::Node& node, const std::string& file, const std::string& path) {
     section->Read(node, file, path + ".");
   };
-  entry.print = [section](int indent) {
-    return fmt::format("\n{}", section->PrintIndented(indent + 2));
+  entry.print = [section](const Style& style) {
+    return fmt::format("\n{}", section->PrintStyled({style.indent + 2, style.help}));
   };
   return *section;
 }
@@ -263,12 +332,12 @@ void YamlOptions::AddSequence(const std::string& key,
       items[i].Read(node[i], file, fmt::format("{}[{}].", path, i));
     }
   };
-  entry.print = [current = std::move(current)](int indent) {
+  entry.print = [current = std::move(current)](const Style& style) {
     const std::vector<YamlOptions> items = current();
     std::string text = items.empty() ? " []\n" : "\n";
     for (const YamlOptions& item : items) {
-      std::string block = item.PrintIndented(indent + 4);
-      block[static_cast<size_t>(indent) + 2] = '-';
+      std::string block = item.PrintStyled({style.indent + 4, style.help});
+      block[static_cast<size_t>(style.indent) + 2] = '-';
       text += block;
     }
     return text;
@@ -284,20 +353,19 @@ void YamlOptions::AddOptionalSection(const std::string& key, std::function<YamlO
       start().Read(node, file, path + ".");
     }
   };
-  entry.print = [current = std::move(current)](int indent) {
+  entry.print = [current = std::move(current)](const Style& style) {
     const std::optional<YamlOptions> section = current();
-    return section ? fmt::format("\n{}", section->PrintIndented(indent + 2)) : std::string(" ~\n");
+    return section ? fmt::format("\n{}", section->PrintStyled({style.indent + 2, style.help}))
+                   : std::string(" ~\n");
   };
 }
 
 void YamlOptions::Require(const std::string& key) {
-  for (const auto& entry : entries_) {
-    if (entry->key == key) {
-      entry->required = true;
-      return;
-    }
+  Entry* const entry = Find(key);
+  if (entry == nullptr) {
+    throw std::logic_error(fmt::format("option '{}' is required but not bound", key));
   }
-  throw std::logic_error(fmt::format("option '{}' is required but not bound", key));
+  entry->required = true;
 }
 
 void YamlOptions::Read(const YAML::Node& node, const std::string& file, const std::string& path) {
@@ -316,16 +384,12 @@ void YamlOptions::Read(const YAML::Node& node, const std::string& file, const st
       throw std::runtime_error(
           fmt::format("{}: key '{}{}' stands twice", Where(file, item.first), path, key));
     }
-    const auto entry = std::ranges::find_if(entries_, [&](const auto& e) { return e->key == key; });
-    if (entry == entries_.end()) {
-      std::vector<std::string> known;
-      for (const auto& e : entries_) {
-        known.push_back(e->key);
-      }
+    const Entry* const entry = Find(key);
+    if (entry == nullptr) {
       throw std::runtime_error(fmt::format("{}: unknown key '{}{}'{}", Where(file, item.first),
-                                           path, key, NearestWordHint(key, known, path)));
+                                           path, key, NearestWordHint(key, Keys(), path)));
     }
-    (*entry)->read(item.second, file, path + key);
+    entry->read(item.second, file, path + key);
   }
   for (const auto& entry : entries_) {
     if (entry->required && !seen.contains(entry->key)) {
@@ -348,14 +412,41 @@ void YamlOptions::ReadText(const std::string& text, const std::string& name) {
 
 void YamlOptions::ReadFile(const std::string& path) { ReadText(ReadTextFile(path), path); }
 
-std::string YamlOptions::PrintIndented(int indent) const {
+void YamlOptions::Set(const std::string& path, const std::string& text) {
+  YamlOptions* section = this;
+  std::string above;  // "window."
+  std::string key = path;
+  for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.')) {
+    YamlOptions* const next = section->FindSection(key.substr(0, dot));
+    if (next == nullptr) {
+      break;
+    }
+    section = next;
+    above += key.substr(0, dot + 1);
+    key.erase(0, dot + 1);
+  }
+  const Entry* const entry = section->Find(key);
+  if (entry == nullptr || entry->section) {
+    throw std::runtime_error(fmt::format("no option '{}'{}", path,
+                                         PathHint(path, key, above, section->Keys(), Values())));
+  }
+  entry->read(YAML::Node(text), "--set", path);
+}
+
+std::string YamlOptions::PrintStyled(const Style& style) const {
   std::string text;
   for (const auto& entry : entries_) {
-    text += fmt::format("{:{}}{}:{}", "", indent, entry->key, entry->print(indent));
+    std::string value = entry->print(style);
+    if (style.help && !entry->help.empty()) {
+      value.insert(value.find('\n'), fmt::format("  # {}", entry->help));
+    }
+    text += fmt::format("{:{}}{}:{}", "", style.indent, entry->key, value);
   }
   return text;
 }
 
-std::string YamlOptions::Print() const { return PrintIndented(0); }
+std::string YamlOptions::Print() const { return PrintStyled({}); }
+
+std::string YamlOptions::PrintWithoutHelp() const { return PrintStyled({.help = false}); }
 
 }  // namespace pangea

@@ -1,24 +1,34 @@
 #pragma once
 
 // Options on disk: YAML keys bound to the members of plain structs, strictly. An unknown or doubled
-// key, a wrong type and a missing required key are errors that name file, line and key, and for an
-// unknown key the nearest known one.
+// key, a wrong type, a value out of its bounds and a missing required key are errors that name
+// file, line and key, and for an unknown key the nearest known one.
 //
-//   void Bind(YamlOptions& yaml, FusionOptions& o) {
-//     yaml.Add("min_inliers", &o.min_inliers);
-//     Bind(yaml.Section("window"), o.window);
-//     yaml.AddChoice("scope", &o.scope, {{"all", Scope::kAll}, {"paper", Scope::kPaper}});
-//   }
+// An options struct is described once, by its Visit: key, bounds, unit, a line of help. Visit is a
+// template, so that the struct need not know this file:
+//
+//   struct FusionOptions {
+//     int min_inliers = 16;
+//     WindowOptions window;
+//
+//     template <typename Archive>
+//     void Visit(Archive& archive) {
+//       archive.Add("min_inliers", &min_inliers, {4, 100000}, "", "distinct landmarks");
+//       archive.Section("window", &window, "the local windows that are aligned");
+//     }
+//   };
 //   FusionOptions options;
 //   YamlOptions yaml;
-//   Bind(yaml, options);
-//   yaml.ReadFile(path);              // throws std::runtime_error; other keys keep their defaults
-//   std::string text = yaml.Print();  // the effective options, readable by ReadFile
+//   options.Visit(yaml);
+//   yaml.ReadFile(path);              // throws std::runtime_error; other keys keep their values
+//   yaml.Set("window.num_keyframes", "7");
+//   std::string text = yaml.Print();  // the options in force, readable by ReadFile
 //
 // The bound struct must outlive the YamlOptions.
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,6 +41,12 @@ class Node;
 
 namespace pangea {
 
+// Both are taken.
+struct OptionBounds {
+  double low = 0;
+  double high = 0;
+};
+
 class YamlOptions {
  public:
   YamlOptions();
@@ -38,7 +54,13 @@ class YamlOptions {
   YamlOptions(YamlOptions&&) noexcept;
   YamlOptions& operator=(YamlOptions&&) noexcept;
 
-  void Add(const std::string& key, bool* value);
+  // With what people are told beside the value: `unit` (empty for a count or a share), `help`.
+  void Add(const std::string& key, int32_t* value, const OptionBounds& bounds,
+           const std::string& unit, const std::string& help);
+  void Add(const std::string& key, double* value, const OptionBounds& bounds,
+           const std::string& unit, const std::string& help);
+
+  void Add(const std::string& key, bool* value, const std::string& help = "");
   void Add(const std::string& key, int32_t* value);
   void Add(const std::string& key, int64_t* value);
   void Add(const std::string& key, uint64_t* value);
@@ -62,7 +84,7 @@ class YamlOptions {
   // An enum by names.
   template <typename Enum>
   void AddChoice(const std::string& key, Enum* value,
-                 std::vector<std::pair<std::string, Enum>> choices) {
+                 std::vector<std::pair<std::string, Enum>> choices, const std::string& help = "") {
     std::vector<std::string> names;
     names.reserve(choices.size());
     for (const auto& [name, choice] : choices) {
@@ -76,11 +98,17 @@ class YamlOptions {
             ++index;
           }
           return index;
-        });
+        },
+        help);
   }
 
   // A nested struct: bind its members to what this returns (valid as long as *this).
-  YamlOptions& Section(const std::string& key);
+  YamlOptions& Section(const std::string& key, const std::string& help = "");
+  // One that describes itself.
+  template <typename T>
+  void Section(const std::string& key, T* value, const std::string& help) {
+    value->Visit(Section(key, help));
+  }
 
   // A list of structs, each bound by `bind(yaml, item)`; the file's list replaces the default.
   template <typename T, typename BindItem>
@@ -120,8 +148,18 @@ class YamlOptions {
   // `name` stands for the file in messages.
   void ReadText(const std::string& text, const std::string& name);
 
-  // All keys with their values now, as YAML.
+  // One value by its path, "window.num_keyframes"; the text is as in a file. Throws
+  // std::runtime_error, and names the nearest path that is known.
+  void Set(const std::string& path, const std::string& text);
+  // The section of that key; nullptr if there is none.
+  YamlOptions* FindSection(const std::string& key);
+
+  // All keys with their values now, as YAML; bounds, unit and help stand beside them as comments.
   std::string Print() const;
+  std::string PrintWithoutHelp() const;
+  std::vector<std::string> Keys() const;
+  // By path, those of sections included.
+  std::map<std::string, std::string> Values() const;
 
  private:
   struct Entry;
@@ -136,7 +174,8 @@ class YamlOptions {
   }
 
   void AddNamed(const std::string& key, const std::vector<std::string>& names,
-                const std::function<void(size_t)>& set, const std::function<size_t()>& get);
+                const std::function<void(size_t)>& set, const std::function<size_t()>& get,
+                const std::string& help);
   void AddSequence(const std::string& key, std::function<std::vector<YamlOptions>(size_t)> resize,
                    std::function<std::vector<YamlOptions>()> current);
   void AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
@@ -147,7 +186,12 @@ class YamlOptions {
   void AddScalars(const std::string& key, const std::string& type, std::vector<T>* value);
   Entry& NewEntry(const std::string& key);
   void Read(const YAML::Node& node, const std::string& file, const std::string& path);
-  std::string PrintIndented(int indent) const;
+  Entry* Find(const std::string& key) const;
+  struct Style {
+    int indent = 0;
+    bool help = true;
+  };
+  std::string PrintStyled(const Style& style) const;
 
   std::vector<std::unique_ptr<Entry>> entries_;
 };

@@ -258,6 +258,65 @@ TEST(YamlOptions, WhatIsPrintedReadsBackTheSame) {
   EXPECT_EQ(second.Print(), printed);
 }
 
+struct Described {
+  int stride = 3;
+  double sigma_m = 0.1;
+  bool equalize = true;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("stride", &stride, {1, 1000}, "", "every so many");
+    archive.Add("sigma_m", &sigma_m, {0.001, 10}, "m", "");
+    archive.Add("equalize", &equalize, "the image first");
+  }
+};
+
+struct Outer {
+  Described check;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("check", &check, "of what is seen");
+  }
+};
+
+TEST(YamlOptions, BoundsUnitAndHelpStandBesideTheValues) {
+  Outer outer;
+  YamlOptions yaml;
+  outer.Visit(yaml);
+  EXPECT_EQ(yaml.Print(),
+            "check:  # of what is seen\n"
+            "  stride: 3  # 1 to 1000: every so many\n"
+            "  sigma_m: 0.1  # 0.001 to 10 m\n"
+            "  equalize: true  # the image first\n");
+  EXPECT_EQ(yaml.PrintWithoutHelp(), "check:\n  stride: 3\n  sigma_m: 0.1\n  equalize: true\n");
+  const std::string printed = yaml.Print();
+  yaml.ReadText(printed, "printed");
+  EXPECT_EQ(yaml.Print(), printed);
+}
+
+TEST(YamlOptions, OneValueIsSetByItsPath) {
+  Outer outer;
+  YamlOptions yaml;
+  outer.Visit(yaml);
+  yaml.Set("check.stride", "7");
+  EXPECT_EQ(outer.check.stride, 7);
+  EXPECT_EQ(yaml.Values().at("check.stride"), "7");
+  const auto complaint = [&yaml](const std::string& path, const std::string& value) -> std::string {
+    try {
+      yaml.Set(path, value);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(complaint("check.stride", "0"),
+            "--set: key 'check.stride' must be a whole number from 1 to 1000, not '0'");
+  EXPECT_EQ(complaint("stride", "7"), "no option 'stride'; did you mean 'check.stride'?");
+  EXPECT_EQ(complaint("check.strid", "7"), "no option 'check.strid'; did you mean 'check.stride'?");
+  EXPECT_EQ(outer.check.stride, 7);
+}
+
 TEST(YamlOptions, BindingAKeyTwiceIsAProgrammersMistake) {
   YamlOptions yaml;
   int value = 0;

@@ -30,6 +30,19 @@ struct EpipolarOptions {
   int min_inliers = 10;
   // log10 of how many sets of unrelated matches would be expected to pass: at most.
   double max_log10_false_alarms = -2.0;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("max_residual", &max_residual, {0.1, 100}, "sigmas",
+                "of an inlier: pixels at the image centre, on octave 0");
+    archive.Add("gravity_sigma", &gravity_sigma, {0, 1}, "rad", "between the two odom frames");
+    archive.Add("max_iterations", &max_iterations, {1, 100000}, "", "of RANSAC");
+    archive.Add("confidence", &confidence, {0.5, 0.999999}, "",
+                "of RANSAC: that an outlier-free sample was drawn");
+    archive.Add("min_inliers", &min_inliers, {5, 10000}, "", "of a place that is recognised");
+    archive.Add("max_log10_false_alarms", &max_log10_false_alarms, {-300, 10}, "",
+                "log10 of the expected number of sets of unrelated matches that pass");
+  }
 };
 
 // A corner's ray: unit length, in its keyframe's odom (gravity-aligned) axes; sigma in radians.

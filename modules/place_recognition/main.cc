@@ -6,12 +6,14 @@
 #include "place_recognition/place_recognition_process.h"
 
 int main(int argc, char** argv) {
+  pangea::PlaceRecognitionOptions options;
+  pangea::YamlOptions yaml;
+  options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-place-recognition",
-       "Finds, for each keyframe, the older keyframes of all maps that show the same place."},
-      [](pangea::Bus& bus) {
-        return std::make_unique<pangea::PlaceRecognitionProcess>(bus,
-                                                                 pangea::PlaceRecognitionOptions{});
+       "Finds, for each keyframe, the older keyframes of all maps that show the same place.", yaml},
+      [&](pangea::Bus& bus) {
+        return std::make_unique<pangea::PlaceRecognitionProcess>(bus, options);
       });
 }

@@ -35,6 +35,14 @@ struct PlaceRecognitionOptions {
     int places = 0;            // verified: the best by retrieval
     int continued_places = 0;  // and those next to where the previous keyframe was recognised
     int candidates = 0;        // published at most: each costs its consumer a bundle adjustment
+
+    template <typename Archive>
+    void Visit(Archive& archive) {
+      archive.Add("places", &places, {0, 1000}, "", "verified: the best by retrieval");
+      archive.Add("continued_places", &continued_places, {0, 1000}, "",
+                  "and those next to where the previous keyframe was recognised");
+      archive.Add("candidates", &candidates, {0, 200}, "", "published at most");
+    }
   };
   Search own{.places = 5, .continued_places = 2, .candidates = 3};
   Search others{.places = 8, .continued_places = 3, .candidates = 5};
@@ -45,6 +53,21 @@ struct PlaceRecognitionOptions {
   // Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
   MatchingOptions guided_matching{.max_distance = 64, .max_ratio = 0.9, .other_corner_px = 5.0};
   EpipolarOptions epipolar;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("min_seq_gap", &min_seq_gap, {1, 1000000}, "keyframes",
+                "of the own map that are too recent");
+    archive.Add("place_half_width", &place_half_width, {0, 1000}, "keyframes",
+                "of one place, to either side");
+    archive.Section("own", &own, "in the query's own map");
+    archive.Section("others", &others, "in other maps");
+    archive.Add("max_keyframes", &max_keyframes, {1, 1000000}, "",
+                "that are remembered, about 90 kB each");
+    archive.Section("matching", &matching, "descriptors of two keyframes");
+    archive.Section("guided_matching", &guided_matching, "along the epipolar lines");
+    archive.Section("epipolar", &epipolar, "two-view check");
+  }
 };
 
 // A place that was looked at and how far it came, for whoever measures this module.

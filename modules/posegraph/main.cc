@@ -2,17 +2,16 @@
 
 #include "bus/process_main.h"
 #include "posegraph/posegraph_process.h"
-#include "posegraph/posegraph_yaml.h"
 
 // KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT --> PoseGraphProcess --> CORRECTION_*, MAP_STATE
 int main(int argc, char** argv) {
   pangea::PoseGraphOptions options;
   pangea::YamlOptions yaml;
-  pangea::Bind(yaml, options);
+  options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-posegraph", "Groups maps, optimises every keyframe's pose, tells agents their drift",
-       &yaml},
+       yaml},
       [&](pangea::Bus& bus) {
         return std::make_unique<pangea::PoseGraphProcess>(bus, options, pangea::WallUtime());
       });

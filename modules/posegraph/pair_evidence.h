@@ -40,6 +40,31 @@ struct MergeOptions {
   // weight of the solve): standard deviations per metre of path.
   double min_drift_per_m = 0.02;
   double min_yaw_drift_per_m = 0.001;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("min_viewpoints", &min_viewpoints, {1, 1000}, "", "that must agree");
+    archive.Add("min_strong_viewpoints", &min_strong_viewpoints, {1, 1000}, "",
+                "that are enough, if each is strong");
+    archive.Add("strong_inliers", &strong_inliers, {4, 100000}, "", "of a strong viewpoint");
+    archive.Add("viewpoint_distance_m", &viewpoint_distance_m, {0, 1000}, "m",
+                "by which a keyframe is another viewpoint");
+    archive.Add("viewpoint_angle", &viewpoint_angle, {0, 3.15}, "rad",
+                "by which a keyframe is another viewpoint");
+    archive.Add("min_scene_extent_m", &min_scene_extent_m, {0, 1000}, "m",
+                "of what the agreeing viewpoints see; less is one spot");
+    archive.Add("min_viewpoints_at_one_spot", &min_viewpoints_at_one_spot, {1, 1000}, "",
+                "that must agree where all see one spot");
+    archive.Add("max_rival_share_at_one_spot", &max_rival_share_at_one_spot, {0, 1}, "",
+                "of the viewpoints, where all see one spot");
+    archive.Add("max_rival_share", &max_rival_share, {0, 1}, "", "of the viewpoints");
+    archive.Add("agree_chi2", &agree_chi2, {0.1, 1000}, "",
+                "of two constraints that agree, 4 degrees of freedom");
+    archive.Add("min_drift_per_m", &min_drift_per_m, {0, 1}, "",
+                "sigma of the odometry, of its path, while maps are compared");
+    archive.Add("min_yaw_drift_per_m", &min_yaw_drift_per_m, {0, 1}, "rad/m",
+                "sigma of the odometry's yaw, while maps are compared");
+  }
 };
 
 // Covariance of the odometry between two nodes of a map, at a point, with the options' least drift

@@ -49,6 +49,20 @@ struct PoseGraphOptions {
   int max_keyframes_waiting = 10;
   // A group's state is published again after so many new keyframes, and 2 % of the group.
   int state_every = 10;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.AddChoice("scope", &scope, {{"all", Scope::kAll}, {"paper", Scope::kPaper}},
+                      "keyframes that are free: all but one, or as in the paper");
+    archive.Add("keyframes_per_waiting_loop", &keyframes_per_waiting_loop, {1, 1000000}, "",
+                "of a group: it waits for one more loop before it solves");
+    archive.Add("max_keyframes_waiting", &max_keyframes_waiting, {0, 1000000}, "",
+                "new keyframes for which loops wait at most");
+    archive.Add("state_every", &state_every, {1, 1000000}, "",
+                "new keyframes, and 2 % of the group");
+    archive.Section("merge", &merge, "when maps become one group");
+    archive.Section("solver", &solver, "graduated non-convexity");
+  }
 };
 
 struct PoseGraphUpdate {

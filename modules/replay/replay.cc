@@ -17,6 +17,7 @@
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
 #include "pangea/again_t.hpp"
+#include "pangea/options_t.hpp"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"
 #include "replay/keyframe_log.h"
@@ -30,16 +31,34 @@ namespace fs = std::filesystem;
 // the clock's.
 class Recorder {
  public:
-  Recorder(Bus& bus, const fs::path& log) : log_(log.string()) {
+  Recorder(Bus& bus, const ServerOptions& options, const fs::path& log)
+      : options_(options), log_(log.string()) {
     bus.Subscribe(".*", [this](const std::string& channel, Bytes data) {
       log_.Write(utime_++, channel, data);
     });
   }
 
-  // Events never share a stamp, so that tools which sort by it keep their order.
-  void SetTime(int64_t utime) { utime_ = std::max(utime, utime_); }
+  // Events never share a stamp, so that tools which sort by it keep their order; but the options
+  // have that of the first event, which so is when it was without them.
+  void SetTime(int64_t utime) {
+    if (utime_ == 0) {
+      WriteOptions(utime);
+    }
+    utime_ = std::max(utime, utime_);
+  }
 
  private:
+  void WriteOptions(int64_t utime) {
+    for (const auto& [process, text] : TextsByProcess(options_)) {
+      options_t message{};
+      message.process = process;
+      message.utime = utime;
+      message.yaml = text;
+      log_.Write(utime, channels::Options(process), EncodeMessage(message));
+    }
+  }
+
+  const ServerOptions options_;
   LogFileWriter log_;
   int64_t utime_ = 0;
 };
@@ -47,22 +66,23 @@ class Recorder {
 // The server's processes, or some of them.
 class Server {
  public:
-  Server(LocalBus& bus, const std::set<std::string>& processes) : bus_(bus) {
+  Server(LocalBus& bus, const ServerOptions& options, const std::set<std::string>& processes)
+      : bus_(bus) {
     const auto wanted = [&processes](const char* process) { return processes.contains(process); };
     if (wanted("place_recognition")) {
-      place_recognition_.emplace(bus, PlaceRecognitionOptions{});
+      place_recognition_.emplace(bus, options.place_recognition);
     }
     if (wanted("inter_map_ba")) {
-      inter_map_ba_.emplace(bus, InterMapBaOptions{});
+      inter_map_ba_.emplace(bus, options.inter_map_ba);
     }
     if (wanted("fusion")) {
-      fusion_.emplace(bus, FusionOptions{});
+      fusion_.emplace(bus, options.fusion);
     }
     if (wanted("posegraph")) {
-      posegraph_.emplace(bus, PoseGraphOptions{});
+      posegraph_.emplace(bus, options.posegraph);
     }
     if (wanted("global_ba")) {
-      global_ba_.emplace(bus, GlobalBaOptions{});
+      global_ba_.emplace(bus, options.global_ba);
     }
   }
 
@@ -198,8 +218,8 @@ int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
 
 }  // namespace
 
-ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs::path& out_log,
-                     LogReadings* readings) {
+ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& options,
+                     double until_s, const fs::path& out_log, LogReadings* readings) {
   UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
   for (const fs::path& log : logs) {
@@ -210,8 +230,8 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, double until_s, const fs
   DropLater(until_s, &keyframes);
 
   LocalBus bus;
-  Recorder recorder(bus, out_log);
-  Server server(bus, {std::begin(kReplayed), std::end(kReplayed)});
+  Recorder recorder(bus, options, out_log);
+  Server server(bus, options, {std::begin(kReplayed), std::end(kReplayed)});
   ReplaySummary summary;
   for (const LoggedKeyframe& keyframe : keyframes) {
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
@@ -234,7 +254,7 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
   ReadKeyframeLog(log, readings);  // throws if keyframes are missing
   std::vector<LoggedMessage> messages = ReadMessages(part.processes, log, part.until_s, readings);
   LocalBus bus;
-  Server server(bus, part.processes);
+  Server server(bus, part.options, part.processes);
   int64_t taken_over = 0;
   if (part.checkpoint_s) {
     taken_over = TakeOver(Past(messages, *part.checkpoint_s), bus);
@@ -251,7 +271,7 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
   while (after_input > 0 && !IsInput(messages[after_input - 1])) {
     --after_input;
   }
-  Recorder recorder(bus, out_log);
+  Recorder recorder(bus, part.options, out_log);
   bool finished = false;
   for (size_t i = 0; i < messages.size(); ++i) {
     recorder.SetTime(messages[i].utime);

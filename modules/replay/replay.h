@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "log_file/log_reading.h"
+#include "server_options/server_options.h"
 
 namespace pangea::session {
 
@@ -24,11 +25,13 @@ struct ReplaySummary {
 // Reads the keyframes of `logs` and writes everything the server says about them, with them, to
 // `out_log` (an LCM log like a session's). Several logs are interleaved by the time since each
 // one's first keyframe, as if they had started together; the first log's map is the oldest.
+// They run with `options`, which the log says first (OPTIONS_*), so that a replay of it has them.
 // `until_s`: only keyframes of so many seconds, since the log's first event, or since the first
 // keyframes of several. Throws std::runtime_error for a log that cannot be read, has no keyframes,
 // or has gaps (named). What of a log is lost is noted in `readings` (log_reader.h), here and below.
-ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, double until_s,
-                     const std::filesystem::path& out_log, LogReadings* readings = nullptr);
+ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, const ServerOptions& options,
+                     double until_s, const std::filesystem::path& out_log,
+                     LogReadings* readings = nullptr);
 
 inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
                                             "posegraph", "global_ba"};
@@ -39,6 +42,7 @@ struct ReplayedPart {
   // log's.
   std::optional<double> checkpoint_s;
   double until_s = std::numeric_limits<double>::infinity();
+  ServerOptions options;
 };
 
 // Some of these processes alone, or all of them from a checkpoint on, fed with what was said in the

@@ -9,10 +9,12 @@
 #include <memory>
 #include <stdexcept>
 
+#include "bus/process.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/recording_arguments.h"
 #include "replay/replay.h"
+#include "report/compare.h"
 #include "report/session_record.h"
 #include "session/session_file.h"
 #include "session/session_list.h"
@@ -84,6 +86,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   PrepareOut(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
+  WriteTiming(summary.wall_s, options.out);
   const int exit_code = Print(ReportRun(script, summary, options.out, readings));
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
@@ -116,6 +119,8 @@ SessionRecord KnownOf(const LogArguments& arguments) {
 }
 
 struct ReplayArguments : LogArguments {
+  std::string options;
+  std::vector<std::string> set;
   double until_s = std::numeric_limits<double>::infinity();
   std::optional<double> checkpoint_s;
   std::vector<std::string> only;
@@ -129,9 +134,23 @@ int PrintDiff(const std::string& a, const std::string& b, double until_s, LogRea
   return diff.First() == nullptr ? 0 : kMissed;
 }
 
+// Those of the logs, what was given on the command line over them; and says which they are.
+ServerOptions OptionsOf(const ReplayArguments& arguments, LogReadings* readings) {
+  LoggedOptions logged =
+      ReadLoggedOptions({arguments.logs.begin(), arguments.logs.end()}, readings);
+  Override(arguments.options, arguments.set, &logged.options);
+  for (const std::string& note : logged.notes) {
+    std::cout << note << "\n";
+  }
+  for (const std::string& other : OtherThanDefault(logged.options)) {
+    std::cout << fmt::format("option {}\n", other);
+  }
+  return logged.options;
+}
+
 // With --only or --from-checkpoint: what is not run, or not yet, is taken from the log.
-void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log,
-                   LogReadings* readings) {
+void RunReplayPart(const ReplayArguments& arguments, const ServerOptions& options,
+                   const std::string& out_log, LogReadings* readings) {
   if (arguments.logs.size() != 1) {
     throw std::runtime_error(
         fmt::format("{}: takes one log, which has what is not to be retransmitted",
@@ -144,6 +163,7 @@ void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log,
     part.processes = {arguments.only.begin(), arguments.only.end()};
   }
   part.checkpoint_s = arguments.checkpoint_s;
+  part.options = options;
   const int64_t taken_over = ReplayPart(log, part, out_log, readings);
   if (arguments.checkpoint_s) {
     std::cout << fmt::format(
@@ -155,8 +175,9 @@ void RunReplayPart(const ReplayArguments& arguments, const std::string& out_log,
 // Some processes alone, and where what they say now parts from what they said.
 int RunReplayOnly(const ReplayArguments& arguments, LogReadings* readings) {
   const std::string log = fs::path(arguments.out) / "session.lcm";
+  const ServerOptions options = OptionsOf(arguments, readings);
   PrepareOut(arguments.out);
-  RunReplayPart(arguments, log, readings);
+  RunReplayPart(arguments, options, log, readings);
   return PrintDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
                    arguments.until_s, readings);
 }
@@ -181,15 +202,18 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
     return RunReplayOnly(arguments, readings);
   }
   const SessionRecord known = KnownOf(arguments);
+  const ServerOptions options = OptionsOf(arguments, readings);
   PrepareOut(out);
+  const int64_t begin = SteadyMicros();
   if (arguments.checkpoint_s) {
-    RunReplayPart(arguments, out / "session.lcm", readings);
+    RunReplayPart(arguments, options, out / "session.lcm", readings);
   } else {
-    const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()},
+    const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()}, options,
                                          arguments.until_s, out / "session.lcm", readings);
     std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                              summary.agent_ids.size());
   }
+  WriteTiming(1e-6 * static_cast<double>(SteadyMicros() - begin), out);
   int exit_code = Print(ReportLog(out / "session.lcm", known, out, readings));
   if (arguments.explain) {
     ExplainInto(out, *arguments.explain, known, readings);
@@ -289,6 +313,16 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
       ->check(CLI::ExistingFile);
   AddResultOptions(*replay, arguments.get());
   replay
+      ->add_option("--options", arguments->options,
+                   "YAML file of options by process (fusion: {alignment: {min_inliers: 20}}), over "
+                   "those of the log")
+      ->check(CLI::ExistingFile);
+  replay
+      ->add_option("--set", arguments->set,
+                   "process.key=value, e.g. fusion.alignment.min_inliers=20; over --options; may "
+                   "be given several times")
+      ->allow_extra_args(false);
+  replay
       ->add_option("--until", arguments->until_s,
                    "Only the first so many seconds of the log (default: all of it)")
       ->check(CLI::PositiveNumber);
@@ -331,6 +365,16 @@ void AddReportCommand(CLI::App& app, CommandResult* result) {
   AddResultOptions(*report, arguments.get());
   report->callback(
       [arguments, result] { result->exit_code = RunReport(*arguments, &result->readings); });
+}
+
+void AddCompareCommand(CLI::App& app) {
+  auto runs = std::make_shared<std::vector<std::string>>();
+  CLI::App* compare =
+      app.add_subcommand("compare", "Reports of several runs side by side, a row each");
+  compare->add_option("runs", *runs, "Folders of run, replay or report")
+      ->required()
+      ->check(CLI::ExistingPath);
+  compare->callback([runs] { std::cout << CompareRuns({runs->begin(), runs->end()}); });
 }
 
 }  // namespace pangea::session

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   pangea::session::AddListCommand(app);
   pangea::session::AddReplayCommand(app, &result);
   pangea::session::AddReportCommand(app, &result);
+  pangea::session::AddCompareCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

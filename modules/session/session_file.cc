@@ -7,7 +7,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "link_emulator/link_conditions_yaml.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
 
@@ -66,6 +65,11 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
           file, agent.id));
+    }
+    if (!agent.keyframes.empty() && agent.vio_options) {
+      throw std::runtime_error(
+          fmt::format("{}: agent {}: with stored keyframes no odometry is run: leave out 'vio'",
+                      file, agent.id));
     }
   }
 }
@@ -132,8 +136,11 @@ SessionScript ParseSessionFile(const fs::path& file) {
         "budget_kb_per_s", "a number from 5 to 1000000 (kB/s), or 0 for no bound",
         [](double kb_per_s) { return kb_per_s == 0 || (kb_per_s >= 5 && kb_per_s <= 1e6); },
         &agent.budget_kb_per_s);
+    item.AddOptional(
+        "vio", &agent.vio_options,
+        [](YamlOptions& section, vio::VioFileOptions& options) { options.Visit(section); });
     item.AddOptional("link", &agent.link,
-                     [](YamlOptions& link, LinkConditions& conditions) { Bind(link, conditions); });
+                     [](YamlOptions& link, LinkConditions& conditions) { conditions.Visit(link); });
   });
   yaml.Require("agents");
   yaml.AddList("faults", &script.faults, [](YamlOptions& item, Fault& fault) {
@@ -144,6 +151,7 @@ SessionScript ParseSessionFile(const fs::path& file) {
     item.AddBetween("disconnect", 1, kMaxAgentId, &fault.disconnect);
     item.AddBetween("seconds", 0, kMaxTime_s, &fault.seconds);
   });
+  yaml.Section("options", &script.options, "");
   const ExpectationsSection expect(yaml, "expect");
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());

@@ -10,6 +10,8 @@
 //   faults:                                             # faults.h
 //     - {at: 12.5, kill: fusion}
 //     - {at: 20, disconnect: 2, seconds: 10}
+//   options:                                            # server_options.h
+//     fusion: {alignment: {min_inliers: 20}}
 //   expect: {fused_by: 40, ate_joint_m: 0.1}            # expectations.h
 
 #include <cstdint>
@@ -20,7 +22,9 @@
 
 #include "link_emulator/link_conditions.h"
 #include "report/expectations.h"
+#include "server_options/server_options.h"
 #include "session/faults.h"
+#include "vio/vio_file_options.h"
 
 namespace pangea::session {
 
@@ -39,15 +43,17 @@ struct AgentScript {
   // running the odometry; the recording is then only its ground truth. Relative to the session
   // file; empty for none.
   std::string keyframes;
-  std::optional<LinkConditions> link;  // a bad link of its own to the server
-  double budget_kb_per_s = 0;          // what its uplink may send, kB/s, 5 .. 1e6; 0: no bound
-  std::filesystem::path resolved;      // the recording's folder, found; empty without a recording
+  std::optional<LinkConditions> link;              // a bad link of its own to the server
+  std::optional<vio::VioFileOptions> vio_options;  // its odometry's options; none: the defaults
+  double budget_kb_per_s = 0;      // what its uplink may send, kB/s, 5 .. 1e6; 0: no bound
+  std::filesystem::path resolved;  // the recording's folder, found; empty without a recording
   std::filesystem::path resolved_keyframes;
 };
 
 struct SessionScript {
   std::vector<AgentScript> agents;
   std::vector<Fault> faults;
+  ServerOptions options;
   Expectations expect;
 };
 

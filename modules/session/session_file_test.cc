@@ -52,6 +52,27 @@ TEST_F(SessionFileTest, ReadsAgentsAndFindsRecordings) {
   EXPECT_EQ(script.agents[1].duration_s, 60);
 }
 
+TEST_F(SessionFileTest, ReadsTheOptionsOfEveryProcess) {
+  const std::string agents = "agents:\n  - {id: 1, recording: ../recordings/MH_01";
+  const SessionScript script = ReadSessionFile(
+      Write(agents + ", vio: {estimator: {window: 9}}}\n"
+                     "options: {fusion: {alignment: {min_inliers: 20}}, place_recognition: "
+                     "{min_seq_gap: 7}}\n"),
+      std::nullopt);
+  ASSERT_TRUE(script.agents[0].vio_options);
+  EXPECT_EQ(script.agents[0].vio_options->vio.estimator.window, 9);
+  EXPECT_EQ(script.options.fusion.alignment.min_inliers, 20);
+  EXPECT_EQ(script.options.place_recognition.min_seq_gap, 7);
+  EXPECT_FALSE(ReadSessionFile(Write(agents + "}\n"), std::nullopt).agents[0].vio_options);
+  EXPECT_THAT(ErrorOf(agents + "}\noptions: {fusion: {alignment: {visibility_stride: 0}}}\n"),
+              HasSubstr("two.yaml:3: key 'options.fusion.alignment.visibility_stride' must be a "
+                        "whole number from 1 to 1000, not '0'"));
+  EXPECT_THAT(ErrorOf(agents + "}\noptions: {fuson: {}}\n"),
+              HasSubstr("did you mean 'options.fusion'?"));
+  EXPECT_THAT(ErrorOf(agents + ", keyframes: one.lcm, vio: {max_points: 10}}\n"),
+              HasSubstr("leave out 'vio'"));
+}
+
 TEST_F(SessionFileTest, ReadsABudget) {
   const std::string agent =
       "agents:\n  - {id: 1, recording: ../recordings/MH_01, budget_kb_per_s: ";

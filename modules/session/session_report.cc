@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "bus/node.h"
+#include "server_options/server_options.h"
 #include "session/session_monitor.h"
 
 namespace pangea::session {
@@ -57,6 +58,15 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadin
   return outcome;
 }
 
+// With which options the server ran, as far as they are not the defaults.
+void NoteOptions(const fs::path& log, LogReadings* readings, ReportInput* input) {
+  const LoggedOptions logged = ReadLoggedOptions({log}, readings);
+  input->notes.insert(input->notes.end(), logged.notes.begin(), logged.notes.end());
+  for (const std::string& other : OtherThanDefault(logged.options)) {
+    input->notes.push_back(fmt::format("option {}", other));
+  }
+}
+
 }  // namespace
 
 ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, const fs::path& out,
@@ -95,6 +105,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
   input.expect = script.expect;
+  NoteOptions(input.server_log, readings, &input);
   return OutcomeOf(input, out, readings);
 }
 
@@ -108,6 +119,7 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }
+  NoteOptions(log, readings, &input);
   return OutcomeOf(input, out, readings);
 }
 

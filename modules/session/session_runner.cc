@@ -8,12 +8,13 @@
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
+#include <map>
 #include <stdexcept>
 
 #include "bus/process.h"
 #include "files/text_file.h"
 #include "link/agent_key.h"
-#include "link_emulator/link_conditions_yaml.h"
+#include "options/yaml_options.h"
 #include "session/buses.h"
 #include "session/child_process.h"
 #include "session/kept_processes.h"
@@ -54,6 +55,7 @@ class Runner {
  public:
   Runner(const SessionScript& script, const RunOptions& options)
       : options_(options),
+        server_options_(script.options),
         faults_(script.faults),
         buses_(OpenBuses(script, options)),
         monitor_(buses_),
@@ -123,6 +125,13 @@ class Runner {
     }
   }
 
+  // The file.
+  std::string WriteOptions(const std::string& process, const std::string& yaml) const {
+    const fs::path file = options_.out / "logs" / (process + ".yaml");
+    WriteTextFile(file, yaml);
+    return file.string();
+  }
+
   // lcm-logger refuses an existing file, and a restarted one must go on in it: append.
   void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
     const auto logger = FindOnPath("lcm-logger");
@@ -137,11 +146,13 @@ class Runner {
     kept_.Start("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link,
                                   "--server", buses_.server, "--journal", options_.journal.string(),
                                   "--keys", (options_.out / "keys").string()});
+    const std::map<std::string, std::string> options = TextsByProcess(server_options_);
     for (const std::string name : kServerProcesses) {
       if (name != "agent_handler") {
         std::string program = "pangea-" + name;
         std::ranges::replace(program, '_', '-');
-        kept_.Start(name, {Program(program), "--bus", buses_.server});
+        kept_.Start(name, {Program(program), "--bus", buses_.server, "--options",
+                           WriteOptions(name, options.at(name))});
       }
       server_names_.push_back(name);
     }
@@ -179,13 +190,11 @@ class Runner {
 
   void StartLinkEmulator(int32_t id, LinkConditions conditions) {
     const std::string name = fmt::format("link_emulator_{}", id);
-    const fs::path file = options_.out / "logs" / (name + ".yaml");
     YamlOptions yaml;
-    Bind(yaml, conditions);
-    WriteTextFile(file, yaml.Print());
+    conditions.Visit(yaml);
     kept_.Start(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id),
                        "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
-                       buses_.agents.at(id), "--options", file.string()});
+                       buses_.agents.at(id), "--options", WriteOptions(name, yaml.Print())});
   }
 
   // A killed player of stored keyframes begins again: what the uplink has is a repeat.
@@ -211,6 +220,11 @@ class Runner {
                   {"--duration", fmt::format("{}", player.script.duration_s - before_s)});
     }
     const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
+    if (player.script.vio_options) {
+      YamlOptions yaml;
+      player.script.vio_options->Visit(yaml);
+      argv.insert(argv.end(), {"--options", WriteOptions(name, yaml.Print())});
+    }
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
     if (player.started == 0) {
       player.started = Now();
@@ -372,6 +386,7 @@ class Runner {
   }
 
   RunOptions options_;
+  ServerOptions server_options_;
   FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;

@@ -9,11 +9,12 @@
 #include <string>
 
 #include "bus/process.h"
+#include "options/yaml_options.h"
 #include "recording/euroc.h"
 #include "vio/live/live_input.h"
 #include "vio/playback.h"
+#include "vio/vio_file_options.h"
 #include "vio/vio_process.h"
-#include "vio/vio_yaml.h"
 
 namespace pangea::vio {
 namespace {
@@ -134,7 +135,7 @@ int RunCommandLine(int argc, char** argv) {
   try {
     VioFileOptions file_options;
     YamlOptions yaml;
-    Bind(yaml, file_options);
+    file_options.Visit(yaml);
     if (!arguments.options_file.empty()) {
       yaml.ReadFile(arguments.options_file);
     }
@@ -145,6 +146,7 @@ int RunCommandLine(int argc, char** argv) {
     Check(arguments);
     arguments.playback.rate = ParseRate(arguments.rate);
     arguments.process.vio = file_options.vio;
+    arguments.process.told_options = yaml.PrintWithoutHelp();
     // The agent shares its machine with the other processes, and one thread gives the same bytes.
     cv::setNumThreads(1);
     return Run(arguments, file_options);

@@ -33,7 +33,8 @@ int8_t ToMessage(EstimatorState state) {
 VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime)
     : options_(options),
       node_(bus, fmt::format("vio_{}", options.agent_id)),
-      outlet_(node_, options.agent_id, kKeptKeyframes, now_utime) {
+      outlet_(node_, options.agent_id, kKeptKeyframes, now_utime),
+      announcer_(bus, node_.name(), options.told_options) {
   node_.Listen<correction_t>(channels::Correction(options_.agent_id),
                              std::bind_front(&VioProcess::OnCorrection, this));
   node_.Listen<landmarks_t>(channels::Landmarks(options_.agent_id),
@@ -202,6 +203,9 @@ void VioProcess::PublishFinished(int64_t now_utime) {
 
 void VioProcess::Tick(int64_t now_utime) {
   outlet_.Tick(now_utime);
+  if (!options_.told_options.empty()) {
+    announcer_.Tick(now_utime);
+  }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
     node_.PublishStatus(now_utime, outlet_.Unacknowledged(), Summary());

@@ -3,7 +3,7 @@
 // The odometry on an agent's bus. Images come from a player (playback.h) or from the bus itself
 // (live_input.h); this class knows only "an image and its inertial samples".
 //
-//   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz out;
+//   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz, OPTIONS_vio_k out;
 //   CORRECTION_k, LANDMARKS_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
 //   keyframe_outlet.h, for the newest kKeptKeyframes.
 
@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bus/node.h"
+#include "bus/options_announcer.h"
 #include "bus/process.h"
 #include "bus/retransmission/keyframe_outlet.h"
 #include "log_file/log_writer.h"
@@ -35,6 +36,8 @@ struct VioProcessOptions {
   VioOptions vio;
   // opened_utime of the first map, one more for each further one; the wall clock without it.
   std::optional<int64_t> map_utime;
+  // What OPTIONS_vio_k says; nothing is said when empty.
+  std::string told_options;
   // Raw odometry at camera rate, TUM; a second map goes to FILE.2, a third to FILE.3.
   std::string out_tum;
   // Keyframes as an LCM log.
@@ -89,6 +92,7 @@ class VioProcess : public Process {
   ShownPose shown_;
   MapLocalization localization_;
   MapId shown_map_;
+  OptionsAnnouncer announcer_;
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";

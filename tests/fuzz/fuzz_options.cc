@@ -4,13 +4,14 @@
 #include <stdexcept>
 
 #include "fuzz.h"
-#include "global_ba/global_ba_yaml.h"
+#include "global_ba/global_ba.h"
 #include "link/agent_key.h"
-#include "loop_verification/loop_verification_yaml.h"
-#include "map_points/map_points_yaml.h"
-#include "posegraph/posegraph_yaml.h"
+#include "loop_verification/drift_gate.h"
+#include "map_points/map_points.h"
+#include "options/yaml_options.h"
+#include "posegraph/posegraph.h"
 #include "session/session_file.h"
-#include "vio/vio_yaml.h"
+#include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {
 namespace {
@@ -19,11 +20,11 @@ template <typename Options>
 void ReadOptions(const std::string& text) {
   Options options;
   YamlOptions yaml;
-  Bind(yaml, options);
+  options.Visit(yaml);
   yaml.ReadText(text, "options.yaml");
   const std::string printed = yaml.Print();
   YamlOptions again;
-  Bind(again, options);
+  options.Visit(again);
   again.ReadText(printed, "printed.yaml");
   Require(again.Print() == printed, "the options printed read back the same");
 }

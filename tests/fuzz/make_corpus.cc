@@ -15,21 +15,22 @@
 #include "bus/transport/test_datagrams.h"
 #include "core/big_endian.h"
 #include "fuzz.h"
-#include "global_ba/global_ba_yaml.h"
+#include "global_ba/global_ba.h"
 #include "link/agent_key.h"
 #include "link/compression.h"
 #include "link_channels.h"
 #include "log_file/log_reader.h"
-#include "loop_verification/loop_verification_yaml.h"
-#include "map_points/map_points_yaml.h"
+#include "loop_verification/drift_gate.h"
+#include "map_points/map_points.h"
 #include "messages/messages.h"
+#include "options/yaml_options.h"
 #include "pangea_schemas.h"
-#include "posegraph/posegraph_yaml.h"
+#include "posegraph/posegraph.h"
 #include "sensor_channels.h"
 #include "server_channels.h"
 #include "uplink/spool.h"
 #include "uplink/uplink.h"
-#include "vio/vio_yaml.h"
+#include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {
 namespace {
@@ -280,7 +281,7 @@ template <typename Options>
 std::string Printed() {
   Options options;
   YamlOptions yaml;
-  Bind(yaml, options);
+  options.Visit(yaml);
   return yaml.Print();
 }
 

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kResendBurst = 64'000;
 constexpr size_t kMaxJournalledBytes = 65'000;
+constexpr size_t kMaxProcesses = 100;
 constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
 constexpr size_t kMaxHaveGaps = 1000;
 // An uplink gives up a gap that its odometry does not fill within ten seconds.
@@ -78,6 +79,9 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
   node_.bus().Subscribe(
       std::string(channels::kConstraint),
       [this](const std::string& channel, Bytes data) { OnAnswer<constraint_t>(channel, data); });
+  node_.bus().Subscribe(
+      std::string(channels::kAllOptions),
+      [this](const std::string& channel, Bytes data) { OnOptions(channel, data); });
   node_.Subscribe<resend_request_t>(
       std::string(channels::kResendRequest),
       [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
@@ -112,6 +116,26 @@ void Archive::OnRetransmission(const again_t& message) {
   }
 }
 
+// Each tells its options every few seconds; they are of its start.
+void Archive::OnOptions(const std::string& channel, Bytes data) {
+  auto options = DecodeAndParse<options_t>(data);
+  if (!options.value) {
+    return node_.Refuse(options.refused);
+  }
+  if (!options_in_force_.contains(options.value->process) &&
+      options_in_force_.size() >= kMaxProcesses) {
+    return node_.Refuse("options of too many processes");
+  }
+  ProcessOptions& known = options_in_force_[options.value->process];
+  if (options.value->utime <= known.utime || journal_->Full()) {
+    return;
+  }
+  if (options.value->yaml != known.yaml) {
+    journal_->Append(now_utime_, channel, data);
+  }
+  known = *std::move(options.value);
+}
+
 void Archive::NoteJournalled(const KeyframeId& id) {
   const auto [highest, is_new] = have_.try_emplace(id.map, id.seq);
   highest->second = std::max(highest->second, id.seq);
@@ -140,7 +164,20 @@ bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPla
   if (channel == channels::kPlaceMatch) {
     return LoadAnswer<place_match_t>(data, place);
   }
+  if (channel.starts_with(channels::kOptionsPrefix)) {
+    return LoadOptions(data);
+  }
   return channel != channels::kConstraint || LoadAnswer<constraint_t>(data, place);
+}
+
+bool Archive::LoadOptions(Bytes data) {
+  auto options = DecodeAndParse<options_t>(data);
+  if (!options.value) {
+    node_.Count("journal_events_unreadable");
+    return !IsDamaged<options_t>(data);
+  }
+  options_in_force_[options.value->process] = *std::move(options.value);
+  return true;
 }
 
 template <typename Message>

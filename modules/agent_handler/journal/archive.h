@@ -5,7 +5,9 @@
 // them.
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
 //               VERDICT_REQUEST out;
-//               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name> in
+//               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name>,
+//               OPTIONS_* in
+// The options of each process are journalled when a start of it brings others than those before.
 
 #include <cstdint>
 #include <deque>
@@ -20,6 +22,7 @@
 #include "agent_handler/journal/resend_queue.h"
 #include "bus/node.h"
 #include "link/pacer.h"
+#include "messages/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/resend_request_t.hpp"
 
@@ -76,9 +79,11 @@ class Archive {
   void OnResendRequest(const resend_request_t& message);
   void OnVerificationRequest(const VerificationRequest& request);
   void OnRetransmission(const again_t& message);
+  void OnOptions(const std::string& channel, Bytes data);
   void NoteJournalled(const KeyframeId& id);
   std::vector<SeqGap> Lost(const MapId& map) const;
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
+  bool LoadOptions(Bytes data);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
   template <typename Message>
   bool LoadAnswer(Bytes data, const JournalPlace& place);
@@ -94,6 +99,7 @@ class Archive {
   int64_t asks_for_gaps_until_utime_ = 0;
   std::map<MapId, int32_t> have_;
   std::vector<MapId> by_age_;
+  std::map<std::string, ProcessOptions> options_in_force_;  // journalled; by process
   OutstandingResults outstanding_;
   ResendQueue resend_queue_;
   Pacer resend_pacer_;

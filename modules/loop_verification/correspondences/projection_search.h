@@ -20,6 +20,21 @@ struct SearchOptions {
   double max_depth_m = 60;      // the deeper, the worse triangulated
   double max_view_angle = 0.9;  // radians between the two lines of sight
   double max_scale = 2.2;       // ratio of the two distances
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of a corner on octave 0");
+    archive.Add("max_hamming", &max_hamming, {0, 256}, "bits", "between descriptors that match");
+    archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
+    archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "",
+                "of the distance to the prediction, 2 degrees of freedom");
+    archive.Add("min_radius_px", &min_radius_px, {0, 1000}, "px", "of the search, at least");
+    archive.Add("max_radius_px", &max_radius_px, {1, 1000}, "px", "of the search, at most");
+    archive.Add("max_depth_m", &max_depth_m, {0.1, 10000}, "m", "of a point that is searched for");
+    archive.Add("max_view_angle", &max_view_angle, {0.01, 3.15}, "rad",
+                "between the two lines of sight");
+    archive.Add("max_scale", &max_scale, {1, 100}, "", "ratio of the two distances");
+  }
 };
 
 // A point that should be seen in the keyframe.

@@ -29,6 +29,21 @@ struct JointBaOptions {
   double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
   int sure_hamming = 56;         // a landmark is sure that is so alike in one match (of 256 bits)
   int iterations = 8;            // each of the two rounds
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of a corner on octave 0");
+    archive.Add("systematic_px", &systematic_px, {0, 20}, "px",
+                "error that all corners of a view share");
+    archive.Add("scale_sigma", &scale_sigma, {0, 1}, "",
+                "share by which a window may be larger than its odometry says");
+    archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "", "of an inlier, 2 degrees of freedom");
+    archive.Add("max_depth_chi2", &max_depth_chi2, {0.1, 1000}, "",
+                "of a point's depth against its prior, 1 degree of freedom");
+    archive.Add("sure_hamming", &sure_hamming, {0, 256}, "bits",
+                "a landmark with one match as near is sure");
+    archive.Add("iterations", &iterations, {1, 1000}, "", "of each of the two rounds");
+  }
 };
 
 struct JointBaResult {

@@ -28,6 +28,16 @@ struct GroupSolverOptions {
   double gnc_factor = 2.0;
   int gnc_steps = 25;
   int max_iterations = 30;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("loop_chi2", &loop_chi2, {0.1, 1000}, "",
+                "of a constraint in force, 4 degrees of freedom");
+    archive.Add("gnc_factor", &gnc_factor, {1.01, 100}, "",
+                "by which the control parameter of GNC grows each step");
+    archive.Add("gnc_steps", &gnc_steps, {1, 1000}, "", "at most");
+    archive.Add("max_iterations", &max_iterations, {1, 10000}, "", "of a solve");
+  }
 };
 
 class GroupSolver {

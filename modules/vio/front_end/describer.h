@@ -25,6 +25,18 @@ struct DescriberOptions {
   int fast_threshold = 20;
   int fast_threshold_low = 7;  // in cells where the first finds nothing
   int cell_px = 40;            // on each octave
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("max_corners", &max_corners, {10, kMaxCorners}, "", "of a keyframe");
+    archive.Add("octaves", &octaves, {1, 16}, "", "of the image pyramid");
+    archive.Add("scale_factor", &scale_factor, {1.1, 1.5}, "",
+                "between octaves; the corners' sigmas assume 1.2");
+    archive.Add("fast_threshold", &fast_threshold, {1, 254}, "grey levels", "of FAST");
+    archive.Add("fast_threshold_low", &fast_threshold_low, {1, 254}, "grey levels",
+                "of FAST in cells where the first finds nothing");
+    archive.Add("cell_px", &cell_px, {8, 1000}, "px", "of a cell, on each octave");
+  }
 };
 
 class Describer {

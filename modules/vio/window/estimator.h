@@ -39,6 +39,24 @@ struct EstimatorOptions {
   double keyframe_track_share = 0.5;
   double keyframe_interval_s = 5;
   double keyframe_min_interval_s = 0.2;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("window", &window, {4, 100}, "", "keyframes");
+    archive.Add("window_parallax_px", &window_parallax_px, {0.1, 1000}, "px",
+                "since the last window keyframe, for another");
+    archive.Add("window_track_share", &window_track_share, {0, 1}, "",
+                "of the last window keyframe's tracks that are left, for another");
+    archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of an observation with sigma_px 1");
+    archive.Add("keyframe_parallax_px", &keyframe_parallax_px, {0.1, 1000}, "px",
+                "since the last keyframe, for another");
+    archive.Add("keyframe_track_share", &keyframe_track_share, {0, 1}, "",
+                "of the last keyframe's tracks that are left, for another");
+    archive.Add("keyframe_interval_s", &keyframe_interval_s, {0.01, 1000}, "s",
+                "between keyframes, at most");
+    archive.Add("keyframe_min_interval_s", &keyframe_min_interval_s, {0, 1000}, "s",
+                "between keyframes, at least");
+  }
 };
 
 enum class EstimatorState { kInitialising, kTracking, kLost };
