@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "bus/retransmission/journal_first.h"
+#include "bus/status_log.h"
 
 namespace pangea {
 
@@ -33,6 +34,9 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     LcmBus bus(url);
     JournalFirstBus journal_first(bus, WallUtime());
     const std::unique_ptr<Process> process = factory(journal_first);
+    StartLog(description.name,
+             fmt::format("bus {}, options {}", url,
+                         options_file.empty() ? "as compiled in" : "of " + options_file));
     return RunProcess(bus, *process, &journal_first);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("{}: {}\n", description.name, error.what());
