@@ -16,6 +16,8 @@ namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr size_t kMaxCorrections = 16 * AgentHandlerProcess::kMaxAgents;
+// So many in a row were not damaged on their way.
+constexpr int kManyHellos = 3;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -126,8 +128,10 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   Agent& agent = found->second;
   const HandlerSession::Opened opened = agent.session.Open(data);
   if (!opened.refused.empty()) {
+    agent.hellos_refused += opened.refused == kHelloNotOpened ? 1 : 0;
     return node_.Refuse(opened.refused);
   }
+  agent.hellos_refused = 0;
   agent.bytes_up += BytesOnTheWire(channel, data);
   if (!opened.welcome.empty()) {
     SendDown(agent_id, &agent, opened.welcome);
@@ -215,6 +219,17 @@ std::string AgentHandlerProcess::OtherSoftware() const {
   return others;
 }
 
+std::string AgentHandlerProcess::OtherKeys() const {
+  std::string others;
+  for (const auto& [agent_id, agent] : agents_) {
+    if (agent.hellos_refused >= kManyHellos) {
+      others += fmt::format("; hellos of agent {} do not open: its key is not the one here, {}",
+                            agent_id, KeyFileName(agent_id));
+    }
+  }
+  return others;
+}
+
 void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   int64_t pending = 0, given_up = 0, keyframes = 0, connected = 0;
   for (const auto& [agent_id, agent] : agents_) {
@@ -236,10 +251,10 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   node_.Set("keyframes_given_up", given_up);
   archive_.SetCounters();
   node_.PublishStatus(now_utime, pending,
-                      fmt::format("{} agents, {} keyframes in the journal{}{}{}", connected,
+                      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}", connected,
                                   archive_.num_keyframes(),
                                   archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "",
-                                  archive_.Damage(), OtherSoftware()));
+                                  archive_.Damage(), OtherSoftware(), OtherKeys()));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {

@@ -44,6 +44,7 @@ class AgentHandlerProcess : public PolledProcess {
     HandlerSession session;
     std::optional<AgentHandler> handler;  // since its first session
     int64_t packets = 0;                  // opened
+    int hellos_refused = 0;               // since one was opened
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;
     int64_t keyframes = 0;
@@ -59,6 +60,8 @@ class AgentHandlerProcess : public PolledProcess {
   void SendAcks();
   // For people: agents whose software is not of this version.
   std::string OtherSoftware() const;
+  // For people: agents who say hello under another key.
+  std::string OtherKeys() const;
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;

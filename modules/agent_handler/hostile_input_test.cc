@@ -219,7 +219,19 @@ TEST_F(LinkWorld, AnotherVersionIsSaid) {
                          OurSoftware());
 }
 
-TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothing) {
+TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothingAndBothSay) {
+  std::string uplink_says, handler_says;
+  const auto hear = [](Bus& bus, const char* channel, std::string* summary) {
+    bus.Subscribe(channel, [summary](const std::string&, Bytes data) {
+      status_t status{};
+      ASSERT_TRUE(DecodeMessage(data, &status));
+      *summary = status.summary;
+    });
+  };
+  hear(agent_bus, "STATUS_uplink_1", &uplink_says);
+  hear(server_bus, "STATUS_agent_handler", &handler_says);
+  Run(3);
+  EXPECT_THAT(uplink_says, testing::StartsWith("connected"));
   KillUplink();
   std::filesystem::rename(KeyFile(1), folder / "server.key");
   MakeKeyFile(KeyFile(1), 1);
@@ -229,6 +241,13 @@ TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothing) {
   PublishKeyframes(2);
   Run(10);
   EXPECT_TRUE(delivered.empty());
+  EXPECT_THAT(uplink_says, testing::HasSubstr("its key for agent 1 is not ours"));
+  EXPECT_THAT(handler_says, testing::HasSubstr("hellos of agent 1 do not open: its key is not"));
+  KillUplink();
+  StartUplink();  // with the server's key
+  Run(3);
+  EXPECT_THAT(uplink_says, testing::StartsWith("connected"));
+  EXPECT_THAT(handler_says, testing::Not(testing::HasSubstr("do not open")));
 }
 
 // Noise, and every message with damaged bytes, on every channel that is listened to.

@@ -8,6 +8,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "agent_handler/keygen.h"
+#include "bus/status_log.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Takes keyframes of all agents, journals and acknowledges them",
@@ -38,6 +39,8 @@ int main(int argc, char** argv) {
     pangea::LcmBus server_bus(server);
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),
                                         options);
+    pangea::StartLog("pangea-agent-handler", fmt::format("bus {}, link {}, journal {}, keys {}",
+                                                         server, link, journal, keys));
     return pangea::RunPolledProcess(link_bus, server_bus, process);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-agent-handler: {}\n", error.what());

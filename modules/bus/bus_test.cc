@@ -12,6 +12,7 @@
 #include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_first.h"
 #include "bus/retransmission/missing.h"
+#include "bus/retransmission/timeouts.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -220,23 +221,23 @@ TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {
 }
 
 TEST(MissingMessages, AreAskedForUntilTheyComeOrNobodyHasThem) {
-  constexpr int64_t kSecond = 1'000'000;
+  constexpr int64_t kWait = timeouts::kGapWait_us, kInterval = timeouts::kRequestInterval_us;
   const MapId map{1, 100};
   MissingMessages missing;
   missing.Note(map, 0);
   missing.Announce(Have{{{map, 99}}, {}});
   EXPECT_TRUE(missing.Due(0).empty());  // it may be under way
-  EXPECT_TRUE(missing.Due(kSecond - 1).empty());
-  const auto due = missing.Due(kSecond);
+  EXPECT_TRUE(missing.Due(kWait - 1).empty());
+  const auto due = missing.Due(kWait);
   ASSERT_EQ(due.size(), 1u);
   EXPECT_EQ(due[0].from_seq, 1);
   EXPECT_EQ(due[0].to_seq, 50);  // not all at once
-  EXPECT_TRUE(missing.Due(2 * kSecond).empty());
-  EXPECT_EQ(missing.Due(3 * kSecond).size(), 1u);
+  EXPECT_TRUE(missing.Due(kWait + kInterval - 1).empty());
+  EXPECT_EQ(missing.Due(kWait + kInterval).size(), 1u);
   missing.Announce(Have{{}, {{map, 1, 98}}});
   missing.Note(map, 99);
-  missing.Due(4 * kSecond);
-  EXPECT_TRUE(missing.Due(9 * kSecond).empty());
+  missing.Due(4 * kInterval);
+  EXPECT_TRUE(missing.Due(9 * kInterval).empty());
 }
 
 TEST(MissingMessages, TheLastOneIsMissedAndNoneBeyondIt) {
@@ -246,13 +247,31 @@ TEST(MissingMessages, TheLastOneIsMissedAndNoneBeyondIt) {
   missing.Announce(Have{{{map, 1}}, {}});
   EXPECT_TRUE(missing.Lacks(map, 1));
   missing.Due(0);
-  const auto due = missing.Due(1'000'000);
+  const auto due = missing.Due(timeouts::kGapWait_us);
   ASSERT_EQ(due.size(), 1u);
   EXPECT_EQ(due[0].from_seq, 1);
   EXPECT_EQ(due[0].to_seq, 1);
   missing.Note(map, 1);
   EXPECT_FALSE(missing.Lacks(map, 1));
   EXPECT_TRUE(missing.Due(9'000'000).empty());
+}
+
+TEST(MissingMessages, TheNextPartIsAskedForOnceTheLastHasCome) {
+  const MapId map{1, 100};
+  MissingMessages missing;
+  missing.Announce(Have{{{map, 99}}, {}});
+  missing.Due(0);
+  ASSERT_EQ(missing.Due(timeouts::kGapWait_us).size(), 1u);
+  int64_t now = timeouts::kGapWait_us;
+  for (int32_t seq = 0; seq < 49; ++seq) {  // answers come, slowly: none is asked for twice
+    missing.Note(map, seq);
+    EXPECT_TRUE(missing.Due(now += timeouts::kRequestInterval_us / 2).empty());
+  }
+  missing.Note(map, 49);
+  const auto due = missing.Due(now);
+  ASSERT_EQ(due.size(), 1u);
+  EXPECT_EQ(due[0].from_seq, 50);
+  EXPECT_EQ(due[0].to_seq, 99);
 }
 
 TEST(RequestAllRetransmissions, AsksForEachOnce) {

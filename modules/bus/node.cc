@@ -83,7 +83,9 @@ void Node::NoteHandling(int64_t ns) {
 
 void Node::Refuse(const std::string& reason) {
   const bool known = refused_.contains(reason) || refused_.size() < kMaxReasons;
-  ++refused_[known ? reason : "other reasons"];
+  if (++refused_[known ? reason : "other reasons"] == 1) {
+    Log(name_, "the first refused: " + (known ? reason : "other reasons"));
+  }
 }
 
 status_t Node::Status(int64_t now_utime, int64_t pending, const std::string& summary) const {
@@ -118,6 +120,9 @@ status_t Node::Status(int64_t now_utime, int64_t pending, const std::string& sum
 void Node::PublishStatus(int64_t now_utime, int64_t pending, const std::string& summary) {
   if (started_utime_ == 0) {
     started_utime_ = now_utime;
+  }
+  if (const auto change = state_changes_.Take(now_utime, summary)) {
+    Log(name_, *change);
   }
   PublishMessage(bus_, channels::Status(name_), Status(now_utime, pending, summary));
 }

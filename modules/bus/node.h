@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "bus/bus.h"
+#include "bus/status_log.h"
 #include "pangea/status_t.hpp"
 
 namespace pangea {
@@ -98,7 +99,8 @@ class Node {
 
   // What another bus of this process keeps from it is told in the status too.
   void Watch(Bus& bus) { heard_.push_back(&bus); }
-  // Counts a refused message by its reason; at most 50 distinct reasons are told apart.
+  // Counts a refused message by its reason; at most 50 distinct reasons are told apart, and the
+  // first of each is logged (status_log.h).
   void Refuse(const std::string& reason);
   void Count(const std::string& counter, int64_t by = 1) { counters_[counter] += by; }
   void Set(const std::string& counter, int64_t value) { counters_[counter] = value; }
@@ -116,6 +118,7 @@ class Node {
   Bus& bus_;
   std::string name_;
   std::vector<Bus*> heard_;
+  StateChanges state_changes_;
   int64_t started_utime_ = 0;
   int64_t messages_in_ = 0;
   int64_t messages_out_ = 0;

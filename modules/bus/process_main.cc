@@ -8,6 +8,7 @@
 
 #include "bus/options_announcer.h"
 #include "bus/retransmission/journal_first.h"
+#include "bus/status_log.h"
 
 namespace pangea {
 namespace {
@@ -62,6 +63,9 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     WithOptions process(factory(journal_first),
                         OptionsAnnouncer(bus, NameOnTheBus(description.name),
                                          description.options.PrintWithoutHelp()));
+    StartLog(description.name,
+             fmt::format("bus {}, options {}", url,
+                         options_file.empty() ? "as compiled in" : "of " + options_file));
     return RunProcess(bus, process, &journal_first);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("{}: {}\n", description.name, error.what());

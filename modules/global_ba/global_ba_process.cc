@@ -5,7 +5,6 @@
 #include <functional>
 #include <utility>
 
-#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -19,68 +18,27 @@ constexpr int64_t kQuiet_us = 3 * kSecond;
 }  // namespace
 
 GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options)
-    : node_(bus, "global_ba"), global_ba_(options) {
-  node_.Listen<keyframe_t>(channels::kAllKeyframes,
-                           std::bind_front(&GlobalBaProcess::OnKeyframe, this));
-  node_.Listen<place_match_t>(channels::kPlaceMatch,
-                              std::bind_front(&GlobalBaProcess::OnPlaceMatch, this));
-  node_.Listen<constraint_t>(channels::kConstraint,
-                             std::bind_front(&GlobalBaProcess::OnConstraint, this));
+    : node_(bus, "global_ba"),
+      global_ba_(options),
+      journal_(node_,
+               {.matches = JournalFollower::Which::kAll,
+                .results = JournalFollower::Which::kAll,
+                .states = true},
+               {.keyframe = [this](Keyframe keyframe) { Take(std::move(keyframe)); },
+                .match =
+                    [this](const PlaceMatch& match) {
+                      Take(match);
+                      return true;
+                    },
+                .result = [this](const Constraint& result) { Take(result); }}) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&GlobalBaProcess::OnMapState, this));
-  node_.Listen<have_t>(channels::kHave, std::bind_front(&GlobalBaProcess::OnHave, this));
-  node_.Subscribe<again_t>(
-      channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
-}
-
-void GlobalBaProcess::OnKeyframe(Keyframe keyframe) {
-  ++num_inputs_;
-  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
-  global_ba_.Take(std::move(keyframe));
-}
-
-void GlobalBaProcess::OnPlaceMatch(const PlaceMatch& match) {
-  ++num_inputs_;
-  matches_.Note(match.query.map, match.query.seq);
-  global_ba_.Take(match);
-}
-
-void GlobalBaProcess::OnConstraint(const Constraint& constraint) {
-  ++num_inputs_;
-  global_ba_.Take(constraint);
 }
 
 void GlobalBaProcess::OnMapState(MapState state, const map_state_t& message) {
   if (auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(state))) {
-    missing_states_.Note(whole->maps);
+    journal_.NoteStates(whole->maps);
     global_ba_.Take(std::move(*whole));
-  }
-}
-
-void GlobalBaProcess::OnHave(const Have& have) {
-  for (const auto& [map, highest_seq] : have.highest_seq) {
-    if (keyframes_.Lacks(map, 0)) {
-      missing_states_.Announce(map);
-    }
-    // What was verified before this process started.
-    if (results_requested_.insert(map).second) {
-      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
-    }
-  }
-  keyframes_.Announce(have);
-  matches_.Announce(have);
-}
-
-void GlobalBaProcess::OnRetransmission(const again_t& message) {
-  const bool known = TakeRetransmission<keyframe_t>(
-                         node_, message, std::bind_front(&GlobalBaProcess::OnKeyframe, this)) ||
-                     TakeRetransmission<place_match_t>(
-                         node_, message, std::bind_front(&GlobalBaProcess::OnPlaceMatch, this)) ||
-                     TakeRetransmission<constraint_t>(
-                         node_, message, std::bind_front(&GlobalBaProcess::OnConstraint, this));
-  if (!known) {
-    node_.Refuse("again: not what was asked for");
   }
 }
 
@@ -99,15 +57,7 @@ void GlobalBaProcess::Finish() {
 }
 
 void GlobalBaProcess::Tick(int64_t now_utime) {
-  for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
-  }
-  for (const SeqGap& gap : matches_.Due(now_utime)) {
-    RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
-  }
-  for (const MapId& map : missing_states_.Due(now_utime)) {
-    AskForState(node_, map);
-  }
+  journal_.Tick(now_utime);
   if (num_inputs_ != num_inputs_at_change_) {
     num_inputs_at_change_ = num_inputs_;
     last_input_utime_ = now_utime;

@@ -183,7 +183,7 @@ HandlerSession::Opened HandlerSession::OnHello(Bytes bytes) {
   Opened opened;
   std::optional<Hello> hello = OpenHello(bytes);
   if (!hello) {
-    opened.refused = "hello is forged or damaged";
+    opened.refused = kHelloNotOpened;
     return opened;
   }
   const bool current = up_ && hello->uplink_run == uplink_run_ && hello->handler_run == run_;

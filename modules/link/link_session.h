@@ -44,6 +44,9 @@ inline constexpr int kSessionOverheadBytes = 1 + 3 + kSealTagBytes;
 // What is larger is none of ours, and is not even opened.
 inline constexpr size_t kMaxLinkPacketBytes = 40'000;
 
+// Why a hello is refused: it was sealed under another key, or changed on its way.
+inline constexpr char kHelloNotOpened[] = "hello is forged or damaged";
+
 // One direction of a session.
 struct SessionKey {
   SecretKey key;

@@ -17,34 +17,29 @@ constexpr char kJournalOwner[] = "agent_handler";
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                                    std::unique_ptr<LoopVerifier> verifier)
-    : node_(bus, name), kind_(kind), verifier_(std::move(verifier)) {
-  node_.Listen<keyframe_t>(channels::kAllKeyframes,
-                           std::bind_front(&CandidateProcess::OnKeyframe, this));
-  node_.Listen<place_match_t>(channels::kPlaceMatch,
-                              std::bind_front(&CandidateProcess::OnPlaceMatch, this));
-  node_.Listen<have_t>(channels::kHave, std::bind_front(&CandidateProcess::OnHave, this));
-  node_.Subscribe<again_t>(
-      channels::Again(name),
-      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
+    : node_(bus, name),
+      kind_(kind),
+      verifier_(std::move(verifier)),
+      journal_(node_,
+               {.matches = JournalFollower::Which::kAll,
+                .results = JournalFollower::Which::kOfFormerRuns},
+               {.keyframe = [this](Keyframe keyframe) { verifier_->Add(std::move(keyframe)); },
+                .match = std::bind_front(&CandidateProcess::TakeMatch, this),
+                .result = [this](const Constraint& result) { verified_.insert(result.Id()); },
+                .have = std::bind_front(&CandidateProcess::OnHave, this),
+                .handled = [this] { CollectReady(); }}) {
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&CandidateProcess::OnVerificationRequest, this));
 }
 
-void CandidateProcess::OnKeyframe(Keyframe keyframe) {
-  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
-  verifier_->Add(std::move(keyframe));
-  CollectReady();
-}
-
-void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
-  if (matches_.Has(match.query.map, match.query.seq)) {
-    return;
+bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
+  if (journal_.HasMatch(match.query)) {
+    return true;
   }
   if (num_pending() + match.candidates.size() > kMaxWaiting) {
     node_.Refuse("too many candidates wait");
-    return;
+    return false;
   }
-  matches_.Note(match.query.map, match.query.seq);
   for (const PlaceCandidate& candidate : match.candidates) {
     Constraint constraint;
     constraint.from = candidate.match;
@@ -54,36 +49,12 @@ void CandidateProcess::OnPlaceMatch(const PlaceMatch& match) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }
-  CollectReady();
+  return true;
 }
 
 void CandidateProcess::OnHave(const Have& have) {
-  for (const auto& [map, highest_seq] : have.highest_seq) {
-    // Verification results of a former run: no need to repeat them.
-    if (results_requested_.insert(map).second) {
-      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
-    }
-  }
-  keyframes_.Announce(have);
-  matches_.Announce(have);
   for (const SeqGap& gap : have.gaps) {
     verifier_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
-  }
-  if (!have.gaps.empty()) {
-    CollectReady();
-  }
-}
-
-void CandidateProcess::OnRetransmission(const again_t& message) {
-  const bool known =
-      TakeRetransmission<keyframe_t>(node_, message,
-                                     std::bind_front(&CandidateProcess::OnKeyframe, this)) ||
-      TakeRetransmission<place_match_t>(node_, message,
-                                        std::bind_front(&CandidateProcess::OnPlaceMatch, this)) ||
-      TakeRetransmission<constraint_t>(
-          node_, message, [this](const Constraint& result) { verified_.insert(result.Id()); });
-  if (!known) {
-    node_.Refuse("again: neither keyframe, match nor constraint");
   }
 }
 
@@ -142,14 +113,7 @@ bool CandidateProcess::VerifyNext() {
 }
 
 void CandidateProcess::Tick(int64_t now_utime) {
-  for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
-  }
-  if (num_pending() <= kMaxWaiting / 2) {
-    for (const SeqGap& gap : matches_.Due(now_utime)) {
-      RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
-    }
-  }
+  journal_.Tick(now_utime, num_pending() <= kMaxWaiting / 2);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
     PublishStatus(now_utime);

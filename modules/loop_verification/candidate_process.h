@@ -2,7 +2,7 @@
 
 // The process around a LoopVerifier: KEYFRAME_* and PLACE_MATCH in, CONSTRAINT out, exactly one a
 // candidate of its kind. A candidate about a keyframe not seen yet waits for it; what is missing is
-// asked for at ticks (RESEND_REQUEST, answers on AGAIN_<name>). Verification results of this run
+// asked for (journal_follower.h). Verification results of this run
 // that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
 // everyone else asks; of those that are still to be made nothing is said, they will come. A
 // verification result depends on the keyframes alone, not on when they came: live and replay agree,
@@ -27,10 +27,9 @@
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/missing.h"
+#include "bus/retransmission/journal_follower.h"
 #include "loop_verification/loop_verifier.h"
 #include "messages/catch_up_messages.h"
-#include "pangea/again_t.hpp"
 
 namespace pangea {
 
@@ -44,10 +43,8 @@ class CandidateProcess : public Process {
   static constexpr size_t kMaxWaiting = 2000;
   static constexpr size_t kMaxSent = 5000;
 
-  void OnKeyframe(Keyframe keyframe);
-  void OnPlaceMatch(const PlaceMatch& match);
+  bool TakeMatch(const PlaceMatch& match);
   void OnHave(const Have& have);
-  void OnRetransmission(const again_t& message);
   void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();
   // The first that is ready; whether some are left.
@@ -58,14 +55,12 @@ class CandidateProcess : public Process {
   Node node_;
   PlaceKind kind_;
   std::unique_ptr<LoopVerifier> verifier_;
-  MissingMessages keyframes_;
-  MissingMessages matches_;
+  JournalFollower journal_;
   // Which wait for keyframes, by (query, match); and with the query, which wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;
   std::deque<std::pair<KeyframeId, PlaceCandidate>> ready_;
   std::set<int64_t> verified_;   // constraint ids
   std::deque<Constraint> sent_;  // newest verification results, to repeat
-  std::set<MapId> results_requested_;
   int64_t next_status_utime_ = 0;
   int64_t num_accepted_ = 0;
 };

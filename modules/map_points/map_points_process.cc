@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -19,24 +18,16 @@ constexpr int64_t kSecond = 1'000'000;
 }  // namespace
 
 MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options)
-    : node_(bus, "map_points"), points_(options) {
-  node_.Listen<keyframe_t>(channels::kAllKeyframes,
-                           std::bind_front(&MapPointsProcess::OnKeyframe, this));
+    : node_(bus, "map_points"),
+      points_(options),
+      journal_(node_, {},
+               {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }}) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&MapPointsProcess::OnMapState, this));
   node_.Listen<map_state_t>(channels::kRefinement,
                             std::bind_front(&MapPointsProcess::OnRefinement, this));
   node_.Subscribe<pose_t>(std::string(channels::kAllPoses),
                           [this](const std::string&, const pose_t& message) { OnPose(message); });
-  node_.Listen<have_t>(channels::kHave, [this](const Have& have) { keyframes_.Announce(have); });
-  node_.Subscribe<again_t>(
-      channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
-}
-
-void MapPointsProcess::OnKeyframe(Keyframe keyframe) {
-  keyframes_.Note(keyframe.id.map, keyframe.id.seq);
-  points_.Take(std::move(keyframe));
 }
 
 void MapPointsProcess::OnMapState(MapState state, const map_state_t& message) {
@@ -79,17 +70,8 @@ void MapPointsProcess::OnPose(const pose_t& message) {
   }
 }
 
-void MapPointsProcess::OnRetransmission(const again_t& message) {
-  if (!TakeRetransmission<keyframe_t>(node_, message,
-                                      std::bind_front(&MapPointsProcess::OnKeyframe, this))) {
-    node_.Refuse("again: not what was asked for");
-  }
-}
-
 void MapPointsProcess::Tick(int64_t now_utime) {
-  for (const SeqGap& gap : keyframes_.Due(now_utime)) {
-    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
-  }
+  journal_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
     PublishStatus(now_utime);

@@ -10,10 +10,9 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/missing.h"
+#include "bus/retransmission/journal_follower.h"
 #include "map_points/map_points.h"
 #include "messages/state_chunks.h"
-#include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/pose_t.hpp"
 
@@ -28,18 +27,16 @@ class MapPointsProcess : public Process {
   void Tick(int64_t now_utime) override;
 
  private:
-  void OnKeyframe(Keyframe keyframe);
   void OnMapState(MapState state, const map_state_t& message);
   void OnRefinement(MapState state, const map_state_t& message);
   void OnPose(const pose_t& message);
-  void OnRetransmission(const again_t& message);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   MapPoints points_;
+  JournalFollower journal_;
   StateChunks states_;
   StateChunks refinements_;
-  MissingMessages keyframes_;
   std::map<int32_t, int64_t> sent_utime_;  // by agent: its pose's, at its last message
   int64_t next_status_utime_ = 0;
 };

@@ -2,12 +2,11 @@
 
 // place_recognition on a bus: KEYFRAME_* and MAP_STATE in, one PLACE_MATCH per keyframe out.
 //
-// Keyframes are taken in seq order, map by map; what is missing is asked for at ticks. After a
-// restart the journal's PLACE_MATCHes are asked for along with its keyframes: a keyframe that has
-// its match is only remembered, and those without one wait until all the others are in, so that no
-// pair of keyframes goes unseen, and until the pose graph, which is asked for the groups, has said
-// which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
-// PLACE_MATCHes itself.
+// Keyframes are taken in seq order, map by map (journal_follower.h). After a restart the journal's
+// PLACE_MATCHes are asked for along with its keyframes: a keyframe that has its match is only
+// remembered, and those without one wait until all the others are in, so that no pair of keyframes
+// goes unseen, and until the pose graph, which is asked for the groups, has said which maps are
+// fused: a candidate's kind hangs on it. It answers requests for the newest PLACE_MATCHes itself.
 //
 // Live, keyframes are recognised one at a time, when no message waits: after a catch-up there may
 // be many, and meanwhile groups are to be heard and requests answered.
@@ -19,10 +18,8 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/in_order.h"
-#include "bus/retransmission/missing.h"
+#include "bus/retransmission/journal_follower.h"
 #include "messages/catch_up_messages.h"
-#include "pangea/again_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "place_recognition/place_recognition.h"
 
@@ -35,40 +32,24 @@ class PlaceRecognitionProcess : public Process {
   void Tick(int64_t now_utime) override;
 
  private:
-  struct Asked {
-    int32_t next = -1;  // what was missing first when we asked
-    int64_t utime = 0;
-  };
-
-  void OnKeyframe(Keyframe keyframe);
-  void OnHave(const Have& have);
-  void OnRetransmission(const again_t& message);
-  void OnKnownMatch(PlaceMatch match);
+  void OnKeyframe(const Keyframe& keyframe);
+  bool OnKnownMatch(PlaceMatch match);
   void OnMapState(const MapState& state);
   void OnResendRequest(const ResendRequest& request);
 
-  void HandleAll(const std::vector<Keyframe>& ready);
-  void Handle(const Keyframe& keyframe);
   void Recognise(const Keyframe& keyframe);
   void ReleaseHeldIfCaughtUp();
-  void ReleaseHeld();
   void RecogniseHeld();
   // The first that is held; whether more may follow.
   bool RecogniseNext();
-  void AskForGaps(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   PlaceRecognition recognition_;
-  InOrder<Keyframe> keyframes_;
-  std::map<MapId, Asked> asked_;
-  // Catching up after a restart.
-  bool catching_up_ = false;
-  int ticks_without_keyframe_ = 0;
+  JournalFollower journal_;
   std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
   std::deque<Keyframe> held_;                       // without a match, in order
   std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again
-  MissingStates missing_states_;
   int64_t next_status_utime_ = 0;
 };
 

@@ -81,7 +81,7 @@ TEST(PoseGraphMissing, AfterARestartItAsksForWhatTheJournalHas) {
   const SyntheticWorld world = MakeWorld(10);
   Server server(1'000'000);
   server.Have(world);
-  server.Tick(12);
+  server.Tick(5);
   int results = 0, keyframes = 0;
   for (const resend_request_t& request : server.requests) {
     results += request.channel == "CONSTRAINT" ? 1 : 0;

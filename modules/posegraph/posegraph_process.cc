@@ -7,7 +7,7 @@
 #include <functional>
 #include <utility>
 
-#include "messages/catch_up_messages.h"
+#include "bus/retransmission/timeouts.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -15,60 +15,35 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
-constexpr int64_t kRetransmissionTimeout_us = kSecond;
-constexpr int64_t kResultAfter_us = 2 * kSecond;
-constexpr int64_t kMaxResultAfter_us = 60 * kSecond;
-constexpr int64_t kGiveUpCatchingUp_us = 5 * kSecond;
-// One request's answers must fit the receive buffer: a keyframe is about 28 kB.
-constexpr int32_t kMaxKeyframesAsked = 50;
-// A gap that nobody fills after so many requests is bridged.
-constexpr int kMaxTimesAsked = 15;
 
 }  // namespace
 
 PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                                    int64_t first_revision)
-    : node_(bus, "posegraph"), graph_(options, first_revision) {
-  node_.Listen<keyframe_t>(channels::kAllKeyframes,
-                           std::bind_front(&PoseGraphProcess::OnKeyframe, this));
-  node_.Listen<constraint_t>(channels::kConstraint,
-                             std::bind_front(&PoseGraphProcess::OnConstraint, this));
-  node_.Listen<place_match_t>(channels::kPlaceMatch,
-                              std::bind_front(&PoseGraphProcess::OnPlaceMatch, this));
+    : node_(bus, "posegraph"),
+      graph_(options, first_revision),
+      journal_(node_,
+               {.in_order = true,
+                .gives_up = true,
+                .matches = JournalFollower::Which::kAll,
+                .results = JournalFollower::Which::kAll},
+               {.keyframe = std::bind_front(&PoseGraphProcess::OnKeyframe, this),
+                .keyframe_came = [this](const KeyframeId& id) { graph_.NoteMap(id.map); },
+                .match = std::bind_front(&PoseGraphProcess::OnPlaceMatch, this),
+                .result = std::bind_front(&PoseGraphProcess::OnConstraint, this),
+                .have = std::bind_front(&PoseGraphProcess::OnHave, this),
+                .more_to_catch_up = [this] { return NumResultsToCatchUp(); },
+                .handled = [this] { SettleUnlessMoreWaits(); }}) {
   node_.Listen<map_state_t>(channels::kRefinement,
                             std::bind_front(&PoseGraphProcess::OnRefinement, this));
-  node_.Listen<have_t>(channels::kHave, std::bind_front(&PoseGraphProcess::OnHave, this));
-  node_.Subscribe<again_t>(
-      channels::Again(node_.name()),
-      [this](const std::string&, const again_t& message) { OnRetransmission(message); });
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&PoseGraphProcess::OnResendRequest, this));
 }
 
-void PoseGraphProcess::OnKeyframe(Keyframe keyframe) {
-  const KeyframeId id = keyframe.id;
-  graph_.NoteMap(id.map);
-  const int32_t from = keyframe.edge ? keyframe.edge->from_seq : id.seq - 1;
-  // An edge that begins further back says that what lies between is lost for good.
-  const int32_t first_lost = std::max(from + 1, keyframes_.next(id.map));
-  const bool credible = id.seq - first_lost <= static_cast<int32_t>(InOrder<Item>::kMaxParked);
-  for (int32_t seq = first_lost; credible && seq < id.seq; ++seq) {
-    Enqueue(id.map, seq, std::nullopt);
-  }
-  Enqueue(id.map, id.seq, std::move(keyframe));
-  SettleUnlessMoreWaits();
-}
-
-void PoseGraphProcess::Enqueue(const MapId& map, int32_t seq, Item item) {
-  for (const Item& ready : keyframes_.Add(map, seq, std::move(item))) {
-    if (ready) {
-      ++num_arrived_;
-      graph_.Take(*ready);
-      ++num_unsettled_;
-    } else {
-      node_.NoteDropped();
-    }
-  }
+void PoseGraphProcess::OnKeyframe(const Keyframe& keyframe) {
+  ++num_arrived_;
+  graph_.Take(keyframe);
+  ++num_unsettled_;
 }
 
 void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
@@ -82,22 +57,21 @@ void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
   }
   graph_.Take(constraint);
   ++num_unsettled_;
-  SettleUnlessMoreWaits();
 }
 
-void PoseGraphProcess::OnPlaceMatch(const PlaceMatch& match) {
+bool PoseGraphProcess::OnPlaceMatch(const PlaceMatch& match) {
   const KeyframeId& query = match.query;
-  matches_.Note(query.map, query.seq);
   for (const PlaceCandidate& candidate : match.candidates) {
     Constraint promised;
     promised.from = candidate.match;
     promised.to = query;
     promised.kind = candidate.kind;
     if (!results_.contains(promised.Id()) && due_.size() < kMaxDue) {
-      due_.try_emplace(promised.Id(), Due{query, now_utime_ + kResultAfter_us, kResultAfter_us});
+      due_.try_emplace(promised.Id(),
+                       Due{query, now_utime_ + timeouts::kResultWait_us, timeouts::kResultWait_us});
     }
   }
-  SettleUnlessMoreWaits();
+  return true;
 }
 
 void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) {
@@ -113,43 +87,17 @@ void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) 
 void PoseGraphProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
     graph_.NoteMap(map);
-    // What was verified before this process started.
-    if (results_requested_.insert(map).second) {
-      RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
-    }
-    keyframes_.Announce(map, highest_seq);
-    if (!have_received_ && keyframes_.next(map) == 0) {
-      catching_up_to_[map] = highest_seq;
-    }
   }
-  matches_.Announce(have);
-  have_received_ = true;
 }
 
-// Keyframes and matches' maps and verification results of the journal that are still to come.
-int64_t PoseGraphProcess::NumToCatchUp() const {
-  int64_t count = 0;
-  for (const auto& [map, seq] : catching_up_to_) {
-    count += std::max(0, seq + 1 - keyframes_.next(map)) + (matches_.Lacks(map, seq) ? 1 : 0);
-  }
-  for (const auto& [id, due] : due_) {
-    const auto goal = catching_up_to_.find(due.query.map);
-    const bool of_journal = goal != catching_up_to_.end() && due.query.seq <= goal->second;
+// Verification results of the journal that are still to come.
+int64_t PoseGraphProcess::NumResultsToCatchUp() const {
+  return std::ranges::count_if(due_, [this](const auto& item) {
+    const Due& due = item.second;
+    const auto goal = journal_.Goal(due.query.map);
     // Asked for twice by its name: the journal does not have it, it is still to be verified.
-    count += of_journal && due.wait_us < 4 * kResultAfter_us ? 1 : 0;
-  }
-  return count;
-}
-
-void PoseGraphProcess::CatchUp(int64_t now_utime) {
-  const int64_t count = NumToCatchUp();
-  if (count < num_to_catch_up_ || caught_up_utime_ == 0) {
-    caught_up_utime_ = now_utime;
-  }
-  num_to_catch_up_ = count;
-  if (count == 0 || now_utime >= caught_up_utime_ + kGiveUpCatchingUp_us) {
-    catching_up_to_.clear();
-  }
+    return goal && due.query.seq <= *goal && due.wait_us < 4 * timeouts::kResultWait_us;
+  });
 }
 
 void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
@@ -160,20 +108,8 @@ void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
   }
 }
 
-void PoseGraphProcess::OnRetransmission(const again_t& message) {
-  const bool known = TakeRetransmission<keyframe_t>(
-                         node_, message, std::bind_front(&PoseGraphProcess::OnKeyframe, this)) ||
-                     TakeRetransmission<place_match_t>(
-                         node_, message, std::bind_front(&PoseGraphProcess::OnPlaceMatch, this)) ||
-                     TakeRetransmission<constraint_t>(
-                         node_, message, std::bind_front(&PoseGraphProcess::OnConstraint, this));
-  if (!known) {
-    node_.Refuse("again: not what was asked for");
-  }
-}
-
 void PoseGraphProcess::SettleUnlessMoreWaits() {
-  if (num_unsettled_ > 0 && catching_up_to_.empty() &&
+  if (num_unsettled_ > 0 && !journal_.catching_up() &&
       (num_unsettled_ >= kMaxUnsettled || !node_.bus().MoreWaits())) {
     num_unsettled_ = 0;
     Publish(graph_.Settle());
@@ -198,19 +134,13 @@ void PoseGraphProcess::Finish() {
 
 void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
-  if (!catching_up_to_.empty()) {
-    CatchUp(now_utime);
-  }
+  journal_.Tick(now_utime);
   SettleUnlessMoreWaits();
-  AskForKeyframes(now_utime);
-  for (const SeqGap& gap : matches_.Due(now_utime)) {
-    RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
-  }
   RequestDueResults(now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
     last_change_utime_ = now_utime;
-  } else if (num_finished_ != num_arrived_ && catching_up_to_.empty() &&
+  } else if (num_finished_ != num_arrived_ && !journal_.catching_up() &&
              now_utime >= last_change_utime_ + kSecond) {
     num_finished_ = num_arrived_;
     Finish();
@@ -218,23 +148,6 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
     PublishStatus(now_utime);
-  }
-}
-
-void PoseGraphProcess::AskForKeyframes(int64_t now_utime) {
-  for (const SeqGap& gap : keyframes_.Gaps()) {
-    Asked& asked = keyframes_asked_[gap.map];
-    if (asked.from_seq != gap.from_seq) {
-      asked = {gap.from_seq, now_utime + kRetransmissionTimeout_us / 2, 0};
-    } else if (now_utime >= asked.next_utime && asked.times >= kMaxTimesAsked) {
-      Enqueue(gap.map, gap.from_seq, std::nullopt);
-    } else if (now_utime >= asked.next_utime) {
-      asked.next_utime = now_utime + kRetransmissionTimeout_us;
-      ++asked.times;
-      RequestRetransmission(
-          node_, channels::Keyframe(gap.map.agent_id),
-          {gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxKeyframesAsked - 1)});
-    }
   }
 }
 
@@ -248,7 +161,7 @@ void PoseGraphProcess::RequestDueResults(int64_t now_utime) {
     ResultNames& names =
         overdue.try_emplace(due.query.map, ResultNames{due.query.map, {}}).first->second;
     if (now_utime >= due.next_ask_utime && names.results.size() < ResultNames::kMax) {
-      due.wait_us = std::min(2 * due.wait_us, kMaxResultAfter_us);
+      due.wait_us = std::min(2 * due.wait_us, timeouts::kMaxResultWait_us);
       due.next_ask_utime = now_utime + due.wait_us;
       names.results.emplace_back(due.query.seq, id);
     }
@@ -271,14 +184,14 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   node_.Set("edges_bridged", counters.bridged);
   node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
   node_.Set("results_due", static_cast<int64_t>(due_.size()));
-  if (!catching_up_to_.empty()) {
-    return node_.PublishStatus(
-        now_utime, num_to_catch_up_,
-        fmt::format("catching up with the journal: {} to go", num_to_catch_up_));
+  if (journal_.catching_up()) {
+    const int64_t to_go = journal_.num_to_catch_up();
+    return node_.PublishStatus(now_utime, to_go,
+                               fmt::format("catching up with the journal: {} to go", to_go));
   }
   node_.PublishStatus(
       now_utime,
-      counters.parked + static_cast<int64_t>(keyframes_.parked()) +
+      counters.parked + static_cast<int64_t>(journal_.parked()) +
           (num_finished_ != num_arrived_ ? 1 : 0),
       fmt::format("{} maps in {} groups, {} constraints in force, {} switched off", counters.maps,
                   counters.groups, counters.in_force, counters.switched_off));

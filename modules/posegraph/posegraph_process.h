@@ -24,17 +24,14 @@
 // watched), the pose graph's own for constraints that wait for keyframes.
 
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/in_order.h"
-#include "bus/retransmission/missing.h"
+#include "bus/retransmission/journal_follower.h"
 #include "messages/catch_up_messages.h"
 #include "messages/state_chunks.h"
-#include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "posegraph/posegraph.h"
 
@@ -55,54 +52,34 @@ class PoseGraphProcess : public Process {
   static constexpr size_t kMaxDue = 20000;
   static constexpr int kMaxUnsettled = 100;
 
-  // Nothing: a seq that will never come.
-  using Item = std::optional<Keyframe>;
-  struct Asked {
-    int32_t from_seq = -1;
-    int64_t next_utime = 0;
-    int times = 0;
-  };
   struct Due {
     KeyframeId query;
     int64_t next_ask_utime = 0;
     int64_t wait_us = 0;
   };
 
-  void OnKeyframe(Keyframe keyframe);
+  void OnKeyframe(const Keyframe& keyframe);
   void OnConstraint(const Constraint& constraint);
-  void OnPlaceMatch(const PlaceMatch& match);
+  bool OnPlaceMatch(const PlaceMatch& match);
   void OnRefinement(MapState state, const map_state_t& message);
   void OnHave(const Have& have);
-  void OnRetransmission(const again_t& message);
   void OnResendRequest(const ResendRequest& request);
 
-  int64_t NumToCatchUp() const;
-  void CatchUp(int64_t now_utime);
-  void Enqueue(const MapId& map, int32_t seq, Item item);
+  int64_t NumResultsToCatchUp() const;
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
-  void AskForKeyframes(int64_t now_utime);
   void RequestDueResults(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   PoseGraph graph_;
-  InOrder<Item> keyframes_;
-  MissingMessages matches_;
+  JournalFollower journal_;
   StateChunks refinements_;
-  std::map<MapId, Asked> keyframes_asked_;
   std::map<int64_t, Due> due_;  // promised verification results, by constraint id
   std::set<int64_t> results_;   // that came
-  std::set<MapId>
-      results_requested_;  // maps whose verification results of a former run were asked for
-  bool have_received_ = false;
-  // What the journal had of each map when this process came, until that is in.
-  std::map<MapId, int32_t> catching_up_to_;
-  int64_t num_to_catch_up_ = 0;
-  int64_t caught_up_utime_ = 0;  // when that fell last
-  int64_t now_utime_ = 0;        // of the newest tick
-  int64_t num_arrived_ = 0;      // keyframes, verification results
-  int num_unsettled_ = 0;        // of them: taken since the last solve
+  int64_t now_utime_ = 0;       // of the newest tick
+  int64_t num_arrived_ = 0;     // keyframes, verification results
+  int num_unsettled_ = 0;       // of them: taken since the last solve
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "bus/status_log.h"
 #include "link/agent_key.h"
 #include "uplink/uplink_process.h"
 
@@ -52,6 +53,9 @@ int main(int argc, char** argv) {
     pangea::UplinkProcess process(agent_bus, link_bus, agent_id,
                                   pangea::ReadKeyFileOf(key, agent_id), options,
                                   spool ? &*spool : nullptr);
+    pangea::StartLog("pangea-uplink",
+                     fmt::format("agent {}, bus {}, link {}, key {}, {}", agent_id, bus, link, key,
+                                 spool_folder.empty() ? "no spool" : "spool " + spool_folder));
     return pangea::RunPolledProcess(agent_bus, link_bus, process);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-uplink: {}\n", error.what());

@@ -279,9 +279,21 @@ void UplinkProcess::Tick(int64_t now_utime) {
   }
   node_.PublishStatus(
       now_utime, pending,
-      fmt::format("{}, {} keyframes acknowledged, {} in the spool{}{}",
-                  uplink_.Connected(now_us_) ? "connected" : "handler is away",
+      fmt::format("{}, {} keyframes acknowledged, {} in the spool{}{}", StateForPeople(),
                   uplink_.keyframes_acked(), pending, RateForPeople(), SpoolForPeople()));
+}
+
+// A handler does not answer who has another key.
+std::string UplinkProcess::StateForPeople() {
+  if (uplink_.Connected(now_us_)) {
+    was_connected_ = true;
+    return "connected";
+  }
+  return was_connected_ ? "handler is away"
+                        : fmt::format(
+                              "no answer yet: the handler is away, or its key for agent {} "
+                              "is not ours",
+                              agent_id_);
 }
 
 std::string UplinkProcess::SpoolForPeople() const {

@@ -39,6 +39,7 @@ class UplinkProcess : public PolledProcess {
   void PublishAsks();
   void PublishCorrections();
   std::string RateForPeople();
+  std::string StateForPeople();
   std::string SpoolForPeople() const;
 
   const int32_t agent_id_;
@@ -49,6 +50,7 @@ class UplinkProcess : public PolledProcess {
   Spool* const spool_;
   Uplink uplink_;
   std::optional<RateLadder> ladder_;
+  bool was_connected_ = false;
   int64_t bytes_up_ = 0;
   int64_t bytes_up_at_status_ = 0;
   double bytes_per_s_ = 0;  // sent, over the last ten seconds or so

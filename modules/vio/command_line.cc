@@ -9,6 +9,7 @@
 #include <string>
 
 #include "bus/process.h"
+#include "bus/status_log.h"
 #include "options/yaml_options.h"
 #include "recording/euroc.h"
 #include "vio/live/live_input.h"
@@ -102,6 +103,9 @@ int Run(const Arguments& a, const VioFileOptions& file_options) {
     Playback(lcm_bus ? &*lcm_bus : nullptr, process, *recording, a.playback).Run();
     return Outcome(process);
   }
+  StartLog("pangea-vio",
+           fmt::format("agent {}, live, bus {}, options {}", a.process.agent_id, a.bus,
+                       a.options_file.empty() ? "as compiled in" : "of " + a.options_file));
   LiveInput live(process, a.process.agent_id, file_options.live_imu);
   RunProcess(*lcm_bus, process);
   process.Flush();

@@ -2,19 +2,11 @@
 
 #include <algorithm>
 
+#include "bus/retransmission/timeouts.h"
 #include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
 
 namespace pangea {
-namespace {
-
-constexpr int64_t kSecond = 1'000'000;
-// One request's answers must not flood a receive buffer: 50 keyframes are about 1.4 MB.
-constexpr int32_t kMaxAsked = 50;
-constexpr int32_t kMaxSmallAsked = 500;
-
-}  // namespace
-
 void RequestRetransmission(Node& node, const std::string& channel, const SeqGap& gap) {
   resend_request_t request{};
   request.requester = node.name();
@@ -28,9 +20,9 @@ void RequestRetransmission(Node& node, const std::string& channel, const SeqGap&
 
 void RequestAllRetransmissions(Node& node, const std::string& channel, const MapId& map,
                                int32_t highest_seq) {
-  for (int32_t seq = 0; seq <= highest_seq; seq += kMaxSmallAsked) {
+  for (int32_t seq = 0; seq <= highest_seq; seq += timeouts::kMaxSmallAsked) {
     RequestRetransmission(node, channel,
-                          {map, seq, std::min(seq + kMaxSmallAsked - 1, highest_seq)});
+                          {map, seq, std::min(seq + timeouts::kMaxSmallAsked - 1, highest_seq)});
   }
 }
 
@@ -60,20 +52,6 @@ void MissingMessages::Announce(const Have& have) {
   }
 }
 
-std::vector<SeqGap> MissingMessages::Due(int64_t now_utime) {
-  std::vector<SeqGap> due;
-  for (const SeqGap& gap : stream_.Gaps()) {
-    Asked& asked = asked_[gap.map];
-    if (asked.from_seq != gap.from_seq) {
-      asked = {gap.from_seq, now_utime + kSecond};
-    } else if (now_utime >= asked.next_utime) {
-      asked.next_utime = now_utime + 2 * kSecond;
-      due.push_back({gap.map, gap.from_seq, std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1)});
-    }
-  }
-  return due;
-}
-
 void MissingStates::Note(const std::vector<MapId>& maps) {
   for (const MapId& map : maps) {
     times_asked_.erase(map);
@@ -85,10 +63,10 @@ std::vector<MapId> MissingStates::Due(int64_t now_utime) {
   if (now_utime < next_utime_) {
     return due;
   }
-  next_utime_ = now_utime + 2 * kSecond;
+  next_utime_ = now_utime + timeouts::kStateInterval_us;
   for (auto it = times_asked_.begin(); it != times_asked_.end() && due.size() < kMaxAsked;) {
     due.push_back(it->first);
-    it = ++it->second < kMaxTimes ? std::next(it) : times_asked_.erase(it);
+    it = ++it->second < timeouts::kMaxStateRequests ? std::next(it) : times_asked_.erase(it);
   }
   return due;
 }

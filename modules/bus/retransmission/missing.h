@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bus/node.h"
+#include "bus/retransmission/gap_requests.h"
 #include "bus/retransmission/in_order.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
@@ -62,23 +63,18 @@ class MissingMessages {
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;
   }
-  // The gaps that have stayed for a second, each at most every two, as much of each as may be asked
-  // for at once.
-  std::vector<SeqGap> Due(int64_t now_utime);
+  // What is to be asked for now (gap_requests.h).
+  std::vector<SeqGap> Due(int64_t now_utime) { return requests_.Due(stream_.Gaps(), now_utime); }
 
  private:
-  struct Asked {
-    int32_t from_seq = -1;
-    int64_t next_utime = 0;
-  };
   InOrder<std::monostate> stream_;
-  std::map<MapId, Asked> asked_;
+  GapRequests requests_;
 };
 
 // Which of the maps that were there before this process no MAP_STATE has named since: whoever comes
 // late asks the pose graph for them, and it says them again to all. Bound: kMaxAsked maps are asked
-// for at once, each at most kMaxTimes: half a minute, in which a pose graph that started with us
-// has caught up with the journal (one that comes later says its states itself).
+// for at once, each at most kMaxStateRequests times (a pose graph that comes later says its states
+// itself).
 class MissingStates {
  public:
   void Announce(const MapId& map) { times_asked_.try_emplace(map, 0); }
@@ -86,10 +82,10 @@ class MissingStates {
   std::vector<MapId> Due(int64_t now_utime);
   // None is missing, or none that anybody would still be asked for.
   bool empty() const { return times_asked_.empty(); }
+  void Forget() { times_asked_.clear(); }
 
  private:
   static constexpr size_t kMaxAsked = 20;
-  static constexpr int kMaxTimes = 15;
 
   std::map<MapId, int> times_asked_;  // of those that are missing
   int64_t next_utime_ = 0;

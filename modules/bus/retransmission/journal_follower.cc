@@ -1,0 +1,215 @@
+#include "bus/retransmission/journal_follower.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "bus/retransmission/timeouts.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+
+namespace pangea {
+
+JournalFollower::JournalFollower(Node& node, const Follows& follows, Handlers handlers)
+    : node_(node), follows_(follows), handlers_(std::move(handlers)) {
+  node_.Listen<keyframe_t>(channels::kAllKeyframes,
+                           std::bind_front(&JournalFollower::OnKeyframe, this));
+  if (follows_.matches == Which::kAll) {
+    node_.Listen<place_match_t>(channels::kPlaceMatch,
+                                std::bind_front(&JournalFollower::OnMatch, this));
+  }
+  if (follows_.results == Which::kAll) {
+    node_.Listen<constraint_t>(channels::kConstraint,
+                               std::bind_front(&JournalFollower::OnResult, this));
+  }
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&JournalFollower::OnHave, this));
+  node_.Subscribe<again_t>(
+      channels::Again(node_.name()),
+      [this](const std::string&, const again_t& again) { OnRetransmission(again); });
+}
+
+void JournalFollower::OnKeyframe(Keyframe keyframe) {
+  if (handlers_.keyframe_came) {
+    handlers_.keyframe_came(keyframe.id);
+  }
+  if (follows_.in_order) {
+    AddInOrder(std::move(keyframe));
+  } else {
+    keyframes_.Add(keyframe.id.map, keyframe.id.seq, std::nullopt);
+    handlers_.keyframe(std::move(keyframe));
+  }
+  Handled();
+}
+
+void JournalFollower::AddInOrder(Keyframe keyframe) {
+  const KeyframeId id = keyframe.id;
+  // An edge that begins further back says that what lies between is lost for good.
+  if (keyframe.edge && keyframe.edge->from_seq < id.seq - 1) {
+    Lose({id.map, keyframe.edge->from_seq + 1, id.seq - 1});
+  }
+  HandOn(keyframes_.Add(id.map, id.seq, std::move(keyframe)));
+}
+
+void JournalFollower::Lose(const SeqGap& gap) {
+  const int32_t from_seq = std::max(gap.from_seq, keyframes_.next(gap.map));
+  const bool credible = gap.to_seq - from_seq < static_cast<int32_t>(InOrder<Item>::kMaxParked);
+  for (int32_t seq = from_seq; credible && seq <= gap.to_seq; ++seq) {
+    HandOn(keyframes_.Add(gap.map, seq, std::nullopt));
+  }
+}
+
+void JournalFollower::Skip(const SeqGap& gap) {
+  const int32_t before = keyframes_.next(gap.map);
+  std::vector<Item> ready = keyframes_.Skip(gap);
+  const auto passed = keyframes_.next(gap.map) - before;
+  if (follows_.in_order) {
+    node_.NoteDropped(passed - static_cast<int64_t>(ready.size()));
+    HandOn(std::move(ready));
+  }
+}
+
+void JournalFollower::HandOn(std::vector<Item> ready) {
+  for (Item& item : ready) {
+    if (item) {
+      handlers_.keyframe(*std::move(item));
+    } else {
+      node_.NoteDropped();
+    }
+  }
+}
+
+void JournalFollower::OnMatch(PlaceMatch match) {
+  const KeyframeId query = match.query;
+  if (handlers_.match(std::move(match)) && follows_.matches == Which::kAll) {
+    matches_.Note(query.map, query.seq);
+  }
+  Handled();
+}
+
+void JournalFollower::OnResult(const Constraint& result) {
+  handlers_.result(result);
+  Handled();
+}
+
+void JournalFollower::OnHave(const Have& have) {
+  if (handlers_.have) {
+    handlers_.have(have);
+  }
+  for (const auto& [map, highest_seq] : have.highest_seq) {
+    if (named_.insert(map).second) {
+      TakeNewMap(map, highest_seq);
+    }
+    keyframes_.Announce(map, highest_seq);
+  }
+  for (const SeqGap& gap : have.gaps) {
+    Skip(gap);
+  }
+  if (follows_.matches == Which::kAll) {
+    matches_.Announce(have);
+  }
+  Handled();
+}
+
+void JournalFollower::TakeNewMap(const MapId& map, int32_t highest_seq) {
+  // A map we know nothing of, yet the journal does: we are the one who came late.
+  if (keyframes_.next(map) == 0) {
+    goal_[map] = highest_seq;
+    keyframe_requests_.Expect(map);
+    if (follows_.states) {
+      states_.Announce(map);
+    }
+  }
+  if (follows_.results != Which::kNone) {
+    RequestAllRetransmissions(node_, std::string(channels::kConstraint), map, highest_seq);
+  }
+}
+
+void JournalFollower::OnRetransmission(const again_t& again) {
+  const bool known = TakeRetransmission<keyframe_t>(
+                         node_, again, std::bind_front(&JournalFollower::OnKeyframe, this)) ||
+                     (follows_.matches != Which::kNone &&
+                      TakeRetransmission<place_match_t>(
+                          node_, again, std::bind_front(&JournalFollower::OnMatch, this))) ||
+                     (follows_.results != Which::kNone &&
+                      TakeRetransmission<constraint_t>(
+                          node_, again, std::bind_front(&JournalFollower::OnResult, this)));
+  if (!known) {
+    node_.Refuse("again: not what was asked for");
+  }
+}
+
+void JournalFollower::Handled() {
+  if (!goal_.empty() && NumMissing() == 0 && num_to_catch_up() == 0) {
+    goal_.clear();
+  }
+  if (handlers_.handled) {
+    handlers_.handled();
+  }
+}
+
+int64_t JournalFollower::NumMissing() const {
+  int64_t count = 0;
+  for (const auto& [map, seq] : goal_) {
+    const bool lacks_matches = follows_.matches == Which::kAll && matches_.Lacks(map, seq);
+    count += std::max(0, seq + 1 - keyframes_.next(map)) + (lacks_matches ? 1 : 0);
+  }
+  return count;
+}
+
+int64_t JournalFollower::num_to_catch_up() const {
+  return NumMissing() + (handlers_.more_to_catch_up ? handlers_.more_to_catch_up() : 0);
+}
+
+void JournalFollower::StopCatchingUp() {
+  goal_.clear();
+  states_.Forget();
+}
+
+std::optional<int32_t> JournalFollower::Goal(const MapId& map) const {
+  const auto it = goal_.find(map);
+  return it == goal_.end() ? std::nullopt : std::optional(it->second);
+}
+
+void JournalFollower::CatchUp(int64_t now_utime) {
+  const int64_t count = num_to_catch_up();
+  if (count < num_to_catch_up_ || num_to_catch_up_ == 0) {
+    progress_utime_ = now_utime;
+  }
+  num_to_catch_up_ = count;
+  if (count == 0 || now_utime >= progress_utime_ + timeouts::kCatchUpSilence_us) {
+    goal_.clear();
+    num_to_catch_up_ = 0;
+  }
+}
+
+void JournalFollower::Tick(int64_t now_utime, bool ask_for_matches) {
+  if (!goal_.empty()) {
+    CatchUp(now_utime);
+    Handled();
+  }
+  AskForKeyframes(now_utime);
+  if (ask_for_matches) {
+    for (const SeqGap& gap : matches_.Due(now_utime)) {
+      RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
+    }
+  }
+  for (const MapId& map : states_.Due(now_utime)) {
+    AskForState(node_, map);
+  }
+}
+
+void JournalFollower::AskForKeyframes(int64_t now_utime) {
+  for (const SeqGap& gap : keyframe_requests_.Due(keyframes_.Gaps(), now_utime)) {
+    if (follows_.gives_up && keyframe_requests_.Requests(gap.map) > timeouts::kMaxRequests) {
+      Lose(gap);
+      Handled();
+      continue;
+    }
+    // Matches first, so that they are here when the keyframes come.
+    if (follows_.matches == Which::kOfFormerRuns && catching_up()) {
+      RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
+    }
+    RequestRetransmission(node_, channels::Keyframe(gap.map.agent_id), gap);
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,30 @@
+#pragma once
+
+// The server of a site by one command: the seven server processes, each started again when it ends,
+// until Ctrl-C or SIGTERM ends them in order (what they say goes to files).
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace pangea::session {
+
+struct ServerOptions {
+  std::string bus;
+  std::string link;
+  std::filesystem::path journal;
+  std::filesystem::path keys;
+  std::filesystem::path logs;
+  std::map<std::string, std::filesystem::path> options;  // of each process, its file
+};
+
+// "fusion=FILE" into `options`. Throws std::runtime_error naming the mend.
+void AddProcessOptions(const std::string& text, ServerOptions* options);
+// <process>.yaml of each process that has one there.
+void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
+
+// Returns the exit code: 0 after a signal, 1 when a process was given up (kept_processes.h). Tells
+// on stdout what it starts. Throws std::runtime_error when it cannot begin.
+int Serve(const ServerOptions& options);
+
+}  // namespace pangea::session

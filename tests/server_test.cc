@@ -1,0 +1,77 @@
+// pangea-server with its real processes.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// On buses of this test's own.
+std::string ServerCommand(const fs::path& folder) {
+  const int port = 20000 + getpid() % 6000 * 2;
+  const auto url = [](int at) {
+    return fmt::format("'udpm://239.255.76.67:{}?ttl=0&recv_buf_size=4194304'", at);
+  };
+  return fmt::format("pangea-server --bus {} --link {} --journal {}/map.lcm --keys {}/keys",
+                     url(port), url(port + 1), folder.string(), folder.string());
+}
+
+TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
+  const fs::path folder = FreshFolder("server");
+  fs::create_directories(folder / "keys");
+  fs::create_directories(folder / "options");
+  std::ofstream(folder / "options" / "posegraph.yaml") << "{}\n";
+  const std::string killed =
+      "pgrep -f 'pangea-fusion.*" + std::to_string(20000 + getpid() % 6000 * 2) + "'";
+  const Outcome outcome = RunCommand(
+      fmt::format("{} --options-dir {}/options & server=$!; sleep 3; kill -9 $({}); sleep 2; kill "
+                  "-INT $server; "
+                  "wait $server; echo exit code $?; pgrep -f {}/map.lcm || echo none is left",
+                  ServerCommand(folder), folder.string(), killed, folder.string()));
+  for (const char* process : {"agent-handler", "place-recognition", "inter-map-ba", "fusion",
+                              "posegraph", "global-ba", "map-points"}) {
+    EXPECT_THAT(outcome.output,
+                testing::ContainsRegex(fmt::format("started .*pangea-{} ", process)));
+  }
+  EXPECT_THAT(outcome.output,
+              HasSubstr(fmt::format("--options {}/options/posegraph.yaml", folder.string())));
+  EXPECT_THAT(outcome.output, HasSubstr("fusion ended (signal 9"));
+  EXPECT_THAT(outcome.output, HasSubstr("starting it again"));
+  EXPECT_THAT(outcome.output, HasSubstr("ended\nexit code 0\n"));
+  EXPECT_THAT(outcome.output, HasSubstr("none is left"));
+  EXPECT_TRUE(fs::exists(folder / "map.lcm"));
+  EXPECT_TRUE(fs::exists(folder / "map.lcm.logs" / "fusion.txt"));
+}
+
+TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
+  const fs::path folder = FreshFolder("server_keys");
+  const Outcome outcome = RunCommand(ServerCommand(folder));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output,
+              HasSubstr("agent_handler ended (exit code 1: pangea-agent-handler: "));
+  EXPECT_THAT(outcome.output, HasSubstr("given up after 3 times"));
+}
+
+TEST(Server, RefusesOptionsOfNoProcessAndOptionsThatAreNotThere) {
+  const fs::path folder = FreshFolder("server_options");
+  Outcome outcome = RunCommand(ServerCommand(folder) + " --options fushion=/dev/null");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("PROCESS one of agent_handler, place_recognition"));
+  outcome = RunCommand(ServerCommand(folder) + " --options fusion=/not/there.yaml");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("there is no file /not/there.yaml"));
+  outcome = RunCommand(ServerCommand(folder) + " --options-dir /not/there");
+  EXPECT_THAT(outcome.output, HasSubstr("there is no such folder"));
+}
+
+}  // namespace
+}  // namespace pangea::tests
