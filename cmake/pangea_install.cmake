@@ -1,5 +1,5 @@
 # `cmake --install`, beside what each target says of itself: headers, the CMake package, units, session files.
-#   --component runtime   programs, the viewer's page, the types' jar, units, session files
+#   --component runtime   programs, the viewer's page, the types' jar, the package of Python, units, session files
 #   --component dev       libraries, headers, lcmtypes, find_package(pangea)
 include(CMakePackageConfigHelpers)
 

@@ -26,6 +26,9 @@ if(PANGEA_SANITIZE)
   endif()
 endif()
 
+# All that people run, and all that `cmake --install` installs; no tests, no viewer's page.
+add_custom_target(programs)
+
 # The include path of one module alone: a folder in which only this module's is. So a library sees the
 # headers of the modules whose libraries it names, and of those that these name, and no others: an
 # include that goes round the layers does not compile.
@@ -63,10 +66,11 @@ function(pangea_library name)
     string(REGEX REPLACE "^pangea_" "" short ${name})
     set_target_properties(${name} PROPERTIES EXPORT_NAME ${short})
     install(TARGETS ${name} EXPORT pangea ARCHIVE COMPONENT dev)
+    if(ARG_SOURCES)
+      add_dependencies(programs ${name})
+    endif()
   endif()
 endfunction()
-
-add_custom_target(programs)
 
 # A program's manual page, where help2man is at hand.
 find_program(HELP2MAN help2man)
@@ -81,6 +85,7 @@ function(pangea_manual_page name)
     COMMAND ${maker} $<TARGET_FILE:${name}> ${PROJECT_VERSION} ${page}
     DEPENDS ${name} ${maker} COMMENT "Manual page of ${name}")
   add_custom_target(${name}_manual_page ALL DEPENDS ${page})
+  add_dependencies(programs ${name}_manual_page)
   install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 endfunction()
 

@@ -43,8 +43,15 @@ const CLI::Validator kLength(
     },
     "POSITIVE");
 
-void WriteJson(const nlohmann::ordered_json& json, const std::string& path) {
-  WriteTextFile(path, json.dump(2) + "\n");
+constexpr const char* kStdout = "-";
+
+// The table, and the JSON into its file; on stdout it stands alone.
+void Write(const std::string& table, const nlohmann::ordered_json& json, const std::string& path) {
+  const std::string text = json.dump(2) + "\n";
+  fmt::print("{}", path == kStdout ? text : table);
+  if (!path.empty() && path != kStdout) {
+    WriteTextFile(path, text);
+  }
 }
 
 }  // namespace
@@ -82,7 +89,8 @@ void EvalCommandLine::AddCommon(CLI::App& command) {
                   "seconds between reference poses across which it is still interpolated")
       ->check(kLength)
       ->capture_default_str();
-  command.add_option("--json", json_path_, "write the metrics to this file");
+  command.add_option("--json", json_path_,
+                     "write the metrics to this file; -: to stdout, in place of the table");
 }
 
 void EvalCommandLine::Run() { chosen_(); }
@@ -104,10 +112,7 @@ std::vector<EvaluationInput> EvalCommandLine::ReadInputs() const {
 void EvalCommandLine::RunAbsolute() const {
   const std::vector<EvaluationInput> inputs = ReadInputs();
   const AbsoluteEvaluation evaluation = EvaluateAbsolute(inputs, max_gap_s_);
-  fmt::print("{}", ToText(evaluation));
-  if (!json_path_.empty()) {
-    WriteJson(ToJson(evaluation), json_path_);
-  }
+  Write(ToText(evaluation), ToJson(evaluation), json_path_);
   if (!plot_prefix_.empty()) {
     const JointAte& se3 = evaluation.by_alignment.front().second;
     const std::string title = fmt::format("ATE {:.3f} m", se3.position_m.rmse);
@@ -120,10 +125,7 @@ void EvalCommandLine::RunRelative() const {
   const std::vector<EvaluationInput> inputs = ReadInputs();
   const RelativeEvaluation evaluation =
       EvaluateRelative(inputs.front(), distances_m_, durations_s_, max_gap_s_);
-  fmt::print("{}", ToText(evaluation));
-  if (!json_path_.empty()) {
-    WriteJson(ToJson(evaluation), json_path_);
-  }
+  Write(ToText(evaluation), ToJson(evaluation), json_path_);
 }
 
 }  // namespace pangea

@@ -16,7 +16,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr int64_t kLineBreakUs = 1'000'000;
 
 ordered_json ToJson(const Statistics& s, double factor) {
   return {{"count", s.count},
@@ -41,15 +40,32 @@ std::vector<std::string> Cells(const std::string& alignment, const std::string& 
           coverage};
 }
 
-// Throws std::runtime_error when no pose has ground truth.
+std::string Associated(const std::string& name, size_t associated, size_t poses) {
+  return fmt::format("{}: {} of {} poses associated", name, associated, poses);
+}
+
+[[noreturn]] void ThrowTooFew(const EvaluationInput& input, size_t associated) {
+  const auto span = [](const Trajectory& trajectory) {
+    return trajectory.empty() ? "nothing"
+                              : fmt::format("{:.3f} .. {:.3f} s", 1e-6 * trajectory.front().utime,
+                                            1e-6 * trajectory.back().utime);
+  };
+  throw std::runtime_error(fmt::format(
+      "{}; at least {} and {:.0f} % must have ground truth at their time. Poses: {}, ground truth: "
+      "{}. Give the ground truth of the same recording in the same clock, in seconds; where it has "
+      "fewer than ten poses a second, a larger --max-gap",
+      Associated(input.name, associated, input.estimate.size()), kMinAssociated,
+      100 * kMinAssociatedShare, span(input.estimate), span(input.reference)));
+}
+
+// Throws std::runtime_error when too few poses have ground truth.
 std::vector<PosePair> PairsOf(const EvaluationInput& input, double max_gap_s) {
   std::vector<PosePair> pairs =
       Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s));
-  if (pairs.empty()) {
-    throw std::runtime_error(fmt::format(
-        "{}: none of its {} poses lies within the reference's time ({:.3f} .. {:.3f} s)",
-        input.name, input.estimate.size(), 1e-6 * input.reference.front().utime,
-        1e-6 * input.reference.back().utime));
+  if (pairs.size() < kMinAssociated ||
+      static_cast<double>(pairs.size()) <
+          kMinAssociatedShare * static_cast<double>(input.estimate.size())) {
+    ThrowTooFew(input, pairs.size());
   }
   return pairs;
 }
@@ -106,6 +122,7 @@ AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, 
   std::vector<std::vector<PosePair>> pairs;
   for (const EvaluationInput& input : inputs) {
     evaluation.names.push_back(input.name);
+    evaluation.poses.push_back(input.estimate.size());
     evaluation.coverage.push_back(Coverage(input.estimate, input.reference));
     pairs.push_back(PairsOf(input, max_gap_s));
   }
@@ -143,7 +160,12 @@ std::string ToText(const AbsoluteEvaluation& evaluation) {
                  fmt::format("{:.4f}", joint.alignment.scale), "-"});
     }
   }
-  return table.Text();
+  std::string text;
+  for (size_t i = 0; i < evaluation.names.size(); ++i) {
+    const size_t associated = evaluation.by_alignment.front().second.agents[i].position_m.count;
+    text += Associated(evaluation.names[i], associated, evaluation.poses[i]) + "\n";
+  }
+  return text + table.Text();
 }
 
 ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
@@ -160,6 +182,8 @@ ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
       const auto& coverage = evaluation.coverage[i];
       entry["trajectories"].push_back(
           {{"name", evaluation.names[i]},
+           {"poses", evaluation.poses[i]},
+           {"associated", joint.agents[i].position_m.count},
            {"ate_m", ToJson(joint.agents[i].position_m, 1)},
            {"rotation_deg", ToJson(joint.agents[i].rotation_rad, kDegrees)},
            {"coverage", coverage ? ordered_json(*coverage) : ordered_json()}});
@@ -172,7 +196,7 @@ RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s) {
   const std::vector<PosePair> pairs = PairsOf(input, max_gap_s);
-  RelativeEvaluation evaluation;
+  RelativeEvaluation evaluation{input.name, input.estimate.size(), pairs.size(), {}, {}};
   for (const double distance_m : distances_m) {
     evaluation.over_distance_m.push_back(
         {distance_m, RelativeErrorOverDistance(pairs, distance_m)});
@@ -197,11 +221,13 @@ std::string ToText(const RelativeEvaluation& evaluation) {
       {"over", "stretches", "RPE rmse m", "median m", "max m", "mean share", "rotation rmse deg"});
   AddRows(evaluation.over_distance_m, "m", &table);
   AddRows(evaluation.over_time_s, "s", &table);
-  return table.Text();
+  return Associated(evaluation.name, evaluation.associated, evaluation.poses) + "\n" + table.Text();
 }
 
 ordered_json ToJson(const RelativeEvaluation& evaluation) {
-  return {{"over_distance", RowsJson(evaluation.over_distance_m, "distance_m")},
+  return {{"poses", evaluation.poses},
+          {"associated", evaluation.associated},
+          {"over_distance", RowsJson(evaluation.over_distance_m, "distance_m")},
           {"over_time", RowsJson(evaluation.over_time_s, "duration_s")}};
 }
 
@@ -209,7 +235,7 @@ std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
                                      const TrajectoryAlignment& alignment) {
   std::vector<Eigen::Vector2d> points;
   for (size_t i = 0; i < trajectory.size(); ++i) {
-    if (i > 0 && trajectory[i].utime - trajectory[i - 1].utime > kLineBreakUs) {
+    if (i > 0 && trajectory[i].utime - trajectory[i - 1].utime > kMaxPoseStepUs) {
       points.push_back(kPlotBreak);
     }
     points.emplace_back((alignment * trajectory[i].T.t).head<2>());
@@ -220,7 +246,7 @@ std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
 std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin) {
   std::vector<Eigen::Vector2d> points;
   for (size_t i = 0; i < errors.size(); ++i) {
-    if (i > 0 && errors[i].utime - errors[i - 1].utime > kLineBreakUs) {
+    if (i > 0 && errors[i].utime - errors[i - 1].utime > kMaxPoseStepUs) {
       points.push_back(kPlotBreak);
     }
     points.emplace_back(1e-6 * static_cast<double>(errors[i].utime - begin), errors[i].position_m);

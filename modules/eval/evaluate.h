@@ -19,13 +19,19 @@ struct EvaluationInput {
   Trajectory reference;
 };
 
+// Fewer partners than this are an accident, such as another clock, and their error says nothing.
+inline constexpr size_t kMinAssociated = 10;
+inline constexpr double kMinAssociatedShare = 0.05;
+
 // Absolute error under one alignment for all inputs, by SE(3), yaw and Sim(3).
 struct AbsoluteEvaluation {
   std::vector<std::string> names;
+  std::vector<size_t> poses;  // of each estimate; those with a partner: by_alignment's counts
   std::vector<std::optional<double>> coverage;
   std::vector<std::pair<TrajectoryAlignmentKind, JointAte>> by_alignment;
 };
-// Throws std::runtime_error when too few poses have ground truth, or an error is no number.
+// Throws std::runtime_error when too few poses have ground truth (kMinAssociated poses and
+// kMinAssociatedShare of each input), or an error is no number.
 AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s);
 std::string ToText(const AbsoluteEvaluation& evaluation);
 nlohmann::ordered_json ToJson(const AbsoluteEvaluation& evaluation);
@@ -35,11 +41,14 @@ struct RelativeRow {
   std::optional<Rpe> rpe;
 };
 struct RelativeEvaluation {
+  std::string name;
+  size_t poses = 0;
+  size_t associated = 0;
   std::vector<RelativeRow> over_distance_m;
   std::vector<RelativeRow> over_time_s;
 };
-// Throws std::runtime_error when no pose has ground truth, no stretch is long enough, or an error
-// is no number.
+// Throws std::runtime_error when too few poses have ground truth, no stretch is long enough, or an
+// error is no number.
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s);
@@ -53,7 +62,7 @@ Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>
 Plot ErrorPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
                const JointAte& joint);
 
-// The line of a trajectory in top view, broken where poses are more than a second apart.
+// The line of a trajectory in top view, broken where poses are more than kMaxPoseStepUs apart.
 std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
                                      const TrajectoryAlignment& alignment);
 std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin);

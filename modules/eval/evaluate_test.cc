@@ -12,6 +12,7 @@
 namespace pangea {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -32,7 +33,7 @@ TEST(Evaluate, TablesAndJsonAgree) {
   const auto json = ToJson(evaluation);
   EXPECT_NEAR(json["SE(3)"]["ate_m"]["rmse"].get<double>(), 0.1, 1e-9);
   EXPECT_EQ(json["SE(3)"]["trajectories"][1]["name"], "two.tum");
-  EXPECT_NEAR(json["yaw"]["trajectories"][0]["coverage"].get<double>(), 14.95 / 9.95, 1e-9);
+  EXPECT_NEAR(json["yaw"]["trajectories"][0]["coverage"].get<double>(), 1, 1e-9);
   const std::string text = ToText(evaluation);
   EXPECT_THAT(text, HasSubstr("| SE(3)     | all together | 600   | 0.1000"));
   EXPECT_THAT(text, HasSubstr("two.tum"));
@@ -52,9 +53,37 @@ TEST(Evaluate, NoCommonTimeIsAnError) {
   for (StampedPose& pose : input.estimate) {
     pose.utime += 1'000'000'000;
   }
-  const auto says_so = ThrowsMessage<std::runtime_error>(HasSubstr("late.tum: none of its 300"));
+  const auto says_so =
+      ThrowsMessage<std::runtime_error>(HasSubstr("late.tum: 0 of 300 poses associated"));
   EXPECT_THAT([&] { EvaluateAbsolute({input}, 0.1); }, says_so);
   EXPECT_THAT([&] { EvaluateRelative(input, {1}, {1}, 0.1); }, says_so);
+}
+
+TEST(Evaluate, PosesWithoutAPartnerAreCounted) {
+  EvaluationInput input = Input("longer.tum", 0);
+  input.reference.resize(150);
+  const AbsoluteEvaluation absolute = EvaluateAbsolute({input}, 0.1);
+  EXPECT_THAT(ToText(absolute), HasSubstr("longer.tum: 150 of 300 poses associated\n"));
+  EXPECT_EQ(ToJson(absolute)["SE(3)"]["trajectories"][0]["poses"], 300);
+  EXPECT_EQ(ToJson(absolute)["SE(3)"]["trajectories"][0]["associated"], 150);
+  const RelativeEvaluation relative = EvaluateRelative(input, {1}, {1}, 0.1);
+  EXPECT_THAT(ToText(relative), HasSubstr("longer.tum: 150 of 300 poses associated\n"));
+  EXPECT_EQ(ToJson(relative)["associated"], 150);
+}
+
+TEST(Evaluate, FewPartnersAreAnError) {
+  EvaluationInput input = Input("few.tum", 0);
+  input.reference.resize(14);  // 14 of 300
+  const auto says_so = ThrowsMessage<std::runtime_error>(
+      AllOf(HasSubstr("few.tum: 14 of 300 poses associated; at least 10 and 5 %"),
+            HasSubstr("Poses: 0.000 .. 14.950 s, ground truth: 0.000 .. 0.650 s"),
+            HasSubstr("--max-gap")));
+  EXPECT_THAT([&] { EvaluateAbsolute({input}, 0.1); }, says_so);
+  EXPECT_THAT([&] { EvaluateRelative(input, {0.1}, {0.1}, 0.1); }, says_so);
+  EXPECT_THAT([&] { EvaluateAbsolute({Input("good.tum", 0), input}, 0.1); }, says_so);
+  input.estimate.resize(9);
+  EXPECT_THAT([&] { EvaluateAbsolute({input}, 0.1); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("9 of 9 poses associated; at least 10")));
 }
 
 TEST(Evaluate, AnErrorThatIsNoNumberIsNone) {
@@ -71,10 +100,18 @@ TEST(Evaluate, NoStretchAtAllIsAnError) {
 }
 
 TEST(Evaluate, LinesBreakAtHoles) {
-  const Trajectory trajectory = {{0, {}}, {500'000, {}}, {5'000'000, {}}};
+  const Trajectory trajectory = {{0, {}}, {500'000, {}}, {7'000'000, {}}};
   const auto points = TopView(trajectory, TrajectoryAlignment());
   ASSERT_EQ(points.size(), 4U);
   EXPECT_FALSE(points[2].allFinite());
+  EXPECT_EQ(ErrorOverTime({{0, 1, 0}, {7'000'000, 1, 0}}, 0).size(), 3U);
+}
+
+// One who stands still has a keyframe every five seconds.
+TEST(Evaluate, LinesOfAStationaryBodyDoNotBreak) {
+  EXPECT_EQ(TopView({{0, {}}, {5'050'000, {}}, {10'100'000, {}}}, TrajectoryAlignment()).size(),
+            3U);
+  EXPECT_EQ(ErrorOverTime({{0, 1, 0}, {5'050'000, 1, 0}}, 0).size(), 2U);
 }
 
 TEST(TableText, ColumnsArePadded) {

@@ -138,13 +138,22 @@ std::optional<double> Coverage(const Trajectory& estimate, const Trajectory& ref
   if (reference.empty()) {
     return std::nullopt;
   }
-  const int64_t reference_span =
-      reference.back().utime - reference.front().utime - kCoverageGraceUs;
-  if (reference_span <= 0) {
+  const int64_t begin = reference.front().utime + kCoverageGraceUs;
+  const int64_t end = reference.back().utime;
+  if (end <= begin) {
     return std::nullopt;
   }
-  const int64_t span = estimate.empty() ? 0 : estimate.back().utime - estimate.front().utime;
-  return static_cast<double>(span) / static_cast<double>(reference_span);
+  int64_t covered = 0;
+  int64_t until = begin;  // what is before it has been looked at
+  for (size_t i = 0; i < estimate.size(); ++i) {
+    const int64_t utime = estimate[i].utime;
+    const bool joined = i > 0 && utime - estimate[i - 1].utime <= kMaxPoseStepUs;
+    const int64_t from = joined ? estimate[i - 1].utime : utime - kCoverageReachUs;
+    const int64_t to = std::min(end, utime + kCoverageReachUs);
+    covered += std::max<int64_t>(0, to - std::max(from, until));
+    until = std::max(until, to);
+  }
+  return static_cast<double>(covered) / static_cast<double>(end - begin);
 }
 
 }  // namespace pangea

@@ -74,10 +74,14 @@ struct Rpe {
 std::optional<Rpe> RelativeErrorOverDistance(const std::vector<PosePair>& pairs, double distance_m);
 std::optional<Rpe> RelativeErrorOverTime(const std::vector<PosePair>& pairs, double duration_s);
 
-// Span of the estimate / span of the reference after its first 5 s (the time to initialise). Above
-// 1 when the estimate begins earlier than that. 0 for fewer than two poses; nothing when the
-// reference is not longer than 5 s.
+// A stationary body gives a keyframe every 5 s; where poses are further apart, some are missing.
+inline constexpr int64_t kMaxPoseStepUs = 6'000'000;
+
+// The share of the reference's time after its first 5 s (the time to initialise) that has a pose:
+// it lies between two poses at most kMaxPoseStepUs apart, or within 1 s of one. 0 to 1; nothing
+// when the reference is not longer than 5 s.
 inline constexpr int64_t kCoverageGraceUs = 5'000'000;
+inline constexpr int64_t kCoverageReachUs = 1'000'000;
 std::optional<double> Coverage(const Trajectory& estimate, const Trajectory& reference);
 
 }  // namespace pangea

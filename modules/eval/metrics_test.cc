@@ -220,13 +220,36 @@ TEST_F(MetricsTest, RelativeErrorIsBlindToTheFrameAndSeesScaleAndYawDrift) {
   EXPECT_FALSE(RelativeErrorOverTime({}, 1));
 }
 
+// A pose every `step_s`, from `from_s` to `to_s`.
+Trajectory Every(double step_s, double from_s, double to_s) {
+  Trajectory poses;
+  for (double s = from_s; s <= to_s + 1e-9; s += step_s) {
+    poses.push_back({std::llround(1e6 * s), {}});
+  }
+  return poses;
+}
+
 TEST_F(MetricsTest, CoverageIsOfTheReferenceAfterItsFirstFiveSeconds) {
   const Trajectory reference = {{0, {}}, {25'000'000, {}}};
-  EXPECT_DOUBLE_EQ(*Coverage({{5'000'000, {}}, {25'000'000, {}}}, reference), 1.0);
-  EXPECT_DOUBLE_EQ(*Coverage({{2'000'000, {}}, {12'000'000, {}}}, reference), 0.5);
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, 5, 25), reference), 1.0);
+  EXPECT_DOUBLE_EQ(*Coverage(Every(5, 5, 25), reference), 1.0) << "stationary";
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, 2, 14), reference), 0.5);
   EXPECT_DOUBLE_EQ(*Coverage({}, reference), 0);
   EXPECT_FALSE(Coverage({}, {}));
   EXPECT_FALSE(Coverage({}, {{0, {}}, {5'000'000, {}}}));
+}
+
+TEST_F(MetricsTest, CoverageIsAtMostOneAndSeesWhatIsMissing) {
+  const Trajectory reference = {{0, {}}, {25'000'000, {}}};
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, 0, 25), reference), 1.0) << "begins earlier";
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, -40, 60), reference), 1.0) << "longer than the reference";
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, 30, 60), reference), 0) << "after its end";
+  EXPECT_DOUBLE_EQ(*Coverage(Every(0.5, -40, -20), reference), 0) << "before its beginning";
+  Trajectory two_ends = Every(0.5, 0, 9);
+  const Trajectory last = Every(0.5, 21, 25);
+  two_ends.insert(two_ends.end(), last.begin(), last.end());
+  EXPECT_DOUBLE_EQ(*Coverage(two_ends, reference), 0.5) << "half of it is missing";
+  EXPECT_DOUBLE_EQ(*Coverage({{15'000'000, {}}}, reference), 0.1) << "one pose";
 }
 
 }  // namespace

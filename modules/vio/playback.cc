@@ -15,6 +15,7 @@ namespace pangea::vio {
 namespace {
 
 constexpr int64_t kImuBeforeStart_us = 500'000;
+constexpr double kRealTime = 1;  // of PlaybackOptions::rate
 
 int64_t ToUs(double seconds) { return static_cast<int64_t>(1e6 * seconds); }
 
@@ -86,13 +87,14 @@ void Playback::Run() {
   pace_.WaitUntil(WallUtime() + ToUs(options_.delay_s));
   const int64_t begin_wall = WallUtime();
   const int64_t begin = images[index].utime;
-  for (; index < images.size() && images[index].utime <= last && !StopRequested(); ++index) {
+  const auto num_images = std::ranges::upper_bound(images, last, {}, &EurocImage::utime) -
+                          images.begin() - static_cast<int64_t>(index);
+  int64_t num_played = 0;
+  for (; num_played < num_images && !StopRequested(); ++index, ++num_played) {
+    progress_.Update(num_played, num_images, "images");
     const int64_t played = images[index].utime - begin;
-    if (options_.rate > 0) {
-      pace_.WaitUntil(begin_wall +
-                      static_cast<int64_t>(static_cast<double>(played) / options_.rate));
-    } else {
-      pace_.WaitForAcknowledgements();
+    if (!WaitForTurn(played, begin_wall)) {
+      continue;
     }
     PlayImage(index);
     const int64_t spent = std::max<int64_t>(1, WallUtime() - begin_wall);
@@ -102,6 +104,21 @@ void Playback::Run() {
   process_.Flush();
   pace_.WaitAtTheEnd();
   process_.PublishFinished(WallUtime());
+}
+
+// Whether the image is to be played: in real time none is that comes too late.
+bool Playback::WaitForTurn(int64_t played_us, int64_t begin_wall) {
+  if (options_.rate <= 0) {
+    pace_.WaitForAcknowledgements();
+    return true;
+  }
+  const auto due =
+      begin_wall + static_cast<int64_t>(static_cast<double>(played_us) / options_.rate);
+  pace_.WaitUntil(due);
+  const auto lag_us = static_cast<int64_t>(options_.rate * static_cast<double>(WallUtime() - due));
+  const bool drop = options_.rate <= kRealTime && lag_us > VioProcess::kMaxLag_us;
+  process_.NoteLag(lag_us, drop ? 1 : 0);
+  return !drop;
 }
 
 // What the odometry has not seen yet, up to and including the first sample at or after `utime`.

@@ -1,8 +1,9 @@
 #pragma once
 
-// Plays a recording into the odometry, paced by the recording's own stamps. No image of a recording
-// is ever dropped: an odometry that cannot keep up falls behind, and its status says how far
-// (realtime_factor_permille).
+// Plays a recording into the odometry, paced by the recording's own stamps. In real time (rate 1 or
+// less) it is as live sensors are: an odometry that cannot keep up drops images
+// (VioProcess::kMaxLag_us). Faster, none is dropped: it falls behind. Its status says how far
+// (lag_ms, in the recording's time; realtime_factor_permille).
 
 #include <cstdint>
 #include <functional>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "bus/retransmission/playback_pace.h"
+#include "files/progress.h"
 #include "recording/euroc.h"
 #include "vio/front_end/tracks.h"
 #include "vio/vio_process.h"
@@ -43,6 +45,7 @@ class Playback {
   void Run();
 
  private:
+  bool WaitForTurn(int64_t played_us, int64_t begin_wall);
   void PlayImage(size_t index);
   std::span<const ImuSample> ImuUntil(int64_t utime);
 
@@ -51,6 +54,7 @@ class Playback {
   const EurocRecording& recording_;
   PlaybackOptions options_;
   std::map<int64_t, TrackedFrame> tracks_;
+  Progress progress_{"pangea-vio"};
   size_t next_imu_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <functional>
+#include <iostream>
 #include <stdexcept>
 
 #include "messages/channels.h"
@@ -15,6 +16,8 @@ namespace pangea::vio {
 namespace {
 
 constexpr int64_t kStatusInterval_us = 1'000'000;
+constexpr int64_t kLagToldInterval_us = 10'000'000;
+constexpr int64_t kNotableLag_us = 500'000;
 
 int8_t ToMessage(EstimatorState state) {
   switch (state) {
@@ -210,10 +213,39 @@ void VioProcess::Tick(int64_t now_utime) {
     next_status_utime_ = now_utime + kStatusInterval_us;
     node_.PublishStatus(now_utime, outlet_.Unacknowledged(), Summary());
   }
+  TellLag(now_utime);
 }
 
 std::string VioProcess::Summary() const {
-  return fmt::format("agent {}: {}", options_.agent_id, state_text_);
+  return fmt::format("agent {}: {}{}", options_.agent_id, state_text_,
+                     lag_us_ >= kNotableLag_us ? "; " + LagText() : "");
+}
+
+std::string VioProcess::LagText() const {
+  return fmt::format("lag {:.1f} s, {} images dropped", 1e-6 * static_cast<double>(lag_us_),
+                     num_dropped_);
+}
+
+void VioProcess::NoteLag(int64_t lag_us, int64_t dropped) {
+  lag_us_ = lag_us;
+  num_dropped_ += dropped;
+  node_.Set("lag_ms", lag_us / 1000);
+  node_.Set("images_dropped", num_dropped_);
+  node_.NoteDropped(dropped);
+}
+
+void VioProcess::TellLag(int64_t now_utime) {
+  const bool behind = num_dropped_ > num_dropped_told_ || lag_us_ > kMaxLag_us;
+  if (!behind || now_utime < next_lag_told_utime_) {
+    return;
+  }
+  num_dropped_told_ = num_dropped_;
+  next_lag_told_utime_ = now_utime + kLagToldInterval_us;
+  std::cerr << fmt::format(
+                   "pangea-vio: agent {} cannot keep up: {} of {}; fewer or smaller images, or a "
+                   "quicker machine\n",
+                   options_.agent_id, LagText(), num_images_ + num_dropped_)
+            << std::flush;
 }
 
 void VioProcess::OnCorrection(const Correction& correction) {

@@ -47,6 +47,9 @@ struct VioProcessOptions {
 class VioProcess : public Process {
  public:
   static constexpr size_t kKeptKeyframes = 200;
+  // Images that come in real time and are further behind the newest one are dropped, the oldest
+  // first: an odometry that cannot keep up leaves images out, and stays this far behind.
+  static constexpr int64_t kMaxLag_us = 1'000'000;
 
   // Throws std::runtime_error when an output file cannot be written.
   VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime);
@@ -59,6 +62,9 @@ class VioProcess : public Process {
   // As Vio::AddImage and Vio::AddTracks.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
+  // How far the odometry is behind its sensors, and how many images were dropped for it since the
+  // last call. Told in the status, and on stderr where it cannot keep up.
+  void NoteLag(int64_t lag_us, int64_t dropped);
   // The sensors' time begins anew: finishes the map, and opens another.
   void StartAnew();
   // No more images: finishes the keyframes in the window.
@@ -84,6 +90,8 @@ class VioProcess : public Process {
   void PublishKeyframe(const Keyframe& keyframe);
   void WriteTum(const VioOutput& output);
   std::string Summary() const;
+  std::string LagText() const;
+  void TellLag(int64_t now_utime);
 
   VioProcessOptions options_;
   Node node_;
@@ -98,6 +106,10 @@ class VioProcess : public Process {
   std::string state_text_ = "waiting for images";
   std::string why_not_tracking_;  // at the newest image
   int64_t num_images_ = 0;
+  int64_t lag_us_ = 0;
+  int64_t num_dropped_ = 0;  // for the lag
+  int64_t num_dropped_told_ = 0;
+  int64_t next_lag_told_utime_ = 0;
   bool has_tracked_ = false;
   std::ofstream tum_;
   std::optional<MapId> tum_map_;

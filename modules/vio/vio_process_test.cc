@@ -429,6 +429,85 @@ TEST_F(VioProcessTest, LiveImagesComeInChunksAndWaitForTheirSamples) {
   EXPECT_GE(status_.num_refused, 2);
 }
 
+// A bus on which messages come while the odometry works on an image.
+class BusyBus : public Bus {
+ public:
+  void Publish(const std::string& channel, Bytes data) override { bus_.Publish(channel, data); }
+  void Subscribe(const std::string& channel_regex, Handler handler) override {
+    bus_.Subscribe(channel_regex, std::move(handler));
+  }
+  void WorkWhenIdle(const std::function<bool()>& piece) override { work_ = piece; }
+  void Drain() { bus_.Drain(); }
+  void Work() {
+    if (work_ && !work_()) {
+      work_ = nullptr;
+    }
+    bus_.Drain();
+  }
+
+ private:
+  LocalBus bus_;
+  std::function<bool()> work_;
+};
+
+TEST_F(VioProcessTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
+  BusyBus bus;
+  std::vector<pose_t> poses;
+  bus.Subscribe("POSE_7", [&](const std::string&, Bytes data) {
+    ASSERT_TRUE(DecodeMessage(data, &poses.emplace_back()));
+  });
+  bus.Subscribe("STATUS_vio_7", [this](const std::string&, Bytes data) {
+    ASSERT_TRUE(DecodeMessage(data, &status_));
+  });
+  VioProcess process(bus, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  constexpr int kImages = 60;
+  int64_t imu_utime = 0, worst_lag_us = 0;
+  for (int i = 0; i < kImages; ++i) {
+    const int64_t utime = i * kImageStep_us;
+    for (const image_t& chunk : Chunks(utime, image)) {
+      PublishMessage(bus, "IMAGE_7", chunk);
+    }
+    for (; imu_utime <= utime; imu_utime += kImuStep_us) {
+      imu_t message{};
+      message.utime = imu_utime;
+      message.accel_body.z = 9.81;
+      PublishMessage(bus, "IMU_7", message);
+    }
+    bus.Drain();
+    if (i % 3 == 2) {  // it does a third of them
+      bus.Work();
+      worst_lag_us = std::max(worst_lag_us, utime - poses.back().utime);
+    }
+  }
+  EXPECT_EQ(worst_lag_us, VioProcess::kMaxLag_us);
+  EXPECT_EQ(poses.size(), kImages / 3u);
+  ::testing::internal::CaptureStderr();
+  process.Tick(1);
+  process.Tick(2);
+  bus.Drain();
+  const std::string dropped = std::to_string(Counter("images_dropped"));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "pangea-vio: agent 7 cannot keep up: lag 1.0 s, " + dropped + " images dropped of " +
+                std::to_string(poses.size() + std::stoul(dropped)) +
+                "; fewer or smaller images, or a quicker machine\n");
+  EXPECT_EQ(Counter("lag_ms"), 1000);
+  EXPECT_NEAR(Counter("images_dropped"), kImages * 2 / 3 - 10, 1) << "those that still wait";
+  EXPECT_EQ(status_.dropped, Counter("images_dropped"));
+  EXPECT_NE(status_.summary.find("; lag 1.0 s, " + dropped + " images dropped"), std::string::npos)
+      << status_.summary;
+
+  for (int i = 0; i < kImages; ++i) {  // now it keeps up
+    bus.Work();
+  }
+  process.Tick(2'000'000);
+  bus.Drain();
+  EXPECT_EQ(poses.back().utime, (kImages - 1) * kImageStep_us);
+  EXPECT_EQ(status_.summary.find("lag"), std::string::npos) << status_.summary;
+}
+
 TEST_F(VioProcessTest, OneStampFarAheadDoesNotBlockTheLiveStream) {
   VioProcess process(bus_, options_, 0);
   LiveInput live(process, 7, ImuNoise{});

@@ -150,7 +150,7 @@ LiveInput::Assembly& LiveInput::AssemblyOf(const image_t& message) {
   if (begun != assemblies_.end()) {
     return *begun;
   }
-  if (assemblies_.size() == kMaxImages) {
+  if (assemblies_.size() == kMaxAssemblies) {
     assemblies_.pop_front();
     process_.node().NoteDropped();
   }
@@ -183,27 +183,53 @@ void LiveInput::Finish(const Assembly& assembly) {
     return;
   }
   images_.emplace_back(assembly.utime, image.pixels);
-  if (images_.size() > kMaxImages) {
-    images_.pop_front();
-    process_.node().NoteDropped();
-  }
+  DropStale();
   Deliver();
 }
 
-void LiveInput::Deliver() {
-  while (!images_.empty() && imu_stamps_.newest() &&
-         *imu_stamps_.newest() >= process_.ImuTimeOf(images_.front().first)) {
-    const auto [utime, image] = images_.front();
+// The oldest, until the rest is no further behind the newest than an odometry may be.
+void LiveInput::DropStale() {
+  int64_t dropped = 0;
+  while (images_.size() > kMaxImages || Lag() > VioProcess::kMaxLag_us) {
     images_.pop_front();
-    const int64_t imu_time = process_.ImuTimeOf(utime);
-    auto end = std::find_if(samples_.begin(), samples_.end(), [imu_time](const ImuSample& sample) {
-      return sample.utime >= imu_time;
-    });
-    end = end == samples_.end() ? end : std::next(end);
-    const std::vector<ImuSample> imu(samples_.begin(), end);
-    samples_.erase(samples_.begin(), end);
-    process_.AddImage(utime, image, imu);
+    ++dropped;
   }
+  if (dropped > 0) {
+    process_.NoteLag(Lag(), dropped);
+  }
+}
+
+// How far the oldest image is behind the newest.
+int64_t LiveInput::Lag() const { return images_.back().first - images_.front().first; }
+
+// Whether the samples reach past the oldest image.
+bool LiveInput::Ready() const {
+  return !images_.empty() && imu_stamps_.newest() &&
+         *imu_stamps_.newest() >= process_.ImuTimeOf(images_.front().first);
+}
+
+void LiveInput::Deliver() {
+  if (Ready()) {
+    process_.node().WorkWhenIdle([this] { return DeliverOne(); });
+  }
+}
+
+// Whether another one is ready.
+bool LiveInput::DeliverOne() {
+  if (!Ready()) {
+    return false;  // the time began anew meanwhile
+  }
+  process_.NoteLag(Lag(), 0);
+  const auto [utime, image] = images_.front();
+  images_.pop_front();
+  const int64_t imu_time = process_.ImuTimeOf(utime);
+  auto end = std::find_if(samples_.begin(), samples_.end(),
+                          [imu_time](const ImuSample& sample) { return sample.utime >= imu_time; });
+  end = end == samples_.end() ? end : std::next(end);
+  const std::vector<ImuSample> imu(samples_.begin(), end);
+  samples_.erase(samples_.begin(), end);
+  process_.AddImage(utime, image, imu);
+  return Ready();
 }
 
 }  // namespace pangea::vio

@@ -2,9 +2,12 @@
 
 // Live sensors on the agent's bus: CAMERA_k once (repeated as often as the bridge likes), IMU_k,
 // and IMAGE_k in chunks. An image goes to the odometry as soon as the inertial samples reach past
-// it. Bounded: at most kMaxImages wait for their samples and kMaxSamples for an image; the oldest
-// go first and are counted as dropped. Stamps that do not go on from the ones before are refused
-// and counted (stamp_check.h); where a stream goes back the odometry starts anew.
+// it and no other message waits: so what has come is known, and an odometry that cannot keep up
+// drops images instead of falling ever further behind (VioProcess::kMaxLag_us). Bounded: at most
+// kMaxAssemblies images wait for their chunks, kMaxImages for their samples or the odometry, and
+// kMaxSamples for an image; the oldest go first and are counted as dropped. Stamps that do not go
+// on from the ones before are refused and counted (stamp_check.h); where a stream goes back the
+// odometry starts anew.
 
 #include <cstdint>
 #include <deque>
@@ -25,7 +28,8 @@ namespace pangea::vio {
 
 class LiveInput {
  public:
-  static constexpr size_t kMaxImages = 10;
+  static constexpr size_t kMaxAssemblies = 10;
+  static constexpr size_t kMaxImages = 100;
   static constexpr size_t kMaxSamples = 20'000;  // 100 s at 200 Hz
   static constexpr int32_t kMaxImageBytes = 16'000'000;
   // A longer hole in the samples, or in the images, is the end of the map anyway (imu_buffer.cc,
@@ -54,7 +58,11 @@ class LiveInput {
   bool TakeStamp(StampCheck* stamps, const std::string& what, int64_t utime);
   void StartAnew();
   void Finish(const Assembly& assembly);
+  bool Ready() const;
+  void DropStale();
+  int64_t Lag() const;
   void Deliver();
+  bool DeliverOne();
 
   VioProcess& process_;
   ImuNoise noise_;

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""A live sensor source: plays a recording in EuRoC's format onto an agent's bus, in real time.
+
+    euroc_source.py --agent 3 --recording MH_01 [--bus URL] [--rate 1]       beside: pangea-vio --live --agent 3
+
+For sensors of your own replace `Recording`: the loop in `play` is all that a source has to do (docs/bus.md).
+"""
+
+import argparse
+import csv
+import re
+import sys
+import time
+from pathlib import Path
+
+from pangea import camera_t, imu_t, pose_t
+from pangea.bus import DEFAULT_URL, Bus, image_chunks
+
+CAMERA_INTERVAL_S = 1.0
+STATES = {pose_t.STATE_INITIALISING: "initialising", pose_t.STATE_TRACKING: "tracking", pose_t.STATE_LOST: "lost"}
+
+
+def numbers(text, key, path):
+    """The list that stands at `key`; EuRoC's sensor.yaml without a YAML reader, which Python has not."""
+    found = re.search(rf"\b{key}:\s*\[([^\]]*)\]", text)
+    if not found:
+        sys.exit(f"euroc_source: {path}: field '{key}' (a list of numbers) is missing")
+    return [float(number) for number in found[1].split(",")]
+
+
+def transform(text, path):
+    """T_BS as (rotation rows, translation)."""
+    m = numbers(text[text.index("T_BS"):] if "T_BS" in text else "", "data", path)
+    return [m[0:3], m[4:7], m[8:11]], [m[3], m[7], m[11]]
+
+
+def relative(a, b):
+    """T_a^-1 T_b"""
+    (Ra, ta), (Rb, tb) = a, b
+    R = [[sum(Ra[k][i] * Rb[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+    t = [sum(Ra[k][i] * (tb[k] - ta[k]) for k in range(3)) for i in range(3)]
+    return R, t
+
+
+def set_transform(message, R, t):
+    message.translation.x, message.translation.y, message.translation.z = t
+    # Each of the four squares in turn: the largest one gives the others without a small divisor.
+    squares = [1 + R[0][0] + R[1][1] + R[2][2], 1 + R[0][0] - R[1][1] - R[2][2],
+               1 - R[0][0] + R[1][1] - R[2][2], 1 - R[0][0] - R[1][1] + R[2][2]]
+    w, x, y, z = [(squares[0], R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]),
+                  (R[2][1] - R[1][2], squares[1], R[1][0] + R[0][1], R[0][2] + R[2][0]),
+                  (R[0][2] - R[2][0], R[1][0] + R[0][1], squares[2], R[2][1] + R[1][2]),
+                  (R[1][0] - R[0][1], R[0][2] + R[2][0], R[2][1] + R[1][2], squares[3])][squares.index(max(squares))]
+    norm = (w * w + x * x + y * y + z * z) ** 0.5
+    q = message.rotation
+    q.w, q.x, q.y, q.z = w / norm, x / norm, y / norm, z / norm
+
+
+class Recording:
+    """camera: camera_t; events: (utime, imu_t or path of an image), in time order."""
+
+    def __init__(self, folder):
+        mav0 = folder / "mav0" if (folder / "mav0").is_dir() else folder
+        self.camera = self._camera(mav0)
+        self.events = sorted([*self._imu(mav0), *self._images(mav0)], key=lambda event: event[0])
+
+    def _camera(self, mav0):
+        path, imu_path = mav0 / "cam0/sensor.yaml", mav0 / "imu0/sensor.yaml"
+        text = path.read_text()
+        camera = camera_t()
+        is_equidistant = re.search(r"distortion_model:\s*[\"']?equi", text)
+        camera.model = camera_t.MODEL_EQUIDISTANT if is_equidistant else camera_t.MODEL_RADTAN
+        camera.width, camera.height = map(int, numbers(text, "resolution", path))
+        camera.fx, camera.fy, camera.cx, camera.cy = numbers(text, "intrinsics", path)
+        camera.distortion = numbers(text, "distortion_coefficients", path)
+        for field in ("time_offset_s", "readout_s"):
+            found = re.search(rf"^{field}:\s*(\S+)", text, re.MULTILINE)
+            setattr(camera, field, float(found[1]) if found else 0.0)
+        set_transform(camera.T_body_cam, *relative(transform(imu_path.read_text(), imu_path), transform(text, path)))
+        return camera
+
+    @staticmethod
+    def _rows(path):
+        with path.open() as file:
+            return [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+
+    def _imu(self, mav0):
+        for stamp, *values in self._rows(mav0 / "imu0/data.csv"):
+            sample = imu_t()
+            sample.utime = int(stamp) // 1000
+            gyro, accel = sample.gyro_body, sample.accel_body
+            gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z = map(float, values[:6])
+            yield sample.utime, sample
+
+    def _images(self, mav0):
+        for stamp, name, *_ in self._rows(mav0 / "cam0/data.csv"):
+            yield int(stamp) // 1000, mav0 / "cam0/data" / name.strip()
+
+
+def play(recording, bus, agent, rate):
+    camera = recording.camera
+    begin_utime, begin_s = recording.events[0][0], time.monotonic()
+    next_camera_s = begin_s
+    for utime, event in recording.events:
+        due_s = begin_s + 1e-6 * (utime - begin_utime) / rate
+        while (left_s := due_s - time.monotonic()) > 0:
+            bus.handle(left_s)  # what the odometry says meanwhile
+        if time.monotonic() >= next_camera_s:
+            bus.publish(f"CAMERA_{agent}", camera)
+            next_camera_s += CAMERA_INTERVAL_S
+        if isinstance(event, imu_t):
+            bus.publish(f"IMU_{agent}", event)
+            continue
+        for chunk in image_chunks(utime, event.read_bytes(), camera.width, camera.height):
+            bus.publish(f"IMAGE_{agent}", chunk)
+
+
+def say_states(bus, agent):
+    """One line whenever the odometry's state changes."""
+    last = [None]
+
+    def on_pose(_, pose):
+        if pose.state != last[0]:
+            last[0] = pose.state
+            print(f"agent {agent}: {STATES.get(pose.state, '?')}", pose.reason, flush=True)
+
+    bus.subscribe(f"POSE_{agent}", on_pose, pose_t)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Plays a recording in EuRoC's format onto an agent's bus.")
+    parser.add_argument("--agent", type=int, required=True, help="agent id")
+    parser.add_argument("--recording", type=Path, required=True, help="folder that holds mav0")
+    parser.add_argument("--bus", default=DEFAULT_URL, help="LCM URL of the agent's bus")
+    parser.add_argument("--rate", type=float, default=1.0, help="times real time")
+    arguments = parser.parse_args()
+    try:
+        recording = Recording(arguments.recording)
+        bus = Bus(arguments.bus)
+    except (OSError, ValueError) as error:
+        sys.exit(f"euroc_source: {error}")
+    say_states(bus, arguments.agent)
+    play(recording, bus, arguments.agent, arguments.rate)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        pass
