@@ -37,7 +37,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(keyframe_t::getHash()), 0x59b338437f11086du);
   EXPECT_EQ(static_cast<uint64_t>(landmarks_t::getHash()), 0xc37fda84c71fcf58u);
   EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
-  EXPECT_EQ(static_cast<uint64_t>(options_t::getHash()), 0x0u);
+  EXPECT_EQ(static_cast<uint64_t>(options_t::getHash()), 0x68b9878722173cbcu);
   EXPECT_EQ(static_cast<uint64_t>(place_match_t::getHash()), 0x5be9f82364c3b435u);
   EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);
   EXPECT_EQ(static_cast<uint64_t>(resend_request_t::getHash()), 0x3f967c69b75046f2u);
