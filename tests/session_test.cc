@@ -15,6 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
+// Three times the worst of four runs: joint 0.038 to 0.039, odometry 0.034 and 0.065.
+constexpr double kMaxAteJoint_m = 0.12;
+constexpr double kMaxAteVio_m = 0.2;
+
 // Played once for all tests of this file.
 class SessionTest : public ::testing::Test {
  protected:
@@ -44,13 +48,15 @@ TEST_F(SessionTest, TwoAgentsBecomeOneMap) {
   ASSERT_FALSE(report.is_discarded());
   ASSERT_EQ(report["groups"].size(), 1u) << run_->output;
   EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
-  EXPECT_LT(report["ate_joint_m"].get<double>(), 0.25);
+  EXPECT_LT(report["ate_joint_m"].get<double>(), kMaxAteJoint_m);
+  EXPECT_EQ(report["constraints_truth"]["wrong"], 0);
+  ASSERT_EQ(report["agents"].size(), 2u);
   for (const auto& agent : report["agents"]) {
     EXPECT_EQ(agent["map_ids"].size(), 1u);
     EXPECT_GT(agent["keyframes"].get<int>(), 10);
     EXPECT_LT(agent["initialised_s"].get<double>(), 4.0);
     EXPECT_GT(agent["coverage"].get<double>(), 0.95);
-    EXPECT_LT(agent["ate_vio_m"].get<double>(), 0.25);
+    EXPECT_LT(agent["ate_vio_m"].get<double>(), kMaxAteVio_m);
   }
 }
 

@@ -9,7 +9,7 @@ EstimatorOptions Options() {
   return options;
 }
 
-std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise) {
+std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise, int frames) {
   std::deque<Ride> rides;
   for (uint64_t seed = 1; seed <= count; ++seed) {
     VioTestWorldOptions options;
@@ -20,7 +20,7 @@ std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise) {
     options.focal_sigma = 0.001;
     options.centre_sigma = 0.001;
     Ride& ride = rides.emplace_back(options);
-    ride.Advance(150);
+    ride.Advance(frames);
     ride.Flush();
   }
   return rides;
@@ -62,13 +62,12 @@ Rigid3 Ride::T_odom_truth() const {
 }
 
 const std::deque<Ride>& TenRides() {
-  static const std::deque<Ride> rides = MakeRides(10, ExactImuIntrinsics());
+  static const std::deque<Ride> rides = MakeRides(10, ExactImuIntrinsics(), 150);
   return rides;
 }
 
-const std::deque<Ride>& RidesOfAWrongImu() {
-  static const std::deque<Ride> rides = MakeRides(5, ImuNoise{});
-  return rides;
+std::deque<Ride> ShortRides(uint64_t count, const ImuNoise& noise) {
+  return MakeRides(count, noise, 60);
 }
 
 }  // namespace pangea::vio

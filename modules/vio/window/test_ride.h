@@ -34,8 +34,8 @@ struct Ride {
 
 // Rides of 15 s to their end, with a calibration that is slightly off; made once.
 const std::deque<Ride>& TenRides();
-// Five of them with an IMU whose scale factors and axes are off, drawn from what the estimator is
-// told.
-const std::deque<Ride>& RidesOfAWrongImu();
+// Rides of 6 s like these. The IMU's scale factors and axes are off by what `noise` says, which the
+// estimator is told.
+std::deque<Ride> ShortRides(uint64_t count, const ImuNoise& noise);
 
 }  // namespace pangea::vio
