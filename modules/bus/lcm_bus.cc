@@ -98,10 +98,20 @@ struct LcmBus::Library : LcmBus::Impl {
 
 struct LcmBus::Multicast : LcmBus::Impl {
   Multicast(const std::string& url, Fragments fragments)
-      : bus_url(url), receiver(ParseUdpmUrl(url), fragments), lcm(url) {
+      : bus_url(url), receiver(WithRoute(url), fragments), lcm(url) {
     if (!lcm.good()) {
       ThrowNotOpened(url, "");
     }
+  }
+  // Before LCM looks for the route itself: it gives advice that no longer helps.
+  static UdpmAddress WithRoute(const std::string& url) {
+    const UdpmAddress address = ParseUdpmUrl(url);
+    try {
+      CheckRoute(address);
+    } catch (const std::system_error& error) {
+      ThrowNotOpened(url, fmt::format(" ({})", error.what()));
+    }
+    return address;
   }
   void Publish(const std::string& channel, Bytes data) override {
     lcm.publish(channel, data.data(), static_cast<unsigned int>(data.size()));

@@ -7,6 +7,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "files/progress.h"
 #include "sim/render/frame_cache.h"
 
 namespace pangea::sim {
@@ -166,16 +167,16 @@ void CommandLine::Apply() {
   }
 }
 
+RecordingSummary CommandLine::Render() const {
+  pangea::Progress progress("pangea-sim");
+  return RenderRecording(options_, [&progress](size_t done, size_t all) {
+    progress.Update(static_cast<int64_t>(done), static_cast<int64_t>(all), "frames");
+  });
+}
+
 void CommandLine::Run() {
   Apply();
-  const RecordingSummary summary = RenderRecording(options_, [](size_t done, size_t all) {
-    constexpr size_t kEvery = 20;
-    if (done % kEvery == 0 || done == all) {
-      fmt::print(stderr, "\r{} of {} frames", done, all);
-      std::fflush(stderr);
-    }
-  });
-  fmt::print(stderr, "\n");
+  const RecordingSummary summary = Render();
   fmt::print(
       "{}: {} frames ({} rendered, {} from the cache), {:.1f} m of path, at most {:.1f} m/s^2",
       options_.out, summary.images, summary.rendered, summary.images - summary.rendered,

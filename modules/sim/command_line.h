@@ -25,6 +25,7 @@ class CommandLine {
   void AddScene(CLI::App& app);
   void AddSensors(CLI::App& app);
   void Apply();
+  RecordingSummary Render() const;
 
   RecordingOptions options_;
   std::string generate_ = "walk";

@@ -87,7 +87,11 @@ void Playback::Run() {
   pace_.WaitUntil(WallUtime() + ToUs(options_.delay_s));
   const int64_t begin_wall = WallUtime();
   const int64_t begin = images[index].utime;
-  for (; index < images.size() && images[index].utime <= last && !StopRequested(); ++index) {
+  const auto num_images = std::ranges::upper_bound(images, last, {}, &EurocImage::utime) -
+                          images.begin() - static_cast<int64_t>(index);
+  int64_t num_played = 0;
+  for (; num_played < num_images && !StopRequested(); ++index, ++num_played) {
+    progress_.Update(num_played, num_images, "images");
     const int64_t played = images[index].utime - begin;
     if (!WaitForTurn(played, begin_wall)) {
       continue;

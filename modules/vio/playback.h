@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bus/retransmission/playback_pace.h"
+#include "files/progress.h"
 #include "recording/euroc.h"
 #include "vio/front_end/tracks.h"
 #include "vio/vio_process.h"
@@ -53,6 +54,7 @@ class Playback {
   const EurocRecording& recording_;
   PlaybackOptions options_;
   std::map<int64_t, TrackedFrame> tracks_;
+  Progress progress_{"pangea-vio"};
   size_t next_imu_ = 0;
 };
 

@@ -117,15 +117,23 @@ class Socket {
     Check(setsockopt(fd_, level, option, &value, sizeof(value)), what);
   }
   void Bind(uint16_t port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_ANY);
-    address.sin_port = htons(port);
-    Check(bind(fd_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), "the port");
+    const sockaddr_in address = Inet({htonl(INADDR_ANY)}, port);
+    Check(bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), "the port");
+  }
+  void Connect(in_addr host, uint16_t port) {
+    const sockaddr_in address = Inet(host, port);
+    Check(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), "the group");
   }
   int Release() { return std::exchange(fd_, -1); }
 
  private:
+  static sockaddr_in Inet(in_addr host, uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr = host;
+    address.sin_port = htons(port);
+    return address;
+  }
   static void Check(int result, const char* what) {
     if (result < 0) {
       throw std::system_error(errno, std::generic_category(), what);
@@ -152,6 +160,8 @@ UdpmAddress ParseUdpmUrl(const std::string& url) {
   }
   return address;
 }
+
+void CheckRoute(const UdpmAddress& address) { Socket().Connect(address.group, address.port); }
 
 int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments) {
   Socket socket;

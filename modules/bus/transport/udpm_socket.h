@@ -28,6 +28,9 @@ struct UdpmAddress {
 // Throws std::runtime_error naming the URL and what is wrong with it.
 UdpmAddress ParseUdpmUrl(const std::string& url);
 
+// Throws std::system_error when this machine has no route to the group.
+void CheckRoute(const UdpmAddress& address);
+
 // Opens the socket, non-blocking; throws std::system_error.
 int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments);
 

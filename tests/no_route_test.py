@@ -1,0 +1,17 @@
+#!/usr/bin/env python3
+"""On a machine without a multicast route a program says one thing, what to do: no_route_test.py BIN"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+SKIPPED = 77
+WITHOUT_NETWORK = ["unshare", "--user", "--map-root-user", "--net"]
+
+if subprocess.run([*WITHOUT_NETWORK, "true"], capture_output=True).returncode != 0:
+    sys.exit(SKIPPED)  # namespaces are forbidden here
+done = subprocess.run([*WITHOUT_NETWORK, Path(sys.argv[1]) / "pangea-fusion"], capture_output=True, text=True, timeout=20)
+print(done.stderr)
+assert done.returncode == 1, done.returncode
+assert done.stderr.count("\n") == 1, "more than our own line"
+assert "cannot open the bus 'udpm://" in done.stderr and "ip route add 224.0.0.0/4 dev lo" in done.stderr
