@@ -89,7 +89,8 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
   if (held_.size() > kMaxHeld) {
     journal_.StopCatchingUp();
   }
-  if (!journal_.catching_up()) {
+  // Matches that came before any catch-up wait for their keyframes: a replay hands them on first.
+  if (std::exchange(was_catching_up_, journal_.catching_up()) && !was_catching_up_) {
     known_matches_.clear();
     RecogniseHeld();
   }

@@ -47,6 +47,7 @@ class PlaceRecognitionProcess : public Process {
   Node node_;
   PlaceRecognition recognition_;
   JournalFollower journal_;
+  bool was_catching_up_ = false;
   std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
   std::deque<Keyframe> held_;                       // without a match, in order
   std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again

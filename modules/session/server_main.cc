@@ -6,7 +6,7 @@
 #include <iostream>
 
 #include "bus/bus.h"
-#include "link/poll_loop.h"
+#include "link/wire.h"
 #include "session/server.h"
 
 int main(int argc, char** argv) {

@@ -93,7 +93,7 @@ void Playback::Run() {
   for (; num_played < num_images && !StopRequested(); ++index, ++num_played) {
     progress_.Update(num_played, num_images, "images");
     const int64_t played = images[index].utime - begin;
-    if (!WaitForTurn(played, begin_wall)) {
+    if (!WaitUntilDue(played, begin_wall)) {
       continue;
     }
     PlayImage(index);
@@ -107,7 +107,7 @@ void Playback::Run() {
 }
 
 // Whether the image is to be played: in real time none is that comes too late.
-bool Playback::WaitForTurn(int64_t played_us, int64_t begin_wall) {
+bool Playback::WaitUntilDue(int64_t played_us, int64_t begin_wall) {
   if (options_.rate <= 0) {
     pace_.WaitForAcknowledgements();
     return true;

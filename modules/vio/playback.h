@@ -45,7 +45,7 @@ class Playback {
   void Run();
 
  private:
-  bool WaitForTurn(int64_t played_us, int64_t begin_wall);
+  bool WaitUntilDue(int64_t played_us, int64_t begin_wall);
   void PlayImage(size_t index);
   std::span<const ImuSample> ImuUntil(int64_t utime);
 
