@@ -17,7 +17,18 @@ void RenderWalk(const fs::path& out, const std::string& arguments) {
   ASSERT_EQ(rendered.exit_code, 0) << rendered.output;
 }
 
-void ExpectApart(const std::string& name, const std::string& first, const std::string& second) {
+// Nothing was fused: so it is also when nothing was mapped.
+void ExpectBothMapped(const nlohmann::json& report) {
+  ASSERT_EQ(report["agents"].size(), 2u);
+  for (const auto& agent : report["agents"]) {
+    EXPECT_EQ(agent["map_ids"].size(), 1u) << agent;
+    EXPECT_GT(agent["keyframes"].get<int>(), 20) << agent;
+  }
+}
+
+// `least_refused`: constraints, where places are taken for one another and the geometry says no.
+void ExpectApart(const std::string& name, const std::string& first, const std::string& second,
+                 int least_refused) {
   const fs::path folder = FreshFolder(name);
   RenderWalk(folder / "a", first);
   RenderWalk(folder / "b", second);
@@ -26,6 +37,10 @@ void ExpectApart(const std::string& name, const std::string& first, const std::s
                                  (folder / "out").string() + " --rate max");
   ASSERT_EQ(run.exit_code, 0) << run.output;
   const auto report = ReadJson(folder / "out" / "report.json");
+  ExpectBothMapped(report);
+  EXPECT_GE(report["constraints"]["refused"].get<int>(), least_refused) << run.output;
+  EXPECT_EQ(report["constraints"]["accepted_inter"], 0) << run.output;
+  ASSERT_EQ(report["groups"].size(), 2u) << run.output;
   for (const auto& group : report["groups"]) {
     EXPECT_EQ(group["agents"].size(), 1u) << run.output;
   }
@@ -33,12 +48,12 @@ void ExpectApart(const std::string& name, const std::string& first, const std::s
 }
 
 TEST(NoWrongFusion, DifferentHalls) {
-  ExpectApart("halls", "--path-seed 1 --scene-seed 1", "--path-seed 1 --scene-seed 2");
+  ExpectApart("halls", "--path-seed 1 --scene-seed 1", "--path-seed 1 --scene-seed 2", 0);
 }
 
 TEST(NoWrongFusion, RoomsWithIdenticalObjects) {
   ExpectApart("twins", "--path-seed 1 --scene twin_objects_a",
-              "--path-seed 2 --scene twin_objects_b");
+              "--path-seed 2 --scene twin_objects_b", 1);
 }
 
 }  // namespace
