@@ -44,13 +44,6 @@ std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
                         static_cast<int32_t>(channel_bytes), static_cast<int32_t>(data_bytes)};
 }
 
-bool BeginsAsLogEvent(Bytes bytes) {
-  std::vector<uint8_t> magic;
-  PutBigEndian(kLogMagic, 4, &magic);
-  const size_t size = std::min(bytes.size(), magic.size());
-  return std::equal(magic.begin(), magic.begin() + static_cast<int64_t>(size), bytes.begin());
-}
-
 bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
   while (size > 0) {
     const ssize_t got = pread(fd, out, size, offset);
@@ -65,6 +58,14 @@ bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
     size -= static_cast<size_t>(got);
   }
   return true;
+}
+
+bool BeginsAsLogEvent(int fd, int64_t offset, int64_t bytes) {
+  std::vector<uint8_t> magic;
+  PutBigEndian(kLogMagic, 4, &magic);
+  std::vector<uint8_t> begin(static_cast<size_t>(std::min<int64_t>(bytes, 4)));
+  return ReadFully(fd, offset, begin.data(), begin.size()) &&
+         std::equal(begin.begin(), begin.end(), magic.begin());
 }
 
 bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {

@@ -31,12 +31,11 @@ size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel,
                       std::vector<uint8_t>* out);
 // Nothing if these bytes are no event's header, or one of absurd lengths.
 std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes);
-// Whether they may be the first of an event, however few there are.
-bool BeginsAsLogEvent(Bytes bytes);
-
 // All of it, going on after interruptions; false when the file refuses or ends.
 bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size);
 bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size);
+// Whether the file's `bytes` from there on may be the first of an event, however few they are.
+bool BeginsAsLogEvent(int fd, int64_t offset, int64_t bytes);
 // Makes a new file in the folder outlive a power cut; false if it may not.
 bool SyncFolder(const std::string& folder);
 

@@ -4,13 +4,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
 
-#include "core/big_endian.h"
 #include "log_file/log_event.h"
 #include "messages/channels.h"
 
@@ -97,12 +95,10 @@ void LogReader::See(const LogPiece& event) {
 
 // A log may be cut anywhere, but begins as one unless it holds an event further on.
 void LogReader::CheckIsLog() const {
-  std::array<uint8_t, 4> begin{};
-  const bool begins_as_log = ReadFully(fd_, 0, begin.data(), begin.size()) &&
-                             GetBigEndian(begin.data(), begin.size()) == kLogMagic;
-  if (scan_.file_bytes() > 0 && !last_ && !begins_as_log) {
-    throw std::runtime_error(fmt::format("{}: is no LCM log: its {} bytes hold no whole event",
-                                         path_, scan_.file_bytes()));
+  const int64_t bytes = scan_.file_bytes();
+  if (bytes > 0 && !last_ && !BeginsAsLogEvent(fd_, 0, bytes)) {
+    throw std::runtime_error(
+        fmt::format("{}: is no LCM log: its {} bytes hold no whole event", path_, bytes));
   }
 }
 

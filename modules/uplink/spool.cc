@@ -59,11 +59,6 @@ std::optional<int64_t> NumberOf(const fs::path& file) {
   return good ? std::optional(std::stoll(digits)) : std::nullopt;
 }
 
-bool BeginsAsEvent(int fd, const LogPiece& piece) {
-  std::vector<uint8_t> begin(static_cast<size_t>(std::min<int64_t>(piece.bytes, 4)));
-  return ReadFully(fd, piece.offset, begin.data(), begin.size()) && BeginsAsLogEvent(begin);
-}
-
 }  // namespace
 
 Spool::Spool(fs::path folder, int32_t agent_id, int64_t max_bytes)
@@ -140,7 +135,8 @@ void Spool::LoadFrom(int fd, int64_t number) {
   while (const CheckedScan::Piece* piece = scan.Next()) {
     if (piece->kind == LogPiece::Kind::kEvent) {
       LoadEvent(number, *piece);
-    } else if (piece->kind == LogPiece::Kind::kDamage || !BeginsAsEvent(fd, *piece)) {
+    } else if (piece->kind == LogPiece::Kind::kDamage ||
+               !BeginsAsLogEvent(fd, piece->offset, piece->bytes)) {
       NoteDamage(number, fmt::format("{} bytes at byte {}", piece->bytes, piece->offset));
     }
   }

@@ -34,11 +34,6 @@ void CheckKind(const std::string& path, int fd) {
   }
 }
 
-bool BeginsAsEvent(int fd, int64_t offset, int64_t bytes) {
-  std::vector<uint8_t> begin(static_cast<size_t>(std::min<int64_t>(bytes, 4)));
-  return ReadFully(fd, offset, begin.data(), begin.size()) && BeginsAsLogEvent(begin);
-}
-
 int64_t SizeOf(const std::vector<DamagedPart>& parts) {
   int64_t size = 0;
   for (const DamagedPart& part : parts) {
@@ -81,7 +76,7 @@ void Journal::Load(const Visitor& visitor) {
     throw std::runtime_error(fmt::format("cannot read the journal '{}': {}", path_, error.what()));
   }
   const bool has_events = SizeOf(parts) < synced_bytes_;
-  if (synced_bytes_ > 0 && !has_events && !BeginsAsEvent(fd_, 0, synced_bytes_)) {
+  if (synced_bytes_ > 0 && !has_events && !BeginsAsLogEvent(fd_, 0, synced_bytes_)) {
     throw std::runtime_error(
         fmt::format("'{}' is no journal, and is left as it is: give another name; if it was one, "
                     "move it away, and agents send again what they have",
@@ -102,8 +97,8 @@ std::vector<DamagedPart> Journal::Scan(const Visitor& visitor) {
       continue;
     }
     newest_crc32_.clear();
-    const bool torn =
-        piece->kind == LogPiece::Kind::kTornTail && BeginsAsEvent(fd_, piece->offset, piece->bytes);
+    const bool torn = piece->kind == LogPiece::Kind::kTornTail &&
+                      BeginsAsLogEvent(fd_, piece->offset, piece->bytes);
     if (!parts.empty() && !torn && parts.back().range.end == piece->offset) {
       parts.back().range.end = piece->end();
     } else {
