@@ -109,7 +109,7 @@ struct Arguments {
   std::vector<std::string> overheard;
   std::vector<int32_t> agents;
   int64_t packets = 1'000'000;
-  double rate = 15'000;
+  double packets_per_s = 15'000;
   std::vector<std::string> command;
 };
 
@@ -135,7 +135,7 @@ int Run(const Arguments& arguments) {
       while (bus.Handle(0)) {
       }
     }
-    const auto due = static_cast<int64_t>(arguments.rate * 1e-6 *
+    const auto due = static_cast<int64_t>(arguments.packets_per_s * 1e-6 *
                                           static_cast<double>(SteadyMicros() - begin_us));
     for (; sent < std::min(due, arguments.packets); ++sent) {
       forger.Shout();
@@ -156,7 +156,7 @@ int main(int argc, char** argv) {
   app.add_option("--overhear", arguments.overheard, "LCM URLs of link buses whose packets it uses");
   app.add_option("--agents", arguments.agents, "agents it pretends to be")->required();
   app.add_option("--packets", arguments.packets, "how many")->capture_default_str();
-  app.add_option("--rate", arguments.rate, "packets per second")->capture_default_str();
+  app.add_option("--packets-per-s", arguments.packets_per_s)->capture_default_str();
   app.add_option("command", arguments.command, "the command, after --")->required();
   CLI11_PARSE(app, argc, argv);
   try {

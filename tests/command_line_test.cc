@@ -107,6 +107,16 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
 }
 
+// `--rate` is how quickly something is played, in every program that has it.
+TEST(Uplink, BandwidthAndBudgetHaveOneUnit) {
+  EXPECT_THAT(Complete({"pangea-uplink", "--b"}), ElementsAre("--bus", "--bandwidth", "--budget"));
+  EXPECT_THAT(Complete({"pangea-uplink", "--ra"}), ElementsAre());
+  Outcome outcome = RunCommand("pangea-uplink --agent 1 --key none --bandwidth 0.5");
+  EXPECT_THAT(outcome.output, HasSubstr("the bandwidth must be at least 1 kB/s"));
+  outcome = RunCommand("pangea-uplink --agent 1 --key none --budget 4");
+  EXPECT_THAT(outcome.output, HasSubstr("the budget must be at least 5 kB/s"));
+}
+
 // Not a report without ground truth, as if the recording had none.
 TEST(Session, ARecordingThatIsGivenIsThere) {
   const Outcome outcome =

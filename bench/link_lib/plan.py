@@ -85,7 +85,7 @@ def forger(options, run):
     overheard = [word for k in range(agents) for word in ("--overhear", bus(options.port + 2 + agents + k))]
     return [str(Path(options.bin).resolve() / "pangea-link-forger"), "--link", bus(options.port + 1), *overheard,
             "--agents", *[str(agent.id) for agent in options.agents], "--packets", str(FORGED_PACKETS),
-            "--rate", f"{FORGED_PACKETS / seconds:.0f}", "--", *run, "--port", str(options.port)]
+            "--packets-per-s", f"{FORGED_PACKETS / seconds:.0f}", "--", *run, "--port", str(options.port)]
 
 
 def host_row(options, name):

@@ -354,7 +354,7 @@ TEST_F(LinkWorld, TheOptionsInForceAreJournalled) {
 // A budget costs corners, never a keyframe: the chain of poses has no gap.
 TEST_F(LinkWorld, UnderABudgetKeyframesAreThinnedAndAllArrive) {
   KillUplink();
-  options.budget_bytes_per_s = 20e3;
+  options.budget_kb_per_s = 20;
   StartUplink();
   status_t status{};
   agent_bus.Subscribe("STATUS_uplink_1", [&](const std::string&, Bytes data) {

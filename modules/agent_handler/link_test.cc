@@ -379,9 +379,9 @@ TEST(Sender, WhatIsStoredTakesNoMemory) {
   EXPECT_LE(in_use() - before, size_t{Sender::kMaxStoredInMemory} + kBytes + 500 * kKeyframes);
 }
 
-TEST(Sender, PacesToItsRate) {
+TEST(Sender, PacesToItsBandwidth) {
   SenderOptions options;
-  options.rate_bytes_per_s = 100'000;
+  options.bandwidth_kb_per_s = 100;
   World world({}, 1, options);
   world.Hello({kMap});
   world.Spool(kMap, 60);

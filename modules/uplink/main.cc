@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
   app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
   app.add_option("--packet-bytes", options.sender.payload_bytes, "keyframe bytes per packet")
       ->capture_default_str();
-  app.add_option("--rate", options.sender.rate_bytes_per_s, "bytes per second at most")
+  app.add_option("--bandwidth", options.sender.bandwidth_kb_per_s,
+                 "kB/s of keyframes at most, repeats included")
       ->capture_default_str();
   app.add_option("--spool", spool_folder,
                  "folder for unacknowledged keyframes (default: none, they are kept in memory)");
@@ -34,13 +35,11 @@ int main(int argc, char** argv) {
   app.add_option("--spool-bytes", options.sender.max_spool_bytes,
                  "unacknowledged keyframes kept in memory; beyond it the newest are not taken")
       ->capture_default_str();
-  double budget_kb_per_s = 0;
-  app.add_option("--budget", budget_kb_per_s,
-                 "kB/s that may be sent; keyframes are thinned to fit (0: no bound)")
+  app.add_option("--budget", options.budget_kb_per_s,
+                 "kB/s of all that may be sent; keyframes are thinned to fit (0: no bound)")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
-    options.budget_bytes_per_s = 1000 * budget_kb_per_s;
     if (const auto invalid = options.Invalid()) {
       throw std::runtime_error(*invalid);
     }

@@ -24,8 +24,8 @@ std::optional<std::string> SenderOptions::Invalid() const {
   if (payload_bytes < kMinPayloadBytes || payload_bytes > kMaxPayloadBytes) {
     return fmt::format("packet size must be {} .. {} bytes", kMinPayloadBytes, kMaxPayloadBytes);
   }
-  if (!(rate_bytes_per_s >= 1000)) {
-    return "rate must be at least 1000 bytes/s";
+  if (!(bandwidth_kb_per_s >= 1)) {
+    return "the bandwidth must be at least 1 kB/s";
   }
   if (max_in_flight_bytes < payload_bytes || max_spool_bytes < kMaxCompressedBytes) {
     return "window or spool is too small";
@@ -34,7 +34,9 @@ std::optional<std::string> SenderOptions::Invalid() const {
 }
 
 Sender::Sender(const SenderOptions& options, Load load)
-    : options_(options), load_(std::move(load)), pacer_(options.rate_bytes_per_s, kBurstBytes) {}
+    : options_(options),
+      load_(std::move(load)),
+      pacer_(1000 * options.bandwidth_kb_per_s, kBurstBytes) {}
 
 Sender::Item& Sender::FindOrAdd(const KeyframeId& id) {
   const auto [it, added] = spool_.try_emplace(id);

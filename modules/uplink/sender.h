@@ -34,7 +34,7 @@ namespace pangea {
 struct SenderOptions {
   // Keyframe bytes per packet: by default what fills one Ethernet frame; the paper has 4096.
   int payload_bytes = kFramePayloadBytes;
-  double rate_bytes_per_s = 4e6;
+  double bandwidth_kb_per_s = 4000;  // keyframes' packets, repeats included, at most
   // Sent, neither arrived nor given up: what the receiver's cache takes (paper, IV.A). A smaller
   // window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take 200 kB.
   int max_in_flight_bytes = 210 * 1024;

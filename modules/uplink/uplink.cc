@@ -28,22 +28,22 @@ constexpr size_t kMaxMaps = 200;
 // A pose's packet on the wire, and what poses may take of a budget.
 constexpr double kPoseBytes = 180;
 constexpr double kPoseShare = 0.05;
-constexpr double kMinBudget = 5000;  // bare keyframes alone take 3 kB/s
+constexpr double kMinBudget_kb_per_s = 5;  // bare keyframes alone take 3 kB/s
 
 }  // namespace
 
 std::optional<std::string> UplinkOptions::Invalid() const {
-  if (budget_bytes_per_s != 0 && !(budget_bytes_per_s >= kMinBudget)) {
+  if (budget_kb_per_s != 0 && !(budget_kb_per_s >= kMinBudget_kb_per_s)) {
     return "the budget must be at least 5 kB/s, or 0 for none";
   }
   return sender.Invalid();
 }
 
 UplinkOptions WithinBudget(UplinkOptions options) {
-  if (const double budget = options.budget_bytes_per_s; budget > 0) {
-    options.sender.rate_bytes_per_s =
-        std::min(options.sender.rate_bytes_per_s, (1 - kPoseShare) * budget);
-    options.pose_hz = std::min(options.pose_hz, kPoseShare * budget / kPoseBytes);
+  if (const double budget_kb_per_s = options.budget_kb_per_s; budget_kb_per_s > 0) {
+    options.sender.bandwidth_kb_per_s =
+        std::min(options.sender.bandwidth_kb_per_s, (1 - kPoseShare) * budget_kb_per_s);
+    options.pose_hz = std::min(options.pose_hz, kPoseShare * 1000 * budget_kb_per_s / kPoseBytes);
   }
   return options;
 }

@@ -20,9 +20,9 @@ namespace pangea {
 struct UplinkOptions {
   SenderOptions sender;
   double pose_hz = 10;  // poses sent up at most this often; 0 for none
-  // Bytes a second that the agent may send, packets and repeats included; 0 for no bound. Keyframes
-  // are thinned to fit (ladder.h), poses sent more seldom.
-  double budget_bytes_per_s = 0;
+  // What the agent may send, packets and repeats included; 0 for no bound. Keyframes are thinned to
+  // fit (ladder.h), poses sent more seldom.
+  double budget_kb_per_s = 0;
 
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;

@@ -37,8 +37,8 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       spool_(spool),
       uplink_(options, [this](const KeyframeId& id) { return Load(id); }) {
   node_.Watch(link_bus);
-  if (options.budget_bytes_per_s > 0) {
-    ladder_.emplace(options.budget_bytes_per_s);
+  if (options.budget_kb_per_s > 0) {
+    ladder_.emplace(1000 * options.budget_kb_per_s);
   }
   if (spool_ != nullptr) {
     for (const KeyframeId& id : spool_->Kept()) {
