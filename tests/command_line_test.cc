@@ -107,6 +107,38 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
 }
 
+// So that `explain` and a replay find images and ground truth.
+TEST(Log, WhatIsMadeOfALogKeepsItsRecordings) {
+  const fs::path folder = FreshFolder("log_recordings");
+  const std::string whole = (folder / "whole" / "session.lcm").string();
+  fs::create_directories(folder / "whole");
+  fs::copy(PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm", whole);
+  std::ofstream(folder / "whole" / "recordings.json")
+      << R"({"agents": [{"id": 2, "recording": "/walk_2", "start": 1.5, "duration": 0}],
+             "expect": {"groups": 1}})";
+  const std::string part = (folder / "part.lcm").string();
+  const std::string parts = (folder / "parts.lcm").string();
+  ASSERT_EQ(RunCommand("pangea-log cut " + whole + " --to 4 --out " + part).exit_code, 0);
+  ASSERT_EQ(RunCommand("pangea-log cat " + part + " --out " + parts).exit_code, 0);
+  for (const std::string& log : {part, parts}) {
+    const auto record = ReadJson(log + ".recordings.json");
+    ASSERT_EQ(record["agents"].size(), 1U) << log;
+    EXPECT_EQ(record["agents"][0]["id"], 2);
+    EXPECT_EQ(record["agents"][0]["recording"], "/walk_2");
+    EXPECT_EQ(record["agents"][0]["start"], 1.5);
+    EXPECT_TRUE(record["expect"].empty()) << "of the whole, not of a part";
+  }
+  // One of the same name that knows no recordings has none.
+  fs::remove(part);
+  ASSERT_EQ(
+      RunCommand("pangea-log cut " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --to 4 --out " +
+                 part)
+          .exit_code,
+      0);
+  EXPECT_FALSE(fs::exists(part + ".recordings.json"));
+  fs::remove_all(folder);
+}
+
 // `--rate` is how quickly something is played, in every program that has it.
 TEST(Uplink, BandwidthAndBudgetHaveOneUnit) {
   EXPECT_THAT(Complete({"pangea-uplink", "--b"}), ElementsAre("--bus", "--bandwidth", "--budget"));

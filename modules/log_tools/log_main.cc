@@ -142,16 +142,18 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   AddCutOptions(*cut, arguments);
   cut->add_option("--out", arguments->out, "The new log")->required();
   cut->callback([arguments] {
-    std::cout << fmt::format(
-        "{}: {} events\n", arguments->out,
-        CutLog(arguments->logs.front(), arguments->cut, arguments->out, &arguments->readings));
+    const std::string& log = arguments->logs.front();
+    const int64_t events = CutLog(log, arguments->cut, arguments->out, &arguments->readings);
+    KeepRecordings({log}, arguments->out);
+    std::cout << fmt::format("{}: {} events\n", arguments->out, events);
   });
   CLI::App* cat = AddCommand(app, "cat", "Several logs in one, by time of capture", arguments, -1);
   cat->alias("merge");
   cat->add_option("--out", arguments->out, "The new log")->required();
   cat->callback([arguments] {
-    std::cout << fmt::format("{}: {} events\n", arguments->out,
-                             MergeLogs(arguments->logs, arguments->out, &arguments->readings));
+    const int64_t events = MergeLogs(arguments->logs, arguments->out, &arguments->readings);
+    KeepRecordings({arguments->logs.begin(), arguments->logs.end()}, arguments->out);
+    std::cout << fmt::format("{}: {} events\n", arguments->out, events);
   });
   CLI::App* out = AddCommand(app, "export", "What a server bus' log amounts to", arguments, 1);
   out->add_option("--tum", arguments->tum, "Folder for the agents' trajectories, TUM format");
@@ -167,8 +169,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
       ->check(CLI::ExistingFile);
   back->add_option("--out", arguments->out, "The new log")->required();
   back->callback([arguments] {
-    const int64_t placed =
-        ImportG2o(arguments->logs.front(), arguments->g2o, arguments->out, &arguments->readings);
+    const std::string& log = arguments->logs.front();
+    const int64_t placed = ImportG2o(log, arguments->g2o, arguments->out, &arguments->readings);
+    KeepRecordings({log}, arguments->out);
     std::cout << fmt::format(
         "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own\n",
         arguments->out, placed, arguments->g2o);

@@ -28,9 +28,9 @@ AgentRun RunOf(const json& agent) {
   return run;
 }
 
-}  // namespace
+fs::path OwnFile(const fs::path& log) { return log.string() + "." + kFile; }
 
-void WriteSessionRecord(const SessionRecord& session, const fs::path& folder) {
+void Write(const SessionRecord& session, const fs::path& file) {
   json agents = json::array();
   for (const AgentRun& agent : session.agents) {
     const std::string recording =
@@ -40,15 +40,38 @@ void WriteSessionRecord(const SessionRecord& session, const fs::path& folder) {
                       {"start", agent.start_s},
                       {"duration", agent.duration_s.value_or(0)}});  // 0: to its end
   }
-  WriteTextFile(folder / kFile,
-                json{{"agents", agents}, {"expect", session.expect}}.dump(2) + "\n");
+  WriteTextFile(file, json{{"agents", agents}, {"expect", session.expect}}.dump(2) + "\n");
+}
+
+}  // namespace
+
+void WriteSessionRecord(const SessionRecord& session, const fs::path& folder) {
+  Write(session, folder / kFile);
+}
+
+void KeepRecordings(const std::vector<fs::path>& logs, const fs::path& out) {
+  SessionRecord kept;
+  std::set<int32_t> ids;
+  for (const AgentRun& agent : ReadSessionRecord(logs).agents) {
+    if (ids.insert(agent.id).second) {
+      kept.agents.push_back(agent);
+    }
+  }
+  if (!kept.agents.empty()) {
+    Write(kept, OwnFile(out));
+  } else {
+    fs::remove(OwnFile(out));  // an earlier log's of this name
+  }
 }
 
 SessionRecord ReadSessionRecord(const std::vector<fs::path>& logs) {
   SessionRecord session;
   std::set<fs::path> seen;
   for (const fs::path& log : logs) {
-    const fs::path file = fs::absolute(log).parent_path() / kFile;
+    fs::path file = OwnFile(fs::absolute(log));
+    if (!Exists(file)) {
+      file = fs::absolute(log).parent_path() / kFile;
+    }
     if (!Exists(file) || !seen.insert(file).second) {
       continue;
     }

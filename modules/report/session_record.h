@@ -21,8 +21,14 @@ struct SessionRecord {
 
 // Both throw std::runtime_error when the file cannot be written, or read.
 void WriteSessionRecord(const SessionRecord& session, const std::filesystem::path& folder);
-// Of the folders that hold `logs`; empty where there is none.
+// Of the logs themselves (KeepRecordings), else of the folders that hold them; empty where there is
+// none.
 SessionRecord ReadSessionRecord(const std::vector<std::filesystem::path>& logs);
+
+// Who played what, for a log made of others: beside it, as <out>.recordings.json. What was expected
+// of the whole is not expected of a part.
+void KeepRecordings(const std::vector<std::filesystem::path>& logs,
+                    const std::filesystem::path& out);
 
 // Those recordings that are still there, folders by agent.
 std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
