@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "files/progress.h"
 #include "log_file/log_event.h"
 #include "messages/channels.h"
 
@@ -42,6 +43,7 @@ const LogPiece* LogReader::NextPiece() {
 
 const LogEvent* LogReader::Next() {
   while (const LogPiece* piece = NextPiece()) {
+    read_bytes_ = piece->end();
     if (Take(*piece)) {
       event_ = {piece->header.utime, piece->channel, piece->data, piece->header.number};
       return &event_;
@@ -103,10 +105,15 @@ void LogReader::CheckIsLog() const {
 }
 
 void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>& handler,
-             LogReadings* readings) {
+             LogReadings* readings, WhileReading while_reading) {
+  constexpr int64_t kMegabyte = 1'000'000;
   LogReader log(path);
+  Progress progress("reading " + path);
   while (const LogEvent* event = log.Next()) {
     handler(*event);
+    if (while_reading == WhileReading::kTellProgress) {
+      progress.Update(log.read_bytes() / kMegabyte, log.file_bytes() / kMegabyte, "MB");
+    }
   }
   if (readings != nullptr) {
     (*readings)[path] = log.reading();

@@ -35,6 +35,9 @@ class LogReader {
   const LogEvent* Next();
   // Of what was read so far.
   const LogReading& reading() const { return reading_; }
+  // How far it is: the end of the last event, and the file's.
+  int64_t read_bytes() const { return read_bytes_; }
+  int64_t file_bytes() const { return scan_.file_bytes(); }
 
  private:
   const LogPiece* NextPiece();
@@ -48,15 +51,21 @@ class LogReader {
   CheckedScan scan_;
   LogReading reading_;
   LogEvent event_;
+  int64_t read_bytes_ = 0;
   std::optional<int64_t> first_utime_;
   std::optional<LostPlace::Event> last_;
   int64_t lost_end_ = -1;   // of the last place
   bool lost_open_ = false;  // what comes behind it is not yet known
 };
 
+// Whether how far it is stands on stderr (files/progress.h). Not where the handler prints: on a
+// terminal the two would be one line.
+enum class WhileReading : uint8_t { kTellProgress, kTellNothing };
+
 // All of the log. What could not be read of it is noted in `readings`; without them a log that is
 // not whole throws std::runtime_error too, when the handler has had what there is.
 void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>& handler,
-             LogReadings* readings = nullptr);
+             LogReadings* readings = nullptr,
+             WhileReading while_reading = WhileReading::kTellProgress);
 
 }  // namespace pangea

@@ -57,6 +57,17 @@ class LogReaderTest : public testing::Test {
     reading = readings.at(path);
     return bytes;
   }
+  // How much of the file was read when each event was handed on.
+  std::vector<double> Shares() const {
+    Save();
+    LogReader log(path);
+    std::vector<double> shares;
+    while (log.Next() != nullptr) {
+      shares.push_back(static_cast<double>(log.read_bytes()) /
+                       static_cast<double>(log.file_bytes()));
+    }
+    return shares;
+  }
   std::string Refusal(LogReadings* readings) const {
     Save();
     try {
@@ -82,6 +93,11 @@ TEST_F(LogReaderTest, AWholeLogLosesNothing) {
   EXPECT_EQ(DescribeLoss(reading), "");
   EXPECT_THAT(LossLines({{"a.lcm", reading}}), ElementsAre());
   EXPECT_EQ(Refusal(nullptr), "");
+}
+
+TEST_F(LogReaderTest, SaysHowMuchItHasRead) {
+  Fill(4);
+  EXPECT_THAT(Shares(), ElementsAre(0.25, 0.5, 0.75, 1));
 }
 
 TEST_F(LogReaderTest, GoesOnBehindDamageAndSaysWhere) {

@@ -10,6 +10,7 @@
 #include <regex>
 #include <stdexcept>
 
+#include "files/progress.h"
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "log_tools/message_fields.h"
@@ -29,7 +30,8 @@ std::regex Expression(const std::string& text) {
 
 // handler(event, seconds since the log's first event).
 template <typename Handler>
-void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings, Handler handler) {
+void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
+             WhileReading while_reading, Handler handler) {
   const std::regex channels = Expression(cut.channels);
   std::optional<int64_t> first;
   const auto read = [&](const LogEvent& event) {
@@ -40,7 +42,7 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings, H
       handler(event, seconds);
     }
   };
-  ReadLog(log, read, readings);
+  ReadLog(log, read, readings, while_reading);
 }
 
 // "a.b[12].c[3]" has the item 12 of an array.
@@ -93,7 +95,7 @@ struct Place {
 
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings) {
-  ReadCut(log, cut, readings, [&](const LogEvent& event, double seconds) {
+  const auto list = [&](const LogEvent& event, double seconds) {
     if (as == ListAs::kJson) {
       ListJson(event, out);
       return;
@@ -104,7 +106,8 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
     if (as == ListAs::kFields) {
       ListFields(event.data, out);
     }
-  });
+  };
+  ReadCut(log, cut, readings, WhileReading::kTellNothing, list);
 }
 
 void CheckNew(const std::string& path) {
@@ -119,9 +122,10 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
   Expression(cut.channels);  // before a file is made
   CheckNew(out);
   LogFileWriter writer(out);
-  ReadCut(log, cut, readings, [&writer](const LogEvent& event, double) {
-    writer.Write(event.utime, event.channel, event.data);
-  });
+  ReadCut(log, cut, readings, WhileReading::kTellProgress,
+          [&writer](const LogEvent& event, double) {
+            writer.Write(event.utime, event.channel, event.data);
+          });
   return writer.count();
 }
 
@@ -145,7 +149,9 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
   for (const std::string& log : logs) {
     files.emplace_back(log);
   }
+  Progress progress("writing " + out);
   for (const Place& place : places) {
+    progress.Update(writer.count(), std::ssize(places), "events");
     const LogEvent* event = files[place.log].Next();
     if (event == nullptr) {
       throw std::runtime_error(fmt::format("{}: changed while it was read", logs[place.log]));

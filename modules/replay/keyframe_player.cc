@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bus/retransmission/playback_pace.h"
+#include "files/progress.h"
 
 namespace pangea::session {
 namespace {
@@ -53,6 +54,9 @@ void KeyframePlayer::PublishFinished(int64_t now_utime) {
 void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
                    std::vector<LoggedKeyframe> keyframes) {
   const int64_t begin = WallUtime();
+  Progress progress("pangea-keyframe-player");
+  int64_t played = 0;
+  const int64_t all = std::ssize(keyframes);
   KeyframePlayer player(bus, options, std::move(keyframes), begin);
   PlaybackPace pace(&bus, player, player.outlet());
   for (auto next = player.next_us(); next && !StopRequested(); next = player.next_us()) {
@@ -62,6 +66,7 @@ void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
       pace.WaitForAcknowledgements();
     }
     player.PlayNext();
+    progress.Update(++played, all, "keyframes");
     pace.Serve(0);
   }
   pace.WaitAtTheEnd();

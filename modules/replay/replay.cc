@@ -219,7 +219,8 @@ int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
 }  // namespace
 
 ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& options,
-                     double until_s, const fs::path& out_log, LogReadings* readings) {
+                     double until_s, const fs::path& out_log, Progress& progress,
+                     LogReadings* readings) {
   UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
   for (const fs::path& log : logs) {
@@ -237,7 +238,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
     bus.Drain();
-    ++summary.keyframes;
+    progress.Update(++summary.keyframes, std::ssize(keyframes), "keyframes");
     const int32_t agent_id = keyframe.id.map.agent_id;
     if (std::find(summary.agent_ids.begin(), summary.agent_ids.end(), agent_id) ==
         summary.agent_ids.end()) {
@@ -249,7 +250,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
 }
 
 int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log,
-                   LogReadings* readings) {
+                   Progress& progress, LogReadings* readings) {
   UseOneThread();
   ReadKeyframeLog(log, readings);  // throws if keyframes are missing
   std::vector<LoggedMessage> messages = ReadMessages(part.processes, log, part.until_s, readings);
@@ -275,6 +276,7 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
   bool finished = false;
   for (size_t i = 0; i < messages.size(); ++i) {
     recorder.SetTime(messages[i].utime);
+    progress.Update(static_cast<int64_t>(i), std::ssize(messages), "messages");
     if (!messages[i].own) {
       bus.Publish(messages[i].channel, messages[i].data);
       bus.Drain();

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "files/progress.h"
 #include "log_file/log_reading.h"
 #include "server_options/server_options.h"
 
@@ -28,9 +29,10 @@ struct ReplaySummary {
 // They run with `options`, which the log says first (OPTIONS_*), so that a replay of it has them.
 // `until_s`: only keyframes of so many seconds, since the log's first event, or since the first
 // keyframes of several. Throws std::runtime_error for a log that cannot be read, has no keyframes,
-// or has gaps (named). What of a log is lost is noted in `readings` (log_reader.h), here and below.
+// or has gaps (named). What of a log is lost is noted in `readings` (log_reader.h), and how far it
+// is in `progress`, here and below.
 ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, const ServerOptions& options,
-                     double until_s, const std::filesystem::path& out_log,
+                     double until_s, const std::filesystem::path& out_log, Progress& progress,
                      LogReadings* readings = nullptr);
 
 inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
@@ -53,6 +55,7 @@ struct ReplayedPart {
 // may differ for no fault of anyone's. Returns how many matches and verification results are the
 // log's instead of their own. Throws as Replay does.
 int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
-                   const std::filesystem::path& out_log, LogReadings* readings = nullptr);
+                   const std::filesystem::path& out_log, Progress& progress,
+                   LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "bus/process.h"
+#include "files/progress.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/recording_arguments.h"
@@ -164,12 +165,23 @@ void RunReplayPart(const ReplayArguments& arguments, const ServerOptions& option
   }
   part.checkpoint_s = arguments.checkpoint_s;
   part.options = options;
-  const int64_t taken_over = ReplayPart(log, part, out_log, readings);
+  int64_t taken_over = 0;
+  {
+    Progress progress("pangea-session");
+    taken_over = ReplayPart(log, part, out_log, progress, readings);
+  }
   if (arguments.checkpoint_s) {
     std::cout << fmt::format(
         "{} matches and verification results of the first {:g} s: taken from {}\n", taken_over,
         *arguments.checkpoint_s, log);
   }
+}
+
+ReplaySummary RunWholeReplay(const ReplayArguments& arguments, const ServerOptions& options,
+                             const std::string& out_log, LogReadings* readings) {
+  Progress progress("pangea-session");
+  return Replay({arguments.logs.begin(), arguments.logs.end()}, options, arguments.until_s, out_log,
+                progress, readings);
 }
 
 // Some processes alone, and where what they say now parts from what they said.
@@ -208,8 +220,7 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   if (arguments.checkpoint_s) {
     RunReplayPart(arguments, options, out / "session.lcm", readings);
   } else {
-    const ReplaySummary summary = Replay({arguments.logs.begin(), arguments.logs.end()}, options,
-                                         arguments.until_s, out / "session.lcm", readings);
+    const ReplaySummary summary = RunWholeReplay(arguments, options, out / "session.lcm", readings);
     std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                              summary.agent_ids.size());
   }
