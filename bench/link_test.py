@@ -94,7 +94,7 @@ class LinkTest(unittest.TestCase):
         coarse, torn = self.row("budget_10", range(10), 0.030), self.row("budget_20", range(9), 0.010)
         rows = [perfect, coarse, torn]
         self.assertEqual([row.passes(rows) for row in rows], [True, True, False])
-        self.assertIn("budget_kb_per_s: 10, link: {seed: 1}", session_yaml(self.options, ROWS["budget_10"]))
+        self.assertIn("uplink: {budget_kb_per_s: 10}, link: {seed: 1}", session_yaml(self.options, ROWS["budget_10"]))
 
     def test_passes_only_whole_and_the_same(self):
         perfect = self.row("perfect", range(10), 0.010)

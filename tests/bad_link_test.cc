@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "programs.h"
 #include "recording/trajectory.h"
 
@@ -11,19 +13,27 @@ namespace pangea::tests {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr double kTolerance_m = 0.005;
 
 fs::path Sample() { return fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks"; }
+
+// What a log has of OPTIONS_*.
+std::string Options(const fs::path& log) {
+  return RunCommand("pangea-log list " + log.string() + " --fields --channels 'OPTIONS_.*'").output;
+}
 
 TEST(BadLink, ChangesNothing) {
   const fs::path folder = FreshFolder("bad_link");
   const std::string rest =
       "keyframes: " + (Sample() / "session.lcm").string() +
       ", link: {loss: 0.1, delay_ms: 300, jitter_ms: 20, reorder: 0.02, duplicate: 0.02";
-  const fs::path file =
-      WriteSession(folder, {"id: 1, " + rest + "}", "id: 2, delay: 2, " + rest + ", seed: 2}"});
+  const fs::path file = WriteSession(folder, {"id: 1, uplink: {packet_bytes: 1100}, " + rest + "}",
+                                              "id: 2, delay: 2, " + rest + ", seed: 2}"});
+  std::ofstream(file, std::ios::app) << "options: {agent_handler: {cache_bytes: 300000}}\n";
   const fs::path out = folder / "out";
   const Outcome run =
       RunCommand("pangea-session run " + file.string() + " --out " + out.string() + " --rate max");
@@ -48,6 +58,12 @@ TEST(BadLink, ChangesNothing) {
     EXPECT_GT(up["reordered"].get<int>(), 2);
   }
   EXPECT_THAT(run.output, HasSubstr("loss 10 %"));
+  // What the link's processes ran with is in the logs.
+  EXPECT_THAT(Options(out / "agent_1.lcm"),
+              AllOf(HasSubstr("packet_bytes: 1100"), HasSubstr("loss: 0.1")));
+  EXPECT_THAT(Options(out / "agent_2.lcm"),
+              AllOf(HasSubstr("packet_bytes: "), Not(HasSubstr("1100"))));
+  EXPECT_THAT(Options(out / "session.lcm"), HasSubstr("cache_bytes: 300000"));
   fs::remove_all(folder);
 }
 

@@ -86,8 +86,8 @@ TEST_F(ReplayOptions, WhatMakesNoSenseIsRefused) {
   EXPECT_FALSE(fs::exists(folder_ / "none"));
 }
 
-TEST_F(ReplayOptions, EveryServerProgramPrintsWhatIsInForce) {
-  std::istringstream programs(kServerPrograms);
+TEST_F(ReplayOptions, EveryProcessPrintsWhatIsInForce) {
+  std::istringstream programs(std::string(kServerPrograms) + " agent-handler uplink link-emulator");
   for (std::string name; programs >> name;) {
     const Outcome defaults = RunCommand("pangea-" + name + " --print-options");
     EXPECT_EQ(defaults.exit_code, 0) << defaults.output;

@@ -87,9 +87,10 @@ class Session:
             options.write_text("".join(f"{part.strip()}\n" for part in [*self.row["emulator"].split(","), f"seed: {id}"]))
             self.start(host, f"link_emulator_{id}", self.program("link-emulator"), "--agent", id, "--agent-link", OWN_LINK,
                        "--server-link", LINK, "--bus", OWN_BUS, "--options", options)
-        packets = ["--packet-bytes", self.row["packet_bytes"]] if self.row["packet_bytes"] else []
+        uplink = self.out / "logs" / f"uplink_{id}.yaml"
+        uplink.write_text(f"packet_bytes: {self.row['packet_bytes']}\n" if self.row["packet_bytes"] else "{}\n")
         self.start(host, f"uplink_{id}", self.program("uplink"), "--agent", id, "--bus", OWN_BUS, "--link", link, "--key",
-                   self.out / "keys" / f"{host}.key", "--spool", self.out / f"spool_{id}", *packets)
+                   self.out / "keys" / f"{host}.key", "--spool", self.out / f"spool_{id}", "--options", uplink)
         self.processes.append(f"uplink_{id}")
         duration = ["--duration", self.row["seconds"]] if self.row["seconds"] else []
         return self.start(host, f"keyframes_{id}", self.program("keyframe-player"), "--agent", id, "--bus", OWN_BUS,

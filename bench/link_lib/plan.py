@@ -21,9 +21,9 @@ ROWS = {
     "reorder_5": "reorder: 0.05",
     "duplicate_5": "duplicate: 0.05",
     "partition_60": "partitions: [{at: 30, seconds: 60}]",
-    "budget_40": "budget_kb_per_s: 40",
-    "budget_20": "budget_kb_per_s: 20",
-    "budget_10": "budget_kb_per_s: 10",
+    "budget_40": "uplink: {budget_kb_per_s: 40}",
+    "budget_20": "uplink: {budget_kb_per_s: 20}",
+    "budget_10": "uplink: {budget_kb_per_s: 10}",
     "forged": "",
 }
 # The same with hosts of their own (hosts.py): nftables loses frames and cuts, an emulator on the agent's host does the rest.
@@ -55,7 +55,7 @@ class Agent:
 
 
 def is_budget(conditions):
-    return conditions.startswith("budget")
+    return conditions.startswith("uplink: {budget")
 
 
 def session_yaml(options, conditions):

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "agent_handler/agent_handler.h"
+#include "agent_handler/agent_handler_options.h"
 #include "agent_handler/journal/archive.h"
 #include "bus/node.h"
 #include "bus/retransmission/missing.h"
@@ -20,11 +21,6 @@
 #include "link/poll_loop.h"
 
 namespace pangea {
-
-struct AgentHandlerOptions {
-  ReceiverOptions receiver;
-  ArchiveOptions archive;
-};
 
 class AgentHandlerProcess : public PolledProcess {
  public:

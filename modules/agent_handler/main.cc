@@ -9,6 +9,7 @@
 #include "agent_handler/agent_handler_process.h"
 #include "agent_handler/keygen.h"
 #include "bus/status_log.h"
+#include "options/options_arguments.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Takes keyframes of all agents, journals and acknowledges them",
@@ -22,15 +23,19 @@ int main(int argc, char** argv) {
   app.add_option("--server", server, "LCM URL of the server bus")->capture_default_str();
   app.add_option("--journal", journal, "LCM log to append to; an existing one is loaded");
   app.add_option("--keys", keys, "folder with the key of each agent that may join");
-  app.add_option("--cache-bytes", options.receiver.cache_bytes, "receive cache per agent")
-      ->capture_default_str()
-      ->check(CLI::Range(2 * pangea::kMaxKeyframeBytes, 1 << 30));
+  pangea::OptionsArguments options_arguments(app);
   pangea::KeygenArguments keygen_arguments;
   const CLI::App* keygen = pangea::AddKeygen(app, &keygen_arguments);
   CLI11_PARSE(app, argc, argv);
   try {
     if (keygen->parsed()) {
       return pangea::Keygen(keygen_arguments);
+    }
+    pangea::YamlOptions yaml;
+    options.Visit(yaml);
+    options_arguments.Read(&yaml);
+    if (options_arguments.Printed(yaml)) {
+      return 0;
     }
     if (journal.empty() || keys.empty()) {
       throw std::runtime_error("give --journal FILE and --keys FOLDER (or: keygen --agent ID)");
@@ -39,9 +44,11 @@ int main(int argc, char** argv) {
     pangea::LcmBus server_bus(server);
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),
                                         options);
-    pangea::StartLog("pangea-agent-handler", fmt::format("bus {}, link {}, journal {}, keys {}",
-                                                         server, link, journal, keys));
-    return pangea::RunPolledProcess(link_bus, server_bus, process);
+    pangea::StartLog("pangea-agent-handler",
+                     fmt::format("bus {}, link {}, journal {}, keys {}, {}", server, link, journal,
+                                 keys, options_arguments.Source()));
+    pangea::OptionsAnnouncer announcer(server_bus, "agent_handler", yaml.PrintWithoutHelp());
+    return pangea::RunPolledProcess(link_bus, server_bus, process, announcer);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-agent-handler: {}\n", error.what());
     return 1;

@@ -158,6 +158,10 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   EXPECT_EQ(handler->End(SIGTERM), 0);
   std::map<std::string, int32_t> next;
   const Journal read(journal, [&](const std::string& channel, Bytes data, const JournalPlace&) {
+    if (channel == channels::Options("agent_handler")) {
+      ++next[channel];
+      return true;
+    }
     keyframe_t keyframe{};
     EXPECT_TRUE(DecodeMessage(data, &keyframe));
     EXPECT_EQ(keyframe.id.seq, next[channel]++) << channel;
@@ -165,6 +169,7 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
   });
   EXPECT_EQ(next["KEYFRAME_1"], kKeyframes);
   EXPECT_EQ(next["KEYFRAME_2"], kKeyframes);
+  EXPECT_EQ(next["OPTIONS_agent_handler"], 1) << "both starts had the same";
   // What was journalled but not yet published when the handler was killed is served, not seen.
   EXPECT_GE(seen.size(), 2u * kKeyframes - 32);
   std::filesystem::remove(journal);

@@ -9,6 +9,7 @@
 #include "bus/options_announcer.h"
 #include "bus/retransmission/journal_first.h"
 #include "bus/status_log.h"
+#include "options/options_arguments.h"
 
 namespace pangea {
 namespace {
@@ -42,19 +43,12 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory) {
   CLI::App app(description.summary, description.name);
   std::string url = kDefaultBusUrl;
-  std::string options_file;
-  bool print_options = false;
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
-  app.add_option("--options", options_file, "YAML file with options");
-  app.add_flag("--print-options", print_options,
-               "print the options in force, those of --options included, and exit");
+  OptionsArguments options(app);
   CLI11_PARSE(app, argc, argv);
   try {
-    if (!options_file.empty()) {
-      description.options.ReadFile(options_file);
-    }
-    if (print_options) {
-      std::cout << description.options.Print();
+    options.Read(&description.options);
+    if (options.Printed(description.options)) {
       return 0;
     }
     UseOneThread();
@@ -63,9 +57,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     WithOptions process(factory(journal_first),
                         OptionsAnnouncer(bus, NameOnTheBus(description.name),
                                          description.options.PrintWithoutHelp()));
-    StartLog(description.name,
-             fmt::format("bus {}, options {}", url,
-                         options_file.empty() ? "as compiled in" : "of " + options_file));
+    StartLog(description.name, fmt::format("bus {}, {}", url, options.Source()));
     return RunProcess(bus, process, &journal_first);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("{}: {}\n", description.name, error.what());

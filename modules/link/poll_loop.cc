@@ -18,7 +18,7 @@ void HandleWaiting(LcmBus& bus) {
 
 }  // namespace
 
-int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process) {
+int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process, OptionsAnnouncer& options) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
   int timeout_ms = 0;
@@ -30,6 +30,7 @@ int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process) {
     timeout_ms = process.Poll(SteadyMicros());
     const int64_t now = SteadyMicros();
     if (now >= next_tick) {
+      options.Tick(WallUtime());
       process.Tick(WallUtime());
       next_tick = now + kTickInterval_us;
     }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "bus/options_announcer.h"
 #include "bus/process.h"
 
 namespace pangea {
@@ -16,7 +17,8 @@ class PolledProcess : public Process {
   virtual int Poll(int64_t steady_us) = 0;
 };
 
-// Handles messages, polls and ticks until a signal. Returns the exit code.
-int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process);
+// Handles messages, polls and ticks until a signal; tells the process' options. Returns the exit
+// code.
+int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process, OptionsAnnouncer& options);
 
 }  // namespace pangea

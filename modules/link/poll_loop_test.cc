@@ -40,7 +40,8 @@ TEST(PollLoop, AFloodOfMessagesDoesNotKeepItFromSending) {
   for (int i = 0; i < kMessages; ++i) {
     a.Publish("A", {});
   }
-  EXPECT_EQ(RunPolledProcess(a, b, process), 0);
+  OptionsAnnouncer options(b, "slow", "");
+  EXPECT_EQ(RunPolledProcess(a, b, process, options), 0);
   EXPECT_EQ(process.handled, kMessages);
   EXPECT_GE(process.polls, kMessages / 2);
 }

@@ -183,13 +183,19 @@ void YamlOptions::AddBetween(const std::string& key, double low, double high, do
   AddWithin(key, RangeText("a number", low, high), Between(low, high), value);
 }
 
-void YamlOptions::AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value) {
+template <typename T>
+void YamlOptions::AddWhole(const std::string& key, T low, T high, T* value) {
   Entry& entry = NewEntry(key);
+  const auto least = static_cast<double>(low), most = static_cast<double>(high);
   entry.read = [=](const YAML::Node& node, const std::string& file, const std::string& path) {
-    *value = ValueWithin<int32_t>(node, file, path, RangeText("a whole number", low, high),
-                                  Between(low, high));
+    *value = ValueWithin<T>(node, file, path, RangeText("a whole number", least, most),
+                            Between(least, most));
   };
   entry.print = [value](const Style&) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
+void YamlOptions::AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value) {
+  AddWhole(key, low, high, value);
 }
 
 void YamlOptions::AddBetween(const std::string& key, double low, double high,
@@ -250,6 +256,12 @@ void YamlOptions::Add(const std::string& key, bool* value, const std::string& he
 void YamlOptions::Add(const std::string& key, int32_t* value, const OptionBounds& bounds,
                       const std::string& unit, const std::string& help) {
   AddBetween(key, static_cast<int32_t>(bounds.low), static_cast<int32_t>(bounds.high), value);
+  entries_.back()->help = HelpText(bounds, unit, help);
+}
+
+void YamlOptions::Add(const std::string& key, int64_t* value, const OptionBounds& bounds,
+                      const std::string& unit, const std::string& help) {
+  AddWhole(key, static_cast<int64_t>(bounds.low), static_cast<int64_t>(bounds.high), value);
   entries_.back()->help = HelpText(bounds, unit, help);
 }
 

@@ -57,6 +57,8 @@ class YamlOptions {
   // With what people are told beside the value: `unit` (empty for a count or a share), `help`.
   void Add(const std::string& key, int32_t* value, const OptionBounds& bounds,
            const std::string& unit, const std::string& help);
+  void Add(const std::string& key, int64_t* value, const OptionBounds& bounds,
+           const std::string& unit, const std::string& help);
   void Add(const std::string& key, double* value, const OptionBounds& bounds,
            const std::string& unit, const std::string& help);
 
@@ -180,6 +182,8 @@ class YamlOptions {
                    std::function<std::vector<YamlOptions>()> current);
   void AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
                           std::function<std::optional<YamlOptions>()> current);
+  template <typename T>
+  void AddWhole(const std::string& key, T low, T high, T* value);
   template <typename T>
   void AddScalar(const std::string& key, const std::string& type, T* value);
   template <typename T>

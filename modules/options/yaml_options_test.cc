@@ -260,12 +260,14 @@ TEST(YamlOptions, WhatIsPrintedReadsBackTheSame) {
 
 struct Described {
   int stride = 3;
+  int64_t bytes = 4'000'000'000;
   double sigma_m = 0.1;
   bool equalize = true;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("stride", &stride, {1, 1000}, "", "every so many");
+    archive.Add("bytes", &bytes, {1e6, 1e15}, "B", "");
     archive.Add("sigma_m", &sigma_m, {0.001, 10}, "m", "");
     archive.Add("equalize", &equalize, "the image first");
   }
@@ -287,9 +289,11 @@ TEST(YamlOptions, BoundsUnitAndHelpStandBesideTheValues) {
   EXPECT_EQ(yaml.Print(),
             "check:  # of what is seen\n"
             "  stride: 3  # 1 to 1000: every so many\n"
+            "  bytes: 4000000000  # 1000000 to 1000000000000000 B\n"
             "  sigma_m: 0.1  # 0.001 to 10 m\n"
             "  equalize: true  # the image first\n");
-  EXPECT_EQ(yaml.PrintWithoutHelp(), "check:\n  stride: 3\n  sigma_m: 0.1\n  equalize: true\n");
+  EXPECT_EQ(yaml.PrintWithoutHelp(),
+            "check:\n  stride: 3\n  bytes: 4000000000\n  sigma_m: 0.1\n  equalize: true\n");
   const std::string printed = yaml.Print();
   yaml.ReadText(printed, "printed");
   EXPECT_EQ(yaml.Print(), printed);
@@ -312,6 +316,9 @@ TEST(YamlOptions, OneValueIsSetByItsPath) {
   };
   EXPECT_EQ(complaint("check.stride", "0"),
             "--set: key 'check.stride' must be a whole number from 1 to 1000, not '0'");
+  EXPECT_EQ(complaint("check.bytes", "12"),
+            "--set: key 'check.bytes' must be a whole number from 1000000 to 1000000000000000, "
+            "not '12'");
   EXPECT_EQ(complaint("stride", "7"), "no option 'stride'; did you mean 'check.stride'?");
   EXPECT_EQ(complaint("check.strid", "7"), "no option 'check.strid'; did you mean 'check.stride'?");
   EXPECT_EQ(outer.check.stride, 7);

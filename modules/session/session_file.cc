@@ -61,6 +61,9 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(
           fmt::format("{}: agent {}: give it a 'recording', or 'keyframes'", file, agent.id));
     }
+    if (const auto invalid = agent.uplink.Invalid()) {
+      throw std::runtime_error(fmt::format("{}: agent {}: uplink: {}", file, agent.id, *invalid));
+    }
     if (!agent.keyframes.empty() && agent.start_s > 0) {
       throw std::runtime_error(fmt::format(
           "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
@@ -132,10 +135,7 @@ SessionScript ParseSessionFile(const fs::path& file) {
     item.AddBetween("start", 0, kMaxTime_s, &agent.start_s);
     item.AddBetween("duration", 0, kMaxTime_s, &agent.duration_s);
     item.Add("keyframes", &agent.keyframes);
-    item.AddWithin(
-        "budget_kb_per_s", "a number from 5 to 1000000 (kB/s), or 0 for no bound",
-        [](double kb_per_s) { return kb_per_s == 0 || (kb_per_s >= 5 && kb_per_s <= 1e6); },
-        &agent.budget_kb_per_s);
+    item.Section("uplink", &agent.uplink, "");
     item.AddOptional(
         "vio", &agent.vio_options,
         [](YamlOptions& section, vio::VioFileOptions& options) { options.Visit(section); });

@@ -20,10 +20,12 @@
 #include <string>
 #include <vector>
 
+#include "agent_handler/agent_handler_options.h"
 #include "link_emulator/link_conditions.h"
 #include "report/expectations.h"
 #include "server_options/server_options.h"
 #include "session/faults.h"
+#include "uplink/uplink.h"
 #include "vio/vio_file_options.h"
 
 namespace pangea::session {
@@ -45,15 +47,26 @@ struct AgentScript {
   std::string keyframes;
   std::optional<LinkConditions> link;              // a bad link of its own to the server
   std::optional<vio::VioFileOptions> vio_options;  // its odometry's options; none: the defaults
-  double budget_kb_per_s = 0;      // what its uplink may send, kB/s, 5 .. 1e6; 0: no bound
+  UplinkOptions uplink;
   std::filesystem::path resolved;  // the recording's folder, found; empty without a recording
   std::filesystem::path resolved_keyframes;
+};
+
+// Of the server's processes, those that compute and the one that keeps the journal.
+struct SessionServerOptions : pangea::ServerOptions {
+  AgentHandlerOptions agent_handler;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("agent_handler", &agent_handler, "");
+    pangea::ServerOptions::Visit(archive);
+  }
 };
 
 struct SessionScript {
   std::vector<AgentScript> agents;
   std::vector<Fault> faults;
-  ServerOptions options;
+  SessionServerOptions options;
   Expectations expect;
 };
 

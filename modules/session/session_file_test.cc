@@ -73,16 +73,25 @@ TEST_F(SessionFileTest, ReadsTheOptionsOfEveryProcess) {
               HasSubstr("leave out 'vio'"));
 }
 
-TEST_F(SessionFileTest, ReadsABudget) {
+TEST_F(SessionFileTest, ReadsOptionsOfTheLink) {
   const std::string agent =
-      "agents:\n  - {id: 1, recording: ../recordings/MH_01, budget_kb_per_s: ";
-  EXPECT_EQ(ReadSessionFile(Write(agent + "20}\n"), std::nullopt).agents[0].budget_kb_per_s, 20);
-  for (const char* bad : {"1", "-20", ".nan", ".inf", "1e300"}) {
-    EXPECT_THAT(ErrorOf(agent + bad + "}\n"),
-                testing::AllOf(HasSubstr("two.yaml:2: key 'agents[0].budget_kb_per_s' must be a "
-                                         "number from 5 to 1000000"),
-                               HasSubstr(bad)));
+      "agents:\n  - {id: 1, recording: ../recordings/MH_01, uplink: {budget_kb_per_s: ";
+  const SessionScript script =
+      ReadSessionFile(Write(agent + "20, packet_bytes: 4096}}\n"
+                                    "options: {agent_handler: {cache_bytes: 500000}}\n"),
+                      std::nullopt);
+  EXPECT_EQ(script.agents[0].uplink.budget_kb_per_s, 20);
+  EXPECT_EQ(script.agents[0].uplink.sender.payload_bytes, 4096);
+  EXPECT_EQ(script.options.agent_handler.receiver.cache_bytes, 500'000);
+  for (const char* bad : {"-20", ".nan", ".inf", "1e300"}) {
+    EXPECT_THAT(
+        ErrorOf(agent + bad + "}}\n"),
+        testing::AllOf(HasSubstr("two.yaml:2: key 'agents[0].uplink.budget_kb_per_s' must be a "
+                                 "number from 0 to 1000000"),
+                       HasSubstr(bad)));
   }
+  EXPECT_THAT(ErrorOf(agent + "1}}\n"),
+              HasSubstr("agent 1: uplink: the budget must be at least 5 kB/s"));
 }
 
 TEST_F(SessionFileTest, ReadsLinkAndKeyframes) {

@@ -126,7 +126,13 @@ class Runner {
   }
 
   // The file.
-  std::string WriteOptions(const std::string& process, const std::string& yaml) const {
+  template <typename Options>
+  std::string WriteOptions(const std::string& process, Options options) const {
+    YamlOptions yaml;
+    options.Visit(yaml);
+    return WriteOptionsText(process, yaml.Print());
+  }
+  std::string WriteOptionsText(const std::string& process, const std::string& yaml) const {
     const fs::path file = options_.out / "logs" / (process + ".yaml");
     WriteTextFile(file, yaml);
     return file.string();
@@ -143,16 +149,17 @@ class Runner {
 
   void StartServer() {
     KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
-    kept_.Start("agent_handler", {Program("pangea-agent-handler"), "--link", buses_.link,
-                                  "--server", buses_.server, "--journal", options_.journal.string(),
-                                  "--keys", (options_.out / "keys").string()});
+    kept_.Start("agent_handler",
+                {Program("pangea-agent-handler"), "--link", buses_.link, "--server", buses_.server,
+                 "--journal", options_.journal.string(), "--keys", (options_.out / "keys").string(),
+                 "--options", WriteOptions("agent_handler", server_options_.agent_handler)});
     const std::map<std::string, std::string> options = TextsByProcess(server_options_);
     for (const std::string name : kServerProcesses) {
       if (name != "agent_handler") {
         std::string program = "pangea-" + name;
         std::ranges::replace(program, '_', '-');
         kept_.Start(name, {Program(program), "--bus", buses_.server, "--options",
-                           WriteOptions(name, options.at(name))});
+                           WriteOptionsText(name, options.at(name))});
       }
       server_names_.push_back(name);
     }
@@ -180,21 +187,19 @@ class Runner {
       if (player.script.link) {
         StartLinkEmulator(id, *player.script.link);
       }
-      kept_.Start(fmt::format("uplink_{}", id),
-                  {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
-                   KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--budget",
-                   fmt::format("{}", player.script.budget_kb_per_s), "--spool",
-                   (options_.out / fmt::format("spool_{}", id)).string()});
+      const std::string name = fmt::format("uplink_{}", id);
+      kept_.Start(name, {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
+                         KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--spool",
+                         (options_.out / fmt::format("spool_{}", id)).string(), "--options",
+                         WriteOptions(name, player.script.uplink)});
     }
   }
 
-  void StartLinkEmulator(int32_t id, LinkConditions conditions) {
+  void StartLinkEmulator(int32_t id, const LinkConditions& conditions) {
     const std::string name = fmt::format("link_emulator_{}", id);
-    YamlOptions yaml;
-    conditions.Visit(yaml);
     kept_.Start(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id),
                        "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
-                       buses_.agents.at(id), "--options", WriteOptions(name, yaml.Print())});
+                       buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
   }
 
   // A killed player of stored keyframes begins again: what the uplink has is a repeat.
@@ -221,9 +226,7 @@ class Runner {
     }
     const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
     if (player.script.vio_options) {
-      YamlOptions yaml;
-      player.script.vio_options->Visit(yaml);
-      argv.insert(argv.end(), {"--options", WriteOptions(name, yaml.Print())});
+      argv.insert(argv.end(), {"--options", WriteOptions(name, *player.script.vio_options)});
     }
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
     if (player.started == 0) {
@@ -386,7 +389,7 @@ class Runner {
   }
 
   RunOptions options_;
-  ServerOptions server_options_;
+  SessionServerOptions server_options_;
   FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;

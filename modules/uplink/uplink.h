@@ -23,9 +23,27 @@ struct UplinkOptions {
   // What the agent may send, packets and repeats included; 0 for no bound. Keyframes are thinned to
   // fit (ladder.h), poses sent more seldom.
   double budget_kb_per_s = 0;
+  int64_t spool_disk_bytes = 4'000'000'000;  // 40 hours of walking
 
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("bandwidth_kb_per_s", &sender.bandwidth_kb_per_s, {1, 1e6}, "kB/s",
+                "of keyframes at most, repeats included");
+    archive.Add("budget_kb_per_s", &budget_kb_per_s, {0, 1e6}, "kB/s",
+                "of all that may be sent, 5 or more; keyframes are thinned to fit; 0: no bound");
+    archive.Add("packet_bytes", &sender.payload_bytes, {kMinPayloadBytes, kMaxPayloadBytes}, "B",
+                "of a keyframe in a packet; above the default a packet takes several frames");
+    archive.Add("in_flight_bytes", &sender.max_in_flight_bytes, {kMaxPayloadBytes, 1 << 30}, "B",
+                "sent and not yet acknowledged");
+    archive.Add("pose_hz", &pose_hz, {0, 1000}, "Hz", "poses sent at most; 0: none");
+    archive.Add("spool_memory_bytes", &sender.max_spool_bytes, {1e6, 1e12}, "B",
+                "unacknowledged keyframes in memory; beyond it the newest are not taken");
+    archive.Add("spool_disk_bytes", &spool_disk_bytes, {1e6, 1e15}, "B",
+                "unacknowledged keyframes in the spool's folder; then memory");
+  }
 };
 
 // With the pace and the poses that the budget allows.

@@ -10,7 +10,7 @@
 
 #include "bus/process.h"
 #include "bus/status_log.h"
-#include "options/yaml_options.h"
+#include "options/options_arguments.h"
 #include "recording/euroc.h"
 #include "vio/live/live_input.h"
 #include "vio/playback.h"
@@ -27,8 +27,6 @@ struct Arguments {
   std::string recording;
   bool live = false;
   std::string rate = "1";
-  std::string options_file;
-  bool print_options = false;
   PlaybackOptions playback;
   VioProcessOptions process;
 };
@@ -40,7 +38,7 @@ class NoBus : public Bus {
   void Subscribe(const std::string&, Handler) override {}
 };
 
-void AddOptions(CLI::App& app, Arguments& a) {
+void AddArguments(CLI::App& app, Arguments& a) {
   app.add_option("--agent", a.process.agent_id, "agent id")->check(CLI::Range(1, 65535));
   app.add_option("--bus", a.bus, "LCM URL of the agent's bus, or none")->capture_default_str();
   app.add_option("--recording", a.recording, "folder in EuRoC's format: plays it");
@@ -54,8 +52,6 @@ void AddOptions(CLI::App& app, Arguments& a) {
   app.add_option("--rate", a.rate, "1, 2, ... times real time, or max")->capture_default_str();
   app.add_option("--tracks", a.playback.tracks_csv,
                  "exact tracks (stamp_ns, landmark_id, u, v) instead of the tracker's");
-  app.add_option("--options", a.options_file, "YAML file with options");
-  app.add_flag("--print-options", a.print_options, "print the options in force and exit");
   app.add_option("--map-utime", a.process.map_utime,
                  "opened_utime of the first map, instead of the wall clock");
   app.add_option("--out-tum", a.process.out_tum, "write the raw odometry, TUM");
@@ -82,7 +78,7 @@ int Outcome(const VioProcess& process) {
   return why && !StopRequested() ? kNoPose : 0;
 }
 
-int Run(const Arguments& a, const VioFileOptions& file_options) {
+int Run(const Arguments& a, const LiveImuNoise& live_imu, const std::string& options_source) {
   std::optional<EurocRecording> recording;
   if (!a.live) {
     recording.emplace(a.recording);
@@ -104,9 +100,8 @@ int Run(const Arguments& a, const VioFileOptions& file_options) {
     return Outcome(process);
   }
   StartLog("pangea-vio",
-           fmt::format("agent {}, live, bus {}, options {}", a.process.agent_id, a.bus,
-                       a.options_file.empty() ? "as compiled in" : "of " + a.options_file));
-  LiveInput live(process, a.process.agent_id, file_options.live_imu);
+           fmt::format("agent {}, live, bus {}, {}", a.process.agent_id, a.bus, options_source));
+  LiveInput live(process, a.process.agent_id, live_imu);
   RunProcess(*lcm_bus, process);
   process.Flush();
   process.PublishFinished(WallUtime());
@@ -130,7 +125,8 @@ void Check(const Arguments& a) {
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Visual-inertial odometry of one agent", "pangea-vio");
   Arguments arguments;
-  AddOptions(app, arguments);
+  AddArguments(app, arguments);
+  OptionsArguments options(app);
   app.footer(fmt::format(
       "Exit code: 0; 1 when something could not be done; {} when a recording was played to its end "
       "and gave no pose.",
@@ -140,11 +136,8 @@ int RunCommandLine(int argc, char** argv) {
     VioFileOptions file_options;
     YamlOptions yaml;
     file_options.Visit(yaml);
-    if (!arguments.options_file.empty()) {
-      yaml.ReadFile(arguments.options_file);
-    }
-    if (arguments.print_options) {
-      std::cout << yaml.Print();
+    options.Read(&yaml);
+    if (options.Printed(yaml)) {
       return 0;
     }
     Check(arguments);
@@ -153,7 +146,7 @@ int RunCommandLine(int argc, char** argv) {
     arguments.process.told_options = yaml.PrintWithoutHelp();
     // The agent shares its machine with the other processes, and one thread gives the same bytes.
     cv::setNumThreads(1);
-    return Run(arguments, file_options);
+    return Run(arguments, file_options.live_imu, options.Source());
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-vio: {}\n", error.what());
     return 1;

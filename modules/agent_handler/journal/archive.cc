@@ -60,7 +60,7 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
                  const ArchiveOptions& options)
     : node_(node),
       options_(options),
-      resend_pacer_(options.resend_bytes_per_s, kResendBurst),
+      resend_pacer_(1000 * options.resend_kb_per_s, kResendBurst),
       now_utime_(now_utime) {
   journal_ = std::make_unique<Journal>(
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {

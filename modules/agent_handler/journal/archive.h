@@ -31,7 +31,7 @@ namespace pangea {
 struct ArchiveOptions {
   // What arrives within this time shares one write to the disk.
   int64_t sync_interval_us = 20'000;
-  double resend_bytes_per_s = 6e6;
+  double resend_kb_per_s = 6000;
 };
 
 class Archive {
