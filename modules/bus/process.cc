@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-volatile std::sig_atomic_t stop_requested = 0;
+volatile std::sig_atomic_t stop_signals = 0;
 
 constexpr int64_t kTickInterval_us = 100'000;
 constexpr int kHandleTimeout_ms = 50;
@@ -32,7 +32,7 @@ int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
 
 void InstallSignalHandlers() {
   struct sigaction action {};
-  action.sa_handler = [](int) { stop_requested = 1; };
+  action.sa_handler = [](int) { stop_signals = stop_signals + 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   // A file that may not grow (a quota, ulimit -f) is a full disk like any other: an error, no
@@ -40,7 +40,9 @@ void InstallSignalHandlers() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-bool StopRequested() { return stop_requested != 0; }
+bool StopRequested() { return stop_signals != 0; }
+
+int StopSignals() { return stop_signals; }
 
 // By name: only programs that solve have OpenMP in them. With no level of parallel regions allowed
 // each region runs in one thread.

@@ -28,6 +28,7 @@ int64_t SteadyMicros();
 // Set by SIGINT and SIGTERM once InstallSignalHandlers has run.
 void InstallSignalHandlers();
 bool StopRequested();
+int StopSignals();  // how many came
 
 // What is solved is solved in the thread that asks for it. CHOLMOD would start three more, which
 // OMP_NUM_THREADS does not keep it from: it asks OpenMP for four by number. Call it at the start.

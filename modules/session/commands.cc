@@ -75,6 +75,7 @@ struct RunArguments {
 int Run(const RunArguments& arguments, LogReadings* readings) {
   SessionScript script =
       ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
+  CheckRate(arguments.rate, script);
   PlaceDisconnects(arguments.rate, &script);
   RunOptions options;
   options.out = fs::path(arguments.out);

@@ -43,6 +43,30 @@ std::optional<fs::path> FindRecording(const fs::path& wanted) {
   return found;
 }
 
+void CheckAgent(const AgentScript& agent, const std::string& file) {
+  if (agent.recording.empty() && agent.keyframes.empty() && !agent.live) {
+    throw std::runtime_error(fmt::format(
+        "{}: agent {}: give it a 'recording', 'keyframes', or 'live: true'", file, agent.id));
+  }
+  if (agent.live && (!agent.keyframes.empty() || agent.start_s > 0)) {
+    throw std::runtime_error(fmt::format("{}: agent {}: is live, nothing is played: leave out '{}'",
+                                         file, agent.id,
+                                         agent.keyframes.empty() ? "start" : "keyframes"));
+  }
+  if (const auto invalid = agent.uplink.Invalid()) {
+    throw std::runtime_error(fmt::format("{}: agent {}: uplink: {}", file, agent.id, *invalid));
+  }
+  if (!agent.keyframes.empty() && agent.start_s > 0) {
+    throw std::runtime_error(fmt::format(
+        "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'", file,
+        agent.id));
+  }
+  if (!agent.keyframes.empty() && agent.vio_options) {
+    throw std::runtime_error(fmt::format(
+        "{}: agent {}: with stored keyframes no odometry is run: leave out 'vio'", file, agent.id));
+  }
+}
+
 void CheckAgents(const SessionScript& script, const std::string& file) {
   if (script.agents.empty()) {
     throw std::runtime_error(fmt::format("{}: 'agents' is empty: list at least one agent", file));
@@ -57,23 +81,7 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
       throw std::runtime_error(
           fmt::format("{}: agent id {} is given twice: every agent needs its own", file, agent.id));
     }
-    if (agent.recording.empty() && agent.keyframes.empty()) {
-      throw std::runtime_error(
-          fmt::format("{}: agent {}: give it a 'recording', or 'keyframes'", file, agent.id));
-    }
-    if (const auto invalid = agent.uplink.Invalid()) {
-      throw std::runtime_error(fmt::format("{}: agent {}: uplink: {}", file, agent.id, *invalid));
-    }
-    if (!agent.keyframes.empty() && agent.start_s > 0) {
-      throw std::runtime_error(fmt::format(
-          "{}: agent {}: stored keyframes are played from the first one on: leave out 'start'",
-          file, agent.id));
-    }
-    if (!agent.keyframes.empty() && agent.vio_options) {
-      throw std::runtime_error(
-          fmt::format("{}: agent {}: with stored keyframes no odometry is run: leave out 'vio'",
-                      file, agent.id));
-    }
+    CheckAgent(agent, file);
   }
 }
 
@@ -131,6 +139,7 @@ SessionScript ParseSessionFile(const fs::path& file) {
     item.AddBetween("id", 1, kMaxAgentId, &agent.id);
     item.Require("id");
     item.Add("recording", &agent.recording);
+    item.Add("live", &agent.live);
     item.AddBetween("delay", 0, kMaxTime_s, &agent.delay_s);
     item.AddBetween("start", 0, kMaxTime_s, &agent.start_s);
     item.AddBetween("duration", 0, kMaxTime_s, &agent.duration_s);
@@ -198,6 +207,15 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
         file.string(), fmt::join(missing, "\n  ")));
   }
   return script;
+}
+
+void CheckRate(const std::string& rate, const SessionScript& script) {
+  for (const AgentScript& agent : script.agents) {
+    if (agent.live && (rate == "max" || std::stod(rate) != 1)) {
+      throw std::runtime_error(
+          fmt::format("agent {} is live: its session needs --rate 1", agent.id));
+    }
+  }
 }
 
 void PlaceDisconnects(const std::string& rate, SessionScript* script) {

@@ -7,6 +7,7 @@
 //     - {id: 2, recording: ../recordings/MH_02, delay: 5, start: 10, duration: 60}
 //     - {id: 3, recording: ../recordings/MH_03, keyframes: MH_03/keyframes.lcm,
 //        link: {loss: 0.05, delay_ms: 50, partitions: [{at: 30, seconds: 60}]}}
+//     - {id: 4, live: true, duration: 300}
 //   faults:                                             # faults.h
 //     - {at: 12.5, kill: fusion}
 //     - {at: 20, disconnect: 2, seconds: 10}
@@ -36,8 +37,11 @@ inline constexpr size_t kMaxSessionAgents = 200;
 struct AgentScript {
   int32_t id = 0;  // 1 .. 65535, unique in the session
   // Folder, relative to the session file or to --recordings; may be absent where there are
-  // keyframes.
+  // keyframes, or live sensors.
   std::string recording;
+  // Its sensors publish on its bus, and no recording is played; one that is named is only its
+  // ground truth. Ends after `duration_s`, or with the session.
+  bool live = false;
   double delay_s = 0;     // session time at which the agent starts
   double start_s = 0;     // where in the recording it starts
   double duration_s = 0;  // how much of it is played; 0 = to the end
@@ -89,6 +93,10 @@ std::vector<std::string> FindInputs(const std::filesystem::path& file,
 // Both; throws for missing inputs too.
 SessionScript ReadSessionFile(const std::filesystem::path& file,
                               const std::optional<std::filesystem::path>& recordings);
+
+// A session with live agents is played at rate "1": theirs is the wall clock. Throws
+// std::runtime_error at another.
+void CheckRate(const std::string& rate, const SessionScript& script);
 
 // `disconnect` faults become partitions of the agents' links, which count wall time, for a session
 // played at this rate ("1", "2", ...). Throws std::runtime_error at rate "max", which has no

@@ -94,6 +94,26 @@ TEST_F(SessionFileTest, ReadsOptionsOfTheLink) {
               HasSubstr("agent 1: uplink: the budget must be at least 5 kB/s"));
 }
 
+TEST_F(SessionFileTest, ReadsLiveAgents) {
+  const SessionScript script = ReadSessionFile(
+      Write("agents:\n"
+            "  - {id: 1, live: true}\n"
+            "  - {id: 2, live: true, duration: 60, recording: ../recordings/MH_02}\n"),
+      std::nullopt);
+  EXPECT_TRUE(script.agents[0].live);
+  EXPECT_EQ(script.agents[1].duration_s, 60);
+  EXPECT_EQ(script.agents[1].resolved, folder_ / "recordings" / "MH_02");
+  EXPECT_THAT(ErrorOf("agents: [{id: 1}]\n"),
+              HasSubstr("'recording', 'keyframes', or 'live: true'"));
+  EXPECT_THAT(ErrorOf("agents: [{id: 1, live: true, keyframes: one.lcm}]\n"),
+              HasSubstr("leave out 'keyframes'"));
+  EXPECT_THAT(ErrorOf("agents: [{id: 1, live: true, start: 3}]\n"), HasSubstr("leave out 'start'"));
+  CheckRate("1", script);
+  for (const char* rate : {"2", "max"}) {
+    EXPECT_THROW(CheckRate(rate, script), std::runtime_error) << rate;
+  }
+}
+
 TEST_F(SessionFileTest, ReadsLinkAndKeyframes) {
   std::ofstream(folder_ / "sessions" / "one.lcm") << "log";
   const SessionScript script =

@@ -28,7 +28,10 @@ std::string Title(const fs::path& file) {
 std::string DescribeAgent(const AgentScript& agent) {
   std::string text =
       fmt::format("{}: {}", agent.id, agent.keyframes.empty() ? agent.recording : agent.keyframes);
-  if (agent.start_s > 0 || agent.duration_s > 0) {
+  if (agent.live) {
+    text = fmt::format("{}: live{}", agent.id,
+                       agent.duration_s > 0 ? fmt::format(", {:g} s", agent.duration_s) : "");
+  } else if (agent.start_s > 0 || agent.duration_s > 0) {
     const std::string end =
         agent.duration_s > 0 ? fmt::format("{:g} s", agent.start_s + agent.duration_s) : "its end";
     text += fmt::format(" from {:g} s to {}", agent.start_s, end);

@@ -39,7 +39,8 @@ TEST(SessionList, TheExampleOfTheDocumentationParses) {
   }
   example.close();
   const SessionScript script = ParseSessionFile(file);
-  EXPECT_EQ(script.agents.size(), 3u);
+  ASSERT_EQ(script.agents.size(), 4u);
+  EXPECT_TRUE(script.agents[3].live);
   EXPECT_EQ(script.faults.size(), 3u);
   EXPECT_EQ(script.expect.size(), 8u);
 }
@@ -52,7 +53,8 @@ TEST(SessionList, TellsWhoIsInAndWhatIsMissing) {
       << "# What it shows.\nagents:\n  - {id: 1, recording: here, start: 5, duration: 10}\n"
          "  - {id: 2, recording: gone, delay: 3}\n"
          "faults: [{at: 4, kill: fusion}, {at: 5, disconnect: 2}]\nexpect: {groups: 1}\n";
-  std::ofstream(folder / "whole.yaml") << "agents: [{id: 7, recording: here}]\n";
+  std::ofstream(folder / "whole.yaml")
+      << "agents: [{id: 7, recording: here}, {id: 8, live: true, duration: 60}]\n";
   std::ofstream(folder / "wrong.yaml") << "agent: [{id: 7, recording: here}]\n";
   std::ofstream(folder / "no_session.txt") << "";
   const std::vector<fs::path> files = SessionFiles(folder);
@@ -64,7 +66,8 @@ TEST(SessionList, TellsWhoIsInAndWhatIsMissing) {
             HasSubstr("agent 2 disconnected from 5 s to 15 s\n"), HasSubstr("expects groups 1\n"),
             HasSubstr("missing: agent 2: recording "), Not(HasSubstr("missing: agent 1"))));
   EXPECT_THAT(DescribeSessions({files[1]}, folder / "recordings"),
-              AllOf(HasSubstr("whole.yaml\n"), HasSubstr("all of it is at hand")));
+              AllOf(HasSubstr("whole.yaml\n"), HasSubstr("agent 8: live, 60 s\n"),
+                    HasSubstr("all of it is at hand")));
   EXPECT_THAT(DescribeSessions({files[2]}, std::nullopt),
               AllOf(HasSubstr("cannot be run"), HasSubstr("did you mean 'agents'?")));
   EXPECT_TRUE(SessionFiles(folder / "nowhere").empty());

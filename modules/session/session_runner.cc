@@ -19,6 +19,7 @@
 #include "session/child_process.h"
 #include "session/kept_processes.h"
 #include "session/open_files.h"
+#include "session/player.h"
 #include "session/session_monitor.h"
 #include "session/session_progress.h"
 
@@ -35,21 +36,6 @@ constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
 constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no pose
-
-double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
-
-// One agent's vio, or the player of its stored keyframes: ends by itself when its recording is
-// over.
-struct Player {
-  AgentScript script;
-  std::optional<ChildProcess> child;
-  double started = 0;
-  double ended = 0;
-  double played_before_s = 0;  // seconds of recording played by earlier runs of a restarted vio
-  int restarts = 0;
-
-  bool done() const { return ended > 0; }
-};
 
 class Runner {
  public:
@@ -207,23 +193,9 @@ class Runner {
     const int32_t id = player.script.id;
     const bool stored = !player.script.keyframes.empty();
     std::vector<std::string> argv = {Program(stored ? "pangea-keyframe-player" : "pangea-vio"),
-                                     "--agent",
-                                     std::to_string(id),
-                                     "--bus",
-                                     buses_.agents.at(id),
-                                     "--rate",
-                                     options_.rate};
-    const double before_s = stored ? 0 : player.played_before_s;
-    if (stored) {
-      argv.insert(argv.end(), {"--keyframes", player.script.resolved_keyframes.string()});
-    } else {
-      argv.insert(argv.end(), {"--recording", player.script.resolved.string(), "--start",
-                               fmt::format("{}", player.script.start_s + before_s)});
-    }
-    if (player.script.duration_s > 0) {
-      argv.insert(argv.end(),
-                  {"--duration", fmt::format("{}", player.script.duration_s - before_s)});
-    }
+                                     "--agent", std::to_string(id), "--bus", buses_.agents.at(id)};
+    const std::vector<std::string> input = InputOf(player, options_.rate);
+    argv.insert(argv.end(), input.begin(), input.end());
     const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
     if (player.script.vio_options) {
       argv.insert(argv.end(), {"--options", WriteOptions(name, *player.script.vio_options)});
@@ -231,6 +203,9 @@ class Runner {
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
     if (player.started == 0) {
       player.started = Now();
+      if (player.script.live) {
+        progress_.PrintLine(DescribeLive(player.script, buses_.agents.at(id)));
+      }
     }
   }
 
@@ -271,23 +246,39 @@ class Runner {
       }
       Step();
     }
+    EndPlayers();
+  }
+
+  // Ctrl-C is how a live agent ends; of recordings it is an interruption.
+  void EndPlayers() {
+    bool ends_live = false, ends_others = false;
     for (Player& player : players_) {
+      if (!player.done()) {
+        (player.script.live ? ends_live : ends_others) = true;
+      }
       if (player.child && !player.done()) {
         player.child->Stop(kStopGrace_s);
         player.ended = Now();
       }
     }
-    summary_.interrupted = StopRequested();
+    summary_.interrupted = StopRequested() && (ends_others || !ends_live);
+    if (StopRequested() && !summary_.interrupted) {
+      progress_.PrintLine("the server works off what has come; Ctrl-C again ends it at once");
+    }
   }
 
   void WatchPlayer(Player& player) {
+    if (player.child && player.IsOver() && !player.is_told_to_end) {
+      player.is_told_to_end = true;
+      player.child->Signal(SIGINT);
+    }
     const auto exit = player.child ? player.child->Poll() : std::nullopt;
     if (!exit || player.done()) {
       return;
     }
     // What a killed vio left may be too short to start in.
     const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
-    if (exit->code == 0 || is_rest || StopRequested()) {
+    if (exit->code == 0 || is_rest || player.is_told_to_end || StopRequested()) {
       player.ended = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
       // Killed: the same agent goes on where it was, in a new map.
@@ -370,9 +361,11 @@ class Runner {
   // stuck: it is waited for.
   void Drain() {
     const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
+    // Of a live session, whose first one only ended the agents.
+    const auto ended_at_once = [] { return StopSignals() > 1; };
     double deadline = Now() + patience_s;
     int results = monitor_.num_results();
-    while (!monitor_.Idle(Working(), kQuiet_s)) {
+    while (!monitor_.Idle(Working(), kQuiet_s) && !ended_at_once()) {
       if (!summary_.interrupted && monitor_.num_results() > results) {
         results = monitor_.num_results();
         deadline = Now() + patience_s;
