@@ -51,6 +51,7 @@ TEST(BadLink, ChangesNothing) {
   ASSERT_EQ(replay.exit_code, 0) << replay.output;
   EXPECT_LT(Distance_m(out / "agent_1.tum", replayed / "agent_1.tum"), kTolerance_m);
   EXPECT_LT(Distance_m(out / "agent_2.tum", replayed / "agent_2.tum"), kTolerance_m);
+  ASSERT_EQ(report["agents"].size(), 2u);
   for (const auto& agent : report["agents"]) {
     const auto& up = agent["link"]["packets_up"];
     EXPECT_GT(up["lost"].get<int>(), 20);
