@@ -78,6 +78,19 @@ TEST_F(VerificationProcesses, OneResultFromTheProcessOfItsKind) {
   EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
 }
 
+// What somebody says later under an id that is taken, changes nothing.
+TEST_F(VerificationProcesses, AKeyframeIsTakenOnce) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  TestAgent repeated = agent_c_;
+  repeated.keyframes[9].points.clear();
+  repeated.keyframes[9].corners.clear();
+  SendKeyframes(repeated, 9, 10);
+  SendMatch(PlaceKind::kInter);
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
+}
+
 // The journal's owner gets what it names retransmitted, once it was sent; of what is still to be
 // verified nothing is said.
 TEST_F(VerificationProcesses, RetransmitsAResultThatTheJournalLacks) {
