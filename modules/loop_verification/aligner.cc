@@ -35,17 +35,17 @@ class Alignment {
       : options_(options),
         frames_m_(frames_m),
         frames_c_(frames_c),
-        window_m_(MakeWindow(Last(frames_m, options.window.num_keyframes), options.window)),
-        window_c_(MakeWindow(Last(frames_c, options.window.num_keyframes), options.window)) {
+        windows_{MakeWindow(Last(frames_m, options.window.num_keyframes), options.window),
+                 MakeWindow(Last(frames_c, options.window.num_keyframes), options.window)} {
     const double floor = options.guess_tilt_floor;
     guess_tilt_sigma_ = std::sqrt(OdometryTiltVariance() + 2 * floor * floor);
   }
 
   std::string FirstGuess(const PlaceCandidate& candidate, uint64_t seed) {
-    std::vector<PointMatch> matches = CandidateMatches(window_m_, window_c_, candidate);
-    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+    std::vector<PointMatch> matches = CandidateMatches(windows_, candidate);
+    for (const Direction direction : kBothDirections) {
       const std::vector<PointMatch> nearest = MatchByDescriptor(
-          window_m_, window_c_, direction, options_.first_max_hamming, options_.first_max_ratio);
+          windows_, direction, options_.first_max_hamming, options_.first_max_ratio);
       matches.insert(matches.end(), nearest.begin(), nearest.end());
     }
     matches = Distinct(matches);
@@ -55,8 +55,8 @@ class Alignment {
     }
     const std::vector<PointObservation> observations = Observations(matches);
     const auto pnp =
-        SolveUprightPnp(observations, RayPairs(candidate), window_c_.T_w_cam.back().t,
-                        window_m_.T_w_cam.back().t, guess_tilt_sigma_, seed, options_.pnp);
+        SolveUprightPnp(observations, RayPairs(candidate), windows_.c.T_w_cam.back().t,
+                        windows_.m.T_w_cam.back().t, guess_tilt_sigma_, seed, options_.pnp);
     if (!pnp) {
       return "PnP found no pose";
     }
@@ -71,9 +71,9 @@ class Alignment {
   }
 
   std::string CheckViews() const {
-    const Eigen::Vector3d axis_m = window_m_.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d axis_m = windows_.m.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d axis_c =
-        pose_.T_m_c.q * (window_c_.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
+        pose_.T_m_c.q * (windows_.c.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
     const double angle = std::acos(std::clamp(axis_m.dot(axis_c), -1.0, 1.0));
     if (angle > options_.max_view_angle || pose_.T_m_c.t.norm() > options_.max_distance_m) {
       return "views do not overlap";
@@ -89,10 +89,10 @@ class Alignment {
     for (int round = 0; round < 2; ++round) {
       matches.clear();
       VisibilityCheck visibility;
-      for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
-        const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
-        const SearchResult result = SearchByProjection(window_m_, window_c_, direction,
-                                                       observer.newest(), pose_, options_.search);
+      for (const Direction direction : kBothDirections) {
+        const Window& observer = windows_.Observer(direction);
+        const SearchResult result =
+            SearchByProjection(windows_, direction, observer.newest(), pose_, options_.search);
         matches.insert(matches.end(), result.matches.begin(), result.matches.end());
         visibility.Add(observer.keyframe(observer.newest()).camera, result);
       }
@@ -116,37 +116,37 @@ class Alignment {
 
   std::string Optimise() {
     matches_.clear();
-    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
-      const Window& observer = direction == Direction::kForward ? window_c_ : window_m_;
+    for (const Direction direction : kBothDirections) {
+      const Window& observer = windows_.Observer(direction);
       for (int frame = 0; frame <= observer.newest(); ++frame) {
         const SearchResult result =
-            SearchByProjection(window_m_, window_c_, direction, frame, pose_, options_.search);
+            SearchByProjection(windows_, direction, frame, pose_, options_.search);
         matches_.insert(matches_.end(), result.matches.begin(), result.matches.end());
       }
     }
     constexpr double kMaxEpipolarError_px = 4;
     constexpr int kMinEpipolarPairs = 16;
-    matches_ = FilterByFundamental(window_m_, window_c_, Agreeing(window_m_, window_c_, matches_),
-                                   kMaxEpipolarError_px, kMinEpipolarPairs);
+    matches_ = FilterByFundamental(windows_, Agreeing(windows_, matches_), kMaxEpipolarError_px,
+                                   kMinEpipolarPairs);
     if (static_cast<int>(matches_.size()) < options_.min_inliers) {
       return "too few points found by projection";
     }
-    ba_ = SolveJointBa(window_m_, window_c_, matches_, pose_.T_m_c, options_.ba);
+    ba_ = SolveJointBa(windows_, matches_, pose_.T_m_c, options_.ba);
     return ba_ ? "" : "the window optimisation failed";
   }
 
   // The same count along the way to the two keyframes, where more than the object before them is in
   // view.
   std::string CheckWiderVisibility() {
-    const Window wide_m = MakeWindow(frames_m_, options_.window);
-    const Window wide_c = MakeWindow(frames_c_, options_.window);
+    const WindowPair wide{MakeWindow(frames_m_, options_.window),
+                          MakeWindow(frames_c_, options_.window)};
     const PoseEstimate pose{ba_->T_m_c, pose_.covariance};
     VisibilityCheck visibility;
-    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
-      const Window& observer = direction == Direction::kForward ? wide_c : wide_m;
+    for (const Direction direction : kBothDirections) {
+      const Window& observer = wide.Observer(direction);
       for (int frame = observer.newest(); frame >= 0; frame -= options_.visibility_stride) {
         visibility.Add(observer.keyframe(frame).camera,
-                       SearchByProjection(wide_m, wide_c, direction, frame, pose, options_.search));
+                       SearchByProjection(wide, direction, frame, pose, options_.search));
       }
     }
     report_.supported_share = visibility.supported_share();
@@ -158,7 +158,7 @@ class Alignment {
     const Eigen::Vector3d up = ba_->T_m_c.q * Eigen::Vector3d::UnitZ();
     const Eigen::Vector2d tilt(-up.y(), up.x());
     const Eigen::Matrix3d R_m_Km =
-        window_m_.keyframe(window_m_.newest()).T_odom_body.q.toRotationMatrix();
+        windows_.m.keyframe(windows_.m.newest()).T_odom_body.q.toRotationMatrix();
     const Eigen::Matrix3d visual =
         R_m_Km * ba_->covariance.bottomRightCorner<3, 3>() * R_m_Km.transpose();
     const double floor = options_.gravity_floor;
@@ -181,7 +181,7 @@ class Alignment {
       }
       const PointMatch& match = matches_[i];
       landmarks.emplace(match.direction, match.landmark);
-      const Window& observer = match.direction == Direction::kForward ? window_c_ : window_m_;
+      const Window& observer = windows_.Observer(match.direction);
       if (match.observed.frame == observer.newest()) {
         cells[match.direction].insert(
             ImageCell(observer.keyframe(observer.newest()).camera,
@@ -223,9 +223,9 @@ class Alignment {
         inliers.push_back(matches_[i]);
       }
     }
-    const auto halves = HalvesOfView(window_m_, window_c_, inliers, ba_->T_m_c);
-    const auto left = SolveJointBa(window_m_, window_c_, halves[0], ba_->T_m_c, options_.ba);
-    const auto right = SolveJointBa(window_m_, window_c_, halves[1], ba_->T_m_c, options_.ba);
+    const auto halves = HalvesOfView(windows_, inliers, ba_->T_m_c);
+    const auto left = SolveJointBa(windows_, halves[0], ba_->T_m_c, options_.ba);
+    const auto right = SolveJointBa(windows_, halves[1], ba_->T_m_c, options_.ba);
     if (!left || !right) {
       return "half of the view gives no pose";
     }
@@ -238,9 +238,9 @@ class Alignment {
   // T_odom_m_odom_c of the present guess.
   Rigid3 OdomAlignment() const {
     const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(),
-                          window_m_.keyframe(window_m_.newest()).T_odom_body.t);
+                          windows_.m.keyframe(windows_.m.newest()).T_odom_body.t);
     const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(),
-                          window_c_.keyframe(window_c_.newest()).T_odom_body.t);
+                          windows_.c.keyframe(windows_.c.newest()).T_odom_body.t);
     return T_odom_m * (ba_ ? ba_->T_m_c : pose_.T_m_c) * T_odom_c.Inverse();
   }
 
@@ -251,9 +251,9 @@ class Alignment {
       inlier[i] = true;
     }
     const Rigid3 guess = pnp_ ? pnp_->pose.T_m_c : Rigid3();
-    report.first = Shown(window_m_, window_c_, first_matches_, inlier, guess, guess);
+    report.first = Shown(windows_, first_matches_, inlier, guess, guess);
     if (ba_) {
-      report.found = Shown(window_m_, window_c_, matches_, ba_->inlier, guess, ba_->T_m_c);
+      report.found = Shown(windows_, matches_, ba_->inlier, guess, ba_->T_m_c);
     }
     return report;
   }
@@ -273,7 +273,7 @@ class Alignment {
   // Of roll or pitch between the two odometries.
   double OdometryTiltVariance() const {
     double variance = 0;
-    for (const Window* window : {&window_m_, &window_c_}) {
+    for (const Window* window : {&windows_.m, &windows_.c}) {
       variance += window->keyframe(window->newest()).roll_pitch_covariance.trace() / 2;
     }
     return variance;
@@ -306,8 +306,8 @@ class Alignment {
 
   std::vector<RayPair> RayPairs(const PlaceCandidate& candidate) const {
     std::vector<RayPair> pairs;
-    const KeyframeView& m = *window_m_.frames.back();
-    const KeyframeView& c = *window_c_.frames.back();
+    const KeyframeView& m = *windows_.m.frames.back();
+    const KeyframeView& c = *windows_.c.frames.back();
     for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
       if (!c.has_ray(corner_c) || !m.has_ray(corner_m)) {
         continue;
@@ -323,8 +323,8 @@ class Alignment {
       const auto unit = [](const Rigid3& T_w_cam, const Eigen::Vector2d& ray) {
         return Eigen::Vector3d(T_w_cam.q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized());
       };
-      pairs.push_back({unit(window_m_.T_w_cam.back(), m.ray(corner_m)),
-                       unit(window_c_.T_w_cam.back(), c.ray(corner_c)), sigma});
+      pairs.push_back({unit(windows_.m.T_w_cam.back(), m.ray(corner_m)),
+                       unit(windows_.c.T_w_cam.back(), c.ray(corner_c)), sigma});
     }
     return pairs;
   }
@@ -333,8 +333,7 @@ class Alignment {
     std::vector<PointObservation> observations;
     observations.reserve(matches.size());
     for (const PointMatch& match : matches) {
-      observations.push_back(
-          MakeObservation(window_m_, window_c_, match, options_.search.pixel_sigma));
+      observations.push_back(MakeObservation(windows_, match, options_.search.pixel_sigma));
     }
     return observations;
   }
@@ -342,8 +341,7 @@ class Alignment {
   const LoopVerificationOptions& options_;
   const KeyframeWindow& frames_m_;
   const KeyframeWindow& frames_c_;
-  Window window_m_;
-  Window window_c_;
+  WindowPair windows_;
   double guess_tilt_sigma_ = 0;  // radians, of roll and pitch between the windows
   PoseEstimate pose_;
   LoopVerificationReport report_;

@@ -120,12 +120,11 @@ std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& la
 
 }  // namespace
 
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
-                                int frame, const PoseEstimate& pose, const SearchOptions& options) {
-  const bool forward = direction == Direction::kForward;
-  const Window& holder = forward ? window_m : window_c;
-  const Window& observer = forward ? window_c : window_m;
-  const Rigid3 T_observer_holder = forward ? pose.T_m_c.Inverse() : pose.T_m_c;
+SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
+                                const PoseEstimate& pose, const SearchOptions& options) {
+  const Window& holder = windows.Holder(direction);
+  const Window& observer = windows.Observer(direction);
+  const Rigid3 T_observer_holder = ObserverFromHolder(direction, pose.T_m_c);
   const KeyframeView& view = *observer.frames[frame];
   const Keyframe& keyframe = view.keyframe();
 
@@ -171,11 +170,10 @@ SearchResult SearchByProjection(const Window& window_m, const Window& window_c, 
   return result;
 }
 
-std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& window_c,
-                                          Direction direction, int max_hamming, double max_ratio) {
-  const bool forward = direction == Direction::kForward;
-  const Window& holder = forward ? window_m : window_c;
-  const Window& observer = forward ? window_c : window_m;
+std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction direction,
+                                          int max_hamming, double max_ratio) {
+  const Window& holder = windows.Holder(direction);
+  const Window& observer = windows.Observer(direction);
   const int frame = observer.newest();
   const Keyframe& keyframe = observer.keyframe(frame);
   std::vector<int> corners;

@@ -52,12 +52,12 @@ struct SearchResult {
 };
 
 // `pose` is T_m_c and its covariance whatever the direction.
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
-                                int frame, const PoseEstimate& pose, const SearchOptions& options);
+SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
+                                const PoseEstimate& pose, const SearchOptions& options);
 
 // Nearest descriptors without any prediction: the newest keyframe's corners against the window's
 // points. For a first guess; a third of these may be wrong.
-std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& window_c,
-                                          Direction direction, int max_hamming, double max_ratio);
+std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction direction,
+                                          int max_hamming, double max_ratio);
 
 }  // namespace pangea

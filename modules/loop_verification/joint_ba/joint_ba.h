@@ -60,7 +60,7 @@ struct JointBaResult {
 };
 
 // Nothing when the problem degenerates.
-std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& window_c,
+std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
                                           const std::vector<PointMatch>& matches,
                                           const Rigid3& T_m_c, const JointBaOptions& options);
 
