@@ -18,7 +18,8 @@ namespace {
 const LoopVerificationGate kNoGate = [](const Rigid3&) { return std::string(); };
 
 Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match_agent, int match,
-                 const PlaceCandidate& candidate, const LoopVerificationOptions& options = {}) {
+                 const PlaceCandidate& candidate, const LoopVerificationOptions& options = {},
+                 LoopVerificationReport* report = nullptr) {
   SubmapStore store;
   for (const TestAgent* agent : {&query_agent, &match_agent}) {
     for (const Keyframe& keyframe : agent->keyframes) {
@@ -28,7 +29,7 @@ Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match
   return Aligner(options).Align(
       store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
       store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes), candidate,
-      kNoGate);
+      kNoGate, report);
 }
 
 TestAgentOptions SecondAgent(int run) {
@@ -337,26 +338,46 @@ TEST(AlignerTest, RefusesHalvesThatDisagree) {
   EXPECT_EQ(Align(off, 9, m, 10, candidate).reason, "the halves of the view disagree");
 }
 
-// Each bar, set out of reach, refuses with its own reason what is accepted otherwise.
+// Each bar, set out of reach, refuses in its own step what is accepted otherwise.
 TEST(AlignerTest, EachBarIsObeyed) {
   const auto room = MakeTestRoom({.seed = 4});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
   const TestAgent c = RunTestAgent(room, SecondAgent(0));
   const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
-  ASSERT_TRUE(Align(c, 9, m, 10, candidate).accepted);
-  const auto reason = [&](const auto& set) {
+  LoopVerificationReport accepted;
+  ASSERT_TRUE(Align(c, 9, m, 10, candidate, {}, &accepted).accepted);
+  const auto refused = [&](auto bar, auto value) {
     LoopVerificationOptions options;
-    set(&options);
-    return Align(c, 9, m, 10, candidate, options).reason;
+    options.*bar = value;
+    LoopVerificationReport report;
+    const Constraint constraint = Align(c, 9, m, 10, candidate, options, &report);
+    return report.refused_by + ": " + constraint.reason;
   };
   using Options = LoopVerificationOptions;
-  EXPECT_EQ(reason([](Options* o) { o->max_view_angle = 0.05; }), "views do not overlap");
-  EXPECT_EQ(reason([](Options* o) { o->max_distance_m = 0.1; }), "views do not overlap");
-  EXPECT_EQ(reason([](Options* o) { o->min_inlier_ratio = 1.1; }), "too many outliers");
-  EXPECT_EQ(reason([](Options* o) { o->min_occupied_cells = 25; }), "inliers too close together");
-  EXPECT_EQ(reason([](Options* o) { o->max_sigma_rad = 1e-6; }), "too uncertain");
-  EXPECT_EQ(reason([](Options* o) { o->max_tilt = 1e-9; }), "roll or pitch contradicts gravity");
-  EXPECT_EQ(reason([](Options* o) { o->min_found = 1000; }), "too few points found by projection");
+  EXPECT_EQ(refused(&Options::min_pnp_inliers, 10000), "PnP: too few matched points with a depth");
+  EXPECT_EQ(refused(&Options::min_pnp_inliers, accepted.pnp_inliers + 1),
+            "PnP: PnP found too few inliers");
+  EXPECT_EQ(refused(&Options::max_view_angle, 0.05), "views: views do not overlap");
+  EXPECT_EQ(refused(&Options::max_distance_m, 0.1), "views: views do not overlap");
+  const std::string in_two = "visibility in the two keyframes: ";
+  EXPECT_EQ(refused(&Options::min_found, 1000), in_two + "too few points found by projection");
+  EXPECT_EQ(refused(&Options::min_comparable, 10000),
+            in_two + "too few points ought to be seen from both");
+  EXPECT_EQ(refused(&Options::min_found_share, 1.1), in_two + "the surroundings contradict");
+  EXPECT_EQ(refused(&Options::min_first_supported_share, 1.1),
+            in_two + "the surroundings contradict");
+  EXPECT_EQ(refused(&Options::min_inliers, 10000),
+            "joint bundle adjustment: too few points found by projection");
+  EXPECT_EQ(refused(&Options::max_tilt, 1e-9), "gravity: roll or pitch contradicts gravity");
+  EXPECT_EQ(refused(&Options::max_tilt_chi2, 1e-9), "gravity: roll or pitch contradicts gravity");
+  EXPECT_EQ(refused(&Options::min_inlier_ratio, 1.1), "inliers: too many outliers");
+  EXPECT_EQ(refused(&Options::min_occupied_cells, 25), "inliers: inliers too close together");
+  EXPECT_EQ(refused(&Options::max_sigma_m, 1e-6), "certainty: too uncertain");
+  EXPECT_EQ(refused(&Options::max_sigma_rad, 1e-6), "certainty: too uncertain");
+  EXPECT_EQ(refused(&Options::min_supported_share, 1.1),
+            "visibility along the way: the surroundings contradict");
+  EXPECT_EQ(refused(&Options::max_halves_chi2, 1e-9),
+            "halves of the view: the halves of the view disagree");
 }
 
 TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
