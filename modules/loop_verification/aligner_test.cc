@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/testing/test_descriptors.h"
 #include "loop_verification/drift_gate.h"
 #include "loop_verification/loop_verification_test_world.h"
 
@@ -159,7 +160,7 @@ TEST(AlignerTest, RefusesOneObjectSeenFromTheSameSide) {
     std::uniform_real_distribution<double> side(-0.6, 0.6);
     for (int i = 0; i < 200; ++i) {
       const TestPoint point{ahead + Eigen::Vector3d(side(random), side(random), side(random)),
-                            {random(), random(), random(), random()}};
+                            RandomDescriptor(random)};
       room.insert(room.begin(), point);
       other.insert(other.begin(), point);
     }
@@ -247,7 +248,7 @@ TEST(AlignerTest, RefusesWhatIsTooUncertain) {
     std::vector<TestPoint> wall;
     for (int i = 0; i < num_points; ++i) {
       const Eigen::Vector3d p(ahead(random), across(random), 1.7 + up(random));
-      wall.push_back({YawRotation(1.75) * p, {random(), random(), random(), random()}});
+      wall.push_back({YawRotation(1.75) * p, RandomDescriptor(random)});
     }
     TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
     walk_m.radius = 0.6;
@@ -264,8 +265,7 @@ TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
   const auto point_at = [&](double x, double y, double z) {
-    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
-                     {random(), random(), random(), random()}};
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z), RandomDescriptor(random)};
   };
   std::vector<TestPoint> wall;
   for (int i = 0; i < 60; ++i) {
@@ -293,8 +293,7 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
   const auto point_at = [&](double x, double y, double z) {
-    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
-                     {random(), random(), random(), random()}};
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z), RandomDescriptor(random)};
   };
   std::vector<TestPoint> points;
   constexpr int kNear = 8;

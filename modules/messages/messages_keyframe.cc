@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 #include "messages/messages.h"
 #include "messages/messages_checks.h"
@@ -51,6 +53,9 @@ Parsed<Preintegration> Parse(const preintegration_t& m) {
   p.covariance = *covariance;
   return {p, ""};
 }
+
+static_assert(kMaxCorners * sizeof(Descriptor) <=
+              std::numeric_limits<decltype(keyframe_t::num_descriptor_bytes)>::max());
 
 void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
   m->num_corners = static_cast<int16_t>(keyframe.corners.size());

@@ -11,10 +11,6 @@ constexpr double kMinDepth = 0.05;  // metres; nearer points are no landmarks
 
 }  // namespace
 
-double CornerSigma(const Corner& corner, double pixel_sigma) {
-  return pixel_sigma * std::pow(1.2, corner.octave);
-}
-
 PointObservation MakeObservation(const WindowPair& windows, const PointMatch& match,
                                  double pixel_sigma) {
   const Window& observer = windows.Observer(match.direction);

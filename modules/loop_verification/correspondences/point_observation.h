@@ -31,9 +31,6 @@ struct PointObservation {
 PointObservation MakeObservation(const WindowPair& windows, const PointMatch& match,
                                  double pixel_sigma);
 
-// sigma of a corner's pixel: grows by 1.2 with each octave (keyframe_t).
-double CornerSigma(const Corner& corner, double pixel_sigma);
-
 // Residual in sigmas of its pixel, and what one sigma of the point's depth adds to it.
 // J, when given: d(residual)/d(xi), xi the tangent of X in the left frame (core/rigid3.h).
 struct WhitenedResidual {

@@ -11,7 +11,6 @@ namespace pangea {
 namespace {
 
 constexpr double kBorderPx = 12;
-constexpr int kNoDistance = 257;
 // Two corners this near are one: a tracked and a detected one of the same spot.
 constexpr double kSamePx = 4;
 
