@@ -7,6 +7,8 @@
 #include <map>
 #include <optional>
 
+#include "core/nearest_corner.h"
+
 namespace pangea {
 namespace {
 
@@ -22,34 +24,6 @@ int LandmarkDistance(const Window& holder, const WindowLandmark& landmark,
     best = std::min(best, HammingDistance(holder.corner(ref).descriptor, descriptor));
   }
   return best;
-}
-
-struct Nearest {
-  int corner = -1;
-  int distance = kNoDistance;
-  int second = kNoDistance;  // of a corner somewhere else
-};
-
-template <typename Distance>
-Nearest FindNearest(const Keyframe& keyframe, const std::vector<int>& corners,
-                    const Distance& distance_of) {
-  Nearest nearest;
-  std::vector<int> distances(corners.size());
-  for (size_t i = 0; i < corners.size(); ++i) {
-    distances[i] = distance_of(corners[i]);
-    if (distances[i] < nearest.distance) {
-      nearest.distance = distances[i];
-      nearest.corner = corners[i];
-    }
-  }
-  for (size_t i = 0; i < corners.size(); ++i) {
-    if (distances[i] < nearest.second && corners[i] != nearest.corner &&
-        (keyframe.corners[corners[i]].pixel - keyframe.corners[nearest.corner].pixel).norm() >
-            kSamePx) {
-      nearest.second = distances[i];
-    }
-  }
-  return nearest;
 }
 
 // One corner, one landmark: the nearer descriptor keeps it.
@@ -150,12 +124,13 @@ SearchResult SearchByProjection(const WindowPair& windows, Direction direction, 
       const Eigen::Vector2d error = keyframe.corners[i].pixel.cast<double>() - prediction->pixel;
       return !view.has_ray(i) || error.dot(covariance.inverse() * error) > options.max_chi2;
     });
-    const Nearest nearest = FindNearest(keyframe, near, [&](int i) {
+    const auto distance_of = [&](int i) {
       return LandmarkDistance(holder, landmark, keyframe.corners[i].descriptor);
-    });
-    if (nearest.corner >= 0 && nearest.distance <= options.max_hamming &&
-        nearest.distance < options.max_ratio * nearest.second) {
-      found.push_back({direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
+    };
+    const NearestCorner nearest =
+        FindNearest(keyframe.corners, near, distance_of, options.max_hamming, kSamePx);
+    if (nearest.index >= 0 && nearest.distance < options.max_ratio * nearest.second) {
+      found.push_back({direction, static_cast<int>(l), {frame, nearest.index}, nearest.distance});
     }
   }
   result.matches = ResolveCorners(found);
@@ -187,13 +162,13 @@ std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction d
     WindowLandmark newest = holder.landmarks[l];
     std::erase_if(newest.observations, [last = newest.observations.back().frame](
                                            const CornerRef& ref) { return ref.frame != last; });
-    const Nearest nearest = FindNearest(keyframe, corners, [&](int i) {
+    const auto distance_of = [&](int i) {
       return LandmarkDistance(holder, newest, keyframe.corners[i].descriptor);
-    });
-    if (nearest.corner >= 0 && nearest.distance <= max_hamming &&
-        nearest.distance < max_ratio * nearest.second) {
-      matches.push_back(
-          {direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
+    };
+    const NearestCorner nearest =
+        FindNearest(keyframe.corners, corners, distance_of, max_hamming, kSamePx);
+    if (nearest.index >= 0 && nearest.distance < max_ratio * nearest.second) {
+      matches.push_back({direction, static_cast<int>(l), {frame, nearest.index}, nearest.distance});
     }
   }
   return ResolveCorners(matches);
