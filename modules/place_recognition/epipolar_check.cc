@@ -3,9 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <random>
 
 #include "core/rigid3.h"
@@ -201,20 +201,10 @@ double ChanceOfInlier(const EpipolarModel& model, const Pairs& pairs, double max
   return (hits + 1.0) / (trials + 2.0);
 }
 
-// log10 of P(at least k of n), each with chance p.
+// log10 of P(at least k of n), each with chance p. A double would underflow.
 double Log10BinomialTail(int n, int k, double p) {
-  double tail = 0;
-  double largest = -kInfinity;
-  std::vector<double> logs;
-  for (int j = k; j <= n; ++j) {
-    logs.push_back(std::lgamma(n + 1.0) - std::lgamma(j + 1.0) - std::lgamma(n - j + 1.0) +
-                   j * std::log(p) + (n - j) * std::log1p(-p));
-    largest = std::max(largest, logs.back());
-  }
-  for (const double log : logs) {
-    tail += std::exp(log - largest);
-  }
-  return (largest + std::log(tail)) / std::numbers::ln10;
+  return k <= 0 ? 0
+                : static_cast<double>(std::log10(boost::math::ibeta<long double>(k, n - k + 1, p)));
 }
 
 int IterationsNeeded(double inlier_ratio, const EpipolarOptions& options) {
