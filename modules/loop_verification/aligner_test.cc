@@ -306,7 +306,9 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   for (const bool vague : {false, true}) {
     std::vector<TestPoint> points_c = points;
     for (int i = 0; vague && i < kNear; ++i) {
-      points_c[i].descriptor[0] = ~points_c[i].descriptor[0];  // noise makes it 75 bits and more
+      for (size_t bit = 0; bit < kDescriptorBits / 4; ++bit) {  // and noise: no sure match
+        FlipBit(&points_c[i].descriptor, bit);
+      }
     }
     TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
     walk_m.relative_depth_sigma = walk_c.relative_depth_sigma = 0.005;
