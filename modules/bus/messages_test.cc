@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bus/bus.h"
+#include "core/testing/test_descriptors.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {
@@ -43,7 +44,7 @@ Keyframe RandomKeyframe(uint64_t seed) {
     Corner corner;
     corner.pixel = Eigen::Vector2f(unit(rng) * 751, unit(rng) * 479);
     corner.octave = static_cast<int8_t>(rng() % 8);
-    corner.descriptor = {rng(), rng(), rng(), rng()};
+    corner.descriptor = RandomDescriptor(rng);
     corner.landmark_id = i < 120 ? i * 7 : kNoLandmark;
     keyframe.corners.push_back(corner);
   }

@@ -2,37 +2,33 @@
 
 // A keyframe as every module past the border sees it: bounded, finite, undistortion still to come.
 
-#include <array>
-#include <bit>
+#include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <vector>
 
 #include "core/camera_model.h"
+#include "core/descriptor.h"
 #include "core/ids.h"
 #include "core/imu/preintegration.h"
 #include "core/rigid3.h"
 
 namespace pangea {
 
-// 256 bits.
-using Descriptor = std::array<uint64_t, 4>;
-
-inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
-  return std::popcount(a[0] ^ b[0]) + std::popcount(a[1] ^ b[1]) + std::popcount(a[2] ^ b[2]) +
-         std::popcount(a[3] ^ b[3]);
-}
-
 inline constexpr int kMaxCorners = 700;
 inline constexpr int32_t kNoLandmark = -1;
 
 struct Corner {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // raw (distorted); on the wire in 1/16 px
-  int8_t octave = 0;  // pyramid level; the pixel's sigma is about 1.2^octave
+  int8_t octave = 0;                                // pyramid level
   Descriptor descriptor{};
   int32_t landmark_id = kNoLandmark;  // unique in its map, the same in every keyframe that saw it
 };
+
+// Of a corner's pixel: grows with each octave (keyframe_t).
+inline double CornerSigma(const Corner& corner, double sigma_on_octave_0) {
+  return sigma_on_octave_0 * std::pow(kOctaveScale, corner.octave);
+}
 
 struct MapPoint {
   int corner = 0;               // index into Keyframe::corners

@@ -1,58 +1,22 @@
 #include "core/matching.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "core/nearest_corner.h"
 
 namespace pangea {
 namespace {
 
-constexpr int kFar = 257;  // more than any distance
 constexpr double kCellPx = 32.0;
-
-bool PassesRatio(int best, int second, double max_ratio) {
-  return best <= max_ratio * static_cast<double>(second);
-}
 
 }  // namespace
 
 std::vector<CornerMatch> MatchCorners(const std::vector<Corner>& a, const std::vector<Corner>& b,
                                       const MatchingOptions& options) {
-  std::vector<int> row(b.size());
-  std::vector<int> column_best(b.size(), kFar);  // of each b: its nearest a and the distance
-  std::vector<int> column_index(b.size(), -1);
-  std::vector<CornerMatch> rows;
-  const auto other_corner_px = static_cast<float>(options.other_corner_px);
-  for (int i = 0; i < static_cast<int>(a.size()); ++i) {
-    const Descriptor& descriptor = a[i].descriptor;
-    int best = kFar;
-    int best_j = -1;
-    for (int j = 0; j < static_cast<int>(b.size()); ++j) {
-      const int distance = HammingDistance(descriptor, b[j].descriptor);
-      row[j] = distance;
-      if (distance < best) {
-        best = distance;
-        best_j = j;
-      }
-      if (distance < column_best[j]) {
-        column_best[j] = distance;
-        column_index[j] = i;
-      }
-    }
-    if (best > options.max_distance) {
-      continue;
-    }
-    int second = kFar;
-    for (int j = 0; j < static_cast<int>(b.size()); ++j) {
-      if (row[j] < second && (b[j].pixel - b[best_j].pixel).norm() > other_corner_px) {
-        second = row[j];
-      }
-    }
-    if (PassesRatio(best, second, options.max_ratio)) {
-      rows.push_back({i, best_j, best});
-    }
-  }
-  std::erase_if(rows, [&](const CornerMatch& match) { return column_index[match.b] != match.a; });
-  return rows;
+  const auto distance_of = [&](int i, int j) {
+    return HammingDistance(a[i].descriptor, b[j].descriptor);
+  };
+  return MutualNearest(a.size(), b, distance_of, options);
 }
 
 CornerGrid::CornerGrid(const std::vector<Corner>& corners) : corners_(&corners) {
@@ -103,28 +67,15 @@ std::vector<int> CornerGrid::Within(const Eigen::Vector2d& pixel, double radius_
 std::optional<CornerMatch> CornerGrid::Nearest(const Eigen::Vector2d& pixel, double radius_px,
                                                const Descriptor& descriptor,
                                                const MatchingOptions& options) const {
-  const std::vector<int> near = Within(pixel, radius_px);
-  CornerMatch best{0, -1, kFar};
-  for (const int i : near) {
-    const int distance = HammingDistance(descriptor, (*corners_)[i].descriptor);
-    if (distance < best.distance) {
-      best = {0, i, distance};
-    }
-  }
-  if (best.b < 0 || best.distance > options.max_distance) {
+  const auto distance_of = [&](int i) {
+    return HammingDistance(descriptor, (*corners_)[i].descriptor);
+  };
+  const NearestCorner nearest = FindNearest(*corners_, Within(pixel, radius_px), distance_of,
+                                            options.max_distance, options.other_corner_px);
+  if (nearest.index < 0 || !nearest.PassesRatio(options.max_ratio)) {
     return std::nullopt;
   }
-  int second = kFar;
-  for (const int i : near) {
-    const Eigen::Vector2f apart = (*corners_)[i].pixel - (*corners_)[best.b].pixel;
-    if (apart.norm() > static_cast<float>(options.other_corner_px)) {
-      second = std::min(second, HammingDistance(descriptor, (*corners_)[i].descriptor));
-    }
-  }
-  if (!PassesRatio(best.distance, second, options.max_ratio)) {
-    return std::nullopt;
-  }
-  return best;
+  return CornerMatch{0, nearest.index, nearest.distance};
 }
 
 }  // namespace pangea

@@ -13,7 +13,7 @@
 namespace pangea {
 
 struct MatchingOptions {
-  int max_distance = 64;   // of 256 bits; two unrelated descriptors differ in about 128
+  int max_distance = kAlikeHamming;
   double max_ratio = 0.8;  // best distance / second best; 1 switches the test off
   // A corner may be described on several octaves: the second best of the ratio test has to be
   // another place of the image, at least this far (pixels) from the best.
@@ -21,7 +21,8 @@ struct MatchingOptions {
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("max_distance", &max_distance, {0, 256}, "bits", "Hamming distance of a match");
+    archive.Add("max_distance", &max_distance, {0, kDescriptorBits}, "bits",
+                "Hamming distance of a match");
     archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
     archive.Add("other_corner_px", &other_corner_px, {0, 1000}, "px",
                 "from the best match to one that counts as second best");

@@ -4,16 +4,16 @@
 
 #include <random>
 
+#include "core/testing/test_descriptors.h"
+
 namespace pangea {
 namespace {
 
 using Rng = std::mt19937_64;
 
-Descriptor RandomDescriptor(Rng& rng) { return {rng(), rng(), rng(), rng()}; }
-
 Descriptor FlipBits(Descriptor descriptor, int first, int count) {
   for (int bit = first; bit < first + count; ++bit) {
-    descriptor[bit / 64] ^= uint64_t{1} << (bit % 64);
+    FlipBit(&descriptor, bit);
   }
   return descriptor;
 }

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/testing/test_descriptors.h"
 #include "loop_verification/drift_gate.h"
 #include "loop_verification/loop_verification_test_world.h"
 
@@ -18,7 +19,8 @@ namespace {
 const LoopVerificationGate kNoGate = [](const Rigid3&) { return std::string(); };
 
 Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match_agent, int match,
-                 const PlaceCandidate& candidate, const LoopVerificationOptions& options = {}) {
+                 const PlaceCandidate& candidate, const LoopVerificationOptions& options = {},
+                 LoopVerificationReport* report = nullptr) {
   SubmapStore store;
   for (const TestAgent* agent : {&query_agent, &match_agent}) {
     for (const Keyframe& keyframe : agent->keyframes) {
@@ -28,7 +30,7 @@ Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match
   return Aligner(options).Align(
       store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
       store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes), candidate,
-      kNoGate);
+      kNoGate, report);
 }
 
 TestAgentOptions SecondAgent(int run) {
@@ -158,7 +160,7 @@ TEST(AlignerTest, RefusesOneObjectSeenFromTheSameSide) {
     std::uniform_real_distribution<double> side(-0.6, 0.6);
     for (int i = 0; i < 200; ++i) {
       const TestPoint point{ahead + Eigen::Vector3d(side(random), side(random), side(random)),
-                            {random(), random(), random(), random()}};
+                            RandomDescriptor(random)};
       room.insert(room.begin(), point);
       other.insert(other.begin(), point);
     }
@@ -246,7 +248,7 @@ TEST(AlignerTest, RefusesWhatIsTooUncertain) {
     std::vector<TestPoint> wall;
     for (int i = 0; i < num_points; ++i) {
       const Eigen::Vector3d p(ahead(random), across(random), 1.7 + up(random));
-      wall.push_back({YawRotation(1.75) * p, {random(), random(), random(), random()}});
+      wall.push_back({YawRotation(1.75) * p, RandomDescriptor(random)});
     }
     TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
     walk_m.radius = 0.6;
@@ -263,8 +265,7 @@ TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
   const auto point_at = [&](double x, double y, double z) {
-    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
-                     {random(), random(), random(), random()}};
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z), RandomDescriptor(random)};
   };
   std::vector<TestPoint> wall;
   for (int i = 0; i < 60; ++i) {
@@ -292,8 +293,7 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
   const auto point_at = [&](double x, double y, double z) {
-    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z),
-                     {random(), random(), random(), random()}};
+    return TestPoint{YawRotation(1.75) * Eigen::Vector3d(x, y, z), RandomDescriptor(random)};
   };
   std::vector<TestPoint> points;
   constexpr int kNear = 8;
@@ -306,7 +306,9 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   for (const bool vague : {false, true}) {
     std::vector<TestPoint> points_c = points;
     for (int i = 0; vague && i < kNear; ++i) {
-      points_c[i].descriptor[0] = ~points_c[i].descriptor[0];  // noise makes it 75 bits and more
+      for (size_t bit = 0; bit < kDescriptorBits / 4; ++bit) {  // and noise: no sure match
+        FlipBit(&points_c[i].descriptor, bit);
+      }
     }
     TestAgentOptions walk_m = FirstAgent(0), walk_c = SecondAgent(0);
     walk_m.relative_depth_sigma = walk_c.relative_depth_sigma = 0.005;
@@ -337,26 +339,46 @@ TEST(AlignerTest, RefusesHalvesThatDisagree) {
   EXPECT_EQ(Align(off, 9, m, 10, candidate).reason, "the halves of the view disagree");
 }
 
-// Each bar, set out of reach, refuses with its own reason what is accepted otherwise.
+// Each bar, set out of reach, refuses in its own step what is accepted otherwise.
 TEST(AlignerTest, EachBarIsObeyed) {
   const auto room = MakeTestRoom({.seed = 4});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
   const TestAgent c = RunTestAgent(room, SecondAgent(0));
   const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
-  ASSERT_TRUE(Align(c, 9, m, 10, candidate).accepted);
-  const auto reason = [&](const auto& set) {
+  LoopVerificationReport accepted;
+  ASSERT_TRUE(Align(c, 9, m, 10, candidate, {}, &accepted).accepted);
+  const auto refused = [&](auto bar, auto value) {
     LoopVerificationOptions options;
-    set(&options);
-    return Align(c, 9, m, 10, candidate, options).reason;
+    options.*bar = value;
+    LoopVerificationReport report;
+    const Constraint constraint = Align(c, 9, m, 10, candidate, options, &report);
+    return report.refused_by + ": " + constraint.reason;
   };
   using Options = LoopVerificationOptions;
-  EXPECT_EQ(reason([](Options* o) { o->max_view_angle = 0.05; }), "views do not overlap");
-  EXPECT_EQ(reason([](Options* o) { o->max_distance_m = 0.1; }), "views do not overlap");
-  EXPECT_EQ(reason([](Options* o) { o->min_inlier_ratio = 1.1; }), "too many outliers");
-  EXPECT_EQ(reason([](Options* o) { o->min_occupied_cells = 25; }), "inliers too close together");
-  EXPECT_EQ(reason([](Options* o) { o->max_sigma_rad = 1e-6; }), "too uncertain");
-  EXPECT_EQ(reason([](Options* o) { o->max_tilt = 1e-9; }), "roll or pitch contradicts gravity");
-  EXPECT_EQ(reason([](Options* o) { o->min_found = 1000; }), "too few points found by projection");
+  EXPECT_EQ(refused(&Options::min_pnp_inliers, 10000), "PnP: too few matched points with a depth");
+  EXPECT_EQ(refused(&Options::min_pnp_inliers, accepted.pnp_inliers + 1),
+            "PnP: PnP found too few inliers");
+  EXPECT_EQ(refused(&Options::max_view_angle, 0.05), "views: views do not overlap");
+  EXPECT_EQ(refused(&Options::max_distance_m, 0.1), "views: views do not overlap");
+  const std::string in_two = "visibility in the two keyframes: ";
+  EXPECT_EQ(refused(&Options::min_found, 1000), in_two + "too few points found by projection");
+  EXPECT_EQ(refused(&Options::min_comparable, 10000),
+            in_two + "too few points ought to be seen from both");
+  EXPECT_EQ(refused(&Options::min_found_share, 1.1), in_two + "the surroundings contradict");
+  EXPECT_EQ(refused(&Options::min_first_supported_share, 1.1),
+            in_two + "the surroundings contradict");
+  EXPECT_EQ(refused(&Options::min_inliers, 10000),
+            "joint bundle adjustment: too few points found by projection");
+  EXPECT_EQ(refused(&Options::max_tilt, 1e-9), "gravity: roll or pitch contradicts gravity");
+  EXPECT_EQ(refused(&Options::max_tilt_chi2, 1e-9), "gravity: roll or pitch contradicts gravity");
+  EXPECT_EQ(refused(&Options::min_inlier_ratio, 1.1), "inliers: too many outliers");
+  EXPECT_EQ(refused(&Options::min_occupied_cells, 25), "inliers: inliers too close together");
+  EXPECT_EQ(refused(&Options::max_sigma_m, 1e-6), "certainty: too uncertain");
+  EXPECT_EQ(refused(&Options::max_sigma_rad, 1e-6), "certainty: too uncertain");
+  EXPECT_EQ(refused(&Options::min_supported_share, 1.1),
+            "visibility along the way: the surroundings contradict");
+  EXPECT_EQ(refused(&Options::max_halves_chi2, 1e-9),
+            "halves of the view: the halves of the view disagree");
 }
 
 TEST(AlignerTest, TheGateOfTheKindIsObeyed) {

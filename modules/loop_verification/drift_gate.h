@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "loop_verification/aligner.h"
+#include "loop_verification/steps/verification.h"
 
 namespace pangea {
 

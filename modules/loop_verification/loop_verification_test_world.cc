@@ -10,6 +10,7 @@
 
 #include "core/matching.h"
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_descriptors.h"
 
 namespace pangea {
 namespace {
@@ -23,8 +24,6 @@ double Uniform(Random& random, double low, double high) {
 double Normal(Random& random, double sigma) {
   return std::normal_distribution<double>(0, sigma)(random);
 }
-
-Descriptor RandomDescriptor(Random& random) { return {random(), random(), random(), random()}; }
 
 // Each bit flips with probability 1/16.
 Descriptor WithFlips(const Descriptor& descriptor, Random& random) {

@@ -5,6 +5,8 @@
 //
 // Frame `w` of a window: gravity-aligned like the map's odom, its origin at the newest keyframe's
 // body. Near origins keep rotations and translations of an alignment well separated.
+//
+// The alignment X = T_m_c takes window frame c (the query's) to window frame m (the match's).
 
 #include <Eigen/Core>
 #include <vector>
@@ -52,11 +54,32 @@ struct Window {
 
   int newest() const { return static_cast<int>(frames.size()) - 1; }
   const Keyframe& keyframe(int frame) const { return frames[frame]->keyframe(); }
+  const Keyframe& newest_keyframe() const { return frames.back()->keyframe(); }
   const Corner& corner(const CornerRef& ref) const {
     return keyframe(ref.frame).corners[ref.corner];
   }
 };
 
 Window MakeWindow(KeyframeWindow frames, const WindowOptions& options);
+
+// Forward: a point of m in a camera of c. Reverse: a point of c in a camera of m.
+enum class Direction { kForward, kReverse };
+inline constexpr Direction kBothDirections[] = {Direction::kForward, Direction::kReverse};
+
+struct WindowPair {
+  Window m, c;  // up to the candidate's match; up to the query
+
+  // Whose point it is, and whose camera sees it.
+  const Window& Holder(Direction direction) const {
+    return direction == Direction::kForward ? m : c;
+  }
+  const Window& Observer(Direction direction) const {
+    return direction == Direction::kForward ? c : m;
+  }
+};
+
+inline Rigid3 ObserverFromHolder(Direction direction, const Rigid3& T_m_c) {
+  return direction == Direction::kForward ? T_m_c.Inverse() : T_m_c;
+}
 
 }  // namespace pangea

@@ -6,6 +6,7 @@
 
 #include "bus/bus.h"
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_descriptors.h"
 #include "map_points/map_points_process.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -28,7 +29,7 @@ class MapPointsTest : public ::testing::Test {
     std::uniform_real_distribution<double> uniform(-1, 1);
     for (int i = 0; i < 600; ++i) {
       points_.emplace_back(6 + 0.5 * uniform(rng), 10 * uniform(rng), 2 * uniform(rng));
-      descriptors_.push_back({rng(), rng(), rng(), rng()});
+      descriptors_.push_back(RandomDescriptor(rng));
     }
     state_.group = kOld;
     state_.revision = 5;

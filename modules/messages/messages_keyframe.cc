@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 #include "messages/messages.h"
 #include "messages/messages_checks.h"
@@ -52,10 +54,13 @@ Parsed<Preintegration> Parse(const preintegration_t& m) {
   return {p, ""};
 }
 
+using DescriptorBytes = decltype(keyframe_t::num_descriptor_bytes);
+static_assert(kMaxCorners * sizeof(Descriptor) <= std::numeric_limits<DescriptorBytes>::max());
+
 void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
   m->num_corners = static_cast<int16_t>(keyframe.corners.size());
   m->descriptors.resize(keyframe.corners.size() * sizeof(Descriptor));
-  m->num_descriptor_bytes = static_cast<int16_t>(m->descriptors.size());
+  m->num_descriptor_bytes = static_cast<DescriptorBytes>(m->descriptors.size());
   for (size_t i = 0; i < keyframe.corners.size(); ++i) {
     const Corner& corner = keyframe.corners[i];
     m->u_16th_px.push_back(static_cast<int16_t>(std::lround(corner.pixel.x() * kPixelScale)));

@@ -11,11 +11,9 @@
 namespace pangea {
 namespace {
 
-constexpr int kDescriptorBits = 256;
-
-uint32_t GatherBits(const Descriptor& descriptor, std::span<const uint8_t> bits) {
+uint32_t GatherBits(const Descriptor& descriptor, std::span<const uint16_t> bits) {
   uint32_t word = 0;
-  for (const uint8_t bit : bits) {
+  for (const uint16_t bit : bits) {
     word = (word << 1) | static_cast<uint32_t>((descriptor[bit / 64] >> (bit % 64)) & 1);
   }
   return word;
@@ -50,9 +48,9 @@ const std::vector<DescriptorIndex::Posting>& DescriptorIndex::Table::Postings(
 
 DescriptorIndex::DescriptorIndex() {
   std::mt19937_64 rng(20200513);
-  std::array<uint8_t, kDescriptorBits> order{};
+  std::array<uint16_t, kDescriptorBits> order{};
   for (Table& table : tables_) {
-    std::iota(order.begin(), order.end(), uint8_t{0});
+    std::iota(order.begin(), order.end(), uint16_t{0});
     for (size_t i = 0; i < kWordBits + kSignatureBits; ++i) {
       std::swap(order[i], order[i + rng() % (order.size() - i)]);
     }

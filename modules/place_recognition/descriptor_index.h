@@ -3,7 +3,7 @@
 // Which keyframes share descriptors with this one: an inverted index that needs no vocabulary file.
 //
 // The words are locality-sensitive hashes: table t's word is a fixed random choice of kWordBits of
-// the 256 descriptor bits (Indyk & Motwani, STOC 1998). Every posting carries a signature of 32
+// the descriptor's bits (Indyk & Motwani, STOC 1998). Every posting carries a signature of 32
 // other bits, so that most chance collisions are seen without touching the descriptor (Hamming
 // embedding; Jegou et al., ECCV 2008). A query corner votes once for each keyframe it meets,
 // weighted by log(keyframes / keyframes met), the idf of Sivic & Zisserman. The constants were
@@ -52,8 +52,8 @@ class DescriptorIndex {
   };
   using Page = std::array<std::vector<Posting>, size_t{1} << kPageBits>;
   struct Table {
-    std::array<uint8_t, kWordBits> word_bits{};
-    std::array<uint8_t, kSignatureBits> signature_bits{};
+    std::array<uint16_t, kWordBits> word_bits{};
+    std::array<uint16_t, kSignatureBits> signature_bits{};
     std::vector<std::unique_ptr<Page>> pages;  // by the word's upper bits; null: none was met
 
     uint32_t Word(const Descriptor& descriptor) const;

@@ -1,20 +1,18 @@
 #include "place_recognition/epipolar_check.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <random>
 
-#include "core/rigid3.h"
+#include "core/epipolar_step.h"
 
 namespace pangea {
 namespace {
 
 using Pairs = std::vector<std::pair<CornerRay, CornerRay>>;
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
 constexpr int kSampleSize = 3;
@@ -126,6 +124,15 @@ Eigen::Vector3d Translation(const std::array<Normal, kSampleSize>& normals, doub
   return longest.isZero(0) ? Eigen::Vector3d::UnitX() : Eigen::Vector3d(longest.normalized());
 }
 
+// Of e = b . (t x w), with w = R a: a's noise is rotated by (b x t) and b's by (t x w), across the
+// rays.
+double SampsonVariance(const Eigen::Vector3d& w, double sigma_a, const CornerRay& b,
+                       const Eigen::Vector3d& t) {
+  const double variance = sigma_a * sigma_a * w.cross(b.direction.cross(t)).squaredNorm() +
+                          b.sigma * b.sigma * b.direction.cross(w.cross(t)).squaredNorm();
+  return std::max(variance, 1e-18);
+}
+
 std::vector<int> Inliers(const EpipolarModel& model, const Pairs& pairs, double max_residual) {
   std::vector<int> inliers;
   for (int i = 0; i < static_cast<int>(pairs.size()); ++i) {
@@ -136,43 +143,23 @@ std::vector<int> Inliers(const EpipolarModel& model, const Pairs& pairs, double 
   return inliers;
 }
 
-// One Gauss-Newton step on the Sampson residuals of `inliers`; the tangent is a rotation about the
-// b axes and t's two directions on its sphere. Damped, because a rotation in place leaves t free.
+// On the Sampson residuals of `inliers`.
 void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, double gravity_sigma,
                 EpipolarModel* model) {
-  const Eigen::Vector3d t = model->t_b_a;
-  const Eigen::Vector3d basis_1 = t.unitOrthogonal();
-  const Eigen::Vector3d basis_2 = t.cross(basis_1);
+  EpipolarStep step(model->t_b_a, 1);
   const Eigen::Matrix3d R = model->R_b_a.toRotationMatrix();
-  Matrix5d hessian = Matrix5d::Identity();
-  Vector5d gradient = Vector5d::Zero();
   for (const int i : inliers) {
     const auto& [a, b] = pairs[i];
     const Eigen::Vector3d w = R * a.direction;
-    const Eigen::Vector3d v_cross_t = b.direction.cross(t);
-    const Eigen::Vector3d w_cross_t = w.cross(t);
-    // e = b . (t x w); its noise is a's rotated by (b x t) and b's by (t x w), across the rays.
-    const double e = v_cross_t.dot(w);
-    const double variance = a.sigma * a.sigma * w.cross(v_cross_t).squaredNorm() +
-                            b.sigma * b.sigma * b.direction.cross(w_cross_t).squaredNorm();
-    const double weight = 1.0 / std::max(variance, 1e-18);
-    Vector5d jacobian;
-    jacobian.head<3>() = w.cross(v_cross_t);
-    const Eigen::Vector3d by_t = w.cross(b.direction);
-    jacobian[3] = basis_1.dot(by_t);
-    jacobian[4] = basis_2.dot(by_t);
-    hessian += weight * jacobian * jacobian.transpose();
-    gradient += weight * e * jacobian;
+    step.Add(w, b.direction, 1, 1 / SampsonVariance(w, a.sigma, b, model->t_b_a));
   }
   // The gravity prior: the part of the rotation that is no yaw.
   const Eigen::Vector3d tilt = LogSo3(YawRotation(-YawOf(model->R_b_a)) * model->R_b_a);
   for (int axis = 0; axis < 2; ++axis) {
-    hessian(axis, axis) += 1.0 / (gravity_sigma * gravity_sigma);
-    gradient[axis] += tilt[axis] / (gravity_sigma * gravity_sigma);
+    step.H(axis, axis) += 1.0 / (gravity_sigma * gravity_sigma);
+    step.g[axis] += tilt[axis] / (gravity_sigma * gravity_sigma);
   }
-  const Vector5d step = -hessian.ldlt().solve(gradient);
-  model->R_b_a = (ExpSo3(step.head<3>()) * model->R_b_a).normalized();
-  model->t_b_a = (t + step[3] * basis_1 + step[4] * basis_2).normalized();
+  step.Apply(&model->R_b_a, &model->t_b_a);
 }
 
 // Local optimisation (Chum et al., DAGM 2003): from a wide inlier set to a narrow one.
@@ -201,20 +188,10 @@ double ChanceOfInlier(const EpipolarModel& model, const Pairs& pairs, double max
   return (hits + 1.0) / (trials + 2.0);
 }
 
-// log10 of P(at least k of n), each with chance p.
+// log10 of P(at least k of n), each with chance p. A double would underflow.
 double Log10BinomialTail(int n, int k, double p) {
-  double tail = 0;
-  double largest = -kInfinity;
-  std::vector<double> logs;
-  for (int j = k; j <= n; ++j) {
-    logs.push_back(std::lgamma(n + 1.0) - std::lgamma(j + 1.0) - std::lgamma(n - j + 1.0) +
-                   j * std::log(p) + (n - j) * std::log1p(-p));
-    largest = std::max(largest, logs.back());
-  }
-  for (const double log : logs) {
-    tail += std::exp(log - largest);
-  }
-  return (largest + std::log(tail)) / std::numbers::ln10;
+  return k <= 0 ? 0
+                : static_cast<double>(std::log10(boost::math::ibeta<long double>(k, n - k + 1, p)));
 }
 
 int IterationsNeeded(double inlier_ratio, const EpipolarOptions& options) {
@@ -243,9 +220,6 @@ double EpipolarModel::Residual(const CornerRay& a, const CornerRay& b) const {
   const Eigen::Vector3d w = R_b_a * a.direction;
   const Eigen::Vector3d b_cross_t = b.direction.cross(t_b_a);
   const Eigen::Vector3d w_cross_t = w.cross(t_b_a);
-  const double e = b_cross_t.dot(w);
-  const double variance = a.sigma * a.sigma * w.cross(b_cross_t).squaredNorm() +
-                          b.sigma * b.sigma * b.direction.cross(w_cross_t).squaredNorm();
   // depth_b b = depth_a w + s t, so depth_a (w x b) = s (b x t) and depth_b (w x b) = s (w x t).
   const Eigen::Vector3d w_cross_b = w.cross(b.direction);
   const double parallax = kParallaxSigmas * std::max(a.sigma, b.sigma);
@@ -253,7 +227,7 @@ double EpipolarModel::Residual(const CornerRay& a, const CornerRay& b) const {
       (w_cross_b.dot(b_cross_t) < 0 || w_cross_b.dot(w_cross_t) < 0)) {
     return kInfinity;
   }
-  return std::abs(e) / std::sqrt(std::max(variance, 1e-18));
+  return std::abs(b_cross_t.dot(w)) / std::sqrt(SampsonVariance(w, a.sigma, b, t_b_a));
 }
 
 std::vector<EpipolarModel> SolveThreePairs(const Pairs& pairs, const std::vector<int>& sample) {

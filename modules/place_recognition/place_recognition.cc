@@ -12,7 +12,6 @@ namespace pangea {
 namespace {
 
 constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
-constexpr double kOctaveScale = 1.2;
 // Runs of keyframes looked at before they are spread over the maps.
 constexpr size_t kMaxPlaces = 100;
 
@@ -148,7 +147,7 @@ PlaceRecognition::Stored PlaceRecognition::MakeStored(const Keyframe& keyframe) 
     CornerRay ray{Eigen::Vector3d::Zero(), 0};
     if (const auto xy = keyframe.camera.Unproject(corner.pixel.cast<double>())) {
       ray.direction = q_odom_cam * Eigen::Vector3d(xy->x(), xy->y(), 1.0).normalized();
-      ray.sigma = keyframe.camera.PixelAngle() * std::pow(kOctaveScale, corner.octave);
+      ray.sigma = CornerSigma(corner, keyframe.camera.PixelAngle());
     }
     stored.rays.push_back(ray);
     if (corner.landmark_id != kNoLandmark) {

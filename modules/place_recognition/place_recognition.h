@@ -49,9 +49,11 @@ struct PlaceRecognitionOptions {
   // Keyframes beyond this many are still recognised but no longer remembered (about 90 kB each).
   int max_keyframes = 20000;
   // Wider than usual: the epipolar check copes with wrong matches, and measures their chance.
-  MatchingOptions matching{.max_distance = 72, .max_ratio = 0.85, .other_corner_px = 5.0};
+  MatchingOptions matching{
+      .max_distance = kCandidateHamming, .max_ratio = 0.85, .other_corner_px = 5.0};
   // Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
-  MatchingOptions guided_matching{.max_distance = 64, .max_ratio = 0.9, .other_corner_px = 5.0};
+  MatchingOptions guided_matching{
+      .max_distance = kAlikeHamming, .max_ratio = 0.9, .other_corner_px = 5.0};
   EpipolarOptions epipolar;
 
   template <typename Archive>

@@ -9,6 +9,7 @@
 
 #include "core/keyframe.h"
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_descriptors.h"
 
 namespace pangea::test {
 
@@ -33,7 +34,7 @@ class TestWorld {
       const Eigen::Vector3d p =
           i % 4 < 2 ? Eigen::Vector3d(side, a, z) : Eigen::Vector3d(a, side, z);
       points_.push_back(p);
-      descriptors_.push_back(RandomDescriptor());
+      descriptors_.push_back(RandomDescriptor(rng_));
     }
   }
 
@@ -71,17 +72,9 @@ class TestWorld {
   }
 
  private:
-  Descriptor RandomDescriptor() {
-    Descriptor descriptor;
-    for (uint64_t& word : descriptor) {
-      word = rng_();
-    }
-    return descriptor;
-  }
   Descriptor Noisy(Descriptor descriptor) {
     for (int i = 0; i < options_.flipped_bits; ++i) {
-      const uint64_t bit = rng_() % 256;
-      descriptor[bit / 64] ^= uint64_t{1} << (bit % 64);
+      FlipBit(&descriptor, rng_() % kDescriptorBits);
     }
     return descriptor;
   }
@@ -92,7 +85,7 @@ class TestWorld {
       Corner corner;
       corner.pixel.x() = u(rng_);
       corner.pixel.y() = v(rng_);
-      corner.descriptor = RandomDescriptor();
+      corner.descriptor = RandomDescriptor(rng_);
       keyframe->corners.push_back(corner);
     }
   }

@@ -138,6 +138,14 @@ class PoseGraph {
     int keyframes_unpublished = 0;
   };
   using Pair = std::pair<int, int>;
+  // What of a map is solved: from the first node to the last that has a loop; what comes after is
+  // joined to the solution by odometry alone.
+  struct SolvedMap {
+    int number = 0;
+    int first = 0;
+    int last = 0;
+    int offset = 0;  // of its nodes in the solver, which counts from its own zero
+  };
 
   int MapNumber(const MapId& map);
   void AddLoop(const Constraint& constraint, NodeRef from, NodeRef to);
@@ -158,8 +166,11 @@ class PoseGraph {
   double OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const;
   std::vector<PairEvidence::Innovation> Innovations(const Group& group,
                                                     const std::vector<Loop*>& loops) const;
-  void Apply(const GroupSolver& solver, const std::map<int, Pair>& scope,
-             const std::map<int, int>& offset);
+  std::vector<SolvedMap> SolvedMaps(const Group& group, const std::vector<Loop*>& loops) const;
+  void AddMaps(const Group& group, const std::vector<SolvedMap>& solved, GroupSolver* solver) const;
+  void AddLoops(const std::vector<Loop*>& loops, const std::vector<SolvedMap>& solved,
+                GroupSolver* solver) const;
+  void Apply(const GroupSolver& solver, const std::vector<SolvedMap>& solved);
 
   // Each of the group's maps as it is told.
   std::map<int, RefinedMap> RefinedMaps(const Group& group) const;

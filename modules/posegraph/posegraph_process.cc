@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>
 
-#include "bus/retransmission/timeouts.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -29,10 +27,14 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                 .results = JournalFollower::Which::kAll},
                {.keyframe = std::bind_front(&PoseGraphProcess::OnKeyframe, this),
                 .keyframe_came = [this](const KeyframeId& id) { graph_.NoteMap(id.map); },
-                .match = std::bind_front(&PoseGraphProcess::OnPlaceMatch, this),
+                .match =
+                    [this](const PlaceMatch& match) {
+                      results_.Promise(match, now_utime_);
+                      return true;
+                    },
                 .result = std::bind_front(&PoseGraphProcess::OnConstraint, this),
                 .have = std::bind_front(&PoseGraphProcess::OnHave, this),
-                .more_to_catch_up = [this] { return NumResultsToCatchUp(); },
+                .more_to_catch_up = [this] { return results_.NumToCatchUp(journal_); },
                 .handled = [this] { SettleUnlessMoreWaits(); }}) {
   node_.Listen<map_state_t>(channels::kRefinement,
                             std::bind_front(&PoseGraphProcess::OnRefinement, this));
@@ -47,9 +49,7 @@ void PoseGraphProcess::OnKeyframe(const Keyframe& keyframe) {
 }
 
 void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
-  const int64_t id = constraint.Id();
-  due_.erase(id);
-  if (results_.insert(id).second) {
+  if (results_.Take(constraint.Id())) {
     ++num_arrived_;
     node_.Count(constraint.accepted ? "results_accepted" : "results_refused");
   } else {
@@ -57,21 +57,6 @@ void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
   }
   graph_.Take(constraint);
   ++num_unsettled_;
-}
-
-bool PoseGraphProcess::OnPlaceMatch(const PlaceMatch& match) {
-  const KeyframeId& query = match.query;
-  for (const PlaceCandidate& candidate : match.candidates) {
-    Constraint promised;
-    promised.from = candidate.match;
-    promised.to = query;
-    promised.kind = candidate.kind;
-    if (!results_.contains(promised.Id()) && due_.size() < kMaxDue) {
-      due_.try_emplace(promised.Id(),
-                       Due{query, now_utime_ + timeouts::kResultWait_us, timeouts::kResultWait_us});
-    }
-  }
-  return true;
 }
 
 void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) {
@@ -88,16 +73,6 @@ void PoseGraphProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
     graph_.NoteMap(map);
   }
-}
-
-// Verification results of the journal that are still to come.
-int64_t PoseGraphProcess::NumResultsToCatchUp() const {
-  return std::ranges::count_if(due_, [this](const auto& item) {
-    const Due& due = item.second;
-    const auto goal = journal_.Goal(due.query.map);
-    // Asked for twice by its name: the journal does not have it, it is still to be verified.
-    return goal && due.query.seq <= *goal && due.wait_us < 4 * timeouts::kResultWait_us;
-  });
 }
 
 void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
@@ -136,7 +111,7 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
   journal_.Tick(now_utime);
   SettleUnlessMoreWaits();
-  RequestDueResults(now_utime);
+  results_.RequestOverdue(node_, now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
     last_change_utime_ = now_utime;
@@ -151,28 +126,6 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
   }
 }
 
-void PoseGraphProcess::RequestDueResults(int64_t now_utime) {
-  if (now_utime < next_results_utime_) {
-    return;
-  }
-  next_results_utime_ = now_utime + kSecond;
-  std::map<MapId, ResultNames> overdue;
-  for (auto& [id, due] : due_) {
-    ResultNames& names =
-        overdue.try_emplace(due.query.map, ResultNames{due.query.map, {}}).first->second;
-    if (now_utime >= due.next_ask_utime && names.results.size() < ResultNames::kMax) {
-      due.wait_us = std::min(2 * due.wait_us, timeouts::kMaxResultWait_us);
-      due.next_ask_utime = now_utime + due.wait_us;
-      names.results.emplace_back(due.query.seq, id);
-    }
-  }
-  for (const auto& [map, names] : overdue) {
-    if (!names.results.empty()) {
-      RequestResults(node_, names);
-    }
-  }
-}
-
 void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   const PoseGraph::Counters counters = graph_.counters();
   node_.Set("maps", counters.maps);
@@ -183,7 +136,7 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   node_.Set("solves", counters.solves);
   node_.Set("edges_bridged", counters.bridged);
   node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
-  node_.Set("results_due", static_cast<int64_t>(due_.size()));
+  node_.Set("results_due", static_cast<int64_t>(results_.size()));
   if (journal_.catching_up()) {
     const int64_t to_go = journal_.num_to_catch_up();
     return node_.PublishStatus(now_utime, to_go,

@@ -20,11 +20,9 @@
 // solve costs the same after one verification result as after ten, and verification results that
 // come faster than solves would make every correction late.
 //
-// Bounds: InOrder's for keyframes, kMaxDue promised verification results (then no more are
-// watched), the pose graph's own for constraints that wait for keyframes.
+// Bounds: InOrder's for keyframes, those of due_results.h, the pose graph's own for constraints
+// that wait for keyframes.
 
-#include <map>
-#include <set>
 #include <string>
 
 #include "bus/node.h"
@@ -33,6 +31,7 @@
 #include "messages/catch_up_messages.h"
 #include "messages/state_chunks.h"
 #include "pangea/map_state_t.hpp"
+#include "posegraph/due_results.h"
 #include "posegraph/posegraph.h"
 
 namespace pangea {
@@ -49,41 +48,29 @@ class PoseGraphProcess : public Process {
   const PoseGraph& graph() const { return graph_; }
 
  private:
-  static constexpr size_t kMaxDue = 20000;
   static constexpr int kMaxUnsettled = 100;
-
-  struct Due {
-    KeyframeId query;
-    int64_t next_ask_utime = 0;
-    int64_t wait_us = 0;
-  };
 
   void OnKeyframe(const Keyframe& keyframe);
   void OnConstraint(const Constraint& constraint);
-  bool OnPlaceMatch(const PlaceMatch& match);
   void OnRefinement(MapState state, const map_state_t& message);
   void OnHave(const Have& have);
   void OnResendRequest(const ResendRequest& request);
 
-  int64_t NumResultsToCatchUp() const;
   void SettleUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
-  void RequestDueResults(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
   PoseGraph graph_;
   JournalFollower journal_;
   StateChunks refinements_;
-  std::map<int64_t, Due> due_;  // promised verification results, by constraint id
-  std::set<int64_t> results_;   // that came
-  int64_t now_utime_ = 0;       // of the newest tick
-  int64_t num_arrived_ = 0;     // keyframes, verification results
-  int num_unsettled_ = 0;       // of them: taken since the last solve
+  DueResults results_;
+  int64_t now_utime_ = 0;    // of the newest tick
+  int64_t num_arrived_ = 0;  // keyframes, verification results
+  int num_unsettled_ = 0;    // of them: taken since the last solve
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish
-  int64_t next_results_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

@@ -156,73 +156,96 @@ void PoseGraph::Solve(Group* group, bool from_the_beginning) {
     return;
   }
 
-  // First and last node of each map; what comes after is joined to the solution by odometry alone.
-  std::map<int, Pair> scope;
-  for (const Loop* loop : loops) {
-    for (const NodeRef& node : {loop->from, loop->to}) {
-      Pair& range = scope.try_emplace(node.map, node.node, node.node).first->second;
-      range = {std::min(range.first, node.node), std::max(range.second, node.node)};
-    }
-  }
-  const int main_map = group->maps.front();
+  const std::vector<SolvedMap> solved = SolvedMaps(*group, loops);
   GroupSolver solver(options_.solver);
-  std::map<int, int> offset;  // of each map's nodes in the solver, which counts from its own zero
-  int num_nodes = 0;
-  for (auto& [number, range] : scope) {
-    if (options_.scope == PoseGraphOptions::Scope::kAll || number != main_map) {
-      range.first = 0;
-    }
-    offset[number] = num_nodes - range.first;
-    for (int i = range.first; i <= range.second; ++i, ++num_nodes) {
-      const bool fixed = number == main_map && i == range.first;
-      solver.AddNode(maps_[number].poses[i], fixed);
-    }
-    const OdometryChain& chain = maps_[number].chain;
-    for (int i = range.first + 1; i <= range.second; ++i) {
-      if (chain[i].edge_from >= range.first) {
-        Relative4 edge = chain[i].edge;
-        edge.covariance *= group->odometry_variance;
-        solver.AddOdometry(offset[number] + chain[i].edge_from, offset[number] + i, edge);
-      }
-    }
-  }
-  std::vector<bool> may_go;
-  for (const Loop* loop : loops) {
-    solver.AddLoop(offset[loop->from.map] + loop->from.node, offset[loop->to.map] + loop->to.node,
-                   loop->relative, loop->on);
-    may_go.push_back(static_cast<int64_t>(may_go.size()) >= group->known_loops);
-  }
+  AddMaps(*group, solved, &solver);
+  AddLoops(loops, solved, &solver);
   if (graduated) {
     solver.SolveGraduated();
     group->known_loops = num_loops;
   } else {
+    std::vector<bool> may_go(loops.size(), true);
+    std::fill_n(may_go.begin(), std::min(group->known_loops, num_loops), false);
     solver.SolveWarm(may_go);
   }
   for (size_t i = 0; i < loops.size(); ++i) {
     loops[i]->on = solver.loop_on(static_cast<int>(i));
   }
-  Apply(solver, scope, offset);
+  Apply(solver, solved);
 }
 
-void PoseGraph::Apply(const GroupSolver& solver, const std::map<int, Pair>& scope,
-                      const std::map<int, int>& offset) {
+std::vector<PoseGraph::SolvedMap> PoseGraph::SolvedMaps(const Group& group,
+                                                        const std::vector<Loop*>& loops) const {
+  std::map<int, SolvedMap> by_number;
+  for (const Loop* loop : loops) {
+    for (const NodeRef& node : {loop->from, loop->to}) {
+      SolvedMap& map =
+          by_number.try_emplace(node.map, SolvedMap{node.map, node.node, node.node}).first->second;
+      map.first = std::min(map.first, node.node);
+      map.last = std::max(map.last, node.node);
+    }
+  }
+  std::vector<SolvedMap> solved;
+  int num_nodes = 0;
+  for (auto& [number, map] : by_number) {
+    if (options_.scope == PoseGraphOptions::Scope::kAll || number != group.maps.front()) {
+      map.first = 0;
+    }
+    map.offset = num_nodes - map.first;
+    num_nodes += map.last - map.first + 1;
+    solved.push_back(map);
+  }
+  return solved;
+}
+
+void PoseGraph::AddMaps(const Group& group, const std::vector<SolvedMap>& solved,
+                        GroupSolver* solver) const {
+  for (const SolvedMap& map : solved) {
+    for (int i = map.first; i <= map.last; ++i) {
+      const bool fixed = map.number == group.maps.front() && i == map.first;
+      solver->AddNode(maps_[map.number].poses[i], fixed);
+    }
+    const OdometryChain& chain = maps_[map.number].chain;
+    for (int i = map.first + 1; i <= map.last; ++i) {
+      if (chain[i].edge_from >= map.first) {
+        Relative4 edge = chain[i].edge;
+        edge.covariance *= group.odometry_variance;
+        solver->AddOdometry(map.offset + chain[i].edge_from, map.offset + i, edge);
+      }
+    }
+  }
+}
+
+void PoseGraph::AddLoops(const std::vector<Loop*>& loops, const std::vector<SolvedMap>& solved,
+                         GroupSolver* solver) const {
+  std::map<int, int> offset;
+  for (const SolvedMap& map : solved) {
+    offset[map.number] = map.offset;
+  }
+  for (const Loop* loop : loops) {
+    solver->AddLoop(offset[loop->from.map] + loop->from.node, offset[loop->to.map] + loop->to.node,
+                    loop->relative, loop->on);
+  }
+}
+
+void PoseGraph::Apply(const GroupSolver& solver, const std::vector<SolvedMap>& solved) {
   std::vector<int> newest;
-  for (const auto& [number, range] : scope) {
-    newest.push_back(offset.at(number) + range.second);
+  for (const SolvedMap& map : solved) {
+    newest.push_back(map.offset + map.last);
   }
   const std::vector<Matrix4d> marginals = solver.Marginals(newest);
-  size_t index = 0;
-  for (const auto& [number, range] : scope) {
+  for (size_t k = 0; k < solved.size(); ++k) {
+    const auto& [number, first, last, offset] = solved[k];
     MapChain& map = maps_[number];
-    for (int i = range.first; i <= range.second; ++i) {
-      map.poses[i] = solver.pose(offset.at(number) + i);
+    for (int i = first; i <= last; ++i) {
+      map.poses[i] = solver.pose(offset + i);
     }
-    const Pose4& last = map.poses[range.second];
-    const Eigen::Vector3d arm = YawRotation(last.yaw) * map.chain[range.second].T_odom_body.t;
-    map.T_map_odom = {last.p - arm, last.yaw};
-    map.covariance = CovarianceAt(marginals[index++], -arm);
-    map.newest_solved = range.second;
-    for (size_t i = range.second + 1; i < map.chain.size(); ++i) {
+    const Pose4& newest_pose = map.poses[last];
+    const Eigen::Vector3d arm = YawRotation(newest_pose.yaw) * map.chain[last].T_odom_body.t;
+    map.T_map_odom = {newest_pose.p - arm, newest_pose.yaw};
+    map.covariance = CovarianceAt(marginals[k], -arm);
+    map.newest_solved = last;
+    for (size_t i = last + 1; i < map.chain.size(); ++i) {
       map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
     }
   }

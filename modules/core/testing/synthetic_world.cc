@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_descriptors.h"
 
 namespace pangea {
 namespace {
@@ -25,11 +26,9 @@ Eigen::Vector3d NormalVector(Random& random, double sigma) {
   return {Normal(random, sigma), Normal(random, sigma), Normal(random, sigma)};
 }
 
-Descriptor RandomDescriptor(Random& random) { return {random(), random(), random(), random()}; }
-
 Descriptor WithFlips(Descriptor descriptor, double probability, Random& random) {
   std::bernoulli_distribution flip(probability);
-  for (int bit = 0; bit < 256; ++bit) {
+  for (int bit = 0; bit < kDescriptorBits; ++bit) {
     descriptor[bit / 64] ^= static_cast<uint64_t>(flip(random)) << (bit % 64);
   }
   return descriptor;
@@ -209,9 +208,9 @@ class AgentWalk {
   Corner NoisyCorner(const Eigen::Vector2d& pixel, double depth) {
     constexpr double kFarDepth = 8;
     Corner corner;
-    corner.octave =
-        static_cast<int8_t>(std::clamp(std::log(kFarDepth / depth) / std::log(1.2) / 3, 0.0, 3.0));
-    const double sigma = options_.pixel_sigma * std::pow(1.2, corner.octave);
+    corner.octave = static_cast<int8_t>(
+        std::clamp(std::log(kFarDepth / depth) / std::log(kOctaveScale) / 3, 0.0, 3.0));
+    const double sigma = CornerSigma(corner, options_.pixel_sigma);
     corner.pixel =
         (pixel + Eigen::Vector2d(Normal(random_, sigma), Normal(random_, sigma))).cast<float>();
     return corner;

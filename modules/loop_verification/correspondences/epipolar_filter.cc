@@ -4,15 +4,15 @@
 
 namespace pangea {
 
-std::vector<PointMatch> FilterByFundamental(const Window& window_m, const Window& window_c,
+std::vector<PointMatch> FilterByFundamental(const WindowPair& windows,
                                             const std::vector<PointMatch>& matches,
                                             double max_error_px, int min_pairs) {
   std::vector<size_t> tested;
   std::vector<cv::Point2d> holder_points, observer_points;
   for (size_t i = 0; i < matches.size(); ++i) {
     const bool forward = matches[i].direction == Direction::kForward;
-    const Window& holder = forward ? window_m : window_c;
-    const Window& observer = forward ? window_c : window_m;
+    const Window& holder = windows.Holder(matches[i].direction);
+    const Window& observer = windows.Observer(matches[i].direction);
     const WindowLandmark& landmark = holder.landmarks[matches[i].landmark];
     if (matches[i].observed.frame != observer.newest() ||
         landmark.observations.back().frame != holder.newest()) {

@@ -11,7 +11,7 @@ namespace pangea {
 // Drops the matches in the newest keyframe of one window whose landmark is also seen in the newest
 // keyframe of the other, where the two corners contradict the fundamental matrix most of them
 // agree on. With fewer than `min_pairs` of them nothing is dropped: eight points fit anything.
-std::vector<PointMatch> FilterByFundamental(const Window& window_m, const Window& window_c,
+std::vector<PointMatch> FilterByFundamental(const WindowPair& windows,
                                             const std::vector<PointMatch>& matches,
                                             double max_error_px, int min_pairs);
 

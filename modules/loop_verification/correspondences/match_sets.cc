@@ -10,18 +10,18 @@
 
 namespace pangea {
 
-std::vector<PointMatch> CandidateMatches(const Window& window_m, const Window& window_c,
+std::vector<PointMatch> CandidateMatches(const WindowPair& windows,
                                          const PlaceCandidate& candidate) {
   std::vector<PointMatch> matches;
-  const int m = window_m.newest(), c = window_c.newest();
+  const int m = windows.m.newest(), c = windows.c.newest();
   for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
-    if (!window_c.frames[c]->has_ray(corner_c) || !window_m.frames[m]->has_ray(corner_m)) {
+    if (!windows.c.frames[c]->has_ray(corner_c) || !windows.m.frames[m]->has_ray(corner_m)) {
       continue;
     }
-    if (const int landmark = window_m.landmark_of_corner[m][corner_m]; landmark >= 0) {
+    if (const int landmark = windows.m.landmark_of_corner[m][corner_m]; landmark >= 0) {
       matches.push_back({Direction::kForward, landmark, {c, corner_c}, 0});
     }
-    if (const int landmark = window_c.landmark_of_corner[c][corner_c]; landmark >= 0) {
+    if (const int landmark = windows.c.landmark_of_corner[c][corner_c]; landmark >= 0) {
       matches.push_back({Direction::kReverse, landmark, {m, corner_m}, 0});
     }
   }
@@ -39,12 +39,12 @@ std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches) {
   return distinct;
 }
 
-std::vector<PointMatch> Agreeing(const Window& window_m, const Window& window_c,
+std::vector<PointMatch> Agreeing(const WindowPair& windows,
                                  const std::vector<PointMatch>& matches) {
   std::map<std::pair<Direction, int>, std::map<int, int>> votes;
   const auto other_of = [&](const PointMatch& match) {
-    const Window& observer = match.direction == Direction::kForward ? window_c : window_m;
-    return observer.landmark_of_corner[match.observed.frame][match.observed.corner];
+    return windows.Observer(match.direction)
+        .landmark_of_corner[match.observed.frame][match.observed.corner];
   };
   for (const PointMatch& match : matches) {
     if (const int other = other_of(match); other >= 0) {
@@ -68,16 +68,14 @@ std::vector<PointMatch> Agreeing(const Window& window_m, const Window& window_c,
   return agreeing;
 }
 
-std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
-                              const std::vector<PointMatch>& matches,
+std::vector<ShownMatch> Shown(const WindowPair& windows, const std::vector<PointMatch>& matches,
                               const std::vector<bool>& inlier, const Rigid3& T_m_c_before,
                               const Rigid3& T_m_c_after) {
   std::vector<ShownMatch> shown;
   for (size_t i = 0; i < matches.size(); ++i) {
     const PointMatch& match = matches[i];
-    const bool forward = match.direction == Direction::kForward;
-    const Window& holder = forward ? window_m : window_c;
-    const Window& observer = forward ? window_c : window_m;
+    const Window& holder = windows.Holder(match.direction);
+    const Window& observer = windows.Observer(match.direction);
     if (match.observed.frame != observer.newest()) {
       continue;
     }
@@ -90,24 +88,25 @@ std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
     };
     const Eigen::Vector2d own = pixel(holder, Rigid3());
     const auto miss = [&](const Rigid3& T_m_c) {
-      return (pixel(observer, forward ? T_m_c.Inverse() : T_m_c) - corner).norm();
+      return (pixel(observer, ObserverFromHolder(match.direction, T_m_c)) - corner).norm();
     };
+    const bool forward = match.direction == Direction::kForward;
     shown.push_back({forward ? own : corner, forward ? corner : own, inlier[i], miss(T_m_c_before),
                      miss(T_m_c_after)});
   }
   return shown;
 }
 
-std::array<std::vector<PointMatch>, 2> HalvesOfView(const Window& window_m, const Window& window_c,
+std::array<std::vector<PointMatch>, 2> HalvesOfView(const WindowPair& windows,
                                                     const std::vector<PointMatch>& matches,
                                                     const Rigid3& T_m_c) {
-  const Rigid3& T_w_cam = window_m.T_w_cam.back();
+  const Rigid3& T_w_cam = windows.m.T_w_cam.back();
   const Eigen::Vector3d view_ray = T_w_cam.q * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d across = view_ray.cross(Eigen::Vector3d::UnitZ());
   std::vector<double> sides;
   for (const PointMatch& match : matches) {
     const bool forward = match.direction == Direction::kForward;
-    const Eigen::Vector3d& p_w = (forward ? window_m : window_c).landmarks[match.landmark].p_w;
+    const Eigen::Vector3d& p_w = windows.Holder(match.direction).landmarks[match.landmark].p_w;
     const Eigen::Vector3d ray = (forward ? p_w : Eigen::Vector3d(T_m_c * p_w)) - T_w_cam.t;
     sides.push_back(ray.dot(across) / ray.dot(view_ray));
   }

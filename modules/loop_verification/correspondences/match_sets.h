@@ -20,14 +20,13 @@ struct ShownMatch {
 };
 
 // Those in the two keyframes themselves, none of their neighbours.
-std::vector<ShownMatch> Shown(const Window& window_m, const Window& window_c,
-                              const std::vector<PointMatch>& matches,
+std::vector<ShownMatch> Shown(const WindowPair& windows, const std::vector<PointMatch>& matches,
                               const std::vector<bool>& inlier, const Rigid3& T_m_c_before,
                               const Rigid3& T_m_c_after);
 
 // The candidate's matched corners that have a depth, in either keyframe or by their landmark in a
 // neighbour.
-std::vector<PointMatch> CandidateMatches(const Window& window_m, const Window& window_c,
+std::vector<PointMatch> CandidateMatches(const WindowPair& windows,
                                          const PlaceCandidate& candidate);
 
 // Each landmark and corner once.
@@ -35,11 +34,10 @@ std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches);
 
 // Of the keyframes' votes on which landmark of the other window a landmark is, the majority stays;
 // corners that are no landmark vote for nothing and stay.
-std::vector<PointMatch> Agreeing(const Window& window_m, const Window& window_c,
-                                 const std::vector<PointMatch>& matches);
+std::vector<PointMatch> Agreeing(const WindowPair& windows, const std::vector<PointMatch>& matches);
 
 // Those left and right of the middle one, across m's line of sight and level; T_m_c: windows.
-std::array<std::vector<PointMatch>, 2> HalvesOfView(const Window& window_m, const Window& window_c,
+std::array<std::vector<PointMatch>, 2> HalvesOfView(const WindowPair& windows,
                                                     const std::vector<PointMatch>& matches,
                                                     const Rigid3& T_m_c);
 

@@ -11,16 +11,10 @@ constexpr double kMinDepth = 0.05;  // metres; nearer points are no landmarks
 
 }  // namespace
 
-double CornerSigma(const Corner& corner, double pixel_sigma) {
-  return pixel_sigma * std::pow(1.2, corner.octave);
-}
-
-PointObservation MakeObservation(const Window& window_m, const Window& window_c,
-                                 const PointMatch& match, double pixel_sigma) {
-  const bool forward = match.direction == Direction::kForward;
-  const Window& holder = forward ? window_m : window_c;
-  const Window& observer = forward ? window_c : window_m;
-  const WindowLandmark& landmark = holder.landmarks[match.landmark];
+PointObservation MakeObservation(const WindowPair& windows, const PointMatch& match,
+                                 double pixel_sigma) {
+  const Window& observer = windows.Observer(match.direction);
+  const WindowLandmark& landmark = windows.Holder(match.direction).landmarks[match.landmark];
   const KeyframeView& view = *observer.frames[match.observed.frame];
   PointObservation observation;
   observation.direction = match.direction;

@@ -2,9 +2,6 @@
 
 // One map point of one window seen by a camera of the other: what PnP, the projection search and
 // the pose refinement share.
-//
-// The alignment X = T_m_c takes window frame c (the query's) to window frame m (the match's).
-// Forward: a point of m in a camera of c. Reverse: a point of c in a camera of m.
 
 #include <Eigen/Core>
 #include <optional>
@@ -13,8 +10,6 @@
 #include "loop_verification/window.h"
 
 namespace pangea {
-
-enum class Direction { kForward, kReverse };
 
 struct PointMatch {
   Direction direction = Direction::kForward;
@@ -33,11 +28,8 @@ struct PointObservation {
   Eigen::Matrix2d sqrt_info;  // whitens a difference of rays by the corner's pixel sigma
 };
 
-PointObservation MakeObservation(const Window& window_m, const Window& window_c,
-                                 const PointMatch& match, double pixel_sigma);
-
-// sigma of a corner's pixel: grows by 1.2 with each octave (keyframe_t).
-double CornerSigma(const Corner& corner, double pixel_sigma);
+PointObservation MakeObservation(const WindowPair& windows, const PointMatch& match,
+                                 double pixel_sigma);
 
 // Residual in sigmas of its pixel, and what one sigma of the point's depth adds to it.
 // J, when given: d(residual)/d(xi), xi the tangent of X in the left frame (core/rigid3.h).

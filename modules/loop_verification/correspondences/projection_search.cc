@@ -7,11 +7,12 @@
 #include <map>
 #include <optional>
 
+#include "core/nearest_corner.h"
+
 namespace pangea {
 namespace {
 
 constexpr double kBorderPx = 12;
-constexpr int kNoDistance = 257;
 // Two corners this near are one: a tracked and a detected one of the same spot.
 constexpr double kSamePx = 4;
 
@@ -23,34 +24,6 @@ int LandmarkDistance(const Window& holder, const WindowLandmark& landmark,
     best = std::min(best, HammingDistance(holder.corner(ref).descriptor, descriptor));
   }
   return best;
-}
-
-struct Nearest {
-  int corner = -1;
-  int distance = kNoDistance;
-  int second = kNoDistance;  // of a corner somewhere else
-};
-
-template <typename Distance>
-Nearest FindNearest(const Keyframe& keyframe, const std::vector<int>& corners,
-                    const Distance& distance_of) {
-  Nearest nearest;
-  std::vector<int> distances(corners.size());
-  for (size_t i = 0; i < corners.size(); ++i) {
-    distances[i] = distance_of(corners[i]);
-    if (distances[i] < nearest.distance) {
-      nearest.distance = distances[i];
-      nearest.corner = corners[i];
-    }
-  }
-  for (size_t i = 0; i < corners.size(); ++i) {
-    if (distances[i] < nearest.second && corners[i] != nearest.corner &&
-        (keyframe.corners[corners[i]].pixel - keyframe.corners[nearest.corner].pixel).norm() >
-            kSamePx) {
-      nearest.second = distances[i];
-    }
-  }
-  return nearest;
 }
 
 // One corner, one landmark: the nearer descriptor keeps it.
@@ -77,87 +50,117 @@ struct Prediction {
   bool comparable = false;
 };
 
-std::optional<Prediction> Predict(const Window& holder, const WindowLandmark& landmark,
-                                  const Window& observer, int frame,
-                                  const Rigid3& T_observer_holder, Direction direction,
-                                  const PoseEstimate& pose, const SearchOptions& options) {
-  const CameraModel& camera = observer.keyframe(frame).camera;
-  const Rigid3& T_w_cam = observer.T_w_cam[frame];
-  const Eigen::Vector3d y = T_observer_holder * landmark.p_w;
-  const Eigen::Vector3d p_cam = T_w_cam.Inverse() * y;
-  Eigen::Matrix<double, 2, 3> J_project;
-  const auto pixel = camera.Project(p_cam, &J_project);
-  if (!pixel || !camera.Contains(*pixel, kBorderPx) || p_cam.z() > options.max_depth_m) {
-    return std::nullopt;
+// The points of one window in one keyframe of the other.
+class ProjectionSearch {
+ public:
+  ProjectionSearch(const WindowPair& windows, Direction direction, int frame,
+                   const PoseEstimate& pose, const SearchOptions& options)
+      : holder_(windows.Holder(direction)),
+        view_(*windows.Observer(direction).frames[frame]),
+        T_w_cam_(windows.Observer(direction).T_w_cam[frame]),
+        T_observer_holder_(ObserverFromHolder(direction, pose.T_m_c)),
+        direction_(direction),
+        pose_(pose),
+        options_(options) {}
+
+  std::optional<Prediction> Predict(const WindowLandmark& landmark) const {
+    const CameraModel& camera = view_.keyframe().camera;
+    const Eigen::Vector3d y = T_observer_holder_ * landmark.p_w;
+    const Eigen::Vector3d p_cam = T_w_cam_.Inverse() * y;
+    Eigen::Matrix<double, 2, 3> J_project;
+    const auto pixel = camera.Project(p_cam, &J_project);
+    if (!pixel || !camera.Contains(*pixel, kBorderPx) || p_cam.z() > options_.max_depth_m) {
+      return std::nullopt;
+    }
+    const auto [angle, log_scale] = ViewChange(landmark, y);
+    const double max_log_scale = std::log(options_.max_scale);
+    if (angle > options_.max_view_angle || log_scale > max_log_scale) {
+      return std::nullopt;
+    }
+    const bool comparable = angle < 0.6 * options_.max_view_angle &&
+                            log_scale < 0.6 * max_log_scale &&
+                            camera.Contains(*pixel, 2 * kBorderPx);
+    const Eigen::Matrix<double, 2, 3> J_y = J_project * T_w_cam_.R().transpose();
+    return Prediction{*pixel, Covariance(landmark, J_y), comparable};
   }
-  // The two lines of sight, in the observing window.
-  const Eigen::Vector3d view_ray = y - T_w_cam.t;
-  const Eigen::Vector3d host_view_ray =
-      y - T_observer_holder * holder.T_w_cam[landmark.host.frame].t;
-  const double scale = std::abs(std::log(view_ray.norm() / host_view_ray.norm()));
-  const double angle =
-      std::acos(std::clamp(view_ray.normalized().dot(host_view_ray.normalized()), -1.0, 1.0));
-  if (angle > options.max_view_angle || scale > std::log(options.max_scale)) {
-    return std::nullopt;
+
+  NearestCorner Find(const WindowLandmark& landmark, const Prediction& prediction) const {
+    const auto distance_of = [&](int i) {
+      return LandmarkDistance(holder_, landmark, view_.keyframe().corners[i].descriptor);
+    };
+    return FindNearest(view_.keyframe().corners, CornersWithin(landmark, prediction), distance_of,
+                       options_.max_hamming, kSamePx);
   }
-  Prediction prediction;
-  prediction.pixel = *pixel;
-  prediction.comparable = angle < 0.6 * options.max_view_angle &&
-                          scale < 0.6 * std::log(options.max_scale) &&
-                          camera.Contains(*pixel, 2 * kBorderPx);
-  const Eigen::Matrix<double, 2, 3> J_y = J_project * T_w_cam.R().transpose();
-  Eigen::Matrix<double, 2, 6> J_pose;
-  if (direction == Direction::kForward) {
-    const Eigen::Matrix3d R_t = pose.T_m_c.R().transpose();
-    J_pose << -J_y * R_t, J_y * R_t * Hat(landmark.p_w - pose.T_m_c.t);
-  } else {
-    J_pose << J_y, -J_y * Hat(pose.T_m_c.q * landmark.p_w);
+
+ private:
+  // Between the host's line of sight and this one, to y in the observing window: the angle, and how
+  // much nearer or farther.
+  std::pair<double, double> ViewChange(const WindowLandmark& landmark,
+                                       const Eigen::Vector3d& y) const {
+    const Eigen::Vector3d ray = y - T_w_cam_.t;
+    const Eigen::Vector3d host_ray =
+        y - T_observer_holder_ * holder_.T_w_cam[landmark.host.frame].t;
+    return {std::acos(std::clamp(ray.normalized().dot(host_ray.normalized()), -1.0, 1.0)),
+            std::abs(std::log(ray.norm() / host_ray.norm()))};
   }
-  const Eigen::Vector2d depth = J_y * (T_observer_holder.q * landmark.depth_sigma_w);
-  prediction.covariance = J_pose * pose.covariance * J_pose.transpose() + depth * depth.transpose();
-  return prediction;
-}
+
+  // Of the pose and of the point's depth; J_y: d(pixel)/d(y).
+  Eigen::Matrix2d Covariance(const WindowLandmark& landmark,
+                             const Eigen::Matrix<double, 2, 3>& J_y) const {
+    Eigen::Matrix<double, 2, 6> J_pose;
+    if (direction_ == Direction::kForward) {
+      const Eigen::Matrix3d R_t = pose_.T_m_c.R().transpose();
+      J_pose << -J_y * R_t, J_y * R_t * Hat(landmark.p_w - pose_.T_m_c.t);
+    } else {
+      J_pose << J_y, -J_y * Hat(pose_.T_m_c.q * landmark.p_w);
+    }
+    const Eigen::Vector2d depth = J_y * (T_observer_holder_.q * landmark.depth_sigma_w);
+    return J_pose * pose_.covariance * J_pose.transpose() + depth * depth.transpose();
+  }
+
+  std::vector<int> CornersWithin(const WindowLandmark& landmark,
+                                 const Prediction& prediction) const {
+    const double host_sigma = CornerSigma(holder_.corner(landmark.host), options_.pixel_sigma);
+    const double spread = std::sqrt(prediction.covariance.trace() + 2 * host_sigma * host_sigma);
+    std::vector<int> near = view_.grid().Within(
+        prediction.pixel, std::clamp(3 * spread, options_.min_radius_px, options_.max_radius_px));
+    std::erase_if(near, [&](int i) {
+      const Corner& corner = view_.keyframe().corners[i];
+      const double sigma = CornerSigma(corner, options_.pixel_sigma);
+      Eigen::Matrix2d covariance = prediction.covariance;
+      covariance.diagonal().array() += sigma * sigma + host_sigma * host_sigma;
+      const Eigen::Vector2d error = corner.pixel.cast<double>() - prediction.pixel;
+      return !view_.has_ray(i) || error.dot(covariance.inverse() * error) > options_.max_chi2;
+    });
+    return near;
+  }
+
+  const Window& holder_;
+  const KeyframeView& view_;
+  const Rigid3& T_w_cam_;
+  Rigid3 T_observer_holder_;
+  Direction direction_;
+  const PoseEstimate& pose_;
+  const SearchOptions& options_;
+};
 
 }  // namespace
 
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
-                                int frame, const PoseEstimate& pose, const SearchOptions& options) {
-  const bool forward = direction == Direction::kForward;
-  const Window& holder = forward ? window_m : window_c;
-  const Window& observer = forward ? window_c : window_m;
-  const Rigid3 T_observer_holder = forward ? pose.T_m_c.Inverse() : pose.T_m_c;
-  const KeyframeView& view = *observer.frames[frame];
-  const Keyframe& keyframe = view.keyframe();
-
+SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
+                                const PoseEstimate& pose, const SearchOptions& options) {
+  const ProjectionSearch search(windows, direction, frame, pose, options);
+  const std::vector<WindowLandmark>& landmarks = windows.Holder(direction).landmarks;
   SearchResult result;
   std::vector<PointMatch> found;
-  std::vector<int> near;
-  for (size_t l = 0; l < holder.landmarks.size(); ++l) {
-    const WindowLandmark& landmark = holder.landmarks[l];
-    const auto prediction =
-        Predict(holder, landmark, observer, frame, T_observer_holder, direction, pose, options);
+  for (int l = 0; l < static_cast<int>(landmarks.size()); ++l) {
+    const auto prediction = search.Predict(landmarks[l]);
     if (!prediction) {
       continue;
     }
-    result.projections.push_back(
-        {static_cast<int>(l), prediction->pixel, false, prediction->comparable});
-    const double host_sigma = CornerSigma(holder.corner(landmark.host), options.pixel_sigma);
-    const double spread = std::sqrt(prediction->covariance.trace() + 2 * host_sigma * host_sigma);
-    near = view.grid().Within(prediction->pixel,
-                              std::clamp(3 * spread, options.min_radius_px, options.max_radius_px));
-    std::erase_if(near, [&](int i) {
-      const double sigma = CornerSigma(keyframe.corners[i], options.pixel_sigma);
-      Eigen::Matrix2d covariance = prediction->covariance;
-      covariance.diagonal().array() += sigma * sigma + host_sigma * host_sigma;
-      const Eigen::Vector2d error = keyframe.corners[i].pixel.cast<double>() - prediction->pixel;
-      return !view.has_ray(i) || error.dot(covariance.inverse() * error) > options.max_chi2;
-    });
-    const Nearest nearest = FindNearest(keyframe, near, [&](int i) {
-      return LandmarkDistance(holder, landmark, keyframe.corners[i].descriptor);
-    });
-    if (nearest.corner >= 0 && nearest.distance <= options.max_hamming &&
-        nearest.distance < options.max_ratio * nearest.second) {
-      found.push_back({direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
+    result.projections.push_back({l, prediction->pixel, false, prediction->comparable});
+    const NearestCorner nearest = search.Find(landmarks[l], *prediction);
+    if (nearest.index >= 0 && nearest.distance < options.max_ratio * nearest.second) {
+      found.push_back({direction, l, {frame, nearest.index}, nearest.distance});
     }
   }
   result.matches = ResolveCorners(found);
@@ -171,11 +174,10 @@ SearchResult SearchByProjection(const Window& window_m, const Window& window_c, 
   return result;
 }
 
-std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& window_c,
-                                          Direction direction, int max_hamming, double max_ratio) {
-  const bool forward = direction == Direction::kForward;
-  const Window& holder = forward ? window_m : window_c;
-  const Window& observer = forward ? window_c : window_m;
+std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction direction,
+                                          int max_hamming, double max_ratio) {
+  const Window& holder = windows.Holder(direction);
+  const Window& observer = windows.Observer(direction);
   const int frame = observer.newest();
   const Keyframe& keyframe = observer.keyframe(frame);
   std::vector<int> corners;
@@ -190,13 +192,13 @@ std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& 
     WindowLandmark newest = holder.landmarks[l];
     std::erase_if(newest.observations, [last = newest.observations.back().frame](
                                            const CornerRef& ref) { return ref.frame != last; });
-    const Nearest nearest = FindNearest(keyframe, corners, [&](int i) {
+    const auto distance_of = [&](int i) {
       return LandmarkDistance(holder, newest, keyframe.corners[i].descriptor);
-    });
-    if (nearest.corner >= 0 && nearest.distance <= max_hamming &&
-        nearest.distance < max_ratio * nearest.second) {
-      matches.push_back(
-          {direction, static_cast<int>(l), {frame, nearest.corner}, nearest.distance});
+    };
+    const NearestCorner nearest =
+        FindNearest(keyframe.corners, corners, distance_of, max_hamming, kSamePx);
+    if (nearest.index >= 0 && nearest.distance < max_ratio * nearest.second) {
+      matches.push_back({direction, static_cast<int>(l), {frame, nearest.index}, nearest.distance});
     }
   }
   return ResolveCorners(matches);

@@ -12,7 +12,7 @@ namespace pangea {
 
 struct SearchOptions {
   double pixel_sigma = 1.0;  // of a corner on octave 0
-  int max_hamming = 75;      // of 256 bits
+  int max_hamming = kPredictedHamming;
   double max_ratio = 0.9;    // best to second-best distance, corners 4 px and further apart
   double max_chi2 = 11.8;    // within 3 sigma of the prediction (2 degrees of freedom)
   double min_radius_px = 4;  // of the search, whatever the prediction claims
@@ -24,7 +24,8 @@ struct SearchOptions {
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of a corner on octave 0");
-    archive.Add("max_hamming", &max_hamming, {0, 256}, "bits", "between descriptors that match");
+    archive.Add("max_hamming", &max_hamming, {0, kDescriptorBits}, "bits",
+                "between descriptors that match");
     archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
     archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "",
                 "of the distance to the prediction, 2 degrees of freedom");
@@ -52,12 +53,12 @@ struct SearchResult {
 };
 
 // `pose` is T_m_c and its covariance whatever the direction.
-SearchResult SearchByProjection(const Window& window_m, const Window& window_c, Direction direction,
-                                int frame, const PoseEstimate& pose, const SearchOptions& options);
+SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
+                                const PoseEstimate& pose, const SearchOptions& options);
 
 // Nearest descriptors without any prediction: the newest keyframe's corners against the window's
 // points. For a first guess; a third of these may be wrong.
-std::vector<PointMatch> MatchByDescriptor(const Window& window_m, const Window& window_c,
-                                          Direction direction, int max_hamming, double max_ratio);
+std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction direction,
+                                          int max_hamming, double max_ratio);
 
 }  // namespace pangea

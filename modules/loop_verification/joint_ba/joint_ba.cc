@@ -13,12 +13,12 @@ namespace pangea {
 namespace {
 
 // Median distance of the inliers' points from the newest keyframe of their window.
-double MedianDistance(const Window& window_m, const Window& window_c,
-                      const std::vector<PointMatch>& matches, const std::vector<bool>& inlier) {
+double MedianDistance(const WindowPair& windows, const std::vector<PointMatch>& matches,
+                      const std::vector<bool>& inlier) {
   std::vector<double> distances;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (inlier[i]) {
-      const Window& holder = HolderSide(matches[i]) == kSideM ? window_m : window_c;
+      const Window& holder = windows.Holder(matches[i].direction);
       distances.push_back(holder.landmarks[matches[i].landmark].p_w.norm());
     }
   }
@@ -27,10 +27,10 @@ double MedianDistance(const Window& window_m, const Window& window_c,
 
 }  // namespace
 
-std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& window_c,
+std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
                                           const std::vector<PointMatch>& matches,
                                           const Rigid3& T_m_c, const JointBaOptions& options) {
-  JointProblem problem(window_m, window_c, T_m_c, options);
+  JointProblem problem(windows, T_m_c, options);
   JointBaResult result;
   result.inlier.assign(matches.size(), true);
   double chi2_sum = 0;
@@ -57,16 +57,15 @@ std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& 
 
   const Rigid3 T_w_Km = problem.NewestPose(kSideM);
   const Rigid3 T_w_Kc = problem.NewestPose(kSideC);
-  result.T_m_c = T_w_Kc * window_c.T_w_body.back().Inverse();
+  result.T_m_c = T_w_Kc * windows.c.T_w_body.back().Inverse();
   result.T_Km_Kc = T_w_Km.Inverse() * T_w_Kc;
   // From the window's axes to Km's; its origin is Km's already.
   Matrix6d rotation = Matrix6d::Zero();
   rotation.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
   rotation.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
   const double rotation_floor =
-      options.systematic_px * window_c.keyframe(window_c.newest()).camera.PixelAngle();
-  const double step_floor =
-      rotation_floor * MedianDistance(window_m, window_c, matches, result.inlier);
+      options.systematic_px * windows.c.keyframe(windows.c.newest()).camera.PixelAngle();
+  const double step_floor = rotation_floor * MedianDistance(windows, matches, result.inlier);
   Vector6d floor;
   floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(rotation_floor);
   const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {

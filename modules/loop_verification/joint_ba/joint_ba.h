@@ -24,11 +24,11 @@ struct JointBaOptions {
   // correlated errors of one odometry's depths. A rotation by so many pixels, and the sideways step
   // that looks the same at the points' median distance.
   double systematic_px = 0.2;
-  double scale_sigma = 0.01;     // share by which a window may be larger than its odometry says
-  double max_chi2 = 9.2;         // of an inlier: 99 % of 2 degrees of freedom
-  double max_depth_chi2 = 10.8;  // of a point's depth against its prior: 99.9 % of one
-  int sure_hamming = 56;         // a landmark is sure that is so alike in one match (of 256 bits)
-  int iterations = 8;            // each of the two rounds
+  double scale_sigma = 0.01;        // share by which a window may be larger than its odometry says
+  double max_chi2 = 9.2;            // of an inlier: 99 % of 2 degrees of freedom
+  double max_depth_chi2 = 10.8;     // of a point's depth against its prior: 99.9 % of one
+  int sure_hamming = kSureHamming;  // a landmark is sure that is so alike in one match
+  int iterations = 8;               // each of the two rounds
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -40,7 +40,7 @@ struct JointBaOptions {
     archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "", "of an inlier, 2 degrees of freedom");
     archive.Add("max_depth_chi2", &max_depth_chi2, {0.1, 1000}, "",
                 "of a point's depth against its prior, 1 degree of freedom");
-    archive.Add("sure_hamming", &sure_hamming, {0, 256}, "bits",
+    archive.Add("sure_hamming", &sure_hamming, {0, kDescriptorBits}, "bits",
                 "a landmark with one match as near is sure");
     archive.Add("iterations", &iterations, {1, 1000}, "", "of each of the two rounds");
   }
@@ -60,7 +60,7 @@ struct JointBaResult {
 };
 
 // Nothing when the problem degenerates.
-std::optional<JointBaResult> SolveJointBa(const Window& window_m, const Window& window_c,
+std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
                                           const std::vector<PointMatch>& matches,
                                           const Rigid3& T_m_c, const JointBaOptions& options);
 

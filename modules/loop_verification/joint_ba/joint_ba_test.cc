@@ -18,17 +18,17 @@ namespace {
 // A match's landmark in both windows: the one of a pair that matches join has the other's name.
 using Joined = std::map<std::pair<Direction, int>, std::set<std::pair<Direction, int>>>;
 
-Joined Partners(const Window& m, const Window& c, const std::vector<PointMatch>& matches) {
+Joined Partners(const WindowPair& windows, const std::vector<PointMatch>& matches) {
   Joined partners;
   for (const PointMatch& match : matches) {
-    const bool forward = match.direction == Direction::kForward;
-    const int other =
-        (forward ? c : m).landmark_of_corner[match.observed.frame][match.observed.corner];
+    const int other = windows.Observer(match.direction)
+                          .landmark_of_corner[match.observed.frame][match.observed.corner];
     const std::pair own{match.direction, match.landmark};
     partners[own].insert(own);
     if (other < 0) {
       continue;
     }
+    const bool forward = match.direction == Direction::kForward;
     const std::pair mate{forward ? Direction::kReverse : Direction::kForward, other};
     partners[own].insert(mate);
     partners[mate].insert(own);
@@ -56,14 +56,14 @@ class JointBaTest : public testing::Test {
         store_.Add(keyframe);
       }
     }
-    m_ = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
-    c_ = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
-    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() * agent_c.T_room_body[5] *
-             c_.T_w_body.back().Inverse();
-    for (const Direction direction : {Direction::kForward, Direction::kReverse}) {
+    windows_.m = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
+    windows_.c = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
+    T_m_c_ = windows_.m.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
+             agent_c.T_room_body[5] * windows_.c.T_w_body.back().Inverse();
+    for (const Direction direction : kBothDirections) {
       for (int frame = 0; frame < 5; ++frame) {
-        const SearchResult found =
-            SearchByProjection(m_, c_, direction, frame, {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
+        const SearchResult found = SearchByProjection(windows_, direction, frame,
+                                                      {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
         matches_.insert(matches_.end(), found.matches.begin(), found.matches.end());
       }
     }
@@ -79,12 +79,12 @@ class JointBaTest : public testing::Test {
         kept.push_back(match);
       }
     }
-    const auto result = SolveJointBa(m_, c_, kept, T_m_c_, options_);
+    const auto result = SolveJointBa(windows_, kept, T_m_c_, options_);
     return result ? result->covariance.topLeftCorner<3, 3>().trace() : 0;
   }
 
   SubmapStore store_;
-  Window m_, c_;
+  WindowPair windows_;
   Rigid3 T_m_c_;
   std::vector<PointMatch> matches_;
   JointBaOptions options_;
@@ -93,10 +93,10 @@ class JointBaTest : public testing::Test {
 // What the optimisation says of its covariance without the landmark that says most is what an
 // optimisation without that landmark says.
 TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
-  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto all = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(all);
   double worst = 0;
-  for (const auto& [landmark, joined] : Partners(m_, c_, matches_)) {
+  for (const auto& [landmark, joined] : Partners(windows_, matches_)) {
     const double without =
         PositionTrace([&joined = joined](const auto& own) { return !joined.contains(own); });
     ASSERT_GT(without, 0);
@@ -116,10 +116,10 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   }
   std::sort(distances.begin(), distances.end());
   options_.sure_hamming = distances[distances.size() / 8];
-  const auto all = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto all = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(all && all->covariance_of_sure);
   std::set<std::pair<Direction, int>> sure;
-  const Joined partners = Partners(m_, c_, matches_);
+  const Joined partners = Partners(windows_, matches_);
   for (const PointMatch& match : matches_) {
     if (match.distance <= options_.sure_hamming) {
       sure.merge(std::set(partners.at({match.direction, match.landmark})));
@@ -132,7 +132,7 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   EXPECT_NEAR(said / of_sure, 1, 0.05);
 
   options_.sure_hamming = -1;
-  const auto none = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto none = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(none);
   EXPECT_FALSE(none->covariance_of_sure);
 }
@@ -141,12 +141,12 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
 // points' distance, the same in every direction.
 TEST_F(JointBaTest, SystematicErrorsAreAdded) {
   options_.systematic_px = 0;
-  const auto without = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto without = SolveJointBa(windows_, matches_, T_m_c_, options_);
   options_.systematic_px = 0.5;
-  const auto with = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto with = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(without && with);
   const Matrix6d added = with->covariance - without->covariance;
-  const double rotation = 0.5 * c_.keyframe(c_.newest()).camera.PixelAngle();
+  const double rotation = 0.5 * windows_.c.keyframe(windows_.c.newest()).camera.PixelAngle();
   EXPECT_LT(
       (added.bottomRightCorner<3, 3>() - rotation * rotation * Eigen::Matrix3d::Identity()).norm(),
       1e-6 * rotation * rotation);
@@ -161,7 +161,7 @@ TEST_F(JointBaTest, SystematicErrorsAreAdded) {
 // corners, and both dimensions' full ones.
 TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
   options_.pixel_sigma = 0.3;
-  const auto result = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto result = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(result);
   EXPECT_GT(result->rms_px, 0.3);
   EXPECT_LT(result->rms_px, std::sqrt(2.0) * 0.3);
@@ -175,16 +175,16 @@ TEST_F(JointBaTest, CountingHalfDoesNotMakeAResidualSmaller) {
   for (const PointMatch& forward : matches_) {
     for (const PointMatch& reverse : matches_) {
       if (forward.direction == Direction::kForward && reverse.direction == Direction::kReverse &&
-          LandmarkAt(c_, forward.observed) == reverse.landmark &&
-          LandmarkAt(m_, reverse.observed) == forward.landmark) {
+          LandmarkAt(windows_.c, forward.observed) == reverse.landmark &&
+          LandmarkAt(windows_.m, reverse.observed) == forward.landmark) {
         both_ways.insert(both_ways.end(), {forward, reverse});
         one_way.push_back(forward);
       }
     }
   }
   ASSERT_GT(one_way.size(), 20u);
-  const auto both = SolveJointBa(m_, c_, both_ways, T_m_c_, options_);
-  const auto one = SolveJointBa(m_, c_, one_way, T_m_c_, options_);
+  const auto both = SolveJointBa(windows_, both_ways, T_m_c_, options_);
+  const auto one = SolveJointBa(windows_, one_way, T_m_c_, options_);
   ASSERT_TRUE(both && one);
   EXPECT_NEAR(both->rms_px / one->rms_px, 4.0 / 3.0, 0.15);
 }
@@ -193,9 +193,9 @@ TEST_F(JointBaTest, CountingHalfDoesNotMakeAResidualSmaller) {
 TEST_F(JointBaTest, TheCovarianceIsNeverSmallerThanTheResidualsSay) {
   options_.systematic_px = 0;
   options_.pixel_sigma = 0.3;
-  const auto honest = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto honest = SolveJointBa(windows_, matches_, T_m_c_, options_);
   options_.pixel_sigma = 0.05;
-  const auto bold = SolveJointBa(m_, c_, matches_, T_m_c_, options_);
+  const auto bold = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(honest && bold);
   EXPECT_GT(bold->covariance.trace(), 0.5 * honest->covariance.trace());
 }

@@ -20,9 +20,9 @@ Matrix6d Floored(const Matrix6d& covariance) {
 
 }  // namespace
 
-JointProblem::JointProblem(const Window& window_m, const Window& window_c, const Rigid3& T_m_c,
+JointProblem::JointProblem(const WindowPair& windows, const Rigid3& T_m_c,
                            const JointBaOptions& options)
-    : windows_{&window_m, &window_c}, options_(options) {
+    : windows_{&windows.m, &windows.c}, options_(options) {
   size_t size = 0;
   for (const int side : {kSideM, kSideC}) {
     pose_offset_[side] = size;

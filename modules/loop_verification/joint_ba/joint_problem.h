@@ -27,8 +27,7 @@ inline int HolderSide(const PointMatch& match) {
 
 class JointProblem {
  public:
-  JointProblem(const Window& window_m, const Window& window_c, const Rigid3& T_m_c,
-               const JointBaOptions& options);
+  JointProblem(const WindowPair& windows, const Rigid3& T_m_c, const JointBaOptions& options);
   ~JointProblem() = default;
   JointProblem(const JointProblem&) = delete;
   JointProblem& operator=(const JointProblem&) = delete;

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "core/testing/test_descriptors.h"
 #include "link/wire.h"
 
 namespace pangea {
@@ -25,7 +26,7 @@ inline Keyframe TestKeyframe(const KeyframeId& id, int num_corners = 600) {
   for (int i = 0; i < num_corners; ++i) {
     Corner corner;
     corner.pixel = {unit(rng) * 751, unit(rng) * 479};
-    corner.descriptor = {rng(), rng(), rng(), rng()};
+    corner.descriptor = RandomDescriptor(rng);
     corner.landmark_id = i < 100 ? i : kNoLandmark;
     keyframe.corners.push_back(corner);
   }

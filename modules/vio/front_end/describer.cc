@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 
 namespace pangea::vio {
 namespace {
 
+static_assert(kDescriptorBits == 256, "what ORB makes");
 // The descriptor's tests reach 15 px from the centre before rotation, 22 after; its patch for the
 // angle is a disc of radius 15.
 constexpr int kPatchRadius = 15;
@@ -58,7 +60,7 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
     : camera_(camera),
       options_(options),
       // One level: it takes the corners of a given octave as they are.
-      orb_(cv::ORB::create(1, 1.2F, 1, kPatchRadius, 0, 2)) {
+      orb_(cv::ORB::create(1, static_cast<float>(kOctaveScale), 1, kPatchRadius, 0, 2)) {
   for (int octave = 0; octave < options_.octaves; ++octave) {
     scales_.push_back(std::pow(options_.scale_factor, octave));
   }

@@ -21,7 +21,7 @@ namespace pangea::vio {
 struct DescriberOptions {
   int max_corners = 600;  // at most kMaxCorners
   int octaves = 8;
-  double scale_factor = 1.2;  // between octaves; Corner::octave's sigma rule assumes it
+  double scale_factor = kOctaveScale;  // between octaves; CornerSigma assumes it
   int fast_threshold = 20;
   int fast_threshold_low = 7;  // in cells where the first finds nothing
   int cell_px = 40;            // on each octave

@@ -1,12 +1,11 @@
 #include "vio/front_end/two_view_check.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 
-#include "core/rigid3.h"
+#include "core/epipolar_step.h"
 
 namespace pangea::vio {
 namespace {
@@ -63,39 +62,25 @@ Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
   return best;
 }
 
-// One Gauss-Newton step in rotation (left, frame b) and direction of translation on
-//   e = t . (R a x b) / |t x R a|,   de/dtheta = ((t.Ra) b - (Ra.b) t) / |t x R a|,
 // Cauchy weights at `threshold`, `from_gyro` as prior of the rotation.
 void FitStep(const Tracks& tracks, double threshold, double rotation_sigma, double noise,
              const Eigen::Quaterniond& from_gyro, Eigen::Quaterniond* q, Eigen::Vector3d* t) {
-  const Eigen::Vector3d u = t->unitOrthogonal();
-  Eigen::Matrix<double, 3, 2> tangent;
-  tangent << u, t->cross(u);
-  Eigen::Matrix<double, 5, 5> h = Eigen::Matrix<double, 5, 5>::Identity() * 1e-9;
-  Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Zero();
+  EpipolarStep step(*t, 1e-9);
   for (size_t i = 0; i < tracks.a.size(); ++i) {
     const Eigen::Vector3d a = *q * tracks.a[i];
-    const Eigen::Vector3d& b = tracks.b[i];
     const double length = t->cross(a).norm();
     if (length < 1e-6) {
       continue;
     }
-    const double e = t->dot(a.cross(b)) / length;
-    Eigen::Matrix<double, 5, 1> row;
-    row.head<3>() = (t->dot(a) * b - a.dot(b) * *t) / length;
-    row.tail<2>() = tangent.transpose() * a.cross(b) / length;
-    const double weight = 1.0 / (1.0 + e * e / (threshold * threshold));
-    h += weight * row * row.transpose();
-    g += weight * row * e;
+    const double e = EpipolarError(a, tracks.b[i], *t);
+    step.Add(a, tracks.b[i], length, 1.0 / (1.0 + e * e / (threshold * threshold)));
   }
   const double prior = noise * noise / (rotation_sigma * rotation_sigma);
-  h.topLeftCorner<3, 3>() += prior * Eigen::Matrix3d::Identity();
-  g.head<3>() += prior * LogSo3(*q * from_gyro.conjugate());
+  step.H.topLeftCorner<3, 3>() += prior * Eigen::Matrix3d::Identity();
+  step.g.head<3>() += prior * LogSo3(*q * from_gyro.conjugate());
   // Where there is no parallax the direction is free: keep it where it is.
-  h.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() * noise * noise;
-  const Eigen::Matrix<double, 5, 1> step = -h.ldlt().solve(g);
-  *q = (ExpSo3(step.head<3>()) * *q).normalized();
-  *t = (*t + tangent * step.tail<2>()).normalized();
+  step.H.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() * noise * noise;
+  step.Apply(q, t);
 }
 
 // Depth times baseline has the sign of (a x t) . (a x b), up to the sign of t: the side most points

@@ -120,7 +120,7 @@ std::vector<MapLocalization::Match> MapLocalization::FindIn(const CameraModel& c
   std::vector<Match> matches;
   for (const auto& [corner, found] : nearest) {
     if (const auto ray = camera.Unproject(corners[corner].pixel.cast<double>())) {
-      const double sigma_px = options_.pixel_sigma * std::pow(1.2, corners[corner].octave);
+      const double sigma_px = CornerSigma(corners[corner], options_.pixel_sigma);
       matches.push_back({found.second, *ray, sigma_px * camera.PixelAngle()});
     }
   }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_descriptors.h"
 
 namespace pangea::vio {
 namespace {
@@ -32,7 +33,7 @@ class MapLocalizationTest : public ::testing::Test {
       landmark.landmark_id = static_cast<int32_t>(landmarks_.landmarks.size());
       landmark.p_map = kTruth * p_odom;
       landmark.sigma_along_m = landmark.sigma_across_m = 0.005;
-      landmark.descriptor = {rng(), rng(), rng(), rng()};
+      landmark.descriptor = RandomDescriptor(rng);
       landmarks_.landmarks.push_back(landmark);
       Corner corner;
       corner.pixel = pixel->cast<float>();

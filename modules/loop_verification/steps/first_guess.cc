@@ -1,0 +1,72 @@
+#include "loop_verification/steps/first_guess.h"
+
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+std::vector<PointMatch> FirstMatches(const FirstGuessOptions& options, const Verification& v) {
+  std::vector<PointMatch> matches = CandidateMatches(v.windows, v.candidate);
+  for (const Direction direction : kBothDirections) {
+    const std::vector<PointMatch> nearest =
+        MatchByDescriptor(v.windows, direction, options.first_max_hamming, options.first_max_ratio);
+    matches.insert(matches.end(), nearest.begin(), nearest.end());
+  }
+  return Distinct(matches);
+}
+
+// In the window's axes.
+Eigen::Vector3d UnitRay(const Window& window, int corner) {
+  const Eigen::Vector2d ray = window.frames.back()->ray(corner);
+  return window.T_w_cam.back().q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized();
+}
+
+// Radians.
+double CornerAngleSigma(const Window& window, int corner, double pixel_sigma) {
+  const Keyframe& keyframe = window.newest_keyframe();
+  return CornerSigma(keyframe.corners[corner], pixel_sigma) * keyframe.camera.PixelAngle();
+}
+
+std::vector<RayPair> RayPairs(const Verification& v) {
+  const auto& [m, c] = v.windows;
+  std::vector<RayPair> pairs;
+  for (const auto& [corner_c, corner_m] : v.candidate.corner_matches) {
+    if (!c.frames.back()->has_ray(corner_c) || !m.frames.back()->has_ray(corner_m)) {
+      continue;
+    }
+    const double sigma_c = CornerAngleSigma(c, corner_c, v.options.search.pixel_sigma);
+    const double sigma_m = CornerAngleSigma(m, corner_m, v.options.search.pixel_sigma);
+    pairs.push_back({UnitRay(m, corner_m), UnitRay(c, corner_c),
+                     std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m +
+                               v.guess_tilt_sigma * v.guess_tilt_sigma)});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+std::string GuessPose(const FirstGuessOptions& options, Verification* verification) {
+  Verification& v = *verification;
+  v.first_matches = FirstMatches(options, v);
+  if (static_cast<int>(v.first_matches.size()) < options.min_pnp_inliers) {
+    return "too few matched points with a depth";
+  }
+  const auto& [m, c] = v.windows;
+  const uint64_t seed = StableHash(m.newest_keyframe().id, c.newest_keyframe().id, 1);
+  v.pnp = SolveUprightPnp(v.Observations(v.first_matches), RayPairs(v), c.T_w_cam.back().t,
+                          m.T_w_cam.back().t, v.guess_tilt_sigma, seed, v.options.pnp);
+  if (!v.pnp) {
+    return "PnP found no pose";
+  }
+  v.pose = v.pnp->pose;
+  std::set<std::pair<Direction, int>> landmarks;
+  for (const int i : v.pnp->inliers) {
+    landmarks.emplace(v.first_matches[i].direction, v.first_matches[i].landmark);
+  }
+  v.report.pnp_inliers = static_cast<int>(landmarks.size());
+  return v.report.pnp_inliers < options.min_pnp_inliers ? "PnP found too few inliers" : "";
+}
+
+}  // namespace pangea

@@ -1,0 +1,65 @@
+#include "loop_verification/steps/verification.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace pangea {
+namespace {
+
+KeyframeWindow Last(const KeyframeWindow& frames, int count) {
+  const auto n = std::min(frames.size(), static_cast<size_t>(count));
+  return {frames.end() - static_cast<std::ptrdiff_t>(n), frames.end()};
+}
+
+}  // namespace
+
+Verification::Verification(const CommonStepOptions& options, const KeyframeWindow& all_m,
+                           const KeyframeWindow& all_c, const PlaceCandidate& candidate,
+                           const LoopVerificationGate& gate)
+    : options(options),
+      all_m(all_m),
+      all_c(all_c),
+      candidate(candidate),
+      gate(gate),
+      windows{MakeWindow(Last(all_m, options.window.num_keyframes), options.window),
+              MakeWindow(Last(all_c, options.window.num_keyframes), options.window)} {}
+
+std::vector<PointObservation> Verification::Observations(const std::vector<PointMatch>& of) const {
+  std::vector<PointObservation> observations;
+  observations.reserve(of.size());
+  for (const PointMatch& match : of) {
+    observations.push_back(MakeObservation(windows, match, options.search.pixel_sigma));
+  }
+  return observations;
+}
+
+double Verification::inlier_ratio() const {
+  return static_cast<double>(ba->num_inlier_observations) / static_cast<double>(matches.size());
+}
+
+std::vector<PointMatch> Verification::InlierMatches() const {
+  std::vector<PointMatch> inliers;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (ba->inlier[i]) {
+      inliers.push_back(matches[i]);
+    }
+  }
+  return inliers;
+}
+
+std::string CheckGate(const CommonStepOptions& /*options*/, Verification* verification) {
+  const auto& [m, c] = verification->windows;
+  // A window's frame is its odom, moved to the newest keyframe.
+  const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(), m.newest_keyframe().T_odom_body.t);
+  const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(), c.newest_keyframe().T_odom_body.t);
+  const Rigid3& T_m_c = verification->ba ? verification->ba->T_m_c : verification->pose.T_m_c;
+  return verification->gate(T_odom_m * T_m_c * T_odom_c.Inverse());
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  return std::sqrt(solver.eigenvalues().maxCoeff());
+}
+
+}  // namespace pangea

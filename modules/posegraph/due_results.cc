@@ -1,0 +1,61 @@
+#include "posegraph/due_results.h"
+
+#include <algorithm>
+
+#include "bus/retransmission/timeouts.h"
+#include "messages/catch_up_messages.h"
+
+namespace pangea {
+
+void DueResults::Promise(const PlaceMatch& match, int64_t now_utime) {
+  for (const PlaceCandidate& candidate : match.candidates) {
+    Constraint promised;
+    promised.from = candidate.match;
+    promised.to = match.query;
+    promised.kind = candidate.kind;
+    if (!came_.contains(promised.Id()) && due_.size() < kMax) {
+      due_.try_emplace(promised.Id(), Due{match.query, now_utime + timeouts::kResultWait_us,
+                                          timeouts::kResultWait_us});
+    }
+  }
+}
+
+bool DueResults::Take(int64_t constraint_id) {
+  due_.erase(constraint_id);
+  return came_.insert(constraint_id).second;
+}
+
+int64_t DueResults::NumToCatchUp(const JournalFollower& journal) const {
+  return std::ranges::count_if(due_, [&journal](const auto& item) {
+    const Due& due = item.second;
+    const auto goal = journal.Goal(due.query.map);
+    // Asked for twice by its name: the journal does not have it, it is still to be verified.
+    return goal && due.query.seq <= *goal && due.wait_us < 4 * timeouts::kResultWait_us;
+  });
+}
+
+void DueResults::RequestOverdue(Node& node, int64_t now_utime) {
+  constexpr int64_t kLookEvery_us = 1'000'000;
+  if (now_utime < next_look_utime_) {
+    return;
+  }
+  next_look_utime_ = now_utime + kLookEvery_us;
+  std::map<MapId, ResultNames> overdue;
+  for (auto& [id, due] : due_) {
+    if (now_utime < due.next_ask_utime) {
+      continue;
+    }
+    const MapId& map = due.query.map;
+    ResultNames& names = overdue.try_emplace(map, ResultNames{map, {}}).first->second;
+    if (names.results.size() < ResultNames::kMax) {
+      due.wait_us = std::min(2 * due.wait_us, timeouts::kMaxResultWait_us);
+      due.next_ask_utime = now_utime + due.wait_us;
+      names.results.emplace_back(due.query.seq, id);
+    }
+  }
+  for (const auto& [map, names] : overdue) {
+    RequestResults(node, names);
+  }
+}
+
+}  // namespace pangea
