@@ -56,6 +56,18 @@ def set_transform(message, R, t):
     q.w, q.x, q.y, q.z = w / norm, x / norm, y / norm, z / norm
 
 
+def field(text, name, otherwise):
+    found = re.search(rf"^{name}:\s*(\S+)", text, re.MULTILINE)
+    return found[1] if found else otherwise
+
+
+def time_offset_of_first_row(text, readout_s):
+    """docs/recordings.md: our offset is the first row's, Kalibr's the middle row's."""
+    ours, kalibr = field(text, "time_offset_s", None), field(text, "timeshift_cam_imu", None)
+    row = field(text, "stamp_row", "middle" if kalibr and not ours else "first")
+    return float(ours or kalibr or 0) - {"first": 0, "middle": 0.5, "last": 1}[row] * readout_s
+
+
 class Recording:
     """camera: camera_t; events: (utime, imu_t or path of an image), in time order."""
 
@@ -73,9 +85,8 @@ class Recording:
         camera.width, camera.height = map(int, numbers(text, "resolution", path))
         camera.fx, camera.fy, camera.cx, camera.cy = numbers(text, "intrinsics", path)
         camera.distortion = numbers(text, "distortion_coefficients", path)
-        for field in ("time_offset_s", "readout_s"):
-            found = re.search(rf"^{field}:\s*(\S+)", text, re.MULTILINE)
-            setattr(camera, field, float(found[1]) if found else 0.0)
+        camera.readout_s = float(field(text, "readout_s", 0))
+        camera.time_offset_s = time_offset_of_first_row(text, camera.readout_s)
         set_transform(camera.T_body_cam, *relative(transform(imu_path.read_text(), imu_path), transform(text, path)))
         return camera
 

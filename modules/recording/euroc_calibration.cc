@@ -95,6 +95,28 @@ double OptionalNumber(const YAML::Node& root, const std::string& file, const std
   return node ? Number(node, file, key) : otherwise;
 }
 
+// The share of the read-out that has passed when the row is exposed whose time a stamp plus the
+// offset is.
+double StampedRow(const YAML::Node& root, const std::string& file, const std::string& otherwise) {
+  const YAML::Node node = root["stamp_row"];
+  const std::string row = !node ? otherwise : node.IsScalar() ? node.Scalar() : "";
+  for (const auto& [name, share] :
+       {std::pair("first", 0.0), std::pair("middle", 0.5), std::pair("last", 1.0)}) {
+    if (row == name) {
+      return share;
+    }
+  }
+  Throw(file, fmt::format("'stamp_row: {}' is not known; known: first, middle, last", row));
+}
+
+// Of the first row. Kalibr fits one time to a whole image, which is that of its middle row.
+double TimeOffset(const YAML::Node& root, const std::string& file, double readout_s) {
+  const bool is_ours = !root["timeshift_cam_imu"] || root["time_offset_s"];
+  const double offset_s =
+      OptionalNumber(root, file, is_ours ? "time_offset_s" : "timeshift_cam_imu", 0);
+  return offset_s - StampedRow(root, file, is_ours ? "first" : "middle") * readout_s;
+}
+
 }  // namespace
 
 CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
@@ -121,9 +143,8 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
   const std::vector<double> d = Numbers(root, sensor_yaml, "distortion_coefficients", 4);
   camera.distortion << d[0], d[1], d[2], d[3];
   camera.T_body_cam = Extrinsics(root, sensor_yaml);
-  camera.time_offset_s = OptionalNumber(root, sensor_yaml, "time_offset_s",
-                                        OptionalNumber(root, sensor_yaml, "timeshift_cam_imu", 0));
   camera.readout_s = OptionalNumber(root, sensor_yaml, "readout_s", 0);
+  camera.time_offset_s = TimeOffset(root, sensor_yaml, camera.readout_s);
   if (const auto invalid = camera.Invalid()) {
     Throw(sensor_yaml, *invalid);
   }

@@ -138,6 +138,22 @@ TEST_F(EurocTest, EquidistantOffsetAndReadout) {
   EXPECT_EQ(camera.readout_s, 0.02);
 }
 
+TEST_F(EurocTest, TheTimeOffsetIsThatOfTheFirstRow) {
+  WriteCamera("radtan", "32, 24");
+  const std::string camera = Text("cam0/sensor.yaml") + "readout_s: 0.02\n";
+  const auto offset = [&](const std::string& fields) {
+    Write("cam0/sensor.yaml", camera + fields);
+    return EurocRecording(root_).camera().time_offset_s;
+  };
+  EXPECT_DOUBLE_EQ(offset("timeshift_cam_imu: -0.003\n"), -0.013);  // Kalibr's: the middle row's
+  EXPECT_DOUBLE_EQ(offset("timeshift_cam_imu: -0.003\nstamp_row: first\n"), -0.003);
+  EXPECT_DOUBLE_EQ(offset("time_offset_s: -0.003\nstamp_row: middle\n"), -0.013);
+  EXPECT_DOUBLE_EQ(offset("time_offset_s: -0.003\nstamp_row: last\n"), -0.023);
+  EXPECT_DOUBLE_EQ(offset("stamp_row: last\n"), -0.02);
+  Write("cam0/sensor.yaml", camera + "stamp_row: upper\n");
+  EXPECT_THAT(Complaint(), HasSubstr("'stamp_row: upper' is not known; known: first, middle"));
+}
+
 TEST_F(EurocTest, MissingPartsAreNamed) {
   EXPECT_THROW(EurocRecording("/nonexistent/recording"), std::runtime_error);
   fs::remove(root_ + "/mav0/imu0/data.csv");

@@ -7,28 +7,67 @@ namespace pangea::vio {
 namespace {
 
 constexpr size_t kMinSamples = 20;  // fewer say little
-// Vibration is a few lines of the spectrum, not white: second differences see all of it, motion
-// integrates less. Of EuRoC's flights, 0.3 of the density serves better than all of it.
-constexpr double kWhiteShare = 0.3;
+// What is not white, but acts as noise: motion between samples, stamps, sensitivity across axes.
+constexpr double kMostShare = 2;
+// The usual parts' noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)): a given value up to this is possible
+// whatever a few rounded samples show.
+constexpr double kUsualGyroDensity = 2e-4, kUsualAccelDensity = 2e-3;
+// Random walks, of which a minute tells next to nothing: the range of the parts that phones and
+// cameras have (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)).
+constexpr double kLeastGyroWalk = 1e-5, kMostGyroWalk = 2e-4;
+constexpr double kLeastAccelWalk = 1e-4, kMostAccelWalk = 3e-3;
 
-}  // namespace
+using Channel = Eigen::Vector3d ImuSample::*;
 
-ImuNoise MeasuredNoise(const ImuNoise& least, std::span<const ImuSample> samples) {
-  ImuNoise noise = least;
-  if (samples.size() < kMinSamples) {
-    return noise;
+// Mean square of the third differences of means of `count` samples each.
+double SquaredThirdDifferences(std::span<const ImuSample> samples, Channel of, size_t count) {
+  const auto mean = [&](size_t first) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t i = first; i < first + count; ++i) {
+      sum += samples[i].*of;
+    }
+    return Eigen::Vector3d(sum / static_cast<double>(count));
+  };
+  double sum = 0;
+  const size_t last = samples.size() - 4 * count;
+  for (size_t i = 0; i <= last; ++i) {
+    sum += (mean(i) - 3 * mean(i + count) + 3 * mean(i + 2 * count) - mean(i + 3 * count))
+               .squaredNorm();
   }
+  return sum / static_cast<double>(last + 1);
+}
+
+double Density(double given, double usual, std::span<const ImuSample> samples, Channel of) {
   const double n = static_cast<double>(samples.size());
   const double dt =
       1e-6 * static_cast<double>(samples.back().utime - samples.front().utime) / (n - 1);
-  double gyro = 0, accel = 0;
-  for (size_t i = 2; i < samples.size(); ++i) {
-    gyro += (samples[i].gyro - 2 * samples[i - 1].gyro + samples[i - 2].gyro).squaredNorm();
-    accel += (samples[i].accel - 2 * samples[i - 1].accel + samples[i - 2].accel).squaredNorm();
+  const double single = SquaredThirdDifferences(samples, of, 1);
+  if (!(single > 0)) {
+    return given;
   }
-  const double to_density = kWhiteShare * kWhiteShare * dt / (6 * 3 * (n - 2));
-  noise.gyro_noise_density = std::max(least.gyro_noise_density, std::sqrt(to_density * gyro));
-  noise.accel_noise_density = std::max(least.accel_noise_density, std::sqrt(to_density * accel));
+  // White noise shows twice the variance in single samples as in pairs' means; vibration, a few
+  // lines of the spectrum, more, and motion integrates as much less of it.
+  const double white_share = std::min(1.0, 2 * SquaredThirdDifferences(samples, of, 2) / single);
+  const double shown = std::sqrt(dt * single / (20 * 3));
+  return std::clamp(given, white_share * shown, std::max(kMostShare * shown, usual));
+}
+
+}  // namespace
+
+ImuNoise WithUsualWalks(ImuNoise given) {
+  given.gyro_random_walk = std::clamp(given.gyro_random_walk, kLeastGyroWalk, kMostGyroWalk);
+  given.accel_random_walk = std::clamp(given.accel_random_walk, kLeastAccelWalk, kMostAccelWalk);
+  return given;
+}
+
+ImuNoise MeasuredNoise(const ImuNoise& given, std::span<const ImuSample> samples) {
+  ImuNoise noise = given;
+  if (samples.size() >= kMinSamples) {
+    noise.gyro_noise_density =
+        Density(given.gyro_noise_density, kUsualGyroDensity, samples, &ImuSample::gyro);
+    noise.accel_noise_density =
+        Density(given.accel_noise_density, kUsualAccelDensity, samples, &ImuSample::accel);
+  }
   return noise;
 }
 

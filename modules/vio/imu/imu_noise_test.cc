@@ -11,39 +11,78 @@
 namespace pangea::vio {
 namespace {
 
+struct Shaking {
+  double gyro_density = 0;
+  double accel_density = 0;
+  double vibration = 0;  // m/s^2, of a rotor at 70 Hz
+};
+
 // A shaken hand: 4 Hz, 3 m/s^2 and 1 rad/s, at 200 Hz.
-std::vector<ImuSample> Shaken(double gyro_density, double accel_density) {
+std::vector<ImuSample> Shaken(const Shaking& shaking) {
   std::mt19937_64 rng(5);
   std::vector<ImuSample> samples;
   for (int i = 0; i < 200; ++i) {
     const double t = 0.005 * i;
     const double s = std::sin(2 * M_PI * 4 * t);
+    const double vibration = shaking.vibration * std::sin(2 * M_PI * 70 * t);
     samples.push_back(
         {1'000'000 + 5'000 * i,
-         Eigen::Vector3d(s, 0.3, 0) + RandomVector(rng, gyro_density * std::sqrt(200)),
-         Eigen::Vector3d(0, 3 * s, kGravity) + RandomVector(rng, accel_density * std::sqrt(200))});
+         Eigen::Vector3d(s, 0.3, 0) + RandomVector(rng, shaking.gyro_density * std::sqrt(200)),
+         Eigen::Vector3d(vibration, 3 * s, kGravity) +
+             RandomVector(rng, shaking.accel_density * std::sqrt(200))});
   }
   return samples;
 }
 
-TEST(MeasuredNoise, FindsVibration) {
-  const ImuNoise noise = MeasuredNoise(ImuNoise{}, Shaken(3e-3, 7e-2));
-  EXPECT_NEAR(noise.gyro_noise_density, 0.3 * 3e-3, 1.2e-4);
-  EXPECT_NEAR(noise.accel_noise_density, 0.3 * 7e-2, 2.4e-3);
-  EXPECT_EQ(noise.gyro_random_walk, ImuNoise{}.gyro_random_walk);
+ImuNoise Given(double gyro_density, double accel_density) {
+  ImuNoise noise;
+  noise.gyro_noise_density = gyro_density;
+  noise.accel_noise_density = accel_density;
+  return noise;
 }
 
-TEST(MeasuredNoise, TakesMotionForNoNoise) {
-  const ImuNoise noise = MeasuredNoise(ImuNoise{}, Shaken(1.7e-4, 2e-3));
-  EXPECT_LT(noise.gyro_noise_density, 2e-4);
-  EXPECT_LT(noise.accel_noise_density, 2.2e-3);
+TEST(MeasuredNoise, RaisesWhatIsGivenFarTooSmall) {
+  const ImuNoise noise = MeasuredNoise(Given(3e-5, 2e-3), Shaken({3e-4, 2e-2}));
+  EXPECT_NEAR(noise.gyro_noise_density, 3e-4, 1e-4);
+  EXPECT_NEAR(noise.accel_noise_density, 2e-2, 4e-3);
 }
 
-TEST(MeasuredNoise, IsNeverBelowTheDataSheet) {
-  const ImuNoise noise = MeasuredNoise(ImuNoise{}, Shaken(0, 0));
-  EXPECT_GE(noise.gyro_noise_density, ImuNoise{}.gyro_noise_density);
-  EXPECT_GE(noise.accel_noise_density, ImuNoise{}.accel_noise_density);
+TEST(MeasuredNoise, LowersWhatIsGivenFarTooLarge) {
+  const ImuNoise noise = MeasuredNoise(Given(3e-2, 0.18), Shaken({3e-4, 4e-3}));
+  EXPECT_LT(noise.gyro_noise_density, 2e-3);
+  EXPECT_GT(noise.gyro_noise_density, 3e-4);
+  EXPECT_LT(noise.accel_noise_density, 0.02);
+  EXPECT_GT(noise.accel_noise_density, 4e-3);
+}
+
+TEST(MeasuredNoise, TakesVibrationForLessThanWhiteNoise) {
+  const Shaking vibrating{.gyro_density = 1.7e-4, .accel_density = 2e-3, .vibration = 2};
+  const double white = 2 / std::sqrt(6.0) * std::sqrt(0.005);  // that would have its variance
+  const ImuNoise noise = MeasuredNoise(ImuNoise{}, Shaken(vibrating));
+  EXPECT_GT(noise.accel_noise_density, 0.05 * white);
+  EXPECT_LT(noise.accel_noise_density, 0.5 * white);
+}
+
+TEST(MeasuredNoise, BelievesWhatTheSamplesAllow) {
+  const ImuNoise given = Given(2.5e-4, 3e-3);
+  const ImuNoise noise = MeasuredNoise(given, Shaken({1.7e-4, 2e-3}));
+  EXPECT_EQ(noise.gyro_noise_density, given.gyro_noise_density);
+  EXPECT_EQ(noise.accel_noise_density, given.accel_noise_density);
+}
+
+TEST(MeasuredNoise, OfExactOrFewSamplesIsWhatIsUsual) {
+  EXPECT_EQ(MeasuredNoise(ImuNoise{}, Shaken({})).accel_noise_density,
+            ImuNoise{}.accel_noise_density);
   EXPECT_EQ(MeasuredNoise(ImuNoise{}, {}).accel_noise_density, ImuNoise{}.accel_noise_density);
+}
+
+TEST(WithUsualWalks, BoundsThem) {
+  ImuNoise given;
+  given.gyro_random_walk = 2.6e-6;
+  given.accel_random_walk = 0.024;
+  EXPECT_EQ(WithUsualWalks(given).gyro_random_walk, 1e-5);
+  EXPECT_EQ(WithUsualWalks(given).accel_random_walk, 3e-3);
+  EXPECT_EQ(WithUsualWalks(ImuNoise{}).accel_random_walk, ImuNoise{}.accel_random_walk);
 }
 
 TEST(MomentsOf, AreThoseOfTheSamples) {

@@ -30,12 +30,16 @@ double DepthVariance(const WindowState& state, const MatrixXd& P, const Triangul
   unused.H.setZero(state.size(), state.size());
   unused.g.setZero(state.size());
   AddLandmark(state, {0, point.point, rays}, 0, &unused);
-  const auto& gain = unused.eliminations.front().gain;
+  const NormalEquations::Elimination& elimination = unused.eliminations.front();
+  const Eigen::RowVectorXd gain = elimination.gain.row(2);
   Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
-  J.head<kCalibrationSize>() = gain.row(2).head<kCalibrationSize>();
-  for (int i = 0; i < static_cast<int>(rays.size()); ++i) {
-    J.segment<kPoseSize>(state.Offset(rays[i].frame)) =
-        gain.row(2).segment<kPoseSize>(kCalibrationSize + kPoseSize * i);
+  J.head<kCalibrationSize>() = gain.head<kCalibrationSize>();
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const int at = state.Offset(rays[i].frame), column = elimination.RayColumn(i);
+    J.segment<kPoseSize>(at) = gain.segment<kPoseSize>(column);
+    if (state.frames[rays[i].frame].has_stamp_error()) {
+      J[at + kStampError] = gain[column + kPoseSize];
+    }
   }
   return point.covariance(2, 2) + J.dot(J * P);
 }

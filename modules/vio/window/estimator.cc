@@ -6,12 +6,14 @@
 #include <cmath>
 
 #include "vio/imu/imu_buffer.h"
+#include "vio/imu/imu_noise.h"
 #include "vio/imu/stationary_detector.h"
 #include "vio/initialization/initialiser.h"
 #include "vio/keyframes/frame_choice.h"
 #include "vio/keyframes/keyframe_finisher.h"
 #include "vio/keyframes/track_history.h"
 #include "vio/window/landmark_store.h"
+#include "vio/window/stamp_jitter.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_start.h"
 
@@ -72,10 +74,10 @@ struct Estimator::Impl {
   Impl(const EstimatorOptions& o, const CameraModel& c, const ImuNoise& n)
       : options(o),
         camera(c),
-        noise(n),
+        noise(WithUsualWalks(n)),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
-        initialiser(c, n, o.pixel_sigma),
-        imu_samples(n),
+        initialiser(c, noise, o.pixel_sigma),
+        imu_samples(noise),
         stationary_detector(c, ray_sigma),
         choice(o, c) {
     problem.state.T_body_cam = c.T_body_cam;
@@ -100,6 +102,10 @@ struct Estimator::Impl {
   int64_t ImuTime(int64_t frame_utime) const {
     return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
   }
+  // When its image was taken, by the IMU's clock.
+  int64_t TakenAt(const WindowFrame& frame) const {
+    return ImuTime(frame.utime) + std::llround(1e6 * frame.stamp_error_s);
+  }
   WindowFrame& Newest() { return problem.state.frames.back(); }
   const WindowFrame& LastWindowKeyframe() const {
     const auto& frames = problem.state.frames;
@@ -117,6 +123,7 @@ struct Estimator::Impl {
   LandmarkStore landmarks;
   ImuBuffer imu_samples;  // since the last published keyframe
   StationaryDetector stationary_detector;
+  StampJitter stamp_jitter;
   FrameChoice choice;
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
@@ -159,6 +166,7 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   frame.utime = utime;
   frame.imu_utime = ImuTime(utime);
   frame.time_offset_s = problem.state.time_offset_s;
+  frame.stamp_sigma_s = stamp_jitter.sigma_s();
   frame.imu = imu;
   frame.omega_body =
       problem.state.imu_intrinsics.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
@@ -241,7 +249,7 @@ FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
         CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
                              previous->T_odom_body, keyframe.T_odom_body);
     ScaledPreintegration span =
-        imu_samples.Integrate(ImuTime(previous->utime), ImuTime(keyframe.utime),
+        imu_samples.Integrate(TakenAt(state.frames[*from]), TakenAt(state.frames[index]),
                               state.imu_intrinsics, previous->gyro_bias, previous->accel_bias);
     if (span.measured.duration_s > 0) {
       span.measured.covariance.diagonal().array() += 1e-14;
@@ -330,6 +338,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
 FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   FrameResult result;
   imu_samples.Add(imu);
+  stamp_jitter.AddFrame(frame.utime);
   const auto fail = [&](const std::string& reason) {
     lost = true;
     result.state = EstimatorState::kLost;
@@ -366,7 +375,8 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   choice.Choose(history, &problem.state);
   ShrinkWindow(&result.finished);
   result.state = EstimatorState::kTracking;
-  result.T_odom_body = Newest().imu.T_odom_body;
+  const int newest = problem.state.Newest();
+  result.T_odom_body = problem.state.PoseAhead(newest, problem.state.Ahead(newest, 0));
   result.v_odom_body = Newest().imu.v_odom_body;
   result.omega_body = Newest().omega_body;
   result.gyro_bias = Newest().imu.gyro_bias;

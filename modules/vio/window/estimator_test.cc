@@ -142,6 +142,24 @@ TEST(Estimator, FollowsThePathForHalfAMinute) {
   EXPECT_LT(LogSo3(camera.T_body_cam.q * ride.world.true_T_body_cam().q.conjugate()).norm(), 0.004);
 }
 
+// As those of images stamped when they arrive.
+TEST(Estimator, AllowsForStampsThatJitter) {
+  double exact = 0, jittering = 0;
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    for (const double jitter_s : {0.0, 0.004}) {
+      VioTestWorldOptions options;
+      options.seed = seed;
+      options.stamp_jitter_s = jitter_s;
+      Ride ride(options);
+      ride.Advance(200);
+      ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+      (jitter_s > 0 ? jittering : exact) += Ate(ride) / 3;
+    }
+  }
+  std::cout << "mean ATE: exact stamps " << exact << " m, 4 ms of jitter " << jittering << " m\n";
+  EXPECT_LT(jittering, 1.3 * exact);
+}
+
 TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     VioTestWorldOptions options;

@@ -109,8 +109,9 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredP
   out.J_calibration.leftCols<3>() =
       J * R_cam_body * (Hat(y_body - T_bc.t) - R_body_anchor * Hat(T_bc.q * x_cam));
   out.J_calibration.middleCols<3>(3) = J * R_cam_body * (R_body_anchor - Matrix3d::Identity());
-  out.J_calibration.col(kTimeOffset) =
-      out.J_frame * Motion(frame, T_c) + out.J_anchor * Motion(anchor, T_a);
+  out.J_frame_stamp = out.J_frame * Motion(frame, T_c);
+  out.J_anchor_stamp = out.J_anchor * Motion(anchor, T_a);
+  out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
   out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;
   out.J_calibration.col(kIntrinsics) += ray - seen.ray;
   out.J_point = J * R_cam_body * R_body_anchor * T_bc.R() * PointJacobian(point.ray_rho);

@@ -44,11 +44,12 @@ struct AnchoredPoint {
 };
 
 // Where a point should be seen by the given intrinsics, and d(ray) by the errors of the anchor's
-// pose, the seeing frame's pose, the calibration, and (alpha, beta, rho). In its own anchor the two
-// pose blocks cancel.
+// pose, the seeing frame's pose, their stamps, the calibration, and (alpha, beta, rho). In its own
+// anchor the blocks of the two frames cancel.
 struct PredictedRay {
   Eigen::Vector2d ray;
   Eigen::Matrix<double, 2, kPoseSize> J_anchor, J_frame;
+  Eigen::Vector2d J_anchor_stamp, J_frame_stamp;
   Eigen::Matrix<double, 2, kCalibrationSize> J_calibration;
   Eigen::Matrix<double, 2, 3> J_point;
 };

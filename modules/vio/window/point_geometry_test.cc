@@ -21,6 +21,7 @@ WindowTestOptions Rolling(uint64_t seed) {
   options.seed = seed;
   options.row_s = 0.02;
   options.late_s = 0.003;
+  options.stamp_sigma_s = 0.004;
   return options;
 }
 
@@ -37,6 +38,13 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
         J.leftCols(kCalibrationSize) = predicted->J_calibration;
         J.middleCols<kPoseSize>(state.Offset(anchor)) += predicted->J_anchor;
         J.middleCols<kPoseSize>(state.Offset(seen.frame)) += predicted->J_frame;
+        const auto add_stamp = [&](int frame, const Eigen::Vector2d& J_stamp) {
+          if (state.frames[frame].has_stamp_error()) {
+            J.col(state.Offset(frame) + kStampError) += J_stamp;
+          }
+        };
+        add_stamp(anchor, predicted->J_anchor_stamp);
+        add_stamp(seen.frame, predicted->J_frame_stamp);
         // The one thing neglected: an error of the velocity moves the pose on to the row's time.
         J.middleCols<3>(state.Offset(anchor) + kVelocity) +=
             state.Ahead(anchor, landmark.point.anchor_row_s) * predicted->J_anchor.rightCols<3>();

@@ -36,7 +36,7 @@ void Ride::Feed(const VioTestWorld::Input& input) {
   world.Drop(last.outlier_landmarks);
   finished.insert(finished.end(), last.finished.begin(), last.finished.end());
   if (last.state == EstimatorState::kTracking) {
-    tracked.push_back({input.frame.utime, last, world.TruthAt(input.frame.utime)});
+    tracked.push_back({input.frame.utime, last, world.TruthAt(input.taken_utime)});
     if (started_s < 0) {
       started_s = 1e-6 * static_cast<double>(input.frame.utime - 1'000'000);
     }

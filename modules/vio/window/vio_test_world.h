@@ -50,6 +50,7 @@ struct VioTestWorldOptions {
   double spin_rps = 0;  // above 0: it rotates on the spot, rad/s
   // The body stands still in between, seconds.
   double stationary_begin_s = -10, stationary_end_s = -10;
+  double stamp_jitter_s = 0;  // of the images' stamps
   // Errors of the calibration the estimator is given.
   double extrinsics_rotation_sigma = 0;  // rad
   double extrinsics_position_sigma = 0;  // m
@@ -64,6 +65,7 @@ class VioTestWorld {
 
   struct Input {
     TrackedFrame frame;
+    int64_t taken_utime = 0;     // its stamp, had it no error
     std::vector<ImuSample> imu;  // since the previous call, to the first at or after the frame
   };
   Input Next();

@@ -1,8 +1,10 @@
 #include "vio/window/window_factors.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace pangea::vio {
 namespace {
@@ -33,7 +35,7 @@ VectorXd PriorError(const WindowProblem& problem) {
 }
 
 // One landmark's part of the normal equations, before it is eliminated. Columns as in
-// NormalEquations::Elimination.
+// NormalEquations::Elimination, kRay of them for each ray.
 struct LandmarkSystem {
   double cost = 0;
   MatrixXd H;
@@ -43,8 +45,22 @@ struct LandmarkSystem {
   Vector3d g_point = Vector3d::Zero();
 };
 
-void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int at_anchor,
-            int at_frame, LandmarkSystem* out) {
+// d(ray) by what an anchor or a frame contributes: its pose's error and its stamp's.
+template <int kRay>
+Eigen::Matrix<double, 2, kRay> FrameJacobian(const Eigen::Matrix<double, 2, kPoseSize>& J_pose,
+                                             const Vector2d& J_stamp, const WindowFrame& frame) {
+  Eigen::Matrix<double, 2, kRay> J;
+  J.template leftCols<kPoseSize>() = J_pose;
+  if constexpr (kRay > kPoseSize) {
+    J.col(kPoseSize) = frame.has_stamp_error() ? J_stamp : Vector2d::Zero();
+  }
+  return J;
+}
+
+template <int kRay>
+void AddRay(const PredictedRay& predicted, const Eigen::Matrix<double, 2, kRay>& J_anchor,
+            const Eigen::Matrix<double, 2, kRay>& J_frame, const Vector2d& r, double scale,
+            int at_anchor, int at_frame, LandmarkSystem* out) {
   const Eigen::Matrix<double, 2, 3> J_point = scale * predicted.J_point;
   out->V += J_point.transpose() * J_point;
   out->g_point += J_point.transpose() * r;
@@ -55,38 +71,33 @@ void AddRay(const PredictedRay& predicted, const Vector2d& r, double scale, int 
   if (at_anchor == at_frame) {
     return;  // in its own anchor a point is where its ray is, wherever the frames are
   }
-  const Eigen::Matrix<double, 2, kPoseSize> J_a =
-      scale * predicted.J_anchor;  // the frame's is -J_a
-  const Eigen::Matrix<double, kPoseSize, kPoseSize> A = J_a.transpose() * J_a;
-  const Eigen::Matrix<double, kCalibrationSize, kPoseSize> C = J_c.transpose() * J_a;
-  const Eigen::Matrix<double, 3, kPoseSize> W_a = J_point.transpose() * J_a;
-  const Eigen::Matrix<double, kPoseSize, 1> g_a = J_a.transpose() * r;
+  const Eigen::Matrix<double, 2, kRay> J_a = scale * J_anchor, J_f = scale * J_frame;
   MatrixXd& H = out->H;
-  H.block<kCalibrationSize, kPoseSize>(0, at_anchor) += C;
-  H.block<kPoseSize, kCalibrationSize>(at_anchor, 0) += C.transpose();
-  H.block<kCalibrationSize, kPoseSize>(0, at_frame) -= C;
-  H.block<kPoseSize, kCalibrationSize>(at_frame, 0) -= C.transpose();
-  H.block<kPoseSize, kPoseSize>(at_anchor, at_anchor) += A;
-  H.block<kPoseSize, kPoseSize>(at_anchor, at_frame) -= A;
-  H.block<kPoseSize, kPoseSize>(at_frame, at_anchor) -= A;
-  H.block<kPoseSize, kPoseSize>(at_frame, at_frame) += A;
-  out->W.middleCols<kPoseSize>(at_anchor) += W_a;
-  out->W.middleCols<kPoseSize>(at_frame) -= W_a;
-  out->g.segment<kPoseSize>(at_anchor) += g_a;
-  out->g.segment<kPoseSize>(at_frame) -= g_a;
+  for (const auto& [J, at] : {std::pair(&J_a, at_anchor), std::pair(&J_f, at_frame)}) {
+    const Eigen::Matrix<double, kCalibrationSize, kRay> C = J_c.transpose() * *J;
+    H.block<kCalibrationSize, kRay>(0, at) += C;
+    H.block<kRay, kCalibrationSize>(at, 0) += C.transpose();
+    H.block<kRay, kRay>(at, at) += J->transpose() * *J;
+    out->W.middleCols<kRay>(at) += J_point.transpose() * *J;
+    out->g.segment<kRay>(at) += J->transpose() * r;
+  }
+  const Eigen::Matrix<double, kRay, kRay> A = J_a.transpose() * J_f;
+  H.block<kRay, kRay>(at_anchor, at_frame) += A;
+  H.block<kRay, kRay>(at_frame, at_anchor) += A.transpose();
 }
 
+template <int kRay>
 LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landmark) {
   const int m = static_cast<int>(landmark.rays.size());
-  const int n = kCalibrationSize + kPoseSize * m;
+  const int n = kCalibrationSize + kRay * m;
   LandmarkSystem out;
   out.H.setZero(n, n);
   out.g.setZero(n);
   out.W.setZero(3, n);
   int at_anchor = -1;
   for (int j = 0; j < m; ++j) {
-    at_anchor = landmark.rays[j].frame == landmark.point.anchor ? kCalibrationSize + kPoseSize * j
-                                                                : at_anchor;
+    at_anchor =
+        landmark.rays[j].frame == landmark.point.anchor ? kCalibrationSize + kRay * j : at_anchor;
   }
   for (int j = 0; j < m; ++j) {
     const FrameRay& seen = landmark.rays[j];
@@ -99,29 +110,42 @@ LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landm
     const double e = r.norm();
     const double root = std::sqrt(HuberWeight(e));
     out.cost += HuberCost(e);
-    AddRay(*predicted, root * r, root / seen.sigma, at_anchor, kCalibrationSize + kPoseSize * j,
-           &out);
+    AddRay<kRay>(
+        *predicted,
+        FrameJacobian<kRay>(predicted->J_anchor, predicted->J_anchor_stamp,
+                            state.frames[landmark.point.anchor]),
+        FrameJacobian<kRay>(predicted->J_frame, predicted->J_frame_stamp, state.frames[seen.frame]),
+        root * r, root / seen.sigma, at_anchor, kCalibrationSize + kRay * j, &out);
   }
   return out;
 }
 
 // From a landmark's own columns to the window's.
+template <int kRay>
 void Scatter(const WindowState& state, const Landmark& landmark, const LandmarkSystem& part,
              NormalEquations* out) {
-  std::vector<int> to;
+  struct Block {
+    int from, to, size;
+  };
+  std::vector<Block> blocks;
+  int from = kCalibrationSize;
   for (const FrameRay& seen : landmark.rays) {
-    to.push_back(state.Offset(seen.frame));
+    const int to = state.Offset(seen.frame);
+    blocks.push_back({from, to, kPoseSize});
+    if (kRay > kPoseSize && state.frames[seen.frame].has_stamp_error()) {
+      blocks.push_back({from + kPoseSize, to + kStampError, 1});
+    }
+    from += kRay;
   }
-  constexpr int kC = kCalibrationSize, kP = kPoseSize;
+  constexpr int kC = kCalibrationSize;
   out->H.topLeftCorner<kC, kC>() += part.H.topLeftCorner<kC, kC>();
   out->g.head<kC>() += part.g.head<kC>();
-  for (int j = 0; j < static_cast<int>(to.size()); ++j) {
-    const int from_j = kC + kP * j;
-    out->g.segment<kP>(to[j]) += part.g.segment<kP>(from_j);
-    out->H.block<kC, kP>(0, to[j]) += part.H.block<kC, kP>(0, from_j);
-    out->H.block<kP, kC>(to[j], 0) += part.H.block<kP, kC>(from_j, 0);
-    for (int i = 0; i < static_cast<int>(to.size()); ++i) {
-      out->H.block<kP, kP>(to[i], to[j]) += part.H.block<kP, kP>(kC + kP * i, from_j);
+  for (const Block& j : blocks) {
+    out->g.segment(j.to, j.size) += part.g.segment(j.from, j.size);
+    out->H.block(0, j.to, kC, j.size) += part.H.block(0, j.from, kC, j.size);
+    out->H.block(j.to, 0, j.size, kC) += part.H.block(j.from, 0, j.size, kC);
+    for (const Block& i : blocks) {
+      out->H.block(i.to, j.to, i.size, j.size) += part.H.block(i.from, j.from, i.size, j.size);
     }
   }
 }
@@ -134,11 +158,10 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
   return r;
 }
 
-}  // namespace
-
+template <int kRay>
 void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
                  NormalEquations* out) {
-  LandmarkSystem part = LineariseLandmark(state, landmark);
+  LandmarkSystem part = LineariseLandmark<kRay>(state, landmark);
   Matrix3d V = part.V;
   V.diagonal() *= 1 + damping;
   V.diagonal().array() += 1e-9;
@@ -146,11 +169,23 @@ void AddLandmark(const WindowState& state, const Landmark& landmark, double damp
   NormalEquations::Elimination elimination;
   elimination.offset = -V_inverse * part.g_point;
   elimination.gain = -V_inverse * part.W;
+  elimination.stamps = kRay > kPoseSize;
   part.H.noalias() += part.W.transpose() * elimination.gain;
   part.g.noalias() += part.W.transpose() * elimination.offset;
   out->cost += part.cost;
-  Scatter(state, landmark, part, out);
+  Scatter<kRay>(state, landmark, part, out);
   out->eliminations.push_back(std::move(elimination));
+}
+
+}  // namespace
+
+void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
+                 NormalEquations* out) {
+  const bool stamps =
+      std::any_of(landmark.rays.begin(), landmark.rays.end(),
+                  [&](const FrameRay& seen) { return state.frames[seen.frame].has_stamp_error(); });
+  stamps ? AddLandmark<kPoseSize + 1>(state, landmark, damping, out)
+         : AddLandmark<kPoseSize>(state, landmark, damping, out);
 }
 
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
@@ -160,9 +195,8 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   Eigen::Matrix<double, 15, 30> J;
   J << residual.J_from, residual.J_to;
   const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * factor.information;
-  const int at = state.Offset(to - 1);  // the two frames are neighbours
-  out->H.block<30, 30>(at, at) += JtL * J;
-  out->g.segment<30>(at) += JtL * residual.r;
+  const Eigen::Matrix<double, 30, 30> A = JtL * J;
+  const Eigen::Matrix<double, 30, 1> b = JtL * residual.r;
   const Eigen::Matrix<double, 15, kImuIntrinsicsSize> J_imu_intrinsics = ImuIntrinsicsJacobian(
       factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>());
   const Eigen::Matrix<double, kImuIntrinsicsSize, 15> JtL_imu_intrinsics =
@@ -170,8 +204,17 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   const Eigen::Matrix<double, 30, kImuIntrinsicsSize> cross = JtL * J_imu_intrinsics;
   out->H.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) +=
       JtL_imu_intrinsics * J_imu_intrinsics;
-  out->H.block<30, kImuIntrinsicsSize>(at, kImuIntrinsics) += cross;
-  out->H.block<kImuIntrinsicsSize, 30>(kImuIntrinsics, at) += cross.transpose();
+  const int at[] = {state.Offset(to - 1), state.Offset(to)};
+  for (int i = 0; i < 2; ++i) {
+    out->g.segment<kFrameSize>(at[i]) += b.segment<kFrameSize>(kFrameSize * i);
+    const auto cross_i = cross.middleRows<kFrameSize>(kFrameSize * i);
+    out->H.block<kFrameSize, kImuIntrinsicsSize>(at[i], kImuIntrinsics) += cross_i;
+    out->H.block<kImuIntrinsicsSize, kFrameSize>(kImuIntrinsics, at[i]) += cross_i.transpose();
+    for (int j = 0; j < 2; ++j) {
+      out->H.block<kFrameSize, kFrameSize>(at[i], at[j]) +=
+          A.block<kFrameSize, kFrameSize>(kFrameSize * i, kFrameSize * j);
+    }
+  }
   out->g.segment<kImuIntrinsicsSize>(kImuIntrinsics) += JtL_imu_intrinsics * residual.r;
   out->cost += 0.5 * residual.r.dot(factor.information * residual.r);
 }
@@ -218,6 +261,15 @@ void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out)
   out->cost += 0.5 * r.squaredNorm();
 }
 
+void AddStampError(const WindowState& state, int frame, NormalEquations* out) {
+  const double sigma = state.frames[frame].stamp_sigma_s;
+  const double error = state.frames[frame].stamp_error_s / sigma;
+  const int at = state.Offset(frame) + kStampError;
+  out->H(at, at) += 1 / (sigma * sigma);
+  out->g[at] += error / sigma;
+  out->cost += 0.5 * error * error;
+}
+
 void AddPrior(const WindowProblem& problem, NormalEquations* out) {
   const WindowPrior& prior = problem.prior;
   const VectorXd e = PriorError(problem);
@@ -248,6 +300,9 @@ double Cost(const WindowProblem& problem) {
     if (frame.stationary) {
       cost += 0.5 * frame.imu.v_odom_body.squaredNorm() /
               (kStationaryVelocitySigma * kStationaryVelocitySigma);
+    }
+    if (frame.has_stamp_error()) {
+      cost += 0.5 * std::pow(frame.stamp_error_s / frame.stamp_sigma_s, 2);
     }
   }
   for (const Landmark& landmark : problem.landmarks) {

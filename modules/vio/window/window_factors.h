@@ -19,6 +19,8 @@ void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations*
 // Two neighbours that are both stationary have one pose: r = (Log(R_i^T R_j), R_i^T (p_j - p_i)).
 bool StationaryTogether(const WindowProblem& problem, int to);
 void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out);
+// What is known of a stamp's error beforehand: nothing but its size.
+void AddStampError(const WindowState& state, int frame, NormalEquations* out);
 void AddPrior(const WindowProblem& problem, NormalEquations* out);
 
 // The sum of them all, without derivatives.

@@ -26,9 +26,12 @@ void Step(WindowProblem& problem, const NormalEquations& equations, const Vector
     Vector3d d = elimination.offset +
                  elimination.gain.leftCols<kCalibrationSize>() * step.head<kCalibrationSize>();
     for (size_t j = 0; j < landmark.rays.size(); ++j) {
-      const int at = kCalibrationSize + kPoseSize * static_cast<int>(j);
-      d += elimination.gain.middleCols<kPoseSize>(at) *
-           step.segment<kPoseSize>(problem.state.Offset(landmark.rays[j].frame));
+      const int at = elimination.RayColumn(j), frame = landmark.rays[j].frame;
+      const int offset = problem.state.Offset(frame);
+      d += elimination.gain.middleCols<kPoseSize>(at) * step.segment<kPoseSize>(offset);
+      if (problem.state.frames[frame].has_stamp_error()) {
+        d += elimination.gain.col(at + kPoseSize) * step[offset + kStampError];
+      }
     }
     landmark.point.ray_rho += d;
     landmark.point.ray_rho.z() = std::max(landmark.point.ray_rho.z(), kMinInverseDepth);
@@ -60,6 +63,9 @@ NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
   }
   if (state.frames[oldest].stationary) {
     AddZeroVelocityUpdate(state, oldest, &out);
+  }
+  if (state.frames[oldest].has_stamp_error()) {
+    AddStampError(state, oldest, &out);
   }
   for (const Landmark& landmark : problem.landmarks) {
     if (landmark.point.anchor == oldest) {
@@ -98,6 +104,9 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
     }
     if (problem.state.frames[i].stationary) {
       AddZeroVelocityUpdate(problem.state, i, &out);
+    }
+    if (problem.state.frames[i].has_stamp_error()) {
+      AddStampError(problem.state, i, &out);
     }
   }
   for (const Landmark& landmark : problem.landmarks) {
@@ -159,7 +168,7 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
   const bool drops_kept = oldest == 1 && what.drop_kept_pose;
   for (int i = 0; i < state.size(); ++i) {
     const bool of_kept = oldest == 1 && i >= kSharedSize && i < at_oldest;
-    const bool of_oldest = i >= at_oldest && i < at_oldest + kFrameSize;
+    const bool of_oldest = i >= at_oldest && i < at_oldest + state.frames[oldest].size();
     const bool goes =
         of_kept ? drops_kept : of_oldest && !(what.keep_pose && i < at_oldest + kPoseSize);
     (goes ? go : stay).push_back(i);

@@ -51,7 +51,13 @@ struct NormalEquations {
   // What a step of the window means for each landmark: step = offset + gain * (step of its frames).
   struct Elimination {
     Eigen::Vector3d offset;
-    Eigen::Matrix<double, 3, Eigen::Dynamic> gain;  // columns: calibration, then each ray's frame
+    // Columns: calibration, then of each ray's frame the pose and, if `stamps`, the stamp's error.
+    Eigen::Matrix<double, 3, Eigen::Dynamic> gain;
+    bool stamps = false;
+
+    int RayColumn(size_t ray) const {
+      return kCalibrationSize + (stamps ? kPoseSize + 1 : kPoseSize) * static_cast<int>(ray);
+    }
   };
   std::vector<Elimination> eliminations;
 };

@@ -22,6 +22,7 @@ WindowProblem NoisyWindow(uint64_t seed) {
   WindowTestOptions options;
   options.seed = seed;
   options.ray_noise = 1;
+  options.stamp_sigma_s = seed % 2 == 0 ? 0.004 : 0;
   WindowProblem problem = TestWindow(options);
   problem.state.frames[1].stationary = problem.state.frames[2].stationary = true;
   return problem;
@@ -96,7 +97,12 @@ TEST(WindowProblem, TheInformationMatchesDifferences) {
   problem.imu_factors[1]->information.setZero();
   const WindowProblem standing = problem;
   const WindowProblem moving = TestWindow({});
-  for (const WindowProblem& each : {standing, moving}) {
+  // Jittering stamps: zero residual, and no time ahead in which the velocity would count.
+  WindowProblem jittering = TestWindow({.stamp_sigma_s = 1e-9});
+  for (WindowFrame& frame : jittering.state.frames) {
+    frame.stamp_sigma_s *= 1e6;
+  }
+  for (const WindowProblem& each : {standing, moving, jittering}) {
     const NormalEquations equations = Linearise(each, 0);
     const MatrixXd numeric = NumericJacobian(each.state, [&](const WindowState& state) -> VectorXd {
       WindowProblem moved = each;
@@ -155,7 +161,7 @@ std::vector<int> RowsLeft(const WindowState& state, const Marginalisation& what)
     const int in_kept = i - kSharedSize, in_oldest = i - kSharedSize - kept;
     const bool goes = (in_kept >= 0 && in_kept < kept)
                           ? what.drop_kept_pose
-                          : in_oldest >= 0 && in_oldest < kFrameSize &&
+                          : in_oldest >= 0 && in_oldest < state.frames[oldest].size() &&
                                 !(what.keep_pose && in_oldest < kPoseSize);
     if (!goes) {
       rows.push_back(i);
@@ -229,12 +235,16 @@ TEST(WindowProblem, FramesImuFactorsAndRaysFollowAMarginalisation) {
 struct Perturbed {
   WindowProblem truth, problem;
 };
-Perturbed Perturb(uint64_t seed, double sigma, double rho_factor) {
+Perturbed Perturb(uint64_t seed, double sigma, double rho_factor, double stamp_sigma_s) {
   WindowTestOptions options;
   options.seed = seed;
   options.landmarks = 40;
+  options.stamp_sigma_s = stamp_sigma_s;
   Perturbed out;
   out.truth = TestWindow(options);
+  for (WindowFrame& frame : out.truth.state.frames) {
+    frame.stamp_sigma_s *= 1e6;  // the truth is to cost nothing
+  }
   HoldStart(&out.truth, 1e-3);
   out.problem = out.truth;
   out.problem.state.Retract(RandomError(out.truth.state, sigma, seed));
@@ -255,7 +265,7 @@ void ExpectTruth(const Perturbed& window) {
 
 TEST(Optimise, FindsBackFromAPerturbation) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
-    Perturbed window = Perturb(seed, 0.02, 1.1);
+    Perturbed window = Perturb(seed, 0.02, 1.1, seed % 2 == 0 ? 0.004 : 0);
     const double cost = Optimise(window.problem, 10);
     EXPECT_LT(cost, 1e-4) << "seed " << seed;
     EXPECT_NEAR(cost, Cost(window.problem), 1e-9);
@@ -274,8 +284,12 @@ WindowProblem FullStep(const WindowProblem& problem) {
     VectorXd own(elimination.gain.cols());
     own.head(kCalibrationSize) = step.head(kCalibrationSize);
     for (size_t j = 0; j < landmark.rays.size(); ++j) {
-      own.segment<kPoseSize>(kCalibrationSize + kPoseSize * static_cast<int>(j)) =
+      own.segment<kPoseSize>(elimination.RayColumn(j)) =
           step.segment<kPoseSize>(problem.state.Offset(landmark.rays[j].frame));
+      if (elimination.stamps && problem.state.frames[landmark.rays[j].frame].has_stamp_error()) {
+        own[elimination.RayColumn(j) + kPoseSize] =
+            step[problem.state.Offset(landmark.rays[j].frame) + kStampError];
+      }
     }
     landmark.point.ray_rho += elimination.offset + elimination.gain * own;
   }
@@ -287,7 +301,7 @@ WindowProblem FullStep(const WindowProblem& problem) {
 TEST(Optimise, DampsWhenTheFullStepIsWorse) {
   int worse = 0;
   for (uint64_t seed = 1; seed <= 50; ++seed) {
-    Perturbed window = Perturb(seed, 0.1, 0.1);
+    Perturbed window = Perturb(seed, 0.1, 0.1, 0);
     std::fill(window.problem.imu_factors.begin(), window.problem.imu_factors.end(), std::nullopt);
     window.problem.prior.H =
         100 * MatrixXd::Identity(window.problem.state.size(), window.problem.state.size());

@@ -72,8 +72,9 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   P.diagonal().segment<kPoseSize>(kSharedSize).array() += 1e-8;
   WindowPrior prior;
   prior.at = start;
-  prior.H = P.llt().solve(MatrixXd::Identity(n, n));
-  prior.g.setZero(n);
+  prior.H.setZero(start.size(), start.size());  // it says nothing of the stamp's error
+  prior.H.topLeftCorner(n, n) = P.llt().solve(MatrixXd::Identity(n, n));
+  prior.g.setZero(start.size());
   return prior;
 }
 

@@ -55,6 +55,9 @@ void WindowState::Retract(const VectorXd& error) {
       frame.imu.gyro_bias += error.segment<3>(at + kGyroBias);
       frame.imu.accel_bias += error.segment<3>(at + kAccelBias);
     }
+    if (frame.has_stamp_error()) {
+      frame.stamp_error_s += error[at + kStampError];
+    }
     at += frame.size();
   }
 }
@@ -78,6 +81,9 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
       e.segment<3>(at + kVelocity) = x.v_odom_body - rotation * y.v_odom_body;
       e.segment<3>(at + kGyroBias) = x.gyro_bias - y.gyro_bias;
       e.segment<3>(at + kAccelBias) = x.accel_bias - y.accel_bias;
+    }
+    if (b.frames[i].has_stamp_error()) {
+      e[at + kStampError] = a.frames[i].stamp_error_s - b.frames[i].stamp_error_s;
     }
     at += b.frames[i].size();
   }

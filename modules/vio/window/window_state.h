@@ -24,6 +24,8 @@ namespace pangea::vio {
 
 // One frame's error is laid out as in core/imu/imu_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
+// After it comes, where stamps jitter, the error of the frame's stamp.
+inline constexpr int kStampError = kFrameSize;
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
 // intrinsics.
 inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
@@ -37,6 +39,9 @@ struct WindowFrame {
   int64_t utime = 0;         // of its TrackedFrame
   int64_t imu_utime = 0;     // utime + time_offset_s
   double time_offset_s = 0;  // when it came
+  // The image was taken this much after its stamp says, and what it may be (stamp_jitter.h).
+  double stamp_error_s = 0;
+  double stamp_sigma_s = 0;  // 0: stamps are exact, and the error is no variable
   ImuState imu;
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate there, rad/s
   bool is_window_keyframe = false;  // it holds its place; else the next frame replaces it
@@ -46,7 +51,8 @@ struct WindowFrame {
   bool stationary = false;
   bool is_tracked = true;  // its rays count: they are not mere noise
 
-  int size() const { return pose_only ? kPoseSize : kFrameSize; }
+  bool has_stamp_error() const { return !pose_only && stamp_sigma_s > 0; }
+  int size() const { return pose_only ? kPoseSize : kFrameSize + (has_stamp_error() ? 1 : 0); }
 };
 
 struct WindowState {
@@ -68,7 +74,7 @@ struct WindowState {
   // The body when a row of a frame's image was exposed, that much after the image's time: the
   // frame's pose, moved on at its velocity and rotation rate.
   double Ahead(int frame, double row_s) const {
-    return time_offset_s - frames[frame].time_offset_s + row_s;
+    return time_offset_s - frames[frame].time_offset_s + frames[frame].stamp_error_s + row_s;
   }
   Rigid3 PoseAhead(int frame, double ahead_s) const;
 

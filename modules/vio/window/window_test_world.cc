@@ -111,6 +111,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
                                     last.imu.accel_bias + RandomVector(rng, 1e-2));
       factor.information = InertialInformation(factor.span.measured, ImuNoise{});
       WindowFrame next = last;
+      next.stamp_sigma_s = next.stamp_error_s = 0;
       next.imu = Predict(At(factor.span, state.imu_intrinsics), last.imu);
       state.frames.push_back(next);
       problem.imu_factors.emplace_back(factor);
@@ -120,6 +121,10 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
     frame.utime = frame.imu_utime - 2'000;
     frame.omega_body = RandomVector(rng, 0.3);
     frame.is_window_keyframe = true;
+    if (options.stamp_sigma_s > 0 && i % 2 == 0) {
+      frame.stamp_sigma_s = options.stamp_sigma_s;
+      frame.stamp_error_s = RandomVector(rng, options.stamp_sigma_s).x();
+    }
   }
   for (int i = 0; i < options.landmarks; ++i) {
     problem.landmarks.push_back(SeenLandmark(state, i, options, rng));
@@ -131,7 +136,8 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
 }
 
 void HoldStart(WindowProblem* problem, double sigma) {
-  problem->prior.H.diagonal().head(kSharedSize + kFrameSize).array() += 1 / (sigma * sigma);
+  problem->prior.H.diagonal().head(kSharedSize + problem->state.frames[0].size()).array() +=
+      1 / (sigma * sigma);
 }
 
 VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed) {

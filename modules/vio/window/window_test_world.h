@@ -15,10 +15,11 @@ namespace pangea::vio {
 struct WindowTestOptions {
   uint64_t seed = 1;
   int frames = 5;
-  int landmarks = 12;    // landmark i is anchored in frame i % (frames - 1), seen from there on
-  double ray_noise = 0;  // sigmas
-  double row_s = 0;      // rows are exposed up to this after the image's time
-  double late_s = 0;     // the time offset has moved by this since the frames came
+  int landmarks = 12;        // landmark i is anchored in frame i % (frames - 1), seen from there on
+  double ray_noise = 0;      // sigmas
+  double row_s = 0;          // rows are exposed up to this after the image's time
+  double stamp_sigma_s = 0;  // of the frames' stamps; every second frame's is a variable
+  double late_s = 0;         // the time offset has moved by this since the frames came
 };
 
 // State and landmarks are true; the prior says nothing.
