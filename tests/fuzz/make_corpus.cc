@@ -21,6 +21,7 @@
 #include "link_channels.h"
 #include "log_file/log_reader.h"
 #include "loop_verification/drift_gate.h"
+#include "loop_verification/steps/steps.h"
 #include "map_points/map_points.h"
 #include "messages/messages.h"
 #include "options/yaml_options.h"
