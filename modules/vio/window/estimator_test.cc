@@ -145,19 +145,19 @@ TEST(Estimator, FollowsThePathForHalfAMinute) {
 // As those of images stamped when they arrive.
 TEST(Estimator, AllowsForStampsThatJitter) {
   double exact = 0, jittering = 0;
-  for (uint64_t seed = 1; seed <= 3; ++seed) {
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
     for (const double jitter_s : {0.0, 0.004}) {
       VioTestWorldOptions options;
       options.seed = seed;
       options.stamp_jitter_s = jitter_s;
       Ride ride(options);
-      ride.Advance(200);
+      ride.Advance(120);
       ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
-      (jitter_s > 0 ? jittering : exact) += Ate(ride) / 3;
+      (jitter_s > 0 ? jittering : exact) += Ate(ride) / 6;
     }
   }
   std::cout << "mean ATE: exact stamps " << exact << " m, 4 ms of jitter " << jittering << " m\n";
-  EXPECT_LT(jittering, 1.3 * exact);
+  EXPECT_LT(jittering, 1.4 * exact);
 }
 
 TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {

@@ -33,7 +33,7 @@ TEST(StampJitter, OfExactStampsIsNone) {
   EXPECT_EQ(Found(5e-5, 0.02, 60), 0);  // rounding, and a few that are late
 }
 
-TEST(StampJitter, IsNotGuessedFromAFewStamps) { EXPECT_EQ(Found(0.005, 0, 8), 0); }
+TEST(StampJitter, IsNotGuessedFromAFewStamps) { EXPECT_EQ(Found(0.005, 0, 7), 0); }
 
 }  // namespace
 }  // namespace pangea::vio

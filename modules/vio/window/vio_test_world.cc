@@ -173,13 +173,15 @@ TrackedFrame VioTestWorld::Observe(int64_t utime) {
 VioTestWorld::Input VioTestWorld::Next() {
   Input input;
   input.taken_utime = next_frame_utime_;
-  input.frame = Observe(next_frame_utime_);
   std::mt19937_64 rng(options_.seed + next_frame_utime_);  // of its own: the world stays as it is
-  input.frame.utime += std::llround(1e6 * RandomVector(rng, options_.stamp_jitter_s).x());
+  const int64_t stamp =
+      next_frame_utime_ + std::llround(1e6 * RandomVector(rng, options_.stamp_jitter_s).x());
   do {
     input.imu.push_back(SampleAt(next_imu_utime_));
     next_imu_utime_ += kImuStep_us;
-  } while (input.imu.back().utime < input.frame.utime);
+  } while (input.imu.back().utime < stamp);
+  input.frame = Observe(next_frame_utime_);
+  input.frame.utime = stamp;
   next_frame_utime_ += std::llround(1e6 / options_.frame_rate_hz);
   return input;
 }
