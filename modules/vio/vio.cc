@@ -29,6 +29,7 @@ void Vio::OpenNewMap() {
   }
   next_seq_ = 0;
   group_revision_ = 0;
+  scale_sigma_.reset();
   described_.clear();
   tracker_.Reset();
   estimator_.emplace(options_.estimator, camera_, noise_);
@@ -84,6 +85,10 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.omega_body = result.omega_body;
   output.is_keyframe = result.is_keyframe;
   output.num_tracked = static_cast<int>(frame.observations.size());
+  for (const FinishedKeyframe& finished : result.finished) {
+    scale_sigma_ = finished.scale_sigma ? finished.scale_sigma : scale_sigma_;
+  }
+  output.scale_sigma = scale_sigma_;
   output.keyframes = Complete(result.finished);
   if (result.state == EstimatorState::kLost) {
     OpenNewMap();

@@ -49,6 +49,8 @@ struct VioOutput {
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
   int num_tracked = 0;
+  // How well the scale is known, a share: of the newest keyframe that tells.
+  std::optional<double> scale_sigma;
   bool is_keyframe = false;         // it was described, and will be finished as a keyframe later
   std::vector<Keyframe> keyframes;  // finished by this image
 };
@@ -108,6 +110,7 @@ class Vio {
   int maps_opened_ = 0;
   int32_t next_seq_ = 0;
   int64_t group_revision_ = 0;
+  std::optional<double> scale_sigma_;
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
   std::vector<ImuSample> rotation_imu_;  // samples the next rotation of the camera needs
   std::optional<int64_t> last_utime_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <functional>
 #include <iostream>
 #include <stdexcept>
@@ -18,6 +19,17 @@ namespace {
 constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int64_t kLagToldInterval_us = 10'000'000;
 constexpr int64_t kNotableLag_us = 500'000;
+
+// In words, when the motion has not told the scale; else nothing.
+std::string UnknownScale(const std::optional<double>& sigma) {
+  constexpr double kUnknown = 0.1;
+  return sigma && *sigma > kUnknown
+             ? fmt::format(
+                   "the scale is known to {:.0f} % only: it takes acceleration, not even "
+                   "motion or turning",
+                   100 * *sigma)
+             : "";
+}
 
 int8_t ToMessage(EstimatorState state) {
   switch (state) {
@@ -85,6 +97,10 @@ void VioProcess::Handle(const VioOutput& output) {
   if (tracking && state_text_ != "tracking") {
     node_.Set("initialised_ms", (output.utime - *first_image_utime_) / 1000);
   }
+  unknown_scale_ = tracking ? UnknownScale(output.scale_sigma) : "";
+  if (output.scale_sigma) {
+    node_.Set("scale_sigma_permille", std::llround(1000 * *output.scale_sigma));
+  }
   state_text_ =
       tracking
           ? "tracking"
@@ -133,7 +149,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
   pose_t message{};
   message.utime = output.utime;
   message.state = ToMessage(output.state);
-  message.reason = output.reason;
+  message.reason = output.state == EstimatorState::kTracking ? unknown_scale_ : output.reason;
   message.map = pangea::ToMessage(output.map);
   message.T_odom_body = pangea::ToMessage(output.T_odom_body);
   message.v_odom_body = pangea::ToMessage(output.v_odom_body);
@@ -217,7 +233,8 @@ void VioProcess::Tick(int64_t now_utime) {
 }
 
 std::string VioProcess::Summary() const {
-  return fmt::format("agent {}: {}{}", options_.agent_id, state_text_,
+  return fmt::format("agent {}: {}{}{}", options_.agent_id, state_text_,
+                     unknown_scale_.empty() ? "" : "; " + unknown_scale_,
                      lag_us_ >= kNotableLag_us ? "; " + LagText() : "");
 }
 

@@ -22,10 +22,9 @@ constexpr double kMaxRms = 2.0;  // sigmas
 // Nothing is better known than this, whatever the window's rays say.
 constexpr double kMinRelativeSigma = 0.005;
 
-// Variance of the inverse depth: that of the rays, and what the errors of calibration and frames
-// (covariance P) do to it.
-double DepthVariance(const WindowState& state, const MatrixXd& P, const Triangulated& point,
-                     const std::vector<FrameRay>& rays) {
+// What the window's error does to the inverse depth.
+Eigen::RowVectorXd DepthJacobian(const WindowState& state, const Triangulated& point,
+                                 const std::vector<FrameRay>& rays) {
   NormalEquations unused;
   unused.H.setZero(state.size(), state.size());
   unused.g.setZero(state.size());
@@ -41,11 +40,30 @@ double DepthVariance(const WindowState& state, const MatrixXd& P, const Triangul
       J[at + kStampError] = gain[column + kPoseSize];
     }
   }
-  return point.covariance(2, 2) + J.dot(J * P);
+  return J;
 }
 
+// What is common to the relative errors of many depths is the scale's.
+class ScaleError {
+ public:
+  void Add(const Eigen::RowVectorXd& J_inverse_depth, double inverse_depth) {
+    sum_ = count_ == 0 ? Eigen::RowVectorXd(J_inverse_depth / inverse_depth)
+                       : Eigen::RowVectorXd(sum_ + J_inverse_depth / inverse_depth);
+    ++count_;
+  }
+  std::optional<double> Sigma(const MatrixXd& P) const {
+    constexpr int kMinDepths = 8;  // fewer are not what is common
+    return count_ < kMinDepths ? std::nullopt
+                               : std::optional(std::sqrt(sum_.dot(sum_ * P)) / count_);
+  }
+
+ private:
+  Eigen::RowVectorXd sum_;
+  int count_ = 0;
+};
+
 std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const MatrixXd& P,
-                                     const TrackHistory& history, int frame) {
+                                     const TrackHistory& history, int frame, ScaleError* scale) {
   const std::vector<FrameRay> rays = history.RaysOf(id, state, 0);
   const auto own = std::find_if(rays.begin(), rays.end(),
                                 [frame](const FrameRay& ray) { return ray.frame == frame; });
@@ -58,10 +76,13 @@ std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const
   }
   const double rho = point->point.ray_rho.z();
   const double floor = kMinRelativeSigma * rho;
-  const double variance = std::max(DepthVariance(state, P, *point, rays), floor * floor);
+  // Variance: that of the rays, and what the errors of calibration and frames do to it.
+  const Eigen::RowVectorXd J = DepthJacobian(state, *point, rays);
+  const double variance = std::max(point->covariance(2, 2) + J.dot(J * P), floor * floor);
   if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
     return std::nullopt;
   }
+  scale->Add(J, rho);
   return LandmarkDepth{id, rho, variance};
 }
 
@@ -120,11 +141,13 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   const int at = state.Offset(index);
   keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
   keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
+  ScaleError scale;
   for (const auto& [id, ray] : history.Frame(frame.utime)) {
-    if (const auto depth = DepthOf(id, state, P, history, index)) {
+    if (const auto depth = DepthOf(id, state, P, history, index, &scale)) {
       keyframe.landmarks.push_back(*depth);
     }
   }
+  keyframe.scale_sigma = scale.Sigma(P);
   return keyframe;
 }
 

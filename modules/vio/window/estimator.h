@@ -86,6 +86,8 @@ struct FinishedKeyframe {
   std::optional<Edge> edge;
   std::optional<Preintegration> preintegration;  // the same span
   std::vector<LandmarkDepth> landmarks;
+  // Of the scale of what it sees, as a share; none with too few depths to tell.
+  std::optional<double> scale_sigma;
 };
 
 struct FrameResult {

@@ -9,7 +9,7 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kStamps = 60;     // two seconds or three
+constexpr size_t kStamps = 60;    // two seconds or three
 constexpr size_t kMinStamps = 8;  // fewer say little
 constexpr double kMadToSigma = 1.4826;
 // 0.1 ms moves a phone's image by a twentieth of a pixel at most.
