@@ -15,7 +15,8 @@ from accuracy_lib.plan import mav0_of  # noqa: E402
 from real_lib import rotations as rot  # noqa: E402
 from real_lib import trajectory  # noqa: E402
 
-FEW = 150  # images: all pairs are matched
+FEATURES = 2000  # an image: matching them on a CPU grows with the square
+FEW = 60  # images: all pairs are matched
 OVERLAP = 12  # images after each that it is matched with
 
 
@@ -45,7 +46,7 @@ def reconstruct(mav0, images, work):
     model, parameters = camera(mav0 / "cam0/sensor.yaml")
     folder = mav0 / "cam0/data"
     colmap("feature_extractor", database_path=database, image_path=folder, image_list_path=listed, ImageReader__single_camera=1,
-           ImageReader__camera_model=model, ImageReader__camera_params=parameters, SiftExtraction__use_gpu=0)
+           ImageReader__camera_model=model, ImageReader__camera_params=parameters, SiftExtraction__use_gpu=0, SiftExtraction__max_num_features=FEATURES)
     if len(images) <= FEW:
         colmap("exhaustive_matcher", database_path=database, SiftMatching__use_gpu=0)
     else:

@@ -10,7 +10,7 @@ from real_lib.alignment import centred, common_scale, rmse
 MIN_POSES = 8  # of a piece, or of a half of it
 SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # what is tried to either side
 REVISIT_APART_S = 10.0
-REVISIT_M, REVISIT_RAD = 0.5, math.radians(30)  # between two camera poses that see the same
+REVISIT_M, REVISIT_RAD = 1.0, math.radians(45)  # between two camera poses that see the same
 REVISIT_STEP_S = 0.4  # of the poses that are paired
 WRONG_M, WRONG_RAD = 0.5, math.radians(5)
 ACROSS = 2  # times as much between pieces: where they join, a reference bends
