@@ -40,7 +40,10 @@ Prior PriorOf(const Input& input, const Options& options, const Parameters& mean
       input.field_of_view ? options.sigma_given_log_focal : options.sigma_log_focal;
   prior.sigma.segment<2>(kCentre).setConstant(options.sigma_centre *
                                               std::max(input.width, input.height));
-  prior.sigma[kDistortion] = options.sigma_distortion;
+  prior.sigma.segment<2>(kDistortion)
+      .setConstant(mean.camera.kind == CameraModel::Kind::kEquidistant
+                       ? options.sigma_distortion_equidistant
+                       : options.sigma_distortion);
   prior.sigma[kReadout] = options.sigma_readout_s;
   return prior;
 }
@@ -64,6 +67,19 @@ std::vector<FramePair> Pairs(const Input& input, const Options& options, const F
   return pairs;
 }
 
+// Half of what lies between the results of the recording's halves: what the residuals do not show,
+// such as a focus or a delay that changes.
+Tangent HalfDifference(const Input& input, const Options& options, std::span<const FramePair> pairs,
+                       int64_t origin, const Solution& solution, const Prior& prior) {
+  const size_t middle = pairs.size() / 2;
+  const auto part = [&](std::span<const FramePair> half) {
+    return Solver(half, input.imu, origin, options.solver).Solve(solution.parameters, prior);
+  };
+  const Parameters first = part(pairs.first(middle)).parameters;
+  const Parameters second = part(pairs.subspan(middle)).parameters;
+  return 0.5 * first.Minus(second);
+}
+
 // Rotation of the camera, rad/s, rms about each of its axes, while points were seen.
 Eigen::Vector3d RotationRms(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
                             int64_t origin_utime, const Parameters& parameters) {
@@ -79,14 +95,15 @@ Eigen::Vector3d RotationRms(std::span<const FramePair> pairs, std::span<const Im
   return (squared / static_cast<double>(std::max<size_t>(1, pairs.size()))).cwiseSqrt();
 }
 
-void AddFloors(const ImuNoise& noise, Result& result) {
+// A gyroscope that reads too little makes lenses too long, by the same share.
+void AddFloors(const ImuNoise& noise, double gyro_scale_sigma, Result& result) {
   const auto add = [&result](int row, double sigma) {
     result.covariance(row, row) += sigma * sigma;
   };
   for (int axis = 0; axis < 3; ++axis) {
     add(kRotation + axis, noise.axes_sigma);
   }
-  add(kLogFocal, noise.gyro_scale_sigma);
+  add(kLogFocal, std::max(gyro_scale_sigma, noise.gyro_scale_sigma));
   result.sigma = result.covariance.diagonal().cwiseSqrt();
 }
 
@@ -167,7 +184,9 @@ Choice ChooseRotation(const Input& input, const Options& options, std::span<cons
   for (size_t i = 0; i < pairs.size(); i += static_cast<size_t>(options.choose_on_every)) {
     some.push_back(pairs[i]);
   }
-  const Solver solver(some, input.imu, origin, options.solver);
+  SolverOptions stiff = options.solver;
+  stiff.velocity_change = options.search.velocity_change;
+  const Solver solver(some, input.imu, origin, stiff);
   for (Hypothesis& hypothesis : found) {
     const Solution solution =
         Refined(solver, hypothesis, PriorOf(input, options, hypothesis.parameters));
@@ -206,6 +225,13 @@ Solution SolveAll(const Input& input, const Options& options, std::span<const Fr
       best = solution;
     }
   }
+  const Tangent apart =
+      HalfDifference(input, options, pairs, origin, best, PriorOf(input, options, best.parameters));
+  for (int row = 0; row < kSize; ++row) {
+    const double scale = std::max(1.0, std::abs(apart[row]) / std::sqrt(best.covariance(row, row)));
+    best.covariance.row(row) *= scale;
+    best.covariance.col(row) *= scale;
+  }
   return best;
 }
 
@@ -216,6 +242,9 @@ Result Calibrate(const Input& input, const Options& options) {
     return result;
   }
   const int64_t origin = input.frames.front().utime;
+  result.image_rate_hz =
+      static_cast<double>(input.frames.size()) /
+      std::max(1e-3, 1e-6 * static_cast<double>(input.frames.back().utime - origin));
   const std::vector<FramePair> pairs = Pairs(input, options, options.pairs, origin);
   result.seconds = SecondsOf(pairs, options.pairs.step_s);
   if (result.seconds < options.min_seconds) {
@@ -235,7 +264,7 @@ Result Calibrate(const Input& input, const Options& options) {
   result.next_cost = choice.next_cost;
   Fill(SolveAll(input, options, pairs, origin, choice.best.parameters), result);
   result.rotation_rms = RotationRms(pairs, input.imu, origin, result.parameters);
-  AddFloors(input.imu_noise, result);
+  AddFloors(input.imu_noise, options.sigma_gyro_scale, result);
   result.refused = Refusal(result, options);
   return result;
 }

@@ -23,8 +23,7 @@ struct Input {
   int width = 0, height = 0;  // pixels
   std::vector<vio::TrackedFrame> frames;
   std::vector<ImuSample> imu;
-  // What calibration of the IMU leaves (core/imu/imu.h): the focal length is no better than the
-  // gyroscope's scale.
+  // What calibration of the IMU leaves (core/imu/imu.h).
   ImuNoise imu_noise;
   std::optional<double> field_of_view;           // of the wider side, radians
   std::optional<Eigen::Quaterniond> q_body_cam;  // to some degrees
@@ -41,16 +40,18 @@ struct Options {
   // What is known of any phone: standard deviations.
   double sigma_axis_aligned = 0.25;  // rad: of a rotation found among the 24
   double sigma_given_rotation = 0.1;
-  double sigma_gyro_bias = 0.1;  // rad/s
+  double sigma_gyro_bias = 0.1;     // rad/s
+  double sigma_gyro_scale = 0.005;  // as sold; larger where the recording says so
   double sigma_time_offset_s = 0.1;
   double sigma_log_focal = 0.3;  // 0.1 with a field of view
   double sigma_given_log_focal = 0.1;
   double sigma_centre = 0.02;  // of the wider side
-  double sigma_distortion = 0.1;
+  double sigma_distortion = 0.15;
+  double sigma_distortion_equidistant = 0.03;
   double readout_s = 0.015;
   double sigma_readout_s = 0.012;
   // The result is refused beyond these.
-  double max_sigma_rotation = 0.035;  // rad
+  double max_sigma_rotation = 0.06;  // rad
   double max_sigma_log_focal = 0.05;
   double max_sigma_time_offset_s = 0.01;
   double max_sigma_px = 2.5;
@@ -63,6 +64,7 @@ struct Result {
   Information covariance = Information::Zero();
   double sigma_px = 0;
   double inlier_share = 0;
+  double image_rate_hz = 0;
   double seconds = 0;    // of pairs
   double points = 0;     // of a pair, median
   double next_cost = 0;  // of the next best rotation, over the best one's; 0: there was none

@@ -64,6 +64,7 @@ Parameters RandomTruth(std::mt19937_64& rng, const TestWorldOptions& options) {
   camera.cx = 319.5 + 6 * n(rng);
   camera.cy = 239.5 + 6 * n(rng);
   camera.distortion[0] = 0.05 * n(rng);
+  camera.distortion[1] = 0.02 * n(rng);
   camera.readout_s = 0.015 + 0.012 * u(rng);
   camera.time_offset_s = 0.05 * u(rng) - 0.5 * camera.readout_s;
   const std::vector<Eigen::Quaterniond> rotations = AxisAlignedRotations();

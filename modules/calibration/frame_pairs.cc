@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "core/median.h"
+
 namespace pangea::calibration {
 namespace {
 
@@ -19,6 +21,14 @@ std::vector<PointPair> Common(const vio::TrackedFrame& a, const vio::TrackedFram
     }
   }
   return points;
+}
+
+double MedianMotion(const std::vector<PointPair>& points) {
+  std::vector<double> motion;
+  for (const PointPair& point : points) {
+    motion.push_back((point.b - point.a).norm());
+  }
+  return Median(std::move(motion));
 }
 
 }  // namespace
@@ -56,6 +66,9 @@ std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, i
         break;
       }
       pair = {a_s, seconds(frames[j]), std::move(points)};
+      if (MedianMotion(pair.points) > options.enough_motion_px) {
+        break;
+      }
     }
     if (!pair.points.empty()) {
       Thin(options.max_points, &pair);

@@ -20,8 +20,9 @@ struct FramePair {
 };
 
 struct FramePairOptions {
-  double max_gap_s = 0.35;
-  double step_s = 0.1;  // between the first images of pairs
+  double max_gap_s = 0.8;
+  double enough_motion_px = 60;  // median: the second image is no later than it takes
+  double step_s = 0.1;           // between the first images of pairs
   int min_points = 25;
   int max_points = 50;     // kept of a pair, evenly
   double min_share = 0.4;  // of the first image's points: the second is as late as this allows

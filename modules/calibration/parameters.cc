@@ -15,7 +15,7 @@ Parameters Parameters::Plus(const Tangent& step) const {
   c.fy = c.fx;
   c.cx += step[kCentre];
   c.cy += step[kCentre + 1];
-  c.distortion[0] += step[kDistortion];
+  c.distortion.head<2>() += step.segment<2>(kDistortion);
   c.readout_s += step[kReadout];
   c.time_offset_s = MiddleRowOffset_s() + step[kTimeOffset] - 0.5 * c.readout_s;
   return next;
@@ -30,7 +30,7 @@ Tangent Parameters::Minus(const Parameters& other) const {
   d[kLogFocal] = std::log(a.fx / b.fx);
   d[kCentre] = a.cx - b.cx;
   d[kCentre + 1] = a.cy - b.cy;
-  d[kDistortion] = a.distortion[0] - b.distortion[0];
+  d.segment<2>(kDistortion) = (a.distortion - b.distortion).head<2>();
   d[kReadout] = a.readout_s - b.readout_s;
   return d;
 }

@@ -17,9 +17,9 @@ enum Row : int {
   kTimeOffset = 6,   // s, of the middle row: t_imu = t_image + offset
   kLogFocal = 7,     // of the one focal length
   kCentre = 8,       // px
-  kDistortion = 10,  // the first coefficient; the others stay as they are
-  kReadout = 11,     // s, first row to last
-  kSize = 12
+  kDistortion = 10,  // the first two coefficients; the others are 0
+  kReadout = 12,     // s, first row to last
+  kSize = 13
 };
 using Tangent = Eigen::Matrix<double, kSize, 1>;
 using Information = Eigen::Matrix<double, kSize, kSize>;

@@ -62,7 +62,9 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
   for (const FramePair& pair : some) {
     num_residuals += pair.points.size();
   }
-  const Solver solver(some, imu, origin_utime, {});
+  SolverOptions stiff;
+  stiff.velocity_change = options.velocity_change;
+  const Solver solver(some, imu, origin_utime, stiff);
   std::vector<Hypothesis> hypotheses;
   for (const Eigen::Quaterniond& rotation : rotations) {
     Hypothesis best{.parameters = {}, .cost = 1e300};

@@ -18,8 +18,9 @@ struct SearchOptions {
   double max_offset_s = 0.15;
   double offset_step_s = 0.015;
   int max_pairs = 50;
-  int max_points = 25;  // of each
-  double sigma_px = 3;  // what the grid leaves
+  int max_points = 25;           // of each
+  double velocity_change = 0.2;  // so short are the pairs
+  double sigma_px = 3;           // what the grid leaves
 };
 
 // Rotations camera to body.

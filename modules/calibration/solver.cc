@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMadToSigma = 1.4826;
 constexpr double kLeastSigma_px = 0.02, kLeastMedian_px = 0.2;
-constexpr double kDirectionStep = 1e-5;  // of its numeric derivative
+constexpr double kTranslationStep = 1e-5;  // of its numeric derivative
 // Information about a direction of translation that nothing tells.
 constexpr double kDirectionDamping = 1e-3;
 constexpr double kConverged = 0.01;  // of a step, in standard deviations
@@ -25,32 +25,24 @@ Tangent DerivativeSteps() {
   return h;
 }
 
-// Two directions across `v`.
-Eigen::Matrix<double, 3, 2> Across(const Eigen::Vector3d& v) {
-  Eigen::Matrix<double, 3, 2> across;
-  across.col(0) = v.unitOrthogonal();
-  across.col(1) = v.cross(across.col(0));
-  return across;
+// Two directions across a pair's translation, and its changes of velocity.
+Eigen::Matrix<double, 9, 8> Steps(const Translation& translation) {
+  Eigen::Matrix<double, 9, 8> steps = Eigen::Matrix<double, 9, 8>::Zero();
+  const Eigen::Vector3d d = translation.head<3>();
+  steps.col(0).head<3>() = d.unitOrthogonal();
+  steps.col(1).head<3>() = d.cross(d.unitOrthogonal());
+  steps.bottomRightCorner<6, 6>().setIdentity();
+  return steps;
 }
 
 // All points alike, then without the outliers.
-Eigen::Vector3d RobustDirection(const PairGeometry& geometry) {
+Translation RobustTranslation(const PairGeometry& geometry) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(geometry.size());
-  const Eigen::Vector3d first = geometry.Direction(weights, Eigen::Vector3d::Zero());
+  const Translation first = geometry.BestTranslation(weights, Translation::Zero());
   const Eigen::VectorXd absolute = geometry.Residuals(first).cwiseAbs();
   const double middle = Median(std::vector<double>(absolute.begin(), absolute.end()));
   weights = (1 + (absolute / (2 * std::max(kLeastMedian_px, middle))).array().square()).inverse();
-  return geometry.Direction(weights, first);
-}
-
-double RobustSigma(const std::vector<Eigen::VectorXd>& residuals) {
-  std::vector<double> absolute;
-  for (const Eigen::VectorXd& r : residuals) {
-    for (const double value : r) {
-      absolute.push_back(std::abs(value));
-    }
-  }
-  return absolute.empty() ? 1 : std::max(kLeastSigma_px, kMadToSigma * Median(absolute));
+  return geometry.BestTranslation(weights, first);
 }
 
 Information PriorInformation(const Prior& prior) {
@@ -64,14 +56,14 @@ Information PriorInformation(const Prior& prior) {
 }  // namespace
 
 struct Solver::PairTerms {
-  Eigen::Vector3d direction;
+  Translation translation;
   Eigen::VectorXd residuals;
 };
 
 struct Solver::Linearised {
   Information hessian = Information::Zero();  // of the data
   Tangent gradient = Tangent::Zero();         // of the data
-  std::map<int64_t, Tangent> blocks;          // the gradient of each block of time
+  std::vector<Tangent> gradients;             // of each pair
   Information prior = Information::Zero();
   Tangent prior_gradient = Tangent::Zero();
   double sigma_px = 1;
@@ -96,35 +88,29 @@ std::vector<PairGeometry> Solver::Geometries(const Parameters& parameters,
   const OrientationCurve curve(imu_, origin_utime_, parameters.gyro_bias);
   std::vector<PairGeometry> geometries;
   for (size_t p = 0; p < pairs_.size(); ++p) {
-    geometries.emplace_back(pairs_[p], rays[p], parameters, curve);
+    geometries.emplace_back(pairs_[p], rays[p], parameters, curve, options_.velocity_change);
   }
   return geometries;
 }
 
-std::vector<Eigen::VectorXd> Solver::Residuals(const Parameters& parameters) const {
-  std::vector<Eigen::VectorXd> residuals;
-  for (const PairGeometry& geometry : Geometries(parameters, Rays(parameters.camera))) {
-    residuals.push_back(geometry.Residuals(RobustDirection(geometry)));
-  }
-  return residuals;
+double Solver::RobustCost(const Eigen::VectorXd& residuals, double sigma_px) const {
+  const double c = options_.robust_at;
+  return 0.5 * c * c * (1 + (residuals / (c * sigma_px)).array().square()).log().sum();
 }
 
-double Solver::RobustCost(const std::vector<Eigen::VectorXd>& residuals, double sigma_px) const {
-  const double c = options_.robust_at;
+double Solver::Cost(const Parameters& parameters, double sigma_px) const {
   double cost = 0;
-  for (const Eigen::VectorXd& r : residuals) {
-    cost += 0.5 * c * c * (1 + (r / (c * sigma_px)).array().square()).log().sum();
+  for (const PairGeometry& geometry : Geometries(parameters, Rays(parameters.camera))) {
+    const Translation translation = RobustTranslation(geometry);
+    cost +=
+        RobustCost(geometry.Residuals(translation), sigma_px) + geometry.ChangeCost(translation);
   }
   return cost;
 }
 
-double Solver::Cost(const Parameters& parameters, double sigma_px) const {
-  return RobustCost(Residuals(parameters), sigma_px);
-}
-
 double Solver::TotalCost(const Parameters& parameters, const Prior& prior, double sigma_px) const {
   const Tangent off = parameters.Minus(prior.mean);
-  return RobustCost(Residuals(parameters), sigma_px) + 0.5 * off.dot(PriorInformation(prior) * off);
+  return Cost(parameters, sigma_px) + 0.5 * off.dot(PriorInformation(prior) * off);
 }
 
 std::vector<Eigen::MatrixXd> Solver::Jacobians(const Parameters& parameters, const Prior& prior,
@@ -140,75 +126,95 @@ std::vector<Eigen::MatrixXd> Solver::Jacobians(const Parameters& parameters, con
       continue;
     }
     const Parameters moved = parameters.Plus(h[k] * Tangent::Unit(k));
-    const bool lens = k >= kLogFocal && k <= kDistortion;
+    const bool lens = k >= kLogFocal && k < kReadout;
     const std::vector<PairGeometry> geometries =
         Geometries(moved, lens ? Rays(moved.camera) : rays);
     for (size_t p = 0; p < terms.size(); ++p) {
       jacobians[p].col(k) =
-          (geometries[p].Residuals(terms[p].direction) - terms[p].residuals) / h[k];
+          (geometries[p].Residuals(terms[p].translation) - terms[p].residuals) / h[k];
     }
   }
   return jacobians;
 }
 
-void Solver::EliminateDirection(const PairGeometry& geometry, const PairTerms& terms,
-                                const Eigen::VectorXd& root_weights, Eigen::MatrixXd* wJ) {
-  const Eigen::Matrix<double, 3, 2> across = Across(terms.direction);
-  Eigen::MatrixXd wB(terms.residuals.size(), 2);
-  for (int k = 0; k < 2; ++k) {
-    const Eigen::Vector3d moved = (terms.direction + kDirectionStep * across.col(k)).normalized();
-    wB.col(k) = (geometry.Residuals(moved) - terms.residuals) / kDirectionStep;
+void Solver::AddPair(const PairGeometry& geometry, const PairTerms& terms,
+                     const Eigen::MatrixXd& jacobian, Linearised* at) const {
+  const Eigen::VectorXd& r = terms.residuals;
+  const Eigen::VectorXd root_weights =
+      (1 + (r / (options_.robust_at * at->sigma_px)).array().square()).rsqrt() / at->sigma_px;
+  const Eigen::Matrix<double, 9, 8> steps = Steps(terms.translation);
+  Eigen::MatrixXd B(r.size(), 8);
+  for (int k = 0; k < 8; ++k) {
+    const Translation moved = terms.translation + kTranslationStep * steps.col(k);
+    B.col(k) = (geometry.Residuals(moved) - r) / kTranslationStep;
   }
-  wB = root_weights.asDiagonal() * wB;
-  Eigen::Matrix2d normal = wB.transpose() * wB;
-  normal.diagonal().array() += kDirectionDamping;
-  *wJ -= wB * normal.ldlt().solve(wB.transpose() * *wJ);
+  const Eigen::MatrixXd wB = root_weights.asDiagonal() * B;
+  const Eigen::MatrixXd wJ = root_weights.asDiagonal() * jacobian;
+  const Eigen::VectorXd wr = root_weights.cwiseProduct(r);
+  using Own = Eigen::Matrix<double, 8, 1>;
+  Own prior = Own::Constant(kDirectionDamping);
+  prior.tail<6>().setConstant(std::pow(geometry.ChangeSigma(), -2));
+  Own own_gradient = wB.transpose() * wr;
+  own_gradient.tail<6>() += prior[7] * terms.translation.tail<6>();
+  Eigen::Matrix<double, 8, 8> own = wB.transpose() * wB;
+  own.diagonal() += prior;
+  const Eigen::MatrixXd cross = wB.transpose() * wJ;
+  const Eigen::LDLT<Eigen::Matrix<double, 8, 8>> factor(own);
+  at->gradients.push_back(wJ.transpose() * wr - cross.transpose() * factor.solve(own_gradient));
+  at->gradient += at->gradients.back();
+  at->hessian += wJ.transpose() * wJ - cross.transpose() * factor.solve(cross);
 }
 
 Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& prior) const {
   const std::vector<PairRays> rays = Rays(parameters.camera);
   const std::vector<PairGeometry> geometries = Geometries(parameters, rays);
   std::vector<PairTerms> terms;
-  std::vector<Eigen::VectorXd> residuals;
+  std::vector<double> absolute;
   for (const PairGeometry& geometry : geometries) {
-    const Eigen::Vector3d direction = RobustDirection(geometry);
-    residuals.push_back(geometry.Residuals(direction));
-    terms.push_back({direction, residuals.back()});
+    const Translation translation = RobustTranslation(geometry);
+    terms.push_back({translation, geometry.Residuals(translation)});
+    for (const double r : terms.back().residuals) {
+      absolute.push_back(std::abs(r));
+    }
   }
-  const std::vector<Eigen::MatrixXd> jacobians = Jacobians(parameters, prior, rays, terms);
   Linearised at;
-  at.sigma_px = RobustSigma(residuals);
-  double inliers = 0, all = 0;
+  at.sigma_px = std::max(kLeastSigma_px, kMadToSigma * Median(absolute));
+  const auto inliers =
+      std::ranges::count_if(absolute, [&at](double r) { return r < kInlierSigmas * at.sigma_px; });
+  at.inlier_share = static_cast<double>(inliers) / static_cast<double>(absolute.size());
+  const std::vector<Eigen::MatrixXd> jacobians = Jacobians(parameters, prior, rays, terms);
   for (size_t p = 0; p < terms.size(); ++p) {
-    const Eigen::VectorXd& r = residuals[p];
-    const Eigen::VectorXd root_weights =
-        (1 + (r / (options_.robust_at * at.sigma_px)).array().square()).rsqrt() / at.sigma_px;
-    Eigen::MatrixXd wJ = root_weights.asDiagonal() * jacobians[p];
-    EliminateDirection(geometries[p], terms[p], root_weights, &wJ);
-    const Tangent gradient = wJ.transpose() * root_weights.cwiseProduct(r);
-    at.hessian += wJ.transpose() * wJ;
-    at.gradient += gradient;
-    const auto block = static_cast<int64_t>(std::floor(pairs_[p].a_s / options_.block_s));
-    at.blocks.try_emplace(block, Tangent::Zero()).first->second += gradient;
-    inliers += static_cast<double>((r.array().abs() < kInlierSigmas * at.sigma_px).count());
-    all += static_cast<double>(r.size());
+    AddPair(geometries[p], terms[p], jacobians[p], &at);
   }
-  at.inlier_share = all > 0 ? inliers / all : 0;
   at.prior = PriorInformation(prior);
   at.prior_gradient = at.prior * parameters.Minus(prior.mean);
-  at.cost = RobustCost(residuals, at.sigma_px) +
-            0.5 * parameters.Minus(prior.mean).dot(at.prior_gradient);
+  at.cost = TotalCost(parameters, prior, at.sigma_px);
   return at;
 }
 
 bool Solver::Plausible(const CameraModel& camera) const {
   const double half_px = 0.5 * std::max(camera.width, camera.height);
-  const double half = camera.kind == CameraModel::Kind::kEquidistant
-                          ? half_px / camera.fx
-                          : std::atan(half_px / camera.fx);
+  const bool equidistant = camera.kind == CameraModel::Kind::kEquidistant;
+  const double half = equidistant ? half_px / camera.fx : std::atan(half_px / camera.fx);
+  const double most = equidistant ? options_.max_distortion_equidistant : options_.max_distortion;
   return camera.fx > 0 && 2 * half > options_.min_field_of_view &&
-         2 * half < options_.max_field_of_view &&
-         std::abs(camera.distortion[0]) < options_.max_distortion;
+         2 * half < options_.max_field_of_view && camera.distortion.cwiseAbs().maxCoeff() < most;
+}
+
+// Of the sum of all pairs' gradients, from how those of blocks of time scatter.
+Information Solver::Scatter(const Linearised& at, double block_s) const {
+  std::map<int64_t, Tangent> blocks;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const auto block = static_cast<int64_t>(std::floor(pairs_[p].a_s / block_s));
+    blocks.try_emplace(block, Tangent::Zero()).first->second += at.gradients[p];
+  }
+  const auto n = static_cast<double>(blocks.size());
+  const Tangent mean = at.gradient / n;
+  Information scatter = Information::Zero();
+  for (const auto& [block, gradient] : blocks) {
+    scatter += (gradient - mean) * (gradient - mean).transpose();
+  }
+  return n / std::max(1.0, n - 1) * scatter;
 }
 
 Information Solver::Covariance(const Linearised& at) const {
@@ -217,21 +223,17 @@ Information Solver::Covariance(const Linearised& at) const {
     h(i, i) += h(i, i) == 0 ? 1e12 : 0;  // a row that is held
   }
   const Information usual = h.ldlt().solve(Information::Identity());
-  const Tangent mean = at.gradient / static_cast<double>(std::max<size_t>(1, at.blocks.size()));
-  Information spread = Information::Zero();
-  for (const auto& [block, gradient] : at.blocks) {
-    spread += (gradient - mean) * (gradient - mean).transpose();
-  }
-  const auto n = static_cast<double>(at.blocks.size());
-  spread *= n / std::max(1.0, n - 1);
-  Information grouped = usual * (spread + at.prior) * usual;
-  // Rows that the blocks call surer than independent residuals would be: by chance.
+  const double seconds = pairs_.back().b_s - pairs_.front().a_s;
+  Information covariance = usual * (Scatter(at, options_.block_s) + at.prior) * usual;
+  const Information slow = usual * (Scatter(at, seconds / options_.long_blocks) + at.prior) * usual;
+  // The largest of the three for each row: blocks may agree by chance.
   for (int i = 0; i < kSize; ++i) {
-    const double scale = std::sqrt(std::max(1.0, usual(i, i) / std::max(1e-30, grouped(i, i))));
-    grouped.row(i) *= scale;
-    grouped.col(i) *= scale;
+    const double largest = std::max({usual(i, i), covariance(i, i), slow(i, i)});
+    const double scale = std::sqrt(largest / std::max(1e-30, covariance(i, i)));
+    covariance.row(i) *= scale;
+    covariance.col(i) *= scale;
   }
-  return grouped;
+  return covariance;
 }
 
 Solution Solver::Solve(const Parameters& start, const Prior& prior) const {
