@@ -168,7 +168,7 @@ class Plan:
         job = Job("vio", f"{where} {name}", self.work / "vio" / where / name, [Command(argv), evaluate],
                   needs=[render] if render else [], main_product="keyframes.lcm",
                   files={"recordings.json": json.dumps({"agents": [run]}) + "\n"},
-                  outside=[] if render else [_mav0(recording) / "cam0/data.csv"])
+                  outside=[] if render else [mav0_of(recording) / "cam0/data.csv"])
         if render:
             render.users.append(job)
         self.jobs.append(job)
@@ -208,7 +208,7 @@ def run(jobs, options, logs):
     Runner(jobs, max(1, options.jobs), logs, options.redo, after).run()
 
 
-def _mav0(recording):
+def mav0_of(recording):
     return recording if recording.name == "mav0" else recording / "mav0"
 
 

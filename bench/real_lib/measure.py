@@ -1,0 +1,163 @@
+"""A trajectory of camera poses against a reference, which may be in pieces; a scale is the estimate's over the reference's."""
+
+import math
+from dataclasses import dataclass
+
+from real_lib import rotations as rot
+from real_lib import trajectory
+from real_lib.alignment import centred, common_scale, rmse
+
+MIN_POSES = 8  # of a piece, or of a half of it
+SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # what is tried to either side
+REVISIT_APART_S = 10.0
+REVISIT_M, REVISIT_RAD = 1.0, math.radians(45)  # between two camera poses that see the same
+REVISIT_STEP_S = 0.4  # of the poses that are paired
+WRONG_M, WRONG_RAD = 0.5, math.radians(5)
+ACROSS = 2  # times as much between pieces: where they join, a reference bends
+
+
+@dataclass
+class Matched:
+    """One piece of the reference with the estimate's poses: (stamp, estimate, reference)."""
+
+    frame: int
+    pairs: list
+
+    def fit(self, begin=-math.inf, end=math.inf):
+        pairs = [pair for pair in self.pairs if begin <= pair[0] < end]
+        if len(pairs) < MIN_POSES:
+            return None
+        return centred([e[1] for _, e, _ in pairs], [r[1] for _, _, r in pairs])
+
+
+def matched(estimate, pieces, shift_s=0.0):
+    return [Matched(piece.frame, trajectory.pairs(estimate, piece.poses, shift_s)) for piece in pieces]
+
+
+def best_shift(estimate, pieces):
+    """Of another system, which may stamp in the clock of its IMU: how far it is ahead of the images', by the smallest ATE."""
+    steps = round(SHIFT_S / SHIFT_STEP_S)
+
+    def error(step):
+        fits = [m.fit() for m in matched(estimate, pieces, step * SHIFT_STEP_S)]
+        squared = [x for fit in fits if fit for x in fit.squared(fit.scale())]
+        return rmse(squared) if squared else math.inf
+
+    return SHIFT_STEP_S * min(range(-steps, steps + 1), key=lambda step: (error(step), abs(step)))
+
+
+def main_frame(fits):
+    """Those of the frame with most poses: only they have a scale in common."""
+    frames = [frame for frame, _ in fits]
+    most = max(frames, key=lambda frame: sum(len(fit.estimate) for f, fit in fits if f == frame))
+    return [fit for frame, fit in fits if frame == most]
+
+
+def scale_within(pieces, begin=-math.inf, end=math.inf):
+    fits = [(m.frame, fit) for m in pieces if (fit := m.fit(begin, end))]
+    return common_scale(main_frame(fits)) if fits else None
+
+
+def measure(estimate, pieces, shift=0.0):
+    """None when too few poses are known in both."""
+    known = matched(estimate, pieces, shift)
+    fits = [(m.frame, fit) for m in known if (fit := m.fit())]
+    if not fits:
+        return None
+    squared = [x for _, fit in fits for x in fit.squared(fit.scale())]
+    path = sum(abs(fit.scale()) * trajectory.path_m(fit.reference) for _, fit in fits)
+    stamps = sorted(pair[0] for m in known for pair in m.pairs)
+    middle = (stamps[0] + stamps[-1]) / 2
+    first, second = scale_within(known, end=middle), scale_within(known, begin=middle)
+    scale = common_scale(main_frame(fits))
+    covered = sum(len(m.pairs) for m in known)
+    result = {"ate_m": rmse(squared), "path_m": path, "ate_share": rmse(squared) / path if path > 0 else None,
+              "scale": scale, "piece_scales": [fit.scale() for _, fit in fits],
+              "drift": second / first if first and second else None, "shift_s": shift, "poses": covered,
+              "coverage": covered / max(covered, sum(expected(estimate, piece) for piece in pieces))}
+    result["revisits"] = revisits(known, scale)
+    return result
+
+
+def expected(estimate, piece):
+    """How many pairs there would be, were the whole piece covered."""
+    period = max(trajectory.period(piece.poses), trajectory.period(estimate))
+    return 1 + math.floor((piece.poses[-1][0] - piece.poses[0][0]) / period) if math.isfinite(period) else len(piece.poses)
+
+
+def near(a, b):
+    """Two camera poses that see the same place."""
+    T = rot.between(a, b)
+    ahead = rot.rotate(T[0], (0.0, 0.0, 1.0))
+    return math.hypot(*T[1]) <= REVISIT_M and math.acos(max(-1.0, min(1.0, ahead[2]))) <= REVISIT_RAD
+
+
+def revisits(known, scale):
+    """Relative poses of places seen again, in the reference's metres: the odometry's drift where a loop may be closed."""
+    metres, radians = [], []
+    for pairs in same_frame(known):
+        nodes = spaced([(t, e, r) for _, (t, e, r) in pairs])
+        for i, (t, e, r) in enumerate(nodes):
+            for u, f, s in nodes[i + 1:]:
+                if u - t >= REVISIT_APART_S and near(r, s):
+                    metres_off, radians_off = difference(rot.between(e, f), rot.between(r, s), scale)
+                    metres.append(metres_off)
+                    radians.append(radians_off)
+    if not metres:
+        return {"pairs": 0, "median_m": None, "median_deg": None}
+    return {"pairs": len(metres), "median_m": middle_of(metres), "median_deg": math.degrees(middle_of(radians))}
+
+
+def same_frame(known):
+    """For each frame its (piece, pair), in the order of time."""
+    for frame in {m.frame for m in known}:
+        yield sorted(((i, pair) for i, m in enumerate(known) if m.frame == frame for pair in m.pairs), key=lambda item: item[1][0])
+
+
+def spaced(nodes):
+    kept = []
+    for node in nodes:
+        if not kept or node[0] - kept[-1][0] >= REVISIT_STEP_S:
+            kept.append(node)
+    return kept
+
+
+def difference(T_estimate, T_reference, scale):
+    """Metres of the reference, radians."""
+    off = rot.subtract(rot.scaled(1 / scale, T_estimate[1]), T_reference[1]) if scale else T_reference[1]
+    return math.hypot(*off), rot.angle(rot.multiply(rot.conjugate(T_estimate[0]), T_reference[0]))
+
+
+def middle_of(values):
+    return sorted(values)[len(values) // 2]
+
+
+def check_constraints(constraints, pieces, scale, T_body_cam):
+    """Accepted ones, (from stamp, to stamp, T_from_to of the bodies), that the reference knows: checked, wrong, of revisits.
+
+    Both of one piece: off by more than WRONG_M or WRONG_RAD; of two pieces of one frame ACROSS times as much."""
+    result = {"checked": 0, "wrong": 0, "revisits": 0, "median_m": None, "median_deg": None}
+    metres, radians = [], []
+    for t, u, T_from_to in constraints:
+        a, b = (in_pieces(pieces, stamp) for stamp in (t, u))
+        result["revisits"] += abs(t - u) >= REVISIT_APART_S
+        if not a or not b or a[0].frame != b[0].frame:
+            continue
+        T = rot.compose(rot.compose(rot.inverse(T_body_cam), T_from_to), T_body_cam)
+        m, r = difference(T, rot.between(a[1], b[1]), scale)
+        bound = 1 if a[0] is b[0] else ACROSS
+        result["checked"] += 1
+        result["wrong"] += m > bound * WRONG_M or r > bound * WRONG_RAD
+        metres.append(m)
+        radians.append(r)
+    if metres:
+        result.update(median_m=middle_of(metres), median_deg=math.degrees(middle_of(radians)))
+    return result
+
+
+def in_pieces(pieces, t):
+    for piece in pieces:
+        pose = trajectory.at(piece.poses, trajectory.stamps_of(piece.poses), t)
+        if pose:
+            return piece, pose
+    return None

@@ -1,0 +1,74 @@
+"""What the products of a plan come to: measured for each run, and for other systems' trajectories."""
+
+from accuracy_lib import plan as accuracy
+from accuracy_lib.metrics import read_json
+from real_lib import rotations as rot
+from real_lib import trajectory
+from real_lib.constraints import accepted
+from real_lib.measure import best_shift, check_constraints, measure
+
+
+class Results:
+    def __init__(self, plan):
+        self.plan = plan
+        mav0 = accuracy.mav0_of(plan.recording)
+        T_rig_body, T_rig_cam = (trajectory.extrinsics(mav0 / sensor / "sensor.yaml") for sensor in ("imu0", "cam0"))
+        self.T_body_cam = rot.between(T_rig_body, T_rig_cam)
+        self.pieces = trajectory.grown(self._reference(T_rig_cam), plan.options.reference_scale)
+
+    def _reference(self, T_rig_cam):
+        truth = self.plan.groundtruth()
+        if truth:
+            poses = trajectory.moved(trajectory.read_groundtruth(truth), T_rig_cam)
+            return [trajectory.Piece(piece, 0) for piece in trajectory.split_at_holes(poses)]
+        return trajectory.read_pieces(self.plan.reference_file())
+
+    def vio(self, start):
+        agent = self.plan.agents[self.plan.WHERE, self.plan.start_name(start)]
+        maps = self._maps(agent)
+        return self._measured(max(maps, key=len), len(maps)) if maps else None
+
+    def server(self, start):
+        return self._of_server(self.plan.start_name(start))
+
+    def halves(self, order):
+        return self._of_server(f"halves_{order}")
+
+    def other(self, file):
+        poses = trajectory.moved(trajectory.read(file), self.T_body_cam)
+        result = measure(poses, self.pieces, best_shift(poses, self.pieces))
+        return {**result, "maps": 1} if result else None
+
+    def _of_server(self, name):
+        job, agents = self.plan.servers[self.plan.WHERE, name]
+        report = read_json(job.folder / "report.json") if job.ended_well else None
+        if not report:
+            return None
+        dense = [pose for agent in agents for pose in self._optimised(job.folder, agent)]
+        result = self._measured(sorted(dense), len(report["groups"]))
+        if result:
+            result["constraints"] = self._constraints(job.folder, agents, report, result["scale"])
+            result["fused"] = any(len(group["agents"]) == len(agents) for group in report["groups"])
+        return result
+
+    def _constraints(self, folder, agents, report, scale):
+        found = [c for constraints in accepted(folder / "session.lcm").values() for c in constraints]
+        counts = report["constraints"]
+        return {"accepted": counts["accepted"], "refused": counts["refused"], "refused_by_reason": counts["refused_by_reason"],
+                "switched_off": sum(group["constraints_switched_off"] for group in report["groups"]),
+                **check_constraints(found, self.pieces, scale, self.T_body_cam)}
+
+    def _measured(self, body_poses, maps):
+        result = measure(trajectory.moved(body_poses, self.T_body_cam), self.pieces) if body_poses else None
+        return {**result, "maps": maps} if result else None
+
+    @staticmethod
+    def _maps(agent):
+        """The odometry's maps, each as its poses."""
+        files = sorted(agent.vio.folder.glob("vio.tum*")) if agent.vio.ended_well else []
+        return [poses for file in files if (poses := trajectory.read(file))]
+
+    def _optimised(self, folder, agent):
+        keyframes = trajectory.read(folder / f"agent_{agent.id}.tum")
+        return [pose for odometry in self._maps(agent) for pose in
+                trajectory.at_camera_rate([k for k in keyframes if odometry[0][0] <= k[0] <= odometry[-1][0]], odometry)]

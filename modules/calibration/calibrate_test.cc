@@ -1,0 +1,95 @@
+#include "calibration/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calibration/calibration_test_world.h"
+
+namespace pangea::calibration {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TestWorldOptions Short(uint64_t seed) {
+  return {.seed = seed, .seconds = 14, .image_hz = 20, .num_points = 700};
+}
+
+// 99.9 % bounds of the mean of `worlds` squared standard normals, by Wilson and Hilferty.
+std::pair<double, double> NeesBounds(int worlds) {
+  const double n = worlds, k = 2.0 / (9 * n), z = 3.29;
+  return {std::pow(1 - k - z * std::sqrt(k), 3), std::pow(1 - k + z * std::sqrt(k), 3)};
+}
+
+TEST(Calibrate, IsAsFarOffAsItSays) {
+  constexpr int kWorlds = 20;
+  Tangent nees = Tangent::Zero(), largest = Tangent::Zero();
+  for (uint64_t seed = 1; seed <= kWorlds; ++seed) {
+    TestWorld world = MakeTestWorld(Short(seed));
+    // This one is exact.
+    world.input.imu_noise.axes_sigma = world.input.imu_noise.gyro_scale_sigma = 0;
+    Options options;
+    options.sigma_gyro_scale = 0;
+    const Result result = Calibrate(world.input, options);
+    EXPECT_EQ(result.refused, "") << seed;
+    const Tangent off = result.parameters.Minus(world.truth);
+    nees += off.cwiseQuotient(result.sigma).cwiseAbs2() / kWorlds;
+    largest = largest.cwiseMax(off.cwiseAbs());
+  }
+  const auto [low, high] = NeesBounds(kWorlds);
+  for (int row = 0; row < kSize; ++row) {
+    EXPECT_GT(nees[row], low) << row;
+    EXPECT_LT(nees[row], high) << row;
+  }
+  EXPECT_LT(largest[kLogFocal], 0.01);
+  EXPECT_LT(largest.segment<3>(kRotation).maxCoeff(), 0.01);
+  EXPECT_LT(largest[kTimeOffset], 0.001);
+}
+
+// Stamps shift a whole image, so its residuals are no independent witnesses.
+TEST(Calibrate, StampsThatJitterMakeItLessSure) {
+  TestWorldOptions options = Short(3);
+  const Result exact = Calibrate(MakeTestWorld(options).input, {});
+  options.stamp_sigma_s = 0.004;
+  const TestWorld world = MakeTestWorld(options);
+  const Result result = Calibrate(world.input, {});
+  EXPECT_EQ(result.refused, "");
+  EXPECT_GT(result.sigma[kTimeOffset], 2 * exact.sigma[kTimeOffset]);
+  const Tangent off = result.parameters.Minus(world.truth).cwiseQuotient(result.sigma);
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 4);
+}
+
+TEST(Calibrate, RefusesRotationAboutOneAxis) {
+  TestWorldOptions options = Short(5);
+  options.rotation_rms = {1e-4, 0.6, 1e-4};
+  const Result result = Calibrate(MakeTestWorld(options).input, {});
+  EXPECT_THAT(result.refused, HasSubstr("rotate more"));
+}
+
+TEST(Calibrate, RefusesACameraThatDoesNotRotate) {
+  TestWorldOptions options = Short(6);
+  options.rotation_rms.setConstant(1e-4);
+  EXPECT_THAT(Calibrate(MakeTestWorld(options).input, {}).refused, Not(""));
+}
+
+TEST(Calibrate, RefusesAGyroscopeInDegrees) {
+  TestWorld world = MakeTestWorld(Short(7));
+  for (ImuSample& sample : world.input.imu) {
+    sample.gyro *= 180 / M_PI;
+  }
+  EXPECT_THAT(Calibrate(world.input, {}).refused, HasSubstr("IMU"));
+}
+
+TEST(Calibrate, TakesWhatIsKnown) {
+  TestWorld world = MakeTestWorld(Short(8));
+  world.input.q_body_cam = world.truth.camera.T_body_cam.q;
+  world.input.field_of_view = 2 * std::atan(0.5 * world.truth.camera.width / world.truth.camera.fx);
+  const Result result = Calibrate(world.input, {});
+  EXPECT_EQ(result.refused, "");
+  EXPECT_EQ(result.next_cost, 0);  // no other rotation was tried
+}
+
+}  // namespace
+}  // namespace pangea::calibration

@@ -1,0 +1,106 @@
+#include "calibration/command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+
+#include "calibration/calibration_folder.h"
+#include "calibration/recording_tracks.h"
+#include "calibration/summary.h"
+#include "files/text_file.h"
+
+namespace pangea::calibration {
+namespace {
+
+constexpr int kRefused = 2;  // exit code
+constexpr double kDegree = M_PI / 180;
+
+struct Arguments {
+  std::string recording, out;
+  double field_of_view_deg = 0;
+  std::vector<std::string> camera_axes;
+  PartOfRecording part;
+};
+
+void AddOptions(CLI::App& app, Arguments& a) {
+  app.add_option("recording", a.recording, "folder in EuRoC's format; sensor.yaml may be missing")
+      ->required();
+  app.add_option("--out", a.out, "folder to make: the recording with its calibration")->required();
+  app.add_option("--fov", a.field_of_view_deg, "degrees over the image's wider side, to 10 %")
+      ->check(CLI::Range(35, 130));
+  app.add_option("--camera-axes", a.camera_axes,
+                 "the IMU's axes along which the image's right, its down, and the line of sight "
+                 "point: a phone's back camera -y -x -z; default: found")
+      ->expected(3)
+      ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option("--start", a.part.start_s, "seconds to skip")->check(CLI::NonNegativeNumber);
+  app.add_option("--duration", a.part.duration_s, "seconds to use")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+}
+
+Eigen::Quaterniond RotationOf(const std::vector<std::string>& axes) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const std::string& axis = axes[static_cast<size_t>(i)];
+    R(axis.back() - 'x', i) = axis.front() == '-' ? -1 : 1;
+  }
+  if (R.determinant() < 0.5) {
+    throw std::runtime_error(
+        "--camera-axes: not a rotation; each axis once, and right x down is the line of sight");
+  }
+  return Eigen::Quaterniond(R);
+}
+
+int Run(const Arguments& a) {
+  std::optional<Eigen::Quaterniond> q_body_cam;
+  if (!a.camera_axes.empty()) {
+    q_body_cam = RotationOf(a.camera_axes);
+  }
+  MakeFolder(a.recording, a.out);
+  const EurocRecording recording(a.out);
+  for (const std::string& warning : recording.warnings()) {
+    std::cerr << fmt::format("pangea-calibrate: {}\n", warning);
+  }
+  Input input = TracksOf(recording, a.part);
+  input.q_body_cam = q_body_cam;
+  if (a.field_of_view_deg > 0) {
+    input.field_of_view = kDegree * a.field_of_view_deg;
+  }
+  const Options options;
+  const Result result = Calibrate(input, options);
+  const std::string summary = Summary(input, options, result);
+  std::cout << summary;
+  if (!result.refused.empty()) {
+    std::filesystem::remove_all(std::filesystem::path(a.out) / "mav0");
+  } else {
+    WriteSensorYaml(a.out, result, input.imu_noise);
+  }
+  WriteTextFile((std::filesystem::path(a.out) / "calibration.txt").string(), summary);
+  return result.refused.empty() ? 0 : kRefused;
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app("Calibrates camera and IMU on a hand-held recording of 20 to 60 s",
+               "pangea-calibrate");
+  Arguments arguments;
+  AddOptions(app, arguments);
+  app.footer(fmt::format(
+      "Exit code: 0; 1 when something could not be done; {} when the motion does not tell.",
+      kRefused));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    cv::setNumThreads(1);  // one thread gives the same bytes
+    return Run(arguments);
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-calibrate: {}\n", error.what());
+    return 1;
+  }
+}
+
+}  // namespace pangea::calibration

@@ -1,0 +1,44 @@
+#pragma once
+
+// What is calibrated, with the tangent that steps and covariances are of.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "core/camera_model.h"
+
+namespace pangea::calibration {
+
+// Rows of the tangent. kRotation: R_body_cam' = Exp(d) R_body_cam, radians, body axes.
+enum Row : int {
+  kRotation = 0,
+  kGyroBias = 3,     // rad/s
+  kTimeOffset = 6,   // s, of the middle row: t_imu = t_image + offset
+  kLogFocal = 7,     // of the one focal length
+  kCentre = 8,       // px
+  kDistortion = 10,  // the first two coefficients; the others are 0
+  kReadout = 12,     // s, first row to last
+  kSize = 13
+};
+using Tangent = Eigen::Matrix<double, kSize, 1>;
+using Information = Eigen::Matrix<double, kSize, kSize>;
+
+struct Parameters {
+  // Pinhole with one focal length. Its time offset is of the first row, as in CameraModel.
+  CameraModel camera;
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
+
+  double MiddleRowOffset_s() const { return camera.time_offset_s + 0.5 * camera.readout_s; }
+  Parameters Plus(const Tangent& step) const;
+  // this (-) other.
+  Tangent Minus(const Parameters& other) const;
+};
+
+// What is known before: a normal distribution about `mean`, independent rows.
+struct Prior {
+  Parameters mean;
+  Tangent sigma = Tangent::Ones();
+};
+
+}  // namespace pangea::calibration

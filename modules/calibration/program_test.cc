@@ -1,0 +1,122 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "calibration/calibration_folder.h"
+#include "calibration/recording_tracks.h"
+#include "calibration/summary.h"
+#include "core/rigid3.h"
+#include "files/text_file.h"
+#include "recording/euroc_calibration.h"
+
+namespace pangea::calibration {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+class Program : public testing::Test {
+ protected:
+  Program() : folder_(fs::temp_directory_path() / "pangea_calibration_program_test") {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~Program() override { fs::remove_all(folder_); }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  // Images and samples, and no sensor.yaml.
+  void MakeRecording() const {
+    fs::create_directories(folder_ / "in/mav0/cam0/data");
+    fs::create_directories(folder_ / "in/mav0/imu0");
+    std::string images, imu;
+    for (int64_t i = 0; i < 3; ++i) {
+      const std::string name = std::to_string(i) + ".png";
+      cv::imwrite(Path("in/mav0/cam0/data/" + name), cv::Mat(48, 64, CV_8UC1, cv::Scalar(90)));
+      images += std::to_string(50'000'000 * (i + 1)) + "," + name + "\n";
+    }
+    for (int64_t i = 0; i < 60; ++i) {
+      imu += std::to_string(5'000'000 * i) + ",0,0,0,0,0,9.81\n";
+    }
+    WriteTextFile(Path("in/mav0/cam0/data.csv"), images);
+    WriteTextFile(Path("in/mav0/imu0/data.csv"), imu);
+  }
+
+  fs::path folder_;
+};
+
+Result Some() {
+  Result result;
+  CameraModel& camera = result.parameters.camera;
+  camera.kind = CameraModel::Kind::kEquidistant;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 484.125;
+  camera.cx = 321.5;
+  camera.cy = 236.25;
+  camera.distortion << -0.0625, 0.125, 0, 0;
+  camera.readout_s = 0.03;
+  camera.time_offset_s = -0.05;
+  camera.T_body_cam.q = ExpSo3({0.1, -0.2, 2.5});
+  result.parameters.gyro_bias = {0.01, 0.02, 0.03};
+  result.sigma.setConstant(1e-3);
+  result.sigma_px = 0.5;
+  result.seconds = 30;
+  result.points = 60;
+  result.rotation_rms.setConstant(0.5);
+  return result;
+}
+
+TEST_F(Program, WhatIsWrittenIsReadAgain) {
+  const Result some = Some();
+  WriteTextFile(Path("cam.yaml"), CameraYaml(some, 30));
+  const CameraModel camera = ReadEurocCamera(Path("cam.yaml"));
+  Parameters read;
+  read.camera = camera;
+  read.gyro_bias = some.parameters.gyro_bias;
+  EXPECT_LT(read.Minus(some.parameters).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_EQ(camera.kind, CameraModel::Kind::kEquidistant);
+  WriteTextFile(Path("imu.yaml"), ImuYaml(some, {.gyro_noise_density = 7e-4}));
+  EXPECT_DOUBLE_EQ(ReadEurocImuCalibration(Path("imu.yaml")).noise.gyro_noise_density, 7e-4);
+}
+
+TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
+  MakeRecording();
+  MakeFolder(Path("in"), Path("out"));
+  const EurocRecording recording(Path("out"));
+  EXPECT_EQ(recording.images().size(), 3U);
+  EXPECT_EQ(recording.camera().width, 64);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "out/mav0/cam0/data"));
+  EXPECT_FALSE(fs::exists(folder_ / "in/mav0/cam0/sensor.yaml"));
+  EXPECT_THROW(MakeFolder(Path("in"), Path("out")), std::runtime_error);
+  const Input input = TracksOf(recording, {});
+  EXPECT_EQ(input.frames.size(), 3U);
+  EXPECT_THAT(Calibrate(input, {}).refused, HasSubstr("record longer"));
+}
+
+TEST(Summary, SaysWhatToDoBetter) {
+  Result result = Some();
+  EXPECT_THAT(Summary({}, {}, result), Not(HasSubstr("better:")));
+  result.rotation_rms = {0.5, 0.05, 0.5};
+  result.points = 20;
+  result.refused = "the focal length is known to 9 % only";
+  const std::string text = Summary({}, {}, result);
+  EXPECT_THAT(text, HasSubstr("better: rotate more left and right"));
+  EXPECT_THAT(text, HasSubstr("better: more light"));
+  EXPECT_THAT(text, HasSubstr("no calibration: the focal length"));
+}
+
+TEST(Summary, SaysWhatTheMotionDidNotTell) {
+  Result result = Some();
+  Input input;
+  input.width = 640;
+  input.height = 480;
+  EXPECT_THAT(Summary(input, {}, result), Not(HasSubstr("not told")));
+  result.sigma[kReadout] = 0.011;
+  EXPECT_THAT(Summary(input, {}, result), HasSubstr("as assumed"));
+}
+
+}  // namespace
+}  // namespace pangea::calibration

@@ -1,0 +1,44 @@
+#pragma once
+
+// Where to begin: of the 24 rotations that take axes to axes, time offsets and fields of view, the
+// ones whose epipolar residuals are smallest.
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "calibration/frame_pairs.h"
+#include "calibration/parameters.h"
+#include "core/imu/imu.h"
+
+namespace pangea::calibration {
+
+struct SearchOptions {
+  double max_offset_s = 0.15;
+  double offset_step_s = 0.015;
+  int max_pairs = 50;
+  int max_points = 25;           // of each
+  double velocity_change = 0.2;  // so short are the pairs
+  double sigma_px = 3;           // what the grid leaves
+};
+
+// Rotations camera to body.
+std::vector<Eigen::Quaterniond> AxisAlignedRotations();
+
+// Best of each rotation with its cost per residual, the best rotation first. `camera` has size,
+// kind and read-out; fields of view are of its wider side, radians.
+struct Hypothesis {
+  Parameters parameters;
+  double cost = 0;
+};
+std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
+                               int64_t origin_utime, const CameraModel& camera,
+                               std::span<const Eigen::Quaterniond> rotations,
+                               std::span<const double> fields_of_view,
+                               const SearchOptions& options);
+
+// Focal length, pixels, of a field of view over the wider side.
+double FocalOf(double field_of_view, const CameraModel& camera);
+
+}  // namespace pangea::calibration

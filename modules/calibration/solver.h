@@ -1,0 +1,77 @@
+#pragma once
+
+// Least squares over all pairs: robust (Cauchy), Levenberg-Marquardt, each pair's
+// translation eliminated (Kaufman, 1975), numeric derivatives with respect to the dozen parameters.
+//
+// Covariance: residuals of one image share the errors of its stamp and of the gyroscope, so they
+// are no independent witnesses. It is that of estimating equations with residuals grouped into
+// blocks of time, short and long ones (Liang & Zeger, Biometrika 1986), or the usual one where that
+// is larger.
+
+#include <span>
+#include <vector>
+
+#include "calibration/epipolar.h"
+#include "core/imu/imu.h"
+
+namespace pangea::calibration {
+
+struct SolverOptions {
+  int max_iterations = 25;
+  double velocity_change = 1;  // within a pair (epipolar.h)
+  double block_s = 1.0;        // of residuals that may share an error
+  int long_blocks = 8;         // of the whole recording: for what changes slowly, as exposure does
+  double robust_at = 2.4;      // of the Cauchy loss, in standard deviations
+  // Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
+  double min_field_of_view = 0.6, max_field_of_view = 2.4;  // rad, of the wider side
+  double max_distortion = 0.6;
+  // A lens that is far from equidistant is none.
+  double max_distortion_equidistant = 0.15;
+};
+
+struct Solution {
+  Parameters parameters;
+  Information covariance = Information::Identity();
+  double sigma_px = 0;      // of residuals, robust
+  double inlier_share = 0;  // of residuals within three standard deviations
+  double cost = 0;          // robust, of all residuals, in units of 1 px
+  int iterations = 0;
+};
+
+class Solver {
+ public:
+  Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu, int64_t origin_utime,
+         const SolverOptions& options);
+
+  // Rows whose prior's sigma is 0 stay as they are.
+  Solution Solve(const Parameters& start, const Prior& prior) const;
+  // Robust, without prior: for hypotheses.
+  double Cost(const Parameters& parameters, double sigma_px) const;
+
+ private:
+  struct Linearised;
+  struct PairTerms;
+  Linearised Linearise(const Parameters& parameters, const Prior& prior) const;
+  // d residuals / d parameters of each pair, translations held.
+  std::vector<Eigen::MatrixXd> Jacobians(const Parameters& parameters, const Prior& prior,
+                                         const std::vector<PairRays>& rays,
+                                         const std::vector<PairTerms>& terms) const;
+  // A pair's part of the normal equations, its translation eliminated.
+  void AddPair(const PairGeometry& geometry, const PairTerms& terms,
+               const Eigen::MatrixXd& jacobian, Linearised* at) const;
+  std::vector<PairRays> Rays(const CameraModel& camera) const;
+  std::vector<PairGeometry> Geometries(const Parameters& parameters,
+                                       const std::vector<PairRays>& rays) const;
+  double RobustCost(const Eigen::VectorXd& residuals, double sigma_px) const;
+  double TotalCost(const Parameters& parameters, const Prior& prior, double sigma_px) const;
+  bool Plausible(const CameraModel& camera) const;
+  Information Scatter(const Linearised& at, double block_s) const;
+  Information Covariance(const Linearised& at) const;
+
+  std::span<const FramePair> pairs_;
+  std::span<const ImuSample> imu_;
+  int64_t origin_utime_;
+  SolverOptions options_;
+};
+
+}  // namespace pangea::calibration
