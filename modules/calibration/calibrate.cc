@@ -48,10 +48,11 @@ Prior PriorOf(const Input& input, const Options& options, const Parameters& mean
   return prior;
 }
 
-// First what matters most, then all; the prior stays where the search began.
+// First without the lens: focal length and distortion run away together while the rotation is
+// rough.
 Solution Refined(const Solver& solver, const Hypothesis& hypothesis, Prior prior) {
   Prior first = prior;
-  first.sigma.tail<kSize - kCentre>().setZero();
+  first.sigma.tail<kSize - kLogFocal>().setZero();
   return solver.Solve(solver.Solve(hypothesis.parameters, first).parameters, prior);
 }
 
@@ -103,12 +104,25 @@ void AddFloors(const ImuNoise& noise, double gyro_scale_sigma, Result& result) {
   for (int axis = 0; axis < 3; ++axis) {
     add(kRotation + axis, noise.axes_sigma);
   }
+  // What two coefficients leave of a lens.
+  constexpr double kLensSigma = 0.001;
+  add(kDistortion, kLensSigma);
+  add(kDistortion + 1, kLensSigma);
   add(kLogFocal, std::max(gyro_scale_sigma, noise.gyro_scale_sigma));
   result.sigma = result.covariance.diagonal().cwiseSqrt();
 }
 
 std::string Refusal(const Result& result, const Options& options) {
   const Tangent& sigma = result.sigma;
+  const double offset_s = std::abs(result.parameters.MiddleRowOffset_s());
+  const double field = FieldOfView(result.parameters.camera);
+  if (offset_s > options.search.max_offset_s || field < options.min_field_of_view ||
+      field > options.max_field_of_view) {
+    return fmt::format(
+        "what fits best is no phone's: a field of view of {:.0f} degrees, a time offset of {:.0f} "
+        "ms: rotate more, about all three axes",
+        field / kDegree, 1e3 * offset_s);
+  }
   if (result.sigma_px > options.max_sigma_px) {
     return fmt::format(
         "points are {:.1f} px off what the gyroscope says (at most {} are plausible): stamps, "
@@ -175,17 +189,27 @@ Choice ChooseRotation(const Input& input, const Options& options, std::span<cons
                           : std::vector<double>(std::begin(kFieldsOfView), std::end(kFieldsOfView));
   FramePairOptions shorter = options.pairs;
   shorter.max_gap_s = options.search_gap_s;
-  const std::vector<FramePair> searched = Pairs(input, options, shorter, origin);
+  const std::vector<FramePair> searched =
+      WithMostMotion(Pairs(input, options, shorter, origin), options.search);
   std::vector<Hypothesis> found =
       Search(searched, input.imu, origin, Nominal(input, options, CameraModel::Kind::kRadtan),
              rotations, fields, options.search);
+  SolverOptions stiff = options.solver;
+  stiff.velocity_change = options.search.velocity_change;
+  // The gyroscope's bias may hide the right one: each is refined a little before most are dropped.
+  const Solver roughly(searched, input.imu, origin, stiff);
+  for (Hypothesis& hypothesis : found) {
+    Prior first = PriorOf(input, options, hypothesis.parameters);
+    first.sigma.tail<kSize - kLogFocal>().setZero();
+    const Solution solution = roughly.Solve(hypothesis.parameters, first);
+    hypothesis = {solution.parameters, solution.cost};
+  }
+  std::ranges::stable_sort(found, {}, &Hypothesis::cost);
   found.resize(std::min(found.size(), static_cast<size_t>(options.max_refined)));
   std::vector<FramePair> some;
   for (size_t i = 0; i < pairs.size(); i += static_cast<size_t>(options.choose_on_every)) {
     some.push_back(pairs[i]);
   }
-  SolverOptions stiff = options.solver;
-  stiff.velocity_change = options.search.velocity_change;
   const Solver solver(some, input.imu, origin, stiff);
   for (Hypothesis& hypothesis : found) {
     const Solution solution =

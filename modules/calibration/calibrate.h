@@ -34,7 +34,7 @@ struct Options {
   double search_gap_s = 0.12;  // of the pairs searched on: what is not yet known adds up over time
   SearchOptions search;
   SolverOptions solver;
-  int max_refined = 6;      // hypotheses, on a part of the pairs
+  int max_refined = 9;      // hypotheses, on a part of the pairs
   int choose_on_every = 3;  // that part
   double min_seconds = 8;   // of pairs
   // What is known of any phone: standard deviations.
@@ -55,7 +55,8 @@ struct Options {
   double max_sigma_log_focal = 0.05;
   double max_sigma_time_offset_s = 0.01;
   double max_sigma_px = 2.5;
-  double min_cost_ratio = 1.03;  // the next best rotation's over the best one's
+  double min_field_of_view = 0.7, max_field_of_view = 2.3;  // rad
+  double min_cost_ratio = 2;  // the next best rotation's over the best one's
 };
 
 struct Result {

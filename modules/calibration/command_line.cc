@@ -33,7 +33,8 @@ void AddOptions(CLI::App& app, Arguments& a) {
       ->check(CLI::Range(35, 130));
   app.add_option("--camera-axes", a.camera_axes,
                  "the IMU's axes along which the image's right, its down, and the line of sight "
-                 "point: a phone's back camera -y -x -z; default: found")
+                 "point: --camera-axes=-y,-x,-z of a phone's back camera; default: found")
+      ->delimiter(',')
       ->expected(3)
       ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
   app.add_option("--start", a.part.start_s, "seconds to skip")->check(CLI::NonNegativeNumber);

@@ -16,6 +16,8 @@ double Motion(const FramePair& pair) {
   return squared / static_cast<double>(pair.points.size());
 }
 
+}  // namespace
+
 std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs,
                                       const SearchOptions& options) {
   std::vector<FramePair> most(pairs.begin(), pairs.end());
@@ -26,8 +28,6 @@ std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs,
   }
   return most;
 }
-
-}  // namespace
 
 std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
   std::vector<Eigen::Quaterniond> rotations;
@@ -46,6 +46,12 @@ std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
   return rotations;
 }
 
+double FieldOfView(const CameraModel& camera) {
+  const double half_px = 0.5 * std::max(camera.width, camera.height);
+  return 2 * (camera.kind == CameraModel::Kind::kEquidistant ? half_px / camera.fx
+                                                             : std::atan(half_px / camera.fx));
+}
+
 double FocalOf(double field_of_view, const CameraModel& camera) {
   const double half_px = 0.5 * std::max(camera.width, camera.height);
   return camera.kind == CameraModel::Kind::kEquidistant ? half_px / (0.5 * field_of_view)
@@ -57,18 +63,17 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
                                std::span<const Eigen::Quaterniond> rotations,
                                std::span<const double> fields_of_view,
                                const SearchOptions& options) {
-  const std::vector<FramePair> some = WithMostMotion(pairs, options);
   size_t num_residuals = 0;
-  for (const FramePair& pair : some) {
+  for (const FramePair& pair : pairs) {
     num_residuals += pair.points.size();
   }
   SolverOptions stiff;
   stiff.velocity_change = options.velocity_change;
-  const Solver solver(some, imu, origin_utime, stiff);
+  const Solver solver(pairs, imu, origin_utime, stiff);
   std::vector<Hypothesis> hypotheses;
   for (const Eigen::Quaterniond& rotation : rotations) {
-    Hypothesis best{.parameters = {}, .cost = 1e300};
     for (const double field_of_view : fields_of_view) {
+      Hypothesis best{.parameters = {}, .cost = 1e300};
       for (double offset = -options.max_offset_s; offset <= options.max_offset_s + 1e-9;
            offset += options.offset_step_s) {
         Parameters trial;
@@ -82,8 +87,8 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
           best = {trial, cost};
         }
       }
+      hypotheses.push_back(best);
     }
-    hypotheses.push_back(best);
   }
   std::ranges::stable_sort(hypotheses, {}, &Hypothesis::cost);
   return hypotheses;

@@ -26,8 +26,8 @@ struct SearchOptions {
 // Rotations camera to body.
 std::vector<Eigen::Quaterniond> AxisAlignedRotations();
 
-// Best of each rotation with its cost per residual, the best rotation first. `camera` has size,
-// kind and read-out; fields of view are of its wider side, radians.
+// Best time offset of each rotation and field of view with its cost per residual, the best first.
+// `camera` has size, kind and read-out; fields of view are of its wider side, radians.
 struct Hypothesis {
   Parameters parameters;
   double cost = 0;
@@ -38,6 +38,12 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
                                std::span<const double> fields_of_view,
                                const SearchOptions& options);
 
+// The pairs with most motion, each thinned.
+std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs,
+                                      const SearchOptions& options);
+
+// Of the wider side, radians.
+double FieldOfView(const CameraModel& camera);
 // Focal length, pixels, of a field of view over the wider side.
 double FocalOf(double field_of_view, const CameraModel& camera);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "calibration/search.h"
 #include "core/median.h"
 
 namespace pangea::calibration {
@@ -193,12 +194,11 @@ Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& 
 }
 
 bool Solver::Plausible(const CameraModel& camera) const {
-  const double half_px = 0.5 * std::max(camera.width, camera.height);
   const bool equidistant = camera.kind == CameraModel::Kind::kEquidistant;
-  const double half = equidistant ? half_px / camera.fx : std::atan(half_px / camera.fx);
   const double most = equidistant ? options_.max_distortion_equidistant : options_.max_distortion;
-  return camera.fx > 0 && 2 * half > options_.min_field_of_view &&
-         2 * half < options_.max_field_of_view && camera.distortion.cwiseAbs().maxCoeff() < most;
+  const double field = FieldOfView(camera);
+  return camera.fx > 0 && field > options_.min_field_of_view &&
+         field < options_.max_field_of_view && camera.distortion.cwiseAbs().maxCoeff() < most;
 }
 
 // Of the sum of all pairs' gradients, from how those of blocks of time scatter.

@@ -10,7 +10,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-constexpr double kLittleRotation = 0.2;  // rad/s, rms
+constexpr double kLittleRotation = 0.1;  // rad/s, rms
 constexpr double kShort_s = 20, kFewPoints = 40, kRough_px = 1.0;
 constexpr double kTold = 0.7;  // of the prior's sigma: above, the data did not tell
 constexpr char kAxisNames[] = {'x', 'y', 'z'};
@@ -26,9 +26,8 @@ std::string Row(const std::string& what, const std::string& value, const std::st
 std::string Values(const Input& input, const Options& options, const Result& result) {
   const CameraModel& c = result.parameters.camera;
   const Tangent& s = result.sigma;
-  const double half_px = 0.5 * std::max(c.width, c.height);
   const bool fisheye = c.kind == CameraModel::Kind::kEquidistant;
-  const double field = 2 * (fisheye ? half_px / c.fx : std::atan(half_px / c.fx)) / kDegree;
+  const double field = FieldOfView(c) / kDegree;
   const Eigen::Vector3d rotation = s.segment<3>(kRotation) / kDegree;
   const double centre_prior = options.sigma_centre * std::max(input.width, input.height);
   std::string text;
@@ -64,8 +63,8 @@ std::vector<std::string> Advice(const Result& result) {
   std::vector<std::string> advice;
   for (int axis = 0; axis < 3; ++axis) {
     if (result.sigma_px > 0 && result.rotation_rms[axis] < kLittleRotation) {
-      advice.push_back(fmt::format("rotate more {}: {:.2f} rad/s, 0.5 is good", kAxes[axis],
-                                   result.rotation_rms[axis]));
+      advice.push_back(
+          fmt::format("rotate more {}: {:.2f} rad/s", kAxes[axis], result.rotation_rms[axis]));
     }
   }
   if (result.seconds < kShort_s) {
@@ -98,6 +97,10 @@ std::string Summary(const Input& input, const Options& options, const Result& re
         "{:.0f} s, {:.0f} points in a pair of images, {:.2f} px off, {:.0f} % within three "
         "standard deviations\n",
         result.seconds, result.points, result.sigma_px, 100 * result.inlier_share);
+    if (result.next_cost > 0) {
+      text += fmt::format("the next best rotation of the camera fits {:.1f} times worse\n",
+                          result.next_cost);
+    }
   }
   for (const std::string& line : Advice(result)) {
     text += "better: " + line + "\n";
