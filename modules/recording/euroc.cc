@@ -138,7 +138,10 @@ EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folde
   ground_truth_ = ReadGroundTruthIn(mav0_, T_s_body, &warnings_);
 }
 
-void EurocRecording::ReadCamera() { camera_ = ReadEurocCamera(mav0_ + "/cam0/sensor.yaml"); }
+void EurocRecording::ReadCamera() {
+  camera_ = ReadEurocCamera(mav0_ + "/cam0/sensor.yaml");
+  calibration_sigmas_ = ReadEurocCalibrationSigmas(mav0_ + "/cam0/sensor.yaml");
+}
 
 Rigid3 EurocRecording::ReadImuCalibration() {
   const EurocImuCalibration calibration = ReadEurocImuCalibration(mav0_ + "/imu0/sensor.yaml");

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration_sigmas.h"
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
 #include "recording/trajectory.h"
@@ -34,6 +35,8 @@ class EurocRecording {
 
   const std::string& mav0() const { return mav0_; }
   const CameraModel& camera() const { return camera_; }
+  // Where sensor.yaml says it.
+  const std::optional<CalibrationSigmas>& calibration_sigmas() const { return calibration_sigmas_; }
   const ImuNoise& imu_noise() const { return imu_noise_; }
   const std::vector<EurocImage>& images() const { return images_; }
   const std::vector<ImuSample>& imu() const { return imu_; }
@@ -55,6 +58,7 @@ class EurocRecording {
 
   std::string mav0_;
   CameraModel camera_;
+  std::optional<CalibrationSigmas> calibration_sigmas_;
   ImuNoise imu_noise_;
   std::vector<EurocImage> images_;
   std::vector<ImuSample> imu_;

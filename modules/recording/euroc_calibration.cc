@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -149,6 +150,40 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
     Throw(sensor_yaml, *invalid);
   }
   return camera;
+}
+
+std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml) {
+  const YAML::Node root = Load(sensor_yaml);
+  bool is_any = false;
+  // The largest of a list, or a number; `unit` of the file in those of the result.
+  const auto read = [&](const char* key, size_t count, double unit, double* sigma) {
+    if (!root[key]) {
+      return;
+    }
+    is_any = true;
+    const std::vector<double> values =
+        count > 0 ? Numbers(root, sensor_yaml, key, count)
+                  : std::vector<double>{Number(root[key], sensor_yaml, key)};
+    const double largest = *std::max_element(values.begin(), values.end()) / unit;
+    if (!(largest > 0 && largest < 1)) {
+      Throw(sensor_yaml,
+            fmt::format("field '{}' must be above 0 and plausible, not {}", key, largest * unit));
+    }
+    *sigma = largest;
+  };
+  const double focal_px = Numbers(root, sensor_yaml, "intrinsics", 4)[0];
+  CalibrationSigmas sigmas;
+  read("rotation_sigma", 3, 1, &sigmas.rotation);
+  read("translation_sigma", 0, 1, &sigmas.position_m);
+  read("time_offset_sigma", 0, 1, &sigmas.time_offset_s);
+  double intrinsics = 0;
+  read("intrinsics_sigma", 4, focal_px, &intrinsics);
+  if (intrinsics > 0) {
+    const std::vector<double> px = Numbers(root, sensor_yaml, "intrinsics_sigma", 4);
+    sigmas.focal = std::max(px[0], px[1]) / focal_px;
+    sigmas.centre = std::max(px[2], px[3]) / focal_px;
+  }
+  return is_any ? std::optional(sigmas) : std::nullopt;
 }
 
 EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {

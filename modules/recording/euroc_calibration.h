@@ -2,8 +2,10 @@
 
 // EuRoC's sensor.yaml files.
 
+#include <optional>
 #include <string>
 
+#include "core/calibration_sigmas.h"
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
 
@@ -15,8 +17,10 @@ struct EurocImuCalibration {
 };
 
 // T_body_cam of the result is the file's T_BS: rig frame from camera.
-// Both throw std::runtime_error naming file and field.
+// All throw std::runtime_error naming file and field.
 CameraModel ReadEurocCamera(const std::string& sensor_yaml);
+// Nothing when the file says none of them (docs/recordings.md); those it does not say are as usual.
+std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml);
 EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml);
 // T_BS of any sensor; identity when the file or the key is missing.
 Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml);

@@ -154,6 +154,23 @@ TEST_F(EurocTest, TheTimeOffsetIsThatOfTheFirstRow) {
   EXPECT_THAT(Complaint(), HasSubstr("'stamp_row: upper' is not known; known: first, middle"));
 }
 
+TEST_F(EurocTest, HowWellTheCalibrationIsKnown) {
+  WriteCamera("radtan", "32, 24");
+  EXPECT_FALSE(EurocRecording(root_).calibration_sigmas());
+  const std::string camera = Text("cam0/sensor.yaml");
+  const double focal_px = EurocRecording(root_).camera().fx;
+  Write("cam0/sensor.yaml", camera + "rotation_sigma: [0.001, 0.004, 0.002]\n" +
+                                "intrinsics_sigma: [2, 2.5, 1.5, 1]\n");
+  const auto sigmas = EurocRecording(root_).calibration_sigmas();
+  ASSERT_TRUE(sigmas);
+  EXPECT_EQ(sigmas->rotation, 0.004);
+  EXPECT_DOUBLE_EQ(sigmas->focal, 2.5 / focal_px);
+  EXPECT_DOUBLE_EQ(sigmas->centre, 1.5 / focal_px);
+  EXPECT_EQ(sigmas->position_m, CalibrationSigmas{}.position_m);  // not given
+  Write("cam0/sensor.yaml", camera + "time_offset_sigma: -0.001\n");
+  EXPECT_THAT(Complaint(), HasSubstr("'time_offset_sigma' must be above 0"));
+}
+
 TEST_F(EurocTest, MissingPartsAreNamed) {
   EXPECT_THROW(EurocRecording("/nonexistent/recording"), std::runtime_error);
   fs::remove(root_ + "/mav0/imu0/data.csv");

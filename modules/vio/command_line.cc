@@ -95,7 +95,7 @@ int Run(const Arguments& a, const LiveImuNoise& live_imu, const std::string& opt
   InstallSignalHandlers();
   VioProcess process(bus, a.process, WallUtime());
   if (recording) {
-    process.Open(recording->camera(), recording->imu_noise());
+    process.Open(recording->camera(), recording->imu_noise(), recording->calibration_sigmas());
     Playback(lcm_bus ? &*lcm_bus : nullptr, process, *recording, a.playback).Run();
     return Outcome(process);
   }

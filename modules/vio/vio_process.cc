@@ -67,11 +67,14 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
 
 VioProcess::~VioProcess() = default;
 
-void VioProcess::Open(const CameraModel& camera, const ImuNoise& noise) {
+void VioProcess::Open(const CameraModel& camera, const ImuNoise& noise,
+                      const std::optional<CalibrationSigmas>& sigmas) {
   const auto open_map = [this, opened = int64_t{0}]() mutable {
     return options_.map_utime ? *options_.map_utime + opened++ : WallUtime();
   };
-  vio_.emplace(options_.agent_id, camera, noise, options_.vio, open_map);
+  VioOptions vio = options_.vio;
+  vio.estimator.calibration = sigmas.value_or(vio.estimator.calibration);
+  vio_.emplace(options_.agent_id, camera, noise, vio, open_map);
 }
 
 void VioProcess::AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu) {

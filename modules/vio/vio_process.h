@@ -55,8 +55,9 @@ class VioProcess : public Process {
   VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime);
   ~VioProcess() override;
 
-  // The calibration: before the first image.
-  void Open(const CameraModel& camera, const ImuNoise& noise);
+  // The calibration, and how well it is known where not as the options say: before the first image.
+  void Open(const CameraModel& camera, const ImuNoise& noise,
+            const std::optional<CalibrationSigmas>& sigmas = std::nullopt);
   bool open() const { return vio_.has_value(); }
 
   // As Vio::AddImage and Vio::AddTracks.

@@ -143,8 +143,10 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      problem.prior = initial.stationary ? StartPrior(problem.state, initial.covariance, noise)
-                                         : MovingStartPrior(problem.state, noise);
+      problem.prior =
+          initial.stationary
+              ? StartPrior(problem.state, initial.covariance, options.calibration, noise)
+              : MovingStartPrior(problem.state, options.calibration, noise);
     } else {
       Append(tracked.utime, from.imu, MakeImuFactor(Newest(), ImuTime(tracked.utime)));
     }

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration_sigmas.h"
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
 #include "core/imu/preintegration.h"
@@ -39,6 +40,7 @@ struct EstimatorOptions {
   double keyframe_track_share = 0.5;
   double keyframe_interval_s = 5;
   double keyframe_min_interval_s = 0.2;
+  CalibrationSigmas calibration;
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -56,6 +58,8 @@ struct EstimatorOptions {
                 "between keyframes, at most");
     archive.Add("keyframe_min_interval_s", &keyframe_min_interval_s, {0, 1000}, "s",
                 "between keyframes, at least");
+    archive.Section("calibration", &calibration,
+                    "how well the given one is known, where the recording does not say");
   }
 };
 

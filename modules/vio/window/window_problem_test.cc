@@ -326,7 +326,7 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   const VectorXd spread = RandomError(start, 0.05, 3).tail(kFrameSize);
   const Eigen::Matrix<double, 15, 15> plain =
       spread * spread.transpose() + 1e-2 * Eigen::Matrix<double, 15, 15>::Identity();
-  const WindowPrior prior = StartPrior(start, plain, ImuNoise{});
+  const WindowPrior prior = StartPrior(start, plain, {}, ImuNoise{});
   const MatrixXd P = prior.H.inverse();
   // Errors drawn as the initialiser means them, seen as the window does: p + dp = Exp(dtheta) p +
   // xi.

@@ -9,14 +9,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
-// Prior uncertainty of the given calibration.
-constexpr double kExtrinsicsRotationSigma =
-    0.001;  // rad; constraints of walks need it (imu_intrinsics.md)
-constexpr double kExtrinsicsPositionSigma = 0.005;  // m
-constexpr double kTimeOffsetSigma = 0.005;          // s
-constexpr double kFocalSigma = 0.001;               // of the focal length
-constexpr double kCentreSigma = 0.001;              // of the focal length: half a pixel
-
 constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
 
 // Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
@@ -56,13 +48,12 @@ Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
 }  // namespace
 
 WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
-                       const ImuNoise& noise) {
+                       const CalibrationSigmas& given, const ImuNoise& noise) {
   const int n = kSharedSize + kFrameSize;
   MatrixXd P = MatrixXd::Zero(n, n);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
-  sigma << Vector3d::Constant(kExtrinsicsRotationSigma),
-      Vector3d::Constant(kExtrinsicsPositionSigma), kTimeOffsetSigma, kFocalSigma, kCentreSigma,
-      kCentreSigma;
+  sigma << Vector3d::Constant(given.rotation), Vector3d::Constant(given.position_m),
+      given.time_offset_s, given.focal, given.centre, given.centre;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
   P.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) =
       ImuIntrinsicsCovariance(noise);
@@ -78,12 +69,13 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   return prior;
 }
 
-WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise) {
+WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
+                             const ImuNoise& noise) {
   Eigen::Matrix<double, 15, 1> sigma;
   sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
       Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
       Vector3d::Constant(kAccelBiasSigma);
-  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), noise);
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), given, noise);
   prior.at.frames[0].imu.accel_bias.setZero();
   return prior;
 }

@@ -5,17 +5,19 @@
 
 #include <Eigen/Core>
 
+#include "core/calibration_sigmas.h"
 #include "vio/window/window_problem.h"
 
 namespace pangea::vio {
 
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
-WindowPrior MovingStartPrior(const WindowState& start, const ImuNoise& noise);
+WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
+                             const ImuNoise& noise);
 
 // `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
 // the left, all differences plain (InitialState).
 WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
-                       const ImuNoise& noise);
+                       const CalibrationSigmas& given, const ImuNoise& noise);
 
 }  // namespace pangea::vio
