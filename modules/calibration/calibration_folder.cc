@@ -131,6 +131,7 @@ void MakeFolder(const std::string& recording, const std::string& out) {
   LinkEntries(from / "cam0", to / "cam0");
   LinkEntries(from / "imu0", to / "imu0");
   Result nothing_known;
+  nothing_known.sigma.setConstant(0.1);  // what is written must be readable
   CameraModel& camera = nothing_known.parameters.camera;
   camera.width = size.width;
   camera.height = size.height;
