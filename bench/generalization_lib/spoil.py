@@ -147,6 +147,52 @@ def cover(recording, *spans):
             recording.painted[row[1]] = lambda pixels: rng.randbytes(len(pixels)).translate(noise)
 
 
+def scaled_noise(recording, times):
+    lines = []
+    for line in recording.imu_yaml.splitlines():
+        key, _, value = line.partition(":")
+        is_noise = key in PHONE
+        lines.append(f"{key}: {times * float(value.split('#')[0])}" if is_noise else line)
+    recording.imu_yaml = "\n".join(lines) + "\n"
+
+
+def noise_10_times(recording):
+    """Noise densities and random walks given ten times too large."""
+    scaled_noise(recording, 10)
+
+
+def noise_a_tenth(recording):
+    """... and ten times too small."""
+    scaled_noise(recording, 0.1)
+
+
+def third_of_imu(recording):
+    """Every third sample: of 200 Hz as many as a browser gives."""
+    recording.imu = recording.imu[::3]
+
+
+def large_accel_bias(recording):
+    """(0.35, -0.25, 0.25) m/s^2: 0.5 in all."""
+    for row in recording.imu:
+        row[4:7] = [f"{float(value) + bias:.10f}" for value, bias in zip(row[4:7], (0.35, -0.25, 0.25))]
+
+
+def accel_scale(recording):
+    """The accelerometer shows 2.5 % too much."""
+    for row in recording.imu:
+        row[4:7] = [f"{1.025 * float(value):.10f}" for value in row[4:7]]
+
+
+def lost_imu(recording):
+    """Three of 97 samples lost."""
+    recording.imu = [row for i, row in enumerate(recording.imu) if i % 97 not in (5, 6, 7)]
+
+
+def doubled_imu(recording):
+    """Every 50th sample twice."""
+    recording.imu = [copy for i, row in enumerate(recording.imu) for copy in ([row, row] if i % 50 == 7 else [row])]
+
+
 def covered(recording):
     """A hand over the lens, for 1 s and for 2 s."""
     cover(recording, (10, 11), (25, 27))
@@ -167,7 +213,8 @@ def exposure_steps(recording):
 
 
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
-                                    jitter, accel_bias, phone_imu, covered, pocket, exposure_steps)}
+                                    jitter, accel_bias, phone_imu, noise_10_times, noise_a_tenth, third_of_imu, large_accel_bias,
+                                    accel_scale, lost_imu, doubled_imu, covered, pocket, exposure_steps)}
 
 
 def main():
@@ -182,7 +229,11 @@ def main():
         SPOILERS[what](recording)
     recording.write(out)
     recording.write_images(source / "cam0/data", out / "cam0/data")
-    shutil.copytree(source / "state_groundtruth_estimate0", out / "state_groundtruth_estimate0")
+    for truth in (source / "state_groundtruth_estimate0", source.parent / "reference.colmap.tum"):
+        if truth.is_dir():
+            shutil.copytree(truth, out / truth.name)
+        elif truth.is_file():
+            shutil.copy(truth, options.out / truth.name)
 
 
 if __name__ == "__main__":

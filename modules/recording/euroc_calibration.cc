@@ -154,35 +154,29 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
 
 std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml) {
   const YAML::Node root = Load(sensor_yaml);
-  bool is_any = false;
-  // The largest of a list, or a number; `unit` of the file in those of the result.
-  const auto read = [&](const char* key, size_t count, double unit, double* sigma) {
+  // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0).
+  const auto read = [&](const char* key, size_t size, size_t first, size_t count, double unit,
+                        double* sigma) {
     if (!root[key]) {
-      return;
+      return false;
     }
-    is_any = true;
-    const std::vector<double> values =
-        count > 0 ? Numbers(root, sensor_yaml, key, count)
-                  : std::vector<double>{Number(root[key], sensor_yaml, key)};
-    const double largest = *std::max_element(values.begin(), values.end()) / unit;
-    if (!(largest > 0 && largest < 1)) {
+    const std::vector<double> values = size > 0 ? Numbers(root, sensor_yaml, key, size)
+                                                : std::vector{Number(root[key], sensor_yaml, key)};
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
+    *sigma = *std::max_element(begin, begin + static_cast<std::ptrdiff_t>(count)) / unit;
+    if (!(*sigma > 0 && *sigma < 1)) {
       Throw(sensor_yaml,
-            fmt::format("field '{}' must be above 0 and plausible, not {}", key, largest * unit));
+            fmt::format("field '{}' must be above 0 and plausible, not {}", key, *sigma * unit));
     }
-    *sigma = largest;
+    return true;
   };
   const double focal_px = Numbers(root, sensor_yaml, "intrinsics", 4)[0];
   CalibrationSigmas sigmas;
-  read("rotation_sigma", 3, 1, &sigmas.rotation);
-  read("translation_sigma", 0, 1, &sigmas.position_m);
-  read("time_offset_sigma", 0, 1, &sigmas.time_offset_s);
-  double intrinsics = 0;
-  read("intrinsics_sigma", 4, focal_px, &intrinsics);
-  if (intrinsics > 0) {
-    const std::vector<double> px = Numbers(root, sensor_yaml, "intrinsics_sigma", 4);
-    sigmas.focal = std::max(px[0], px[1]) / focal_px;
-    sigmas.centre = std::max(px[2], px[3]) / focal_px;
-  }
+  bool is_any = read("rotation_sigma", 3, 0, 3, 1, &sigmas.rotation);
+  is_any |= read("translation_sigma", 0, 0, 1, 1, &sigmas.position_m);
+  is_any |= read("time_offset_sigma", 0, 0, 1, 1, &sigmas.time_offset_s);
+  is_any |= read("intrinsics_sigma", 4, 0, 2, focal_px, &sigmas.focal);
+  is_any |= read("intrinsics_sigma", 4, 2, 2, focal_px, &sigmas.centre);
   return is_any ? std::optional(sigmas) : std::nullopt;
 }
 

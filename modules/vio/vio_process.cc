@@ -22,10 +22,10 @@ constexpr int64_t kNotableLag_us = 500'000;
 
 // In words, when the motion has not told the scale; else nothing.
 std::string UnknownScale(const std::optional<double>& sigma) {
-  constexpr double kUnknown = 0.1;
+  constexpr double kUnknown = 0.03;
   return sigma && *sigma > kUnknown
              ? fmt::format(
-                   "the scale is known to {:.0f} % only: it takes acceleration, not even "
+                   "the scale is known to {:.0f} % at best: it takes acceleration, not even "
                    "motion or turning",
                    100 * *sigma)
              : "";

@@ -15,6 +15,7 @@
 #include "vio/command_line.h"
 #include "vio/front_end/test_images.h"
 #include "vio/vio_process_test_world.h"
+#include "vio/window/vio_test_world.h"
 
 namespace pangea::vio {
 namespace {
@@ -44,6 +45,30 @@ size_t SharedLandmarks(const Keyframe& first, const Keyframe& second) {
   return static_cast<size_t>(
       std::ranges::count_if(a, [&b](int32_t landmark_id) { return b.contains(landmark_id); }));
 }
+// Driving evenly does not tell it; walking does.
+TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
+  for (const double drive_mps : {0.0, 1.5}) {
+    VioTestWorldOptions motion;
+    motion.seed = 4;
+    motion.drive_mps = drive_mps;
+    VioTestWorld world(motion);
+    const cv::Mat image = RandomTexture(world.camera().width, world.camera().height, 11);
+    VioProcess process(bus_, options_, 0);
+    process.Open(world.camera(), motion.imu_noise);
+    int said = 0;
+    for (int frame = 0; frame < 100; ++frame) {
+      const VioTestWorld::Input input = world.Next();
+      process.AddTracks(input.frame, image, input.imu);
+      process.Tick(1'000'000 + input.frame.utime);
+      bus_.Drain();
+      const bool in_pose = poses_.back().reason.starts_with("the scale is known to ");
+      said += in_pose && status_.summary.find(poses_.back().reason) != std::string::npos ? 1 : 0;
+    }
+    EXPECT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
+    EXPECT_EQ(said > 0, drive_mps > 0) << said;
+  }
+}
+
 TEST_F(VioProcessTest, PublishesPosesAndCompleteKeyframes) {
   options_.out_tum = ::testing::TempDir() + "vio_process.tum";
   options_.out_keyframes = ::testing::TempDir() + "vio_process.lcm";
