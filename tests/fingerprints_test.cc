@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "pangea/again_t.hpp"
+#include "pangea/anchor_edit_t.hpp"
+#include "pangea/anchor_t.hpp"
 #include "pangea/camera_t.hpp"
 #include "pangea/checksums_t.hpp"
 #include "pangea/constraint_t.hpp"
@@ -19,6 +21,7 @@
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
+#include "pangea/shown_anchors_t.hpp"
 #include "pangea/status_t.hpp"
 #include "pangea/verdict_request_t.hpp"
 
@@ -27,6 +30,8 @@ namespace {
 
 TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(again_t::getHash()), 0x6f768b67d21c1586u);
+  EXPECT_EQ(static_cast<uint64_t>(anchor_edit_t::getHash()), 0x5fbea6d3c1d5a048u);
+  EXPECT_EQ(static_cast<uint64_t>(anchor_t::getHash()), 0x7a574a839c8d38ddu);
   EXPECT_EQ(static_cast<uint64_t>(camera_t::getHash()), 0xe1fe7ec25d6f1ac5u);
   EXPECT_EQ(static_cast<uint64_t>(checksums_t::getHash()), 0x52fe142c43cbb67au);
   EXPECT_EQ(static_cast<uint64_t>(constraint_t::getHash()), 0x2730b9abbbf2e325u);
@@ -41,6 +46,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(place_match_t::getHash()), 0x5be9f82364c3b435u);
   EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);
   EXPECT_EQ(static_cast<uint64_t>(resend_request_t::getHash()), 0x3f967c69b75046f2u);
+  EXPECT_EQ(static_cast<uint64_t>(shown_anchors_t::getHash()), 0x608bec938752b558u);
   EXPECT_EQ(static_cast<uint64_t>(status_t::getHash()), 0xc86ad2441b54de87u);
   EXPECT_EQ(static_cast<uint64_t>(verdict_request_t::getHash()), 0x2c0625dca65827feu);
 }

@@ -17,6 +17,10 @@ inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 inline constexpr std::string_view kVerificationRequest = "VERDICT_REQUEST";
+// From the journal; what apps and tools ask for is kAnchorRequestPrefix.
+inline constexpr std::string_view kAnchorEdit = "ANCHOR_EDIT";
+// Anchors in their group's frame.
+inline constexpr std::string_view kAnchor = "ANCHOR";
 // In files alone.
 inline constexpr std::string_view kChecksums = "CHECKSUMS";
 inline constexpr std::string_view kDamaged = "DAMAGED";
@@ -25,6 +29,7 @@ inline constexpr std::string_view kDamaged = "DAMAGED";
 inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";
 inline constexpr std::string_view kAllCorrections = "CORRECTION_[0-9]+";
 inline constexpr std::string_view kAllLandmarks = "LANDMARKS_[0-9]+";
+inline constexpr std::string_view kAllAnchors = "ANCHOR_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 inline constexpr std::string_view kAllLinkUps = "LINK_UP_[0-9]+";
@@ -39,6 +44,9 @@ inline constexpr std::string_view kPosePrefix = "POSE_";
 inline constexpr std::string_view kKeyframePrefix = "KEYFRAME_";
 inline constexpr std::string_view kCorrectionPrefix = "CORRECTION_";
 inline constexpr std::string_view kLandmarksPrefix = "LANDMARKS_";
+inline constexpr std::string_view kAnchorPrefix = "ANCHOR_";
+inline constexpr std::string_view kAnchorRequestPrefix = "ANCHOR_REQUEST_";
+inline constexpr std::string_view kShownAnchorsPrefix = "SHOWN_ANCHORS_";
 inline constexpr std::string_view kLinkUpPrefix = "LINK_UP_";
 inline constexpr std::string_view kLinkDownPrefix = "LINK_DOWN_";
 // And each process.
@@ -56,6 +64,12 @@ inline std::string Pose(int32_t agent_id) { return OfAgent(kPosePrefix, agent_id
 inline std::string Keyframe(int32_t agent_id) { return OfAgent(kKeyframePrefix, agent_id); }
 inline std::string Correction(int32_t agent_id) { return OfAgent(kCorrectionPrefix, agent_id); }
 inline std::string Landmarks(int32_t agent_id) { return OfAgent(kLandmarksPrefix, agent_id); }
+inline std::string Anchor(int32_t agent_id) { return OfAgent(kAnchorPrefix, agent_id); }
+// 0: a tool on the server's bus.
+inline std::string AnchorRequest(int32_t agent_id) {
+  return OfAgent(kAnchorRequestPrefix, agent_id);
+}
+inline std::string ShownAnchors(int32_t agent_id) { return OfAgent(kShownAnchorsPrefix, agent_id); }
 inline std::string LinkUp(int32_t agent_id) { return OfAgent(kLinkUpPrefix, agent_id); }
 inline std::string LinkDown(int32_t agent_id) { return OfAgent(kLinkDownPrefix, agent_id); }
 inline std::string Status(std::string_view process) {
