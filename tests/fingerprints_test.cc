@@ -30,7 +30,7 @@ namespace {
 
 TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(again_t::getHash()), 0x6f768b67d21c1586u);
-  EXPECT_EQ(static_cast<uint64_t>(anchor_edit_t::getHash()), 0x5fbea6d3c1d5a048u);
+  EXPECT_EQ(static_cast<uint64_t>(anchor_edit_t::getHash()), 0x91772b3888cb7d66u);
   EXPECT_EQ(static_cast<uint64_t>(anchor_t::getHash()), 0x7a574a839c8d38ddu);
   EXPECT_EQ(static_cast<uint64_t>(camera_t::getHash()), 0xe1fe7ec25d6f1ac5u);
   EXPECT_EQ(static_cast<uint64_t>(checksums_t::getHash()), 0x52fe142c43cbb67au);

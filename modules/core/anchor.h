@@ -49,6 +49,8 @@ struct AnchorEdit {
   int32_t keyframe_seq = 0;
   int64_t utime = 0;  // sensor clock
   Rigid3 T_ref_anchor;
+  // The agent's at utime, as its odometry had it then; else it lies between two keyframes.
+  std::optional<Rigid3> T_odom_body;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw
   std::optional<Matrix6d> covariance;               // of T_ref_anchor, where it is known
 };

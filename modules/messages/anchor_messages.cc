@@ -58,6 +58,12 @@ std::string ParsePlace(const anchor_edit_t& m, AnchorEdit* edit) {
       return "anchor edit: invalid covariance";
     }
   }
+  if (m.has_T_odom_body != 0) {
+    edit->T_odom_body = Parse(m.T_odom_body).value;
+    if (!edit->T_odom_body) {
+      return "anchor edit: invalid pose of the agent";
+    }
+  }
   edit->map = *map.value;
   edit->keyframe_seq = m.keyframe_seq;
   edit->utime = m.utime;
@@ -90,6 +96,8 @@ anchor_edit_t ToMessage(const AnchorEdit& edit) {
   m.keyframe_seq = edit.keyframe_seq;
   m.utime = edit.utime;
   m.T_ref_anchor = ToMessage(edit.T_ref_anchor);
+  m.has_T_odom_body = static_cast<int8_t>(edit.T_odom_body.has_value());
+  m.T_odom_body = ToMessage(edit.T_odom_body.value_or(Rigid3()));
   Eigen::Vector2f::Map(m.pixel) = edit.pixel.cast<float>();
   if (edit.covariance) {
     FromCovariance6(*edit.covariance, m.covariance);

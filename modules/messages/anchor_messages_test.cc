@@ -25,6 +25,7 @@ AnchorEdit Edit() {
   edit.keyframe_seq = 6;
   edit.utime = 7'000'000;
   edit.T_ref_anchor = {ExpSo3({0.1, 0.2, 0.3}), {1, 2, 3}};
+  edit.T_odom_body = {ExpSo3({0, 0, 2}), {7, 8, 9}};
   edit.pixel = {376.5, 240.25};
   edit.covariance = 0.25 * Matrix6d::Identity();
   return edit;
@@ -62,6 +63,7 @@ TEST(AnchorMessages, AnEditThereAndBack) {
   EXPECT_EQ(parsed.value->utime, edit.utime);
   EXPECT_EQ(parsed.value->pixel, edit.pixel);
   EXPECT_LT(parsed.value->T_ref_anchor.Minus(edit.T_ref_anchor).norm(), 1e-12);
+  EXPECT_LT(parsed.value->T_odom_body->Minus(*edit.T_odom_body).norm(), 1e-12);
   EXPECT_EQ(*parsed.value->covariance, *edit.covariance);
 }
 
@@ -112,6 +114,7 @@ TEST(AnchorMessages, EditsThatAreRefused) {
       [](anchor_edit_t& m) { m.pixel[1] = NAN; },
       [](anchor_edit_t& m) { m.covariance[0] = -1; },
       [](anchor_edit_t& m) { m.T_ref_anchor.rotation.w = 7; },
+      [](anchor_edit_t& m) { m.T_odom_body.rotation.w = 7; },
   };
   for (size_t i = 0; i < damages.size(); ++i) {
     anchor_edit_t message = ToMessage(Edit());
