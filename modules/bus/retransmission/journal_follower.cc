@@ -131,7 +131,8 @@ void JournalFollower::OnRetransmission(const again_t& again) {
                           node_, again, std::bind_front(&JournalFollower::OnMatch, this))) ||
                      (follows_.results != Which::kNone &&
                       TakeRetransmission<constraint_t>(
-                          node_, again, std::bind_front(&JournalFollower::OnResult, this)));
+                          node_, again, std::bind_front(&JournalFollower::OnResult, this))) ||
+                     (handlers_.other && handlers_.other(again));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }

@@ -50,6 +50,8 @@ class JournalFollower {
     std::function<bool(PlaceMatch)> match = {};
     std::function<void(const Constraint&)> result = {};
     std::function<void(const Have&)> have = {};  // before what follows from it
+    // A retransmission of something else; whether it was asked for.
+    std::function<bool(const again_t&)> other = {};
     // What else of the journal is still to come, in a catch-up.
     std::function<int64_t()> more_to_catch_up = {};
     std::function<void()> handled = {};  // after each message

@@ -1,0 +1,42 @@
+#pragma once
+
+// Which anchors a listener is told of now: those that changed, at most every kInterval_us each, and
+// each again every kRepeat_us for whoever came late. An anchor that is gone is told kTimesGone
+// times.
+//
+// In: all that the listener is to know, and the time. Bounded: what is no longer among that is
+// forgotten.
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "core/anchor.h"
+
+namespace pangea {
+
+class AnchorUpdates {
+ public:
+  static constexpr int64_t kInterval_us = 500'000;
+  static constexpr int64_t kRepeat_us = 10'000'000;
+  static constexpr int kTimesGone = 3;
+
+  AnchorUpdates(double moved_m, double moved_rad) : moved_m_(moved_m), moved_rad_(moved_rad) {}
+
+  std::vector<AnchorState> Due(const std::vector<AnchorState>& states, int64_t now_utime);
+
+ private:
+  struct Sent {
+    AnchorState state;
+    int64_t utime = 0;
+    int times_gone = 0;
+  };
+
+  bool IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime) const;
+
+  const double moved_m_;
+  const double moved_rad_;
+  std::map<AnchorId, Sent> sent_;
+};
+
+}  // namespace pangea

@@ -1,0 +1,235 @@
+#include "anchors/anchors.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+constexpr size_t kMaxNotPlaced = 100;
+
+// Covariance of T_b_a from that of T_a_b, first order.
+Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
+  const Eigen::Matrix3d R_b_a = T_a_b.R().transpose();
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = -R_b_a;
+  J.topRightCorner<3, 3>() = -R_b_a * Hat(T_a_b.t);
+  J.bottomRightCorner<3, 3>() = -R_b_a;
+  return J * covariance * J.transpose();
+}
+
+// The covariance of a transform whose left frame is turned.
+Matrix6d Turned(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = R;
+  J.bottomRightCorner<3, 3>() = R;
+  return J * covariance * J.transpose();
+}
+
+}  // namespace
+
+void Anchors::Take(const Keyframe& keyframe) {
+  const MapId& map = keyframe.id.map;
+  tracks_[map].Add(keyframe);
+  if (const auto waiting = waiting_.extract(map); !waiting.empty()) {
+    for (const AnchorId& id : waiting.mapped()) {
+      PlaceOrWait(id);
+    }
+  }
+}
+
+std::string Anchors::Take(const AnchorEdit& edit) {
+  std::string refused = book_.Take(edit);
+  if (refused.empty() && edit.placement != AnchorEdit::Placement::kSame) {
+    PlaceOrWait(edit.anchor);
+  }
+  return refused;
+}
+
+// An anchor that cannot be put somewhere else stays where it is.
+void Anchors::PlaceOrWait(const AnchorId& id) {
+  const AnchorEdit& edit = *book_.entries().at(id).place;
+  static const OdometryTrack kNoKeyframes;
+  const auto track = tracks_.find(edit.map);
+  PlacementResult result =
+      Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+  if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
+    placements_[id] = std::move(*placement);
+  } else if (const auto* const not_placed = std::get_if<NotPlaced>(&result)) {
+    if (not_placed_.size() < kMaxNotPlaced) {
+      not_placed_.push_back(
+          fmt::format("anchor {} \"{}\": {}", ToString(id), edit.name, not_placed->reason));
+    }
+  } else {
+    waiting_[edit.map].insert(id);
+  }
+}
+
+void Anchors::Take(const MapState& state) {
+  auto group = std::make_shared<Group>();
+  group->id = state.group;
+  group->revision = state.revision;
+  for (const KeyframePose& pose : state.keyframes) {
+    group->T_map_body[pose.id] = pose.T_map_body;
+  }
+  for (const MapId& map : state.maps) {
+    auto& known = groups_[map];
+    if (known == nullptr || known->revision < group->revision) {
+      known = group;
+    }
+  }
+}
+
+void Anchors::Take(const Correction& correction) {
+  Correction& newest = corrections_[correction.map];
+  if (newest.revision < correction.revision) {
+    newest = correction;
+  }
+}
+
+std::vector<MapId> Anchors::AgentMaps() const {
+  std::vector<MapId> maps;
+  for (const auto& [map, track] : tracks_) {
+    if (!maps.empty() && maps.back().agent_id == map.agent_id) {
+      maps.back() = map;
+    } else {
+      maps.push_back(map);
+    }
+  }
+  return maps;
+}
+
+const Anchors::Group* Anchors::GroupOf(const MapId& map) const {
+  const auto found = groups_.find(map);
+  return found == groups_.end() ? nullptr : found->second.get();
+}
+
+Rigid3 Anchors::T_map_odom(const MapId& map) const {
+  const Group* const group = GroupOf(map);
+  const auto track = tracks_.find(map);
+  if (group == nullptr || track == tracks_.end()) {
+    return {};
+  }
+  // The newest that both know.
+  auto it = group->T_map_body.upper_bound({map, std::numeric_limits<int32_t>::max()});
+  while (it != group->T_map_body.begin() && (--it)->first.map == map) {
+    if (const TrackedKeyframe* const keyframe = track->second.Find(it->first.seq)) {
+      return it->second * keyframe->T_odom_body.Inverse();
+    }
+  }
+  return {};
+}
+
+// A keyframe that the group's state does not have yet lies on the odometry behind those it has.
+Rigid3 Anchors::T_map_body(const MapId& map, int32_t seq) const {
+  if (const Group* const group = GroupOf(map)) {
+    const auto found = group->T_map_body.find({map, seq});
+    if (found != group->T_map_body.end()) {
+      return found->second;
+    }
+  }
+  return T_map_odom(map) * tracks_.at(map).Find(seq)->T_odom_body;
+}
+
+Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
+  std::vector<Rigid3> poses;
+  InGroup mean{{Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}, Matrix6d::Zero()};
+  for (const Hold& hold : placement.holds) {
+    poses.push_back(T_map_body(placement.map, hold.seq) * hold.T_body_anchor);
+    mean.T_map_anchor.t += hold.weight * poses.back().t;
+  }
+  // Rotations around the first one, which they hardly differ from.
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  Matrix6d spread = Matrix6d::Zero();
+  for (size_t i = 0; i < poses.size(); ++i) {
+    turn += placement.holds[i].weight * LogSo3(poses[i].q * poses[0].q.conjugate());
+    const Eigen::Vector3d off = poses[i].t - mean.T_map_anchor.t;
+    spread.topLeftCorner<3, 3>() += placement.holds[i].weight * off * off.transpose();
+  }
+  mean.T_map_anchor.q = (ExpSo3(turn) * poses[0].q).normalized();
+  mean.covariance = Turned(T_map_odom(placement.map).R(), placement.covariance) + spread;
+  return mean;
+}
+
+AnchorState Anchors::Base(const AnchorId& id, const AnchorEntry& entry, const MapId& map) const {
+  AnchorState state;
+  state.anchor = id;
+  state.revision = entry.revision;
+  state.edited_by = entry.edited_by;
+  state.gone = entry.deleted;
+  state.name = entry.name;
+  state.payload = entry.payload;
+  state.map = map;
+  const Group* const group = GroupOf(map);
+  state.group = group != nullptr ? group->id : map;
+  state.group_revision = group != nullptr ? group->revision : 0;
+  return state;
+}
+
+std::vector<AnchorState> Anchors::ForAgent(const MapId& map) const {
+  const auto track = tracks_.find(map);
+  if (track == tracks_.end()) {
+    return {};
+  }
+  const Rigid3 T_odom_map = T_map_odom(map).Inverse();
+  const auto correction = corrections_.find(map);
+  const Matrix6d correction_covariance =
+      correction == corrections_.end() ? Matrix6d(Matrix6d::Zero()) : correction->second.covariance;
+  const Matrix6d frame_covariance = InverseCovariance(T_odom_map.Inverse(), correction_covariance);
+  const Eigen::Vector3d agent = track->second.keyframes().rbegin()->second.T_odom_body.t;
+  std::vector<std::pair<double, AnchorState>> near;
+  std::vector<AnchorState> gone;
+  for (const auto& [id, placement] : placements_) {
+    AnchorState state = Base(id, book_.entries().at(id), map);
+    // Of another group there is no place in this one's frame.
+    const bool own = placement.map == map;
+    state.gone |= !own && (GroupOf(map) == nullptr || GroupOf(placement.map) == nullptr ||
+                           GroupOf(map)->id != GroupOf(placement.map)->id);
+    if (state.gone) {
+      gone.push_back(std::move(state));
+      continue;
+    }
+    const InGroup position = Position(placement);
+    state.T_odom_anchor = T_odom_map * position.T_map_anchor;
+    // What the group is not sure of moves its own map's anchors with it.
+    state.covariance =
+        ComposeCovariance(T_odom_map, own ? Matrix6d(Matrix6d::Zero()) : frame_covariance,
+                          position.T_map_anchor, position.covariance);
+    if (const double away_m = (state.T_odom_anchor.t - agent).norm(); away_m <= options_.near_m) {
+      near.emplace_back(away_m, std::move(state));
+    }
+  }
+  std::ranges::stable_sort(near, {}, &std::pair<double, AnchorState>::first);
+  near.resize(std::min<size_t>(near.size(), options_.max_near));
+  std::vector<AnchorState> states;
+  for (auto& [away_m, state] : near) {
+    states.push_back(std::move(state));
+  }
+  std::ranges::move(gone, std::back_inserter(states));
+  return states;
+}
+
+std::vector<AnchorState> Anchors::All() const {
+  std::vector<AnchorState> states;
+  for (const auto& [id, placement] : placements_) {
+    const Group* const group = GroupOf(placement.map);
+    const MapId frame = group != nullptr ? group->id : placement.map;
+    AnchorState state = Base(id, book_.entries().at(id), placement.map);
+    state.map = frame;
+    const InGroup position = Position(placement);
+    state.T_odom_anchor = position.T_map_anchor;
+    state.covariance = position.covariance;
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+size_t Anchors::num_placed() const {
+  return static_cast<size_t>(std::ranges::count_if(
+      placements_, [this](const auto& item) { return !book_.entries().at(item.first).deleted; }));
+}
+
+}  // namespace pangea

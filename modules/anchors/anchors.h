@@ -1,0 +1,106 @@
+#pragma once
+
+// The anchors of all maps, and where each is for whom.
+//
+// In: keyframes (in the order of their maps), edits (in the journal's order), whole group states,
+// corrections. Out: for an agent, the anchors of its group near it, in its odom frame; for watchers
+// all anchors in their group's frame. An anchor is held by keyframes (placement.h), so it follows
+// when the pose graph or a bundle adjustment moves these, when maps are fused, and when a fusion is
+// undone.
+//
+// No clock, no thread: the same calls give the same results. Bounded: max_anchors, and about 2 kB a
+// keyframe.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "anchors/anchor_book.h"
+#include "anchors/odometry_track.h"
+#include "anchors/placement.h"
+#include "core/anchor.h"
+#include "core/server_messages.h"
+
+namespace pangea {
+
+struct AnchorsOptions {
+  int max_anchors = 10000;
+  int holds = 8;           // keyframes that hold one
+  double near_m = 50;      // from an agent
+  int max_near = 64;       // sent to one agent
+  double moved_m = 0.002;  // sent again
+  double moved_rad = 0.002;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("max_anchors", &max_anchors, {1, 1e6}, "", "that are not deleted");
+    archive.Add("holds", &holds, {1, 100}, "", "keyframes that hold an anchor at most");
+    archive.Add("near_m", &near_m, {0.1, 1e5}, "m", "from an agent to the anchors it hears of");
+    archive.Add("max_near", &max_near, {1, 256}, "", "anchors an agent hears of, the nearest");
+    archive.Add("moved_m", &moved_m, {0, 100}, "m", "by which an anchor moved that is sent again");
+    archive.Add("moved_rad", &moved_rad, {0, 3.15}, "rad",
+                "by which an anchor turned that is sent again");
+  }
+};
+
+class Anchors {
+ public:
+  explicit Anchors(const AnchorsOptions& options)
+      : options_(options), book_(static_cast<size_t>(options.max_anchors)) {}
+
+  void Take(const Keyframe& keyframe);
+  // Why it is refused, or an empty string.
+  std::string Take(const AnchorEdit& edit);
+  // Whole; the highest revision wins, map by map.
+  void Take(const MapState& state);
+  void Take(const Correction& correction);
+
+  // The agents' maps: of each the newest.
+  std::vector<MapId> AgentMaps() const;
+  // Those near the map's newest keyframe, the nearest first; and those that are gone for it:
+  // deleted or in no group with it. Empty for a map without keyframes.
+  std::vector<AnchorState> ForAgent(const MapId& map) const;
+  // Every placed anchor in its group's frame, and those that were deleted.
+  std::vector<AnchorState> All() const;
+
+  size_t num_anchors() const { return book_.entries().size() - book_.num_deleted(); }
+  size_t num_placed() const;
+  size_t num_waiting() const { return waiting_.size(); }
+  // Why anchors could not be placed, since the last call.
+  std::vector<std::string> TakeNotPlaced() { return std::exchange(not_placed_, {}); }
+
+ private:
+  struct Group {
+    MapId id;
+    int64_t revision = 0;
+    std::map<KeyframeId, Rigid3> T_map_body;
+  };
+  // Where something is in a group.
+  struct InGroup {
+    Rigid3 T_map_anchor;
+    Matrix6d covariance;
+  };
+
+  void PlaceOrWait(const AnchorId& id);
+  const Group* GroupOf(const MapId& map) const;
+  // The newest odom frame; in a map that is in no group its own.
+  Rigid3 T_map_odom(const MapId& map) const;
+  Rigid3 T_map_body(const MapId& map, int32_t seq) const;
+  InGroup Position(const AnchorPlacement& placement) const;
+  AnchorState Base(const AnchorId& id, const AnchorEntry& entry, const MapId& map) const;
+
+  const AnchorsOptions options_;
+  AnchorBook book_;
+  std::map<MapId, OdometryTrack> tracks_;
+  std::map<AnchorId, AnchorPlacement> placements_;
+  std::map<MapId, std::set<AnchorId>> waiting_;  // for a keyframe of this map
+  std::map<MapId, std::shared_ptr<const Group>> groups_;
+  std::map<MapId, Correction> corrections_;
+  std::vector<std::string> not_placed_;
+};
+
+}  // namespace pangea

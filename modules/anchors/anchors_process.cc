@@ -1,0 +1,125 @@
+#include "anchors/anchors_process.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "bus/retransmission/missing.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond_us = 1'000'000;
+constexpr int64_t kPublishInterval_us = 100'000;
+constexpr int32_t kMaxAsked = 50;
+// Edits are one stream over all maps.
+const MapId kAllMaps{1, 0};
+
+}  // namespace
+
+AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options)
+    : options_(options),
+      node_(bus, "anchors"),
+      anchors_(options),
+      journal_(node_, {.in_order = true, .gives_up = true, .states = true},
+               {.keyframe = [this](const Keyframe& keyframe) { anchors_.Take(keyframe); },
+                .other = std::bind_front(&AnchorsProcess::OnRetransmission, this)}),
+      for_watchers_(options.moved_m, options.moved_rad) {
+  node_.Listen<map_state_t>(channels::kMapState,
+                            std::bind_front(&AnchorsProcess::OnMapState, this));
+  node_.Listen<correction_t>(channels::kAllCorrections,
+                             [this](const Correction& correction) { anchors_.Take(correction); });
+  node_.Listen<anchor_edit_t>(channels::kAnchorEdit,
+                              std::bind_front(&AnchorsProcess::OnEdit, this));
+}
+
+void AnchorsProcess::OnMapState(MapState state, const map_state_t& message) {
+  if (const auto whole = states_.Add(message.chunk, message.num_chunks, std::move(state))) {
+    anchors_.Take(*whole);
+    journal_.NoteStates(whole->maps);
+  }
+}
+
+void AnchorsProcess::OnEdit(AnchorEdit edit) {
+  if (edit.seq < 0 || edit.seq > std::numeric_limits<int32_t>::max() - 1) {
+    return node_.Refuse("anchor edit: not from the journal");
+  }
+  const auto seq = static_cast<int32_t>(edit.seq);
+  for (const AnchorEdit& next : edits_.Add(kAllMaps, seq, std::move(edit))) {
+    if (const std::string refused = anchors_.Take(next); !refused.empty()) {
+      node_.Refuse(refused);
+    }
+  }
+  for (const std::string& reason : anchors_.TakeNotPlaced()) {
+    node_.Refuse(reason);
+  }
+}
+
+bool AnchorsProcess::OnRetransmission(const again_t& again) {
+  return TakeRetransmission<anchor_edit_t>(node_, again,
+                                           std::bind_front(&AnchorsProcess::OnEdit, this));
+}
+
+void AnchorsProcess::RequestMissingEdits(int64_t now_utime) {
+  if (now_utime < next_request_utime_) {
+    return;
+  }
+  next_request_utime_ = now_utime + kSecond_us;
+  for (SeqGap gap : edits_.Gaps()) {
+    gap.to_seq = std::min(gap.to_seq, gap.from_seq + kMaxAsked - 1);
+    RequestRetransmission(node_, std::string(channels::kAnchorEdit), gap);
+  }
+}
+
+void AnchorsProcess::PublishDue(int64_t now_utime) {
+  if (now_utime < next_publish_utime_ || journal_.catching_up()) {
+    return;
+  }
+  next_publish_utime_ = now_utime + kPublishInterval_us;
+  std::map<MapId, AnchorUpdates> for_agents;
+  for (const MapId& map : anchors_.AgentMaps()) {
+    auto known = for_agents_.extract(map);
+    AnchorUpdates& updates =
+        known ? for_agents.insert(std::move(known)).position->second
+              : for_agents.try_emplace(map, options_.moved_m, options_.moved_rad).first->second;
+    for (const AnchorState& state : updates.Due(anchors_.ForAgent(map), now_utime)) {
+      node_.Publish(channels::Anchor(map.agent_id), ToMessage(state));
+    }
+  }
+  for_agents_ = std::move(for_agents);
+  for (const AnchorState& state : for_watchers_.Due(anchors_.All(), now_utime)) {
+    node_.Publish(std::string(channels::kAnchor), ToMessage(state));
+  }
+}
+
+void AnchorsProcess::Finish() {
+  for (const AnchorState& state : anchors_.All()) {
+    node_.Publish(std::string(channels::kAnchor), ToMessage(state));
+  }
+}
+
+void AnchorsProcess::Tick(int64_t now_utime) {
+  journal_.Tick(now_utime);
+  RequestMissingEdits(now_utime);
+  PublishDue(now_utime);
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond_us;
+    PublishStatus(now_utime);
+  }
+}
+
+void AnchorsProcess::PublishStatus(int64_t now_utime) {
+  node_.Set("anchors", static_cast<int64_t>(anchors_.num_anchors()));
+  node_.Set("anchors_placed", static_cast<int64_t>(anchors_.num_placed()));
+  node_.PublishStatus(
+      now_utime, static_cast<int64_t>(anchors_.num_waiting()),
+      fmt::format("{} anchors, {} of them placed", anchors_.num_anchors(), anchors_.num_placed()));
+}
+
+}  // namespace pangea

@@ -1,0 +1,56 @@
+#pragma once
+
+// KEYFRAME_*, MAP_STATE, CORRECTION_*, ANCHOR_EDIT, HAVE in; ANCHOR_k, ANCHOR, STATUS_anchors out.
+//
+// Edits are taken in the journal's order: what is missing is asked for at ticks (RESEND_REQUEST,
+// answers on AGAIN_anchors), and agent_handler repeats the newest, so that a lost tail shows. What
+// agents are told is paced by the clock (anchor_updates.h); in a replay nobody listens, and only
+// ANCHOR is said, at the end (Finish).
+
+#include <cstdint>
+#include <map>
+
+#include "anchors/anchor_updates.h"
+#include "anchors/anchors.h"
+#include "bus/node.h"
+#include "bus/process.h"
+#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/journal_follower.h"
+#include "messages/state_chunks.h"
+#include "pangea/again_t.hpp"
+#include "pangea/map_state_t.hpp"
+
+namespace pangea {
+
+class AnchorsProcess : public Process {
+ public:
+  AnchorsProcess(Bus& bus, const AnchorsOptions& options);
+
+  void Tick(int64_t now_utime) override;
+  // Says where every anchor is.
+  void Finish();
+
+  const Anchors& anchors() const { return anchors_; }
+
+ private:
+  void OnMapState(MapState state, const map_state_t& message);
+  void OnEdit(AnchorEdit edit);
+  bool OnRetransmission(const again_t& again);
+  void RequestMissingEdits(int64_t now_utime);
+  void PublishDue(int64_t now_utime);
+  void PublishStatus(int64_t now_utime);
+
+  const AnchorsOptions options_;
+  Node node_;
+  Anchors anchors_;
+  JournalFollower journal_;
+  StateChunks states_;
+  InOrder<AnchorEdit> edits_;  // one stream
+  AnchorUpdates for_watchers_;
+  std::map<MapId, AnchorUpdates> for_agents_;  // the newest map of each
+  int64_t next_request_utime_ = 0;
+  int64_t next_publish_utime_ = 0;
+  int64_t next_status_utime_ = 0;
+};
+
+}  // namespace pangea

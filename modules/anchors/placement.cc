@@ -1,0 +1,182 @@
+#include "anchors/placement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "anchors/surface.h"
+
+namespace pangea {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// The map around a pixel is that of the keyframes up to so long before and after.
+constexpr int64_t kSurface_us = 5'000'000;
+constexpr double kMinDepth_m = 0.1;
+constexpr double kPixelSigma = 1;
+// An anchor that nobody said anything of: placed by hand.
+constexpr double kUnknownSigma_m = 0.01, kUnknownSigma_rad = 0.02;
+constexpr double kFloorSigma_m = 0.001, kFloorSigma_rad = 0.0005;
+
+struct Pose {
+  Rigid3 T_odom_anchor;
+  Matrix6d covariance;
+};
+
+struct Viewer {
+  Rigid3 T_odom_cam;
+  const CameraModel& camera;
+};
+
+Matrix6d Diagonal(double sigma_m, double sigma_rad) {
+  Vector6d variances;
+  variances << Vector3d::Constant(sigma_m * sigma_m), Vector3d::Constant(sigma_rad * sigma_rad);
+  return variances.asDiagonal();
+}
+
+// The points that keyframes around this time have, each once, as this view sees them.
+std::vector<SurfacePoint> PointsInView(const OdometryTrack& track, int64_t utime,
+                                       const Viewer& viewer) {
+  const Rigid3 T_cam_odom = viewer.T_odom_cam.Inverse();
+  std::vector<SurfacePoint> points;
+  std::set<int32_t> landmarks;
+  // The newest keyframe that has a landmark knows it best.
+  for (auto it = track.keyframes().rbegin(); it != track.keyframes().rend(); ++it) {
+    const TrackedKeyframe& keyframe = it->second;
+    if (std::abs(keyframe.utime - utime) > kSurface_us) {
+      continue;
+    }
+    const Rigid3 T_cam_source = T_cam_odom * keyframe.T_odom_cam();
+    for (const TrackedPoint& point : keyframe.points) {
+      const Vector3d p_cam = T_cam_source * Vector3d(point.p_cam.cast<double>());
+      if (p_cam.z() < kMinDepth_m ||
+          (point.landmark_id != kNoLandmark && !landmarks.insert(point.landmark_id).second)) {
+        continue;
+      }
+      points.push_back(
+          {p_cam.head<2>() / p_cam.z(), 1 / p_cam.z(), point.relative_depth_sigma / p_cam.z()});
+    }
+  }
+  return points;
+}
+
+// Upright, facing the camera.
+Rigid3 Upright(const Rigid3& T_odom_cam, const Vector3d& p_cam) {
+  const Vector3d p_odom = T_odom_cam * p_cam;
+  const Vector3d to_camera = T_odom_cam.t - p_odom;
+  return {YawRotation(std::atan2(to_camera.y(), to_camera.x())), p_odom};
+}
+
+std::optional<Pose> OnSurface(const AnchorEdit& edit, const OdometryTrack& track,
+                              const Viewer& viewer) {
+  const auto ray = viewer.camera.Unproject(edit.pixel);
+  if (!ray) {
+    return std::nullopt;
+  }
+  const auto depth = DepthBehind(*ray, PointsInView(track, edit.utime, viewer));
+  if (!depth) {
+    return std::nullopt;
+  }
+  const Vector3d p_cam = depth->depth_m * Vector3d(ray->x(), ray->y(), 1);
+  const Vector3d along = viewer.T_odom_cam.q * p_cam.normalized();
+  const double sigma_along = depth->sigma_m * p_cam.norm() / depth->depth_m;
+  const double sigma_across = kPixelSigma * viewer.camera.PixelAngle() * p_cam.norm();
+  Matrix6d covariance = Diagonal(sigma_across, kUnknownSigma_rad);
+  covariance.topLeftCorner<3, 3>() +=
+      (sigma_along * sigma_along - sigma_across * sigma_across) * along * along.transpose();
+  return Pose{Upright(viewer.T_odom_cam, p_cam), covariance};
+}
+
+bool Sees(const TrackedKeyframe& keyframe, const Vector3d& p_odom) {
+  const Vector3d p_cam = keyframe.T_odom_cam().Inverse() * p_odom;
+  const auto pixel = p_cam.z() > kMinDepth_m ? keyframe.camera->Project(p_cam) : std::nullopt;
+  return pixel && keyframe.camera->Contains(*pixel);
+}
+
+// Of the keyframes that see the place, or of all where none does, those nearest in time; with the
+// weight of what the odometry knows between them and the placement.
+AnchorPlacement HoldBy(const OdometryTrack& track, int64_t utime, const Pose& pose, int count) {
+  std::vector<std::pair<int64_t, int32_t>> seeing, blind;  // (microseconds away, seq)
+  for (const auto& [seq, keyframe] : track.keyframes()) {
+    if (const int64_t away_us = std::abs(keyframe.utime - utime); away_us <= kSurface_us) {
+      (Sees(keyframe, pose.T_odom_anchor.t) ? seeing : blind).emplace_back(away_us, seq);
+    }
+  }
+  std::vector<std::pair<int64_t, int32_t>>& chosen = seeing.empty() ? blind : seeing;
+  const int32_t nearest = track.Nearest(utime)->first;
+  if (chosen.empty()) {
+    chosen.emplace_back(0, nearest);
+  }
+  std::ranges::sort(chosen);
+  chosen.resize(std::min<size_t>(chosen.size(), count));
+
+  AnchorPlacement placement;
+  placement.covariance = pose.covariance;
+  double total = 0;
+  for (const auto& [away_us, seq] : chosen) {
+    const auto [variance_m2, variance_rad2] = track.Drift(nearest, seq);
+    const double lever_m = (pose.T_odom_anchor.t - track.Find(seq)->T_odom_body.t).norm();
+    const double weight =
+        1 / (kFloorSigma_m * kFloorSigma_m + variance_m2 + variance_rad2 * lever_m * lever_m);
+    if (weight > 0 || chosen.size() == 1) {
+      const Rigid3 T_body_odom = track.Find(seq)->T_odom_body.Inverse();
+      placement.holds.push_back({seq, T_body_odom * pose.T_odom_anchor, weight});
+      total += weight;
+    }
+  }
+  for (Hold& hold : placement.holds) {
+    hold.weight = total > 0 ? hold.weight / total : 1;
+  }
+  placement.covariance += Diagonal(kFloorSigma_m, kFloorSigma_rad);
+  return placement;
+}
+
+PlacementResult Held(const AnchorEdit& edit, const OdometryTrack& track, int64_t utime,
+                     const Pose& pose, int holds) {
+  AnchorPlacement placement = HoldBy(track, utime, pose, holds);
+  placement.map = edit.map;
+  return placement;
+}
+
+// An editor's covariance is of T_ref_anchor, in the reference's frame.
+Pose Relative(const AnchorEdit& edit, const Rigid3& T_odom_ref) {
+  const Matrix6d own = edit.covariance.value_or(Diagonal(kUnknownSigma_m, kUnknownSigma_rad));
+  return {T_odom_ref * edit.T_ref_anchor,
+          ComposeCovariance(T_odom_ref, Matrix6d::Zero(), edit.T_ref_anchor, own)};
+}
+
+}  // namespace
+
+PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds) {
+  if (edit.placement == AnchorEdit::Placement::kKeyframe) {
+    const TrackedKeyframe* const keyframe = track.Find(edit.keyframe_seq);
+    if (keyframe == nullptr) {
+      return AwaitsKeyframe();
+    }
+    return Held(edit, track, keyframe->utime, Relative(edit, keyframe->T_odom_body), holds);
+  }
+  if (track.keyframes().empty() || track.keyframes().rbegin()->second.utime < edit.utime) {
+    return AwaitsKeyframe();
+  }
+  const auto T_odom_body = edit.T_odom_body ? edit.T_odom_body : track.Between(edit.utime);
+  if (!T_odom_body) {
+    return NotPlaced{"it is from before the map's first keyframe"};
+  }
+  if (edit.placement == AnchorEdit::Placement::kBody) {
+    return Held(edit, track, edit.utime, Relative(edit, *T_odom_body), holds);
+  }
+  const CameraModel& camera = *track.Nearest(edit.utime)->second.camera;
+  const auto pose = OnSurface(edit, track, {*T_odom_body * camera.T_body_cam, camera});
+  if (!pose) {
+    return NotPlaced{"the map has no surface behind this pixel"};
+  }
+  return Held(edit, track, edit.utime, *pose, holds);
+}
+
+}  // namespace pangea
