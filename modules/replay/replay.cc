@@ -9,6 +9,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "anchors/anchors_process.h"
 #include "bus/bus.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
@@ -21,6 +22,7 @@
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"
 #include "replay/keyframe_log.h"
+#include "replay/logged_edits.h"
 
 namespace pangea::session {
 namespace {
@@ -84,6 +86,9 @@ class Server {
     if (wanted("global_ba")) {
       global_ba_.emplace(bus, options.global_ba);
     }
+    if (wanted("anchors")) {
+      anchors_.emplace(bus, options.anchors);
+    }
   }
 
   // What waits for a quiet bus when live.
@@ -96,6 +101,10 @@ class Server {
       global_ba_->Finish();
       bus_.Drain();
     }
+    if (anchors_) {
+      anchors_->Finish();
+      bus_.Drain();
+    }
   }
 
  private:
@@ -105,6 +114,7 @@ class Server {
   std::optional<FusionProcess> fusion_;
   std::optional<PoseGraphProcess> posegraph_;
   std::optional<GlobalBaProcess> global_ba_;
+  std::optional<AnchorsProcess> anchors_;
 };
 
 void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
@@ -129,13 +139,18 @@ bool IsKeyframe(const std::string& channel) {
   return channel.starts_with(channels::kKeyframePrefix);
 }
 
+// What agents say, and nobody computes.
+bool IsFromAgents(const std::string& channel) {
+  return IsKeyframe(channel) || channel == channels::kAnchorEdit;
+}
+
 // What place_recognition, inter_map_ba and fusion say, once each.
 bool IsMatchOrResult(const std::string& channel) {
   return channel == channels::kPlaceMatch || channel == channels::kConstraint;
 }
 
 bool IsInput(const LoggedMessage& message) {
-  return !message.own && (IsKeyframe(message.channel) || IsMatchOrResult(message.channel));
+  return !message.own && (IsFromAgents(message.channel) || IsMatchOrResult(message.channel));
 }
 
 // Who says so; empty for agents.
@@ -149,6 +164,9 @@ std::string Speaker(const LogEvent& event) {
   }
   if (event.channel == channels::kRefinement) {
     return "global_ba";
+  }
+  if (event.channel == channels::kAnchor) {
+    return "anchors";
   }
   constraint_t message{};
   if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message)) {
@@ -166,7 +184,7 @@ std::vector<LoggedMessage> ReadMessages(const std::set<std::string>& processes, 
     begin = begin.value_or(event.utime);
     const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
     const std::string speaker = Speaker(event);
-    if ((!speaker.empty() || IsKeyframe(event.channel)) && elapsed_s <= until_s) {
+    if ((!speaker.empty() || IsFromAgents(event.channel)) && elapsed_s <= until_s) {
       messages.push_back({event.utime,
                           elapsed_s,
                           event.channel,
@@ -223,8 +241,10 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
                      LogReadings* readings) {
   UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
+  LoggedEdits edits;
   for (const fs::path& log : logs) {
     by_log.push_back(ReadKeyframeLog(log, readings));
+    Merge(ReadAnchorEdits(log), &edits);
   }
   std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
   const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
@@ -234,10 +254,16 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
   Recorder recorder(bus, options, out_log);
   Server server(bus, options, {std::begin(kReplayed), std::end(kReplayed)});
   ReplaySummary summary;
+  int64_t next_edit = 0;  // of several logs they are numbered anew
   for (const LoggedKeyframe& keyframe : keyframes) {
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
     bus.Drain();
+    for (anchor_edit_t& edit : edits[keyframe.id]) {
+      edit.seq = next_edit++;
+      PublishMessage(bus, std::string(channels::kAnchorEdit), edit);
+      bus.Drain();
+    }
     progress.Update(++summary.keyframes, std::ssize(keyframes), "keyframes");
     const int32_t agent_id = keyframe.id.map.agent_id;
     if (std::find(summary.agent_ids.begin(), summary.agent_ids.end(), agent_id) ==

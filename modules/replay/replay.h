@@ -36,7 +36,7 @@ ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, const Serve
                      LogReadings* readings = nullptr);
 
 inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba", "fusion",
-                                            "posegraph", "global_ba"};
+                                            "posegraph",         "global_ba",    "anchors"};
 
 struct ReplayedPart {
   std::set<std::string> processes{std::begin(kReplayed), std::end(kReplayed)};
@@ -49,11 +49,11 @@ struct ReplayedPart {
 
 // Some of these processes alone, or all of them from a checkpoint on, fed with what was said in the
 // log in its order by the others, and up to the checkpoint by those who match and verify:
-// keyframes, matches, verification results, states. Writes that and their own messages, which stand
-// in the log where they sent them now. A log of a replay gives the same messages again. In a live
-// session some of them depend on what came while the process was busy: there, matches and states
-// may differ for no fault of anyone's. Returns how many matches and verification results are the
-// log's instead of their own. Throws as Replay does.
+// keyframes, anchor edits, matches, verification results, states. Writes that and their own
+// messages, which stand in the log where they sent them now. A log of a replay gives the same
+// messages again. In a live session some of them depend on what came while the process was busy:
+// there, matches and states may differ for no fault of anyone's. Returns how many matches and
+// verification results are the log's instead of their own. Throws as Replay does.
 int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
                    const std::filesystem::path& out_log, Progress& progress,
                    LogReadings* readings = nullptr);

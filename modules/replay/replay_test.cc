@@ -6,6 +6,11 @@
 
 #include <sstream>
 
+#include "log_file/log_reader.h"
+#include "log_file/log_writer.h"
+#include "messages/anchor_messages.h"
+#include "replay/keyframe_log.h"
+
 namespace pangea::session {
 namespace {
 
@@ -43,6 +48,76 @@ TEST(Replay, TellsHowFarItIs) {
   EXPECT_THAT(part, EndsWith(" messages\n"));
   std::filesystem::remove(log);
   std::filesystem::remove(log + ".part");
+}
+
+// The sample's first seconds, with an anchor that agent 1 placed after a keyframe of its.
+class ReplayOfAnchors : public testing::Test {
+ protected:
+  ReplayOfAnchors() {
+    std::filesystem::remove(log_);
+    LogFileWriter file(log_);
+    const auto keyframes = ReadKeyframeLog(kSample);
+    int64_t seq = 0;
+    for (const LoggedKeyframe& keyframe : keyframes) {
+      file.Write(keyframe.captured_utime, keyframe.channel, keyframe.data);
+      if (keyframe.id.seq == 2) {
+        file.Write(keyframe.captured_utime, "ANCHOR_EDIT", EncodeMessage(EditAt(keyframe.id, seq)));
+        // As agent_handler repeats the newest.
+        file.Write(keyframe.captured_utime, "ANCHOR_EDIT", EncodeMessage(EditAt(keyframe.id, seq)));
+        ++seq;
+      }
+    }
+  }
+  ~ReplayOfAnchors() override {
+    for (const char* suffix : {"", ".1", ".2", ".part"}) {
+      std::filesystem::remove(log_ + suffix);
+    }
+  }
+
+  static anchor_edit_t EditAt(const KeyframeId& keyframe, int64_t seq) {
+    AnchorEdit edit;
+    edit.anchor = {keyframe.map.agent_id, 1};
+    edit.agent_id = keyframe.map.agent_id;
+    edit.right = AnchorRight::kEditOwn;
+    edit.seq = seq;
+    edit.name = "kettle";
+    edit.placement = AnchorEdit::Placement::kKeyframe;
+    edit.map = keyframe.map;
+    edit.keyframe_seq = keyframe.seq;
+    edit.T_ref_anchor.t = {1, 0, 0};
+    return ToMessage(edit);
+  }
+  // Bytes of the messages on a channel, in the log's order.
+  static std::vector<std::vector<uint8_t>> On(const std::string& channel, const std::string& log) {
+    std::vector<std::vector<uint8_t>> all;
+    ReadLog(log, [&](const LogEvent& event) {
+      if (event.channel == channel) {
+        all.emplace_back(event.data.begin(), event.data.end());
+      }
+    });
+    return all;
+  }
+
+  const std::string log_ = testing::TempDir() + "replay_anchors.lcm";
+  std::ostringstream out_;
+  Progress progress_{"replay", out_, false, [] { return 0.0; }};
+};
+
+TEST_F(ReplayOfAnchors, PlacesThemAgainTheSame) {
+  Replay({log_}, {}, kUntil_s, log_ + ".1", progress_);
+  const auto anchors = On("ANCHOR", log_ + ".1");
+  ASSERT_FALSE(anchors.empty());
+  anchor_t anchor{};
+  ASSERT_TRUE(DecodeMessage(anchors[0], &anchor));
+  EXPECT_EQ(anchor.name, "kettle");
+  EXPECT_EQ(On("ANCHOR_EDIT", log_ + ".1").size(), anchors.size());
+
+  Replay({log_ + ".1"}, {}, kUntil_s, log_ + ".2", progress_);
+  EXPECT_EQ(On("ANCHOR", log_ + ".2"), anchors);
+  ReplayedPart alone;
+  alone.processes = {"anchors"};
+  ReplayPart(log_ + ".1", alone, log_ + ".part", progress_);
+  EXPECT_EQ(On("ANCHOR", log_ + ".part"), anchors);
 }
 
 }  // namespace

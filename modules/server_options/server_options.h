@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "anchors/anchors.h"
 #include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
 #include "inter_map_ba/inter_map_ba.h"
@@ -30,6 +31,7 @@ struct ServerOptions {
   PoseGraphOptions posegraph;
   GlobalBaOptions global_ba;
   MapPointsOptions map_points;
+  AnchorsOptions anchors;
 
   // A section for each process, by its name on the bus.
   template <typename Archive>
@@ -40,6 +42,7 @@ struct ServerOptions {
     archive.Section("posegraph", &posegraph, "");
     archive.Section("global_ba", &global_ba, "");
     archive.Section("map_points", &map_points, "");
+    archive.Section("anchors", &anchors, "");
   }
 };
 
