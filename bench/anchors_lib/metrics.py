@@ -1,0 +1,35 @@
+"""What the sessions came to, from their report.json."""
+
+import statistics
+
+FIELDS = ["error_m", "error_px", "largest_jump_m", "error_at_fusion_m", "error_10s_m", "error_end_m", "error_max_m"]
+
+
+def metrics(report, placed):
+    """Over all anchors as the other agent shows them: median and worst of each field."""
+    anchors = report.get("anchors", [])
+    seen = [agent for anchor in anchors for agent in anchor["agents"] if agent.get("error_m") is not None]
+    names = [anchor["name"] for anchor in anchors]
+    found = {"placed": sum(anchor.get("placed", True) for anchor in anchors), "shown": len(seen),
+             "lost": placed - len(seen), "doubled": len(names) - len(set(names))}
+    for field in FIELDS:
+        values = [agent[field] for agent in seen if agent.get(field) is not None]
+        found[field] = {"median": statistics.median(values), "worst": max(values)} if values else None
+    return found
+
+
+def number(value):
+    return "–" if value is None else f"{value['median']:.3f}; {value['worst']:.3f}"
+
+
+def table(found):
+    lines = ["| session | shown | error m | px | at fusion m | 10 s later m | at the end m | largest jump m |",
+             "|---|---|---|---|---|---|---|---|"]
+    for name, f in found.items():
+        if f is None:
+            lines.append(f"| {name} | failed | | | | | | |")
+            continue
+        cells = [f["error_m"], f["error_px"], f["error_at_fusion_m"], f["error_10s_m"], f["error_end_m"],
+                 f["largest_jump_m"]]
+        lines.append(f"| {name} | {f['shown']} | " + " | ".join(number(cell) for cell in cells) + " |")
+    return "\n".join(lines) + "\n\nMedian; worst, over the anchors as the other agent shows them.\n"
