@@ -14,7 +14,8 @@ from anchors_lib.metrics import metrics, table  # noqa: E402
 
 
 def agent(error, jump):
-    return {"id": 2, "error_m": error, "error_px": 100 * error, "largest_jump_m": jump}
+    return {"id": 2, "error_m": error, "error_px": None if error is None else 100 * error,
+            "largest_jump_m": jump}
 
 
 class AnchorsTest(unittest.TestCase):
