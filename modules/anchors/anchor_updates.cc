@@ -35,4 +35,14 @@ std::vector<AnchorState> AnchorUpdates::Due(const std::vector<AnchorState>& stat
   return due;
 }
 
+std::set<AnchorId> AnchorUpdates::Told() const {
+  std::set<AnchorId> told;
+  for (const auto& [id, sent] : sent_) {
+    if (!sent.state.gone || sent.times_gone < kTimesGone) {
+      told.insert(id);
+    }
+  }
+  return told;
+}
+
 }  // namespace pangea

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "core/anchor.h"
@@ -24,6 +25,8 @@ class AnchorUpdates {
   AnchorUpdates(double moved_m, double moved_rad) : moved_m_(moved_m), moved_rad_(moved_rad) {}
 
   std::vector<AnchorState> Due(const std::vector<AnchorState>& states, int64_t now_utime);
+  // What the listener knows as placed.
+  std::set<AnchorId> Told() const;
 
  private:
   struct Sent {

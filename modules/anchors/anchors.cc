@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -34,6 +35,7 @@ Matrix6d Turned(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
 void Anchors::Take(const Keyframe& keyframe) {
   const MapId& map = keyframe.id.map;
   tracks_[map].Add(keyframe);
+  positions_.reset();
   if (const auto waiting = waiting_.extract(map); !waiting.empty()) {
     for (const AnchorId& id : waiting.mapped()) {
       PlaceOrWait(id);
@@ -58,6 +60,7 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
       Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
   if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
     placements_[id] = std::move(*placement);
+    positions_.reset();
   } else if (const auto* const not_placed = std::get_if<NotPlaced>(&result)) {
     if (not_placed_.size() < kMaxNotPlaced) {
       not_placed_.push_back(
@@ -69,6 +72,7 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
 }
 
 void Anchors::Take(const MapState& state) {
+  positions_.reset();
   auto group = std::make_shared<Group>();
   group->id = state.group;
   group->revision = state.revision;
@@ -154,22 +158,51 @@ Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
   return mean;
 }
 
-AnchorState Anchors::Base(const AnchorId& id, const AnchorEntry& entry, const MapId& map) const {
+const std::map<AnchorId, Anchors::InGroup>& Anchors::Positions() const {
+  if (!positions_) {
+    positions_.emplace();
+    for (const auto& [id, placement] : placements_) {
+      positions_->emplace(id, Position(placement));
+    }
+  }
+  return *positions_;
+}
+
+bool Anchors::SameGroup(const MapId& a, const MapId& b) const {
+  const Group *const group_a = GroupOf(a), *const group_b = GroupOf(b);
+  return a == b || (group_a != nullptr && group_b != nullptr && group_a->id == group_b->id);
+}
+
+AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
+  const AnchorEntry& entry = book_.entries().at(id);
+  const Group* const group = GroupOf(map);
   AnchorState state;
   state.anchor = id;
   state.revision = entry.revision;
   state.edited_by = entry.edited_by;
   state.gone = entry.deleted;
   state.name = entry.name;
-  state.payload = entry.payload;
+  state.payload = entry.deleted ? "" : entry.payload;
   state.map = map;
-  const Group* const group = GroupOf(map);
   state.group = group != nullptr ? group->id : map;
   state.group_revision = group != nullptr ? group->revision : 0;
   return state;
 }
 
-std::vector<AnchorState> Anchors::ForAgent(const MapId& map) const {
+// The newest first.
+std::vector<AnchorId> Anchors::DeletedOf(const MapId& map) const {
+  std::vector<AnchorId> deleted;
+  for (const auto& [id, placement] : placements_) {
+    if (book_.entries().at(id).deleted && SameGroup(map, placement.map)) {
+      deleted.push_back(id);
+    }
+  }
+  std::ranges::stable_sort(deleted, std::greater(), &AnchorId::created_utime);
+  deleted.resize(std::min<size_t>(deleted.size(), options_.max_near));
+  return deleted;
+}
+
+std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<AnchorId>& told) const {
   const auto track = tracks_.find(map);
   if (track == tracks_.end()) {
     return {};
@@ -179,50 +212,49 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map) const {
   const Matrix6d correction_covariance =
       correction == corrections_.end() ? Matrix6d(Matrix6d::Zero()) : correction->second.covariance;
   const Matrix6d frame_covariance = InverseCovariance(T_odom_map.Inverse(), correction_covariance);
-  const Eigen::Vector3d agent = track->second.keyframes().rbegin()->second.T_odom_body.t;
-  std::vector<std::pair<double, AnchorState>> near;
-  std::vector<AnchorState> gone;
-  for (const auto& [id, placement] : placements_) {
-    AnchorState state = Base(id, book_.entries().at(id), map);
-    // Of another group there is no place in this one's frame.
-    const bool own = placement.map == map;
-    state.gone |= !own && (GroupOf(map) == nullptr || GroupOf(placement.map) == nullptr ||
-                           GroupOf(map)->id != GroupOf(placement.map)->id);
-    if (state.gone) {
-      gone.push_back(std::move(state));
-      continue;
+  const Eigen::Vector3d p_odom_agent = track->second.keyframes().rbegin()->second.T_odom_body.t;
+  std::vector<std::pair<double, AnchorId>> near;
+  for (const auto& [id, position] : Positions()) {
+    const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm();
+    if (away_m <= options_.near_m && !book_.entries().at(id).deleted &&
+        SameGroup(map, placements_.at(id).map)) {
+      near.emplace_back(away_m, id);
     }
-    const InGroup position = Position(placement);
+  }
+  std::ranges::sort(near);
+  near.resize(std::min<size_t>(near.size(), options_.max_near));
+
+  std::vector<AnchorState> states;
+  for (const auto& [away_m, id] : near) {
+    const InGroup& position = Positions().at(id);
+    AnchorState& state = states.emplace_back(Describe(id, map));
     state.T_odom_anchor = T_odom_map * position.T_map_anchor;
-    // What the group is not sure of moves its own map's anchors with it.
+    // What the group is not sure of moves a map's own anchors with it.
+    const bool own = placements_.at(id).map == map;
     state.covariance =
         ComposeCovariance(T_odom_map, own ? Matrix6d(Matrix6d::Zero()) : frame_covariance,
                           position.T_map_anchor, position.covariance);
-    if (const double away_m = (state.T_odom_anchor.t - agent).norm(); away_m <= options_.near_m) {
-      near.emplace_back(away_m, std::move(state));
+  }
+  for (const AnchorId& id : DeletedOf(map)) {
+    states.push_back(Describe(id, map));
+  }
+  for (const AnchorId& id : told) {
+    if (const auto placement = placements_.find(id);
+        placement != placements_.end() && !SameGroup(map, placement->second.map)) {
+      states.emplace_back(Describe(id, map)).gone = true;
     }
   }
-  std::ranges::stable_sort(near, {}, &std::pair<double, AnchorState>::first);
-  near.resize(std::min<size_t>(near.size(), options_.max_near));
-  std::vector<AnchorState> states;
-  for (auto& [away_m, state] : near) {
-    states.push_back(std::move(state));
-  }
-  std::ranges::move(gone, std::back_inserter(states));
   return states;
 }
 
 std::vector<AnchorState> Anchors::All() const {
   std::vector<AnchorState> states;
-  for (const auto& [id, placement] : placements_) {
-    const Group* const group = GroupOf(placement.map);
-    const MapId frame = group != nullptr ? group->id : placement.map;
-    AnchorState state = Base(id, book_.entries().at(id), placement.map);
-    state.map = frame;
-    const InGroup position = Position(placement);
+  for (const auto& [id, position] : Positions()) {
+    const MapId& map = placements_.at(id).map;
+    AnchorState& state = states.emplace_back(Describe(id, map));
+    state.map = state.group;
     state.T_odom_anchor = position.T_map_anchor;
     state.covariance = position.covariance;
-    states.push_back(std::move(state));
   }
   return states;
 }

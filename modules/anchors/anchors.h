@@ -62,8 +62,9 @@ class Anchors {
   // The agents' maps: of each the newest.
   std::vector<MapId> AgentMaps() const;
   // Those near the map's newest keyframe, the nearest first; and those that are gone for it:
-  // deleted or in no group with it. Empty for a map without keyframes.
-  std::vector<AnchorState> ForAgent(const MapId& map) const;
+  // deleted (the newest max_near), and of those `told` before what is in no group with it any more.
+  // Empty for a map without keyframes.
+  std::vector<AnchorState> ForAgent(const MapId& map, const std::set<AnchorId>& told = {}) const;
   // Every placed anchor in its group's frame, and those that were deleted.
   std::vector<AnchorState> All() const;
 
@@ -91,7 +92,12 @@ class Anchors {
   Rigid3 T_map_odom(const MapId& map) const;
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
   InGroup Position(const AnchorPlacement& placement) const;
-  AnchorState Base(const AnchorId& id, const AnchorEntry& entry, const MapId& map) const;
+  // Of each placed anchor.
+  const std::map<AnchorId, InGroup>& Positions() const;
+  bool SameGroup(const MapId& a, const MapId& b) const;
+  // Without its place.
+  AnchorState Describe(const AnchorId& id, const MapId& map) const;
+  std::vector<AnchorId> DeletedOf(const MapId& map) const;
 
   const AnchorsOptions options_;
   AnchorBook book_;
@@ -101,6 +107,8 @@ class Anchors {
   std::map<MapId, std::shared_ptr<const Group>> groups_;
   std::map<MapId, Correction> corrections_;
   std::vector<std::string> not_placed_;
+  // Since the last change; nothing: to be computed.
+  mutable std::optional<std::map<AnchorId, InGroup>> positions_;
 };
 
 }  // namespace pangea

@@ -16,7 +16,7 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
-constexpr int64_t kPublishInterval_us = 100'000;
+constexpr int64_t kPublishInterval_us = 250'000;
 constexpr int32_t kMaxAsked = 50;
 // Edits are one stream over all maps.
 const MapId kAllMaps{1, 0};
@@ -88,7 +88,8 @@ void AnchorsProcess::PublishDue(int64_t now_utime) {
     AnchorUpdates& updates =
         known ? for_agents.insert(std::move(known)).position->second
               : for_agents.try_emplace(map, options_.moved_m, options_.moved_rad).first->second;
-    for (const AnchorState& state : updates.Due(anchors_.ForAgent(map), now_utime)) {
+    for (const AnchorState& state :
+         updates.Due(anchors_.ForAgent(map, updates.Told()), now_utime)) {
       node_.Publish(channels::Anchor(map.agent_id), ToMessage(state));
     }
   }
