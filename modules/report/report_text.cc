@@ -42,6 +42,9 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
   if (const Table truth = TruthTable(metrics); !truth.empty()) {
     text += fmt::format("\n{}\n{}\n", truth.Text(), kNeesExplained);
   }
+  if (const Table anchors = AnchorTable(metrics); !anchors.empty()) {
+    text += fmt::format("\n## Anchors\n\n{}\n{}\n", anchors.Text(), kAnchorsExplained);
+  }
   if (const Table processes = ProcessTable(input, session); !processes.empty()) {
     text += fmt::format("\n## Processes\n\n{}", processes.Text());
   }

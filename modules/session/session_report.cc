@@ -45,6 +45,14 @@ AgentRun RunOf(const AgentScript& script) {
   return run;
 }
 
+std::vector<WantedAnchor> WantedAnchors(const SessionScript& script) {
+  std::vector<WantedAnchor> wanted;
+  for (const AnchorScript& anchor : script.anchors) {
+    wanted.push_back({anchor.agent, anchor.name});
+  }
+  return wanted;
+}
+
 // Its report, and in words what it missed.
 ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadings* readings) {
   WrittenReport report = WriteReport(input, out.string(), readings);
@@ -104,6 +112,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
   if (summary.interrupted) {
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
+  input.anchors = WantedAnchors(script);
   input.expect = script.expect;
   NoteOptions(input.server_log, readings, &input);
   return OutcomeOf(input, out, readings);
@@ -114,6 +123,7 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
+  input.anchors = known.anchors;
   input.expect = known.expect;
   for (AgentRun& run : input.agents) {  // a session's own log has its agents' beside it
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
@@ -124,7 +134,7 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
-  SessionRecord session{{}, script.expect};
+  SessionRecord session{{}, script.expect, WantedAnchors(script)};
   for (const AgentScript& agent : script.agents) {
     session.agents.push_back(RunOf(agent));
   }

@@ -222,6 +222,9 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
   }
   html += Section("error", "Error over time", error);
   html += Section("fusions", "Fusions", Fusions(session, metrics));
+  if (const Table anchors = AnchorTable(metrics); !anchors.empty()) {
+    html += Section("anchors", "Anchors", anchors.Html() + Aside(kAnchorsExplained));
+  }
   html += Section("constraints", "Constraints", Constraints(session, metrics));
   html += Section("load", "Load",
                   ChartOr(LoadChart(session, metrics), "CPU of each process over the session",
