@@ -181,6 +181,18 @@ bool AddAnchorEdit(Bytes data, CapturedSession* session) {
   return true;
 }
 
+bool AddAnchor(Bytes data, CapturedSession* session) {
+  anchor_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto state = Parse(message);
+  if (state.value && !state.value->gone) {
+    session->anchors_placed.insert(state.value->anchor);
+  }
+  return state.value.has_value();
+}
+
 bool AddState(Bytes data, double session_s, States* states) {
   map_state_t message{};
   if (!DecodeMessage(data, &message)) {
@@ -227,6 +239,9 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
       good = AddState(event.data, session_s, &states);
     } else if (event.channel == channels::kAnchorEdit) {
       good = AddAnchorEdit(event.data, &session);
+    } else if (event.channel == channels::kAnchor ||
+               channels::AgentOf(event.channel, channels::kAnchorPrefix) > 0) {
+      good = AddAnchor(event.data, &session);
     } else if (event.channel.starts_with(channels::kStatusPrefix)) {
       good = AddStatus(event.data, event.utime, &session);
     }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -80,6 +81,7 @@ struct CapturedSession {
   std::map<int64_t, Constraint> constraints;  // by id
   // in any order; of one revision and editor the first
   std::map<AnchorId, std::vector<AnchorEdit>> anchor_edits;
+  std::set<AnchorId> anchors_placed;         // that the server has said the place of
   std::map<int32_t, CameraModel> cameras;    // by agent, of the newest keyframe
   std::map<std::string, status_t> statuses;  // newest of each process
   ProcessSamples samples;

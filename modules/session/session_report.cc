@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bus/node.h"
 #include "server_options/server_options.h"
 #include "session/session_monitor.h"
@@ -64,6 +66,20 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadin
     }
   }
   return outcome;
+}
+
+// Nobody showed any: without the agents' logs nothing is known of them.
+void ForgetAnchorsOfAReplay(ReportInput* input) {
+  if (std::ranges::any_of(input->agents,
+                          [](const AgentRun& run) { return !run.bus_log.empty(); })) {
+    return;
+  }
+  input->anchors.clear();
+  if (std::erase_if(input->expect,
+                    [](const auto& bound) { return bound.first.starts_with("anchor_"); }) > 0) {
+    input->notes.emplace_back(
+        "no log of an agent's bus: what is expected of anchors was not checked");
+  }
 }
 
 // With which options the server ran, as far as they are not the defaults.
@@ -129,6 +145,7 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }
+  ForgetAnchorsOfAReplay(&input);
   NoteOptions(log, readings, &input);
   return OutcomeOf(input, out, readings);
 }

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "eval/metrics.h"
+#include "report/metrics/group_history.h"
 
 namespace pangea::session {
 namespace {
@@ -44,58 +45,6 @@ std::map<int64_t, AnchorEdit> InForce(const std::vector<AnchorEdit>& edits) {
   }
   return in_force;
 }
-
-// Groups over the session, each as a number that its maps share.
-class Groups {
- public:
-  explicit Groups(const CapturedSession& session) : session_(session) {}
-
-  // Agents with a map in its group at the end, itself included.
-  std::set<int32_t> AgentsWith(const MapId& map) const {
-    const std::map<MapId, size_t> group_of = At(session_.changes.size());
-    std::set<int32_t> agents{map.agent_id};
-    const auto own = group_of.find(map);
-    for (const auto& [other, group] : group_of) {
-      if (own != group_of.end() && group == own->second) {
-        agents.insert(other.agent_id);
-      }
-    }
-    return agents;
-  }
-
-  // Wall clock since when the map is in one group with one of the agent's, for good.
-  std::optional<int64_t> TogetherSince(const MapId& map, int32_t agent) const {
-    std::optional<int64_t> since;
-    for (size_t i = 0; i < session_.changes.size(); ++i) {
-      if (!Together(At(i + 1), map, agent)) {
-        since.reset();
-      } else if (!since) {
-        since = session_.begin_utime + std::llround(1e6 * session_.changes[i].session_s);
-      }
-    }
-    return since;
-  }
-
- private:
-  // After the first so many changes; a map that is in none of them is alone.
-  std::map<MapId, size_t> At(size_t num_changes) const {
-    std::map<MapId, size_t> group_of;
-    for (size_t i = 0; i < num_changes; ++i) {
-      for (const MapId& map : session_.changes[i].maps) {
-        group_of[map] = i;
-      }
-    }
-    return group_of;
-  }
-  static bool Together(const std::map<MapId, size_t>& group_of, const MapId& map, int32_t agent) {
-    const auto own = group_of.find(map);
-    return own != group_of.end() && std::ranges::any_of(group_of, [&](const auto& other) {
-             return other.first.agent_id == agent && other.second == own->second;
-           });
-  }
-
-  const CapturedSession& session_;
-};
 
 // In one frame that an agent showed.
 struct Sighting {
@@ -150,7 +99,7 @@ class Evaluation {
     metrics.id = id;
     metrics.made_by = id.agent_id;
     metrics.name = edits.rbegin()->second.name;
-    metrics.placed = std::ranges::any_of(viewers_, [&](const auto& viewer) {
+    metrics.placed = session_.anchors_placed.contains(id) || std::ranges::any_of(viewers_, [&](const auto& viewer) {
       const auto heard = viewer.second->track->heard.find(id);
       return heard != viewer.second->track->heard.end() &&
              std::ranges::any_of(heard->second, [](const HeardAnchor& h) { return !h.gone; });
@@ -236,7 +185,7 @@ class Evaluation {
                         int32_t agent) const;
 
   const CapturedSession& session_;
-  Groups groups_;
+  GroupHistory groups_;
   std::map<int32_t, const AnchorViewer*> viewers_;
   std::map<int32_t, Sightings> sightings_;
 };
@@ -268,16 +217,6 @@ std::optional<Rigid3> Unblended(const std::vector<HeardAnchor>& heard, const Anc
     return std::nullopt;
   }
   return std::prev(after)->T_odom_anchor;
-}
-
-// Pixels from the nearest border; none outside the image.
-std::optional<double> Inside(const CameraModel& camera, const Eigen::Vector3d& p_cam) {
-  const auto pixel = p_cam.z() > 0 ? camera.Project(p_cam) : std::nullopt;
-  if (!pixel || !camera.Contains(*pixel)) {
-    return std::nullopt;
-  }
-  return std::min(
-      {pixel->x(), pixel->y(), camera.width - 1 - pixel->x(), camera.height - 1 - pixel->y()});
 }
 
 // Where it ought to be seen and can be drawn nowhere: the image's diagonal.
@@ -403,6 +342,15 @@ AnchorAtAgent Evaluation::AtAgent(const AnchorId& id, const std::vector<Placing>
 }
 
 }  // namespace
+
+std::optional<double> Inside(const CameraModel& camera, const Eigen::Vector3d& p_cam) {
+  const auto pixel = p_cam.z() > 0 ? camera.Project(p_cam) : std::nullopt;
+  if (!pixel || !camera.Contains(*pixel)) {
+    return std::nullopt;
+  }
+  return std::min(
+      {pixel->x(), pixel->y(), camera.width - 1 - pixel->x(), camera.height - 1 - pixel->y()});
+}
 
 std::vector<AnchorMetrics> AnchorsOf(const CapturedSession& session,
                                      const std::vector<AnchorViewer>& viewers,

@@ -48,12 +48,15 @@ struct AnchorMetrics {
   std::optional<AnchorId> id;  // none: it was never requested
   std::string name;
   int32_t made_by = 0;  // 0: a tool on the server
-  bool placed = false;  // somebody heard of it
+  bool placed = false;  // an agent heard where it is, or the server said it
   std::optional<AnchorView> placing;
   std::vector<AnchorAtAgent> agents;  // the others of its group at the end, ascending
 };
 
 inline constexpr int64_t kAnchorSettled_us = 10'000'000;
+
+// Pixels from the nearest border of a point in the camera frame; none where it is not in the image.
+std::optional<double> Inside(const CameraModel& camera, const Eigen::Vector3d& p_cam);
 
 // What is known of one agent.
 struct AnchorViewer {
