@@ -19,7 +19,7 @@ using testing::Not;
 
 const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr char kServerPrograms[] =
-    "place-recognition inter-map-ba fusion posegraph global-ba map-points";
+    "place-recognition inter-map-ba fusion posegraph global-ba map-points anchors";
 
 class ReplayOptions : public ::testing::Test {
  protected:

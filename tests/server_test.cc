@@ -40,7 +40,7 @@ TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
       ServerCommand(folder), folder.string(), killed, folder.string());
   const Outcome outcome = RunCommand("sh " + (folder / "run.sh").string());
   for (const char* process : {"agent-handler", "place-recognition", "inter-map-ba", "fusion",
-                              "posegraph", "global-ba", "map-points"}) {
+                              "posegraph", "global-ba", "map-points", "anchors"}) {
     EXPECT_THAT(outcome.output,
                 testing::ContainsRegex(fmt::format("started .*pangea-{} ", process)));
   }

@@ -16,7 +16,7 @@ from link_lib.metrics import decode_status, events  # noqa: E402
 from link_lib.hosts import LINK, OWN_BUS, Hosts  # noqa: E402
 from link_lib.plan import SECOND_STARTS_AFTER_S  # noqa: E402
 
-SERVER = ("place-recognition", "inter-map-ba", "fusion", "posegraph", "global-ba", "map-points")
+SERVER = ("place-recognition", "inter-map-ba", "fusion", "posegraph", "global-ba", "map-points", "anchors")
 WORK = ("KEYFRAME_", "PLACE_MATCH", "AGAIN_", "CONSTRAINT", "MAP_STATE")
 OWN_LINK = OWN_BUS.replace(":7667", ":7669")  # between an uplink and its link emulator
 START_TIMEOUT_S, DRAIN_TIMEOUT_S, QUIET_S, FRESH_S, STEP_S = 30, 300, 2.5, 3, 0.2

@@ -300,6 +300,40 @@ void YamlOptions::Add(const std::string& key, std::vector<std::string>* value) {
   AddScalars(key, "a text", value);
 }
 
+void YamlOptions::AddPairBetween(const std::string& key, double low, double high, double* first,
+                                 double* second) {
+  Entry& entry = NewEntry(key);
+  entry.read = [=](const YAML::Node& node, const std::string& file, const std::string& path) {
+    if (!node.IsSequence() || node.size() != 2) {
+      ThrowType(node, file, path,
+                fmt::format("a list of two numbers, each from {} to {}", low, high));
+    }
+    const auto item = [&](size_t i) {
+      return ValueWithin<double>(node[i], file, fmt::format("{}[{}]", path, i),
+                                 RangeText("a number", low, high), Between(low, high));
+    };
+    *first = item(0);
+    *second = item(1);
+  };
+  entry.print = [first, second](const Style&) {
+    return fmt::format(" [{}, {}]\n", ScalarText(*first), ScalarText(*second));
+  };
+}
+
+void YamlOptions::AddText(const std::string& key, size_t max_bytes, std::string* value) {
+  Entry& entry = NewEntry(key);
+  entry.read = [=](const YAML::Node& node, const std::string& file, const std::string& path) {
+    auto text = ScalarValue<std::string>(node, file, path, "a text");
+    if (text.size() > max_bytes) {
+      throw std::runtime_error(
+          fmt::format("{}: key '{}' must be a text of at most {} bytes, not {}", Where(file, node),
+                      path, max_bytes, text.size()));
+    }
+    *value = std::move(text);
+  };
+  entry.print = [value](const Style&) { return fmt::format(" {}\n", ScalarText(*value)); };
+}
+
 void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string>& names,
                            const std::function<void(size_t)>& set,
                            const std::function<size_t()>& get, const std::string& help) {

@@ -81,6 +81,11 @@ class YamlOptions {
   void AddWithin(const std::string& key, const std::string& type,
                  const std::function<bool(double)>& is_within, double* value);
   void Add(const std::string& key, std::vector<double>* value);
+  // A list of two numbers, both from `low` to `high`.
+  void AddPairBetween(const std::string& key, double low, double high, double* first,
+                      double* second);
+  // At most so many bytes.
+  void AddText(const std::string& key, size_t max_bytes, std::string* value);
   void Add(const std::string& key, std::vector<std::string>* value);
 
   // An enum by names.

@@ -81,6 +81,32 @@ Values Wrong(const ordered_json& report) {
   return {{"", any ? Number(truth.at("wrong")) : std::nullopt}};
 }
 
+constexpr char kAnchorError[] = "error_m";
+constexpr char kAnchorPixels[] = "error_px";
+constexpr char kAnchorJump[] = "largest_jump_m";
+
+// Of each other agent of its group; an anchor that none of them could show has no value. One that
+// an agent shows and never looks at has no pixels to be off by, and misses nothing.
+template <const char* kKey>
+Values EachAnchor(const ordered_json& report) {
+  Values metrics;
+  for (const ordered_json& anchor : report.at("anchors")) {
+    const auto name = anchor.at("name").get<std::string>();
+    for (const ordered_json& agent : anchor.at("agents")) {
+      const bool unseen = kKey == kAnchorPixels && agent.at(kKey).is_null();
+      if (unseen && agent.at(kAnchorError).is_number()) {
+        continue;
+      }
+      metrics.push_back({fmt::format("{} at agent {}: ", name, agent.at("id").get<int32_t>()),
+                         Number(agent.at(kKey))});
+    }
+    if (anchor.at("agents").empty()) {
+      metrics.push_back({fmt::format("{}: ", name), std::nullopt});
+    }
+  }
+  return metrics;
+}
+
 constexpr char kCoverage[] = "coverage";
 constexpr char kAteVio[] = "ate_vio_m";
 constexpr char kAteServer[] = "ate_server_m";
@@ -102,6 +128,9 @@ constexpr std::array kKinds = {
     Kind{kAteServer, Relation::kAtMost, " m", 1e6, Each<kAteServer>},
     Kind{"ate_joint_m", Relation::kAtMost, " m", 1e6, Joint},
     Kind{"wrong_constraints", Relation::kAtMost, "", 1e6, Wrong},
+    Kind{"anchor_error_m", Relation::kAtMost, " m", 1e6, EachAnchor<kAnchorError>},
+    Kind{"anchor_error_px", Relation::kAtMost, " px", 1e6, EachAnchor<kAnchorPixels>},
+    Kind{"anchor_largest_jump_m", Relation::kAtMost, " m", 1e6, EachAnchor<kAnchorJump>},
 };
 
 bool Met(Relation relation, double bound, double value) {

@@ -13,9 +13,11 @@
 //   ate_vio_m, ate_server_m  at most, each agent
 //   ate_joint_m         at most
 //   wrong_constraints   at most: accepted, and not so by the ground truth
+//   anchor_error_m, anchor_error_px, anchor_largest_jump_m
+//                       at most, each anchor at each other agent of its group
 //
 // Metrics are report.json's (docs/report.md). One that is not there, because there is no ground
-// truth or no fusion, misses its bound. All of them are in a replay's report too.
+// truth or no fusion, misses its bound. All of them but the anchors' are in a replay's report too.
 
 #include <map>
 #include <nlohmann/json.hpp>

@@ -22,6 +22,11 @@ ordered_json Report() {
     "groups": [{"agents": [1, 2]}],
     "ate_joint_m": 0.05,
     "constraints_truth": {"checked": 12, "wrong": 1},
+    "anchors": [
+      {"name": "kettle", "agents": [
+        {"id": 2, "error_m": 0.01, "error_px": 3, "largest_jump_m": 0.002},
+        {"id": 3, "error_m": 0.02, "error_px": 4, "largest_jump_m": 0.001}]},
+      {"name": "pot", "agents": [{"id": 1, "error_m": 0.015, "error_px": 2, "largest_jump_m": 0}]}],
     "fused_at": [
       {"change": "fused", "session_s": 10.5, "agents": [2]},
       {"change": "fused", "session_s": 20.5, "agents": [1, 2]},
@@ -75,6 +80,34 @@ TEST(Expectations, AMetricThatIsNotThereMisses) {
   for (const char* name : {"ate_joint_m", "wrong_constraints", "fused_by", "maps", "coverage"}) {
     EXPECT_FALSE(Met(name, 1, nothing)) << name;
   }
+}
+
+TEST(Expectations, TheWorstAnchorCounts) {
+  EXPECT_TRUE(Met("anchor_error_m", 0.02));
+  EXPECT_FALSE(Met("anchor_error_m", 0.019));
+  EXPECT_TRUE(Met("anchor_largest_jump_m", 0.002));
+  EXPECT_FALSE(Met("anchor_largest_jump_m", 0.0015));
+  const CheckedExpectation pixels = Only({{"anchor_error_px", 4}}, Report());
+  EXPECT_TRUE(pixels.met);
+  EXPECT_EQ(pixels.value, "kettle at agent 2: 3 px, kettle at agent 3: 4 px, pot at agent 1: 2 px");
+}
+
+TEST(Expectations, AnAnchorThatIsNotShownMissesAndOneThatIsNotLookedAtDoesNot) {
+  ordered_json report = Report();
+  ordered_json& third = report["anchors"][0]["agents"][1];
+  third["error_px"] = nullptr;
+  EXPECT_TRUE(Met("anchor_error_px", 3, report));
+  third["error_m"] = nullptr;
+  for (const char* name : {"anchor_error_px", "anchor_error_m"}) {
+    EXPECT_FALSE(Met(name, 1000, report)) << name;
+  }
+  ordered_json alone = Report();
+  alone["anchors"][1]["agents"] = ordered_json::array();
+  EXPECT_EQ(Only({{"anchor_error_m", 1}}, alone).value,
+            "kettle at agent 2: 0.01 m, kettle at agent 3: 0.02 m, pot: none");
+  EXPECT_FALSE(Met("anchor_error_m", 1, alone));
+  alone["anchors"] = ordered_json::array();
+  EXPECT_FALSE(Met("anchor_error_m", 1, alone));
 }
 
 TEST(Expectations, AreShownWithTheirValues) {

@@ -7,6 +7,7 @@
 
 #include "files/text_file.h"
 #include "report/html/report_html.h"
+#include "report/report_anchor_pictures.h"
 #include "report/report_json.h"
 #include "report/report_pictures.h"
 #include "report/report_text.h"
@@ -62,9 +63,13 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
   } catch (const std::runtime_error& error) {
     metrics.notes.emplace_back(error.what());
   }
+  const std::string anchors_jpeg = AnchorsJpeg(session, metrics, &metrics.notes);
+  if (!anchors_jpeg.empty()) {
+    WriteTextFile(folder + "/" + kAnchorPicture, anchors_jpeg);
+  }
   ordered_json json = ReportJson(input, session, metrics);
-  std::string markdown = ReportMarkdown(input, session, metrics);
-  std::string html = ReportHtml(input, session, metrics);
+  std::string markdown = ReportMarkdown(input, session, metrics, !anchors_jpeg.empty());
+  std::string html = ReportHtml(input, session, metrics, anchors_jpeg);
   std::vector<CheckedExpectation> checked = Check(input.expect, json);
   if (!checked.empty()) {
     const Table table = ToTable(checked);

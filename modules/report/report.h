@@ -11,7 +11,9 @@
 //   map.ply                  points coloured by agent, in the largest group's map frame (other
 //                            groups, whose frames are unrelated to it: map.<map>.ply)
 //   report.json, report.md, report.html
-//   trajectory.png, error.png  (groups that no ground truth places: trajectory.<map>.png)
+//   anchors.jpg              up to four anchors in the images of two agents; none without
+//   recordings trajectory.png, error.png  (groups that no ground truth places:
+//   trajectory.<map>.png)
 //
 // A map that no MAP_STATE mentions is a group of its own with the odometry's poses. <map> is
 // "<agent>_<opened utime>".
@@ -41,7 +43,7 @@ struct AgentRun {
   // the part of the recording that was played, seconds since its first image
   double start_s = 0;
   std::optional<double> duration_s;  // none: to its end
-  // log of the agent's bus with POSE_<id>; empty or absent: the VIO's track is that of its
+  // log of the agent's bus with POSE_<id>, anchors; empty or absent: the VIO's track is that of its
   // keyframes
   std::string bus_log;
   // payload on the link bus, both directions; none when it was not measured (a replay)
@@ -52,8 +54,14 @@ struct AgentRun {
   std::optional<double> realtime_factor;
 };
 
+// An anchor that the session was to place: one that is not in the logs is reported too.
+struct WantedAnchor {
+  int32_t agent = 0;
+  std::string name;
+};
+
 struct ReportInput {
-  // log of the server bus: KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_*
+  // log of the server bus: KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_*
   std::string server_log = {};
   // an agent that is only in the log need not be here
   std::vector<AgentRun> agents = {};
@@ -63,6 +71,7 @@ struct ReportInput {
   std::map<std::string, int> restarts = {};
   // what else a reader must know, e.g. warnings about a recording
   std::vector<std::string> notes = {};
+  std::vector<WantedAnchor> anchors = {};
   // bounds on the metrics, checked at the end of the report
   Expectations expect = {};
 };

@@ -119,6 +119,31 @@ ordered_json ProcessesJson(const ReportInput& input, const CapturedSession& sess
   return processes;
 }
 
+ordered_json AnchorAtAgentJson(const AnchorAtAgent& at) {
+  return {{"id", at.agent},
+          {"error_m", Number(at.error_m)},
+          {"error_px", Number(at.error_px)},
+          {"largest_jump_m", Number(at.largest_jump_m)},
+          {"error_at_fusion_m", Number(at.error_at_fusion_m)},
+          {"error_10s_m", Number(at.error_10s_m)},
+          {"error_end_m", Number(at.error_end_m)},
+          {"error_max_m", Number(at.error_max_m)},
+          {"error_unblended_m", Number(at.error_unblended_m)},
+          {"reason", at.reason.empty() ? ordered_json() : ordered_json(at.reason)}};
+}
+
+ordered_json AnchorJson(const AnchorMetrics& anchor) {
+  ordered_json json = {{"name", anchor.name},
+                       {"id", anchor.id ? ordered_json(ToString(*anchor.id)) : ordered_json()},
+                       {"made_by", anchor.made_by},
+                       {"placed", anchor.placed},
+                       {"agents", ordered_json::array()}};
+  for (const AnchorAtAgent& at : anchor.agents) {
+    json["agents"].push_back(AnchorAtAgentJson(at));
+  }
+  return json;
+}
+
 }  // namespace
 
 ordered_json ReportJson(const ReportInput& input, const CapturedSession& session,
@@ -150,6 +175,10 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
   json["fused_at"] = ordered_json::array();
   for (const GroupChange& change : session.changes) {
     json["fused_at"].push_back(ChangeJson(change, metrics));
+  }
+  json["anchors"] = ordered_json::array();
+  for (const AnchorMetrics& anchor : metrics.anchors) {
+    json["anchors"].push_back(AnchorJson(anchor));
   }
   json["processes"] = ProcessesJson(input, session);
   json["lost"] = metrics.lost;

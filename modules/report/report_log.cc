@@ -7,6 +7,7 @@
 #include "bus/node.h"
 #include "core/keyframe.h"
 #include "log_file/log_reader.h"
+#include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "messages/state_chunks.h"
@@ -144,6 +145,7 @@ bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
   const auto keyframe = Parse(message);
   if (keyframe.value) {
     session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value, session_s));
+    session->cameras.insert_or_assign(keyframe.value->id.map.agent_id, keyframe.value->camera);
   }
   return keyframe.value.has_value();
 }
@@ -158,6 +160,37 @@ bool AddConstraint(Bytes data, CapturedSession* session) {
     session->constraints.insert_or_assign(constraint.value->Id(), *constraint.value);
   }
   return constraint.value.has_value();
+}
+
+bool AddAnchorEdit(Bytes data, CapturedSession* session) {
+  anchor_edit_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  auto edit = Parse(message);
+  if (!edit.value) {
+    return false;
+  }
+  std::vector<AnchorEdit>& edits = session->anchor_edits[edit.value->anchor];
+  const bool known = std::ranges::any_of(edits, [&edit](const AnchorEdit& other) {
+    return other.revision == edit.value->revision && other.agent_id == edit.value->agent_id;
+  });
+  if (!known) {
+    edits.push_back(std::move(*edit.value));
+  }
+  return true;
+}
+
+bool AddAnchor(Bytes data, CapturedSession* session) {
+  anchor_t message{};
+  if (!DecodeMessage(data, &message)) {
+    return false;
+  }
+  const auto state = Parse(message);
+  if (state.value && !state.value->gone) {
+    session->anchors_placed.insert(state.value->anchor);
+  }
+  return state.value.has_value();
 }
 
 bool AddState(Bytes data, double session_s, States* states) {
@@ -204,6 +237,11 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
       good = AddConstraint(event.data, &session);
     } else if (event.channel == channels::kMapState) {
       good = AddState(event.data, session_s, &states);
+    } else if (event.channel == channels::kAnchorEdit) {
+      good = AddAnchorEdit(event.data, &session);
+    } else if (event.channel == channels::kAnchor ||
+               channels::AgentOf(event.channel, channels::kAnchorPrefix) > 0) {
+      good = AddAnchor(event.data, &session);
     } else if (event.channel.starts_with(channels::kStatusPrefix)) {
       good = AddStatus(event.data, event.utime, &session);
     }
@@ -219,9 +257,11 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings) {
   PoseTrack track;
   Frames frames;
+  AnchorTrackReader anchors(agent_id);
   const std::string poses = channels::Pose(agent_id);
   const std::string corrections = channels::Correction(agent_id);
   const auto add = [&](const LogEvent& event) {
+    anchors.Add(event);
     if (event.channel == poses) {
       AddPose(event.data, &track);
     } else if (event.channel == corrections) {
@@ -235,6 +275,7 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* read
   };
   ReadLog(path, add, readings);
   Finish(frames, &track);
+  track.anchors = anchors.Take();
   return track;
 }
 

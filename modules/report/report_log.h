@@ -6,14 +6,18 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "core/anchor.h"
+#include "core/camera_model.h"
 #include "core/ids.h"
 #include "core/server_messages.h"
 #include "log_file/log_reading.h"
 #include "pangea/status_t.hpp"
 #include "recording/trajectory.h"
+#include "report/anchor_track.h"
 
 namespace pangea::session {
 
@@ -48,12 +52,13 @@ struct ProcessSample {
 };
 using ProcessSamples = std::map<std::string, std::vector<ProcessSample>>;  // by process
 
-// POSE_k and CORRECTION_k of one agent, and what its processes said of themselves.
+// POSE_k and CORRECTION_k of one agent, its anchors, and what its processes said of themselves.
 struct PoseTrack {
   std::optional<int64_t> first_utime;  // first pose message, whatever its state
   std::optional<int64_t> first_tracking_utime;
   std::map<MapId, Trajectory> odometry;  // T_odom_body while tracking
   std::vector<LivePose> live;            // while tracking, ascending in time
+  AnchorTrack anchors;
   ProcessSamples samples;
 };
 
@@ -74,17 +79,22 @@ struct CapturedSession {
   std::map<MapId, std::shared_ptr<const MapState>> states;
   std::vector<GroupChange> changes;
   std::map<int64_t, Constraint> constraints;  // by id
-  std::map<std::string, status_t> statuses;   // newest of each process
+  // in any order; of one revision and editor the first
+  std::map<AnchorId, std::vector<AnchorEdit>> anchor_edits;
+  std::set<AnchorId> anchors_placed;         // that the server has said the place of
+  std::map<int32_t, CameraModel> cameras;    // by agent, of the newest keyframe
+  std::map<std::string, status_t> statuses;  // newest of each process
   ProcessSamples samples;
   std::map<int32_t, PoseTrack> poses;
   std::map<std::string, int> unreadable;  // messages that did not decode or parse, by channel
   int incomplete_states = 0;              // of which a chunk is missing
 };
 
-// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, STATUS_* of a server bus' log. What of the log is lost
-// is noted in `readings` (log_reader.h), here and below.
+// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_* of a server bus' log. What of the
+// log is lost is noted in `readings` (log_reader.h), here and below.
 CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = nullptr);
-// Reads POSE_<agent_id>, CORRECTION_<agent_id> and STATUS_* of an agent bus' log.
+// Reads POSE_<agent_id>, CORRECTION_<agent_id>, STATUS_* and what AnchorTrack has of an agent bus'
+// log.
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -113,6 +113,28 @@ Table TruthTable(const ReportMetrics& metrics) {
   return table;
 }
 
+Table AnchorTable(const ReportMetrics& metrics) {
+  Table table({"anchor", "made by", "agent", "error m", "px", "largest jump m", "at fusion m",
+               "after 10 s m", "end m", "max m", "unblended m", ""});
+  for (const AnchorMetrics& anchor : metrics.anchors) {
+    std::vector<std::string> cells = {anchor.name, fmt::format("{}", anchor.made_by)};
+    if (anchor.agents.empty()) {
+      cells.resize(11, "-");
+      cells.emplace_back(anchor.placed ? "no other agent is in its group" : "never placed");
+      table.Add(std::move(cells));
+      continue;
+    }
+    for (const AnchorAtAgent& at : anchor.agents) {
+      std::string reason = anchor.placed ? at.reason : "never placed";
+      table.Add({cells[0], cells[1], fmt::format("{}", at.agent), Cell(at.error_m, 3),
+                 Cell(at.error_px, 1), Cell(at.largest_jump_m, 3), Cell(at.error_at_fusion_m, 3),
+                 Cell(at.error_10s_m, 3), Cell(at.error_end_m, 3), Cell(at.error_max_m, 3),
+                 Cell(at.error_unblended_m, 3), std::move(reason)});
+    }
+  }
+  return table;
+}
+
 Table ProcessTable(const ReportInput& input, const CapturedSession& session) {
   Table table({"process", "realtime", "in", "out", "dropped", "median ms", "p99 ms", "MB", "CPU s",
                "restarts"});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "report/report_anchor_pictures.h"
 #include "report/report_tables.h"
 
 namespace pangea::session {
@@ -11,7 +12,7 @@ std::string FileName(const MapId& map) {
 }
 
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
-                           const ReportMetrics& metrics) {
+                           const ReportMetrics& metrics, bool has_anchor_picture) {
   std::string text = "# Session report\n\n";
   if (!metrics.lost.empty()) {
     text += fmt::format("**{}**\n\n- {}\n\n", kLostExplained, fmt::join(metrics.lost, "\n- "));
@@ -41,6 +42,12 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
   }
   if (const Table truth = TruthTable(metrics); !truth.empty()) {
     text += fmt::format("\n{}\n{}\n", truth.Text(), kNeesExplained);
+  }
+  if (const Table anchors = AnchorTable(metrics); !anchors.empty()) {
+    text += fmt::format("\n## Anchors\n\n{}\n{}\n", anchors.Text(), kAnchorsExplained);
+    if (has_anchor_picture) {
+      text += fmt::format("\n![Anchors]({})\n\n{}\n", kAnchorPicture, kAnchorPictureExplained);
+    }
   }
   if (const Table processes = ProcessTable(input, session); !processes.empty()) {
     text += fmt::format("\n## Processes\n\n{}", processes.Text());

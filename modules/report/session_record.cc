@@ -40,7 +40,14 @@ void Write(const SessionRecord& session, const fs::path& file) {
                       {"start", agent.start_s},
                       {"duration", agent.duration_s.value_or(0)}});  // 0: to its end
   }
-  WriteTextFile(file, json{{"agents", agents}, {"expect", session.expect}}.dump(2) + "\n");
+  json anchors = json::array();
+  for (const WantedAnchor& anchor : session.anchors) {
+    anchors.push_back({{"agent", anchor.agent}, {"name", anchor.name}});
+  }
+  WriteTextFile(file,
+                json{{"agents", agents}, {"anchors", anchors}, {"expect", session.expect}}.dump(
+                    2, ' ', false, json::error_handler_t::replace) +
+                    "\n");
 }
 
 }  // namespace
@@ -79,6 +86,10 @@ SessionRecord ReadSessionRecord(const std::vector<fs::path>& logs) {
       const json remembered = json::parse(ReadTextFile(file));
       for (const json& agent : remembered.at("agents")) {
         session.agents.push_back(RunOf(agent));
+      }
+      for (const json& anchor : remembered.value("anchors", json::array())) {
+        session.anchors.push_back(
+            {anchor.at("agent").get<int32_t>(), anchor.at("name").get<std::string>()});
       }
       // Of several sessions together nothing was expected.
       session.expect =

@@ -1,7 +1,8 @@
 #pragma once
 
 // What a session keeps beside its log (recordings.json), so that a later replay or explanation
-// finds ground truth and images: what each agent played, and what was expected.
+// finds ground truth and images: what each agent played, which anchors were to be
+// placed, and what was expected.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +18,7 @@ namespace pangea::session {
 struct SessionRecord {
   std::vector<AgentRun> agents;  // id, recording and the part of it that was played
   Expectations expect;
+  std::vector<WantedAnchor> anchors;
 };
 
 // Both throw std::runtime_error when the file cannot be written, or read.

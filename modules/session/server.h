@@ -1,6 +1,6 @@
 #pragma once
 
-// The server of a site by one command: the seven server processes, each started again when it ends,
+// The server of a site by one command: the eight server processes, each started again when it ends,
 // until Ctrl-C or SIGTERM ends them in order (what they say goes to files).
 
 #include <filesystem>

@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/anchor.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
 
@@ -17,6 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr int32_t kMaxAgentId = 65535;
 constexpr double kMaxTime_s = 1e6;  // eleven days
+constexpr double kMaxPixel = 20000;
 
 // A recording is a folder with mav0 in it, or mav0 itself.
 bool IsRecording(const fs::path& folder) {
@@ -130,6 +132,58 @@ void CheckFaults(const SessionScript& script, const std::string& file) {
   }
 }
 
+// The border of messages takes no other.
+bool IsPrintable(const std::string& name) {
+  return std::ranges::none_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+}
+
+void CheckAnchor(const AnchorScript& anchor, const SessionScript& script, const std::string& file) {
+  if (anchor.name.empty() || !IsPrintable(anchor.name)) {
+    throw std::runtime_error(fmt::format(
+        "{}: anchors: at {} s: 'name' must be a text of printable characters", file, anchor.at_s));
+  }
+  const auto agent = std::ranges::find(script.agents, anchor.agent, &AgentScript::id);
+  if (agent == script.agents.end()) {
+    throw std::runtime_error(fmt::format("{}: anchors: {}: there is no agent {} in this session",
+                                         file, anchor.name, anchor.agent));
+  }
+  if (agent->recording.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: anchors: {}: agent {} has no 'recording', whose first image 'at' counts "
+                    "from",
+                    file, anchor.name, anchor.agent));
+  }
+}
+
+void CheckAnchors(const SessionScript& script, const std::string& file) {
+  if (script.anchors.size() > kMaxScriptedAnchors) {
+    throw std::runtime_error(fmt::format("{}: 'anchors' lists {}: a session takes {} at most", file,
+                                         script.anchors.size(), kMaxScriptedAnchors));
+  }
+  std::set<std::string> names;
+  for (const AnchorScript& anchor : script.anchors) {
+    CheckAnchor(anchor, script, file);
+    if (!names.insert(anchor.name).second) {
+      throw std::runtime_error(
+          fmt::format("{}: anchors: the name '{}' is given twice: every anchor needs its own", file,
+                      anchor.name));
+    }
+  }
+}
+
+void AddAnchors(YamlOptions& yaml, std::vector<AnchorScript>* anchors) {
+  yaml.AddList("anchors", anchors, [](YamlOptions& item, AnchorScript& anchor) {
+    item.AddBetween("agent", 1, kMaxAgentId, &anchor.agent);
+    item.AddBetween("at", 0, kMaxTime_s, &anchor.at_s);
+    item.AddText("name", kMaxAnchorName, &anchor.name);
+    item.AddPairBetween("pixel", 0, kMaxPixel, &anchor.pixel.x(), &anchor.pixel.y());
+    item.AddText("payload", kMaxAnchorPayload, &anchor.payload);
+    for (const char* needed : {"agent", "at", "name", "pixel"}) {
+      item.Require(needed);
+    }
+  });
+}
+
 }  // namespace
 
 SessionScript ParseSessionFile(const fs::path& file) {
@@ -160,11 +214,13 @@ SessionScript ParseSessionFile(const fs::path& file) {
     item.AddBetween("disconnect", 1, kMaxAgentId, &fault.disconnect);
     item.AddBetween("seconds", 0, kMaxTime_s, &fault.seconds);
   });
+  AddAnchors(yaml, &script.anchors);
   yaml.Section("options", &script.options, "");
   const ExpectationsSection expect(yaml, "expect");
   yaml.ReadFile(file.string());
   CheckAgents(script, file.string());
   CheckFaults(script, file.string());
+  CheckAnchors(script, file.string());
   script.expect = expect.Take();
   return script;
 }

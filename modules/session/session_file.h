@@ -11,10 +11,13 @@
 //   faults:                                             # faults.h
 //     - {at: 12.5, kill: fusion}
 //     - {at: 20, disconnect: 2, seconds: 10}
+//   anchors:                                            # anchor_placer.h
+//     - {agent: 1, at: 12, name: kettle, pixel: [376, 240]}
 //   options:                                            # server_options.h
 //     fusion: {alignment: {min_inliers: 20}}
 //   expect: {fused_by: 40, ate_joint_m: 0.1}            # expectations.h
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -33,6 +36,8 @@ namespace pangea::session {
 
 // What one machine has been seen to run: each agent is three processes and an LCM bus.
 inline constexpr size_t kMaxSessionAgents = 200;
+
+inline constexpr size_t kMaxScriptedAnchors = 1000;
 
 struct AgentScript {
   int32_t id = 0;  // 1 .. 65535, unique in the session
@@ -56,6 +61,15 @@ struct AgentScript {
   std::filesystem::path resolved_keyframes;
 };
 
+// What an agent places: the surface that its image nearest to `at_s` shows at `pixel`.
+struct AnchorScript {
+  int32_t agent = 0;  // one with a recording
+  double at_s = 0;    // of its recording, since its first image, as AgentScript::start_s
+  std::string name;   // unique in the session
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw: x, y
+  std::string payload;
+};
+
 // Of the server's processes, those that compute and the one that keeps the journal.
 struct SessionServerOptions : pangea::ServerOptions {
   AgentHandlerOptions agent_handler;
@@ -70,6 +84,7 @@ struct SessionServerOptions : pangea::ServerOptions {
 struct SessionScript {
   std::vector<AgentScript> agents;
   std::vector<Fault> faults;
+  std::vector<AnchorScript> anchors;
   SessionServerOptions options;
   Expectations expect;
 };
@@ -77,7 +92,7 @@ struct SessionScript {
 // Processes of a session that are started once, whoever its agents are.
 inline constexpr const char* kServerProcesses[] = {
     "agent_handler", "place_recognition", "inter_map_ba", "fusion",
-    "posegraph",     "global_ba",         "map_points"};
+    "posegraph",     "global_ba",         "map_points",   "anchors"};
 
 // Reads and checks a session file, without a look at the recordings and logs it names. Throws
 // std::runtime_error that names file, key and mend.

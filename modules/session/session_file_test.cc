@@ -173,6 +173,58 @@ TEST_F(SessionFileTest, ADisconnectIsAPartitionOfTheLink) {
   EXPECT_EQ(script.agents[1].link->loss, 0.1);
 }
 
+TEST_F(SessionFileTest, ReadsAnchors) {
+  const std::string agents =
+      "agents: [{id: 1, recording: ../recordings/MH_01}, {id: 2, live: true}]\n";
+  const std::string kettle = "{agent: 1, at: 12, name: kettle, pixel: [376, 240.5]}";
+  const SessionScript script = ReadSessionFile(
+      Write(agents + "anchors:\n  - " + kettle +
+            "\n  - {agent: 1, at: 0, name: pot, pixel: [0, 20000], payload: '{\"a\": 1}'}\n"),
+      std::nullopt);
+  ASSERT_EQ(script.anchors.size(), 2u);
+  EXPECT_EQ(script.anchors[0].agent, 1);
+  EXPECT_EQ(script.anchors[0].at_s, 12);
+  EXPECT_EQ(script.anchors[0].name, "kettle");
+  EXPECT_EQ(script.anchors[0].pixel, Eigen::Vector2d(376, 240.5));
+  EXPECT_EQ(script.anchors[0].payload, "");
+  EXPECT_EQ(script.anchors[1].payload, R"({"a": 1})");
+  const auto refuses = [&](const std::string& anchor, const std::string& why) {
+    EXPECT_THAT(ErrorOf(agents + "anchors:\n  - " + anchor + "\n"),
+                testing::AllOf(HasSubstr("two.yaml:"), HasSubstr(why)));
+  };
+  refuses("{agent: 3, at: 1, name: a, pixel: [1, 1]}", "anchors: a: there is no agent 3");
+  refuses("{agent: 2, at: 1, name: a, pixel: [1, 1]}", "anchors: a: agent 2 has no 'recording'");
+  refuses(kettle + "\n  - " + kettle, "the name 'kettle' is given twice");
+  refuses("{agent: 1, at: 1, name: '', pixel: [1, 1]}", "'name' must be a text");
+  refuses("{agent: 1, at: 1, name: \"a\\nb\", pixel: [1, 1]}", "printable");
+  refuses("{agent: 1, at: 1, name: " + std::string(101, 'a') + ", pixel: [1, 1]}",
+          ":3: key 'anchors[0].name' must be a text of at most 100 bytes, not 101");
+  refuses("{agent: 1, at: 1, name: a, pixel: [1, 1], payload: " + std::string(1001, 'a') + "}",
+          ":3: key 'anchors[0].payload' must be a text of at most 1000 bytes, not 1001");
+  refuses("{agent: 1, at: 1, name: a, pixel: [1, 20001]}",
+          ":3: key 'anchors[0].pixel[1]' must be a number from 0 to 20000, not '20001'");
+  refuses("{agent: 1, at: 1, name: a, pixel: [-1, 1]}", "key 'anchors[0].pixel[0]'");
+  for (const char* bad : {"7", "[7]", "[7, 7, 7]"}) {
+    refuses("{agent: 1, at: 1, name: a, pixel: " + std::string(bad) + "}",
+            ":3: key 'anchors[0].pixel' must be a list of two numbers, each from 0 to 20000");
+  }
+  refuses("{agent: 1, at: 1, name: a, pixl: [1, 1]}", "did you mean 'anchors[0].pixel'?");
+  refuses("{agent: 1, at: 1, pixel: [1, 1]}", "name");
+}
+
+TEST_F(SessionFileTest, MoreAnchorsThanASessionTakesAreRefused) {
+  std::string text = "agents: [{id: 1, recording: ../recordings/MH_01}]\nanchors:\n";
+  const auto add = [&text](size_t i) {
+    text += "  - {agent: 1, at: 1, name: a" + std::to_string(i) + ", pixel: [1, 1]}\n";
+  };
+  for (size_t i = 0; i < kMaxScriptedAnchors; ++i) {
+    add(i);
+  }
+  EXPECT_EQ(ReadSessionFile(Write(text), std::nullopt).anchors.size(), kMaxScriptedAnchors);
+  add(kMaxScriptedAnchors);
+  EXPECT_THAT(ErrorOf(text), HasSubstr("'anchors' lists 1001: a session takes 1000 at most"));
+}
+
 TEST_F(SessionFileTest, UnknownKeysNameTheirLineAndTheNearest) {
   const std::string agent = "# a comment\nagents:\n  - {id: 1, recording: ../recordings/MH_02}\n";
   EXPECT_THAT(ErrorOf(agent + "fualts: []\n"),
@@ -242,6 +294,8 @@ TEST_F(SessionFileTest, EveryNumberHasItsRange) {
               "0 to 1000000");
     }
     refuses(agent + "expect: {coverage: " + bad + "}\n", "expect.coverage", "0 to 1");
+    refuses(agent + "anchors: [{agent: 1, name: a, pixel: [1, 1], at: " + bad + "}]\n",
+            "anchors.0.\\.at", "0 to 1000000");
     refuses(agent + "expect: {groups: " + bad + "}\n", "expect.groups", "0 to 1000000");
   }
   for (const std::string id : {"0", "-1", "65536"}) {

@@ -32,6 +32,7 @@ SessionMonitor::SessionMonitor(const Buses& buses) : last_work_(WallUtime()) {
   for (const auto& [id, url] : buses.agents) {
     agents_[id];
     buses_.push_back(std::make_unique<LcmBus>(url));
+    agent_buses_[id] = buses_.back().get();
     WatchAgent(id, *buses_.back());
   }
 }

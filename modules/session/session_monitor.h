@@ -43,6 +43,8 @@ class SessionMonitor {
   void Handle(int timeout_ms);
 
   const AgentProgress& agent(int32_t id) const;
+  // Its bus, which Handle handles.
+  Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
   // Newest status of each process by name, whichever bus it came on.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
   int constraints_accepted() const { return accepted_; }
@@ -65,6 +67,7 @@ class SessionMonitor {
   void OnStatus(Bytes data);
 
   std::vector<std::unique_ptr<LcmBus>> buses_;
+  std::map<int32_t, Bus*> agent_buses_;
   std::map<int32_t, AgentProgress> agents_;
   std::map<int32_t, Rigid3> T_odom_body_;  // newest pose of each agent
   std::set<int32_t> with_odometry_;        // agents that publish poses

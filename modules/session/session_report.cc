@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bus/node.h"
 #include "server_options/server_options.h"
 #include "session/session_monitor.h"
@@ -45,6 +47,14 @@ AgentRun RunOf(const AgentScript& script) {
   return run;
 }
 
+std::vector<WantedAnchor> WantedAnchors(const SessionScript& script) {
+  std::vector<WantedAnchor> wanted;
+  for (const AnchorScript& anchor : script.anchors) {
+    wanted.push_back({anchor.agent, anchor.name});
+  }
+  return wanted;
+}
+
 // Its report, and in words what it missed.
 ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadings* readings) {
   WrittenReport report = WriteReport(input, out.string(), readings);
@@ -56,6 +66,20 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadin
     }
   }
   return outcome;
+}
+
+// Nobody showed any: without the agents' logs nothing is known of them.
+void ForgetAnchorsOfAReplay(ReportInput* input) {
+  if (std::ranges::any_of(input->agents,
+                          [](const AgentRun& run) { return !run.bus_log.empty(); })) {
+    return;
+  }
+  input->anchors.clear();
+  if (std::erase_if(input->expect,
+                    [](const auto& bound) { return bound.first.starts_with("anchor_"); }) > 0) {
+    input->notes.emplace_back(
+        "no log of an agent's bus: what is expected of anchors was not checked");
+  }
 }
 
 // With which options the server ran, as far as they are not the defaults.
@@ -104,6 +128,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
   if (summary.interrupted) {
     input.notes.emplace_back("interrupted: the recordings were not played to their end");
   }
+  input.anchors = WantedAnchors(script);
   input.expect = script.expect;
   NoteOptions(input.server_log, readings, &input);
   return OutcomeOf(input, out, readings);
@@ -114,17 +139,19 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
   ReportInput input;
   input.server_log = log.string();
   input.agents = known.agents;
+  input.anchors = known.anchors;
   input.expect = known.expect;
   for (AgentRun& run : input.agents) {  // a session's own log has its agents' beside it
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }
+  ForgetAnchorsOfAReplay(&input);
   NoteOptions(log, readings, &input);
   return OutcomeOf(input, out, readings);
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
-  SessionRecord session{{}, script.expect};
+  SessionRecord session{{}, script.expect, WantedAnchors(script)};
   for (const AgentScript& agent : script.agents) {
     session.agents.push_back(RunOf(agent));
   }

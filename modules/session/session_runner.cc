@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <stdexcept>
 
@@ -15,6 +16,7 @@
 #include "files/text_file.h"
 #include "link/agent_key.h"
 #include "options/yaml_options.h"
+#include "session/anchor_app.h"
 #include "session/buses.h"
 #include "session/child_process.h"
 #include "session/kept_processes.h"
@@ -45,6 +47,7 @@ class Runner {
         faults_(script.faults),
         buses_(OpenBuses(script, options)),
         monitor_(buses_),
+        anchors_(PlanAnchors(script)),
         progress_(isatty(STDOUT_FILENO) != 0),
         kept_(options.out / "logs") {
     for (const AgentScript& agent : script.agents) {
@@ -64,6 +67,7 @@ class Runner {
     Play();
     Drain();
     progress_.Finish();
+    std::ranges::copy(anchors_.NotPlaced(), std::back_inserter(summary_.failures));
     kept_.StopAll(kStopGrace_s);
     summary_.wall_s = Now() - begin_;
     summary_.status = monitor_.statuses();
@@ -173,6 +177,7 @@ class Runner {
       if (player.script.link) {
         StartLinkEmulator(id, *player.script.link);
       }
+      anchors_.Join(player.script, &monitor_.agent_bus(id));
       const std::string name = fmt::format("uplink_{}", id);
       kept_.Start(name, {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
                          KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--spool",
@@ -339,6 +344,7 @@ class Runner {
   void Step() {
     InjectFaults();
     monitor_.Handle(100);
+    anchors_.Step();
     Revive();
     std::vector<AgentLine> lines;
     for (const Player& player : players_) {
@@ -386,6 +392,7 @@ class Runner {
   FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;
+  AnchorApp anchors_;
   SessionProgress progress_;
   KeptProcesses kept_;
   std::vector<Player> players_;

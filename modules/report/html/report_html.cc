@@ -6,6 +6,7 @@
 #include "report/html/report_charts.h"
 #include "report/html/report_svg.h"
 #include "report/metrics/report_paper.h"
+#include "report/report_anchor_pictures.h"
 #include "report/report_pictures.h"
 #include "report/report_tables.h"
 
@@ -19,7 +20,7 @@ constexpr const char* kPolicy = R"(<!DOCTYPE html>
 <head>
 <meta charset="utf-8"/>
 <meta name="viewport" content="width=device-width, initial-scale=1"/>
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'"/>
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{}'"/>
 )";
 
 constexpr const char* kHead = R"(<title>Session report</title>
@@ -56,6 +57,7 @@ h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--edge); }
 .tip i { font-style: normal; border-left: 4px solid var(--line, transparent); padding-left: 0.4rem; }
 .tip b { font-variant-numeric: tabular-nums; }
 .wide { overflow-x: auto; }
+img { max-width: 100%; }
 table { border-collapse: collapse; margin: 0.75rem 0; font-size: 0.9rem; }
 th, td { padding: 0.25rem 0.6rem; border-bottom: 1px solid var(--edge); text-align: left; }
 th { background: var(--soft); }
@@ -198,10 +200,19 @@ std::string Paper(const ReportMetrics& metrics) {
                                    "read ours as a check of the system.");
 }
 
+// In the page itself: it fetches nothing.
+std::string AnchorFigure(const std::string& jpeg) {
+  return jpeg.empty()
+             ? ""
+             : fmt::format("<p><img alt=\"Anchors\" src=\"data:image/jpeg;base64,{}\"/></p>\n",
+                           Base64(jpeg)) +
+                   Aside(kAnchorPictureExplained);
+}
+
 }  // namespace
 
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
-                       const ReportMetrics& metrics) {
+                       const ReportMetrics& metrics, const std::string& anchors_jpeg) {
   const std::vector<Picture> pictures = Pictures(metrics);
   std::string html = Head();
   html += "<h1>Session report</h1>\n";
@@ -222,6 +233,10 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
   }
   html += Section("error", "Error over time", error);
   html += Section("fusions", "Fusions", Fusions(session, metrics));
+  if (const Table anchors = AnchorTable(metrics); !anchors.empty()) {
+    html += Section("anchors", "Anchors",
+                    anchors.Html() + Aside(kAnchorsExplained) + AnchorFigure(anchors_jpeg));
+  }
   html += Section("constraints", "Constraints", Constraints(session, metrics));
   html += Section("load", "Load",
                   ChartOr(LoadChart(session, metrics), "CPU of each process over the session",

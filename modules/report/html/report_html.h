@@ -9,8 +9,9 @@
 
 namespace pangea::session {
 
+// `anchors_jpeg`: of AnchorsJpeg; empty for none.
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
-                       const ReportMetrics& metrics);
+                       const ReportMetrics& metrics, const std::string& anchors_jpeg);
 
 // The page with one more section at its end.
 std::string WithSection(std::string page, const std::string& id, const std::string& title,

@@ -79,6 +79,7 @@ void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentMetr
   }
   agent->odometry = std::move(track.odometry);
   agent->samples = std::move(track.samples);
+  agent->anchors = std::move(track.anchors);
   agent->live = LiveMetricsOf(track.live, FusedRevisions(session), agent->ground_truth);
   agent->odometry_at_camera_rate = !agent->odometry.empty();
   std::optional<int64_t> first_pose = track.first_tracking_utime;
@@ -199,6 +200,14 @@ void AddConstraints(const CapturedSession& session, ReportMetrics* metrics) {
   metrics->intra_constraints = CheckConstraints(intra);
 }
 
+void AddAnchors(const ReportInput& input, const CapturedSession& session, ReportMetrics* metrics) {
+  std::vector<AnchorViewer> viewers;
+  for (const AgentMetrics& agent : metrics->agents) {
+    viewers.push_back({agent.id, &agent.anchors, &agent.odometry, &agent.ground_truth});
+  }
+  metrics->anchors = AnchorsOf(session, viewers, input.anchors);
+}
+
 }  // namespace
 
 bool AgentMetrics::AteCounts() const {
@@ -235,6 +244,7 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
     AddJoint(metrics.agents, &group);
   }
   AddConstraints(session, &metrics);
+  AddAnchors(input, session, &metrics);
   metrics.lost = readings == nullptr ? std::vector<std::string>() : LossLines(*readings);
   return metrics;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "eval/metrics.h"
+#include "report/metrics/report_anchors.h"
 #include "report/metrics/report_groups.h"
 #include "report/metrics/report_live.h"
 #include "report/metrics/report_truth.h"
@@ -30,6 +31,7 @@ struct AgentMetrics {
   std::optional<Ate> server;            // its keyframes in the main group, SE(3)
   std::optional<double> coverage;
   LiveMetrics live;        // of what it showed while the session ran
+  AnchorTrack anchors;     // on its bus
   ProcessSamples samples;  // of the processes on its bus
   AgentRun run;
 
@@ -49,6 +51,7 @@ struct ReportMetrics {
   ConstraintsTruth all_constraints;
   ConstraintsTruth inter_constraints;
   ConstraintsTruth intra_constraints;
+  std::vector<AnchorMetrics> anchors;
   std::vector<std::string> notes;
   std::vector<std::string> lost;  // of the logs read, lines of LossLines
 

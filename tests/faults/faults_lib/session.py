@@ -10,7 +10,8 @@ from pathlib import Path
 
 from link_lib.metrics import events, statuses
 
-SERVER = ("agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba", "map_points")
+SERVER = ("agent_handler", "place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba", "map_points",
+          "anchors")
 SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
 
 
