@@ -333,8 +333,8 @@ TEST_F(AnchorLink, ADeafAgentCostsABoundedRate) {
   int64_t number = 0;
   const auto hellos = [&](int count) {
     for (int i = 0; i < count; ++i) {
-      link_bus.Publish("LINK_UP_1", session.Seal({LinkKind::kHello, ++number,
-                                                  Encode(LinkHello{"test", {}})}));
+      link_bus.Publish("LINK_UP_1",
+                       session.Seal({LinkKind::kHello, ++number, Encode(LinkHello{"test", {}})}));
       Run(1);
     }
   };
@@ -391,8 +391,9 @@ TEST_F(AnchorLink, NothingOfAnchorsCrashesAProcess) {
   Request(TestEdit({1, 99}, 1, 1));
   Run(10);
   ExpectDelivered(5);
-  const bool arrived = std::ranges::any_of(
-      journalled, [](const auto& item) { return item.second.anchor == AnchorId{1, 99}; });
+  const bool arrived = std::ranges::any_of(journalled, [](const auto& item) {
+    return item.second.anchor == AnchorId{1, 99};
+  });
   EXPECT_TRUE(arrived);
 }
 

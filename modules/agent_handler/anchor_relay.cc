@@ -131,8 +131,7 @@ void AnchorRelay::Poll() {
 void AnchorRelay::SendDue(int32_t agent_id, int64_t now_us, const Send& send) {
   Agent& agent = agents_.at(agent_id);
   if (!agent.answers.empty()) {
-    send(LinkKind::kAnchorEditAnswers,
-         EncodeAnchorEditAnswers(std::exchange(agent.answers, {})));
+    send(LinkKind::kAnchorEditAnswers, EncodeAnchorEditAnswers(std::exchange(agent.answers, {})));
   }
   while (const auto body = agent.table.Next(now_us)) {
     agent.table.Charge(send(LinkKind::kAnchor, *body));

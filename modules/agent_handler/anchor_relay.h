@@ -2,9 +2,9 @@
 
 // Anchors between the agents and the server: edits up into the journal, states down to the agents.
 //   server bus: ANCHOR_REQUEST_0, ANCHOR_k in; ANCHOR_EDIT out (journal/anchor_edits.h)
-// An edit is checked against what its editor's key allows as far as the edit alone tells: one who may
-// edit its own only gives the anchor's maker. What is refused is answered too, so that it is not
-// sent for ever.
+// An edit is checked against what its editor's key allows as far as the edit alone tells: one who
+// may edit its own only gives the anchor's maker. What is refused is answered too, so that it is
+// not sent for ever.
 
 #include <cstdint>
 #include <deque>

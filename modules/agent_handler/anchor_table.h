@@ -1,8 +1,8 @@
 #pragma once
 
-// One agent's anchors on their way down: of each the newest state, sent until the agent says that it
-// has it. A state machine: monotonic microseconds go in, bodies of packets come out; no clock, no
-// bus, one thread. Bounds: kMaxAnchors, kAnchorBytesPerSecond.
+// One agent's anchors on their way down: of each the newest state, sent until the agent says that
+// it has it. A state machine: monotonic microseconds go in, bodies of packets come out; no clock,
+// no bus, one thread. Bounds: kMaxAnchors, kAnchorBytesPerSecond.
 
 #include <cstdint>
 #include <map>

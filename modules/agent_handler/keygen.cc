@@ -16,9 +16,10 @@ CLI::App* AddKeygen(CLI::App& app, KeygenArguments* arguments) {
   keygen->add_option("--out", arguments->file,
                      "file to make; never written over (default: agent_ID.key here)");
   keygen
-      ->add_option("--anchors", arguments->anchors,
-                   "what the agent may do with anchors: read, own (edit those it made), write (edit "
-                   "all)")
+      ->add_option(
+          "--anchors", arguments->anchors,
+          "what the agent may do with anchors: read, own (edit those it made), write (edit "
+          "all)")
       ->capture_default_str()
       ->check(CLI::IsMember({"read", "own", "write"}));
   return keygen;

@@ -26,9 +26,8 @@ struct RightWord {
   std::string_view word;
   AnchorRight right;
 };
-constexpr RightWord kRightWords[] = {{"read", AnchorRight::kRead},
-                                     {"own", AnchorRight::kEditOwn},
-                                     {"write", AnchorRight::kEditAll}};
+constexpr RightWord kRightWords[] = {
+    {"read", AnchorRight::kRead}, {"own", AnchorRight::kEditOwn}, {"write", AnchorRight::kEditAll}};
 
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));

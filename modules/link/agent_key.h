@@ -1,9 +1,9 @@
 #pragma once
 
 // An agent's pre-shared key as a file: text, mode 0600, made by `pangea-agent-handler keygen`. The
-// agent has one, the server a folder of them. The server's copy also says what its agent may do with
-// anchors, `anchors: read | own | write`: see them, edit those it made (also without the line), edit
-// all.
+// agent has one, the server a folder of them. The server's copy also says what its agent may do
+// with anchors, `anchors: read | own | write`: see them, edit those it made (also without the
+// line), edit all.
 
 #include <cstdint>
 #include <filesystem>

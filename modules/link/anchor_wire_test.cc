@@ -58,8 +58,7 @@ TEST(AnchorWire, TheLargestFitAnEthernetFrame) {
   EXPECT_LE(EncodeAnchor(kLargest, message).size(), size_t{kFramePayloadBytes});
   const std::vector<int64_t> numbers(kMaxAnchorsReceived, kLargest);
   EXPECT_LE(EncodeAnchorsReceived(numbers).size(), size_t{kFramePayloadBytes});
-  const std::vector<AnchorEditAnswer> answers(kMaxAnchorEditAnswers,
-                                              {edit.anchor, kLargest, true});
+  const std::vector<AnchorEditAnswer> answers(kMaxAnchorEditAnswers, {edit.anchor, kLargest, true});
   EXPECT_LE(EncodeAnchorEditAnswers(answers).size(), size_t{kFramePayloadBytes});
   EXPECT_TRUE(ParseAnchorEditAnswers(EncodeAnchorEditAnswers(answers)).value);
 }

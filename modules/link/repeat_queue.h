@@ -34,7 +34,7 @@ class RepeatQueue {
   std::optional<AnchorId> Next(int64_t now_us);
   void Charge(int64_t bytes_on_the_wire) { pacer_.Take(bytes_on_the_wire); }
 
-  size_t size() const { return turn_of_.size(); }
+  size_t size() const { return order_of_.size(); }
 
  private:
   static constexpr double kBurstBytes = 4000;
@@ -44,9 +44,9 @@ class RepeatQueue {
   };
 
   Pacer pacer_;
-  int64_t last_turn_ = 0;
-  std::map<int64_t, Waiting> by_turn_;
-  std::map<AnchorId, int64_t> turn_of_;
+  int64_t last_order_ = 0;
+  std::map<int64_t, Waiting> by_order_;
+  std::map<AnchorId, int64_t> order_of_;
 };
 
 }  // namespace pangea

@@ -17,8 +17,8 @@ class AgentAnchors {
  public:
   static constexpr size_t kMaxAnchors = 256;
 
-  // If another anchor finds no room: the one that goes for it, if one may: one that is gone, or else
-  // one that this session has not spoken of.
+  // If another anchor finds no room: the one that goes for it, if one may: one that is gone, or
+  // else one that this session has not spoken of.
   std::optional<AnchorState> MakeRoomFor(const AnchorId& id);
 
   enum class Taken { kNew, kKnown, kFull };

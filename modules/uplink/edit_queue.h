@@ -1,7 +1,7 @@
 #pragma once
 
-// The agent's edits of anchors until the journal has them. A state machine: monotonic microseconds go
-// in; no clock, no bus, one thread. Bounds: kMaxEdits anchors, and a rate.
+// The agent's edits of anchors until the journal has them. A state machine: monotonic microseconds
+// go in; no clock, no bus, one thread. Bounds: kMaxEdits anchors, and a rate.
 
 #include <cstdint>
 #include <map>
@@ -20,8 +20,8 @@ class EditQueue {
   explicit EditQueue(double bytes_per_s) : queue_(bytes_per_s) {}
 
   enum class Taken { kNew, kOutdated, kFull };
-  // In place of an older edit of the anchor: the newer stands for both, also for where the older put
-  // it, if the newer leaves it there.
+  // In place of an older edit of the anchor: the newer stands for both, also for where the older
+  // put it, if the newer leaves it there.
   Taken Add(AnchorEdit edit);
   // Whether it was waiting for it.
   bool OnAnswer(const AnchorEditAnswer& answer);

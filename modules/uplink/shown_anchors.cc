@@ -26,7 +26,7 @@ void ShownAnchorsBlend::Set(const AnchorState& state) {
   const bool jumps = is_new || entry.map != state.map || entry.revision != state.revision ||
                      entry.edited_by != state.edited_by;
   if (jumps) {
-    entry = {state.revision, state.edited_by, state.map,
+    entry = {state.revision,      state.edited_by,     state.map,
              state.T_odom_anchor, state.T_odom_anchor, 0};
     changed_ = true;
   } else if (!Same(entry.T_odom_anchor, state.T_odom_anchor)) {

@@ -44,8 +44,8 @@ std::optional<std::string> UplinkOptions::Invalid() const {
 
 UplinkOptions WithinBudget(UplinkOptions options) {
   if (const double budget_kb_per_s = options.budget_kb_per_s; budget_kb_per_s > 0) {
-    options.sender.bandwidth_kb_per_s =
-        std::min(options.sender.bandwidth_kb_per_s, (1 - kPoseShare - kAnchorShare) * budget_kb_per_s);
+    options.sender.bandwidth_kb_per_s = std::min(options.sender.bandwidth_kb_per_s,
+                                                 (1 - kPoseShare - kAnchorShare) * budget_kb_per_s);
     options.pose_hz = std::min(options.pose_hz, kPoseShare * 1000 * budget_kb_per_s / kPoseBytes);
   }
   return options;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Edits of anchors in the journal: each (anchor, revision, editor) once, numbered from 0 on, told
-// once the disk has it, told again to whoever asks.
+// Edits of anchors in the journal: each (anchor, revision, editor) once, numbered from 0 on,
+// published once the disk has it, retransmitted to whoever asks.
 //   server bus: ANCHOR_EDIT, AGAIN_<requester> out
 //
 // Bounds: kMaxEdits, of some 100 bytes each in memory; kMaxRequests wait.

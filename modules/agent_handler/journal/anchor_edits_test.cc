@@ -22,9 +22,8 @@ class AnchorEditsTest : public testing::Test {
  protected:
   void SetUp() override {
     std::filesystem::remove(path);
-    bus.Subscribe("ANCHOR_EDIT", [this](const std::string&, Bytes data) {
-      published.push_back(Decoded(data));
-    });
+    bus.Subscribe("ANCHOR_EDIT",
+                  [this](const std::string&, Bytes data) { published.push_back(Decoded(data)); });
     bus.Subscribe("AGAIN_anchors", [this](const std::string&, Bytes data) {
       again_t message{};
       ASSERT_TRUE(DecodeMessage(data, &message));
