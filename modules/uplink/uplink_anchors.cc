@@ -13,6 +13,14 @@ UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per
                               [this](AnchorEdit edit) { OnRequest(std::move(edit)); });
 }
 
+void UplinkAnchors::OnPose(int64_t utime, const MapId& map,
+                           const std::optional<Rigid3>& T_odom_body) {
+  shown_.OnPose(utime, map);
+  if (T_odom_body) {
+    poses_.Add(utime, map, *T_odom_body);
+  }
+}
+
 void UplinkAnchors::OnRequest(AnchorEdit edit) {
   if (edit.agent_id != 0 && edit.agent_id != agent_id_) {
     return node_.Refuse("another agent's edit of an anchor");
@@ -20,6 +28,11 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   edit.agent_id = agent_id_;
   edit.right = AnchorRight::kUnknown;
   edit.seq = -1;
+  const bool by_pose = edit.placement == AnchorEdit::Placement::kBody ||
+                       edit.placement == AnchorEdit::Placement::kPixel;
+  if (by_pose && !edit.T_odom_body) {
+    edit.T_odom_body = poses_.At(edit.utime, edit.map);
+  }
   switch (edits_.Add(std::move(edit))) {
     case EditQueue::Taken::kNew:
       return node_.Count("anchor_edits");

@@ -5,12 +5,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "bus/node.h"
 #include "link/link_session.h"
 #include "uplink/agent_anchors.h"
 #include "uplink/edit_queue.h"
+#include "uplink/pose_history.h"
 #include "uplink/shown_anchors.h"
 
 namespace pangea {
@@ -28,7 +30,8 @@ class UplinkAnchors {
   }
   void OnPacket(const LinkPacket& packet, int64_t now_us);
   void OnNewSession();
-  void OnPose(int64_t utime, const MapId& map) { shown_.OnPose(utime, map); }
+  // `T_odom_body`: none while it does not track.
+  void OnPose(int64_t utime, const MapId& map, const std::optional<Rigid3>& T_odom_body);
   void OnKeyframe(int64_t utime, const MapId& map) { shown_.OnKeyframe(utime, map); }
   // What is due to the server; only in a session.
   void SendDue(int64_t now_us, const Send& send);
@@ -49,6 +52,7 @@ class UplinkAnchors {
   EditQueue edits_;
   AgentAnchors anchors_;
   ShownAnchorsBlend shown_;
+  PoseHistory poses_;
 };
 
 }  // namespace pangea

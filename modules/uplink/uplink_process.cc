@@ -147,7 +147,9 @@ void UplinkProcess::OnPose(Bytes data) {
   // While it initialises there is no map yet.
   if (map.value && map.value->agent_id == agent_id_) {
     uplink_.AddPose(*map.value, message.group_revision, EncodePose(message));
-    anchors_.OnPose(message.utime, *map.value);
+    const auto T_odom_body = Parse(message.T_odom_body).value;
+    const bool tracks = message.state == pose_t::STATE_TRACKING;
+    anchors_.OnPose(message.utime, *map.value, tracks ? T_odom_body : std::nullopt);
   }
 }
 
