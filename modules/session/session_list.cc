@@ -63,6 +63,10 @@ std::string DescribeScript(const SessionScript& script) {
   for (const Fault& fault : script.faults) {
     text += fmt::format("  {}\n", DescribeFault(fault));
   }
+  for (const AnchorScript& anchor : script.anchors) {
+    text += fmt::format("  agent {} places {} at {:g} s of its recording\n", anchor.agent,
+                        anchor.name, anchor.at_s);
+  }
   if (!script.expect.empty()) {
     std::vector<std::string> bounds;
     for (const auto& [name, bound] : script.expect) {

@@ -42,7 +42,8 @@ TEST(SessionList, TheExampleOfTheDocumentationParses) {
   ASSERT_EQ(script.agents.size(), 4u);
   EXPECT_TRUE(script.agents[3].live);
   EXPECT_EQ(script.faults.size(), 3u);
-  EXPECT_EQ(script.expect.size(), 8u);
+  EXPECT_EQ(script.anchors.size(), 1u);
+  EXPECT_EQ(script.expect.size(), 11u);
 }
 
 TEST(SessionList, TellsWhoIsInAndWhatIsMissing) {
@@ -52,6 +53,7 @@ TEST(SessionList, TellsWhoIsInAndWhatIsMissing) {
   std::ofstream(folder / "good.yaml")
       << "# What it shows.\nagents:\n  - {id: 1, recording: here, start: 5, duration: 10}\n"
          "  - {id: 2, recording: gone, delay: 3}\n"
+         "anchors: [{agent: 1, at: 7, name: kettle, pixel: [3, 4]}]\n"
          "faults: [{at: 4, kill: fusion}, {at: 5, disconnect: 2}]\nexpect: {groups: 1}\n";
   std::ofstream(folder / "whole.yaml")
       << "agents: [{id: 7, recording: here}, {id: 8, live: true, duration: 60}]\n";
@@ -63,6 +65,7 @@ TEST(SessionList, TellsWhoIsInAndWhatIsMissing) {
       DescribeSessions({files[0]}, folder / "recordings"),
       AllOf(HasSubstr("good.yaml: What it shows.\n"), HasSubstr("agent 1: here from 5 s to 15 s\n"),
             HasSubstr("agent 2: gone, after 3 s\n"), HasSubstr("kill fusion at 4 s\n"),
+            HasSubstr("agent 1 places kettle at 7 s of its recording\n"),
             HasSubstr("agent 2 disconnected from 5 s to 15 s\n"), HasSubstr("expects groups 1\n"),
             HasSubstr("missing: agent 2: recording "), Not(HasSubstr("missing: agent 1"))));
   EXPECT_THAT(DescribeSessions({files[1]}, folder / "recordings"),
