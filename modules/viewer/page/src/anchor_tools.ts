@@ -88,6 +88,7 @@ export class AnchorTools {
       this.delete(target, anchor.said);
     } else {
       this.stage.flyTo(anchor.said.index);
+      this.draw();
     }
   }
 
@@ -148,6 +149,7 @@ export class AnchorTools {
       void this.placeAt(offsetX, offsetY);
     } else if (clicked) {
       this.stage.choose(this.stage.anchorAt(offsetX, offsetY));
+      this.draw();
     }
   }
 
