@@ -123,8 +123,8 @@ TEST_F(LogAnchorsTest, TheTableHasTheNewest) {
   EXPECT_NEAR(PositionSigma(*logged.anchors.at(kKettle).state), std::sqrt(2e-4), 1e-6);
   const std::string text = ToText(logged, log);
   EXPECT_THAT(text,
-              HasSubstr("1/10                     agent 1            1 placed   1/1795251811384046"
-                        "           1.000 2.000 3.000    0.014        35  kettle\n"));
+              testing::ContainsRegex("1/10 +agent 1 +1 placed +1/1795251811384046 +1.000 2.000 "
+                                     "3.000 +0.014 +35  kettle\n"));
   EXPECT_THAT(text, testing::ContainsRegex("0/20 +server +1 edited +0  door\n"));
   EXPECT_THAT(text, testing::ContainsRegex("2/30 +agent 2 +2 deleted +0  old\n"));
   EXPECT_THAT(text, Not(HasSubstr("replay")));

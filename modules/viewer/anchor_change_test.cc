@@ -11,7 +11,7 @@ const MapId kOne = TestMap(1);
 const MapId kTwo = TestMap(2);
 constexpr int64_t kNow = 1'800'000'000'000'000;
 
-// Two agents that are one group: on y = 0 and on y = 10, keyframes 0 to 9 at x = seq. Turned
+// Two agents that are one group: on y = 0 and on y = 10, keyframes 0 to 9 at x = seq. Rotated
 // bodies, so that a transform that is the wrong way round shows.
 class AnchorChangeTest : public testing::Test {
  protected:

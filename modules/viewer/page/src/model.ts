@@ -238,11 +238,11 @@ export class Model {
       return;
     }
     // One that somebody moved is near other keyframes now.
-    const stays = known && known.said.revision === said.revision;
+    const same = known && known.said.revision === said.revision;
     const moved = known?.moved && said.revision <= known.moved.revision ? known.moved : undefined;
     this.anchors.set(said.index, {
       said,
-      holder: moved || stays ? known!.holder : -1,
+      holder: moved || same ? known!.holder : -1,
       T_holder_anchor: known?.T_holder_anchor ?? new Pose(),
       moved,
     });
