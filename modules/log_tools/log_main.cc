@@ -9,7 +9,9 @@
 #include <optional>
 
 #include "files/text_file.h"
+#include "log_tools/anchors_gltf.h"
 #include "log_tools/explain.h"
+#include "log_tools/log_anchors.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/log_edit.h"
 #include "log_tools/log_export.h"
@@ -74,6 +76,27 @@ void ExplainResult(Arguments& arguments) {
   }
 }
 
+void ListAnchors(Arguments& arguments) {
+  const std::string& log = arguments.logs.front();
+  const LoggedAnchors logged = ReadAnchors(log, &arguments.readings);
+  if (arguments.out.empty()) {
+    std::cout << ToText(logged, log);
+    return;
+  }
+  if (arguments.out.ends_with(".json")) {
+    WriteTextFile(arguments.out, ToJson(logged));
+  } else {
+    ExportGltf(log, logged, arguments.out, &arguments.readings);
+  }
+  std::cout << fmt::format("{}: {} anchors\n", arguments.out, logged.anchors.size());
+}
+
+std::string IsJsonOrGltf(const std::string& path) {
+  return path.ends_with(".json") || path.ends_with(".gltf")
+             ? ""
+             : fmt::format("{}: ends neither in .json nor in .gltf", path);
+}
+
 // A file that is no log, its reader refuses.
 std::string IsNotEmpty(const std::string& path) {
   return std::filesystem::file_size(path) > 0 ? ""
@@ -122,6 +145,13 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                                    : ListAs::kLines,
                std::cout, &arguments->readings);
   });
+  CLI::App* anchors = AddCommand(
+      app, "anchors", "The anchors as the log ends: where they are, who made them", arguments, 1);
+  anchors
+      ->add_option("--out", arguments->out,
+                   "FILE.json: every field; FILE.gltf: with the map points, glTF 2.0, y up")
+      ->check(IsJsonOrGltf);
+  anchors->callback([arguments] { ListAnchors(*arguments); });
   CLI::App* diff =
       AddCommand(app, "diff",
                  "Where two runs part: the first message of each channel that differs, "

@@ -51,9 +51,10 @@ std::vector<Eigen::Vector3d> PointsOf(const CapturedSession& session, const Fina
   return points;
 }
 
-std::array<int, 3> Rgb(const std::string& colour) {
+std::array<uint8_t, 3> Rgb(const std::string& colour) {
   const int value = std::stoi(colour.substr(1), nullptr, 16);
-  return {value >> 16, (value >> 8) & 255, value & 255};
+  return {static_cast<uint8_t>(value >> 16), static_cast<uint8_t>(value >> 8),
+          static_cast<uint8_t>(value)};
 }
 
 void AddGroup(const ReportMetrics& metrics, const GroupMetrics& group, Plot* plot) {
@@ -145,22 +146,31 @@ Picture ErrorPicture(const ReportMetrics& metrics) {
 
 }  // namespace
 
+std::vector<ColouredPoint> MapPoints(const CapturedSession& session, const ReportMetrics& metrics,
+                                     const FinalGroup& group) {
+  std::vector<ColouredPoint> points;
+  for (const MapId& map : group.maps) {
+    const std::array<uint8_t, 3> rgb = Rgb(AgentColour(metrics.IndexOf(map.agent_id)));
+    for (const Eigen::Vector3d& p_map : PointsOf(session, group, map)) {
+      points.push_back({p_map, rgb});
+    }
+  }
+  return points;
+}
+
 std::string MapPly(const CapturedSession& session, const ReportMetrics& metrics,
                    const FinalGroup& group) {
+  const std::vector<ColouredPoint> points = MapPoints(session, metrics, group);
   std::string body;
-  size_t count = 0;
-  for (const MapId& map : group.maps) {
-    const auto [red, green, blue] = Rgb(AgentColour(metrics.IndexOf(map.agent_id)));
-    for (const Eigen::Vector3d& p : PointsOf(session, group, map)) {
-      body += fmt::format("{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), red, green, blue);
-      ++count;
-    }
+  for (const auto& [p, rgb] : points) {
+    body +=
+        fmt::format("{:.4f} {:.4f} {:.4f} {} {} {}\n", p.x(), p.y(), p.z(), rgb[0], rgb[1], rgb[2]);
   }
   return fmt::format(
       "ply\nformat ascii 1.0\ncomment map frame: odom of map {}, metres, z up\nelement vertex {}\n"
       "property float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n{}",
-      ToString(group.frame), count, body);
+      ToString(group.frame), points.size(), body);
 }
 
 std::vector<Picture> Pictures(const ReportMetrics& metrics) {

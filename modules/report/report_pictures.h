@@ -2,6 +2,8 @@
 
 // map.ply and the two pictures.
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,8 +12,16 @@
 
 namespace pangea::session {
 
-// ASCII PLY of the group's map points in its map frame; a landmark seen by several keyframes of a
-// map counts once, from where its depth is known best.
+struct ColouredPoint {
+  Eigen::Vector3d p_map;
+  std::array<uint8_t, 3> rgb;  // its agent's
+};
+
+// The group's map points in its map frame; a landmark seen by several keyframes of a map counts
+// once, from where its depth is known best.
+std::vector<ColouredPoint> MapPoints(const CapturedSession& session, const ReportMetrics& metrics,
+                                     const FinalGroup& group);
+// The same as ASCII PLY.
 std::string MapPly(const CapturedSession& session, const ReportMetrics& metrics,
                    const FinalGroup& group);
 

@@ -1,6 +1,6 @@
 // Writes the log of a session that never was, for measuring the viewer: agents walk in circles
 // through one hall, keyframes three times a second, poses ten times; from half way on they are one
-// group that is solved twice a second, with every pose moved by each solve.
+// group that is solved twice a second, with every pose moved by each solve, and has ten anchors.
 //   pangea-viewer-bench-log OUT.lcm AGENTS KEYFRAMES_PER_AGENT POINTS_PER_KEYFRAME
 
 #include <fmt/format.h>
@@ -14,6 +14,7 @@
 
 #include "bus/bus.h"
 #include "log_file/log_writer.h"
+#include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
@@ -140,6 +141,23 @@ class BenchLog {
     }
     for (const map_state_t& chunk : ToMessages(state)) {
       Put(std::string(channels::kMapState), chunk);
+    }
+    WriteAnchors();
+  }
+
+  // In front of the first ten keyframes of agent 1.
+  void WriteAnchors() {
+    for (int n = 0; n < 10; ++n) {
+      AnchorState anchor;
+      anchor.anchor = {1, kStart + n};
+      anchor.revision = 1;
+      anchor.edited_by = 1;
+      anchor.name = fmt::format("anchor {}", n);
+      anchor.map = anchor.group = MapOf(1);
+      anchor.group_revision = revision_;
+      anchor.T_odom_anchor.t = PoseOf(1, n / 3.0) * Eigen::Vector3d(0, 0, 2);
+      anchor.covariance = 1e-4 * Matrix6d::Identity();
+      Put(std::string(channels::kAnchor), ToMessage(anchor));
     }
   }
 

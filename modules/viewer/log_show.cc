@@ -34,6 +34,20 @@ LogShow::LogShow(const std::string& path, size_t max_solved_poses)
 
 void LogShow::Read(const std::string& path) {
   SceneEvents parser;
+  std::map<AnchorId, AnchorState> anchors;
+  // Each is said again every ten seconds, for hours.
+  const auto repeats_anchor = [&anchors](const SceneEvent& event) {
+    const auto* state = std::get_if<AnchorState>(&event);
+    if (state == nullptr) {
+      return false;
+    }
+    const auto [last, first] = anchors.try_emplace(state->anchor, *state);
+    const bool repeats = !first && !ShowsMore(last->second, *state);
+    if (!repeats) {
+      last->second = *state;
+    }
+    return repeats;
+  };
   std::optional<int64_t> begin;
   double time_s = 0;
   const auto take = [&](const LogEvent& event) {
@@ -42,7 +56,7 @@ void LogShow::Read(const std::string& path) {
     time_s = std::max(time_s, 1e-6 * static_cast<double>(event.utime - *begin));
     SceneEvents::Outcome outcome = parser.Parse(event.channel, event.data);
     num_refused_ += outcome.refused.empty() ? 0 : 1;
-    if (outcome.event) {
+    if (outcome.event && !repeats_anchor(*outcome.event)) {
       events_.push_back({time_s, std::move(*outcome.event)});
     }
   };

@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   std::string url = pangea::kDefaultBusUrl;
   std::vector<std::string> agent_urls;
   std::string log;
+  bool read_only = false;
   std::string page = DefaultPage().string();
   WebOptions options;
   CLI::App app("Shows a running system, or a captured log, in a browser", "pangea-viewer");
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--name", options.names,
                  "a name of this machine by which browsers may ask for the page");
+  app.add_flag("--read-only", read_only, "pages show anchors, and cannot change them");
   app.add_option("--page", page, "folder of the built page")->capture_default_str();
   app.footer(
       "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
@@ -51,7 +53,9 @@ int main(int argc, char** argv) {
   InstallSignalHandlers();
   try {
     if (log.empty()) {
-      ServeBus(url, agent_urls, options, page);
+      ServeBus(url, agent_urls,
+               read_only ? ViewerProcess::Pages::kLook : ViewerProcess::Pages::kEdit, options,
+               page);
     } else {
       return ServeLog(log, options, page);
     }

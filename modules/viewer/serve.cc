@@ -7,7 +7,6 @@
 
 #include "bus/process.h"
 #include "viewer/log_show.h"
-#include "viewer/viewer_process.h"
 
 namespace pangea::viewer {
 namespace {
@@ -27,9 +26,9 @@ void HandleWaiting(LcmBus& bus) {
 }  // namespace
 
 void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls,
-              const WebOptions& options, const std::string& page) {
+              ViewerProcess::Pages pages, const WebOptions& options, const std::string& page) {
   LcmBus bus(url);
-  ViewerProcess process(bus, url, WallUtime());
+  ViewerProcess process(bus, url, WallUtime(), pages);
   std::vector<std::unique_ptr<LcmBus>> agent_buses;
   for (const std::string& agent_url : agent_urls) {
     agent_buses.push_back(std::make_unique<LcmBus>(agent_url));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer/anchor_change.h"
 #include "viewer/scene/scene.h"
 
 namespace pangea::viewer {
@@ -32,6 +33,11 @@ class Show {
   virtual std::string source() const = 0;
   // The whole log's, for marks on its slider.
   virtual std::vector<Fusion> all_fusions() const { return {}; }
+
+  // Whether pages may change anchors; of a log nobody may.
+  virtual bool editable() const { return false; }
+  // What cannot be done is told to all pages (Scene::Tell).
+  virtual void Change(const AnchorChange&) {}
 
   virtual void Seek(double) {}
   virtual void Play(bool) {}

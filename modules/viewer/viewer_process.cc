@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -19,15 +20,22 @@ constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
 
 }  // namespace
 
-ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime)
-    : node_(bus, "viewer"), source_(std::move(source)), start_utime_(start_utime) {
+ViewerProcess::ViewerProcess(Bus& bus, std::string source, int64_t start_utime, Pages pages)
+    : node_(bus, "viewer"),
+      source_(std::move(source)),
+      start_utime_(start_utime),
+      pages_(pages),
+      now_utime_(start_utime) {
   for (const std::string_view channel :
        {channels::kAllKeyframes, channels::kAllPoses, channels::kAllCorrections,
-        channels::kConstraint, channels::kMapState, channels::kAllStatus, channels::kAllImages}) {
+        channels::kConstraint, channels::kMapState, channels::kAllStatus, channels::kAllImages,
+        channels::kAnchor}) {
     node_.SubscribeBytes(std::string(channel), std::bind_front(&ViewerProcess::OnMessage, this));
   }
   node_.SubscribeBytes(channels::Again(node_.name()),
                        std::bind_front(&ViewerProcess::OnMessage, this));
+  node_.Listen<anchor_edit_t>(channels::kAnchorEdit,
+                              std::bind_front(&ViewerProcess::OnAnchorEdit, this));
   node_.Listen<have_t>(channels::kHave, std::bind_front(&ViewerProcess::OnHave, this));
 }
 
@@ -46,6 +54,9 @@ void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
   }
   if (const auto* keyframe = std::get_if<ShownKeyframe>(&*outcome.event)) {
     keyframes_.Note(keyframe->id.map, keyframe->id.seq);
+  }
+  if (const auto* anchor = std::get_if<AnchorState>(&*outcome.event)) {
+    requests_.Heard(anchor->anchor, anchor->revision);
   }
   std::visit([this](const auto& event) { scene_.Take(event); }, *outcome.event);
 }
@@ -66,10 +77,42 @@ void ViewerProcess::AskForMissing(int64_t now_utime) {
   }
 }
 
+// Of equal revisions the higher agent's counts, and it is not ours: the anchor is then as ANCHOR
+// says.
+void ViewerProcess::OnAnchorEdit(const AnchorEdit& edit) {
+  requests_.Heard(edit.anchor, edit.revision);
+}
+
+int64_t ViewerProcess::NewAnchorUtime() {
+  newest_anchor_utime_ = std::max(now_utime_, newest_anchor_utime_ + 1);
+  return newest_anchor_utime_;
+}
+
+void ViewerProcess::Change(const AnchorChange& change) {
+  const auto edit = EditOf(scene_, change, NewAnchorUtime());
+  if (!edit) {
+    scene_.Tell("nothing was changed: that anchor is no longer there");
+  } else if (!requests_.Add(*edit, now_utime_)) {
+    scene_.Tell("nothing was changed: too many edits wait for the server");
+  }
+}
+
+void ViewerProcess::PublishRequests() {
+  for (const AnchorEdit& edit : requests_.TakeGivenUp(now_utime_)) {
+    node_.Refuse("anchor edit: not in the journal after 20 s");
+    scene_.Tell(fmt::format("\"{}\" was not changed: the server did not answer", edit.name));
+  }
+  for (const AnchorEdit& edit : requests_.Due(now_utime_)) {
+    node_.Publish(channels::AnchorRequest(0), ToMessage(edit));
+  }
+}
+
 void ViewerProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
   clock_.now_s = 1e-6 * static_cast<double>(now_utime - start_utime_);
   scene_.SetTime(clock_.now_s);
   AskForMissing(now_utime);
+  PublishRequests();
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;
     node_.Set("keyframes", static_cast<int64_t>(scene_.keyframes().size()));

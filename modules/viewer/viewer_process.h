@@ -2,6 +2,9 @@
 
 // A live bus as a show: everything people may want to see of it in, STATUS_viewer out. A viewer
 // that starts late asks for the keyframes and verification results it missed, as any process does.
+//
+// What people do to anchors goes out as ANCHOR_REQUEST_0, each edit once a second until ANCHOR_EDIT
+// or ANCHOR shows that it is in the journal; after 20 s the pages are told that it is not.
 
 #include <set>
 #include <string>
@@ -11,6 +14,7 @@
 #include "bus/process.h"
 #include "bus/retransmission/missing.h"
 #include "messages/catch_up_messages.h"
+#include "viewer/anchor_requests.h"
 #include "viewer/scene/scene_events.h"
 #include "viewer/show.h"
 
@@ -18,7 +22,9 @@ namespace pangea::viewer {
 
 class ViewerProcess : public Process, public Show {
  public:
-  ViewerProcess(Bus& bus, std::string source, int64_t start_utime);
+  enum class Pages : uint8_t { kEdit, kLook };
+
+  ViewerProcess(Bus& bus, std::string source, int64_t start_utime, Pages pages = Pages::kEdit);
 
   // An agent's own bus: its images, which do not go further.
   void WatchAgent(Bus& agent_bus);
@@ -29,20 +35,29 @@ class ViewerProcess : public Process, public Show {
   int64_t epoch() const override { return 1; }
   ShowClock clock() const override { return clock_; }
   std::string source() const override { return source_; }
+  bool editable() const override { return pages_ == Pages::kEdit; }
+  void Change(const AnchorChange& change) override;
 
  private:
   void OnMessage(const std::string& channel, Bytes data);
   void OnHave(const Have& have);
   void AskForMissing(int64_t now_utime);
+  void OnAnchorEdit(const AnchorEdit& edit);
+  int64_t NewAnchorUtime();
+  void PublishRequests();
 
   Node node_;
   std::string source_;
   int64_t start_utime_;
+  const Pages pages_;
+  int64_t now_utime_;  // of the last tick
   Scene scene_;
   SceneEvents events_;
   ShowClock clock_;
   MissingMessages keyframes_;
   std::set<MapId> results_requested_;  // maps whose verification results of before were asked for
+  AnchorRequests requests_;
+  int64_t newest_anchor_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

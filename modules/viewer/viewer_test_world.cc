@@ -39,4 +39,16 @@ Constraint TestConstraint(const KeyframeId& from, const KeyframeId& to, bool acc
   return constraint;
 }
 
+AnchorState TestAnchor(int64_t n, const MapId& group) {
+  AnchorState anchor;
+  anchor.anchor = {1, n};
+  anchor.revision = 1;
+  anchor.edited_by = 1;
+  anchor.name = "anchor " + std::to_string(n);
+  anchor.map = anchor.group = group;
+  anchor.T_odom_anchor.t.z() = static_cast<double>(n);
+  anchor.covariance = 1e-4 * Matrix6d::Identity();
+  return anchor;
+}
+
 }  // namespace pangea::viewer

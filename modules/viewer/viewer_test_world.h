@@ -15,6 +15,9 @@ ShownKeyframe TestKeyframe(const MapId& map, int32_t seq);
 MapState TestState(const std::vector<MapId>& maps, int32_t highest_seq, int64_t revision);
 Constraint TestConstraint(const KeyframeId& from, const KeyframeId& to, bool accepted);
 
+// "anchor N", N metres up from the origin of the group, which is `group`'s map.
+AnchorState TestAnchor(int64_t n, const MapId& group);
+
 // A show that a test moves by hand.
 class TestShow : public Show {
  public:
@@ -26,9 +29,14 @@ class TestShow : public Show {
   void Play(bool play) override { clock_.playing = play; }
   void SetSpeed(double speed) override { clock_.speed = speed; }
 
+  bool editable() const override { return editable_; }
+  void Change(const AnchorChange& change) override { changes_.push_back(change); }
+
   Scene scene_;
   int64_t epoch_ = 1;
   ShowClock clock_;
+  bool editable_ = true;
+  std::vector<AnchorChange> changes_;
 };
 
 }  // namespace pangea::viewer

@@ -10,7 +10,17 @@
 
 namespace pangea::viewer {
 
-enum class ItemKind : uint8_t { kMap, kAgent, kKeyframe, kSolved, kConstraint, kProcess, kFusion };
+enum class ItemKind : uint8_t {
+  kMap,
+  kAgent,
+  kKeyframe,
+  kSolved,
+  kConstraint,
+  kProcess,
+  kFusion,
+  kAnchor,
+  kNotice
+};
 
 struct Item {
   ItemKind kind = ItemKind::kMap;

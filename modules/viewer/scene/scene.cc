@@ -32,6 +32,12 @@ int IndexOf(std::map<Key, int>* index, const Key& key, size_t limit, const Appen
 
 }  // namespace
 
+bool ShowsMore(const AnchorState& before, const AnchorState& after) {
+  return before.revision != after.revision || before.edited_by != after.edited_by ||
+         before.gone != after.gone || before.map != after.map ||
+         Moved(before.T_odom_anchor, after.T_odom_anchor) || before.covariance != after.covariance;
+}
+
 std::optional<int> Scene::MapIndex(const MapId& id) const {
   const auto found = map_index_.find(id);
   return found == map_index_.end() ? std::nullopt : std::make_optional(found->second);
@@ -243,6 +249,48 @@ void Scene::Take(const ProcessHealth& health) {
   }
   processes_[static_cast<size_t>(index)] = {health, time_s_};
   changes_.Touch({ItemKind::kProcess, index});
+}
+
+void Scene::Take(const AnchorState& anchor) {
+  // One that is gone before it was seen needs no room.
+  if ((anchor.gone && !anchor_index_.contains(anchor.anchor)) || MapOf(anchor.map) < 0) {
+    return;
+  }
+  const int index = IndexOf(&anchor_index_, anchor.anchor, kMaxAnchors, [&] {
+    anchors_.push_back(anchor);
+    changes_.Touch({ItemKind::kAnchor, static_cast<int64_t>(anchors_.size()) - 1});
+  });
+  if (index < 0) {
+    ++num_left_out_;
+    return;
+  }
+  AnchorState& known = anchors_[static_cast<size_t>(index)];
+  const bool late = known.gone || anchor.revision < known.revision ||
+                    (anchor.group == known.group && anchor.group_revision < known.group_revision);
+  if (!late && ShowsMore(known, anchor)) {
+    known = anchor;
+    changes_.Touch({ItemKind::kAnchor, index});
+  }
+}
+
+const AnchorState* Scene::FindAnchor(const AnchorId& id) const {
+  const auto found = anchor_index_.find(id);
+  if (found == anchor_index_.end() || anchors_[static_cast<size_t>(found->second)].gone) {
+    return nullptr;
+  }
+  return &anchors_[static_cast<size_t>(found->second)];
+}
+
+void Scene::Tell(const std::string& notice) {
+  notice_ = {time_s_, notice};
+  changes_.Touch({ItemKind::kNotice, 0});
+}
+
+Rigid3 Scene::T_map_body(const SceneKeyframe& keyframe) const {
+  const SceneMap& map = maps_[static_cast<size_t>(keyframe.map)];
+  return keyframe.T_map_body && keyframe.group == map.group
+             ? *keyframe.T_map_body
+             : map.T_map_odom * keyframe.shown.T_odom_body;
 }
 
 double Scene::DriftOf(const SceneAgent& agent) const {

@@ -1,9 +1,9 @@
 #pragma once
 
 // What is there to see: maps, keyframes with their points, solved poses, verification results,
-// agents, the health of processes, fusions. Domain messages in, in any order and repeated as they
-// like; state and the order in which it changed out. Knows no page, no socket and no clock: the
-// time is told.
+// agents, the health of processes, fusions, anchors. Domain messages in, in any order and repeated
+// as they like; state and the order in which it changed out. Knows no page, no socket and no clock:
+// the time is told.
 //
 // Bounded (kMax...): what comes beyond is not shown, and counted.
 
@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/anchor.h"
 #include "core/drift.h"
 #include "core/ids.h"
 #include "core/keyframe.h"
@@ -112,6 +113,15 @@ struct Fusion {
   std::vector<MapId> maps;
 };
 
+// A line for people; only the newest is kept.
+struct Notice {
+  double time_s = 0;
+  std::string text;
+};
+
+// Whether a state shows anything that the one before it did not.
+bool ShowsMore(const AnchorState& before, const AnchorState& after);
+
 class Scene {
  public:
   static constexpr size_t kMaxAgents = 100;
@@ -121,6 +131,7 @@ class Scene {
   static constexpr size_t kMaxConstraints = 50'000;
   static constexpr size_t kMaxProcesses = 200;
   static constexpr size_t kMaxFusions = 1000;
+  static constexpr size_t kMaxAnchors = 10'000;  // those that were deleted while it looked count
 
   // Seconds since the start of what is shown; what comes after happened then.
   void SetTime(double time_s) { time_s_ = time_s; }
@@ -132,6 +143,9 @@ class Scene {
   void Take(const Correction& correction);
   void Take(const MapState& state);
   void Take(const ProcessHealth& health);
+  // In its group's frame, as on ANCHOR. One that was deleted stays in the list, gone.
+  void Take(const AnchorState& anchor);
+  void Tell(const std::string& notice);
 
   double time_s() const { return time_s_; }
   const Changes& changes() const { return changes_; }
@@ -141,8 +155,14 @@ class Scene {
   const std::map<int32_t, SceneAgent>& agents() const { return agents_; }
   const std::vector<SceneProcess>& processes() const { return processes_; }
   const std::vector<Fusion>& fusions() const { return fusions_; }
+  const std::vector<AnchorState>& anchors() const { return anchors_; }
+  const AnchorState* FindAnchor(const AnchorId& id) const;  // null: none, or gone
+  const Notice& notice() const { return notice_; }
   std::optional<int> MapIndex(const MapId& id) const;
   int64_t num_left_out() const { return num_left_out_; }
+
+  // Where a keyframe is in its group's frame: as solved, or by its map's odometry.
+  Rigid3 T_map_body(const SceneKeyframe& keyframe) const;
 
   // How far the agent has been moved by corrections since its map joined its group, metres.
   double DriftOf(const SceneAgent& agent) const;
@@ -174,6 +194,9 @@ class Scene {
   std::map<std::string, int> process_index_;
   std::map<MapId, std::pair<int64_t, std::set<MapId>>> together_;  // revision and maps of the group
   std::vector<Fusion> fusions_;
+  std::vector<AnchorState> anchors_;
+  std::map<AnchorId, int> anchor_index_;
+  Notice notice_;
   int64_t num_left_out_ = 0;
 };
 

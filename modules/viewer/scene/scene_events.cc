@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/again_t.hpp"
@@ -167,6 +168,9 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
   }
   if (channel == channels::kConstraint) {
     return Parsable<constraint_t>(data);
+  }
+  if (channel == channels::kAnchor) {
+    return Parsable<anchor_t>(data);
   }
   if (channel == channels::kMapState) {
     return Decoded<map_state_t>(data, [this](const map_state_t& message) -> Outcome {

@@ -16,7 +16,7 @@
 namespace pangea::viewer {
 
 using SceneEvent = std::variant<ShownKeyframe, ShownPose, std::shared_ptr<const ShownImage>,
-                                Constraint, Correction, MapState, ProcessHealth>;
+                                Constraint, Correction, MapState, ProcessHealth, AnchorState>;
 
 class SceneEvents {
  public:

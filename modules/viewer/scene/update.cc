@@ -82,6 +82,13 @@ class Update {
       case ItemKind::kFusion:
         json_["fusions"].push_back(FusionJson(scene_.fusions()[index]));
         break;
+      case ItemKind::kAnchor:
+        AddAnchor(item.index, scene_.anchors()[index]);
+        break;
+      case ItemKind::kNotice:
+        json_["notice"] = {{"time_s", Rounded(scene_.notice().time_s)},
+                           {"text", scene_.notice().text}};
+        break;
     }
   }
 
@@ -125,6 +132,7 @@ class Update {
       }
       json_["start"] = {{"live", clock.live},
                         {"source", show_.source()},
+                        {"editable", show_.editable()},
                         {"end_s", clock.end_s},
                         {"all_fusions", std::move(all)}};
     }
@@ -236,6 +244,24 @@ class Update {
                                   {"memory_mb", Rounded(health.memory_mb)},
                                   {"cpu_s", Rounded(health.cpu_s)},
                                   {"refused", std::move(refused)}});
+  }
+
+  void AddAnchor(int64_t index, const AnchorState& anchor) {
+    json said = {{"index", index},
+                 {"id", {anchor.anchor.agent_id, anchor.anchor.created_utime}},
+                 {"gone", anchor.gone}};
+    if (!anchor.gone) {
+      // Of the position, root mean square over its axes.
+      const double sigma_m = std::sqrt(anchor.covariance.topLeftCorner<3, 3>().trace() / 3);
+      said.update({{"name", anchor.name},
+                   {"revision", anchor.revision},
+                   {"edited_by", anchor.edited_by},
+                   {"payload_bytes", anchor.payload.size()},
+                   {"group", scene_.MapIndex(anchor.map).value_or(-1)},
+                   {"T_map_anchor", PoseJson(anchor.T_odom_anchor)},
+                   {"sigma_m", Rounded(sigma_m)}});
+    }
+    json_["anchors"].push_back(std::move(said));
   }
 
   json FusionJson(const Fusion& fusion) const {

@@ -3,8 +3,8 @@
 // The message to a page: what it lacks of a show, in one block of bytes, little-endian.
 //
 //   uint32   length of the JSON text, a multiple of 4 (padded with spaces)
-//   JSON     clock, maps, agents, verification results, processes, fusions: what is small; and the
-//            counts of records
+//   JSON     clock, maps, agents, verification results, processes, fusions, anchors: what is small;
+//            and the counts of records
 //   records  "keyframes": uint32 index, map, seq, number of points; float32 T_odom_body (x y z, qw
 //            qx qy qz); then the points, float32 x y z in the body frame
 //            "solved": uint32 keyframe index, group (a map's index); float32 T_map_body (7)

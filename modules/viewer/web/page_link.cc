@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "viewer/web/anchor_text.h"
+
 namespace pangea::viewer {
 namespace {
 
@@ -42,6 +44,8 @@ bool PageLink::Receive(std::string_view text) {
   } else if (key == "speed" && value.is_number() && value.get<double>() > 0 &&
              value.get<double>() <= kMaxSpeed) {
     show_.SetSpeed(value.get<double>());
+  } else if (const auto change = ParseAnchorChange(key, value); change && show_.editable()) {
+    show_.Change(*change);
   } else {
     return false;
   }

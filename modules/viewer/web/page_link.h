@@ -24,7 +24,11 @@ class PageLink {
   // What to send now; nothing while the last one is under way or when there is no update.
   std::optional<std::vector<uint8_t>> Next();
 
-  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT}.
+  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT};
+  // where the show is editable also {"anchor_add": {"name": NAME, "keyframe": INDEX, "p_body": [X,
+  // Y, Z]}},
+  // {"anchor_move": {"anchor": [AGENT, CREATED], "keyframe": INDEX, "p_body": [X, Y, Z]}} and
+  // {"anchor_delete": {"anchor": [AGENT, CREATED]}}.
   // False for anything else: no page of ours says it.
   bool Receive(std::string_view text);
 

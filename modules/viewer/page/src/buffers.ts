@@ -73,6 +73,14 @@ export class PointCloud {
     this.object.geometry.setDrawRange(0, this.growing.count);
   }
 
+  // Of each point its keyframe and where it is in that one's body frame.
+  forEach(take: (keyframe: number, x: number, y: number, z: number) => void) {
+    const { position, keyframe } = this.object.geometry.attributes;
+    for (let i = 0; i < this.growing.count; ++i) {
+      take(keyframe.array[i], position.array[3 * i], position.array[3 * i + 1], position.array[3 * i + 2]);
+    }
+  }
+
   clear() {
     this.growing.clear();
     this.object.geometry.setDrawRange(0, 0);

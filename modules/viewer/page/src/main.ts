@@ -1,4 +1,5 @@
 import "./style.css";
+import { AnchorTools, madeBy } from "./anchor_tools";
 import { Connection } from "./connection";
 import { Model } from "./model";
 import {
@@ -24,6 +25,8 @@ const connection = new Connection(take, (open) => {
   byId("connection").textContent = open ? "" : "not connected, trying again…";
 });
 
+const anchorTools = new AnchorTools(canvas, stage, model, connection, announce);
+
 function take(update: Update) {
   model.apply(update);
   stage.take(update);
@@ -36,6 +39,8 @@ function take(update: Update) {
     // Not what happened before the page was opened, or was jumped over.
     if (!update.start && model.now_s - fusion.time_s < 3) announce(fusionText(fusion));
   }
+  const { notice } = update;
+  if (notice && model.now_s - notice.time_s < 3) announce(notice.text);
   panelsDirty = true;
 }
 
@@ -59,13 +64,14 @@ function drawPanels() {
   slider.max = String(start.end_s);
   if (!dragging) slider.value = String(model.now_s);
   drawAgents(model);
+  anchorTools.draw();
   drawHealth(model);
   drawLegend(stage.gridCell_m, stage.ellipseScale, model.leftOut);
 }
 
 // --- what people do
 
-for (const what of ["points", "accepted", "refused"] as const) {
+for (const what of ["points", "accepted", "refused", "anchors"] as const) {
   const box = byId<HTMLInputElement>(`show_${what}`);
   box.onchange = () => stage.show(what, box.checked);
 }
@@ -112,10 +118,13 @@ addEventListener("keydown", ({ key, target }) => {
 
 function hover(x: number, y: number) {
   const box = canvas.getBoundingClientRect();
-  const constraint = stage.constraintAt(x - box.left, y - box.top);
+  const anchor = model.anchors.get(stage.anchorAt(x - box.left, y - box.top) ?? -1);
+  const constraint = anchor ? undefined : stage.constraintAt(x - box.left, y - box.top);
   stage.highlight(constraint);
   const tip = byId("tip");
-  tip.textContent = constraint ? tipOf(constraint, model) : "";
+  tip.textContent = anchor
+    ? `${anchor.said.name}\nanchor by ${madeBy(anchor.said)}`
+    : constraint ? tipOf(constraint, model) : "";
   tip.style.left = `${Math.min(x + 14, innerWidth - 300)}px`;
   tip.style.top = `${y + 14}px`;
 }

@@ -2,7 +2,7 @@
 
 import { Box3, Matrix4, Quaternion, Vector3 } from "three";
 import type {
-  AgentSaid, ConstraintSaid, FusionSaid, MapSaid, PoseNumbers, ProcessSaid, Update,
+  AgentSaid, AnchorSaid, ConstraintSaid, FusionSaid, MapSaid, PoseNumbers, ProcessSaid, Update,
 } from "./protocol";
 
 export class Pose {
@@ -45,6 +45,15 @@ export interface Keyframe {
   shown: Pose; // where it is, on its way there
 }
 
+export interface Anchor {
+  said: AnchorSaid;
+  // The keyframe that carries it on the stage, so that it goes where that goes; -1: none yet.
+  holder: number;
+  T_holder_anchor: Pose;
+  // Where somebody at this page has put it, until the server says more than this revision.
+  moved?: { revision: number; T_holder_anchor: Pose };
+}
+
 interface Map_ {
   said: MapSaid;
   T_map_odom: Pose;
@@ -57,6 +66,7 @@ interface Map_ {
 // about all the time.
 const kCellStep = 5;
 const kMargin = 3;
+const kMaxHolders = 2000; // keyframes among which the one that carries an anchor is looked for
 
 export class Model {
   start?: Update["start"];
@@ -73,6 +83,9 @@ export class Model {
   constraints: ConstraintSaid[] = [];
   processes = new Map<string, ProcessSaid>();
   fusions: FusionSaid[] = [];
+  anchors = new Map<number, Anchor>();
+  anchorsVersion = 0; // another number: another list
+  private unheld = new Set<number>(); // anchors whose place among the keyframes is to be found
   readonly box = new Box3(); // of where all keyframes belong
   private readonly unsettled = new Set<number>(); // keyframes that are new, or not where they belong
 
@@ -117,7 +130,10 @@ export class Model {
         T_map_body: Pose.of(said.T_map_body),
       };
     }
+    for (const said of update.anchors) this.takeAnchor(said);
+    if (update.notice) for (const index of this.anchors.keys()) this.putBack(index);
     if (update.start || update.maps.length + update.keyframes.length + update.solved.length > 0) this.place();
+    this.holdAnchors();
     for (const { index } of update.keyframes) {
       const keyframe = this.keyframes[index];
       keyframe.shown.copy(keyframe.target);
@@ -203,14 +219,91 @@ export class Model {
     return this.before ? keyframe.map : this.maps[keyframe.map].said.group;
   }
 
-  private placeInGroup({ T_odom_body, solved, target }: Keyframe, map: Map_) {
+  private placeInGroup(keyframe: Keyframe, map: Map_) {
     if (this.before) {
-      target.copy(T_odom_body);
-    } else if (solved && solved.group === map.said.group) {
-      target.copy(solved.T_map_body);
+      keyframe.target.copy(keyframe.T_odom_body);
     } else {
-      target.setProduct(map.T_map_odom, T_odom_body);
+      fusedPose(keyframe, map, keyframe.target);
     }
+  }
+
+  // --- anchors
+
+  private takeAnchor(said: AnchorSaid) {
+    ++this.anchorsVersion;
+    const known = this.anchors.get(said.index);
+    if (said.gone) {
+      this.anchors.delete(said.index);
+      this.unheld.delete(said.index);
+      return;
+    }
+    // One that somebody moved is near other keyframes now.
+    const same = known && known.said.revision === said.revision;
+    const moved = known?.moved && said.revision <= known.moved.revision ? known.moved : undefined;
+    this.anchors.set(said.index, {
+      said,
+      holder: moved || same ? known!.holder : -1,
+      T_holder_anchor: known?.T_holder_anchor ?? new Pose(),
+      moved,
+    });
+    this.unheld.add(said.index);
+  }
+
+  // An anchor is where the server has it in its group's frame. While the keyframe that carries it is in another
+  // group (a fusion, of which the anchor is not told yet), it stays with that.
+  private holdAnchors() {
+    for (const [index, anchor] of this.anchors) {
+      const T_map_anchor = Pose.of(anchor.said.T_map_anchor);
+      if (!this.isIn(anchor.holder, anchor.said.group)) {
+        if (!this.unheld.has(index)) continue;
+        const nearest = this.nearestKeyframe(T_map_anchor.t, anchor.said.group);
+        if (nearest < 0) continue;
+        anchor.holder = nearest;
+        anchor.moved = undefined;
+      }
+      const keyframe = this.keyframes[anchor.holder];
+      const T_map_body = fusedPose(keyframe, this.maps[keyframe.map], new Pose());
+      anchor.T_holder_anchor = T_map_body.inverse().times(T_map_anchor);
+      this.unheld.delete(index);
+    }
+  }
+
+  private isIn(k: number, group: number): boolean {
+    const keyframe = this.keyframes[k];
+    return keyframe?.arrived && this.maps[keyframe.map].said.group === group;
+  }
+
+  // Of many keyframes not every one is looked at.
+  private nearestKeyframe(p_map: Vector3, group: number): number {
+    const step = Math.ceil(this.keyframes.length / kMaxHolders);
+    const pose = new Pose();
+    let nearest = -1;
+    let least = Infinity;
+    for (let k = 0; k < this.keyframes.length; k += step) {
+      if (!this.isIn(k, group)) continue;
+      const distance = fusedPose(this.keyframes[k], this.maps[this.keyframes[k].map], pose).t.distanceToSquared(p_map);
+      if (distance < least) [nearest, least] = [k, distance];
+    }
+    return nearest;
+  }
+
+  // On the stage; nothing while its group has no keyframe there.
+  anchorPose(index: number): Pose | undefined {
+    const anchor = this.anchors.get(index);
+    const keyframe = anchor && this.keyframes[anchor.holder];
+    return keyframe?.shown.times((anchor!.moved ?? anchor!).T_holder_anchor);
+  }
+
+  moveAnchor(index: number, position: Vector3) {
+    const anchor = this.anchors.get(index);
+    if (!anchor || anchor.holder < 0) return;
+    const t = this.keyframes[anchor.holder].shown.inverse().apply(position);
+    anchor.moved = { revision: anchor.said.revision, T_holder_anchor: new Pose(t, anchor.T_holder_anchor.q) };
+  }
+
+  putBack(index: number) {
+    const anchor = this.anchors.get(index);
+    if (anchor) anchor.moved = undefined;
   }
 
   get moving(): boolean {
@@ -233,6 +326,13 @@ export class Model {
     }
     return moved;
   }
+}
+
+// In its group's frame: as solved, or by its map's odometry. Returns `into`.
+function fusedPose({ T_odom_body, solved }: Keyframe, map: Map_, into: Pose): Pose {
+  return solved && solved.group === map.said.group
+    ? into.copy(solved.T_map_body)
+    : into.setProduct(map.T_map_odom, T_odom_body);
 }
 
 type Boxes = Map<number, { min: Vector3; max: Vector3; agent: number }>;

@@ -23,5 +23,5 @@ export function agentColour(agent: number): string {
 
 export const colours = () =>
   isDark()
-    ? { background: "#14171c", grid: "#2a3038", accepted: "#f2f2f2", refused: "#f0729a" }
-    : { background: "#fafafa", grid: "#dcdfe4", accepted: "#1a1a1a", refused: "#c2185b" };
+    ? { background: "#14171c", grid: "#2a3038", accepted: "#f2f2f2", refused: "#f0729a", anchor: "#e8b4ff" }
+    : { background: "#fafafa", grid: "#dcdfe4", accepted: "#1a1a1a", refused: "#c2185b", anchor: "#7b1fa2" };

@@ -15,7 +15,7 @@ export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
 }
 
 // A new element; text never becomes markup.
-function element(tag: string, className: string, text = ""): HTMLElement {
+export function element(tag: string, className: string, text = ""): HTMLElement {
   const made = document.createElement(tag);
   made.className = className;
   made.textContent = text;
@@ -24,7 +24,7 @@ function element(tag: string, className: string, text = ""): HTMLElement {
 
 // The children of `parent`, one a key and in their order. Those that are there stay, so that what
 // people point at, press or read is not taken from under them ten times a second.
-function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLElement): HTMLElement[] {
+export function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLElement): HTMLElement[] {
   const known = new Map([...parent.children].map((child) => [(child as HTMLElement).dataset.key, child]));
   const children = keys.map((key) => {
     const child = (known.get(key) as HTMLElement | undefined) ?? make(key);
@@ -37,7 +37,7 @@ function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLE
   return children;
 }
 
-function tell(at: HTMLElement, selector: string, text: string) {
+export function tell(at: HTMLElement, selector: string, text: string) {
   const told = at.querySelector(selector)!;
   if (told.textContent !== text) told.textContent = text;
 }

@@ -82,6 +82,20 @@ export interface ViewSaid {
   image: Uint8Array;
 }
 
+// In its group's frame, z up. Of one that is gone index, id and gone alone are told.
+export interface AnchorSaid {
+  index: number;
+  id: [number, number]; // who made it (0: a tool on the server), when
+  gone: boolean;
+  name: string;
+  revision: number;
+  edited_by: number;
+  payload_bytes: number;
+  group: number; // a map's index
+  T_map_anchor: PoseNumbers;
+  sigma_m: number; // of the position, root mean square over its axes
+}
+
 export interface Update {
   epoch: number;
   version: number;
@@ -90,12 +104,14 @@ export interface Update {
   speed: number;
   left_out: number;
   // In the first update of an epoch: forget all before.
-  start?: { live: boolean; source: string; end_s: number; all_fusions: FusionSaid[] };
+  start?: { live: boolean; editable: boolean; source: string; end_s: number; all_fusions: FusionSaid[] };
   maps: MapSaid[];
   agents: AgentSaid[];
   constraints: ConstraintSaid[];
   processes: ProcessSaid[];
   fusions: FusionSaid[];
+  anchors: AnchorSaid[];
+  notice?: { time_s: number; text: string };
   keyframes: KeyframeSaid[];
   solved: SolvedSaid[];
   view?: ViewSaid;
@@ -138,7 +154,7 @@ export function decode(bytes: ArrayBuffer): Update {
     json.view.tracks = tracks;
     json.view.image = new Uint8Array(bytes, 4 + length + 4 * (at + 1), integers[at]);
   }
-  const none = { maps: [], agents: [], constraints: [], processes: [], fusions: [] };
+  const none = { maps: [], agents: [], constraints: [], processes: [], fusions: [], anchors: [] };
   return { ...none, ...json, keyframes, solved };
 }
 
@@ -147,4 +163,7 @@ export type Said =
   | { seek: number }
   | { play: boolean }
   | { speed: number }
-  | { watch: number };
+  | { watch: number }
+  | { anchor_add: { name: string; keyframe: number; p_body: number[] } }
+  | { anchor_move: { anchor: [number, number]; keyframe: number; p_body: number[] } }
+  | { anchor_delete: { anchor: [number, number] } };

@@ -1,9 +1,12 @@
 // The drawing: points, trajectories, constraints, agents. A frame sends the graphics card what changed
 // since the last one and nothing else.
 
-import { Box3, Color, GridHelper, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from "three";
+import {
+  Box3, Color, GridHelper, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+} from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { AgentDrawing } from "./agents";
+import { AnchorDrawings } from "./anchors";
 import { Lines, PointCloud } from "./buffers";
 import { Model } from "./model";
 import type { AgentSaid, ConstraintSaid, Update } from "./protocol";
@@ -11,6 +14,8 @@ import { agentColour, colours } from "./palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
 const kHoverPixels = 8;
+const kPickPixels = 12; // from a map point
+const kFlight_m = 3; // from an anchor that it flies to
 const kSettle_ms = 350; // of what is left to where things belong, all but 1/e is gone in such a time
 
 const wantsStill = matchMedia("(prefers-reduced-motion: reduce)");
@@ -29,6 +34,8 @@ export class Stage {
   private readonly refused: Lines;
   private readonly hovered: Lines;
   private readonly agents = new Map<number, AgentDrawing>();
+  private readonly anchors: AnchorDrawings;
+  private flight?: { target: Vector3; position: Vector3 };
   private readonly colourOf = new Map<number, Color>(); // of an agent
   private grid?: GridHelper;
   private readonly drawnConstraints = new Set<number>();
@@ -53,7 +60,10 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.49 * Math.PI;
     this.controls.addEventListener("change", () => (this.dirty = true));
-    this.controls.addEventListener("start", () => (this.userMoved = true));
+    this.controls.addEventListener("start", () => {
+      this.userMoved = true;
+      this.flight = undefined;
+    });
     this.points = new PointCloud(pointMaterial(this.poses.uniform, this.pointSize));
     this.trajectories = new Lines(lineMaterial(this.poses.uniform, this.screen, 3, 0.95));
     this.accepted = new Lines(lineMaterial(this.poses.uniform, this.screen, 1.2, 0.35));
@@ -62,6 +72,8 @@ export class Stage {
     for (const drawn of [this.points, this.trajectories, this.accepted, this.refused, this.hovered]) {
       this.scene.add(drawn.object);
     }
+    this.anchors = new AnchorDrawings(labels);
+    this.scene.add(this.anchors.object);
     this.refused.object.visible = false;
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.recolour();
@@ -75,6 +87,7 @@ export class Stage {
     for (const drawing of this.agents.values()) drawing.remove();
     this.agents.clear();
     for (const agent of this.model.agents.values()) this.drawing(agent).take(agent);
+    this.anchors.recolour();
     this.colourOf.clear();
     this.model.keyframes.forEach((_, k) => this.writePose(k));
     this.redrawConstraints();
@@ -85,7 +98,7 @@ export class Stage {
     this.dirty = this.posesDirty = true;
   }
 
-  show(what: "points" | "accepted" | "refused", visible: boolean) {
+  show(what: "points" | "accepted" | "refused" | "anchors", visible: boolean) {
     this[what].object.visible = visible;
     this.dirty = true;
   }
@@ -140,6 +153,14 @@ export class Stage {
       drawing.place(pose, newest, this.model.before ? 0 : this.ellipseScale);
       drawing.placeLabel(pose, this.camera, this.renderer.domElement);
     }
+  }
+
+  private drawAnchors() {
+    const placed = [...this.model.anchors.values()].flatMap(({ said: { index, name } }) => {
+      const pose = this.model.anchorPose(index);
+      return pose ? [{ index, name, pose }] : [];
+    });
+    this.anchors.place(placed, this.camera, this.renderer.domElement);
   }
 
   private writePose(k: number) {
@@ -201,8 +222,95 @@ export class Stage {
     return [pixel(a), pixel(b)];
   }
 
+  // --- anchors
+
+  get chosenAnchor(): number {
+    return this.anchors.chosen;
+  }
+
+  choose(index: number | undefined) {
+    this.anchors.chosen = index ?? -1;
+    this.dirty = true;
+  }
+
+  // In pixels of the canvas; nothing behind the camera.
+  pixelOf(p: Vector3): Vector2 | undefined {
+    const { clientWidth, clientHeight } = this.renderer.domElement;
+    const at = p.clone().project(this.camera);
+    if (at.z > 1) return undefined;
+    return new Vector2(((at.x + 1) / 2) * clientWidth, ((1 - at.y) / 2) * clientHeight);
+  }
+
+  anchorAt(x: number, y: number): number | undefined {
+    if (!this.anchors.object.visible) return undefined;
+    let best: number | undefined;
+    let least = kPickPixels;
+    for (const index of this.model.anchors.keys()) {
+      const pose = this.model.anchorPose(index);
+      const distance = (pose && this.pixelOf(pose.t)?.distanceTo(new Vector2(x, y))) ?? Infinity;
+      if (distance < least) [best, least] = [index, distance];
+    }
+    return best;
+  }
+
+  // The map point or the keyframe under the pointer, in the body frame of the keyframe that saw it.
+  pick(x: number, y: number): { keyframe: number; p_body: Vector3 } | undefined {
+    const { keyframes } = this.model;
+    const pointer = new Vector2(x, y);
+    const p = new Vector3();
+    let best: { keyframe: number; p_body: Vector3 } | undefined;
+    let least = kPickPixels;
+    const offer = (keyframe: number, px: number, py: number, pz: number) => {
+      const { t, q } = keyframes[keyframe].shown;
+      p.set(px, py, pz).applyQuaternion(q).add(t);
+      const distance = this.pixelOf(p)?.distanceTo(pointer) ?? Infinity;
+      if (distance < least) [best, least] = [{ keyframe, p_body: new Vector3(px, py, pz) }, distance];
+    };
+    if (this.points.object.visible) this.points.forEach(offer);
+    keyframes.forEach((keyframe, k) => keyframe.arrived && offer(k, 0, 0, 0));
+    return best;
+  }
+
+  // Where the pointer's ray meets a plane.
+  onPlane(x: number, y: number, point: Vector3, normal: Vector3): Vector3 | undefined {
+    const { clientWidth, clientHeight } = this.renderer.domElement;
+    const caster = new Raycaster();
+    caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.camera);
+    const plane = new Plane().setFromNormalAndCoplanarPoint(normal, point);
+    return caster.ray.intersectPlane(plane, new Vector3()) ?? undefined;
+  }
+
+  viewDirection(): Vector3 {
+    return this.camera.getWorldDirection(new Vector3());
+  }
+
+  // The pointer does something else than moving the camera.
+  holdCamera(held: boolean) {
+    this.controls.enabled = !held;
+  }
+
+  // To the anchor, looking the way it looks now.
+  flyTo(index: number) {
+    const pose = this.model.anchorPose(index);
+    this.choose(index);
+    if (!pose) return;
+    this.userMoved = true;
+    const back = this.viewDirection().multiplyScalar(-kFlight_m);
+    this.flight = { target: pose.t.clone(), position: pose.t.clone().add(back) };
+  }
+
+  private fly(share: number) {
+    if (!this.flight) return;
+    const { target, position } = this.flight;
+    this.controls.target.lerp(target, share);
+    this.camera.position.lerp(position, share);
+    if (this.camera.position.distanceTo(position) < 1e-3 * kFlight_m) this.flight = undefined;
+    this.dirty = true;
+  }
+
   fit() {
     this.userMoved = false;
+    this.flight = undefined;
     this.fittedTo.makeEmpty();
     this.redraw();
   }
@@ -272,10 +380,12 @@ export class Stage {
       this.posesDirty = this.model.moving || following;
       this.dirty = true;
     }
+    this.fly(step);
     this.controls.update();
     if (!this.dirty && !always) return false;
     this.dirty = false;
     this.drawAgents();
+    this.drawAnchors();
     this.renderer.render(this.scene, this.camera);
     return true;
   }

@@ -156,6 +156,8 @@ async function testLive(browser) {
     const notice = document.getElementById("notice");
     new MutationObserver(() => seen.notices.push(notice.textContent)).observe(notice, { childList: true });
   });
+  start(`${options.bin}/pangea-anchors`, "--bus", bus);
+  start(`${options.bin}/pangea-viewer-test-journal`, bus);
   start("lcm-logplayer", "--speed=2", `--lcm-url=${bus}`, options.log);
   await becomes(page, "live: two maps at first", () => seen.twoMaps);
   await becomes(page, "live: the fusion is followed and announced", () =>
@@ -163,6 +165,120 @@ async function testLive(browser) {
   await becomes(page, "live: every keyframe arrives", () => pangea.model.numKeyframes === 63);
   check("live: one group", (await page.evaluate(numGroups)) === 1);
   check("live: no time slider", await page.locator("#player").isHidden());
+  await testLiveAnchors(page);
+}
+
+// Pixels of map points that nothing lies over, far from each other.
+const pointsToClick = (count) => {
+  const { model, stage } = pangea;
+  const found = [];
+  stage.points.forEach((k, x, y, z) => {
+    const { t, q } = model.keyframes[k].shown;
+    const pixel = stage.pixelOf(t.clone().set(x, y, z).applyQuaternion(q).add(t));
+    if (found.length === count || document.elementFromPoint(pixel?.x, pixel?.y)?.id !== "stage") return;
+    if (found.every((other) => other.distanceTo(pixel) > 150)) found.push(pixel);
+  });
+  return found.map((pixel) => ({ x: pixel.x, y: pixel.y }));
+};
+
+async function placeAnchor(page, point, name) {
+  await page.locator("#anchor_add").click();
+  await page.mouse.click(point.x, point.y);
+  await page.locator("#anchor_name").fill(name);
+  await page.locator('#anchor_dialog button[value="place"]').click();
+}
+
+// Where the first anchor is, on the stage and on the screen.
+const anchorNow = () => {
+  const [index] = pangea.model.anchors.keys();
+  const { t } = pangea.model.anchorPose(index);
+  const pixel = pangea.stage.pixelOf(t);
+  return { at: [t.x, t.y, t.z], x: pixel.x, y: pixel.y, revision: pangea.model.anchors.get(index).said.revision };
+};
+const distance = (a, b) => Math.hypot(...a.map((value, i) => value - b[i]));
+
+async function testLiveAnchors(page) {
+  await settled(page);
+  await page.waitForTimeout(1500); // the camera comes to a stop
+  const [point, ...others] = await page.evaluate(pointsToClick, 3);
+  await placeAnchor(page, point, "kettle <b>");
+  await becomes(page, "anchors: one that is placed is listed by its name", () =>
+    document.querySelector(".anchor .name")?.textContent === "kettle <b>");
+  let anchor = await page.evaluate(anchorNow);
+  // The nearest point to the pointer may be a neighbour of the one that was meant.
+  const off_px = Math.hypot(anchor.x - point.x, anchor.y - point.y);
+  check("anchors: it is where it was put", off_px < 13, `${off_px.toFixed(1)} px off`);
+  await page.locator(".anchor .what").click();
+  await becomes(page, "anchors: the camera goes there", () =>
+    pangea.stage.pixelOf(pangea.model.anchorPose([...pangea.model.anchors.keys()][0]).t).distanceTo({
+      x: document.getElementById("stage").clientWidth / 2, y: document.getElementById("stage").clientHeight / 2 }) < 3);
+  await page.waitForTimeout(500);
+
+  anchor = await page.evaluate(anchorNow);
+  await page.mouse.move(anchor.x, anchor.y);
+  await page.mouse.down();
+  await page.mouse.move(anchor.x - 60, anchor.y - 40, { steps: 5 });
+  const dragged = await page.evaluate(anchorNow);
+  await page.mouse.up();
+  check("anchors: it follows the pointer", distance(dragged.at, anchor.at) > 0.1 &&
+    Math.hypot(dragged.x - anchor.x + 60, dragged.y - anchor.y + 40) < 2, `${distance(dragged.at, anchor.at)} m`);
+  await becomes(page, "anchors: the server has moved it", () => [...pangea.model.anchors.values()][0].said.revision === 2);
+  const moved = await page.evaluate(anchorNow);
+  check("anchors: it stays where it was dragged", distance(moved.at, dragged.at) < 0.01,
+    `${(1000 * distance(moved.at, dragged.at)).toFixed(1)} mm off`);
+
+  await page.locator('.anchor[data-key="0"] .delete').click();
+  check("anchors: deleting asks", (await page.locator(".anchor .delete").textContent()) === "delete?");
+  await page.locator('.anchor[data-key="0"] .delete').click();
+  await becomes(page, "anchors: it is gone", () => pangea.model.anchors.size === 0);
+
+  await page.locator("#fit").click();
+  await page.waitForTimeout(2500);
+  for (const [i, name] of ["kettle", "window", "door"].entries()) await placeAnchor(page, [point, ...others][i], name);
+  await becomes(page, "anchors: three more", () => document.querySelectorAll(".anchor").length === 3);
+  await page.mouse.move(5, 400);
+  await becomes(page, "anchors: what was said is hidden again", () =>
+    !document.getElementById("notice").classList.contains("shown"));
+  await page.waitForTimeout(500);
+  // The processes at the bottom are silent: the log is at its end.
+  const { y } = await page.locator("footer").boundingBox();
+  await page.screenshot({ path: `${options.out}/viewer_anchors.png`, clip: { x: 0, y: 0, width: 1280, height: y } });
+}
+
+// Of a log anchors are shown and listed; nobody changes them.
+async function testAnchorsOfLog(page) {
+  await becomes(page, "anchors: the log's ten are listed", () => document.querySelectorAll(".anchor").length === 10);
+  check("anchors: nobody changes a log's",
+    await page.evaluate(() => document.getElementById("anchor_add").hidden &&
+      [...document.querySelectorAll(".anchor .delete")].every((button) => button.hidden)));
+  await settled(page);
+  const off = await page.evaluate(() => {
+    const { model } = pangea;
+    const { said, holder } = model.anchors.get(0);
+    const { shown, solved } = model.keyframes[holder];
+    const [x, y, z] = said.T_map_anchor;
+    const at = model.anchorPose(0).t;
+    // One group alone stays where it is, so the stage's frame is the map's.
+    return Math.hypot(at.x - x, at.y - y, at.z - z) + shown.t.distanceTo(solved.T_map_body.t);
+  });
+  check("anchors: they are where the log has them", off < 0.03, `${off} m off`);
+  await page.locator('.anchor[data-key="3"] .what').click();
+  await becomes(page, "anchors: a click flies there", () => {
+    const at = pangea.stage.pixelOf(pangea.model.anchorPose(3).t);
+    const canvas = document.getElementById("stage");
+    return Math.hypot(at.x - canvas.clientWidth / 2, at.y - canvas.clientHeight / 2) < 3;
+  });
+  await becomes(page, "anchors: names stand beside them", () =>
+    [...document.querySelectorAll(".anchor_label")].some((label) => !label.hidden && label.textContent === "anchor 3"));
+  await page.mouse.move(5, 400);
+  await page.waitForTimeout(300);
+  await screenshot(page, "anchors_of_log");
+  await page.locator("#show_anchors").uncheck();
+  await becomes(page, "anchors: they can be hidden", () =>
+    [...document.querySelectorAll(".anchor_label")].every((label) => label.hidden));
+  await seek(page, 0.2);
+  await becomes(page, "anchors: before they were made there are none", () =>
+    pangea.model.anchors.size === 0 && document.getElementById("anchors").hidden);
 }
 
 // Nothing of a card is cut off, and none is to be scrolled to.
@@ -182,6 +298,7 @@ async function testTwelve(browser) {
   await becomes(page, "twelve agents: their keyframes come", () => pangea.model.numKeyframes === 240);
   check("twelve agents: it is one", (await page.evaluate(numGroups)) === 1);
   await becomes(page, "twelve agents: all their cards are in sight", allCardsInSight);
+  await testAnchorsOfLog(page);
 }
 
 await run(async () => {

@@ -1,0 +1,57 @@
+// The part of a server that a test of the page needs to change anchors: what tools ask for gets its
+// number and is published as if journalled. pangea-anchors does the rest.
+//   pangea-viewer-test-journal URL
+
+#include <iostream>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "bus/bus.h"
+#include "bus/process.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+
+namespace {
+
+using namespace pangea;
+
+class TestJournal {
+ public:
+  explicit TestJournal(LcmBus& bus) : bus_(bus) {
+    bus.Subscribe(channels::AnchorRequest(0), [this](const std::string&, Bytes data) {
+      anchor_edit_t edit{};
+      if (DecodeMessage(data, &edit) && Parse(edit).value) {
+        Take(edit);
+      }
+    });
+  }
+
+ private:
+  void Take(anchor_edit_t edit) {
+    const std::pair<AnchorId, int64_t> key{*Parse(edit.anchor).value, edit.revision};
+    const auto [number, first] = numbers_.emplace(key, static_cast<int64_t>(numbers_.size()));
+    edit.seq = number->second;
+    edit.may = anchor_edit_t::MAY_EDIT_ALL;
+    PublishMessage(bus_, std::string(channels::kAnchorEdit), edit);
+  }
+
+  LcmBus& bus_;
+  std::map<std::pair<AnchorId, int64_t>, int64_t> numbers_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: pangea-viewer-test-journal URL\n";
+    return 2;
+  }
+  InstallSignalHandlers();
+  LcmBus bus(argv[1]);
+  const TestJournal journal(bus);
+  while (!StopRequested()) {
+    bus.Handle(100);
+  }
+  return 0;
+}
