@@ -18,6 +18,8 @@ constexpr int64_t kSecond_us = 1'000'000;
 constexpr size_t kMaxCorrections = 16 * AgentHandlerProcess::kMaxAgents;
 // So many in a row were not damaged on their way.
 constexpr int kManyHellos = 3;
+// An uplink that is there says hello each second.
+constexpr int64_t kAway_us = 3 * kSecond_us;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -32,7 +34,8 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
       key_folder_(key_folder),
       options_(options),
       node_(server_bus, "agent_handler"),
-      archive_(node_, journal_path, now_utime, options.archive) {
+      archive_(node_, journal_path, now_utime, options.archive),
+      anchors_(node_, archive_) {
   node_.Watch(link_bus);
   ReadKeys();
   for (const MapId& map : archive_.maps()) {
@@ -78,7 +81,7 @@ void AgentHandlerProcess::OnLandmarks(const MapLandmarks& landmarks, const landm
 // An agent whose key has gone is shut out; what it sent stays. One whose key has changed begins a
 // new session.
 void AgentHandlerProcess::ReadKeys() {
-  const std::map<int32_t, SecretKey> keys = key_folder_.Read();
+  const std::map<int32_t, AgentKey> keys = key_folder_.Read();
   if (keys.size() > kMaxAgents) {
     throw std::runtime_error(
         fmt::format("folder of keys {}: it has {}, and one server takes {} agents at most: take "
@@ -86,14 +89,17 @@ void AgentHandlerProcess::ReadKeys() {
                     key_folder_name_, keys.size(), kMaxAgents));
   }
   std::erase_if(agents_, [&](const auto& item) { return !keys.contains(item.first); });
-  for (const auto& [agent_id, key] : keys) {
+  std::map<int32_t, AnchorRight> rights;
+  for (const auto& [agent_id, read] : keys) {
+    rights[agent_id] = read.anchors;
     const auto agent = agents_.find(agent_id);
     if (agent == agents_.end()) {
-      agents_.emplace(agent_id, Agent{HandlerSession(agent_id, key), std::nullopt});
-    } else if (!(agent->second.session.agent_key() == key)) {
-      agent->second.session = HandlerSession(agent_id, key);
+      agents_.emplace(agent_id, Agent{HandlerSession(agent_id, read.key), std::nullopt});
+    } else if (!(agent->second.session.agent_key() == read.key)) {
+      agent->second.session = HandlerSession(agent_id, read.key);
     }
   }
+  anchors_.SetRights(rights);
 }
 
 AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
@@ -113,10 +119,12 @@ AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
   return handler;
 }
 
-void AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes packet) {
+int64_t AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes packet) {
   const std::string channel = channels::LinkDown(agent_id);
   link_bus_.Publish(channel, packet);
-  agent->bytes_down += BytesOnTheWire(channel, packet);
+  const int64_t bytes = BytesOnTheWire(channel, packet);
+  agent->bytes_down += bytes;
+  return bytes;
 }
 
 void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
@@ -140,13 +148,17 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
     return;
   }
   ++agent.packets;
+  agent.heard_us = now_us_;
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));
   }
   if (opened.new_uplink) {
     agent.handler->OnNewUplink();
+    anchors_.OnNewSession(agent_id);
   }
-  const std::string reason = agent.handler->OnPacket(*opened.packet);
+  const std::string reason = AnchorRelay::IsOfAnchors(opened.packet->kind)
+                                 ? anchors_.OnPacket(agent_id, *opened.packet)
+                                 : agent.handler->OnPacket(*opened.packet);
   if (!reason.empty()) {
     node_.Refuse(reason);
   }
@@ -174,12 +186,23 @@ void AgentHandlerProcess::SendAcks() {
   }
 }
 
+void AgentHandlerProcess::SendAnchors() {
+  for (auto& [agent_id, agent] : agents_) {
+    if (agent.session.HasUplink() && now_us_ - agent.heard_us < kAway_us) {
+      anchors_.SendDue(agent_id, now_us_, [&](LinkKind kind, std::vector<uint8_t> body) {
+        return SendDown(agent_id, &agent, agent.session.Seal(kind, std::move(body)));
+      });
+    }
+  }
+}
+
 int AgentHandlerProcess::Poll(int64_t steady_us) {
   now_us_ = steady_us;
   archive_.set_now_us(steady_us);
   for (auto& [agent_id, agent] : agents_) {
     JournalReady(&agent);
   }
+  anchors_.Poll();
   for (const KeyframeId& id : archive_.Sync()) {
     const auto agent = agents_.find(id.map.agent_id);
     if (agent != agents_.end() && agent->second.handler) {
@@ -187,7 +210,9 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
       agent->second.handler->Journalled(id);
     }
   }
+  anchors_.OnJournalled(archive_.TakeJournalledEdits());
   SendAcks();
+  SendAnchors();
   archive_.AnswerResendRequests();
   const bool busy =
       archive_.busy() || std::any_of(agents_.begin(), agents_.end(), [](const auto& item) {
@@ -250,6 +275,7 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   node_.Set("keyframes", keyframes);
   node_.Set("keyframes_given_up", given_up);
   archive_.SetCounters();
+  anchors_.SetCounters();
   node_.PublishStatus(now_utime, pending,
                       fmt::format("{} agents, {} keyframes in the journal{}{}{}{}", connected,
                                   archive_.num_keyframes(),

@@ -3,7 +3,7 @@
 // The agent_handler between the link bus and the server bus.
 //   link bus:   LINK_UP_* in; LINK_DOWN_k out
 //   server bus: POSE_k, STATUS_agent_handler and what archive.h says out; CORRECTION_k, LANDMARKS_k
-//               and what archive.h says in
+//               and what archive.h and anchor_relay.h say in
 // Keyframes are acknowledged and published once the journal's disk has them. What does not open
 // under the key of the agent it claims to be from is dropped and counted; it costs one attempt to
 // open it, and leaves nothing behind.
@@ -14,6 +14,7 @@
 
 #include "agent_handler/agent_handler.h"
 #include "agent_handler/agent_handler_options.h"
+#include "agent_handler/anchor_relay.h"
 #include "agent_handler/journal/archive.h"
 #include "bus/node.h"
 #include "bus/retransmission/missing.h"
@@ -40,13 +41,15 @@ class AgentHandlerProcess : public PolledProcess {
     HandlerSession session;
     std::optional<AgentHandler> handler;  // since its first session
     int64_t packets = 0;                  // opened
+    int64_t heard_us = 0;                 // the newest of them
     int hellos_refused = 0;               // since one was opened
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;
     int64_t keyframes = 0;
   };
   void OnLinkUp(const std::string& channel, Bytes data);
-  void SendDown(int32_t agent_id, Agent* agent, Bytes packet);
+  // The bytes on the wire.
+  int64_t SendDown(int32_t agent_id, Agent* agent, Bytes packet);
   void ReadKeys();
   void LookForKeys();
   AgentHandler MakeHandler(int32_t agent_id) const;
@@ -54,6 +57,7 @@ class AgentHandlerProcess : public PolledProcess {
   void OnLandmarks(const MapLandmarks& landmarks, const landmarks_t& message);
   void JournalReady(Agent* agent);
   void SendAcks();
+  void SendAnchors();
   // For people: agents whose software is not of this version.
   std::string OtherSoftware() const;
   // For people: agents who say hello under another key.
@@ -66,6 +70,7 @@ class AgentHandlerProcess : public PolledProcess {
   const AgentHandlerOptions options_;
   Node node_;
   Archive archive_;
+  AnchorRelay anchors_;
   std::map<int32_t, Agent> agents_;          // those with a key
   std::map<MapId, Correction> corrections_;  // the newest of each map, at most 16,000
   MissingStates missing_corrections_;        // of the maps that were in the journal at the start

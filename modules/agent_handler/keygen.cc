@@ -15,13 +15,20 @@ CLI::App* AddKeygen(CLI::App& app, KeygenArguments* arguments) {
       ->check(CLI::Range(1, 65535));
   keygen->add_option("--out", arguments->file,
                      "file to make; never written over (default: agent_ID.key here)");
+  keygen
+      ->add_option(
+          "--anchors", arguments->anchors,
+          "what the agent may do with anchors: read, own (edit those it made), write (edit "
+          "all)")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"read", "own", "write"}));
   return keygen;
 }
 
 int Keygen(const KeygenArguments& arguments) {
   const std::string file =
       arguments.file.empty() ? KeyFileName(arguments.agent_id) : arguments.file;
-  MakeKeyFile(file, arguments.agent_id);
+  MakeKeyFile(file, arguments.agent_id, AnchorRightOf(arguments.anchors).value());
   std::cout << fmt::format(
       "{}: for agent {} (pangea-uplink --key); the server needs a copy in its folder of keys "
       "(--keys)\n",

@@ -11,6 +11,7 @@ namespace pangea {
 struct KeygenArguments {
   int32_t agent_id = 0;
   std::string file;  // empty: agent_ID.key here
+  std::string anchors = "own";
 };
 
 // The subcommand, which fills in the arguments.

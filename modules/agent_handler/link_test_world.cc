@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "link/agent_key.h"
 #include "messages/channels.h"
@@ -14,8 +15,20 @@
 namespace pangea {
 
 void LossyBus::Publish(const std::string& channel, Bytes data) {
-  if (std::uniform_real_distribution<double>(0, 1)(rng_) >= loss) {
+  if (loss > 0 && Unit() < loss) {
+    return;
+  }
+  if (held > 0 && held_.size() < kMaxHeld && Unit() < held) {
+    held_.emplace_back(channel, std::vector<uint8_t>(data.begin(), data.end()));
+    return;
+  }
+  inner.Publish(channel, data);
+  if (doubled > 0 && Unit() < doubled) {
     inner.Publish(channel, data);
+  }
+  if (!held_.empty() && Unit() < 0.3) {
+    inner.Publish(held_.back().first, held_.back().second);
+    held_.pop_back();
   }
 }
 
@@ -69,6 +82,10 @@ void LinkWorld::SetUp() {
 void LinkWorld::TearDown() {
   handler.reset();
   std::filesystem::remove_all(folder);
+}
+
+void LinkWorld::SetAnchorRight(const std::string& word) const {
+  std::ofstream(KeyFile(1), std::ios::app) << "anchors: " << word << "\n";
 }
 
 void LinkWorld::StartUplink() {

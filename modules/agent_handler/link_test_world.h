@@ -19,6 +19,7 @@ namespace pangea {
 inline constexpr int64_t kSecond = 1'000'000;
 inline const MapId kMap{1, 1000};
 
+// Loses, doubles, and holds back until others have overtaken.
 class LossyBus : public Bus {
  public:
   void Publish(const std::string& channel, Bytes data) override;
@@ -27,9 +28,14 @@ class LossyBus : public Bus {
   }
   LocalBus inner;
   double loss = 0;
+  double doubled = 0;
+  double held = 0;
 
  private:
+  double Unit() { return std::uniform_real_distribution<double>(0, 1)(rng_); }
   std::mt19937_64 rng_{3};
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> held_;  // at most kMaxHeld
+  static constexpr size_t kMaxHeld = 10;
 };
 
 // Fresh buses at each restart of a process would be the true thing; here a bus lets go of a process
@@ -54,6 +60,8 @@ class LinkWorld : public testing::Test {
   std::filesystem::path KeyFile(int32_t agent_id) const {
     return folder / "keys" / KeyFileName(agent_id);
   }
+  // Lets the agent in again, with this right; from the handler's next look at the keys on.
+  void SetAnchorRight(const std::string& word) const;
   void StartUplink();
   void KillUplink();
   void StartHandler();

@@ -22,6 +22,13 @@ namespace fs = std::filesystem;
 constexpr size_t kHexBytes = 2 * SecretKey::kBytes;
 constexpr size_t kMaxFileBytes = 4096;
 
+struct RightWord {
+  std::string_view word;
+  AnchorRight right;
+};
+constexpr RightWord kRightWords[] = {
+    {"read", AnchorRight::kRead}, {"own", AnchorRight::kEditOwn}, {"write", AnchorRight::kEditAll}};
+
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
 }
@@ -97,11 +104,28 @@ std::optional<std::string_view> ValueOf(std::string_view line, std::string_view 
   return line;
 }
 
+// Of the line "anchors: WORD".
+AnchorRight ReadRight(const fs::path& file, std::string_view word) {
+  const auto right = AnchorRightOf(word);
+  if (!right) {
+    constexpr size_t kMaxSaid = 40;
+    Fail(file, fmt::format("it has the line \"anchors: {}\": make it read (see anchors), own (edit "
+                           "those it made) or write (edit all), or take the line out (own)",
+                           word.substr(0, kMaxSaid)));
+  }
+  return *right;
+}
+
 }  // namespace
+
+std::optional<AnchorRight> AnchorRightOf(std::string_view word) {
+  const auto* const found = std::ranges::find(kRightWords, word, &RightWord::word);
+  return found == std::end(kRightWords) ? std::nullopt : std::optional(found->right);
+}
 
 std::string KeyFileName(int32_t agent_id) { return fmt::format("agent_{}.key", agent_id); }
 
-void MakeKeyFile(const fs::path& file, int32_t agent_id) {
+void MakeKeyFile(const fs::path& file, int32_t agent_id, AnchorRight anchors) {
   const SecretKey key = SecretKey::Random();
   char hex[kHexBytes + 1];
   sodium_bin2hex(hex, sizeof(hex), key.bytes().data(), key.bytes().size());
@@ -109,8 +133,11 @@ void MakeKeyFile(const fs::path& file, int32_t agent_id) {
       "# Lets agent {0} into a Pangea server. Secret: a copy for the agent (pangea-uplink --key), "
       "a "
       "copy for the\n# server's folder of keys (pangea-agent-handler --keys).\nagent: {0}\nkey: "
-      "{1}\n",
-      agent_id, hex);
+      "{1}\n"
+      "# What the agent may do with anchors, by the server's copy: read, own (edit those it made), "
+      "write (edit all).\n{2}anchors: {3}\n",
+      agent_id, hex, anchors == AnchorRight::kEditOwn ? "# " : "",
+      std::ranges::find(kRightWords, anchors, &RightWord::right)->word);
   const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (fd < 0) {
     Fail(file, errno == EEXIST ? "exists already, and is left as it is: give another --out"
@@ -129,6 +156,7 @@ AgentKey ReadKeyFile(const fs::path& file) {
   const SecretText text = ReadSecret(file);
   std::optional<int32_t> agent_id;
   std::optional<SecretKey> key;
+  AnchorRight anchors = AnchorRight::kEditOwn;
   for (std::string_view rest = text.view(); !rest.empty();) {
     const std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(line.size() + 1, rest.size()));
@@ -144,14 +172,16 @@ AgentKey ReadKeyFile(const fs::path& file) {
       if (!key) {
         Fail(file, fmt::format("key must be {} hexadecimal digits", kHexBytes));
       }
+    } else if (const auto word = ValueOf(line, "anchors")) {
+      anchors = ReadRight(file, *word);
     } else if (!line.empty() && line[0] != '#') {
-      Fail(file, "is no key file: it has lines agent: and key: only");
+      Fail(file, "is no key file: it has lines agent:, key: and anchors: only");
     }
   }
   if (!agent_id || !key) {
     Fail(file, "is no key file: it needs the lines agent: and key:");
   }
-  return {*agent_id, *key};
+  return {*agent_id, *key, anchors};
 }
 
 SecretKey ReadKeyFileOf(const fs::path& file, int32_t agent_id) {
@@ -188,7 +218,7 @@ bool KeyFolder::IsGone(int32_t agent_id) const {
   return file == files_.end() || !fs::exists(file->second, error);
 }
 
-std::map<int32_t, SecretKey> KeyFolder::Read() {
+std::map<int32_t, AgentKey> KeyFolder::Read() {
   std::error_code error;
   if (!fs::is_directory(folder_, error)) {
     throw std::runtime_error(
@@ -197,11 +227,11 @@ std::map<int32_t, SecretKey> KeyFolder::Read() {
                     folder_.string(), (folder_ / KeyFileName(1)).string()));
   }
   const Stamps stamps = Look();
-  std::map<int32_t, SecretKey> keys;
+  std::map<int32_t, AgentKey> keys;
   std::map<int32_t, fs::path> files;
   for (const auto& [file, stamp] : stamps) {
     const AgentKey read = ReadKeyFile(file);
-    if (!keys.emplace(read.agent_id, read.key).second) {
+    if (!keys.emplace(read.agent_id, read).second) {
       Fail(file, fmt::format("is a second key of agent {}: take one of them out", read.agent_id));
     }
     files[read.agent_id] = file;

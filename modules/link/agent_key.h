@@ -1,15 +1,19 @@
 #pragma once
 
 // An agent's pre-shared key as a file: text, mode 0600, made by `pangea-agent-handler keygen`. The
-// agent has one, the server a folder of them.
+// agent has one, the server a folder of them. The server's copy also says what its agent may do
+// with anchors, `anchors: read | own | write`: see them, edit those it made (also without the
+// line), edit all.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "core/anchor.h"
 #include "link/seal.h"
 
 namespace pangea {
@@ -17,13 +21,18 @@ namespace pangea {
 struct AgentKey {
   int32_t agent_id = 0;
   SecretKey key;
+  AnchorRight anchors = AnchorRight::kEditOwn;
 };
+
+// "read", "own" or "write"; nothing of another word.
+std::optional<AnchorRight> AnchorRightOf(std::string_view word);
 
 // "agent_4.key"
 std::string KeyFileName(int32_t agent_id);
 
 // A new random key. Throws std::runtime_error if the file exists or cannot be written.
-void MakeKeyFile(const std::filesystem::path& file, int32_t agent_id);
+void MakeKeyFile(const std::filesystem::path& file, int32_t agent_id,
+                 AnchorRight anchors = AnchorRight::kEditOwn);
 
 // Throws std::runtime_error that names the file and the mend: missing, readable by others,
 // malformed.
@@ -38,7 +47,7 @@ class KeyFolder {
   explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   // Throws std::runtime_error: no such folder, a file of it cannot be used, two of one agent.
-  std::map<int32_t, SecretKey> Read();
+  std::map<int32_t, AgentKey> Read();
   // Whether files have come, gone or changed since the last Read.
   bool Changed() const;
   // Whether the file is gone that the last successful Read had the agent's key from.

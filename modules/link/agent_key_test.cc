@@ -46,6 +46,7 @@ TEST_F(AgentKeyTest, RoundTrip) {
   EXPECT_EQ(ReadKeyFile(a).agent_id, 4);
   EXPECT_TRUE(ReadKeyFileOf(a, 4) == ReadKeyFile(a).key);
   EXPECT_FALSE(ReadKeyFile(a).key == ReadKeyFile(b).key);
+  EXPECT_EQ(ReadKeyFile(a).anchors, AnchorRight::kEditOwn);
   EXPECT_THAT(ReasonOf([&] { ReadKeyFileOf(a, 7); }),
               testing::AllOf(HasSubstr("a.key"), HasSubstr("agent 4"), HasSubstr("agent 7")));
 }
@@ -78,6 +79,22 @@ TEST_F(AgentKeyTest, MistakesGetAnAnswerWithoutTheSecret) {
   const std::string secret(63, 'b');
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", "agent: 4\nkey: " + secret + "\n")); }),
               testing::Not(HasSubstr("bbbb")));
+}
+
+TEST_F(AgentKeyTest, WhatItAllowsWithAnchors) {
+  for (const AnchorRight right :
+       {AnchorRight::kRead, AnchorRight::kEditOwn, AnchorRight::kEditAll}) {
+    const fs::path file = folder / "a.key";
+    fs::remove(file);
+    MakeKeyFile(file, 4, right);
+    EXPECT_EQ(ReadKeyFile(file).anchors, right);
+  }
+  const std::string key = "agent: 4\nkey: " + std::string(64, 'a') + "\n";
+  EXPECT_EQ(ReadKeyFile(Write("a.key", key)).anchors, AnchorRight::kEditOwn) << "as made before";
+  EXPECT_EQ(ReadKeyFile(Write("a.key", key + "anchors: write\n")).anchors, AnchorRight::kEditAll);
+  EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", key + "anchors: all\n")); }),
+              testing::AllOf(HasSubstr("bad.key"), HasSubstr("\"anchors: all\""),
+                             HasSubstr("make it read")));
 }
 
 TEST_F(AgentKeyTest, AFolderOfKeys) {

@@ -26,9 +26,13 @@ enum class LinkKind : uint8_t {
   kPiece = 2,      // of a keyframe
   kLastPiece = 3,  // of a keyframe: its index says how many there are
   kPose = 4,
+  kAnchorEdit = 5,
+  kAnchorsReceived = 6,
   kWelcome = 16,
   kAck = 17,
   kLandmarks = 18,
+  kAnchor = 19,
+  kAnchorEditAnswers = 20,
 };
 
 struct LinkPacket {

@@ -13,6 +13,12 @@
 //          count, and of each keyframe in the cache: index of its map, seq, bits of its pieces;
 //          count, and of each correction: an encoded correction_t
 //   landmarks: an encoded landmarks_t; best effort
+// Anchors (anchor_wire.h), each sent again until the other side says that it has it:
+//   anchor edit (up):          an encoded anchor_edit_t
+//   anchor edit answers (down): count, and of each: agent_id and created_utime of the anchor,
+//                              revision, 1 if it is in the journal or 0 if it was refused
+//   anchor (down):             number, an encoded anchor_t
+//   anchors received (up):     count, and each number
 
 #include <cstdint>
 #include <map>

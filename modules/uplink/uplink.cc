@@ -4,6 +4,8 @@
 #include <set>
 #include <utility>
 
+#include "link/anchor_wire.h"
+
 namespace pangea {
 namespace {
 
@@ -28,6 +30,7 @@ constexpr size_t kMaxMaps = 200;
 // A pose's packet on the wire, and what poses may take of a budget.
 constexpr double kPoseBytes = 180;
 constexpr double kPoseShare = 0.05;
+constexpr double kAnchorShare = 0.05;
 constexpr double kMinBudget_kb_per_s = 5;  // bare keyframes alone take 3 kB/s
 
 }  // namespace
@@ -41,11 +44,17 @@ std::optional<std::string> UplinkOptions::Invalid() const {
 
 UplinkOptions WithinBudget(UplinkOptions options) {
   if (const double budget_kb_per_s = options.budget_kb_per_s; budget_kb_per_s > 0) {
-    options.sender.bandwidth_kb_per_s =
-        std::min(options.sender.bandwidth_kb_per_s, (1 - kPoseShare) * budget_kb_per_s);
+    options.sender.bandwidth_kb_per_s = std::min(options.sender.bandwidth_kb_per_s,
+                                                 (1 - kPoseShare - kAnchorShare) * budget_kb_per_s);
     options.pose_hz = std::min(options.pose_hz, kPoseShare * 1000 * budget_kb_per_s / kPoseBytes);
   }
   return options;
+}
+
+double AnchorBytesPerSecond(const UplinkOptions& options) {
+  const double budget = 1000 * options.budget_kb_per_s;
+  return budget > 0 ? std::min(kAnchorBytesPerSecond, kAnchorShare * budget)
+                    : kAnchorBytesPerSecond;
 }
 
 Uplink::Uplink(const UplinkOptions& options, Sender::Load load)

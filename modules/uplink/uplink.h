@@ -48,6 +48,8 @@ struct UplinkOptions {
 
 // With the pace and the poses that the budget allows.
 UplinkOptions WithinBudget(UplinkOptions options);
+// What it leaves for edits of anchors, bytes on the wire per second.
+double AnchorBytesPerSecond(const UplinkOptions& options);
 
 class Uplink {
  public:
@@ -75,6 +77,8 @@ class Uplink {
   };
   // What to ask of the odometry now; each gap is repeated until it is filled or given up.
   std::vector<Ask> Asks(int64_t now_us);
+  // The number of a packet of anchors, which others make; only when connected.
+  int64_t NextNumber(int64_t now_us) { return sender_.NextNumber(now_us); }
   // Corrections the agent has to be told now: new ones, and one per second it has not applied.
   std::vector<Correction> TakeCorrections(int64_t now_us);
   // The highest acknowledged seq of each map; -1 for none.

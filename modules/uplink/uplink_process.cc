@@ -26,6 +26,20 @@ size_t Checksum(Bytes data) {
   return std::hash<std::string_view>{}({reinterpret_cast<const char*>(data.data()), data.size()});
 }
 
+const char* KindForPeople(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::kHello:
+      return "hellos";
+    case LinkKind::kPose:
+      return "poses";
+    case LinkKind::kAnchorEdit:
+    case LinkKind::kAnchorsReceived:
+      return "anchors";
+    default:
+      return "keyframes";
+  }
+}
+
 }  // namespace
 
 UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
@@ -35,7 +49,8 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
       spool_(spool),
-      uplink_(options, [this](const KeyframeId& id) { return Load(id); }) {
+      uplink_(options, [this](const KeyframeId& id) { return Load(id); }),
+      anchors_(node_, agent_id, AnchorBytesPerSecond(options)) {
   node_.Watch(link_bus);
   if (options.budget_kb_per_s > 0) {
     ladder_.emplace(1000 * options.budget_kb_per_s);
@@ -79,6 +94,7 @@ void UplinkProcess::OnKeyframe(Bytes data) {
   if (!uplink_.NoteReceived(keyframe.value->id, now_us_)) {
     return node_.Count("keyframes_repeated");
   }
+  anchors_.OnKeyframe(keyframe.value->utime, keyframe.value->id.map);
   const std::vector<uint8_t> bytes = FitBudget(*keyframe.value, data);
   std::vector<uint8_t> compressed = Compress(bytes);
   const auto compressed_bytes = static_cast<int64_t>(compressed.size());
@@ -131,6 +147,7 @@ void UplinkProcess::OnPose(Bytes data) {
   // While it initialises there is no map yet.
   if (map.value && map.value->agent_id == agent_id_) {
     uplink_.AddPose(*map.value, message.group_revision, EncodePose(message));
+    anchors_.OnPose(message.utime, *map.value);
   }
 }
 
@@ -142,12 +159,16 @@ void UplinkProcess::OnLinkDown(Bytes data) {
   node_.Count("bytes_down", BytesOnTheWire(channels::LinkDown(agent_id_), data));
   if (opened.new_session) {
     uplink_.OnNewSession();
+    anchors_.OnNewSession();
   }
   if (!opened.packet) {
     return;
   }
   if (opened.packet->kind == LinkKind::kLandmarks) {
     return OnLandmarks(opened.packet->body);
+  }
+  if (UplinkAnchors::IsOfAnchors(opened.packet->kind)) {
+    return anchors_.OnPacket(*opened.packet, now_us_);
   }
   if (opened.packet->kind != LinkKind::kAck) {
     return node_.Refuse("packet of an unknown kind");
@@ -172,19 +193,18 @@ void UplinkProcess::OnLandmarks(Bytes body) {
   node_.Count("landmark_messages");
 }
 
-void UplinkProcess::Send(const LinkPacket& packet) {
+int64_t UplinkProcess::Send(const LinkPacket& packet) {
   const std::string channel = channels::LinkUp(agent_id_);
   const std::vector<uint8_t> bytes = session_.Seal(packet);
   link_bus_.Publish(channel, bytes);
   const int on_the_wire = BytesOnTheWire(channel, bytes);
-  const char* const kind = packet.kind == LinkKind::kHello  ? "hellos"
-                           : packet.kind == LinkKind::kPose ? "poses"
-                                                            : "keyframes";
+  const char* const kind = KindForPeople(packet.kind);
   node_.Count("packets_up");
   node_.Count("bytes_up", on_the_wire);
   bytes_up_ += on_the_wire;
   node_.Count(fmt::format("packets_up_{}", kind));
   node_.Count(fmt::format("bytes_up_{}", kind), on_the_wire);
+  return on_the_wire;
 }
 
 int UplinkProcess::Poll(int64_t steady_us) {
@@ -192,10 +212,16 @@ int UplinkProcess::Poll(int64_t steady_us) {
   for (const LinkPacket& packet : uplink_.Poll(steady_us)) {
     Send(packet);
   }
+  if (uplink_.Connected(steady_us)) {
+    anchors_.SendDue(steady_us, [this](LinkKind kind, std::vector<uint8_t> body) {
+      return Send({kind, uplink_.NextNumber(now_us_), std::move(body)});
+    });
+  }
   PublishHave();
   PublishAsks();
   PublishCorrections();
-  return uplink_.Idle() ? kIdle_ms : kBusy_ms;
+  anchors_.Publish(steady_us);
+  return uplink_.Idle() && !anchors_.moving() ? kIdle_ms : kBusy_ms;
 }
 
 void UplinkProcess::PublishHave() {
@@ -265,11 +291,13 @@ void UplinkProcess::Tick(int64_t now_utime) {
   }
   next_status_utime_ = now_utime + kStatusInterval_us;
   const Sender& sender = uplink_.sender();
-  const auto pending = static_cast<int64_t>(sender.spooled());
+  const auto spooled = static_cast<int64_t>(sender.spooled());
+  const auto edits_waiting = static_cast<int64_t>(anchors_.edits_waiting());
   node_.Set("keyframes_acked", uplink_.keyframes_acked());
   node_.Set("keyframes_lost", uplink_.keyframes_lost());
   node_.Set("packets_resent", sender.resent());
-  node_.Set("spool", pending);
+  node_.Set("spool", spooled);
+  node_.Set("anchor_edits_waiting", edits_waiting);
   node_.Set("spool_memory_bytes", sender.spooled_bytes());
   if (spool_ != nullptr) {
     spool_->Sync();
@@ -278,9 +306,9 @@ void UplinkProcess::Tick(int64_t now_utime) {
     node_.Set("spool_damaged_bytes", spool_->damaged_bytes());
   }
   node_.PublishStatus(
-      now_utime, pending,
+      now_utime, spooled + edits_waiting,
       fmt::format("{}, {} keyframes acknowledged, {} in the spool{}{}", StateForPeople(),
-                  uplink_.keyframes_acked(), pending, RateForPeople(), SpoolForPeople()));
+                  uplink_.keyframes_acked(), spooled, RateForPeople(), SpoolForPeople()));
 }
 
 // A handler does not answer who has another key.

@@ -2,7 +2,7 @@
 
 // The uplink between its agent's bus and the link bus.
 //   agent bus: KEYFRAME_k, AGAIN_uplink_k, POSE_k in; HAVE, CORRECTION_k, RESEND_REQUEST,
-//              STATUS_uplink_k out
+//              STATUS_uplink_k out; and what uplink_anchors.h says
 //   link bus:  LINK_DOWN_k in, LINK_UP_k out
 
 #include <optional>
@@ -15,6 +15,7 @@
 #include "uplink/ladder.h"
 #include "uplink/spool.h"
 #include "uplink/uplink.h"
+#include "uplink/uplink_anchors.h"
 
 namespace pangea {
 
@@ -33,7 +34,8 @@ class UplinkProcess : public PolledProcess {
   // The keyframe's bytes as they are sent: all of them, or what the budget leaves.
   std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
   void OnLandmarks(Bytes body);
-  void Send(const LinkPacket& packet);
+  // The bytes on the wire.
+  int64_t Send(const LinkPacket& packet);
   std::vector<uint8_t> Load(const KeyframeId& id);
   void PublishHave();
   void PublishAsks();
@@ -49,6 +51,7 @@ class UplinkProcess : public PolledProcess {
   MapContinuity continuity_;
   Spool* const spool_;
   Uplink uplink_;
+  UplinkAnchors anchors_;
   std::optional<RateLadder> ladder_;
   bool was_connected_ = false;
   int64_t bytes_up_ = 0;

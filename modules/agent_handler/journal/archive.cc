@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "bus/retransmission/missing.h"
+#include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
@@ -60,6 +61,7 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
                  const ArchiveOptions& options)
     : node_(node),
       options_(options),
+      anchor_edits_(node),
       resend_pacer_(1000 * options.resend_kb_per_s, kResendBurst),
       now_utime_(now_utime) {
   journal_ = std::make_unique<Journal>(
@@ -96,7 +98,9 @@ void Archive::OnResendRequest(const resend_request_t& message) {
   if (message.requester == node_.name()) {
     return;
   }
-  const std::string reason = resend_queue_.Add(message, index_);
+  const std::string reason = message.channel == channels::kAnchorEdit
+                                 ? anchor_edits_.OnResendRequest(message)
+                                 : resend_queue_.Add(message, index_);
   if (!reason.empty()) {
     node_.Refuse(reason);
   }
@@ -167,7 +171,18 @@ bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPla
   if (channel.starts_with(channels::kOptionsPrefix)) {
     return LoadOptions(data);
   }
+  if (channel == channels::kAnchorEdit) {
+    return LoadAnchorEdit(data, place);
+  }
   return channel != channels::kConstraint || LoadAnswer<constraint_t>(data, place);
+}
+
+bool Archive::LoadAnchorEdit(Bytes data, const JournalPlace& place) {
+  if (anchor_edits_.Load(data, place)) {
+    return true;
+  }
+  node_.Count("journal_events_unreadable");
+  return !IsDamaged<anchor_edit_t>(data);
 }
 
 bool Archive::LoadOptions(Bytes data) {
@@ -191,6 +206,13 @@ bool Archive::LoadAnswer(Bytes data, const JournalPlace& place) {
     index_.Add(*answer.value, place);
   }
   return true;
+}
+
+AnchorEdits::Taken Archive::Append(AnchorEdit edit) {
+  if (!journal_->HasUnsynced()) {
+    oldest_unsynced_us_ = now_us_;
+  }
+  return anchor_edits_.Take(std::move(edit), now_utime_, journal_.get());
 }
 
 void Archive::Append(const KeyframeId& id, std::vector<uint8_t> bytes) {
@@ -220,6 +242,7 @@ std::vector<KeyframeId> Archive::Sync() {
     node_.bus().Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe.bytes);
   }
   unsynced_.clear();
+  anchor_edits_.OnSynced();
   return synced;
 }
 
@@ -245,6 +268,10 @@ void Archive::AnswerResendRequests() {
   // Also bounds the work of one call when keyframes have no match or verification result to send.
   constexpr int kMaxKeyframes = 200;
   resend_pacer_.Refill(now_us_);
+  for (int64_t bytes = 1; resend_pacer_.Ready() && bytes > 0;) {
+    bytes = anchor_edits_.AnswerNext(*journal_);
+    resend_pacer_.Take(bytes);
+  }
   for (int i = 0; i < kMaxKeyframes && resend_pacer_.Ready(); ++i) {
     const auto answer = resend_queue_.Next(index_);
     if (!answer) {
@@ -300,6 +327,7 @@ void Archive::PublishHave() {
     message.num_gaps = static_cast<int16_t>(message.gaps.size());
     node_.Publish(std::string(channels::kHave), message);
   } while (it != by_age_.end());
+  anchor_edits_.PublishNewest();
 }
 
 void Archive::RequestOutstanding() {
@@ -317,6 +345,7 @@ void Archive::SetCounters() {
   node_.Set("journal_keyframes", index_.num_keyframes());
   node_.Set("journal_matches", index_.num_matches());
   node_.Set("journal_constraints", index_.num_constraints());
+  node_.Set("journal_anchor_edits", anchor_edits_.num_edits());
   node_.Set("results_missing", index_.num_missing_results());
 }
 

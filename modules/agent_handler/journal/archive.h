@@ -1,10 +1,10 @@
 #pragma once
 
-// What the server has on its disk, towards the server bus: keyframes, place matches and
-// verification results, each journalled once, told about (HAVE) and sent again to whoever lacks
-// them.
+// What the server has on its disk, towards the server bus: keyframes, place matches, verification
+// results and edits of anchors, each journalled once, told about (HAVE) and sent again to whoever
+// lacks them.
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
-//               VERDICT_REQUEST out;
+//               VERDICT_REQUEST out, and what anchor_edits.h says;
 //               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name>,
 //               OPTIONS_* in
 // The options of each process are journalled when a start of it brings others than those before.
@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "agent_handler/journal/anchor_edits.h"
 #include "agent_handler/journal/journal.h"
 #include "agent_handler/journal/outstanding_results.h"
 #include "agent_handler/journal/resend_queue.h"
@@ -47,8 +48,11 @@ class Archive {
   // While it is, nothing may be appended.
   bool Full() const { return journal_->Full(); }
   void Append(const KeyframeId& id, std::vector<uint8_t> bytes);
+  AnchorEdits::Taken Append(AnchorEdit edit);
   // Writes what is due; the keyframes that the disk has since, published.
   std::vector<KeyframeId> Sync();
+  // The edits that the disk has since.
+  std::vector<AnchorEdit> TakeJournalledEdits() { return anchor_edits_.TakeJournalled(); }
   void AnswerResendRequests();
   void PublishHave();
   // Asks for the matches and verification results that keyframes should have by now.
@@ -64,7 +68,9 @@ class Archive {
   std::vector<SeqGap> Refillable(const MapId& map) const;
   // For people; empty if the journal was whole at the start.
   std::string Damage() const;
-  bool busy() const { return journal_->HasUnsynced() || resend_queue_.waiting() > 0; }
+  bool busy() const {
+    return journal_->HasUnsynced() || resend_queue_.waiting() + anchor_edits_.waiting() > 0;
+  }
   bool disk_refuses() const { return disk_refuses_; }
   int64_t num_keyframes() const { return index_.num_keyframes(); }
 
@@ -84,6 +90,7 @@ class Archive {
   std::vector<SeqGap> Lost(const MapId& map) const;
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   bool LoadOptions(Bytes data);
+  bool LoadAnchorEdit(Bytes data, const JournalPlace& place);
   // Answers are place matches and constraints: of a journal that is read, and new ones.
   template <typename Message>
   bool LoadAnswer(Bytes data, const JournalPlace& place);
@@ -93,6 +100,7 @@ class Archive {
   Node& node_;
   const ArchiveOptions options_;
   JournalIndex index_;
+  AnchorEdits anchor_edits_;
   std::unique_ptr<Journal> journal_;
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;

@@ -1,0 +1,63 @@
+#include "uplink/agent_anchors.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kAgain_us = 10'000'000;
+
+}  // namespace
+
+std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorId& id) {
+  if (anchors_.contains(id) || anchors_.size() < kMaxAnchors) {
+    return std::nullopt;
+  }
+  auto found = std::ranges::find_if(anchors_, [](const auto& a) { return a.second.state.gone; });
+  if (found == anchors_.end()) {
+    found = std::ranges::find_if(anchors_, [](const auto& a) { return a.second.number == 0; });
+  }
+  if (found == anchors_.end()) {
+    return std::nullopt;
+  }
+  AnchorState state = std::move(found->second.state);
+  anchors_.erase(found);
+  return state;
+}
+
+AgentAnchors::Taken AgentAnchors::Take(const LinkAnchor& anchor, int64_t now_us) {
+  const AnchorId& id = anchor.state.anchor;
+  if (!anchors_.contains(id) && anchors_.size() >= kMaxAnchors) {
+    return Taken::kFull;  // not confirmed: it comes again
+  }
+  if (received_.size() < kMaxAnchorsReceived) {
+    received_.push_back(anchor.number);
+  }
+  Entry& entry = anchors_[id];
+  if (anchor.number <= entry.number) {
+    return Taken::kKnown;
+  }
+  entry = {anchor.state, anchor.number, now_us};
+  return Taken::kNew;
+}
+
+void AgentAnchors::OnNewSession() {
+  received_.clear();
+  for (auto& [id, entry] : anchors_) {
+    entry.number = 0;
+  }
+}
+
+std::vector<AnchorState> AgentAnchors::DueAgain(int64_t now_us) {
+  std::vector<AnchorState> due;
+  for (auto& [id, entry] : anchors_) {
+    if (now_us - entry.told_us >= kAgain_us) {
+      entry.told_us = now_us;
+      due.push_back(entry.state);
+    }
+  }
+  return due;
+}
+
+}  // namespace pangea

@@ -1,0 +1,107 @@
+#include "uplink/uplink_anchors.h"
+
+#include <utility>
+
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+
+namespace pangea {
+
+UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s)
+    : node_(node), agent_id_(agent_id), edits_(edit_bytes_per_s) {
+  node_.Listen<anchor_edit_t>(channels::AnchorRequest(agent_id),
+                              [this](AnchorEdit edit) { OnRequest(std::move(edit)); });
+}
+
+void UplinkAnchors::OnRequest(AnchorEdit edit) {
+  if (edit.agent_id != 0 && edit.agent_id != agent_id_) {
+    return node_.Refuse("another agent's edit of an anchor");
+  }
+  edit.agent_id = agent_id_;
+  edit.right = AnchorRight::kUnknown;
+  edit.seq = -1;
+  switch (edits_.Add(std::move(edit))) {
+    case EditQueue::Taken::kNew:
+      return node_.Count("anchor_edits");
+    case EditQueue::Taken::kOutdated:
+      return node_.Count("anchor_edits_repeated");
+    case EditQueue::Taken::kFull:
+      node_.NoteDropped();
+      return node_.Refuse("too many edits of anchors wait for the server");
+  }
+}
+
+void UplinkAnchors::OnNewSession() {
+  edits_.OnNewSession();
+  anchors_.OnNewSession();
+}
+
+void UplinkAnchors::OnPacket(const LinkPacket& packet, int64_t now_us) {
+  if (packet.kind == LinkKind::kAnchor) {
+    OnAnchor(packet.body, now_us);
+  } else {
+    OnEditAnswers(packet.body);
+  }
+}
+
+void UplinkAnchors::Tell(const AnchorState& state) {
+  node_.Publish(channels::Anchor(agent_id_), ToMessage(state));
+}
+
+void UplinkAnchors::OnAnchor(Bytes body, int64_t now_us) {
+  const auto anchor = ParseAnchor(agent_id_, body);
+  if (!anchor.value) {
+    return node_.Refuse(anchor.refused);
+  }
+  if (auto left_out = anchors_.MakeRoomFor(anchor.value->state.anchor)) {
+    left_out->gone = true;
+    Tell(*left_out);
+    shown_.Erase(left_out->anchor);
+  }
+  switch (anchors_.Take(*anchor.value, now_us)) {
+    case AgentAnchors::Taken::kNew:
+      node_.Set("anchors", static_cast<int64_t>(anchors_.size()));
+      Tell(anchor.value->state);
+      return shown_.Set(anchor.value->state);
+    case AgentAnchors::Taken::kKnown:
+      return;
+    case AgentAnchors::Taken::kFull:
+      return node_.Refuse("more anchors than an agent keeps");
+  }
+}
+
+void UplinkAnchors::OnEditAnswers(Bytes body) {
+  const auto answers = ParseAnchorEditAnswers(body);
+  if (!answers.value) {
+    return node_.Refuse(answers.refused);
+  }
+  for (const AnchorEditAnswer& answer : *answers.value) {
+    if (!edits_.OnAnswer(answer)) {
+      continue;  // a repeat
+    }
+    node_.Count(answer.journalled ? "anchor_edits_journalled" : "anchor_edits_refused");
+    if (!answer.journalled) {
+      node_.Refuse("the server refused an edit of an anchor: what our key there allows");
+    }
+  }
+}
+
+void UplinkAnchors::SendDue(int64_t now_us, const Send& send) {
+  while (const auto edit = edits_.Next(now_us)) {
+    edits_.Charge(send(LinkKind::kAnchorEdit, EncodeAnchorEdit(*edit)));
+  }
+  if (const std::vector<int64_t> received = anchors_.TakeReceived(); !received.empty()) {
+    send(LinkKind::kAnchorsReceived, EncodeAnchorsReceived(received));
+  }
+}
+
+void UplinkAnchors::Publish(int64_t now_us) {
+  for (const AnchorState& state : anchors_.DueAgain(now_us)) {
+    Tell(state);
+  }
+  if (const auto shown = shown_.Poll(now_us)) {
+    node_.Publish(channels::ShownAnchors(agent_id_), ToMessage(*shown));
+  }
+}
+
+}  // namespace pangea
