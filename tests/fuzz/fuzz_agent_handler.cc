@@ -23,7 +23,8 @@ class Agent {
  public:
   Agent(QuickBus* bus, const SecretKey& key) : session_(1, key) {
     for (const LinkKind kind :
-         {LinkKind::kHello, LinkKind::kPiece, LinkKind::kLastPiece, LinkKind::kPose}) {
+         {LinkKind::kHello, LinkKind::kPiece, LinkKind::kLastPiece, LinkKind::kPose,
+          LinkKind::kAnchorEdit, LinkKind::kAnchorsReceived}) {
       bus->Subscribe(ChannelOfKind(kind), [this, bus, kind](const std::string&, Bytes body) {
         bus->Publish("LINK_UP_1", session_.Seal({kind, ++number_, {body.begin(), body.end()}}));
       });

@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "fuzz.h"
+#include "link/anchor_wire.h"
 #include "link/compression.h"
 #include "link/wire.h"
 #include "messages/catch_up_messages.h"
@@ -74,6 +75,19 @@ void ParsePoseBody(std::vector<uint8_t> body) {
   }
 }
 
+void ParseAnchorBodies(std::vector<uint8_t> body) {
+  if (const auto numbers = ParseAnchorsReceived(body); numbers.value) {
+    Require(ParseAnchorsReceived(EncodeAnchorsReceived(*numbers.value)).value == numbers.value,
+            "accepted once, accepted again");
+  }
+  if (const auto answers = ParseAnchorEditAnswers(body); answers.value) {
+    Require(ParseAnchorEditAnswers(EncodeAnchorEditAnswers(*answers.value)).value.has_value(),
+            "accepted once, accepted again");
+  }
+  ParseAnchor(1, body);
+  ParseAnchorEdit(1, body);
+}
+
 void DecompressAndParse(std::vector<uint8_t> bytes) {
   if (const auto data = Decompress(bytes, kMaxKeyframeBytes)) {
     Require(data->size() <= size_t{kMaxKeyframeBytes}, "no more than allowed");
@@ -101,6 +115,10 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       DecompressAndParse,
       ParseBytes<landmarks_t>,
       ParseOnly<verdict_request_t>,
+      ParseBytes<anchor_edit_t>,
+      ParseBytes<anchor_t>,
+      ParseBytes<shown_anchors_t>,
+      ParseAnchorBodies,
   };
   if (size > 0) {
     targets[data[0] % std::size(targets)]({data + 1, data + size});

@@ -9,6 +9,8 @@
 #include "fuzz.h"
 #include "link/wire.h"
 #include "pangea/again_t.hpp"
+#include "pangea/anchor_edit_t.hpp"
+#include "pangea/anchor_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/keyframe_t.hpp"
@@ -39,6 +41,10 @@ inline const std::vector<Channel>& HandlerChannels() {
       ChannelOf<again_t>("AGAIN_agent_handler"),
       ChannelOf<landmarks_t>("LANDMARKS_1"),
       ChannelOf<verdict_request_t>("VERDICT_REQUEST"),
+      ChannelOf<anchor_edit_t>("ANCHOR_EDIT_UP"),
+      {"ANCHORS_RECEIVED", {}},
+      ChannelOf<anchor_edit_t>("ANCHOR_REQUEST_0"),
+      ChannelOf<anchor_t>("ANCHOR_1"),
   };
   return channels;
 }
@@ -51,6 +57,9 @@ inline const std::vector<Channel>& UplinkChannels() {
       ChannelOf<pose_t>("POSE_1"),
       ChannelOf<again_t>("AGAIN_uplink_1"),
       ChannelOf<landmarks_t>("LANDMARKS"),
+      {"ANCHOR_DOWN", {}},
+      {"ANCHOR_EDIT_ANSWERS", {}},
+      ChannelOf<anchor_edit_t>("ANCHOR_REQUEST_1"),
   };
   return channels;
 }
@@ -67,6 +76,14 @@ inline std::string ChannelOfKind(LinkKind kind) {
       return "POSE";
     case LinkKind::kLandmarks:
       return "LANDMARKS";
+    case LinkKind::kAnchorEdit:
+      return "ANCHOR_EDIT_UP";
+    case LinkKind::kAnchorsReceived:
+      return "ANCHORS_RECEIVED";
+    case LinkKind::kAnchor:
+      return "ANCHOR_DOWN";
+    case LinkKind::kAnchorEditAnswers:
+      return "ANCHOR_EDIT_ANSWERS";
     default:
       return "ACK";
   }
