@@ -63,12 +63,13 @@ class AnchorLink : public LinkWorld {
   void PublishAnchor(const AnchorState& state) {
     PublishMessage(server_bus, channels::Anchor(1), ToMessage(state));
   }
-  void PublishPose(int64_t utime) {
+  void PublishPose(int64_t utime, const Eigen::Vector3d& t_odom_body = {0, 0, 0}) {
     pose_t pose{};
     pose.utime = utime;
     pose.state = pose_t::STATE_TRACKING;
     pose.map = ToMessage(kMap);
-    pose.T_odom_body = pose.T_map_body = ToMessage(Rigid3());
+    pose.T_odom_body = pose.T_map_body =
+        ToMessage(Rigid3(Eigen::Quaterniond::Identity(), t_odom_body));
     PublishMessage(agent_bus, "POSE_1", pose);
   }
   void MakeLinkBad() {
@@ -144,6 +145,23 @@ TEST_F(AnchorLink, AnEditIsJournalledAndTheStateComesBack) {
 }
 
 // Apps repeat what they have not seen come back: an uplink that is killed forgets what it held.
+TEST_F(AnchorLink, ATapCarriesThePoseOfItsImage) {
+  Run(2);
+  for (int i = 0; i < 5; ++i) {
+    PublishPose(1'000'000 + 50'000 * i, {0.1 * i, 0, 0});
+  }
+  Run(0.1);
+  AnchorEdit edit = TestEdit({1, 5}, 1, 1);
+  edit.map = kMap;
+  edit.placement = AnchorEdit::Placement::kPixel;
+  edit.utime = 1'125'000;
+  Request(edit);
+  Run(1);
+  ASSERT_EQ(journalled.size(), 1u);
+  ASSERT_TRUE(journalled.begin()->second.T_odom_body);
+  EXPECT_NEAR(journalled.begin()->second.T_odom_body->t.x(), 0.25, 1e-9);
+}
+
 TEST_F(AnchorLink, EditsAreJournalledOnceEachThoughBothEndsAreKilled) {
   MakeLinkBad();
   std::mt19937_64 rng(5);
@@ -210,11 +228,10 @@ TEST_F(AnchorLink, StatesArriveAndTheNewestWins) {
   MakeLinkBad();
   std::mt19937_64 rng(6);
   std::map<AnchorId, AnchorState> newest;
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 190; ++i) {
     const AnchorId id{2, static_cast<int64_t>(rng() % 20)};
     AnchorState& state = newest[id];
-    const int64_t revision = state.revision + 1;
-    state = TestAnchor(id, revision, kMap, {0.1 * i, 1, 2});
+    state = TestAnchor(id, state.revision + 1, kMap, {0.1 * i, 1, 2});
     state.gone = i > 150 && rng() % 2 == 0;
     PublishAnchor(state);
     Run(0.05);
@@ -236,6 +253,18 @@ TEST_F(AnchorLink, StatesArriveAndTheNewestWins) {
     EXPECT_EQ(EncodeMessage(ToMessage(heard.at(id))), EncodeMessage(ToMessage(state)));
   }
   EXPECT_EQ(handler_counters.at("anchors_unconfirmed"), 0);
+}
+
+TEST_F(AnchorLink, WhatWasOvertakenDoesNotWin) {
+  link_bus.held = 0.3;
+  Run(2);
+  for (int64_t revision = 1; revision < 100; ++revision) {
+    PublishAnchor(TestAnchor({2, 5}, revision, kMap));
+    Run(0.01);
+    PublishAnchor(TestAnchor({2, 5}, ++revision, kMap));
+    Run(2);
+    ASSERT_EQ(heard.at({2, 5}).revision, revision);
+  }
 }
 
 TEST_F(AnchorLink, ARestartedUplinkHearsAllAgain) {

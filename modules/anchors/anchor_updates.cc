@@ -7,7 +7,7 @@ namespace pangea {
 bool AnchorUpdates::IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime) const {
   const int64_t since_us = now_utime - sent.utime;
   if (state.gone && sent.state.gone) {
-    return sent.times_gone < kTimesGone && since_us >= kInterval_us;
+    return since_us >= (sent.times_gone < kTimesGone ? kInterval_us : kRepeat_us);
   }
   const bool is_other = state.gone != sent.state.gone || state.revision != sent.state.revision ||
                         state.edited_by != sent.state.edited_by || state.map != sent.state.map ||

@@ -2,7 +2,7 @@
 
 // Which anchors a listener is told of now: those that changed, at most every kInterval_us each, and
 // each again every kRepeat_us for whoever came late. An anchor that is gone is told kTimesGone
-// times.
+// times in a row first.
 //
 // In: all that the listener is to know, and the time. Bounded: what is no longer among that is
 // forgotten.

@@ -1,5 +1,6 @@
 // The server's processes together on one bus.
 
+#include "anchors/anchors_process.h"
 #include "fusion/fusion_process.h"
 #include "fuzz.h"
 #include "global_ba/global_ba_process.h"
@@ -18,15 +19,18 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
   GlobalBaProcess global_ba(bus, GlobalBaOptions{});
   MapPointsProcess map_points(bus, MapPointsOptions{});
+  AnchorsProcess anchors(bus, AnchorsOptions{});
   int64_t now_us = 1'000'000;
   fuzz::Play({data, size}, fuzz::ServerChannels(), &bus, [&](int64_t wait_us) {
     now_us += wait_us;
-    for (Process* process : std::initializer_list<Process*>{
-             &place_recognition, &inter_map_ba, &fusion, &posegraph, &global_ba, &map_points}) {
+    for (Process* process :
+         std::initializer_list<Process*>{&place_recognition, &inter_map_ba, &fusion, &posegraph,
+                                         &global_ba, &map_points, &anchors}) {
       process->Tick(now_us);
     }
   });
   posegraph.Finish();
+  anchors.Finish();
   bus.Drain();
   return 0;
 }

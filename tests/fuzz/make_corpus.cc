@@ -23,6 +23,7 @@
 #include "loop_verification/drift_gate.h"
 #include "loop_verification/steps/steps.h"
 #include "map_points/map_points.h"
+#include "messages/anchor_messages.h"
 #include "messages/messages.h"
 #include "options/yaml_options.h"
 #include "pangea_schemas.h"
@@ -369,6 +370,29 @@ void Sensors(const Corpus& corpus) {
   corpus.Add("live_input", "camera", sequence);
 }
 
+// A keyframe, and an anchor on a pixel of it and one in its frame.
+void Anchors(const Payload& keyframe_bytes, const Corpus& corpus) {
+  keyframe_t keyframe{};
+  Require(DecodeMessage(keyframe_bytes, &keyframe), "the log's keyframes decode");
+  Payload sequence;
+  AppendStep(Find(ServerChannels(), "KEYFRAME_1"), keyframe_bytes, &sequence);
+  for (int seq = 0; seq < 2; ++seq) {
+    AnchorEdit edit;
+    edit.anchor = {1, 10 + seq};
+    edit.agent_id = 1;
+    edit.right = AnchorRight::kEditOwn;
+    edit.seq = seq;
+    edit.name = "kettle";
+    edit.placement = seq == 0 ? AnchorEdit::Placement::kPixel : AnchorEdit::Placement::kKeyframe;
+    edit.map = Parse(keyframe.id).value->map;
+    edit.keyframe_seq = keyframe.id.seq;
+    edit.utime = keyframe.utime;
+    edit.pixel = {300, 200};
+    AppendStep(Find(ServerChannels(), "ANCHOR_EDIT"), EncodeMessage(ToMessage(edit)), &sequence);
+  }
+  corpus.Add("server", "anchors", sequence);
+}
+
 void Server(const std::vector<Captured>& events, const Corpus& corpus) {
   constexpr size_t kMaxBytes = 16'000;
   std::map<std::string, int> taken;
@@ -381,6 +405,7 @@ void Server(const std::vector<Captured>& events, const Corpus& corpus) {
     }
   }
   corpus.Add("server", "session", sequence);
+  Anchors(First(events, "KEYFRAME_1"), corpus);
 }
 
 int Make(const std::string& log, const Corpus& corpus) {

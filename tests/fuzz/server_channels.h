@@ -6,7 +6,9 @@
 
 #include "fuzz.h"
 #include "pangea/again_t.hpp"
+#include "pangea/anchor_edit_t.hpp"
 #include "pangea/constraint_t.hpp"
+#include "pangea/correction_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
@@ -34,6 +36,9 @@ inline const std::vector<Channel>& ServerChannels() {
       ChannelOf<again_t>("AGAIN_map_points"),
       ChannelOf<pose_t>("POSE_1"),
       ChannelOf<verdict_request_t>("VERDICT_REQUEST"),
+      ChannelOf<anchor_edit_t>("ANCHOR_EDIT"),
+      ChannelOf<correction_t>("CORRECTION_1"),
+      ChannelOf<again_t>("AGAIN_anchors"),
   };
   return channels;
 }
