@@ -216,6 +216,36 @@ TEST(YamlOptions, ARangeTakesItsEndsAndIsNamed) {
   EXPECT_THAT(complaint("bound: .nan"), HasSubstr("'bound' must be a number from 0 to 1, not"));
 }
 
+TEST(YamlOptions, APairAndATextHaveTheirBounds) {
+  double x = 1, y = 2.5;
+  std::string text = "a: b";
+  YamlOptions yaml;
+  yaml.AddPairBetween("pixel", 0, 10, &x, &y);
+  yaml.AddText("text", 4, &text);
+  const std::string printed = yaml.Print();
+  x = y = 0;
+  text.clear();
+  yaml.ReadText(printed, "printed");
+  EXPECT_EQ(x, 1);
+  EXPECT_EQ(y, 2.5);
+  EXPECT_EQ(text, "a: b");
+  const auto complaint = [&](const std::string& bad) -> std::string {
+    try {
+      yaml.ReadText(bad, "f.yaml");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(complaint("pixel: [0, 10]\ntext: abcd\n"), "taken");
+  EXPECT_EQ(complaint("pixel: [0, 10.1]"),
+            "f.yaml:1: key 'pixel[1]' must be a number from 0 to 10, not '10.1'");
+  EXPECT_EQ(complaint("pixel: 7"),
+            "f.yaml:1: key 'pixel' must be a list of two numbers, each from 0 to 10, not '7'");
+  EXPECT_EQ(complaint("text: abcde"),
+            "f.yaml:1: key 'text' must be a text of at most 4 bytes, not 5");
+}
+
 TEST(YamlOptions, MissingDoubledAndBroken) {
   EXPECT_THAT(Complaint("items: [{name: x}]"), HasSubstr("key 'items[0].id' is missing"));
   EXPECT_THAT(Complaint("count: 1\ncount: 2"), HasSubstr("'count' stands twice"));

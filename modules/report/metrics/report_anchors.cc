@@ -71,10 +71,10 @@ std::optional<Rigid3> PoseAt(const Trajectory& poses, int64_t utime) {
   if (const auto between = Interpolate(poses, utime, kMaxPoseGap_us)) {
     return between;
   }
-  for (const StampedPose& pose : poses) {
-    if (std::abs(pose.utime - utime) <= kMaxGroundTruthGapUs) {
-      return pose.T;
-    }
+  const auto off = [utime](const StampedPose& pose) { return std::abs(pose.utime - utime); };
+  const auto nearest = std::ranges::min_element(poses, {}, off);
+  if (nearest != poses.end() && off(*nearest) <= kMaxGroundTruthGapUs) {
+    return nearest->T;
   }
   return std::nullopt;
 }
@@ -99,11 +99,13 @@ class Evaluation {
     metrics.id = id;
     metrics.made_by = id.agent_id;
     metrics.name = edits.rbegin()->second.name;
-    metrics.placed = session_.anchors_placed.contains(id) || std::ranges::any_of(viewers_, [&](const auto& viewer) {
-      const auto heard = viewer.second->track->heard.find(id);
-      return heard != viewer.second->track->heard.end() &&
-             std::ranges::any_of(heard->second, [](const HeardAnchor& h) { return !h.gone; });
-    });
+    metrics.placed =
+        session_.anchors_placed.contains(id) ||
+        std::ranges::any_of(viewers_, [&](const auto& viewer) {
+          const auto heard = viewer.second->track->heard.find(id);
+          return heard != viewer.second->track->heard.end() &&
+                 std::ranges::any_of(heard->second, [](const HeardAnchor& h) { return !h.gone; });
+        });
     const std::vector<Placing> placings = PlacingsOf(id, edits);
     if (!placings.empty()) {
       metrics.placing = placings.front().view;
