@@ -122,6 +122,12 @@ size_t LogShow::NumSolvedPoses() const {
   return poses;
 }
 
+size_t LogShow::NumAnchorStates() const {
+  return static_cast<size_t>(std::ranges::count_if(events_, [](const Timed& timed) {
+    return std::holds_alternative<AnchorState>(timed.event);
+  }));
+}
+
 void LogShow::Reset() {
   scene_ = std::make_unique<Scene>();
   ++epoch_;

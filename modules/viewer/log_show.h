@@ -39,7 +39,9 @@ class LogShow : public Show {
   int64_t num_refused() const { return num_refused_; }
   // What of the log is lost.
   const LogReadings& readings() const { return readings_; }
+  // In memory.
   size_t NumSolvedPoses() const;
+  size_t NumAnchorStates() const;
 
  private:
   struct Timed {

@@ -34,11 +34,11 @@ TEST(AnchorsOfALog, AreShownAsTheyWereAtTheTime) {
   }
   LogShow show(path);
   EXPECT_EQ(show.num_refused(), 1);
+  EXPECT_EQ(show.NumAnchorStates(), 3U) << "repetitions are left out";
   EXPECT_FALSE(show.editable());
   EXPECT_THAT(show.scene().anchors(), IsEmpty());
   show.Seek(4.5);
   EXPECT_EQ(show.scene().anchors().at(0).T_odom_anchor.t.x(), 1);
-  EXPECT_EQ(show.scene().changes().version(), 2U) << "the map and the anchor, no repetition";
   show.Seek(6);
   EXPECT_EQ(show.scene().anchors().at(0).T_odom_anchor.t.x(), 2);
   show.Seek(9);

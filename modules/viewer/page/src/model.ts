@@ -132,8 +132,9 @@ export class Model {
     }
     for (const said of update.anchors) this.takeAnchor(said);
     if (update.notice) for (const index of this.anchors.keys()) this.putBack(index);
-    if (update.start || update.maps.length + update.keyframes.length + update.solved.length > 0) this.place();
-    this.holdAnchors();
+    const placesChange = update.start || update.maps.length + update.keyframes.length + update.solved.length > 0;
+    if (placesChange) this.place();
+    if (placesChange || update.anchors.length > 0) this.holdAnchors();
     for (const { index } of update.keyframes) {
       const keyframe = this.keyframes[index];
       keyframe.shown.copy(keyframe.target);
