@@ -12,6 +12,7 @@ void TakePlace(const AnchorEdit& older, AnchorEdit* newer) {
   newer->utime = older.utime;
   newer->T_ref_anchor = older.T_ref_anchor;
   newer->pixel = older.pixel;
+  newer->T_odom_body = older.T_odom_body;
   newer->covariance = older.covariance;
 }
 
@@ -32,6 +33,11 @@ EditQueue::Taken EditQueue::Add(AnchorEdit edit) {
   queue_.Add(edit.anchor);
   edits_[edit.anchor] = std::move(edit);
   return Taken::kNew;
+}
+
+bool EditQueue::Has(const AnchorId& anchor, int64_t revision) const {
+  const auto waiting = edits_.find(anchor);
+  return waiting != edits_.end() && waiting->second.revision >= revision;
 }
 
 bool EditQueue::OnAnswer(const AnchorEditAnswer& answer) {

@@ -23,6 +23,8 @@ class EditQueue {
   // In place of an older edit of the anchor: the newer stands for both, also for where the older
   // put it, if the newer leaves it there.
   Taken Add(AnchorEdit edit);
+  // This edit of the anchor, or a newer one.
+  bool Has(const AnchorId& anchor, int64_t revision) const;
   // Whether it was waiting for it.
   bool OnAnswer(const AnchorEditAnswer& answer);
   void OnNewSession() { queue_.SendAllAgain(); }

@@ -6,6 +6,12 @@
 #include "messages/channels.h"
 
 namespace pangea {
+namespace {
+
+// Keyframes leave the odometry's window within seconds; one that stands still makes one in five.
+constexpr int64_t kMaxHeld_us = 10'000'000;
+
+}  // namespace
 
 UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s)
     : node_(node), agent_id_(agent_id), edits_(edit_bytes_per_s) {
@@ -17,8 +23,14 @@ void UplinkAnchors::OnPose(int64_t utime, const MapId& map,
                            const std::optional<Rigid3>& T_odom_body) {
   shown_.OnPose(utime, map);
   if (T_odom_body) {
-    poses_.Add(utime, map, *T_odom_body);
+    poses_.AddPose(utime, map, *T_odom_body);
   }
+}
+
+void UplinkAnchors::OnKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body) {
+  shown_.OnKeyframe(utime, map);
+  poses_.AddKeyframe(utime, map, T_odom_body);
+  ReleaseSettled();
 }
 
 void UplinkAnchors::OnRequest(AnchorEdit edit) {
@@ -30,9 +42,41 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   edit.seq = -1;
   const bool by_pose = edit.placement == AnchorEdit::Placement::kBody ||
                        edit.placement == AnchorEdit::Placement::kPixel;
-  if (by_pose && !edit.T_odom_body) {
-    edit.T_odom_body = poses_.At(edit.utime, edit.map);
+  const auto held = held_.find(edit.anchor);
+  if (held != held_.end() && held->second.edit.revision >= edit.revision) {
+    return node_.Count("anchor_edits_repeated");
   }
+  Release(edit.anchor);  // the queue makes one edit of the two
+  if (by_pose && !edit.T_odom_body && held_.size() < EditQueue::kMaxEdits &&
+      !edits_.Has(edit.anchor, edit.revision)) {
+    const AnchorId id = edit.anchor;
+    held_[id] = {std::move(edit), now_us_ + kMaxHeld_us};
+    return ReleaseSettled();
+  }
+  Queue(std::move(edit));
+}
+
+void UplinkAnchors::Release(const AnchorId& id) {
+  if (auto held = held_.extract(id)) {
+    AnchorEdit& edit = held.mapped().edit;
+    edit.T_odom_body = poses_.At(edit.utime, edit.map);
+    Queue(std::move(edit));
+  }
+}
+
+void UplinkAnchors::ReleaseSettled() {
+  std::vector<AnchorId> settled;
+  for (const auto& [id, held] : held_) {
+    if (poses_.IsSettled(held.edit.utime, held.edit.map) || now_us_ >= held.until_us) {
+      settled.push_back(id);
+    }
+  }
+  for (const AnchorId& id : settled) {
+    Release(id);
+  }
+}
+
+void UplinkAnchors::Queue(AnchorEdit edit) {
   switch (edits_.Add(std::move(edit))) {
     case EditQueue::Taken::kNew:
       return node_.Count("anchor_edits");
@@ -109,6 +153,8 @@ void UplinkAnchors::SendDue(int64_t now_us, const Send& send) {
 }
 
 void UplinkAnchors::Publish(int64_t now_us) {
+  now_us_ = now_us;
+  ReleaseSettled();
   for (const AnchorState& state : anchors_.DueAgain(now_us)) {
     Tell(state);
   }

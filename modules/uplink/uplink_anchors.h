@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -32,23 +33,34 @@ class UplinkAnchors {
   void OnNewSession();
   // `T_odom_body`: none while it does not track.
   void OnPose(int64_t utime, const MapId& map, const std::optional<Rigid3>& T_odom_body);
-  void OnKeyframe(int64_t utime, const MapId& map) { shown_.OnKeyframe(utime, map); }
+  void OnKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body);
   // What is due to the server; only in a session.
   void SendDue(int64_t now_us, const Send& send);
   // What is due on the agent's bus.
   void Publish(int64_t now_us);
   // Publish wants to be called every few milliseconds.
   bool moving() const { return shown_.moving(); }
-  size_t edits_waiting() const { return edits_.waiting(); }
+  size_t edits_waiting() const { return edits_.waiting() + held_.size(); }
 
  private:
+  // One that says "where I was then", until the keyframe after it says better where that was.
+  struct Held {
+    AnchorEdit edit;
+    int64_t until_us = 0;
+  };
+
   void OnRequest(AnchorEdit edit);
+  void Queue(AnchorEdit edit);
+  void Release(const AnchorId& id);
+  void ReleaseSettled();
   void OnAnchor(Bytes body, int64_t now_us);
   void OnEditAnswers(Bytes body);
   void Tell(const AnchorState& state);
 
   Node& node_;
   const int32_t agent_id_;
+  int64_t now_us_ = 0;
+  std::map<AnchorId, Held> held_;  // at most kMaxEdits
   EditQueue edits_;
   AgentAnchors anchors_;
   ShownAnchorsBlend shown_;

@@ -94,7 +94,7 @@ void UplinkProcess::OnKeyframe(Bytes data) {
   if (!uplink_.NoteReceived(keyframe.value->id, now_us_)) {
     return node_.Count("keyframes_repeated");
   }
-  anchors_.OnKeyframe(keyframe.value->utime, keyframe.value->id.map);
+  anchors_.OnKeyframe(keyframe.value->utime, keyframe.value->id.map, keyframe.value->T_odom_body);
   const std::vector<uint8_t> bytes = FitBudget(*keyframe.value, data);
   std::vector<uint8_t> compressed = Compress(bytes);
   const auto compressed_bytes = static_cast<int64_t>(compressed.size());

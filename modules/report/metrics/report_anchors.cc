@@ -22,9 +22,10 @@ struct Placing {
   int64_t revision = 0;  // in force from this one on
   MapId map;
   int64_t utime = 0;
-  std::optional<Eigen::Vector3d> p_truth;
-  std::string reason;  // why there is none
-  std::optional<AnchorView> view;
+  std::optional<Rigid3> T_odom_body = {};  // as the edit has it
+  std::optional<Eigen::Vector3d> p_truth = {};
+  std::string reason = {};  // why there is none
+  std::optional<AnchorView> view = {};
 };
 
 bool IsAllowed(const AnchorEdit& edit) {
@@ -129,7 +130,7 @@ class Evaluation {
         utime = keyframe == session_.keyframes.end() ? 0 : keyframe->second.utime;
       }
       if (edit.placement != AnchorEdit::Placement::kSame && !edit.deleted) {
-        placings.push_back({revision, edit.map, utime, {}, "", {}});
+        placings.push_back({revision, edit.map, utime, edit.T_odom_body});
       }
     }
     for (size_t i = 0; i < placings.size(); ++i) {
@@ -153,8 +154,8 @@ class Evaluation {
       return fmt::format("agent {} has not heard where it is", agent);
     }
     const auto odometry = viewer.odometry->find(placing->map);
-    const auto T_odom_body = odometry == viewer.odometry->end()
-                                 ? std::nullopt
+    const auto T_odom_body = placing->T_odom_body || odometry == viewer.odometry->end()
+                                 ? placing->T_odom_body
                                  : PoseAt(odometry->second, placing->utime);
     const auto T_truth_body = TruthAt(viewer, placing->utime);
     if (!T_odom_body || !T_truth_body) {

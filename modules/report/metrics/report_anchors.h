@@ -4,7 +4,9 @@
 //
 // An anchor's true place follows from its placing by agent i at an image:
 //   p_truth = T_truth_body_i * T_odom_body_i^-1 * p_odom
-// with p_odom where agent i first heard that it is. Agent j shows it at p_odom_shown, so at
+// with p_odom where agent i first heard that it is, and T_odom_body_i the pose that it was placed
+// by (so that a tap on a pixel is on the ray through that pixel). Agent j shows it at p_odom_shown,
+// so at
 //   T_truth_body_j * T_odom_body_j^-1 * p_odom_shown
 // and the distance of the two is the error. All ground truths are in one frame.
 
