@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> agent_urls;
   std::string log;
   std::string page = DefaultPage().string();
-  WebOptions options;
+  pangea::web::WebOptions options;
   CLI::App app("Shows a running system, or a captured log, in a browser", "pangea-viewer");
   auto* bus_option =
       app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();

@@ -11,22 +11,23 @@
 
 #include "viewer/scene/update.h"
 #include "viewer/show.h"
+#include "web/web_site.h"
 
 namespace pangea::viewer {
 
-class PageLink {
+class PageLink : public web::WebPeer {
  public:
-  static constexpr size_t kMaxText = 1000;
   static constexpr double kMaxSpeed = 1000;
 
   explicit PageLink(Show& show) : show_(show) {}
 
-  // What to send now; nothing while the last one is under way or when there is no update.
-  std::optional<std::vector<uint8_t>> Next();
+  bool is_text() const override { return false; }
+  // Nothing while the last one is under way or when there is no update.
+  std::optional<std::vector<uint8_t>> Next() override;
 
   // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT}.
   // False for anything else: no page of ours says it.
-  bool Receive(std::string_view text);
+  bool Receive(std::string_view text) override;
 
  private:
   Show& show_;
