@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 namespace pangea {
@@ -49,13 +50,16 @@ std::string Anchors::Take(const AnchorEdit& edit) {
   return refused;
 }
 
+PlacementResult Anchors::Try(const AnchorEdit& edit) const {
+  static const OdometryTrack kNoKeyframes;
+  const auto track = tracks_.find(edit.map);
+  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+}
+
 // An anchor that cannot be put somewhere else stays where it is.
 void Anchors::PlaceOrWait(const AnchorId& id) {
   const AnchorEdit& edit = *book_.entries().at(id).place;
-  static const OdometryTrack kNoKeyframes;
-  const auto track = tracks_.find(edit.map);
-  PlacementResult result =
-      Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+  PlacementResult result = Try(edit);
   if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
     placements_[id] = std::move(*placement);
   } else if (const auto* const not_placed = std::get_if<NotPlaced>(&result)) {
@@ -163,9 +167,7 @@ AnchorState Anchors::Base(const AnchorId& id, const AnchorEntry& entry, const Ma
   state.name = entry.name;
   state.payload = entry.payload;
   state.map = map;
-  const Group* const group = GroupOf(map);
-  state.group = group != nullptr ? group->id : map;
-  state.group_revision = group != nullptr ? group->revision : 0;
+  std::tie(state.group, state.group_revision) = GroupAndRevision(map);
   return state;
 }
 
@@ -212,19 +214,55 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map) const {
   return states;
 }
 
+AnchorState Anchors::InItsGroup(const AnchorId& id, const AnchorPlacement& placement) const {
+  AnchorState state = Base(id, book_.entries().at(id), placement.map);
+  state.map = state.group;
+  const InGroup position = Position(placement);
+  state.T_odom_anchor = position.T_map_anchor;
+  state.covariance = position.covariance;
+  return state;
+}
+
 std::vector<AnchorState> Anchors::All() const {
   std::vector<AnchorState> states;
   for (const auto& [id, placement] : placements_) {
-    const Group* const group = GroupOf(placement.map);
-    const MapId frame = group != nullptr ? group->id : placement.map;
-    AnchorState state = Base(id, book_.entries().at(id), placement.map);
-    state.map = frame;
-    const InGroup position = Position(placement);
-    state.T_odom_anchor = position.T_map_anchor;
-    state.covariance = position.covariance;
-    states.push_back(std::move(state));
+    states.push_back(InItsGroup(id, placement));
   }
   return states;
+}
+
+std::optional<AnchorState> Anchors::InItsGroup(const AnchorId& id) const {
+  const auto placement = placements_.find(id);
+  return placement == placements_.end() ? std::nullopt
+                                        : std::optional(InItsGroup(id, placement->second));
+}
+
+std::pair<MapId, int64_t> Anchors::GroupAndRevision(const MapId& map) const {
+  const Group* const group = GroupOf(map);
+  return group == nullptr ? std::pair(map, int64_t{0}) : std::pair(group->id, group->revision);
+}
+
+std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group,
+                                                              const Eigen::Vector3d& p_map) const {
+  std::optional<NearKeyframe> nearest;
+  for (const auto& [map, track] : tracks_) {
+    if (GroupAndRevision(map).first != group) {
+      continue;
+    }
+    const Rigid3 T_map_newest_odom = T_map_odom(map);
+    const Group* const state = GroupOf(map);
+    for (const auto& [seq, keyframe] : track.keyframes()) {
+      Rigid3 T_map_body = T_map_newest_odom * keyframe.T_odom_body;
+      if (state != nullptr) {
+        const auto found = state->T_map_body.find({map, seq});
+        T_map_body = found != state->T_map_body.end() ? found->second : T_map_body;
+      }
+      if (!nearest || (T_map_body.t - p_map).norm() < (nearest->T_map_body.t - p_map).norm()) {
+        nearest = {{map, seq}, T_map_body};
+      }
+    }
+  }
+  return nearest;
 }
 
 size_t Anchors::num_placed() const {

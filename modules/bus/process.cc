@@ -55,7 +55,7 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
   while (!StopRequested()) {
-    bus.Handle(process.poll_interval_ms());
+    bus.Handle(process.longest_wait_ms());
     const int64_t now = WallUtime();
     if (journal_first != nullptr) {
       journal_first->Poll(now);
@@ -64,7 +64,7 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
       process.Tick(now);
       next_tick = now + kTickInterval_us;
     }
-    process.Poll(now);
+    process.BetweenMessages(now);
   }
   return 0;
 }

@@ -16,9 +16,9 @@ class Process {
   // no result may depend on it.
   virtual void Tick(int64_t now_utime) = 0;
   // What else a process serves beside the bus: called after each message, and when none came for
-  // poll_interval_ms.
-  virtual void Poll(int64_t) {}
-  virtual int poll_interval_ms() const { return 50; }
+  // longest_wait_ms.
+  virtual void BetweenMessages(int64_t) {}
+  virtual int longest_wait_ms() const { return 50; }
 };
 
 // Microseconds since 1970 that never step: the wall clock as it was when the process first asked,

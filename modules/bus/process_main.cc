@@ -31,8 +31,8 @@ class WithOptions : public Process {
     announcer_.Tick(now_utime);
     process_->Tick(now_utime);
   }
-  void Poll(int64_t now_utime) override { process_->Poll(now_utime); }
-  int poll_interval_ms() const override { return process_->poll_interval_ms(); }
+  void BetweenMessages(int64_t now_utime) override { process_->BetweenMessages(now_utime); }
+  int longest_wait_ms() const override { return process_->longest_wait_ms(); }
 
  private:
   std::unique_ptr<Process> process_;
