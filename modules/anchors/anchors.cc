@@ -22,8 +22,8 @@ Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
   return J * covariance * J.transpose();
 }
 
-// The covariance of a transform whose left frame is turned.
-Matrix6d Turned(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
+// The covariance of a transform whose left frame is rotated.
+Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
   Matrix6d J = Matrix6d::Zero();
   J.topLeftCorner<3, 3>() = R;
   J.bottomRightCorner<3, 3>() = R;
@@ -146,15 +146,15 @@ Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
     mean.T_map_anchor.t += hold.weight * poses.back().t;
   }
   // Rotations around the first one, which they hardly differ from.
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Matrix6d spread = Matrix6d::Zero();
   for (size_t i = 0; i < poses.size(); ++i) {
-    turn += placement.holds[i].weight * LogSo3(poses[i].q * poses[0].q.conjugate());
+    rotation += placement.holds[i].weight * LogSo3(poses[i].q * poses[0].q.conjugate());
     const Eigen::Vector3d off = poses[i].t - mean.T_map_anchor.t;
     spread.topLeftCorner<3, 3>() += placement.holds[i].weight * off * off.transpose();
   }
-  mean.T_map_anchor.q = (ExpSo3(turn) * poses[0].q).normalized();
-  mean.covariance = Turned(T_map_odom(placement.map).R(), placement.covariance) + spread;
+  mean.T_map_anchor.q = (ExpSo3(rotation) * poses[0].q).normalized();
+  mean.covariance = Rotated(T_map_odom(placement.map).R(), placement.covariance) + spread;
   return mean;
 }
 

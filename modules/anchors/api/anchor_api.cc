@@ -178,7 +178,7 @@ void AnchorApi::Answer(const web::WebRequest& request, Reply reply) {
     return reply(Error(404, "there is nothing here: /v1/openapi.json has what there is"));
   }
   if (!complete_) {
-    WebAnswer starting = Error(503, "the journal is still being read: ask again in a second");
+    WebAnswer starting = Error(503, "the journal is still being read: try again in a second");
     starting.headers = {{"Retry-After", "1"}};
     return reply(starting);
   }
@@ -406,7 +406,7 @@ AnchorId AnchorApi::NewId() {
 
 void AnchorApi::Submit(AnchorEdit edit, const Reply& reply) {
   if (pending_.size() >= kMaxPending) {
-    return reply(Error(503, "too many edits are under way: ask again in a second"));
+    return reply(Error(503, "too many edits are under way: try again in a second"));
   }
   if (edit.revision > 1) {
     requested_[edit.anchor] = edit.revision;
