@@ -189,7 +189,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (!HostAllowed(host, server_.options.names)) {
       asked_->page = "";
       Refuse(403, "This host name is not known here: --name NAME allows it.\n");
-    } else if (server_.options.for_programs && !origin.empty() && !known) {
+    } else if (server_.options.for_programs && !known && IsOfAPage(request)) {
       Refuse(403, "Pages of other origins may not ask: --allow-origin URL allows one.\n");
     } else if (websocket::is_upgrade(request)) {
       OpenSocket(std::move(request), known || (server_.options.for_programs && origin.empty()));
@@ -203,6 +203,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
     } else {
       Ask(ToWebRequest(std::move(request), host));
     }
+  }
+
+  // A browser names the origin, or, of what a page merely embeds, that it is another's.
+  static bool IsOfAPage(const Request& request) {
+    const std::string from = Text(request["Sec-Fetch-Site"]);
+    return request.count(http::field::origin) > 0 || from == "cross-site" || from == "same-site";
   }
 
   static WebRequest ToWebRequest(Request request, const std::string& host) {

@@ -324,6 +324,16 @@ TEST_F(ForProgramsTest, PagesOfOtherOriginsGetNothing) {
   }
 }
 
+// An image or a script of another's page comes without an origin.
+TEST_F(ForProgramsTest, PagesOfOthersEmbedNothing) {
+  const auto get = [this](const std::string& from) {
+    return Ask("GET /echo HTTP/1.1\r\nHost: 127.0.0.1:1\r\nSec-Fetch-Site: " + from + "\r\n\r\n");
+  };
+  EXPECT_THAT(get("cross-site"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("same-site"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("none"), StartsWith("HTTP/1.1 201")) << "typed by the user";
+}
+
 TEST_F(ForProgramsTest, PagesOfAnAllowedOriginMay) {
   const std::string answer = Request("POST", "https://app.example");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 201"));
