@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 namespace pangea {
@@ -23,7 +24,7 @@ Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
 }
 
 // The covariance of a transform whose left frame is rotated.
-Matrix6d RotateFrame(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
+Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
   Matrix6d J = Matrix6d::Zero();
   J.topLeftCorner<3, 3>() = R;
   J.bottomRightCorner<3, 3>() = R;
@@ -51,13 +52,16 @@ std::string Anchors::Take(const AnchorEdit& edit) {
   return refused;
 }
 
+PlacementResult Anchors::Try(const AnchorEdit& edit) const {
+  static const OdometryTrack kNoKeyframes;
+  const auto track = tracks_.find(edit.map);
+  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+}
+
 // An anchor that cannot be put somewhere else stays where it is.
 void Anchors::PlaceOrWait(const AnchorId& id) {
   const AnchorEdit& edit = *book_.entries().at(id).place;
-  static const OdometryTrack kNoKeyframes;
-  const auto track = tracks_.find(edit.map);
-  PlacementResult result =
-      Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+  PlacementResult result = Try(edit);
   if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
     placements_[id] = std::move(*placement);
     positions_.reset();
@@ -154,7 +158,7 @@ Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
     spread.topLeftCorner<3, 3>() += placement.holds[i].weight * off * off.transpose();
   }
   mean.T_map_anchor.q = (ExpSo3(rotation) * poses[0].q).normalized();
-  mean.covariance = RotateFrame(T_map_odom(placement.map).R(), placement.covariance) + spread;
+  mean.covariance = Rotated(T_map_odom(placement.map).R(), placement.covariance) + spread;
   return mean;
 }
 
@@ -175,7 +179,6 @@ bool Anchors::SameGroup(const MapId& a, const MapId& b) const {
 
 AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
   const AnchorEntry& entry = book_.entries().at(id);
-  const Group* const group = GroupOf(map);
   AnchorState state;
   state.anchor = id;
   state.revision = entry.revision;
@@ -184,8 +187,7 @@ AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
   state.name = entry.name;
   state.payload = entry.deleted ? "" : entry.payload;
   state.map = map;
-  state.group = group != nullptr ? group->id : map;
-  state.group_revision = group != nullptr ? group->revision : 0;
+  std::tie(state.group, state.group_revision) = GroupAndRevision(map);
   return state;
 }
 
@@ -250,13 +252,49 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
 std::vector<AnchorState> Anchors::All() const {
   std::vector<AnchorState> states;
   for (const auto& [id, position] : Positions()) {
-    const MapId& map = placements_.at(id).map;
-    AnchorState& state = states.emplace_back(Describe(id, map));
-    state.map = state.group;
-    state.T_odom_anchor = position.T_map_anchor;
-    state.covariance = position.covariance;
+    states.push_back(*InItsGroup(id));
   }
   return states;
+}
+
+std::optional<AnchorState> Anchors::InItsGroup(const AnchorId& id) const {
+  const auto position = Positions().find(id);
+  if (position == Positions().end()) {
+    return std::nullopt;
+  }
+  AnchorState state = Describe(id, placements_.at(id).map);
+  state.map = state.group;
+  state.T_odom_anchor = position->second.T_map_anchor;
+  state.covariance = position->second.covariance;
+  return state;
+}
+
+std::pair<MapId, int64_t> Anchors::GroupAndRevision(const MapId& map) const {
+  const Group* const group = GroupOf(map);
+  return group == nullptr ? std::pair(map, int64_t{0}) : std::pair(group->id, group->revision);
+}
+
+std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group,
+                                                              const Eigen::Vector3d& p_map) const {
+  std::optional<NearKeyframe> nearest;
+  for (const auto& [map, track] : tracks_) {
+    if (GroupAndRevision(map).first != group) {
+      continue;
+    }
+    const Rigid3 T_map_newest_odom = T_map_odom(map);
+    const Group* const state = GroupOf(map);
+    for (const auto& [seq, keyframe] : track.keyframes()) {
+      Rigid3 T_map_body = T_map_newest_odom * keyframe.T_odom_body;
+      if (state != nullptr) {
+        const auto found = state->T_map_body.find({map, seq});
+        T_map_body = found != state->T_map_body.end() ? found->second : T_map_body;
+      }
+      if (!nearest || (T_map_body.t - p_map).norm() < (nearest->T_map_body.t - p_map).norm()) {
+        nearest = {{map, seq}, T_map_body};
+      }
+    }
+  }
+  return nearest;
 }
 
 size_t Anchors::num_placed() const {

@@ -17,6 +17,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "anchors/anchor_book.h"
@@ -67,6 +68,23 @@ class Anchors {
   std::vector<AnchorState> ForAgent(const MapId& map, const std::set<AnchorId>& told = {}) const;
   // Every placed anchor in its group's frame, and those that were deleted.
   std::vector<AnchorState> All() const;
+
+  // What all edits together say, also of anchors that are not placed.
+  const AnchorBook& book() const { return book_; }
+  // One in its group's frame; nothing for one that is not placed.
+  std::optional<AnchorState> InItsGroup(const AnchorId& id) const;
+  // The group that a map belongs to, and its revision; the map itself and 0 while it is alone.
+  std::pair<MapId, int64_t> GroupAndRevision(const MapId& map) const;
+  // Of a group's keyframes the nearest to a point in its frame (metres); nothing for what is not,
+  // or no longer, the id of a group that has keyframes.
+  struct NearKeyframe {
+    KeyframeId id;
+    Rigid3 T_map_body;
+  };
+  std::optional<NearKeyframe> NearestKeyframe(const MapId& group,
+                                              const Eigen::Vector3d& p_map) const;
+  // Where an edit would put its anchor, as far as the maps have come.
+  PlacementResult Try(const AnchorEdit& edit) const;
 
   size_t num_anchors() const { return book_.entries().size() - book_.num_deleted(); }
   size_t num_placed() const;

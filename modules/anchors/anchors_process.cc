@@ -18,6 +18,8 @@ namespace {
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr int64_t kPublishInterval_us = 250'000;
 constexpr int32_t kMaxAsked = 50;
+// The newest edit has been heard then, and with it a gap before it: it comes every second.
+constexpr int64_t kNewestEditRepeated_us = 2 * kSecond_us;
 // Edits are one stream over all maps.
 const MapId kAllMaps{1, 0};
 
@@ -29,6 +31,7 @@ AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options)
       anchors_(options),
       journal_(node_, {.in_order = true, .gives_up = true, .states = true},
                {.keyframe = [this](const Keyframe& keyframe) { anchors_.Take(keyframe); },
+                .have = [this](const Have&) { have_received_ = true; },
                 .other = std::bind_front(&AnchorsProcess::OnRetransmission, this)}),
       for_watchers_(options.moved_m, options.moved_rad) {
   node_.Listen<map_state_t>(channels::kMapState,
@@ -52,8 +55,12 @@ void AnchorsProcess::OnEdit(AnchorEdit edit) {
   }
   const auto seq = static_cast<int32_t>(edit.seq);
   for (const AnchorEdit& next : edits_.Add(kAllMaps, seq, std::move(edit))) {
-    if (const std::string refused = anchors_.Take(next); !refused.empty()) {
+    const std::string refused = anchors_.Take(next);
+    if (!refused.empty()) {
       node_.Refuse(refused);
+    }
+    if (on_edit_taken_) {
+      on_edit_taken_(next, refused);
     }
   }
   for (const std::string& reason : anchors_.TakeNotPlaced()) {
@@ -64,6 +71,15 @@ void AnchorsProcess::OnEdit(AnchorEdit edit) {
 bool AnchorsProcess::OnRetransmission(const again_t& again) {
   return TakeRetransmission<anchor_edit_t>(node_, again,
                                            std::bind_front(&AnchorsProcess::OnEdit, this));
+}
+
+void AnchorsProcess::Request(const AnchorEdit& edit) {
+  node_.Publish(channels::AnchorRequest(edit.agent_id), ToMessage(edit));
+}
+
+bool AnchorsProcess::is_complete() const {
+  return have_utime_ > 0 && now_utime_ >= have_utime_ + kNewestEditRepeated_us &&
+         !journal_.catching_up() && edits_.Gaps().empty();
 }
 
 void AnchorsProcess::RequestMissingEdits(int64_t now_utime) {
@@ -106,6 +122,8 @@ void AnchorsProcess::Finish() {
 }
 
 void AnchorsProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
+  have_utime_ = have_received_ && have_utime_ == 0 ? now_utime : have_utime_;
   journal_.Tick(now_utime);
   RequestMissingEdits(now_utime);
   PublishDue(now_utime);

@@ -8,7 +8,10 @@
 // ANCHOR is said, at the end (Finish).
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <string>
+#include <utility>
 
 #include "anchors/anchor_updates.h"
 #include "anchors/anchors.h"
@@ -32,6 +35,14 @@ class AnchorsProcess : public Process {
 
   const Anchors& anchors() const { return anchors_; }
 
+  // Asks agent_handler to journal an edit of a tool on the server (agent 0).
+  void Request(const AnchorEdit& edit);
+  // Called with each edit of the journal once it is taken, or why it was refused.
+  using EditHandler = std::function<void(const AnchorEdit&, const std::string& refused)>;
+  void OnEditTaken(EditHandler handler) { on_edit_taken_ = std::move(handler); }
+  // All of the journal was heard, as far as anybody can tell.
+  bool is_complete() const;
+
  private:
   void OnMapState(MapState state, const map_state_t& message);
   void OnEdit(AnchorEdit edit);
@@ -41,6 +52,7 @@ class AnchorsProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   const AnchorsOptions options_;
+  EditHandler on_edit_taken_;
   Node node_;
   Anchors anchors_;
   JournalFollower journal_;
@@ -48,6 +60,9 @@ class AnchorsProcess : public Process {
   InOrder<AnchorEdit> edits_;  // one stream
   AnchorUpdates for_watchers_;
   std::map<MapId, AnchorUpdates> for_agents_;  // the newest map of each
+  bool have_received_ = false;
+  int64_t have_utime_ = 0;  // of the first tick after the first HAVE
+  int64_t now_utime_ = 0;
   int64_t next_request_utime_ = 0;
   int64_t next_publish_utime_ = 0;
   int64_t next_status_utime_ = 0;

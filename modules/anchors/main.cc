@@ -1,15 +1,41 @@
+#include <CLI/CLI.hpp>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "anchors/anchors_process.h"
+#include "anchors/api/anchors_server.h"
 #include "bus/process_main.h"
 
 // KEYFRAME_*, MAP_STATE, CORRECTION_*, ANCHOR_EDIT --> AnchorsProcess --> ANCHOR_k, ANCHOR
+//                                     HTTP <--> AnchorApi --> ANCHOR_REQUEST_0
 int main(int argc, char** argv) {
   pangea::AnchorsOptions options;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
+  std::string http;
+  std::vector<std::string> origins, names;
+  const auto add_arguments = [&](CLI::App& app) {
+    auto* const http_option = app.add_option(
+        "--http", http, "ADDRESS:PORT of the API for apps, as 127.0.0.1:8090; without it none");
+    app.add_option("--allow-origin", origins,
+                   "pages of this origin may use the API, as https://app.example; repeatable")
+        ->needs(http_option);
+    app.add_option("--name", names, "a name of this machine by which apps may ask; repeatable")
+        ->needs(http_option);
+  };
+  const auto make = [&](pangea::Bus& bus) -> std::unique_ptr<pangea::Process> {
+    if (http.empty()) {
+      return std::make_unique<pangea::AnchorsProcess>(bus, options);
+    }
+    pangea::web::WebOptions web_options = pangea::ListenAt(http);
+    web_options.origins = origins;
+    web_options.names = names;
+    return std::make_unique<pangea::AnchorsServer>(bus, options, web_options);
+  };
   return pangea::ProcessMain(
       argc, argv,
-      {"pangea-anchors", "Holds anchors in the maps, and tells agents where they are", yaml},
-      [&](pangea::Bus& bus) { return std::make_unique<pangea::AnchorsProcess>(bus, options); });
+      {"pangea-anchors", "Holds anchors in the maps, and tells agents and apps where they are",
+       yaml, add_arguments},
+      make);
 }

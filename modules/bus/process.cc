@@ -13,7 +13,6 @@ namespace {
 volatile std::sig_atomic_t stop_signals = 0;
 
 constexpr int64_t kTickInterval_us = 100'000;
-constexpr int kHandleTimeout_ms = 50;
 
 template <typename Clock>
 int64_t MicrosOf() {
@@ -56,7 +55,7 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
   while (!StopRequested()) {
-    bus.Handle(kHandleTimeout_ms);
+    bus.Handle(process.longest_wait_ms());
     const int64_t now = WallUtime();
     if (journal_first != nullptr) {
       journal_first->Poll(now);
@@ -65,6 +64,7 @@ int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
       process.Tick(now);
       next_tick = now + kTickInterval_us;
     }
+    process.BetweenMessages(now);
   }
   return 0;
 }

@@ -15,6 +15,10 @@ class Process {
   // Housekeeping at about 10 Hz: resend requests, time-outs, status. Never called in a replay, so
   // no result may depend on it.
   virtual void Tick(int64_t now_utime) = 0;
+  // What else a process serves beside the bus: called after each message, and when none came for
+  // longest_wait_ms.
+  virtual void BetweenMessages(int64_t) {}
+  virtual int longest_wait_ms() const { return 50; }
 };
 
 // Microseconds since 1970 that never step: the wall clock as it was when the process first asked,

@@ -31,6 +31,8 @@ class WithOptions : public Process {
     announcer_.Tick(now_utime);
     process_->Tick(now_utime);
   }
+  void BetweenMessages(int64_t now_utime) override { process_->BetweenMessages(now_utime); }
+  int longest_wait_ms() const override { return process_->longest_wait_ms(); }
 
  private:
   std::unique_ptr<Process> process_;
@@ -44,6 +46,9 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
   CLI::App app(description.summary, description.name);
   std::string url = kDefaultBusUrl;
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
+  if (description.add_arguments) {
+    description.add_arguments(app);
+  }
   OptionsArguments options(app);
   CLI11_PARSE(app, argc, argv);
   try {

@@ -9,12 +9,17 @@
 #include "bus/process.h"
 #include "options/yaml_options.h"
 
+namespace CLI {
+class App;
+}
+
 namespace pangea {
 
 struct ProcessDescription {
-  std::string name;      // "pangea-fusion"; on the bus it is "fusion"
-  std::string summary;   // for --help
-  YamlOptions& options;  // of --options FILE.yaml
+  std::string name;                                   // "pangea-fusion"; on the bus it is "fusion"
+  std::string summary;                                // for --help
+  YamlOptions& options;                               // of --options FILE.yaml
+  std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
 };
 
 // Reads the command line (--bus URL, --options FILE.yaml, --print-options), then makes the process,

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   std::string log;
   bool read_only = false;
   std::string page = DefaultPage().string();
-  WebOptions options;
+  pangea::web::WebOptions options;
   CLI::App app("Shows a running system, or a captured log, in a browser", "pangea-viewer");
   auto* bus_option =
       app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();

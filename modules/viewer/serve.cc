@@ -7,6 +7,7 @@
 
 #include "bus/process.h"
 #include "viewer/log_show.h"
+#include "viewer/web/page_site.h"
 
 namespace pangea::viewer {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 constexpr int kServe_ms = 20;
 constexpr int kMaxMessagesAtOnce = 500;
 
-void Announce(const WebServer& server, const WebOptions& options) {
+void Announce(const web::WebServer& server, const web::WebOptions& options) {
   std::cout << fmt::format("http://{}:{}/\n", options.listen, server.port()) << std::flush;
 }
 
@@ -26,7 +27,7 @@ void HandleWaiting(LcmBus& bus) {
 }  // namespace
 
 void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls,
-              ViewerProcess::Pages pages, const WebOptions& options, const std::string& page) {
+              ViewerProcess::Pages pages, const web::WebOptions& options, const std::string& page) {
   LcmBus bus(url);
   ViewerProcess process(bus, url, WallUtime(), pages);
   std::vector<std::unique_ptr<LcmBus>> agent_buses;
@@ -34,7 +35,8 @@ void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls
     agent_buses.push_back(std::make_unique<LcmBus>(agent_url));
     process.WatchAgent(*agent_buses.back());
   }
-  WebServer server(options, ReadPage(page), process);
+  PageSite site(ReadPage(page), process);
+  web::WebServer server(options, site);
   Announce(server, options);
   while (!StopRequested()) {
     HandleWaiting(bus);
@@ -46,10 +48,11 @@ void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls
   }
 }
 
-int ServeLog(const std::string& log, const WebOptions& options, const std::string& page) {
+int ServeLog(const std::string& log, const web::WebOptions& options, const std::string& page) {
   LogShow show(log);
   const int exit_code = TellLosses("pangea-viewer", show.readings(), 0);
-  WebServer server(options, ReadPage(page), show);
+  PageSite site(ReadPage(page), show);
+  web::WebServer server(options, site);
   Announce(server, options);
   int64_t now = WallUtime();
   while (!StopRequested()) {

@@ -315,6 +315,24 @@ void OptionFiles(const Corpus& corpus) {
   }
 }
 
+void AnchorApiRequests(const Corpus& corpus) {
+  corpus.AddText("anchor_api", "group",
+                 R"(POST /v1/anchors
+{"name": "kettle", "payload": "{}", "pose": {"group": "1/1000", "position": [1, 2, 0.5],
+ "orientation": [1, 0, 0, 0]}})");
+  corpus.AddText("anchor_api", "keyframe",
+                 R"(POST /v1/anchors
+{"pose": {"keyframe": {"map": "2/1001", "seq": 1}, "position": [1, 0, 0]}})");
+  corpus.AddText("anchor_api", "pixel",
+                 R"(POST /v1/anchors
+{"pose": {"agent": 1, "utime": 1000000, "pixel": [376.5, 240]}})");
+  corpus.AddText("anchor_api", "change",
+                 "PUT /v1/anchors/1%2F17\n{\"name\": \"pot\", \"revision\": 1}");
+  corpus.AddText("anchor_api", "delete", "DELETE /v1/anchors/1/17\n");
+  corpus.AddText("anchor_api", "list", "GET /v1/anchors?group=1%2F1000\n");
+  corpus.AddText("anchor_api", "agent", "GET /v1/agents/2/anchors\n");
+}
+
 void Recording(const Corpus& corpus) {
   const std::string extrinsics =
       "T_BS:\n  rows: 4\n  cols: 4\n  data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n";
@@ -420,6 +438,7 @@ int Make(const std::string& log, const Corpus& corpus) {
   Journals(events, corpus);
   Spools(events, corpus);
   OptionFiles(corpus);
+  AnchorApiRequests(corpus);
   Recording(corpus);
   Sensors(corpus);
   Server(events, corpus);

@@ -11,18 +11,19 @@
 
 #include "viewer/scene/update.h"
 #include "viewer/show.h"
+#include "web/web_site.h"
 
 namespace pangea::viewer {
 
-class PageLink {
+class PageLink : public web::WebPeer {
  public:
-  static constexpr size_t kMaxText = 1000;
   static constexpr double kMaxSpeed = 1000;
 
   explicit PageLink(Show& show) : show_(show) {}
 
-  // What to send now; nothing while the last one is under way or when there is no update.
-  std::optional<std::vector<uint8_t>> Next();
+  bool is_text() const override { return false; }
+  // Nothing while the last one is under way or when there is no update.
+  std::optional<std::vector<uint8_t>> Next() override;
 
   // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT};
   // where the show is editable also {"anchor_add": {"name": NAME, "keyframe": INDEX, "p_body": [X,
@@ -30,7 +31,7 @@ class PageLink {
   // {"anchor_move": {"anchor": [AGENT, CREATED], "keyframe": INDEX, "p_body": [X, Y, Z]}} and
   // {"anchor_delete": {"anchor": [AGENT, CREATED]}}.
   // False for anything else: no page of ours says it.
-  bool Receive(std::string_view text);
+  bool Receive(std::string_view text) override;
 
  private:
   Show& show_;

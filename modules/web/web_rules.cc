@@ -1,20 +1,16 @@
-#include "viewer/web/web_rules.h"
+#include "web/web_rules.h"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
-#include <stdexcept>
 
-namespace pangea::viewer {
+namespace pangea::web {
 namespace {
-
-namespace fs = std::filesystem;
 
 bool IsAddress(const std::string& text) {
   std::array<unsigned char, sizeof(in6_addr)> address{};
@@ -29,18 +25,6 @@ bool IsPort(std::string_view text) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, port);
   return error == std::errc() && stop == end && port > 0;
-}
-
-std::string TypeOf(const fs::path& file) {
-  static const std::map<std::string, std::string> kTypes = {
-      {".html", "text/html; charset=utf-8"},
-      {".js", "text/javascript; charset=utf-8"},
-      {".css", "text/css; charset=utf-8"},
-      {".svg", "image/svg+xml"},
-      {".png", "image/png"},
-      {".woff2", "font/woff2"}};
-  const auto type = kTypes.find(file.extension().string());
-  return type == kTypes.end() ? "application/octet-stream" : type->second;
 }
 
 }  // namespace
@@ -63,22 +47,16 @@ bool OriginAllowed(std::string_view origin, std::string_view host) {
          (origin == fmt::format("http://{}", host) || origin == fmt::format("https://{}", host));
 }
 
-std::map<std::string, PageFile> ReadPage(const fs::path& folder) {
-  if (!fs::is_regular_file(folder / "index.html")) {
-    throw std::runtime_error(fmt::format(
-        "there is no page in {}: scripts/viewer builds it (with npm), or give --page FOLDER",
-        folder.string()));
-  }
-  std::map<std::string, PageFile> page;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      std::ifstream in(entry.path(), std::ios::binary);
-      page[fmt::format("/{}", fs::relative(entry.path(), folder).generic_string())] = {
-          TypeOf(entry.path()), std::string(std::istreambuf_iterator<char>(in), {})};
+bool IsOrigin(std::string_view text) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (text.starts_with(scheme)) {
+      const std::string_view host = text.substr(scheme.size());
+      return !host.empty() && std::ranges::all_of(host, [](unsigned char c) {
+        return std::isalnum(c) != 0 || c == '.' || c == '-' || c == ':' || c == '[' || c == ']';
+      });
     }
   }
-  page["/"] = page["/index.html"];
-  return page;
+  return false;
 }
 
-}  // namespace pangea::viewer
+}  // namespace pangea::web

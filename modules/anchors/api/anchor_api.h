@@ -1,0 +1,90 @@
+#pragma once
+
+// The anchors, for apps: what a request asks of them, and what is answered (openapi_anchors.json).
+// No socket, no bus, no clock: the owner gives requests, time, and the journal's edits, and
+// publishes the edits that this one makes. All of them are a tool's on the server (agent 0).
+//
+// An edit is requested each second until the journal has it; only then the asker is told so, or
+// after kTimeout_us that nobody knows. Bounded: kMaxPending edits under way.
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "anchors/anchors.h"
+#include "anchors/api/anchor_feed.h"
+#include "anchors/api/edit_body.h"
+#include "web/web_site.h"
+
+namespace pangea {
+
+class AnchorApi : public web::WebSite {
+ public:
+  static constexpr int64_t kRepeat_us = 1'000'000;
+  static constexpr int64_t kTimeout_us = 5'000'000;
+  static constexpr size_t kMaxPending = 100;
+
+  using EditRequest = std::function<void(const AnchorEdit&)>;
+
+  // `anchors`, taken with `options`, outlive it. `request`: publishes an edit to be journalled.
+  AnchorApi(const Anchors& anchors, const AnchorsOptions& options, EditRequest request)
+      : anchors_(anchors),
+        max_anchors_(static_cast<size_t>(options.max_anchors)),
+        request_(std::move(request)),
+        feed_(anchors, options.moved_m, options.moved_rad) {}
+
+  // Often: repeats, time-outs. `complete`: the anchors are all those of the journal; until then no
+  // request is answered with less.
+  void Tick(int64_t now_utime, bool complete);
+  // The journal has this edit; `refused`: why it is nevertheless none, or empty.
+  void Take(const AnchorEdit& edit, const std::string& refused);
+
+  void Answer(const web::WebRequest& request, Reply reply) override;
+  std::unique_ptr<web::WebPeer> Open(const web::WebRequest& request) override;
+
+ private:
+  using Path = std::vector<std::string>;
+
+  struct Pending {
+    AnchorEdit edit;
+    Reply reply;
+    int64_t next_utime = 0;  // it is requested again
+    int64_t timeout_utime = 0;
+  };
+
+  void AnswerAnchors(const web::WebRequest& request, const std::string& query, const Reply& reply);
+  void AnswerAnchor(const web::WebRequest& request, const Path& path, const Reply& reply);
+  void Make(const web::WebRequest& request, const Reply& reply);
+  // Changes or deletes one that is there.
+  void Change(const web::WebRequest& request, const ListedAnchor& anchor, const Reply& reply);
+  web::WebAnswer List(const std::string& query) const;
+  web::WebAnswer Agents() const;
+  web::WebAnswer AnchorsOfAgent(const std::string& agent) const;
+
+  // Fills in where the anchor is to be. Nothing wrong: an empty error.
+  BadField SetPose(const BodyPose& pose, AnchorEdit* edit) const;
+  BadField SetPose(const PoseInGroup& pose, AnchorEdit* edit) const;
+  BadField SetPose(const PoseByKeyframe& pose, AnchorEdit* edit) const;
+  BadField SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const;
+  AnchorId NewId();
+  void Submit(AnchorEdit edit, const Reply& reply);
+  web::WebAnswer Outcome(const AnchorEdit& ours, const AnchorEdit& journalled,
+                         const std::string& refused) const;
+
+  const Anchors& anchors_;
+  const size_t max_anchors_;
+  const EditRequest request_;
+  AnchorFeed feed_;
+  int64_t now_utime_ = 0;
+  bool complete_ = false;
+  int64_t newest_created_utime_ = 0;
+  std::list<Pending> pending_;
+  // Revisions that were requested and that the journal may still get.
+  std::map<AnchorId, int64_t> requested_;
+};
+
+}  // namespace pangea

@@ -1,0 +1,451 @@
+// Every route, what is refused, conflicts and time-outs, without a socket and a bus.
+
+#include "anchors/api/anchor_api.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/testing/synthetic_world.h"
+
+namespace pangea {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr int64_t kSecond_us = 1'000'000;
+
+struct Heard {
+  int status = 0;  // 0: no answer yet
+  json body;
+  std::map<std::string, std::string> headers;
+};
+
+// One for all tests: it is what takes long.
+const SyntheticWorld& World() {
+  static const SyntheticWorld world = [] {
+    SyntheticWorldOptions options;
+    options.num_keyframes = 20;
+    return MakeSyntheticWorld(options);
+  }();
+  return world;
+}
+
+class AnchorApiTest : public testing::Test {
+ protected:
+  AnchorApiTest()
+      : anchors_(options_),
+        api_(anchors_, options_, [this](const AnchorEdit& edit) { requested_.push_back(edit); }) {
+    for (const SyntheticAgent& agent : world_.agents) {
+      for (const Keyframe& keyframe : agent.keyframes) {
+        anchors_.Take(keyframe);
+      }
+    }
+    Pass(0);
+  }
+
+  const MapId& map(int agent) const { return world_.agents[agent].map; }
+  void Pass(int64_t us) { api_.Tick(now_utime_ += us, complete_); }
+
+  std::shared_ptr<Heard> Ask(const std::string& method, const std::string& target,
+                             const std::string& body = "", const std::string& if_match = "") {
+    auto heard = std::make_shared<Heard>();
+    api_.Answer({method, target, "localhost", if_match, body}, [heard](web::WebAnswer answer) {
+      EXPECT_EQ(heard->status, 0) << "answered twice";
+      heard->status = answer.status;
+      heard->headers.insert(answer.headers.begin(), answer.headers.end());
+      heard->body = answer.body.empty() ? json() : json::parse(answer.body);
+    });
+    return heard;
+  }
+  Heard Get(const std::string& target) { return *Ask("GET", target); }
+
+  // As agent_handler and AnchorsProcess do.
+  void Journal(AnchorEdit edit) {
+    edit.seq = next_seq_++;
+    if (edit.agent_id == 0) {
+      edit.right = AnchorRight::kEditAll;
+    }
+    const std::string refused = anchors_.Take(edit);
+    api_.Take(edit, refused);
+  }
+  void JournalNewest() { Journal(requested_.back()); }
+
+  std::string NewBody(int agent, const Eigen::Vector3d& p) const {
+    return fmt::format(
+        R"({{"name": "kettle", "payload": "hot", "pose": {{"group": "{}", "position": [{}, {}, {}]}}}})",
+        ToString(map(agent)), p.x(), p.y(), p.z());
+  }
+  // An anchor near agent 1, journalled.
+  json Make() {
+    const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
+    JournalNewest();
+    EXPECT_EQ(heard->status, 201) << heard->body;
+    return heard->body;
+  }
+  Eigen::Vector3d NearAgent() const {
+    return world_.agents[0].keyframes[15].T_odom_body * Eigen::Vector3d(1.5, 0.3, 0);
+  }
+  void Fuse() {
+    MapState state;
+    state.group = map(0);
+    state.revision = 1;
+    for (const SyntheticAgent& agent : world_.agents) {
+      state.maps.push_back(agent.map);
+      for (const Keyframe& keyframe : agent.keyframes) {
+        state.keyframes.push_back({keyframe.id, keyframe.utime, world_.T_hall_body(keyframe.id)});
+      }
+    }
+    anchors_.Take(state);
+  }
+  static Eigen::Vector3d PositionOf(const json& anchor) {
+    const json& p = anchor.at("pose").at("position");
+    return {p[0].get<double>(), p[1].get<double>(), p[2].get<double>()};
+  }
+
+  AnchorsOptions options_;
+  const SyntheticWorld& world_ = World();
+  Anchors anchors_;
+  AnchorApi api_;
+  std::vector<AnchorEdit> requested_;
+  bool complete_ = true;
+  int64_t now_utime_ = 1'700'000'000'000'000;
+  int64_t next_seq_ = 0;
+};
+
+TEST_F(AnchorApiTest, AnAnchorIsMadeOnceTheJournalHasIt) {
+  const Eigen::Vector3d p = NearAgent();
+  const auto heard = Ask("POST", "/v1/anchors", NewBody(0, p));
+  EXPECT_EQ(heard->status, 0);
+  ASSERT_EQ(requested_.size(), 1u);
+  EXPECT_EQ(requested_[0].agent_id, 0);
+  EXPECT_EQ(requested_[0].anchor.agent_id, 0);
+  EXPECT_EQ(requested_[0].placement, AnchorEdit::Placement::kKeyframe);
+  EXPECT_LT(requested_[0].T_ref_anchor.t.norm(), 2);
+  EXPECT_EQ(Get("/v1/anchors").body["anchors"].size(), 0u);
+  JournalNewest();
+  ASSERT_EQ(heard->status, 201);
+  const std::string id = heard->body["id"];
+  EXPECT_EQ(id, fmt::format("0/{}", now_utime_));
+  EXPECT_EQ(heard->headers["Location"], "/v1/anchors/" + id);
+  EXPECT_EQ(heard->headers["ETag"], "\"1\"");
+  EXPECT_EQ(heard->body["name"], "kettle");
+  EXPECT_EQ(heard->body["payload"], "hot");
+  EXPECT_EQ(heard->body["made_by"], 0);
+  EXPECT_EQ(heard->body["group"], ToString(map(0)));
+  EXPECT_EQ(heard->body["deleted"], false);
+  EXPECT_EQ(heard->body["sigma_m"].size(), 3u);
+  EXPECT_NEAR(heard->body["pose"]["orientation"][0].get<double>(), 1, 1e-3);
+  // Keyframes that hold it agree to millimetres.
+  EXPECT_LT((PositionOf(heard->body) - p).norm(), 0.01);
+  EXPECT_EQ(Get("/v1/anchors/" + id).body, heard->body);
+  EXPECT_EQ(Get("/v1/anchors/0%2F" + id.substr(2)).body, heard->body);
+  EXPECT_EQ(Get("/v1/anchors").body["anchors"], json::array({heard->body}));
+}
+
+TEST_F(AnchorApiTest, APoseOfAFusedGroupIsKeptByTheNearestKeyframe) {
+  Fuse();
+  const Eigen::Vector3d p =
+      world_.T_hall_body({map(1), 10}) * Eigen::Vector3d(0.3, 0, 0.1);  // map frame: the hall's
+  Ask("POST", "/v1/anchors", NewBody(0, p));
+  ASSERT_EQ(requested_.size(), 1u);
+  const KeyframeId held{requested_[0].map, requested_[0].keyframe_seq};
+  const double held_m = (world_.T_hall_body(held).t - p).norm();
+  for (const SyntheticAgent& agent : world_.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      EXPECT_GE((world_.T_hall_body(keyframe.id).t - p).norm(), held_m);
+    }
+  }
+  JournalNewest();
+  const json anchors = Get("/v1/anchors?group=" + ToString(map(0))).body["anchors"];
+  ASSERT_EQ(anchors.size(), 1u);
+  EXPECT_LT((PositionOf(anchors[0]) - p).norm(), 0.02);
+  EXPECT_EQ(anchors[0]["group_revision"], 1);
+  // The other map is no group of its own any more.
+  EXPECT_EQ(Get("/v1/anchors?group=" + ToString(map(1))).body["anchors"].size(), 0u);
+  const auto refused = Ask("POST", "/v1/anchors", NewBody(1, p));
+  EXPECT_EQ(refused->status, 400);
+  EXPECT_EQ(refused->body["field"], "pose.group");
+}
+
+TEST_F(AnchorApiTest, AnAnchorByAKeyframeAndOneBehindAPixel) {
+  const auto by_keyframe = Ask(
+      "POST", "/v1/anchors",
+      fmt::format(R"({{"pose": {{"keyframe": {{"map": "{}", "seq": 4}}, "position": [1, 0, 0]}}}})",
+                  ToString(map(1))));
+  JournalNewest();
+  EXPECT_EQ(by_keyframe->status, 201);
+  EXPECT_EQ(by_keyframe->body["group"], ToString(map(1)));
+
+  const Keyframe& keyframe = world_.agents[0].keyframes[10];
+  ASSERT_FALSE(keyframe.points.empty());
+  const Corner& corner = keyframe.corners[keyframe.points[keyframe.points.size() / 2].corner];
+  const auto behind =
+      Ask("POST", "/v1/anchors",
+          fmt::format(R"({{"pose": {{"agent": 1, "utime": {}, "pixel": [{}, {}]}}}})",
+                      keyframe.utime, corner.pixel.x(), corner.pixel.y()));
+  ASSERT_EQ(requested_.back().placement, AnchorEdit::Placement::kPixel) << behind->body;
+  EXPECT_EQ(requested_.back().map, map(0));
+  JournalNewest();
+  EXPECT_EQ(behind->status, 201) << behind->body;
+}
+
+TEST_F(AnchorApiTest, WhatCannotBePlacedIsRefusedBeforeItIsJournalled) {
+  const struct {
+    std::string pose, field, error;
+  } kCases[] = {
+      {R"({"group": "9/9", "position": [0, 0, 0]})", "pose.group", "/v1/agents"},
+      {fmt::format(R"({{"group": "{}", "position": [0, 0, 5000]}})", ToString(map(0))),
+       "pose.position", "1000 m"},
+      {R"({"keyframe": {"map": "9/9", "seq": 0}, "position": [0, 0, 0]})", "pose.keyframe",
+       "no keyframe 9/9#0"},
+      {fmt::format(R"({{"keyframe": {{"map": "{}", "seq": 99}}, "position": [0, 0, 0]}})",
+                   ToString(map(0))),
+       "pose.keyframe", "no keyframe"},
+      {R"({"agent": 9, "utime": 1, "pixel": [1, 2]})", "pose.agent", "/v1/agents"},
+      {fmt::format(R"({{"agent": 1, "utime": {}, "pixel": [-5000, 2]}})",
+                   world_.agents[0].keyframes[5].utime),
+       "pose", "no surface"},
+      {R"({"group": "1/17", "position": [0, 0]})", "pose.position", "[x, y, z]"},
+  };
+  for (const auto& c : kCases) {
+    const auto heard = Ask("POST", "/v1/anchors", "{\"pose\": " + c.pose + "}");
+    EXPECT_EQ(heard->status, 400) << c.pose;
+    EXPECT_EQ(heard->body.value("field", ""), c.field) << c.pose << heard->body;
+    EXPECT_THAT(heard->body.value("error", ""), HasSubstr(c.error)) << c.pose;
+  }
+  EXPECT_TRUE(requested_.empty());
+}
+
+TEST_F(AnchorApiTest, ItIsRequestedEachSecondAndGivenUpAfterFive) {
+  const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
+  for (int i = 0; i < 49; ++i) {
+    Pass(kSecond_us / 10);
+  }
+  EXPECT_EQ(heard->status, 0);
+  EXPECT_EQ(requested_.size(), 5u);
+  Pass(kSecond_us / 10);
+  EXPECT_EQ(heard->status, 503);
+  EXPECT_THAT(heard->body.value("error", ""), HasSubstr("pangea-agent-handler"));
+  Pass(kSecond_us);
+  EXPECT_EQ(requested_.size(), 5u);
+  JournalNewest();  // later nevertheless
+  EXPECT_EQ(Get("/v1/anchors").body["anchors"].size(), 1u);
+}
+
+TEST_F(AnchorApiTest, AChangeKeepsWhatItDoesNotName) {
+  const json made = Make();
+  const std::string target = "/v1/anchors/" + made["id"].get<std::string>();
+  const auto renamed = Ask("PUT", target, R"({"name": "pot"})");
+  ASSERT_EQ(requested_.back().revision, 2);
+  EXPECT_EQ(requested_.back().placement, AnchorEdit::Placement::kSame);
+  JournalNewest();
+  ASSERT_EQ(renamed->status, 200);
+  EXPECT_EQ(renamed->headers["ETag"], "\"2\"");
+  EXPECT_EQ(renamed->body["name"], "pot");
+  EXPECT_EQ(renamed->body["payload"], "hot");
+  EXPECT_EQ(renamed->body["pose"], made["pose"]);
+  const auto moved = Ask(
+      "PUT", target,
+      fmt::format(R"({{"pose": {{"keyframe": {{"map": "{}", "seq": 3}}, "position": [1, 0, 0]}}}})",
+                  ToString(map(0))));
+  JournalNewest();
+  EXPECT_EQ(moved->body["name"], "pot");
+  EXPECT_GT((PositionOf(moved->body) - PositionOf(made)).norm(), 0.1);
+  const auto empty = Ask("PUT", target, "{}");
+  EXPECT_EQ(empty->status, 400);
+}
+
+TEST_F(AnchorApiTest, AnEditOfWhatIsOldIsAConflict) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  Ask("PUT", target, R"({"name": "pot"})");
+  JournalNewest();
+  const size_t before = requested_.size();
+  EXPECT_EQ(Ask("PUT", target, R"({"name": "x", "revision": 1})")->status, 409);
+  EXPECT_EQ(Ask("PUT", target, R"({"name": "x"})", "\"1\"")->status, 409);
+  EXPECT_EQ(Ask("DELETE", target, "", "\"1\"")->status, 409);
+  EXPECT_EQ(Ask("DELETE", target, "", "yesterday")->status, 400);
+  EXPECT_EQ(requested_.size(), before);
+  const auto good = Ask("PUT", target, R"({"name": "x"})", "\"2\"");
+  EXPECT_EQ(Ask("PUT", target, R"({"name": "y"})", "\"2\"")->status, 409) << "one is under way";
+  JournalNewest();
+  EXPECT_EQ(good->status, 200);
+}
+
+TEST_F(AnchorApiTest, TwoChangesAtOnceHaveTwoRevisions) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const auto first = Ask("PUT", target, R"({"name": "first"})");
+  const AnchorEdit first_edit = requested_.back();
+  const auto second = Ask("PUT", target, R"({"name": "second"})");
+  EXPECT_EQ(requested_.back().revision, 3);
+  Journal(first_edit);
+  JournalNewest();
+  EXPECT_EQ(first->status, 200);
+  EXPECT_EQ(second->status, 200);
+  EXPECT_EQ(Get(target).body["name"], "second");
+}
+
+TEST_F(AnchorApiTest, AChangeThatTheJournalNeverHadLocksNobodyOut) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const auto lost = Ask("PUT", target, R"({"name": "lost"})");
+  Pass(5 * kSecond_us);
+  EXPECT_EQ(lost->status, 503);
+  const auto next = Ask("PUT", target, R"({"name": "next"})", "\"1\"");
+  EXPECT_EQ(requested_.back().revision, 3) << "the lost one may still come";
+  JournalNewest();
+  EXPECT_EQ(next->status, 200);
+}
+
+TEST_F(AnchorApiTest, WhoeverLosesToAnotherIsToldSo) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const auto ours = Ask("PUT", target, R"({"name": "ours"})");
+  AnchorEdit theirs = requested_.back();
+  theirs.agent_id = 2;
+  theirs.right = AnchorRight::kEditAll;
+  theirs.name = "theirs";
+  Journal(theirs);
+  EXPECT_EQ(ours->status, 0);
+  JournalNewest();  // of equal revisions the highest agent wins
+  EXPECT_EQ(ours->status, 409);
+  EXPECT_THAT(ours->body.value("error", ""), HasSubstr("agent 2"));
+  EXPECT_EQ(Get(target).body["name"], "theirs");
+
+  // Another tool on the server drew the same revision.
+  const auto again = Ask("PUT", target, R"({"name": "again"})");
+  AnchorEdit other_tool = requested_.back();
+  other_tool.name = "other tool";
+  Journal(other_tool);
+  EXPECT_EQ(again->status, 409);
+}
+
+TEST_F(AnchorApiTest, DeletedForEver) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const auto deleted = Ask("DELETE", target);
+  EXPECT_EQ(deleted->status, 0);
+  const auto changed = Ask("PUT", target, R"({"name": "late"})");
+  const AnchorEdit change = requested_.back();
+  Journal(requested_[requested_.size() - 2]);
+  EXPECT_EQ(deleted->status, 204);
+  Journal(change);
+  EXPECT_EQ(changed->status, 410);
+  EXPECT_EQ(Get(target).status, 410);
+  EXPECT_EQ(Ask("DELETE", target)->status, 410);
+  EXPECT_EQ(Get("/v1/anchors").body["anchors"].size(), 0u);
+}
+
+TEST_F(AnchorApiTest, WhatTheJournalsEditIsRefusedForIsSaid) {
+  const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
+  api_.Take(requested_.back(), "anchor edit: there are 10000 anchors, max_anchors");
+  EXPECT_EQ(heard->status, 409);
+  EXPECT_THAT(heard->body.value("error", ""), HasSubstr("max_anchors"));
+}
+
+TEST_F(AnchorApiTest, AgentsAndTheirAnchors) {
+  Make();
+  const json agents = Get("/v1/agents").body["agents"];
+  ASSERT_EQ(agents.size(), 2u);
+  EXPECT_EQ(agents[0], (json{{"id", 1},
+                             {"map", ToString(map(0))},
+                             {"group", ToString(map(0))},
+                             {"group_revision", 0}}));
+  EXPECT_EQ(Get("/v1/agents/2/anchors").body["anchors"].size(), 0u);
+  Fuse();
+  EXPECT_EQ(Get("/v1/agents").body["agents"][1]["group"], ToString(map(0)));
+  const Heard of_two = Get("/v1/agents/2/anchors");
+  EXPECT_EQ(of_two.body["map"], ToString(map(1)));
+  ASSERT_EQ(of_two.body["anchors"].size(), 1u);
+  // The same place, seen from each agent's newest keyframe.
+  const auto in_hall = [&](int agent) {
+    const json anchors = Get(fmt::format("/v1/agents/{}/anchors", agent + 1)).body["anchors"];
+    const Keyframe& newest = world_.agents[agent].keyframes.back();
+    return Eigen::Vector3d(world_.T_hall_body(newest.id) *
+                           (newest.T_odom_body.Inverse() * PositionOf(anchors[0])));
+  };
+  EXPECT_LT((in_hall(0) - in_hall(1)).norm(), 1e-6);
+  EXPECT_EQ(Get("/v1/agents/3/anchors").status, 404);
+  EXPECT_EQ(Get("/v1/agents/x/anchors").status, 404);
+}
+
+TEST_F(AnchorApiTest, AnAnchorThatWaitsHasNoPose) {
+  AnchorEdit edit;
+  edit.anchor = {2, 7};
+  edit.agent_id = 2;
+  edit.right = AnchorRight::kEditOwn;
+  edit.payload = "\xff";  // not of this API: apps on the bus may send any bytes
+  edit.placement = AnchorEdit::Placement::kKeyframe;
+  edit.map = map(1);
+  edit.keyframe_seq = 1000;
+  Journal(edit);
+  const Heard heard = Get("/v1/anchors/2/7");
+  EXPECT_EQ(heard.status, 200);
+  EXPECT_TRUE(heard.body["pose"].is_null());
+  EXPECT_TRUE(heard.body["group"].is_null());
+  EXPECT_EQ(heard.body["payload"], "\xEF\xBF\xBD");
+}
+
+TEST_F(AnchorApiTest, UntilTheJournalIsReadNothingIsAnsweredWithLess) {
+  complete_ = false;
+  Pass(0);
+  for (const char* target : {"/v1/anchors", "/v1/agents", "/v1/anchors/0/1"}) {
+    Heard heard = Get(target);
+    EXPECT_EQ(heard.status, 503) << target;
+    EXPECT_EQ(heard.headers["Retry-After"], "1") << target;
+  }
+  EXPECT_EQ(Ask("POST", "/v1/anchors", NewBody(0, NearAgent()))->status, 503);
+  EXPECT_EQ(Get("/v1/openapi.json").status, 200);
+}
+
+TEST_F(AnchorApiTest, WhatIsNotThere) {
+  for (const char* target : {"/", "", "/v1", "/v1/", "/v2/anchors", "/v1/anchors/", "/v1/anchors/1",
+                             "/v1/anchors/1/2/3", "/v1/agents/1", "/v1/agents/1/keyframes", "*",
+                             "/v1/anchors/1/2", "/v1/anchors/a/b", "/%", "/v1/%2", "?", "/v1?x"}) {
+    EXPECT_EQ(Get(target).status, 404) << target;
+  }
+  for (const char* target : {"/v1/anchors?x=1", "/v1/anchors?group=", "/v1/anchors?group=1"}) {
+    EXPECT_EQ(Get(target).status, 400) << target;
+  }
+  EXPECT_EQ(Get("/v1/events").status, 426);
+  EXPECT_EQ(api_.Open({"GET", "/v1/anchors", "", "", ""}), nullptr);
+  EXPECT_NE(api_.Open({"GET", "/v1/events", "", "", ""}), nullptr);
+}
+
+TEST_F(AnchorApiTest, OnlyTheMethodsThereAre) {
+  const std::string one = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const std::pair<std::string, std::string> kCases[] = {
+      {"/v1/anchors", "GET, POST"},    {one, "GET, PUT, DELETE"},   {"/v1/agents", "GET"},
+      {"/v1/agents/1/anchors", "GET"}, {"/v1/openapi.json", "GET"}, {"/v1/events", "GET"}};
+  for (const auto& [target, methods] : kCases) {
+    const auto heard = Ask("PATCH", target);
+    EXPECT_EQ(heard->status, 405) << target;
+    EXPECT_EQ(heard->headers["Allow"], methods) << target;
+  }
+}
+
+TEST_F(AnchorApiTest, EditsUnderWayAreBounded) {
+  std::vector<std::shared_ptr<Heard>> heard;
+  for (size_t i = 0; i <= AnchorApi::kMaxPending; ++i) {
+    heard.push_back(Ask("POST", "/v1/anchors", NewBody(0, NearAgent())));
+  }
+  EXPECT_EQ(heard[0]->status, 0);
+  EXPECT_EQ(heard.back()->status, 503);
+  std::set<AnchorId> ids;
+  for (const AnchorEdit& edit : requested_) {
+    ids.insert(edit.anchor);
+  }
+  EXPECT_EQ(ids.size(), AnchorApi::kMaxPending) << "no number twice";
+}
+
+TEST_F(AnchorApiTest, ItsDescriptionIsJson) {
+  const json document = Get("/v1/openapi.json").body;
+  for (const char* path : {"/v1/anchors", "/v1/anchors/{agent}/{number}", "/v1/agents",
+                           "/v1/agents/{agent}/anchors", "/v1/events", "/v1/openapi.json"}) {
+    EXPECT_TRUE(document["paths"].contains(path)) << path;
+  }
+  EXPECT_EQ(document["paths"].size(), 6u);
+}
+
+}  // namespace
+}  // namespace pangea

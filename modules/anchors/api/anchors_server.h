@@ -1,0 +1,36 @@
+#pragma once
+
+// AnchorsProcess with its API on a web server: HTTP and WebSockets are served between messages.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "anchors/anchors_process.h"
+#include "anchors/api/anchor_api.h"
+#include "web/web_server.h"
+
+namespace pangea {
+
+// "127.0.0.1:8090" or "[::1]:8090"; port 0: a free one. Throws std::runtime_error for what is none.
+web::WebOptions ListenAt(const std::string& address_and_port);
+
+class AnchorsServer : public Process {
+ public:
+  // Throws std::runtime_error when it cannot listen there; else says on stdout where it does.
+  AnchorsServer(Bus& bus, const AnchorsOptions& options, const web::WebOptions& web_options);
+
+  void Tick(int64_t now_utime) override { process_.Tick(now_utime); }
+  void BetweenMessages(int64_t now_utime) override;
+  // So soon an answer begins after its request came.
+  int longest_wait_ms() const override { return 10; }
+
+  uint16_t port() const { return server_.port(); }
+
+ private:
+  AnchorsProcess process_;
+  AnchorApi api_;
+  web::WebServer server_;
+};
+
+}  // namespace pangea

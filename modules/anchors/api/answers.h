@@ -1,0 +1,33 @@
+#pragma once
+
+// What the API's requests and answers are made of.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "anchors/api/anchor_json.h"
+#include "anchors/api/edit_body.h"
+#include "web/web_site.h"
+
+namespace pangea::anchor_answers {
+
+web::WebAnswer Json(int status, const nlohmann::json& body);
+// {"error": ...}, for people.
+web::WebAnswer Error(int status, const std::string& error);
+// 400, with the field.
+web::WebAnswer Error(const BadField& bad);
+// 405, "GET, PUT".
+web::WebAnswer OnlyMethods(const char* methods);
+// With its revision as ETag.
+web::WebAnswer OneAnchor(int status, const ListedAnchor& anchor);
+
+std::string PercentDecoded(std::string_view text);
+// "/v1/anchors/2/17" is {"v1", "anchors", "2", "17"}.
+std::vector<std::string> SplitPath(const std::string& path);
+// What If-Match says: "3" with its quotes, or 3.
+std::optional<int64_t> RevisionOf(std::string_view if_match);
+
+}  // namespace pangea::anchor_answers

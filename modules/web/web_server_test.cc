@@ -1,0 +1,351 @@
+#include "web/web_server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "web/testing/web_client.h"
+#include "web/web_rules.h"
+
+namespace pangea::web {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+TEST(WebRules, HostsThatAreThisMachine) {
+  const std::vector<std::string> names = {"robot.local"};
+  for (const char* host : {"localhost", "localhost:8080", "127.0.0.1:8080", "192.168.1.7", "[::1]",
+                           "[::1]:8080", "robot.local:8080"}) {
+    EXPECT_TRUE(HostAllowed(host, names)) << host;
+  }
+  for (const char* host :
+       {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example",
+        "localhost.evil.example:8080", "[evil]:1", ":8080", "robot.local.evil"}) {
+    EXPECT_FALSE(HostAllowed(host, names)) << host;
+  }
+  for (const char* port : {"", "0", "65536", "99999999999999999999", "-1", "+1", " 1", "1 ", "0x50",
+                           "80;script-src *", "80 https://evil.example", "*"}) {
+    for (const char* host : {"localhost:", "127.0.0.1:", "[::1]:", "robot.local:"}) {
+      EXPECT_FALSE(HostAllowed(std::string(host) + port, names)) << host << port;
+    }
+  }
+}
+
+TEST(WebRules, OriginsThatAreThisServer) {
+  EXPECT_TRUE(OriginAllowed("http://127.0.0.1:8080", "127.0.0.1:8080"));
+  EXPECT_TRUE(OriginAllowed("https://robot.local", "robot.local"));
+  for (const char* origin : {"", "null", "http://evil.example", "http://127.0.0.1:8081",
+                             "http://127.0.0.1", "file://127.0.0.1:8080"}) {
+    EXPECT_FALSE(OriginAllowed(origin, "127.0.0.1:8080")) << origin;
+  }
+  EXPECT_FALSE(OriginAllowed("http://", ""));
+}
+
+TEST(WebRules, WhatABrowserGivesAsAnOrigin) {
+  for (const char* origin : {"https://app.example", "http://10.0.0.7:5173", "http://[::1]:80"}) {
+    EXPECT_TRUE(IsOrigin(origin)) << origin;
+  }
+  for (const char* origin : {"", "*", "null", "https://", "app.example", "https://app.example/",
+                             "ftp://app.example", "https://app.example/a", "http://a\r\nb"}) {
+    EXPECT_FALSE(IsOrigin(origin)) << origin;
+  }
+}
+
+class TestPeer : public WebPeer {
+ public:
+  explicit TestPeer(int* to_send) : to_send_(to_send) {}
+  bool is_text() const override { return true; }
+  std::optional<std::vector<uint8_t>> Next() override {
+    if (*to_send_ == 0) {
+      return std::nullopt;
+    }
+    const std::string text = "message " + std::to_string((*to_send_)--);
+    return std::vector<uint8_t>(text.begin(), text.end());
+  }
+  bool Receive(std::string_view text) override { return text == "good"; }
+
+ private:
+  int* const to_send_;
+};
+
+// Answers "/" at once, "/later" when the test says, "/echo" with what it was sent.
+class TestSite : public WebSite {
+ public:
+  void Answer(const WebRequest& request, Reply reply) override {
+    last_ = request;
+    if (request.target == "/later") {
+      later_.push_back(std::move(reply));
+    } else if (request.target == "/echo") {
+      reply({201, "text/plain", request.method + " " + request.body, {{"Location", "/there"}}});
+    } else if (request.target == "/") {
+      reply({200, "text/html; charset=utf-8", "<p>page"});
+    } else {
+      reply({404, "text/plain", "nothing"});
+    }
+  }
+  std::unique_ptr<WebPeer> Open(const WebRequest& request) override {
+    return request.target == "/socket" ? std::make_unique<TestPeer>(&to_send_) : nullptr;
+  }
+
+  WebRequest last_;
+  std::vector<Reply> later_;
+  int to_send_ = 0;
+};
+
+class WebServerTest : public testing::Test {
+ protected:
+  explicit WebServerTest(const WebOptions& options = {"127.0.0.1", 0, {}})
+      : server_(options, site_) {}
+
+  void Serve() {
+    for (int i = 0; i < 5; ++i) {
+      server_.Serve(10);
+    }
+  }
+  std::string Ask(const std::string& request) {
+    WebClient client(server_.port());
+    client.Send(request);
+    Serve();
+    return client.Received();
+  }
+
+  TestSite site_;
+  WebServer server_;
+};
+
+TEST_F(WebServerTest, GivesTheSitesAnswerAndLetsItLoadNothing) {
+  const std::string answer = Ask("GET / HTTP/1.1\r\nHost: localhost:1\r\n\r\n");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 200 OK"));
+  EXPECT_THAT(answer, HasSubstr("<p>page"));
+  EXPECT_THAT(answer, HasSubstr("Content-Security-Policy: default-src 'none'"));
+  EXPECT_THAT(answer, Not(HasSubstr("Vary")));
+}
+
+TEST_F(WebServerTest, AHeadIsAGetWithoutItsBody) {
+  const std::string answer = Ask("HEAD / HTTP/1.1\r\nHost: localhost:1\r\n\r\n");
+  EXPECT_EQ(site_.last_.method, "GET");
+  EXPECT_THAT(answer, HasSubstr("Content-Length: 7"));
+  EXPECT_THAT(answer, Not(HasSubstr("<p>page")));
+}
+
+TEST_F(WebServerTest, TheSiteHearsMethodBodyAndCondition) {
+  const std::string answer =
+      Ask("PUT /echo HTTP/1.1\r\nHost: localhost:1\r\nIf-Match: \"3\"\r\nContent-Length: 4\r\n\r\n"
+          "body");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 201"));
+  EXPECT_THAT(answer, HasSubstr("Location: /there"));
+  EXPECT_THAT(answer, HasSubstr("PUT body"));
+  EXPECT_EQ(site_.last_.if_match, "\"3\"");
+}
+
+TEST_F(WebServerTest, ALargeBodyIsRefusedWithTheReason) {
+  const std::string body(WebServer::kMaxBody + 1, 'x');
+  const std::string answer = Ask("POST /echo HTTP/1.1\r\nHost: localhost:1\r\nContent-Length: " +
+                                 std::to_string(body.size()) + "\r\n\r\n" + body);
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 413"));
+  EXPECT_THAT(answer, HasSubstr("16384 bytes"));
+  EXPECT_THAT(Ask("POST /echo HTTP/1.1\r\nHost: localhost:1\r\nContent-Length: 16384\r\n\r\n" +
+                  body.substr(1)),
+              StartsWith("HTTP/1.1 201"));
+}
+
+TEST_F(WebServerTest, AnAnswerMayComeLater) {
+  WebClient client(server_.port());
+  client.Send("GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  Serve();
+  EXPECT_EQ(client.Received(), "");
+  ASSERT_EQ(site_.later_.size(), 1U);
+  site_.later_[0]({200, "text/plain", "here it is"});
+  site_.later_[0]({200, "text/plain", "twice"});
+  Serve();
+  const std::string answer = client.Received();
+  EXPECT_THAT(answer, HasSubstr("here it is"));
+  EXPECT_THAT(answer, Not(HasSubstr("twice")));
+  // The connection goes on; a reply to what was answered already is none to the next question.
+  client.Send("GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  Serve();
+  site_.later_[0]({200, "text/plain", "old"});
+  Serve();
+  EXPECT_EQ(client.Received(), "");
+}
+
+TEST_F(WebServerTest, AReplyToSomebodyWhoIsGoneIsHarmless) {
+  {
+    WebClient client(server_.port());
+    client.Send("GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    Serve();
+  }
+  ASSERT_EQ(site_.later_.size(), 1U);
+  site_.later_[0]({200, "text/plain", "nobody"});
+  Serve();
+  EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), HasSubstr("<p>page"));
+}
+
+TEST(WebServer, AReplyAfterItsEndIsHarmless) {
+  TestSite site;
+  {
+    WebServer server({"127.0.0.1", 0, {}}, site);
+    WebClient client(server.port());
+    client.Send("GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    server.Serve(20);
+  }
+  ASSERT_EQ(site.later_.size(), 1U);
+  site.later_[0]({200, "text/plain", "nobody"});
+}
+
+TEST_F(WebServerTest, ASiteThatDoesNotAnswerIsNotWaitedForForever) {
+  WebClient client(server_.port());
+  client.Send("GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  server_.Serve(9'000);
+  EXPECT_EQ(client.Received(), "");
+  server_.Serve(1'500);
+  EXPECT_THAT(client.Received(), StartsWith("HTTP/1.1 503"));
+}
+
+TEST_F(WebServerTest, RefusesNamesThatAreNotItsOwn) {
+  EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n"), StartsWith("HTTP/1.1 403"));
+}
+
+TEST_F(WebServerTest, OnlyItsOwnPageMayConnect) {
+  for (const char* origin : {"http://evil.example", "null", ""}) {
+    EXPECT_THAT(Ask(UpgradeRequest("/socket", origin)), StartsWith("HTTP/1.1 403")) << origin;
+  }
+  EXPECT_THAT(Ask(UpgradeRequest("/socket", "http://127.0.0.1:1")), StartsWith("HTTP/1.1 101"));
+  EXPECT_THAT(Ask(UpgradeRequest("/", "http://127.0.0.1:1")), StartsWith("HTTP/1.1 404"));
+}
+
+TEST_F(WebServerTest, APeerIsSentWhatThereIsAndWhatItShouldNotSayEndsIt) {
+  WebClient client(server_.port());
+  client.Send(UpgradeRequest("/socket", "http://127.0.0.1:1"));
+  site_.to_send_ = 3;
+  Serve();
+  const std::string received = client.Received();
+  for (const char* message : {"\x81\x09message 3", "message 2", "message 1"}) {
+    EXPECT_THAT(received, HasSubstr(message));
+  }
+  client.Send(MaskedFrame("good"));
+  Serve();
+  EXPECT_EQ(client.Received(), "");
+  client.Send(MaskedFrame("bad"));
+  Serve();
+  EXPECT_THAT(client.Received(), HasSubstr("\x88"));  // the closing handshake
+}
+
+TEST_F(WebServerTest, PeersAreCounted) {
+  std::vector<std::unique_ptr<WebClient>> clients;
+  for (int i = 0; i <= WebServer::kMaxPeers; ++i) {
+    clients.push_back(std::make_unique<WebClient>(server_.port()));
+    clients.back()->Send(UpgradeRequest("/socket", "http://127.0.0.1:1"));
+    Serve();
+    EXPECT_THAT(clients.back()->Received(),
+                StartsWith(i < WebServer::kMaxPeers ? "HTTP/1.1 101" : "HTTP/1.1 503"));
+  }
+  clients.clear();
+  Serve();
+  EXPECT_THAT(Ask(UpgradeRequest("/socket", "http://127.0.0.1:1")), StartsWith("HTTP/1.1 101"));
+}
+
+// Nobody locks the server by opening connections and saying nothing, or half a request, or by
+// leaving the answer where it is, or by asking for what takes long.
+TEST_F(WebServerTest, ANewConnectionTakesTheOldestsPlace) {
+  const char* const said[] = {"", "GET / HT", "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                              "GET /later HTTP/1.1\r\nHost: localhost\r\n\r\n"};
+  std::vector<std::unique_ptr<WebClient>> clients;
+  for (int i = 0; i < 2 * WebServer::kMaxConnections; ++i) {
+    clients.push_back(std::make_unique<WebClient>(server_.port()));
+    clients.back()->Send(said[i % 4]);
+    server_.Serve(1);
+  }
+  EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), HasSubstr("<p>page"));
+  const auto closed = std::ranges::count_if(clients, [](const auto& client) {
+    bool is_closed = false;
+    client->Received(&is_closed);
+    return is_closed;
+  });
+  EXPECT_EQ(closed, WebServer::kMaxConnections + 1);
+  bool newest_closed = false;
+  clients.back()->Received(&newest_closed);
+  EXPECT_FALSE(newest_closed);
+  for (const WebSite::Reply& reply : site_.later_) {
+    reply({200, "text/plain", "late"});
+  }
+  Serve();
+}
+
+TEST_F(WebServerTest, ALongRequestEndsTheConnection) {
+  WebClient client(server_.port());
+  client.Send("GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(100'000, 'x') + "\r\n\r\n");
+  Serve();
+  bool closed = false;
+  EXPECT_EQ(client.Received(&closed), "");
+  EXPECT_TRUE(closed);
+}
+
+TEST(WebServer, SaysWhatIsWrongWithItsAddress) {
+  TestSite site;
+  WebServer first({"127.0.0.1", 0, {}}, site);
+  EXPECT_THROW(WebServer({"127.0.0.1", first.port(), {}}, site), std::runtime_error);
+  EXPECT_THROW(WebServer({"nowhere", 0, {}}, site), std::runtime_error);
+  EXPECT_THROW(WebServer({"127.0.0.1", 0, {}, true, {"https://app.example/"}}, site),
+               std::runtime_error);
+}
+
+class ForProgramsTest : public WebServerTest {
+ protected:
+  ForProgramsTest() : WebServerTest({"127.0.0.1", 0, {}, true, {"https://app.example"}}) {}
+
+  std::string Request(const std::string& method, const std::string& origin) {
+    site_.last_ = {};
+    return Ask(method + " /echo HTTP/1.1\r\nHost: 127.0.0.1:1\r\n" +
+               (origin.empty() ? "" : "Origin: " + origin + "\r\n") +
+               "Access-Control-Request-Method: PUT\r\nContent-Length: 0\r\n\r\n");
+  }
+};
+
+TEST_F(ForProgramsTest, ProgramsMayAskWithoutAnOrigin) {
+  EXPECT_THAT(Request("POST", ""), StartsWith("HTTP/1.1 201"));
+  EXPECT_THAT(Ask(UpgradeRequest("/socket", "")), StartsWith("HTTP/1.1 101"));
+}
+
+TEST_F(ForProgramsTest, PagesOfOtherOriginsGetNothing) {
+  for (const char* origin : {"http://evil.example", "null", "https://app.example.evil"}) {
+    for (const char* method : {"GET", "POST", "DELETE", "OPTIONS"}) {
+      const std::string answer = Request(method, origin);
+      EXPECT_THAT(answer, StartsWith("HTTP/1.1 403")) << method << " " << origin;
+      EXPECT_THAT(answer, Not(HasSubstr("Access-Control"))) << method << " " << origin;
+      EXPECT_EQ(site_.last_.method, "") << "the site was asked";
+    }
+    EXPECT_THAT(Ask(UpgradeRequest("/socket", origin)), StartsWith("HTTP/1.1 403")) << origin;
+  }
+}
+
+// An image or a script of another's page comes without an origin.
+TEST_F(ForProgramsTest, PagesOfOthersEmbedNothing) {
+  const auto get = [this](const std::string& from) {
+    return Ask("GET /echo HTTP/1.1\r\nHost: 127.0.0.1:1\r\nSec-Fetch-Site: " + from + "\r\n\r\n");
+  };
+  EXPECT_THAT(get("cross-site"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("same-site"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("none"), StartsWith("HTTP/1.1 201")) << "typed by the user";
+}
+
+TEST_F(ForProgramsTest, PagesOfAnAllowedOriginMay) {
+  const std::string answer = Request("POST", "https://app.example");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 201"));
+  EXPECT_THAT(answer, HasSubstr("Access-Control-Allow-Origin: https://app.example\r\n"));
+  EXPECT_THAT(answer, HasSubstr("Vary: Origin"));
+  const std::string preflight = Request("OPTIONS", "https://app.example");
+  EXPECT_THAT(preflight, StartsWith("HTTP/1.1 204"));
+  EXPECT_THAT(preflight, HasSubstr("Access-Control-Allow-Methods: GET, POST, PUT, DELETE"));
+  EXPECT_THAT(preflight, HasSubstr("Access-Control-Allow-Headers: Content-Type, If-Match"));
+  EXPECT_EQ(site_.last_.method, "") << "a preflight is the server's own";
+  EXPECT_THAT(Ask(UpgradeRequest("/socket", "https://app.example")), StartsWith("HTTP/1.1 101"));
+}
+
+}  // namespace
+}  // namespace pangea::web
