@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <sstream>
 
 #include "programs.h"
 
@@ -24,15 +25,25 @@ class SessionTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new fs::path(FreshFolder("session"));
-    run_ = new Outcome(RunCommand("pangea-session run " PANGEA_SOURCE_DIR "/sessions/demo.yaml"
-                                  " --recordings " +
-                                  Walk(1).parent_path().string() + " --out " +
+    run_ = new Outcome(RunCommand("pangea-session run " + DemoAtHalfSize().string() +
+                                  " --recordings " + Walk(1).parent_path().string() + " --out " +
                                   (*folder_ / "out").string() + " --rate max"));
   }
   static void TearDownTestSuite() {
     fs::remove_all(*folder_);
     delete folder_;
     delete run_;
+  }
+  // The recordings here have images of half the size.
+  static fs::path DemoAtHalfSize() {
+    std::stringstream text;
+    text << std::ifstream(PANGEA_SOURCE_DIR "/sessions/demo.yaml").rdbuf();
+    std::string demo = text.str();
+    const std::string pixel = "pixel: [418, 374]";
+    demo.replace(demo.find(pixel), pixel.size(), "pixel: [209, 187]");
+    const fs::path file = *folder_ / "demo.yaml";
+    std::ofstream(file) << demo;
+    return file;
   }
   static fs::path Out(const std::string& name) { return *folder_ / "out" / name; }
 
@@ -58,6 +69,17 @@ TEST_F(SessionTest, TwoAgentsBecomeOneMap) {
     EXPECT_GT(agent["coverage"].get<double>(), 0.95);
     EXPECT_LT(agent["ate_vio_m"].get<double>(), kMaxAteVio_m);
   }
+}
+
+// The recordings are too short for an error 10 s after the fusion.
+TEST_F(SessionTest, TheAnchorIsPlacedAndShownToTheOther) {
+  const auto anchors = ReadJson(Out("report.json"))["anchors"];
+  ASSERT_EQ(anchors.size(), 1u);
+  EXPECT_EQ(anchors[0]["name"], "kettle");
+  EXPECT_EQ(anchors[0]["made_by"], 1);
+  EXPECT_TRUE(anchors[0]["placed"]);
+  ASSERT_EQ(anchors[0]["agents"].size(), 1u);
+  EXPECT_EQ(anchors[0]["agents"][0]["id"], 2);
 }
 
 TEST_F(SessionTest, LeavesEveryFile) {

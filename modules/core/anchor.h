@@ -55,7 +55,7 @@ struct AnchorEdit {
   std::optional<Matrix6d> covariance;               // of T_ref_anchor, where it is known
 };
 
-inline constexpr size_t kMaxAnchorName = 100;
+inline constexpr size_t kMaxAnchorName = 50;
 inline constexpr size_t kMaxAnchorPayload = 1000;
 
 // Where an anchor is, for those who show it.
