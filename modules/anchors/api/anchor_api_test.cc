@@ -24,21 +24,14 @@ struct Heard {
   std::map<std::string, std::string> headers;
 };
 
-// One for all tests: it is what takes long.
-const SyntheticWorld& World() {
-  static const SyntheticWorld world = [] {
-    SyntheticWorldOptions options;
-    options.num_keyframes = 20;
-    return MakeSyntheticWorld(options);
-  }();
-  return world;
-}
-
 class AnchorApiTest : public testing::Test {
  protected:
   AnchorApiTest()
       : anchors_(options_),
         api_(anchors_, options_, [this](const AnchorEdit& edit) { requested_.push_back(edit); }) {
+    SyntheticWorldOptions options;
+    options.num_keyframes = 20;
+    world_ = MakeSyntheticWorld(options);
     for (const SyntheticAgent& agent : world_.agents) {
       for (const Keyframe& keyframe : agent.keyframes) {
         anchors_.Take(keyframe);
@@ -107,7 +100,7 @@ class AnchorApiTest : public testing::Test {
   }
 
   AnchorsOptions options_;
-  const SyntheticWorld& world_ = World();
+  SyntheticWorld world_;
   Anchors anchors_;
   AnchorApi api_;
   std::vector<AnchorEdit> requested_;
