@@ -244,7 +244,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
   LoggedEdits edits;
   for (const fs::path& log : logs) {
     by_log.push_back(ReadKeyframeLog(log, readings));
-    Merge(ReadAnchorEdits(log), &edits);
+    Merge(ReadAnchorEdits(log, readings), &edits);
   }
   std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
   const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
