@@ -137,8 +137,8 @@ TEST_F(ArchiveTest, IsRefusedWhenAnyByteIsOther) {
 
 TEST_F(ArchiveTest, WritesNothingOutsideTheSite) {
   const std::vector<uint8_t> data(3, 1);
-  for (const char* name : {"site/../../evil", "/etc/evil", "site/keys/../evil.key", "site/lock",
-                           "site/keys/.key"}) {
+  for (const char* name :
+       {"site/../../evil", "/etc/evil", "site/keys/../evil.key", "site/lock", "site/keys/.key"}) {
     fs::remove(file);
     ArchiveFileWriter writer(file);
     writer.Begin(name, 3, 0600, 0);

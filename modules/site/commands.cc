@@ -86,7 +86,7 @@ void RunMerge(const Arguments& arguments) {
       "{}: {} keyframes of {}, {} of {}, {} anchor edits; {} maps were in both\n", arguments.out,
       summary.keyframes_first, arguments.site, summary.keyframes_second, arguments.other,
       summary.anchor_edits, summary.maps_in_both);
-  std::cout << fmt::format("the server that starts on it looks for places that both have\n");
+  std::cout << "the server that starts on it looks for places that both have\n";
   NoteLoss(arguments.out, summary.bytes_lost);
 }
 
@@ -101,8 +101,8 @@ void RunCompact(const Arguments& arguments) {
 
 void RunDelete(const Arguments& arguments) {
   const Site site = ReadSite(arguments.site);
-  std::cout << fmt::format("{} to delete {}: type its name, {}: ", arguments.now ? "for ever" : "",
-                           site.folder.string(), site.description.name)
+  std::cout << fmt::format("{}: type the site's name, {}, to {} it: ", site.folder.string(),
+                           site.description.name, arguments.now ? "remove" : "move away")
             << std::flush;
   std::string typed;
   std::getline(std::cin, typed);

@@ -61,7 +61,8 @@ TEST(Compact, DropsDamageAndKeepsACopyOfIt) {
   file.close();
   Compact(site);
   LogReadings readings;
-  ReadLog(site.journal(), [](const LogEvent&) {}, &readings);
+  ReadLog(
+      site.journal(), [](const LogEvent&) {}, &readings);
   EXPECT_TRUE(readings.begin()->second.whole());
   EXPECT_EQ(EventsOf(site).size(), WalksOf({1}).size() - 1);
   EXPECT_EQ(std::count_if(fs::directory_iterator(site.folder), fs::directory_iterator(),
@@ -110,11 +111,14 @@ TEST(Compact, LeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
   const std::vector<StoredEvent> before = Wasteful();
   const std::vector<StoredEvent> after = Lean();
   const int num_written = static_cast<int>(after.size());
-  const std::vector<std::pair<CompactStep, int>> kills{
-      {CompactStep::kRead, 1},          {CompactStep::kWrite, 1},
-      {CompactStep::kWrite, num_written / 2}, {CompactStep::kWrite, num_written},
-      {CompactStep::kWritten, 1},       {CompactStep::kCompared, 1},
-      {CompactStep::kSwapped, 1},       {CompactStep::kDone, 1}};
+  const std::vector<std::pair<CompactStep, int>> kills{{CompactStep::kRead, 1},
+                                                       {CompactStep::kWrite, 1},
+                                                       {CompactStep::kWrite, num_written / 2},
+                                                       {CompactStep::kWrite, num_written},
+                                                       {CompactStep::kWritten, 1},
+                                                       {CompactStep::kCompared, 1},
+                                                       {CompactStep::kSwapped, 1},
+                                                       {CompactStep::kDone, 1}};
   for (const auto& [step, nth] : kills) {
     const Site site = MakeSite(FreshFolder("compact_killed") / "hall", before);
     CompactKilledAt(site, step, nth);

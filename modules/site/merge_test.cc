@@ -11,7 +11,7 @@
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "replay/replay.h"
-#include "report/metrics/final_groups.h"
+#include "report/metrics/report_groups.h"
 #include "site/site_export.h"
 #include "site/site_test_world.h"
 
@@ -73,8 +73,8 @@ TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
 
 TEST_F(MergeTest, NumbersAnchorEditsOn) {
   const Site a = MakeSite(folder / "a", {EditEvent({1, 7}, 1, 0), EditEvent({1, 7}, 2, 1)});
-  const Site b = MakeSite(folder / "b", {EditEvent({2, 7}, 1, 0), EditEvent({1, 7}, 1, 1),
-                                         EditEvent({2, 8}, 1, 5)});
+  const Site b = MakeSite(
+      folder / "b", {EditEvent({2, 7}, 1, 0), EditEvent({1, 7}, 1, 1), EditEvent({2, 8}, 1, 5)});
   EXPECT_EQ(MergeSites(a, b, out, {}).anchor_edits, 4);
   int64_t next = 0;
   for (const StoredEvent& event : EventsOf(ReadSite(out))) {
@@ -132,8 +132,9 @@ TEST_F(MergeTest, BringsTheFirstsOptionsAndKeysIfWanted) {
   EXPECT_FALSE(fs::exists(out / "options/posegraph.yaml"));
   EXPECT_EQ(ReadTextFile(out / "keys/agent_2.key"), "two");
   std::ofstream(second.keys() / "agent_1.key") << "other";
-  EXPECT_THAT(WhyNot([&] { MergeSites(first, second, folder / "x", {.name = "", .with_keys = true}); }),
-              HasSubstr("is another key than the other site's"));
+  EXPECT_THAT(
+      WhyNot([&] { MergeSites(first, second, folder / "x", {.name = "", .with_keys = true}); }),
+      HasSubstr("is another key than the other site's"));
   EXPECT_FALSE(fs::exists(folder / "x"));
 }
 
