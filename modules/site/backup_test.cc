@@ -101,6 +101,15 @@ TEST_P(BackupTest, OverwritesNothing) {
   EXPECT_THAT(WhyNot([&] { Restore(copy, site.folder); }), HasSubstr("nothing is overwritten"));
 }
 
+TEST_P(BackupTest, LeavesNothingOnAFullDisk) {
+  EXPECT_THAT(OnFullDisk(300'000, [&] { BackUp(site, copy, false); }),
+              HasSubstr("cannot be written"));
+  BackUp(site, copy, false);
+  EXPECT_THAT(OnFullDisk(300'000, [&] { Restore(copy, folder / "again"); }),
+              HasSubstr("cannot be written"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, BackupTest, testing::Values("copy.tar.zst", "copy"),
                          [](const auto& info) {
                            return std::string(info.param) == "copy" ? "Folder" : "Archive";

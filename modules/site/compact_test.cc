@@ -84,6 +84,14 @@ TEST(Compact, RefusesWhileTheSiteOrItsJournalIsInUse) {
   EXPECT_EQ(EventsOf(site), WalksOf({1}));
 }
 
+TEST(Compact, LeavesTheOldOneWhenTheDiskIsFull) {
+  const Site site = MakeSite(FreshFolder("compact_full") / "hall", Wasteful());
+  EXPECT_THAT(OnFullDisk(300'000, [&] { Compact(site); }),
+              HasSubstr("journal.lcm.compacting: cannot be written: File too large"));
+  EXPECT_EQ(EventsOf(site), Wasteful());
+  EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));
+}
+
 TEST(Compact, HasNothingToDoWithoutAJournal) {
   const Site site = CreateSite(FreshFolder("compact_empty") / "hall", NewDescription("hall"));
   EXPECT_THROW(Compact(site), std::runtime_error);

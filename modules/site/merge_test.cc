@@ -118,6 +118,12 @@ TEST_F(MergeTest, RefusesAMapThatDiffers) {
   EXPECT_FALSE(fs::exists(out));
 }
 
+TEST_F(MergeTest, LeavesNothingOnAFullDisk) {
+  EXPECT_THAT(OnFullDisk(1'000'000, [&] { MergeSites(first, second, out, {}); }),
+              HasSubstr("cannot be written"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
 TEST_F(MergeTest, BringsTheFirstsOptionsAndKeysIfWanted) {
   std::ofstream(first.options() / "fusion.yaml") << "{}\n";
   std::ofstream(second.options() / "posegraph.yaml") << "{}\n";

@@ -1,7 +1,13 @@
 #include "site/site_test_world.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
 
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -98,6 +104,29 @@ std::vector<StoredEvent> EventsOf(const Site& site) {
     events.push_back({event.utime, event.channel, {event.data.begin(), event.data.end()}});
   });
   return events;
+}
+
+std::string OnFullDisk(int64_t bytes, const std::function<void()>& action) {
+  int said[2];
+  EXPECT_EQ(pipe(said), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{static_cast<rlim_t>(bytes), static_cast<rlim_t>(bytes)};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      action();
+    } catch (const std::exception& error) {
+      [[maybe_unused]] const auto n = write(said[1], error.what(), std::strlen(error.what()));
+    }
+    _exit(0);
+  }
+  close(said[1]);
+  char text[1000] = {};
+  [[maybe_unused]] const auto n = read(said[0], text, sizeof(text) - 1);
+  close(said[0]);
+  waitpid(child, nullptr, 0);
+  return text;
 }
 
 std::string FoundAtOpening(const Site& site) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <string>
 #include <vector>
@@ -33,6 +34,9 @@ StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
 Site MakeSite(const std::filesystem::path& folder, const std::vector<StoredEvent>& events);
 // Without CHECKSUMS and DAMAGED.
 std::vector<StoredEvent> EventsOf(const Site& site);
+// In a process of its own, for which no file can be longer than so many bytes, as on a full disk;
+// why it threw, empty if it did not.
+std::string OnFullDisk(int64_t bytes, const std::function<void()>& action);
 // What the agent_handler that opens it finds amiss; empty: nothing.
 std::string FoundAtOpening(const Site& site);
 
