@@ -129,7 +129,7 @@ class NewFile {
 };
 
 fs::path MakeRoomFor(const fs::path& folder, const std::string& name) {
-  const fs::path path = folder / name;
+  fs::path path = folder / name;
   fs::create_directories(path.parent_path());
   return path;
 }

@@ -23,7 +23,7 @@ fs::path NameFor(const fs::path& folder) {
 fs::path Delete(const Site& site, bool now) {
   const SiteLock lock(site);
   const fs::path folder = fs::absolute(site.folder / "").parent_path();
-  const fs::path away = NameFor(folder);
+  fs::path away = NameFor(folder);
   fs::rename(folder, away);
   SyncToDisk(folder.parent_path());
   if (!now) {
