@@ -73,6 +73,33 @@ TEST_F(SiteProgram, ServesASiteThatIsLookedAtAndBackedUpMeanwhile) {
   EXPECT_EQ(Site("compact " + site).exit_code, 0);
 }
 
+// Two days: a server on each walk by itself, which matches its keyframes; then one on both.
+TEST_F(SiteProgram, AServerFusesTheMapsOfTwoSitesThatWereMerged) {
+  std::ofstream(folder / "run.sh") << fmt::format(
+      R"(cd {0}
+within_a_minute() {{
+  for i in $(seq 120); do sh -c "$1" >/dev/null 2>&1 && return; sleep 0.5; done
+  echo "never: $1"
+}}
+serve_until() {{  # a site, and what to wait for
+  pangea-server --site $1 >$1.txt & server=$!
+  within_a_minute "$2"
+  kill -INT $server; wait $server
+}}
+for day in 1 2; do
+  pangea-site create day_$day {1} >/dev/null
+  pangea-log cut {2}/logs/two_walks/session.lcm --channels KEYFRAME_$day --out day_$day/journal.lcm
+  serve_until day_$day "pangea-site info day_$day | grep -q 'matches *3[12]$'"
+done
+pangea-site merge day_1 day_2 --out both
+serve_until both "grep -q 'posegraph: 2 maps in 1 groups' both/logs/posegraph.txt"
+)",
+      folder.string(), Buses(), PANGEA_SOURCE_DIR);
+  const std::string said = RunCommand("sh " + (folder / "run.sh").string()).output;
+  EXPECT_THAT(said, HasSubstr("both: 32 keyframes of day_1, 31 of day_2"));
+  EXPECT_THAT(said, Not(HasSubstr("never")));
+}
+
 TEST_F(SiteProgram, ExportsTrajectoriesAndPoints) {
   MakeSiteOfWalks();
   const Outcome outcome = Site(fmt::format("export {} --out {}/out", site, folder.string()));
