@@ -50,9 +50,8 @@ void List(const std::string& folder) {
 
 void Create(const Arguments& arguments) {
   const fs::path folder = arguments.site;
-  SiteDescription description = NewDescription(
-      arguments.name.empty() ? fs::absolute(folder / "").parent_path().filename().string()
-                             : arguments.name);
+  SiteDescription description =
+      NewDescription(arguments.name.empty() ? NameOfFolder(folder) : arguments.name);
   description.bus = arguments.bus.empty() ? description.bus : arguments.bus;
   description.link = arguments.link.empty() ? description.link : arguments.link;
   const Site site = CreateSite(folder, description);

@@ -195,8 +195,7 @@ MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& o
     CopyKeys(second, made_site.keys());
   }
   SiteDescription description =
-      NewDescription(options.name.empty() ? fs::absolute(out / "").parent_path().filename().string()
-                                          : options.name);
+      NewDescription(options.name.empty() ? NameOfFolder(out) : options.name);
   description.bus = first.description.bus;
   description.link = first.description.link;
   made.Commit(description);

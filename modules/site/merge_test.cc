@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <functional>
 
 #include "files/text_file.h"
 #include "log_file/log_reader.h"
@@ -12,7 +11,6 @@
 #include "messages/channels.h"
 #include "replay/replay.h"
 #include "report/metrics/report_groups.h"
-#include "site/site_export.h"
 #include "site/site_test_world.h"
 
 namespace pangea::site {
@@ -20,15 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-
-std::string WhyNot(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "nothing was refused";
-}
 
 int Count(const std::vector<StoredEvent>& events, const std::string& channel) {
   return static_cast<int>(std::ranges::count(events, channel, &StoredEvent::channel));
@@ -58,11 +47,6 @@ TEST_F(MergeTest, HasAllOfTheFirstAndBehindItTheSecondsKeyframes) {
 // What the server makes of it: the maps overlap, and become one group.
 TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
   MergeSites(first, second, out, {});
-  LogReadings readings;
-  const std::vector<std::string> files = ExportSite(ReadSite(out), folder / "exported", &readings);
-  EXPECT_THAT(files, testing::ElementsAre((folder / "exported/agent_1.tum").string(),
-                                          (folder / "exported/agent_2.tum").string(),
-                                          (folder / "exported/map.ply").string()));
   Progress progress("test");
   session::Replay({out / "journal.lcm"}, {}, 1e9, folder / "replay.lcm", progress);
   const auto groups = session::FinalGroups(session::ReadServerLog(folder / "replay.lcm"));

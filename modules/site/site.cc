@@ -112,6 +112,10 @@ int ReadPid(int fd) {
 
 }  // namespace
 
+std::string NameOfFolder(const fs::path& folder) {
+  return fs::absolute(folder / "").parent_path().filename();
+}
+
 SiteDescription NewDescription(const std::string& name) {
   SiteDescription description;
   description.name = name;
@@ -155,7 +159,7 @@ Site OpenSite(const fs::path& folder) {
   if (fs::exists(folder / "site.yaml")) {
     return ReadSite(folder);
   }
-  return CreateSite(folder, NewDescription(fs::absolute(folder / "").parent_path().filename()));
+  return CreateSite(folder, NewDescription(NameOfFolder(folder)));
 }
 
 SiteInTheMaking::SiteInTheMaking(const fs::path& folder)

@@ -45,7 +45,9 @@ struct Site {
   std::filesystem::path logs() const { return folder / "logs"; }
 };
 
-// Now, on the default buses.
+// What a site is called that nobody gave a name.
+std::string NameOfFolder(const std::filesystem::path& folder);
+// Made now, on the default buses.
 SiteDescription NewDescription(const std::string& name);
 
 // Throws std::runtime_error that names the file, the field and the mend: there is no site, or

@@ -17,15 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-std::string WhyNot(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "nothing was refused";
-}
-
 TEST(Site, IsReadAsItWasMade) {
   const fs::path folder = FreshFolder("made") / "hall";
   SiteDescription description = NewDescription("The \"hall\": north");

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <stdexcept>
 
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -104,6 +105,15 @@ std::vector<StoredEvent> EventsOf(const Site& site) {
     events.push_back({event.utime, event.channel, {event.data.begin(), event.data.end()}});
   });
   return events;
+}
+
+std::string WhyNot(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "nothing was refused";
 }
 
 std::string OnFullDisk(int64_t bytes, const std::function<void()>& action) {

@@ -34,6 +34,8 @@ StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
 Site MakeSite(const std::filesystem::path& folder, const std::vector<StoredEvent>& events);
 // Without CHECKSUMS and DAMAGED.
 std::vector<StoredEvent> EventsOf(const Site& site);
+// Why it threw.
+std::string WhyNot(const std::function<void()>& action);
 // In a process of its own, for which no file can be longer than so many bytes, as on a full disk;
 // why it threw, empty if it did not.
 std::string OnFullDisk(int64_t bytes, const std::function<void()>& action);
