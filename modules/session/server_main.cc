@@ -4,40 +4,100 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <optional>
+#include <stdexcept>
 
 #include "bus/bus.h"
 #include "link/wire.h"
 #include "session/server.h"
+#include "site/site.h"
+
+namespace pangea::session {
+namespace {
+
+struct Arguments {
+  ServerOptions options;
+  std::string site;
+  std::string options_folder;
+  std::vector<std::string> option_files;
+};
+
+void AddArguments(CLI::App& app, Arguments* arguments) {
+  ServerOptions& options = arguments->options;
+  CLI::Option* site = app.add_option(
+      "--site", arguments->site,
+      "folder of a site: journal, keys, options, logs, buses; made at the first start");
+  app.add_option(
+      "--bus", options.bus,
+      fmt::format("LCM URL of the server bus (default: the site's, or {})", kDefaultBusUrl));
+  app.add_option(
+      "--link", options.link,
+      fmt::format("LCM URL of the link bus (default: the site's, or {})", kDefaultLinkUrl));
+  app.add_option("--journal", options.journal,
+                 "without --site: LCM log to append to; an existing one is loaded")
+      ->excludes(site);
+  app.add_option("--keys", options.keys,
+                 "without --site: folder with the key of each agent that may join")
+      ->excludes(site);
+  app.add_option("--logs", options.logs,
+                 "folder for what the processes say (default: <journal>.logs)")
+      ->excludes(site);
+  app.add_option("--options-dir", arguments->options_folder,
+                 "folder with options: fusion.yaml, posegraph.yaml, ...")
+      ->excludes(site);
+  app.add_option("--options", arguments->option_files,
+                 "PROCESS=FILE.yaml, before what the folder has");
+}
+
+// What the command line leaves open is the site's.
+void UseSite(const site::Site& site, Arguments* arguments) {
+  ServerOptions& options = arguments->options;
+  options.journal = site.journal();
+  options.keys = site.keys();
+  options.logs = site.logs();
+  arguments->options_folder = site.options();
+  options.bus = options.bus.empty() ? site.description.bus : options.bus;
+  options.link = options.link.empty() ? site.description.link : options.link;
+}
+
+void UseDefaults(ServerOptions* options) {
+  if (options->journal.empty() || options->keys.empty()) {
+    throw std::runtime_error("give --site FOLDER, or --journal FILE and --keys FOLDER");
+  }
+  options->bus = options->bus.empty() ? kDefaultBusUrl : options->bus;
+  options->link = options->link.empty() ? kDefaultLinkUrl : options->link;
+  if (options->logs.empty()) {
+    options->logs = options->journal.string() + ".logs";
+  }
+}
+
+int Run(Arguments* arguments) {
+  std::optional<site::SiteLock> lock;
+  if (!arguments->site.empty()) {
+    const site::Site site = site::OpenSite(arguments->site);
+    lock.emplace(site);
+    UseSite(site, arguments);
+  }
+  UseDefaults(&arguments->options);
+  if (!arguments->options_folder.empty()) {
+    AddOptionsFolder(arguments->options_folder, &arguments->options);
+  }
+  for (const std::string& file : arguments->option_files) {
+    AddProcessOptions(file, &arguments->options);
+  }
+  return Serve(arguments->options);
+}
+
+}  // namespace
+}  // namespace pangea::session
 
 int main(int argc, char** argv) {
   CLI::App app("Runs the server's processes, and starts again what ends", "pangea-server");
-  pangea::session::ServerOptions options;
-  options.bus = pangea::kDefaultBusUrl;
-  options.link = pangea::kDefaultLinkUrl;
-  std::string folder;
-  std::vector<std::string> files;
-  app.add_option("--bus", options.bus, "LCM URL of the server bus")->capture_default_str();
-  app.add_option("--link", options.link, "LCM URL of the link bus")->capture_default_str();
-  app.add_option("--journal", options.journal, "LCM log to append to; an existing one is loaded")
-      ->required();
-  app.add_option("--keys", options.keys, "folder with the key of each agent that may join")
-      ->required();
-  app.add_option("--logs", options.logs,
-                 "folder for what the processes say (default: <journal>.logs)");
-  app.add_option("--options-dir", folder, "folder with options: fusion.yaml, posegraph.yaml, ...");
-  app.add_option("--options", files, "PROCESS=FILE.yaml, before what the folder has");
+  pangea::session::Arguments arguments;
+  pangea::session::AddArguments(app, &arguments);
   CLI11_PARSE(app, argc, argv);
   try {
-    if (!folder.empty()) {
-      pangea::session::AddOptionsFolder(folder, &options);
-    }
-    for (const std::string& file : files) {
-      pangea::session::AddProcessOptions(file, &options);
-    }
-    if (options.logs.empty()) {
-      options.logs = options.journal.string() + ".logs";
-    }
-    return pangea::session::Serve(options);
+    return pangea::session::Run(&arguments);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-server: {}\n", error.what());
     return 1;

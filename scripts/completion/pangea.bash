@@ -40,4 +40,4 @@ _pangea() {
 
 complete -o bashdefault -o default -F _pangea pangea-agent-handler pangea-anchors pangea-calibrate pangea-eval pangea-fusion pangea-global-ba \
   pangea-inter-map-ba pangea-keyframe-player pangea-link-emulator pangea-log pangea-map-points pangea-place-recognition \
-  pangea-posegraph pangea-server pangea-session pangea-sim pangea-uplink pangea-viewer pangea-vio
+  pangea-posegraph pangea-server pangea-session pangea-sim pangea-site pangea-uplink pangea-viewer pangea-vio

@@ -1,0 +1,205 @@
+#include "site/commands.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "site/backup.h"
+#include "site/compact.h"
+#include "site/merge.h"
+#include "site/site.h"
+#include "site/site_delete.h"
+#include "site/site_export.h"
+#include "site/site_info.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string site, other, out, name, bus, link;
+  bool with_keys = false;
+  bool now = false;
+};
+using Shared = std::shared_ptr<Arguments>;
+
+double Megabytes(int64_t bytes) { return 1e-6 * static_cast<double>(bytes); }
+
+void NoteLoss(const fs::path& of, int64_t bytes) {
+  if (bytes > 0) {
+    std::cerr << fmt::format(
+        "pangea-site: {}: {} bytes of it are damaged and lost; all else is there\n", of.string(),
+        bytes);
+  }
+}
+
+void List(const std::string& folder) {
+  const std::vector<fs::path> folders =
+      folder.empty() ? DefaultSiteFolders() : std::vector<fs::path>{folder};
+  std::string text;
+  for (const fs::path& one : folders) {
+    text += ListSites(one);
+  }
+  std::cout << (text.empty() ? "no sites here; name their folder, or: pangea-site create PATH\n"
+                             : text);
+}
+
+void Create(const Arguments& arguments) {
+  const fs::path folder = arguments.site;
+  SiteDescription description =
+      NewDescription(arguments.name.empty() ? NameOfFolder(folder) : arguments.name);
+  description.bus = arguments.bus.empty() ? description.bus : arguments.bus;
+  description.link = arguments.link.empty() ? description.link : arguments.link;
+  const Site site = CreateSite(folder, description);
+  std::cout << fmt::format(
+      "{}: made; a key for each agent into {}, then: pangea-server --site {}\n", folder.string(),
+      site.keys().string(), folder.string());
+}
+
+void RunBackup(const Arguments& arguments) {
+  const BackupSummary summary =
+      BackUp(ReadSite(arguments.site), arguments.out, arguments.with_keys);
+  std::cout << fmt::format(
+      "{}: {:.1f} MB of journal, {} events, in {:.1f} MB; read again: the "
+      "same{}\n",
+      arguments.out, Megabytes(summary.journal_bytes), summary.events, Megabytes(summary.bytes),
+      arguments.with_keys ? "; it holds the agents' keys: keep it safe" : "");
+  NoteLoss(arguments.site, summary.lost_bytes);
+}
+
+void RunRestore(const Arguments& arguments) {
+  const BackupSummary summary = Restore(arguments.other, arguments.site);
+  std::cout << fmt::format("{}: {:.1f} MB of journal, {} events\n", arguments.site,
+                           Megabytes(summary.journal_bytes), summary.events);
+  NoteLoss(arguments.site, summary.lost_bytes);
+}
+
+void RunMerge(const Arguments& arguments) {
+  const MergeSummary summary = MergeSites(ReadSite(arguments.site), ReadSite(arguments.other),
+                                          arguments.out, {arguments.name, arguments.with_keys});
+  std::cout << fmt::format(
+      "{}: {} keyframes of {}, {} of {}, {} anchor edits; {} maps were in both\n", arguments.out,
+      summary.keyframes_first, arguments.site, summary.keyframes_second, arguments.other,
+      summary.anchor_edits, summary.maps_in_both);
+  std::cout << "the server that starts on it looks for places that both have\n";
+  NoteLoss(arguments.out, summary.bytes_lost);
+}
+
+void RunCompact(const Arguments& arguments) {
+  const Site site = ReadSite(arguments.site);
+  const CompactSummary summary = Compact(site);
+  std::cout << fmt::format("{}: {} events in {:.1f} MB, before {} in {:.1f} MB\n",
+                           site.journal().string(), summary.events_after,
+                           Megabytes(summary.bytes_after), summary.events_before,
+                           Megabytes(summary.bytes_before));
+}
+
+void RunDelete(const Arguments& arguments) {
+  const Site site = ReadSite(arguments.site);
+  std::cout << fmt::format("{}: type the site's name, {}, to {} it: ", site.folder.string(),
+                           site.description.name, arguments.now ? "remove" : "move away")
+            << std::flush;
+  std::string typed;
+  std::getline(std::cin, typed);
+  if (typed != site.description.name) {
+    throw std::runtime_error(fmt::format("'{}' is not the site's name, '{}': nothing is deleted",
+                                         typed, site.description.name));
+  }
+  const fs::path away = Delete(site, arguments.now);
+  std::cout << (away.empty() ? fmt::format("{}: removed\n", site.folder.string())
+                             : fmt::format("{}: is {} now; remove that for the room\n",
+                                           site.folder.string(), away.string()));
+}
+
+CLI::App* AddSiteCommand(CLI::App& app, const std::string& name, const std::string& help,
+                         const Shared& arguments) {
+  CLI::App* command = app.add_subcommand(name, help);
+  command->add_option("path", arguments->site, "The site's folder")->required();
+  return command;
+}
+
+void AddReading(CLI::App& app, const Shared& arguments, LogReadings* readings) {
+  CLI::App* list = app.add_subcommand("list", "The sites in a folder: name, size, folder, state");
+  list->add_option("folder", arguments->site,
+                   "Folder of sites (default: ~/.local/share/pangea and /var/lib/pangea)");
+  list->callback([arguments] { List(arguments->site); });
+
+  CLI::App* info = AddSiteCommand(
+      app, "info", "What is in a site: keyframes, maps, anchors, damage; a server may run",
+      arguments);
+  info->callback([arguments] { std::cout << ToText(ReadInfo(ReadSite(arguments->site))); });
+
+  CLI::App* out = AddSiteCommand(
+      app, "export", "Trajectories (*.tum) and map points (map.ply), by a replay of the journal",
+      arguments);
+  out->add_option("--out", arguments->out, "New folder for them")->required();
+  out->callback([arguments, readings] {
+    for (const std::string& file :
+         ExportSite(ReadSite(arguments->site), arguments->out, readings)) {
+      std::cout << file << "\n";
+    }
+  });
+}
+
+void AddMaking(CLI::App& app, const Shared& arguments) {
+  CLI::App* create = AddSiteCommand(app, "create", "A new site", arguments);
+  create->add_option("--name", arguments->name, "Its name (default: its folder's)");
+  create->add_option("--bus", arguments->bus,
+                     "LCM URL of its server bus (default: the server's default; two sites that are "
+                     "served at once need one each)");
+  create->add_option("--link", arguments->link, "LCM URL of its link bus (default: likewise)");
+  create->callback([arguments] { Create(*arguments); });
+
+  CLI::App* backup = AddSiteCommand(
+      app, "backup", "Copies a site while its server runs, and reads the copy again", arguments);
+  backup->add_option("to", arguments->out, "New FILE.tar.zst, or a new folder, which is a site")
+      ->required();
+  backup->add_flag("--with-keys", arguments->with_keys, "The agents' keys too");
+  backup->callback([arguments] { RunBackup(*arguments); });
+
+  CLI::App* restore = app.add_subcommand("restore", "A site from a backup");
+  restore->add_option("from", arguments->other, "FILE.tar.zst or folder of `backup`")
+      ->required()
+      ->check(CLI::ExistingPath);
+  restore->add_option("path", arguments->site, "The new site's folder")->required();
+  restore->callback([arguments] { RunRestore(*arguments); });
+
+  CLI::App* merge = app.add_subcommand(
+      "merge", "Two sites as one new one, whose server fuses their maps where they overlap");
+  merge->add_option("first", arguments->site, "The older site's folder; its options are kept")
+      ->required();
+  merge->add_option("second", arguments->other, "The other's")->required();
+  merge->add_option("--out", arguments->out, "The new site's folder")->required();
+  merge->add_option("--name", arguments->name, "Its name (default: its folder's)");
+  merge->add_flag("--with-keys", arguments->with_keys, "The agents' keys of both too");
+  merge->callback([arguments] { RunMerge(*arguments); });
+}
+
+void AddChanging(CLI::App& app, const Shared& arguments) {
+  CLI::App* compact = AddSiteCommand(
+      app, "compact",
+      "Drops repeats, replaced options and filled damage from the journal; no server may run",
+      arguments);
+  compact->callback([arguments] { RunCompact(*arguments); });
+
+  CLI::App* remove = AddSiteCommand(
+      app, "delete", "Asks for the site's name, and moves it to PATH.deleted-<UTC time>",
+      arguments);
+  remove->add_flag("--now", arguments->now, "Removes it");
+  remove->callback([arguments] { RunDelete(*arguments); });
+}
+
+}  // namespace
+
+void AddCommands(CLI::App& app, LogReadings* readings) {
+  const auto arguments = std::make_shared<Arguments>();
+  AddReading(app, arguments, readings);
+  AddMaking(app, arguments);
+  AddChanging(app, arguments);
+}
+
+}  // namespace pangea::site

@@ -1,0 +1,99 @@
+#include "site/compact.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <iostream>
+#include <stdexcept>
+
+#include "agent_handler/journal/journal.h"
+#include "log_file/log_reader.h"
+#include "site/journal_contents.h"
+#include "site/journal_writer.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Nobody else has it open; what is damaged is kept beside it.
+Journal Lock(const fs::path& journal) {
+  return Journal(journal.string(),
+                 [](const std::string&, Bytes, const JournalPlace&) { return true; });
+}
+
+int64_t WriteWhatCounts(const fs::path& from, const JournalContents& contents, const fs::path& to,
+                        const std::function<void(CompactStep)>& on_step) {
+  JournalWriter writer(to);
+  CountingEvents counting(contents);
+  LogReadings readings;
+  const auto copy = [&](const LogEvent& event) {
+    if (counting.Counts(event)) {
+      on_step(CompactStep::kWrite);
+      writer.Write(event.utime, event.channel, event.data);
+    }
+  };
+  ReadLog(from, copy, &readings);
+  writer.Finish();
+  return writer.count();
+}
+
+// Owner and mode: the server's user goes on writing it, whoever compacts.
+void TakeOwner(const fs::path& from, const fs::path& to) {
+  struct stat info {};
+  if (stat(from.c_str(), &info) != 0 || chown(to.c_str(), info.st_uid, info.st_gid) != 0 ||
+      chmod(to.c_str(), info.st_mode & 07777) != 0) {
+    throw std::runtime_error(fmt::format("{}: cannot be given the owner of {}: {}; run as that one",
+                                         to.string(), from.string(), std::strerror(errno)));
+  }
+}
+
+}  // namespace
+
+CompactSummary Compact(const Site& site, const std::function<void(CompactStep)>& on_step) {
+  const fs::path journal = site.journal();
+  const fs::path made = site.folder / "journal.lcm.compacting";
+  const SiteLock lock(site);
+  if (!fs::exists(journal)) {
+    throw std::runtime_error(
+        fmt::format("{}: there is no journal yet, nothing to compact", journal.string()));
+  }
+  const Journal old = Lock(journal);
+  if (const std::string said = old.mend().Said(journal); !said.empty()) {
+    std::cerr << said << "\n";
+  }
+  fs::remove(made);  // of a run that was ended
+  CompactSummary summary;
+  summary.bytes_before = static_cast<int64_t>(fs::file_size(journal));
+  on_step(CompactStep::kRead);
+  const JournalContents contents = ReadContents(journal);
+  summary.events_before = contents.events;
+  try {
+    summary.events_after = WriteWhatCounts(journal, contents, made, on_step);
+    TakeOwner(journal, made);
+    on_step(CompactStep::kWritten);
+    const JournalContents written = ReadContents(made);
+    if (!written.reading.whole() || !written.SaysTheSame(contents)) {
+      throw std::runtime_error(
+          fmt::format("{}: does not say what {} says, and is thrown away; is the disk all right?",
+                      made.string(), journal.string()));
+    }
+    summary.bytes_after = static_cast<int64_t>(fs::file_size(made));
+    SyncToDisk(made);
+    on_step(CompactStep::kCompared);
+  } catch (...) {
+    fs::remove(made);
+    throw;
+  }
+  fs::rename(made, journal);
+  on_step(CompactStep::kSwapped);
+  SyncToDisk(site.folder);
+  on_step(CompactStep::kDone);
+  return summary;
+}
+
+}  // namespace pangea::site

@@ -1,0 +1,143 @@
+#include "site/compact.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "site/journal_contents.h"
+#include "site/site_test_world.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// With repeats of all kinds among them, and options that newer ones replace.
+std::vector<StoredEvent> Wasteful() {
+  std::vector<StoredEvent> events{OptionsEvent("fusion", "a: 1"), OptionsEvent("fusion", "a: 2")};
+  for (const StoredEvent& event : WalksOf({1})) {
+    events.push_back(event);
+    events.push_back(event);
+  }
+  events.push_back(EditEvent({1, 7}, 1, 0));
+  events.push_back(EditEvent({1, 7}, 1, 0));
+  events.push_back(EditEvent({1, 7}, 2, 1));
+  events.push_back({1'800'000'000'000'000, "OTHER", {1, 2, 3}});
+  events.push_back({1'800'000'000'000'000, "OTHER", {1, 2, 3}});
+  events.push_back(OptionsEvent("fusion", "a: 3"));
+  return events;
+}
+
+std::vector<StoredEvent> Lean() {
+  std::vector<StoredEvent> events = WalksOf({1});
+  events.push_back(EditEvent({1, 7}, 1, 0));
+  events.push_back(EditEvent({1, 7}, 2, 1));
+  events.push_back({1'800'000'000'000'000, "OTHER", {1, 2, 3}});
+  events.push_back({1'800'000'000'000'000, "OTHER", {1, 2, 3}});
+  events.push_back(OptionsEvent("fusion", "a: 3"));
+  return events;
+}
+
+TEST(Compact, KeepsWhatCountsInItsOrder) {
+  const Site site = MakeSite(FreshFolder("compact") / "hall", Wasteful());
+  const CompactSummary summary = Compact(site);
+  EXPECT_EQ(EventsOf(site), Lean());
+  EXPECT_EQ(FoundAtOpening(site), "");
+  EXPECT_EQ(summary.events_before, std::ssize(Wasteful()));
+  EXPECT_EQ(summary.events_after, std::ssize(Lean()));
+  EXPECT_LT(summary.bytes_after, 0.55 * static_cast<double>(summary.bytes_before));
+}
+
+TEST(Compact, DropsDamageAndKeepsACopyOfIt) {
+  const Site site = MakeSite(FreshFolder("compact_damage") / "hall", WalksOf({1}));
+  std::fstream file(site.journal(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(40'000);
+  file.write("damage", 6);
+  file.close();
+  Compact(site);
+  LogReadings readings;
+  ReadLog(
+      site.journal(), [](const LogEvent&) {}, &readings);
+  EXPECT_TRUE(readings.begin()->second.whole());
+  EXPECT_EQ(EventsOf(site).size(), WalksOf({1}).size() - 1);
+  EXPECT_EQ(std::count_if(fs::directory_iterator(site.folder), fs::directory_iterator(),
+                          [](const auto& entry) {
+                            return entry.path().string().find("damaged-") != std::string::npos;
+                          }),
+            1);
+}
+
+TEST(Compact, RefusesWhileTheSiteOrItsJournalIsInUse) {
+  const Site site = MakeSite(FreshFolder("compact_used") / "hall", WalksOf({1}));
+  {
+    const Journal journal(site.journal(),
+                          [](const std::string&, Bytes, const JournalPlace&) { return true; });
+    EXPECT_THROW(Compact(site), std::runtime_error);
+  }
+  const SiteLock lock(site);
+  EXPECT_THROW(Compact(site), std::runtime_error);
+  EXPECT_EQ(EventsOf(site), WalksOf({1}));
+}
+
+TEST(Compact, LeavesTheOldOneWhenTheDiskIsFull) {
+  const Site site = MakeSite(FreshFolder("compact_full") / "hall", Wasteful());
+  EXPECT_THAT(OnFullDisk(300'000, [&] { Compact(site); }),
+              HasSubstr("journal.lcm.compacting: cannot be written: File too large"));
+  EXPECT_EQ(EventsOf(site), Wasteful());
+  EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));
+}
+
+TEST(Compact, HasNothingToDoWithoutAJournal) {
+  const Site site = CreateSite(FreshFolder("compact_empty") / "hall", NewDescription("hall"));
+  EXPECT_THROW(Compact(site), std::runtime_error);
+  EXPECT_FALSE(fs::exists(site.journal()));
+}
+
+// kill -9 when a step is reached for the n-th time.
+void CompactKilledAt(const Site& site, CompactStep step, int nth) {
+  const pid_t child = fork();
+  if (child == 0) {
+    int seen = 0;
+    Compact(site, [&](CompactStep reached) {
+      if (reached == step && ++seen == nth) {
+        kill(getpid(), SIGKILL);
+      }
+    });
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status)) << "the step was not reached";
+}
+
+TEST(Compact, LeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
+  const std::vector<StoredEvent> before = Wasteful();
+  const std::vector<StoredEvent> after = Lean();
+  const int num_written = static_cast<int>(after.size());
+  const std::vector<std::pair<CompactStep, int>> kills{{CompactStep::kRead, 1},
+                                                       {CompactStep::kWrite, 1},
+                                                       {CompactStep::kWrite, num_written / 2},
+                                                       {CompactStep::kWrite, num_written},
+                                                       {CompactStep::kWritten, 1},
+                                                       {CompactStep::kCompared, 1},
+                                                       {CompactStep::kSwapped, 1},
+                                                       {CompactStep::kDone, 1}};
+  for (const auto& [step, nth] : kills) {
+    const Site site = MakeSite(FreshFolder("compact_killed") / "hall", before);
+    CompactKilledAt(site, step, nth);
+    const bool swapped = step >= CompactStep::kSwapped;
+    EXPECT_EQ(EventsOf(site), swapped ? after : before) << static_cast<int>(step);
+    EXPECT_EQ(FoundAtOpening(site), "");
+    Compact(site);  // what was left over is no obstacle
+    EXPECT_EQ(EventsOf(site), after);
+    EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));
+  }
+}
+
+}  // namespace
+}  // namespace pangea::site

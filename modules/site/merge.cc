@@ -1,0 +1,205 @@
+#include "site/merge.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <optional>
+#include <set>
+#include <stdexcept>
+
+#include "files/text_file.h"
+#include "log_file/checksums.h"
+#include "log_file/log_reader.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "site/journal_contents.h"
+#include "site/journal_writer.h"
+#include "site/site_files.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The data's checksum of each keyframe of a map.
+using MapKeyframes = std::map<int32_t, uint32_t>;
+using MapsOfJournal = std::map<MapId, MapKeyframes>;
+
+bool IsKeyframe(const LogEvent& event) {
+  return event.channel.starts_with(channels::kKeyframePrefix);
+}
+
+std::optional<KeyframeId> KeyframeOf(const LogEvent& event) {
+  keyframe_t message{};
+  return DecodeMessage(event.data, &message) ? Parse(message.id).value : std::nullopt;
+}
+
+std::optional<Constraint> ConstraintOf(const LogEvent& event) {
+  constraint_t message{};
+  return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
+}
+
+void ReadJournal(const Site& site, const std::function<void(const LogEvent&)>& handler,
+                 LogReadings* readings) {
+  if (fs::exists(site.journal())) {
+    ReadLog(site.journal(), handler, readings);
+  }
+}
+
+MapsOfJournal ReadMaps(const Site& site, LogReadings* readings) {
+  MapsOfJournal maps;
+  ReadJournal(
+      site,
+      [&maps](const LogEvent& event) {
+        const auto id = IsKeyframe(event) ? KeyframeOf(event) : std::nullopt;
+        if (id) {
+          maps[id->map].emplace(id->seq, EventChecksum(event.data));
+        }
+      },
+      readings);
+  return maps;
+}
+
+// The maps that both have. Throws if one of them is not the same in both.
+std::set<MapId> MapsInBoth(const Site& first, const MapsOfJournal& maps_first, const Site& second,
+                           const MapsOfJournal& maps_second) {
+  std::set<MapId> both;
+  for (const auto& [id, keyframes] : maps_second) {
+    const auto other = maps_first.find(id);
+    if (other == maps_first.end()) {
+      continue;
+    }
+    if (other->second != keyframes) {
+      throw std::runtime_error(fmt::format(
+          "map {} is in {} ({} keyframes) and in {} ({} keyframes), and is not the same in both; "
+          "is one an older copy of the other? Then take the newer one alone",
+          ToString(id), first.journal().string(), other->second.size(), second.journal().string(),
+          keyframes.size()));
+    }
+    both.insert(id);
+  }
+  return both;
+}
+
+class Merger {
+ public:
+  Merger(const fs::path& journal, std::set<MapId> in_both)
+      : writer_(journal), in_both_(std::move(in_both)) {}
+
+  void TakeFirst(const LogEvent& event) {
+    const std::string name = NameOf(event);
+    if (event.channel == channels::kAnchorEdit) {
+      WriteEdit(event, name);
+    } else if (name.empty() || event.channel.starts_with(channels::kOptionsPrefix) ||
+               names_.insert(name).second) {
+      Write(event, &summary_.keyframes_first);
+    }
+  }
+
+  void TakeSecond(const LogEvent& event) {
+    const std::string name = NameOf(event);
+    if (event.channel == channels::kAnchorEdit) {
+      WriteEdit(event, name);
+    } else if (GoesAlong(event) && names_.insert(name).second) {
+      Write(event, &summary_.keyframes_second);
+    }
+  }
+
+  MergeSummary Finish() {
+    writer_.Finish();
+    summary_.maps_in_both = std::ssize(in_both_);
+    return summary_;
+  }
+
+ private:
+  bool GoesAlong(const LogEvent& event) const {
+    if (IsKeyframe(event)) {
+      const auto id = KeyframeOf(event);
+      return id && !in_both_.contains(id->map);
+    }
+    const auto constraint =
+        event.channel == channels::kConstraint ? ConstraintOf(event) : std::nullopt;
+    return constraint && constraint->from.map != constraint->to.map;
+  }
+
+  // Capture times go on from the first's: they do not step back from one to the next.
+  void Write(const LogEvent& event, int64_t* keyframes) {
+    latest_utime_ = std::max(latest_utime_, event.utime);
+    writer_.Write(latest_utime_, event.channel, event.data);
+    *keyframes += IsKeyframe(event) ? 1 : 0;
+  }
+
+  void WriteEdit(const LogEvent& event, const std::string& name) {
+    anchor_edit_t message{};
+    if (name.empty() || !DecodeMessage(event.data, &message) || !names_.insert(name).second) {
+      return;
+    }
+    message.seq = summary_.anchor_edits++;
+    latest_utime_ = std::max(latest_utime_, event.utime);
+    writer_.Write(latest_utime_, event.channel, EncodeMessage(message));
+  }
+
+  JournalWriter writer_;
+  const std::set<MapId> in_both_;
+  std::set<std::string> names_;  // of what is written
+  int64_t latest_utime_ = 0;
+  MergeSummary summary_;
+};
+
+// A file of the second site beside those of the first, unless it is there already.
+void CopyKeys(const Site& site, const fs::path& keys) {
+  for (const fs::path& key : KeyFiles(site)) {
+    const fs::path to = keys / key.filename();
+    if (!fs::exists(to)) {
+      fs::copy_file(key, to);
+    } else if (ReadTextFile(to) != ReadTextFile(key)) {
+      throw std::runtime_error(
+          fmt::format("{}: is another key than the other site's; an agent has one: merge without "
+                      "--with-keys, and make new keys",
+                      key.string()));
+    }
+  }
+}
+
+void CopyOptions(const Site& site, const fs::path& options) {
+  for (const fs::path& file : OptionFiles(site)) {
+    fs::copy_file(file, options / file.filename());
+  }
+}
+
+}  // namespace
+
+MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& out,
+                        const MergeOptions& options) {
+  SiteInTheMaking made(out);
+  LogReadings readings;
+  const MapsOfJournal maps = ReadMaps(first, &readings);
+  std::set<MapId> in_both = MapsInBoth(first, maps, second, ReadMaps(second, &readings));
+  const Site made_site{made.folder(), {}};
+  Merger merger(made_site.journal(), std::move(in_both));
+  ReadJournal(
+      first, [&merger](const LogEvent& event) { merger.TakeFirst(event); }, &readings);
+  ReadJournal(
+      second, [&merger](const LogEvent& event) { merger.TakeSecond(event); }, &readings);
+  MergeSummary summary = merger.Finish();
+  for (const auto& [log, reading] : readings) {
+    summary.bytes_lost += reading.lost_bytes;
+  }
+  fs::create_directories(made_site.keys());
+  fs::permissions(made_site.keys(), fs::perms::owner_all);
+  fs::create_directories(made_site.options());
+  CopyOptions(first, made_site.options());
+  if (options.with_keys) {
+    CopyKeys(first, made_site.keys());
+    CopyKeys(second, made_site.keys());
+  }
+  SiteDescription description =
+      NewDescription(options.name.empty() ? NameOfFolder(out) : options.name);
+  description.bus = first.description.bus;
+  description.link = first.description.link;
+  made.Commit(description);
+  return summary;
+}
+
+}  // namespace pangea::site

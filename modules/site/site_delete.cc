@@ -1,0 +1,36 @@
+#include "site/site_delete.h"
+
+#include <fmt/format.h>
+
+namespace pangea::site {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// With "-2" and so on behind it where there is one already.
+fs::path NameFor(const fs::path& folder) {
+  const std::string first = fmt::format("{}.deleted-{}", folder.string(), TimeForFileName());
+  std::string name = first;
+  for (int i = 2; fs::exists(name); ++i) {
+    name = fmt::format("{}-{}", first, i);
+  }
+  return name;
+}
+
+}  // namespace
+
+fs::path Delete(const Site& site, bool now) {
+  const SiteLock lock(site);
+  const fs::path folder = fs::absolute(site.folder / "").parent_path();
+  fs::path away = NameFor(folder);
+  fs::rename(folder, away);
+  SyncToDisk(folder.parent_path());
+  if (!now) {
+    return away;
+  }
+  fs::remove_all(away);
+  return {};
+}
+
+}  // namespace pangea::site

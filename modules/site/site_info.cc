@@ -1,0 +1,206 @@
+#include "site/site_info.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+
+#include "anchors/anchor_book.h"
+#include "log_file/log_reader.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+
+int64_t BytesIn(const fs::path& folder) {
+  int64_t bytes = 0;
+  std::error_code ignored;  // what is not ours to read, or has just gone
+  for (auto it = fs::recursive_directory_iterator(
+           folder, fs::directory_options::skip_permission_denied, ignored);
+       it != fs::recursive_directory_iterator(); it.increment(ignored)) {
+    bytes += it->is_regular_file(ignored) ? static_cast<int64_t>(it->file_size(ignored)) : 0;
+  }
+  return bytes;
+}
+
+// Counts what the events say.
+class Counter {
+ public:
+  explicit Counter(SiteInfo* info) : info_(info) {}
+
+  void Take(const LogEvent& event) {
+    info_->first_utime = std::min(info_->first_utime.value_or(event.utime), event.utime);
+    info_->last_utime = std::max(info_->last_utime.value_or(event.utime), event.utime);
+    if (event.channel.starts_with(channels::kKeyframePrefix)) {
+      TakeKeyframe(event.data);
+    } else if (event.channel == channels::kPlaceMatch) {
+      ++info_->matches;
+    } else if (event.channel == channels::kConstraint) {
+      TakeConstraint(event.data);
+    } else if (event.channel == channels::kAnchorEdit) {
+      TakeEdit(event.data);
+    }
+  }
+  int64_t anchors() const {
+    return static_cast<int64_t>(book_.entries().size() - book_.num_deleted());
+  }
+
+ private:
+  void TakeKeyframe(Bytes data) {
+    keyframe_t message{};
+    if (DecodeMessage(data, &message)) {
+      if (const auto id = Parse(message.id).value) {
+        info_->keyframes[id->map].insert(id->seq);
+      }
+    }
+  }
+  void TakeConstraint(Bytes data) {
+    constraint_t message{};
+    if (DecodeMessage(data, &message)) {
+      ++(message.accepted ? info_->constraints_accepted : info_->constraints_refused);
+    }
+  }
+  void TakeEdit(Bytes data) {
+    anchor_edit_t message{};
+    if (DecodeMessage(data, &message)) {
+      if (const auto edit = Parse(message).value) {
+        book_.Take(*edit);
+      }
+    }
+  }
+
+  SiteInfo* info_;
+  AnchorBook book_{std::numeric_limits<size_t>::max()};
+};
+
+std::string Megabytes(int64_t bytes) {
+  return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
+}
+
+std::string Date(std::optional<int64_t> utime) {
+  return utime ? fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
+                             fmt::gmtime(static_cast<std::time_t>(*utime / 1'000'000)))
+               : "-";
+}
+
+std::string UseOf(const std::optional<int>& user) {
+  return user ? fmt::format("in use by process {}", *user) : "not in use";
+}
+
+// A server that runs is about to write the rest of the last event.
+std::string DamageOf(const SiteInfo& info) {
+  LogReading reading = info.reading;
+  if (info.user) {
+    reading.torn_bytes = 0;
+  }
+  return reading.whole() ? "none" : DescribeLoss(reading);
+}
+
+std::string Missing(const std::set<int32_t>& seqs) {
+  const int64_t missing = *seqs.rbegin() + 1 - std::ssize(seqs);
+  return missing == 0 ? "" : fmt::format(", {} missing", missing);
+}
+
+std::string Line(const std::string& what, const std::string& value) {
+  return fmt::format("{:<12} {}\n", what, value);
+}
+
+}  // namespace
+
+SiteInfo ReadInfo(const Site& site) {
+  SiteInfo info;
+  info.site = site;
+  info.user = UserOf(site);
+  info.bytes = BytesIn(site.folder);
+  info.free_bytes = static_cast<int64_t>(fs::space(site.folder).available);
+  if (fs::exists(site.journal())) {
+    Counter counter(&info);
+    LogReadings readings;
+    ReadLog(
+        site.journal(), [&counter](const LogEvent& event) { counter.Take(event); }, &readings);
+    info.anchors = counter.anchors();
+    info.reading = readings.at(site.journal());
+  }
+  return info;
+}
+
+std::string ToText(const SiteInfo& info) {
+  const SiteDescription& description = info.site.description;
+  std::map<int32_t, int> maps_of_agent;
+  int64_t num_keyframes = 0;
+  for (const auto& [map, seqs] : info.keyframes) {
+    ++maps_of_agent[map.agent_id];
+    num_keyframes += std::ssize(seqs);
+  }
+  std::vector<int32_t> agents;
+  for (const auto& [agent, maps] : maps_of_agent) {
+    agents.push_back(agent);
+  }
+  std::string text =
+      Line("name", description.name) + Line("folder", info.site.folder.string()) +
+      Line("created", description.created) + Line("state", UseOf(info.user)) +
+      Line("size", Megabytes(info.bytes)) + Line("free disk", Megabytes(info.free_bytes)) +
+      Line("bus", description.bus) + Line("link", description.link) +
+      Line("agents", fmt::format("{}", fmt::join(agents, ", "))) +
+      Line("maps", fmt::format("{}", info.keyframes.size())) +
+      Line("keyframes", fmt::format("{}", num_keyframes)) +
+      Line("matches", fmt::format("{}", info.matches)) +
+      Line("constraints", fmt::format("{} accepted, {} refused", info.constraints_accepted,
+                                      info.constraints_refused)) +
+      Line("anchors", fmt::format("{}", info.anchors)) + Line("first", Date(info.first_utime)) +
+      Line("last", Date(info.last_utime)) + Line("damage", DamageOf(info));
+  for (const auto& [map, seqs] : info.keyframes) {
+    text +=
+        Line("map", fmt::format("{}: {} keyframes{}", ToString(map), seqs.size(), Missing(seqs)));
+  }
+  return text;
+}
+
+std::vector<fs::path> DefaultSiteFolders() {
+  std::vector<fs::path> folders;
+  if (const char* home = std::getenv("HOME"); home != nullptr) {
+    folders.push_back(fs::path(home) / ".local/share/pangea");
+  }
+  folders.emplace_back("/var/lib/pangea");
+  std::error_code error;
+  std::erase_if(folders, [&error](const fs::path& folder) {
+    fs::directory_iterator(folder, error);
+    return static_cast<bool>(error);
+  });
+  return folders;
+}
+
+std::string ListSites(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw std::runtime_error(fmt::format("{}: is no folder", folder.string()));
+  }
+  std::vector<fs::path> sites;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::error_code ignored;
+    if (fs::exists(entry.path() / "site.yaml", ignored)) {
+      sites.push_back(entry.path());
+    }
+  }
+  std::ranges::sort(sites);
+  std::string text;
+  for (const fs::path& path : sites) {
+    try {
+      const Site site = ReadSite(path);
+      text += fmt::format("{:<24} {:>12}  {}  {}\n", site.description.name,
+                          Megabytes(BytesIn(path)), path.string(), UseOf(UserOf(site)));
+    } catch (const std::exception& error) {
+      text += fmt::format("{:<24} {:>12}  {}  {}\n", "?", Megabytes(BytesIn(path)), path.string(),
+                          error.what());
+    }
+  }
+  return text;
+}
+
+}  // namespace pangea::site

@@ -1,0 +1,134 @@
+#include "site/site.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "site/site_delete.h"
+#include "site/site_info.h"
+#include "site/site_test_world.h"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+TEST(Site, IsReadAsItWasMade) {
+  const fs::path folder = FreshFolder("made") / "hall";
+  SiteDescription description = NewDescription("The \"hall\": north");
+  description.bus = "udpm://239.255.76.67:7001?ttl=0";
+  const Site made = CreateSite(folder, description);
+  EXPECT_EQ(fs::status(made.keys()).permissions(), fs::perms::owner_all);
+  const Site read = ReadSite(folder);
+  EXPECT_EQ(read.description.name, description.name);
+  EXPECT_EQ(read.description.bus, description.bus);
+  EXPECT_EQ(read.description.created, description.created);
+}
+
+TEST(Site, IsMadeAtTheFirstOpeningAndFoundAtTheSecond) {
+  const fs::path folder = FreshFolder("opened") / "hall";
+  EXPECT_EQ(OpenSite(folder).description.name, "hall");
+  EXPECT_EQ(OpenSite(folder / "").description.name, "hall");
+}
+
+TEST(Site, IsMadeOfAJournalThatWasThere) {
+  const fs::path folder = FreshFolder("adopted");
+  std::ofstream(folder / "journal.lcm") << "";
+  fs::create_directories(folder / "keys");
+  EXPECT_NO_THROW(OpenSite(folder));
+}
+
+TEST(Site, RefusesAFolderOfSomethingElse) {
+  const fs::path folder = FreshFolder("else");
+  std::ofstream(folder / "thesis.tex") << "x";
+  EXPECT_THAT(WhyNot([&] { OpenSite(folder); }), HasSubstr("'thesis.tex' in it is nothing of"));
+  EXPECT_FALSE(fs::exists(folder / "keys"));
+  EXPECT_THAT(WhyNot([&] { OpenSite(folder / "thesis.tex"); }), HasSubstr("is no folder"));
+  EXPECT_THAT(WhyNot([&] { ReadSite(folder); }), HasSubstr("it has no site.yaml"));
+}
+
+TEST(Site, NamesFileAndFieldOfWhatIsWrong) {
+  const fs::path folder = FreshFolder("wrong");
+  const auto refused = [&](const std::string& yaml) {
+    std::ofstream(folder / "site.yaml") << yaml;
+    return WhyNot([&] { ReadSite(folder); });
+  };
+  const std::string rest = "created: now\nbus: a\nlink: b\n";
+  EXPECT_THAT(refused("format: 2\nname: x\n" + rest), HasSubstr("site.yaml: format: 2; this"));
+  EXPECT_THAT(refused("format: 1\nname: \"\"\n" + rest), HasSubstr("site.yaml: name: give 1 to"));
+  EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: a\nlink: a\n"),
+              HasSubstr("two LCM URLs that differ"));
+  EXPECT_THAT(refused("format: 1\n" + rest), HasSubstr("name"));
+  EXPECT_THAT(refused("format: 1\nnaem: x\n" + rest), HasSubstr("did you mean 'name'"));
+}
+
+TEST(SiteLock, IsHeldByOneAndNamesIt) {
+  const Site site = CreateSite(FreshFolder("lock") / "hall", NewDescription("hall"));
+  EXPECT_FALSE(UserOf(site));
+  int ready[2], end[2];
+  ASSERT_EQ(pipe(ready), 0);
+  ASSERT_EQ(pipe(end), 0);
+  const pid_t other = fork();
+  if (other == 0) {
+    const SiteLock lock(site);
+    char byte = 'x';
+    [[maybe_unused]] auto n = write(ready[1], &byte, 1);
+    n = read(end[0], &byte, 1);
+    _exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  EXPECT_EQ(UserOf(site), other);
+  const std::string named = "is in use by process " + std::to_string(other);
+  EXPECT_THAT(WhyNot([&] { const SiteLock lock(site); }), HasSubstr(named));
+  EXPECT_THAT(WhyNot([&] { Delete(site, true); }), HasSubstr(named));
+  ASSERT_EQ(write(end[1], &byte, 1), 1);
+  waitpid(other, nullptr, 0);
+  EXPECT_FALSE(UserOf(site));  // it need not have tidied up
+  EXPECT_NO_THROW(const SiteLock lock(site));
+}
+
+TEST(SiteInfo, CountsWhatIsThere) {
+  std::vector<StoredEvent> events = WalksOf({1, 2});
+  events.push_back(EditEvent({1, 7}, 1, 0));
+  events.push_back(EditEvent({1, 8}, 1, 1));
+  events.push_back(EditEvent({1, 7}, 2, 2, true));
+  const Site site = MakeSite(FreshFolder("info") / "hall", events);
+  const SiteInfo info = ReadInfo(site);
+  EXPECT_EQ(info.keyframes.size(), 2u);
+  EXPECT_EQ(info.keyframes.begin()->second.size(), 32u);
+  EXPECT_EQ(info.matches, 63);
+  EXPECT_EQ(info.constraints_accepted, 56);
+  EXPECT_EQ(info.constraints_refused, 9);
+  EXPECT_EQ(info.anchors, 1);
+  EXPECT_TRUE(info.reading.whole());
+  EXPECT_GT(info.free_bytes, 0);
+  EXPECT_THAT(ToText(info), HasSubstr("damage       none\n"));
+  EXPECT_THAT(ListSites(site.folder.parent_path()), HasSubstr("not in use"));
+}
+
+TEST(SiteInfo, TellsDamageButNotWhatAServerIsWriting) {
+  const Site site = MakeSite(FreshFolder("torn") / "hall", WalksOf({1}));
+  fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);
+  EXPECT_THAT(ToText(ReadInfo(site)), testing::Not(HasSubstr("damage       none")));
+  const SiteLock lock(site);
+  EXPECT_THAT(ToText(ReadInfo(site)), HasSubstr("damage       none\n"));
+}
+
+TEST(SiteDelete, MovesAwayOrRemoves) {
+  const fs::path folder = FreshFolder("delete");
+  Site site = MakeSite(folder / "hall", WalksOf({1}));
+  const fs::path away = Delete(site, false);
+  EXPECT_FALSE(fs::exists(site.folder));
+  EXPECT_TRUE(fs::exists(away / "journal.lcm"));
+  site = CreateSite(folder / "hall", NewDescription("hall"));
+  EXPECT_EQ(Delete(site, true), "");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+}
+
+}  // namespace
+}  // namespace pangea::site

@@ -1,0 +1,148 @@
+#include "site/site_test_world.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+
+#include "log_file/log_reader.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "pangea/options_t.hpp"
+
+namespace pangea::site {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename Message>
+auto ParseEvent(const LogEvent& event) {
+  Message message{};
+  EXPECT_TRUE(DecodeMessage(event.data, &message));
+  return Parse(message).value.value();
+}
+
+bool IsOf(const LogEvent& event, const std::set<int32_t>& agents) {
+  const auto has = [&agents](const KeyframeId& id) { return agents.contains(id.map.agent_id); };
+  if (event.channel == channels::kPlaceMatch) {
+    const auto match = ParseEvent<place_match_t>(event);
+    return has(match.query) &&
+           std::ranges::all_of(match.candidates, [&](const auto& c) { return has(c.match); });
+  }
+  if (event.channel == channels::kConstraint) {
+    const auto constraint = ParseEvent<constraint_t>(event);
+    return has(constraint.from) && has(constraint.to);
+  }
+  return agents.contains(channels::AgentOf(event.channel, channels::kKeyframePrefix));
+}
+
+}  // namespace
+
+fs::path FreshFolder(const std::string& name) {
+  const fs::path folder =
+      fs::path(testing::TempDir()) / ("pangea_site_" + name + "_" + std::to_string(getpid()));
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  return folder;
+}
+
+std::vector<StoredEvent> WalksOf(const std::set<int32_t>& agents) {
+  std::vector<StoredEvent> events;
+  const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
+  ReadLog(log, [&](const LogEvent& event) {
+    if (IsOf(event, agents)) {
+      events.push_back({event.utime, event.channel, {event.data.begin(), event.data.end()}});
+    }
+  });
+  EXPECT_FALSE(events.empty());
+  return events;
+}
+
+StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted) {
+  AnchorEdit edit;
+  edit.anchor = anchor;
+  edit.revision = revision;
+  edit.agent_id = anchor.agent_id;
+  edit.right = AnchorRight::kEditOwn;
+  edit.seq = seq;
+  edit.deleted = deleted;
+  edit.name = "kettle";
+  return {1'800'000'000'000'000, std::string(channels::kAnchorEdit),
+          EncodeMessage(ToMessage(edit))};
+}
+
+StoredEvent OptionsEvent(const std::string& process, const std::string& yaml) {
+  options_t message{};
+  message.process = process;
+  message.utime = 1;
+  message.yaml = yaml;
+  return {1'800'000'000'000'000, channels::Options(process), EncodeMessage(message)};
+}
+
+Site MakeSite(const fs::path& folder, const std::vector<StoredEvent>& events) {
+  const Site site = CreateSite(folder, NewDescription(folder.filename()));
+  JournalWriter writer(site.journal());
+  int since_sync = 0;
+  for (const StoredEvent& event : events) {
+    writer.Write(event.utime, event.channel, event.data);
+    if (++since_sync % 10 == 0) {  // as small groups as a server's
+      writer.Finish();
+    }
+  }
+  writer.Finish();
+  return site;
+}
+
+std::vector<StoredEvent> EventsOf(const Site& site) {
+  std::vector<StoredEvent> events;
+  ReadLog(site.journal(), [&](const LogEvent& event) {
+    events.push_back({event.utime, event.channel, {event.data.begin(), event.data.end()}});
+  });
+  return events;
+}
+
+std::string WhyNot(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "nothing was refused";
+}
+
+std::string OnFullDisk(int64_t bytes, const std::function<void()>& action) {
+  int said[2];
+  EXPECT_EQ(pipe(said), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{static_cast<rlim_t>(bytes), static_cast<rlim_t>(bytes)};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      action();
+    } catch (const std::exception& error) {
+      [[maybe_unused]] const auto n = write(said[1], error.what(), std::strlen(error.what()));
+    }
+    _exit(0);
+  }
+  close(said[1]);
+  char text[1000] = {};
+  [[maybe_unused]] const auto n = read(said[0], text, sizeof(text) - 1);
+  close(said[0]);
+  waitpid(child, nullptr, 0);
+  return text;
+}
+
+std::string FoundAtOpening(const Site& site) {
+  const Journal journal(site.journal(),
+                        [](const std::string&, Bytes, const JournalPlace&) { return true; });
+  return journal.mend().Said(site.journal());
+}
+
+}  // namespace pangea::site

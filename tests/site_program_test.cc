@@ -1,0 +1,143 @@
+// pangea-site and pangea-server --site, as people use them.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "programs.h"
+
+namespace pangea::tests {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+// On buses of this test's own.
+std::string Buses() {
+  const int port = 33000 + getpid() % 6000 * 2;
+  return fmt::format("--bus 'udpm://239.255.76.67:{}?ttl=0' --link 'udpm://239.255.76.67:{}?ttl=0'",
+                     port, port + 1);
+}
+
+class SiteProgram : public testing::Test {
+ protected:
+  const fs::path folder = FreshFolder("site");
+  const std::string site = folder / "hall";
+
+  // A journal of both walks, with nothing said of them yet.
+  void MakeSiteOfWalks() const {
+    ASSERT_EQ(Site(fmt::format("create {} {}", site, Buses())).exit_code, 0);
+    const Outcome cut = RunCommand(
+        fmt::format("pangea-log cut " PANGEA_SOURCE_DIR
+                    "/logs/two_walks/session.lcm --channels 'KEYFRAME_.*' --out {}/journal.lcm",
+                    site));
+    ASSERT_EQ(cut.exit_code, 0) << cut.output;
+  }
+  static Outcome Site(const std::string& arguments) {
+    return RunCommand("pangea-site " + arguments);
+  }
+};
+
+TEST_F(SiteProgram, ServesASiteThatIsLookedAtAndBackedUpMeanwhile) {
+  MakeSiteOfWalks();
+  // What is done while the server runs, and then what it left.
+  std::ofstream(folder / "run.sh") << fmt::format(
+      "pangea-server --site {0} & server=$!; sleep 6\n"
+      "echo server $server\n"
+      "pangea-server --site {0}; echo second server $?\n"
+      "pangea-site compact {0}; echo compact $?\n"
+      "pangea-site info {0}; pangea-site list {1}; pangea-site backup {0} {1}/copy.tar.zst\n"
+      "kill -INT $server; wait $server; echo server ended $?\n",
+      site, folder.string());
+  const std::string said = RunCommand("sh " + (folder / "run.sh").string()).output;
+  ASSERT_THAT(said, ContainsRegex("server [0-9]+\n"));
+  const size_t at = said.find("\nserver ") + 8;
+  const std::string in_use =
+      fmt::format("is in use by process {}", said.substr(at, said.find('\n', at) - at));
+  EXPECT_THAT(said, HasSubstr("pangea-server: " + site + ": " + in_use));
+  EXPECT_THAT(said, HasSubstr("second server 1"));
+  EXPECT_THAT(said, HasSubstr("pangea-site: " + site + ": " + in_use));
+  EXPECT_THAT(said, HasSubstr("compact 1"));
+  EXPECT_THAT(said, ContainsRegex("keyframes +63\n"));
+  EXPECT_THAT(said, HasSubstr("state        " + in_use.substr(3)));
+  EXPECT_THAT(said, HasSubstr("read again: the same"));
+  EXPECT_THAT(said, HasSubstr("server ended 0"));
+  EXPECT_TRUE(fs::exists(folder / "hall" / "logs" / "fusion.txt"));
+  EXPECT_EQ(Site("restore " + (folder / "copy.tar.zst").string() + " " + site + "_2").exit_code, 0);
+  EXPECT_THAT(Site("info " + site + "_2").output, ContainsRegex("keyframes +63\n"));
+  EXPECT_EQ(Site("compact " + site).exit_code, 0);
+}
+
+// Two days: a server on each walk by itself, which matches its keyframes; then one on both.
+TEST_F(SiteProgram, AServerFusesTheMapsOfTwoSitesThatWereMerged) {
+  std::ofstream(folder / "run.sh") << fmt::format(
+      R"(cd {0}
+within_a_minute() {{
+  for i in $(seq 120); do sh -c "$1" >/dev/null 2>&1 && return; sleep 0.5; done
+  echo "never: $1"
+}}
+serve_until() {{  # a site, and what to wait for
+  pangea-server --site $1 >$1.txt & server=$!
+  within_a_minute "$2"
+  kill -INT $server; wait $server
+}}
+for day in 1 2; do
+  pangea-site create day_$day {1} >/dev/null
+  pangea-log cut {2}/logs/two_walks/session.lcm --channels KEYFRAME_$day --out day_$day/journal.lcm
+  serve_until day_$day "pangea-site info day_$day | grep -q 'matches *3[12]$'"
+done
+pangea-site merge day_1 day_2 --out both
+serve_until both "grep -q 'posegraph: 2 maps in 1 groups' both/logs/posegraph.txt"
+)",
+      folder.string(), Buses(), PANGEA_SOURCE_DIR);
+  const std::string said = RunCommand("sh " + (folder / "run.sh").string()).output;
+  EXPECT_THAT(said, HasSubstr("both: 32 keyframes of day_1, 31 of day_2"));
+  EXPECT_THAT(said, Not(HasSubstr("never")));
+}
+
+TEST_F(SiteProgram, ExportsTrajectoriesAndPoints) {
+  MakeSiteOfWalks();
+  const Outcome outcome = Site(fmt::format("export {} --out {}/out", site, folder.string()));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  for (const char* file : {"agent_1.tum", "agent_2.tum", "map.ply"}) {
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "out"), fs::directory_iterator()), 3);
+}
+
+TEST_F(SiteProgram, DeletesWhatIsNamed) {
+  Site("create " + site + " --name 'The hall'");
+  Outcome outcome = RunCommand("echo hall | pangea-site delete " + site);
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("'hall' is not the site's name, 'The hall'"));
+  EXPECT_TRUE(fs::exists(site));
+  EXPECT_EQ(Site("delete " + site).exit_code, 1);  // nobody there to ask
+  outcome = RunCommand("echo The hall | pangea-site delete " + site);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_FALSE(fs::exists(site));
+}
+
+TEST_F(SiteProgram, SaysWhatIsWrongWithACommand) {
+  EXPECT_THAT(Site("info " + site).output, HasSubstr("is no site: it has no site.yaml"));
+  EXPECT_THAT(Site("list " + site).output, HasSubstr("is no folder"));
+  EXPECT_THAT(Site("merge " + site).output, HasSubstr("second is required"));
+  EXPECT_NE(Site("").exit_code, 0);
+  std::ofstream(folder / "thesis.tex") << "x";
+  EXPECT_THAT(RunCommand("pangea-server --site " + folder.string()).output,
+              HasSubstr("'thesis.tex' in it is nothing of a site's"));
+  for (const char* other : {"--journal x", "--keys x", "--logs x", "--options-dir x"}) {
+    const Outcome outcome = RunCommand(fmt::format("pangea-server --site {} {}", site, other));
+    EXPECT_THAT(outcome.output, HasSubstr("--site excludes --")) << other;
+    EXPECT_GT(outcome.exit_code, 100);
+  }
+  EXPECT_THAT(RunCommand("pangea-server").output, HasSubstr("give --site FOLDER, or --journal"));
+  EXPECT_FALSE(fs::exists(site));
+}
+
+}  // namespace
+}  // namespace pangea::tests
