@@ -7,20 +7,22 @@
 #include <string>
 
 #include "bus/process.h"
+#include "files/scratch_file.h"
 #include "options/yaml_options.h"
 
 namespace pangea {
 
 struct ProcessDescription {
-  std::string name;      // "pangea-fusion"; on the bus it is "fusion"
-  std::string summary;   // for --help
-  YamlOptions& options;  // of --options FILE.yaml
+  std::string name;                       // "pangea-fusion"; on the bus it is "fusion"
+  std::string summary;                    // for --help
+  YamlOptions& options;                   // of --options FILE.yaml
+  ScratchFileOptions* scratch = nullptr;  // of --scratch-mb; null: it sets nothing aside
 };
 
-// Reads the command line (--bus URL, --options FILE.yaml, --print-options), then makes the process,
-// whose options are set by now, and runs it: the journal's HAVE first (journal_first.h), messages
-// and ticks until a signal. It tells its options on the bus (options_announcer.h). Errors become
-// one line and exit code 1.
+// Reads the command line (--bus URL, --options FILE.yaml, --print-options, --scratch-mb), then
+// makes the process, whose options are set by now, and runs it: the journal's HAVE first
+// (journal_first.h), messages and ticks until a signal. It tells its options on the bus
+// (options_announcer.h). Errors become one line and exit code 1.
 using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory);

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "bus/bus.h"
+#include "files/scratch_file.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -69,20 +70,21 @@ class Server {
   Server(LocalBus& bus, const ServerOptions& options, const std::set<std::string>& processes)
       : bus_(bus) {
     const auto wanted = [&processes](const char* process) { return processes.contains(process); };
+    const auto scratch = std::make_shared<ScratchFile>();
     if (wanted("place_recognition")) {
-      place_recognition_.emplace(bus, options.place_recognition);
+      place_recognition_.emplace(bus, options.place_recognition, scratch);
     }
     if (wanted("inter_map_ba")) {
-      inter_map_ba_.emplace(bus, options.inter_map_ba);
+      inter_map_ba_.emplace(bus, options.inter_map_ba, scratch);
     }
     if (wanted("fusion")) {
-      fusion_.emplace(bus, options.fusion);
+      fusion_.emplace(bus, options.fusion, scratch);
     }
     if (wanted("posegraph")) {
       posegraph_.emplace(bus, options.posegraph);
     }
     if (wanted("global_ba")) {
-      global_ba_.emplace(bus, options.global_ba);
+      global_ba_.emplace(bus, options.global_ba, scratch);
     }
   }
 
