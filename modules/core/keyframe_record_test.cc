@@ -15,6 +15,10 @@ Keyframe Full() {
   keyframe.camera.width = 640;
   keyframe.camera.height = 480;
   keyframe.camera.fx = 401.25;
+  keyframe.camera.fy = 402.25;
+  keyframe.camera.cx = 320.5;
+  keyframe.camera.cy = 240.5;
+  keyframe.camera.time_offset_s = -0.004;
   keyframe.camera.distortion = {0.1, -0.2, 0.3, -0.4};
   keyframe.camera.T_body_cam = {YawRotation(0.3), {0.1, 0.2, 0.3}};
   keyframe.camera.readout_s = 0.03;
@@ -26,7 +30,11 @@ Keyframe Full() {
   keyframe.edge = OdometryEdge{16, {YawRotation(0.01), {0.2, 0, 0}}, Matrix6d::Identity() * 0.7};
   keyframe.preintegration.emplace();
   keyframe.preintegration->duration_s = 0.25;
+  keyframe.preintegration->delta_q = YawRotation(0.02);
+  keyframe.preintegration->delta_v = {4, 5, 6};
   keyframe.preintegration->delta_p = {7, 8, 9};
+  keyframe.preintegration->gyro_bias = {0.1, 0.2, 0.3};
+  keyframe.preintegration->accel_bias = {0.4, 0.5, 0.6};
   keyframe.preintegration->covariance(2, 5) = 0.125;
   keyframe.preintegration->bias_jacobian(8, 5) = -3;
   keyframe.corners.resize(3);
@@ -42,16 +50,37 @@ TEST(KeyframeRecord, ComesBackToTheLastBit) {
   const auto back = KeyframeFromRecord(record);
   ASSERT_TRUE(back);
   EXPECT_EQ(back->id, keyframe.id);
+  EXPECT_EQ(back->utime, keyframe.utime);
   EXPECT_EQ(back->camera.kind, keyframe.camera.kind);
+  EXPECT_EQ(back->camera.width, keyframe.camera.width);
+  EXPECT_EQ(back->camera.height, keyframe.camera.height);
+  EXPECT_EQ(back->camera.fx, keyframe.camera.fx);
+  EXPECT_EQ(back->camera.fy, keyframe.camera.fy);
+  EXPECT_EQ(back->camera.cx, keyframe.camera.cx);
+  EXPECT_EQ(back->camera.cy, keyframe.camera.cy);
+  EXPECT_EQ(back->camera.time_offset_s, keyframe.camera.time_offset_s);
+  EXPECT_EQ(back->camera.readout_s, keyframe.camera.readout_s);
+  EXPECT_EQ(back->v_odom_body, keyframe.v_odom_body);
+  EXPECT_EQ(back->gyro_bias, keyframe.gyro_bias);
+  EXPECT_EQ(back->accel_bias, keyframe.accel_bias);
   EXPECT_EQ(back->camera.distortion, keyframe.camera.distortion);
   EXPECT_EQ(back->camera.T_body_cam.q.coeffs(), keyframe.camera.T_body_cam.q.coeffs());
+  EXPECT_EQ(back->camera.T_body_cam.t, keyframe.camera.T_body_cam.t);
   EXPECT_EQ(back->T_odom_body.q.coeffs(), keyframe.T_odom_body.q.coeffs());
   EXPECT_EQ(back->T_odom_body.t, keyframe.T_odom_body.t);
   EXPECT_EQ(back->roll_pitch_covariance, keyframe.roll_pitch_covariance);
   ASSERT_TRUE(back->edge);
   EXPECT_EQ(back->edge->from_seq, 16);
+  EXPECT_EQ(back->edge->T_from_this.q.coeffs(), keyframe.edge->T_from_this.q.coeffs());
+  EXPECT_EQ(back->edge->T_from_this.t, keyframe.edge->T_from_this.t);
   EXPECT_EQ(back->edge->covariance, keyframe.edge->covariance);
   ASSERT_TRUE(back->preintegration);
+  EXPECT_EQ(back->preintegration->duration_s, 0.25);
+  EXPECT_EQ(back->preintegration->delta_q.coeffs(), keyframe.preintegration->delta_q.coeffs());
+  EXPECT_EQ(back->preintegration->delta_v, keyframe.preintegration->delta_v);
+  EXPECT_EQ(back->preintegration->delta_p, keyframe.preintegration->delta_p);
+  EXPECT_EQ(back->preintegration->gyro_bias, keyframe.preintegration->gyro_bias);
+  EXPECT_EQ(back->preintegration->accel_bias, keyframe.preintegration->accel_bias);
   EXPECT_EQ(back->preintegration->covariance, keyframe.preintegration->covariance);
   EXPECT_EQ(back->preintegration->bias_jacobian, keyframe.preintegration->bias_jacobian);
   ASSERT_EQ(back->corners.size(), 3u);
@@ -60,9 +89,11 @@ TEST(KeyframeRecord, ComesBackToTheLastBit) {
   EXPECT_EQ(back->corners[1].descriptor, keyframe.corners[1].descriptor);
   EXPECT_EQ(back->corners[1].landmark_id, 99);
   ASSERT_EQ(back->points.size(), 2u);
+  EXPECT_EQ(back->points[1].corner, 2);
+  EXPECT_EQ(back->points[1].inverse_depth, 0.25F);
   EXPECT_EQ(back->points[1].inverse_depth_var, 0.02F);
   EXPECT_EQ(back->group_revision, 5);
-  EXPECT_EQ(ToRecord(*back), record);  // and whatever was not named
+  EXPECT_EQ(ToRecord(*back), record);
 }
 
 TEST(KeyframeRecord, WithoutEdgeAndPreintegration) {
