@@ -21,6 +21,16 @@ std::string NameOnTheBus(const std::string& program) {
   return name;
 }
 
+void AddScratchOption(CLI::App& app, ScratchFileOptions* scratch) {
+  constexpr int64_t kMega = 1'000'000;
+  const auto set = [scratch](int64_t megabytes) { scratch->max_bytes = megabytes * kMega; };
+  app.add_option_function<int64_t>("--scratch-mb", set,
+                                   "of the file for keyframes, in $TMPDIR or else /var/tmp; what "
+                                   "comes beyond stays in memory")
+      ->check(CLI::Range(int64_t{0}, int64_t{1'000'000'000}))
+      ->default_str(fmt::format("{}", scratch->max_bytes / kMega));
+}
+
 // A process that tells its options beside what it does.
 class WithOptions : public Process {
  public:
@@ -48,6 +58,9 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
   if (description.add_arguments) {
     description.add_arguments(app);
+  }
+  if (description.scratch != nullptr) {
+    AddScratchOption(app, description.scratch);
   }
   OptionsArguments options(app);
   CLI11_PARSE(app, argc, argv);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bus/process.h"
+#include "files/scratch_file.h"
 #include "options/yaml_options.h"
 
 namespace CLI {
@@ -20,12 +21,13 @@ struct ProcessDescription {
   std::string summary;                                // for --help
   YamlOptions& options;                               // of --options FILE.yaml
   std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
+  ScratchFileOptions* scratch = nullptr;  // of --scratch-mb; null: it sets nothing aside
 };
 
-// Reads the command line (--bus URL, --options FILE.yaml, --print-options), then makes the process,
-// whose options are set by now, and runs it: the journal's HAVE first (journal_first.h), messages
-// and ticks until a signal. It tells its options on the bus (options_announcer.h). Errors become
-// one line and exit code 1.
+// Reads the command line (--bus URL, --options FILE.yaml, --print-options, --scratch-mb), then
+// makes the process, whose options are set by now, and runs it: the journal's HAVE first
+// (journal_first.h), messages and ticks until a signal. It tells its options on the bus
+// (options_announcer.h). Errors become one line and exit code 1.
 using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory);

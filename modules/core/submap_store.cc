@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "core/keyframe_record.h"
 
 namespace pangea {
 
@@ -53,34 +56,46 @@ void SubmapStore::Add(Keyframe keyframe) {
   if (!options_.keep_preintegration) {
     keyframe.preintegration.reset();
   }
-  keyframes_.emplace(id, std::make_shared<const Keyframe>(std::move(keyframe)));
-  arrival_.push_back(id);
-  if (arrival_.size() > static_cast<size_t>(options_.max_keyframes)) {
-    keyframes_.erase(arrival_.front());
-    if (const auto cached = views_.find(arrival_.front()); cached != views_.end()) {
-      uses_.erase(cached->second.use);
-      views_.erase(cached);
-    }
-    arrival_.pop_front();
+  Stored stored{Record(ToRecord(keyframe), records_.get()), keyframe.T_odom_body.t, {}};
+  if (keyframe.edge) {
+    stored.edge_from_seq = keyframe.edge->from_seq;
+    stored.edge_m = keyframe.edge->T_from_this.t.norm();
+  }
+  if (stored.record.in_memory()) {
+    in_memory_.push_back(id);
+    ++counters_.in_memory;
+  }
+  keyframes_.emplace(id, std::move(stored));
+  if (in_memory_.size() > static_cast<size_t>(options_.max_in_memory)) {
+    DropOne();
   }
 }
 
+void SubmapStore::DropOne() {
+  views_.Erase(in_memory_.front());
+  keyframes_.erase(in_memory_.front());
+  in_memory_.pop_front();
+  --counters_.in_memory;
+  ++counters_.dropped;
+}
+
 std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
-  if (const auto cached = views_.find(id); cached != views_.end()) {
-    uses_.splice(uses_.begin(), uses_, cached->second.use);
-    return cached->second.view;
+  if (auto view = views_.Find(id)) {
+    return view;
   }
   const auto stored = keyframes_.find(id);
   if (stored == keyframes_.end()) {
     return nullptr;
   }
-  auto view = std::make_shared<const KeyframeView>(stored->second);
-  uses_.push_front(id);
-  views_.emplace(id, Cached{view, uses_.begin()});
-  if (uses_.size() > static_cast<size_t>(options_.max_views)) {
-    views_.erase(uses_.back());
-    uses_.pop_back();
+  const auto record = stored->second.record.Bytes(records_.get());
+  auto keyframe = record ? KeyframeFromRecord(*record) : std::nullopt;
+  if (!keyframe) {
+    ++counters_.unreadable;
+    return nullptr;
   }
+  auto view =
+      std::make_shared<const KeyframeView>(std::make_shared<const Keyframe>(*std::move(keyframe)));
+  views_.Add(id, view);
   return view;
 }
 
@@ -121,10 +136,10 @@ bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
     if (it == keyframes_.end()) {
       return LostSince(next).has_value();
     }
-    if (!it->second->edge) {
+    if (!it->second.edge_from_seq) {
       return true;
     }
-    next.seq = it->second->edge->from_seq;
+    next.seq = *it->second.edge_from_seq;
   }
   return true;
 }
@@ -134,10 +149,10 @@ bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& new
   while (next.seq > older.seq) {
     const auto it = keyframes_.find(next);
     if (it != keyframes_.end()) {
-      if (!it->second->edge) {
+      if (!it->second.edge_from_seq) {
         return true;
       }
-      next.seq = it->second->edge->from_seq;
+      next.seq = *it->second.edge_from_seq;
     } else if (const auto lost_since = LostSince(next)) {
       next.seq = *lost_since - 1;
     } else {
@@ -151,7 +166,7 @@ std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
                                                const KeyframeId& newer) const {
   double path_m = 0;
   KeyframeId next = newer;
-  const Keyframe* after_gap = nullptr;
+  const Stored* after_gap = nullptr;
   while (next.seq >= older.seq) {
     const auto it = keyframes_.find(next);
     if (it == keyframes_.end()) {
@@ -162,20 +177,20 @@ std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
       next.seq = *lost_since - 1;
       continue;
     }
-    const Keyframe& keyframe = *it->second;
+    const Stored& keyframe = it->second;
     if (after_gap != nullptr) {
-      path_m += (after_gap->T_odom_body.t - keyframe.T_odom_body.t).norm();
+      path_m += (after_gap->p_odom_body - keyframe.p_odom_body).norm();
       after_gap = nullptr;
     }
     if (next == older) {
       return path_m;
     }
-    if (!keyframe.edge) {
+    if (!keyframe.edge_from_seq) {
       return std::nullopt;
     }
-    next.seq = keyframe.edge->from_seq;
+    next.seq = *keyframe.edge_from_seq;
     if (keyframes_.contains(next)) {
-      path_m += keyframe.edge->T_from_this.t.norm();
+      path_m += keyframe.edge_m;
     } else {
       after_gap = &keyframe;
     }

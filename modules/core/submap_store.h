@@ -4,13 +4,16 @@
 // undistorted rays, a grid over the corners, landmark look-ups.
 //
 // In: keyframes in any order. Out: views by id, and the window of keyframes up to
-// one of them. Bounded: beyond max_keyframes the keyframe added first is dropped; derived data is
-// kept for the max_views keyframes used last and made again when asked for. Not thread safe.
+// one of them. In memory are, of every keyframe, where it is and what leads from one to the next
+// (some 200 bytes), and the views of the max_views keyframes used last. The rest is in a
+// RecordStore. What that has no room for stays in memory, encoded, and is bounded there: beyond
+// max_in_memory the one of these that was added first is dropped. No result depends on what lies
+// where. Not thread safe.
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,6 +22,8 @@
 
 #include "core/keyframe.h"
 #include "core/matching.h"
+#include "core/recent_cache.h"
+#include "core/record_store.h"
 
 namespace pangea {
 
@@ -58,15 +63,17 @@ class KeyframeView {
 using KeyframeWindow = std::vector<std::shared_ptr<const KeyframeView>>;
 
 struct SubmapStoreOptions {
-  // A keyframe of 700 corners takes about 40 kB, its view about 25 kB more.
-  int max_keyframes = 20000;
-  int max_views = 256;
+  int max_in_memory = 20000;         // about 30 kB each
+  int max_views = 256;               // about 65 kB each
   bool keep_preintegration = false;  // nothing that matches places needs it
 };
 
 class SubmapStore {
  public:
-  explicit SubmapStore(SubmapStoreOptions options = {}) : options_(options) {}
+  // Without a RecordStore everything stays in memory.
+  explicit SubmapStore(SubmapStoreOptions options = {},
+                       std::shared_ptr<RecordStore> records = nullptr)
+      : options_(options), records_(std::move(records)), views_(options.max_views) {}
 
   // A keyframe that is already there stays as it is.
   void Add(Keyframe keyframe);
@@ -76,8 +83,9 @@ class SubmapStore {
 
   bool Contains(const KeyframeId& id) const { return keyframes_.contains(id); }
   size_t size() const { return keyframes_.size(); }
+  const RecordCounters& counters() const { return counters_; }
 
-  // Null when it is not there.
+  // Null when it is not there, or cannot be read.
   std::shared_ptr<const KeyframeView> Find(const KeyframeId& id);
   // The keyframe and up to `count` - 1 before it, along the odometry edges; shorter where the map
   // begins or an edge is missing, empty when the keyframe is not there.
@@ -95,17 +103,22 @@ class SubmapStore {
   // First seq of the lost run that this keyframe is in.
   std::optional<int32_t> LostSince(const KeyframeId& id) const;
 
-  struct Cached {
-    std::shared_ptr<const KeyframeView> view;
-    std::list<KeyframeId>::iterator use;
+  struct Stored {
+    Record record;
+    Eigen::Vector3d p_odom_body;
+    std::optional<int32_t> edge_from_seq;
+    double edge_m = 0;  // its length
   };
 
+  void DropOne();
+
   SubmapStoreOptions options_;
-  std::map<KeyframeId, std::shared_ptr<const Keyframe>> keyframes_;
+  std::shared_ptr<RecordStore> records_;
+  std::map<KeyframeId, Stored> keyframes_;
   std::map<KeyframeId, int32_t> lost_;  // last of a run -> its first seq
-  std::deque<KeyframeId> arrival_;
-  std::map<KeyframeId, Cached> views_;
-  std::list<KeyframeId> uses_;  // newest first
+  std::deque<KeyframeId> in_memory_;    // in the order they came
+  RecentCache<KeyframeId, KeyframeView> views_;
+  RecordCounters counters_;
 };
 
 }  // namespace pangea

@@ -2,6 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "core/keyframe_record.h"
+#include "core/testing/test_record_store.h"
+
 namespace pangea {
 namespace {
 
@@ -89,8 +96,67 @@ TEST(SubmapStore, GoesOnAfterWhatWasLost) {
   EXPECT_TRUE(store.WindowUpTo({kMap, 3}, 5).empty());
 }
 
+// What a store says of a map with gaps, whatever is asked first.
+std::vector<std::vector<uint8_t>> Answers(SubmapStore store) {
+  for (int seq = 0; seq < 60; ++seq) {
+    if (seq % 20 != 13) {
+      store.Add(MakeKeyframe(seq));
+    }
+  }
+  std::vector<std::vector<uint8_t>> answers;
+  for (const int seq : {5, 59, 0, 30, 17, 58, 5, 31}) {
+    for (const auto& view : store.WindowUpTo({kMap, seq}, 5)) {
+      answers.push_back(ToRecord(view->keyframe()));
+    }
+    const double path_m = store.PathBetween({kMap, seq - 4}, {kMap, seq}).value_or(-1);
+    answers.push_back({static_cast<uint8_t>(path_m),
+                       static_cast<uint8_t>(store.ChainIsComplete({kMap, 0}, {kMap, seq}))});
+  }
+  return answers;
+}
+
+TEST(SubmapStore, SaysTheSameWhateverLiesWhere) {
+  const auto expected = Answers(SubmapStore({.max_views = 10000}));
+  EXPECT_GT(expected.size(), 30u);
+  EXPECT_EQ(Answers(SubmapStore({.max_views = 1})), expected);
+  EXPECT_EQ(Answers(SubmapStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(10000))),
+            expected);
+  EXPECT_EQ(Answers(SubmapStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(20))),
+            expected);
+}
+
+TEST(SubmapStore, WhatFindsNoRoomStaysInMemoryAndIsBoundedThere) {
+  SubmapStore store({.max_in_memory = 3, .max_views = 2},
+                    std::make_shared<test::TestRecordStore>(2));
+  for (int seq = 0; seq < 7; ++seq) {
+    store.Add(MakeKeyframe(seq));
+    EXPECT_NE(store.Find({kMap, seq}), nullptr);
+  }
+  EXPECT_EQ(store.size(), 5u);
+  EXPECT_EQ(store.counters().in_memory, 3);
+  EXPECT_EQ(store.counters().dropped, 2);
+  for (const int seq : {0, 1, 4, 5, 6}) {
+    EXPECT_NE(store.Find({kMap, seq}), nullptr) << seq;
+  }
+  EXPECT_FALSE(store.Contains({kMap, 2}));
+  EXPECT_EQ(store.Find({kMap, 3}), nullptr);
+}
+
+TEST(SubmapStore, WhatCannotBeReadIsNotThere) {
+  const auto records = std::make_shared<test::TestRecordStore>(100);
+  SubmapStore store({.max_views = 1}, records);
+  store.Add(MakeKeyframe(0));
+  store.Add(MakeKeyframe(1));
+  records->broken = true;
+  EXPECT_EQ(store.Find({kMap, 0}), nullptr);
+  EXPECT_TRUE(store.WindowUpTo({kMap, 1}, 2).empty());
+  EXPECT_EQ(store.counters().unreadable, 2);
+  records->broken = false;
+  EXPECT_EQ(store.WindowUpTo({kMap, 1}, 2).size(), 2u);
+}
+
 TEST(SubmapStore, IsBounded) {
-  SubmapStore store({.max_keyframes = 3, .max_views = 2});
+  SubmapStore store({.max_in_memory = 3, .max_views = 2});
   for (int seq = 0; seq < 5; ++seq) {
     store.Add(MakeKeyframe(seq));
     EXPECT_NE(store.Find({kMap, seq}), nullptr);

@@ -26,7 +26,8 @@ struct FusionOptions {
 
 class Fusion : public LoopVerifier {
  public:
-  explicit Fusion(const FusionOptions& options) : LoopVerifier(options.alignment, options.drift) {}
+  explicit Fusion(const FusionOptions& options, std::shared_ptr<RecordStore> records = nullptr)
+      : LoopVerifier(options.alignment, options.drift, std::move(records)) {}
 };
 
 }  // namespace pangea

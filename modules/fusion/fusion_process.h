@@ -9,8 +9,10 @@ namespace pangea {
 
 class FusionProcess : public CandidateProcess {
  public:
-  FusionProcess(Bus& bus, const FusionOptions& options)
-      : CandidateProcess(bus, "fusion", PlaceKind::kInter, std::make_unique<Fusion>(options)) {}
+  FusionProcess(Bus& bus, const FusionOptions& options,
+                const std::shared_ptr<RecordStore>& records = nullptr)
+      : CandidateProcess(bus, "fusion", PlaceKind::kInter,
+                         std::make_unique<Fusion>(options, records), records) {}
 };
 
 }  // namespace pangea

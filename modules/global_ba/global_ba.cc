@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/byte_record.h"
+
 namespace pangea {
 namespace {
 
@@ -26,7 +28,35 @@ bool HasShape(const MapState& state, const std::vector<KeyframePose>& refined) {
   return true;
 }
 
+std::vector<uint8_t> ToRecord(const std::vector<std::pair<int, int>>& corners) {
+  ByteRecordWriter writer;
+  writer.Put(static_cast<uint32_t>(corners.size()));
+  for (const auto& [query, match] : corners) {
+    writer.Put(static_cast<int16_t>(query));
+    writer.Put(static_cast<int16_t>(match));
+  }
+  return writer.Take();
+}
+
+std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& record) {
+  ByteRecordReader reader(record);
+  std::vector<std::pair<int, int>> corners(reader.GetCount(2 * sizeof(int16_t)));
+  for (auto& [query, match] : corners) {
+    int16_t corner = 0;
+    reader.Get(&corner);
+    query = corner;
+    reader.Get(&corner);
+    match = corner;
+  }
+  return corners;
+}
+
 }  // namespace
+
+GlobalBa::GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records)
+    : options_(options),
+      records_(std::move(records)),
+      store_({.keep_preintegration = true}, records_) {}
 
 void GlobalBa::Take(Keyframe keyframe) {
   if (!store_.Contains(keyframe.id)) {
@@ -37,8 +67,9 @@ void GlobalBa::Take(Keyframe keyframe) {
 
 void GlobalBa::Take(const PlaceMatch& match) {
   for (const PlaceCandidate& candidate : match.candidates) {
-    if (matched_.size() < kMaxMatched) {
-      matched_.try_emplace({match.query, candidate.match}, candidate.corner_matches);
+    const Pair pair(match.query, candidate.match);
+    if (matched_.size() < kMaxMatched && !matched_.contains(pair)) {
+      matched_.emplace(pair, Record(ToRecord(candidate.corner_matches), records_.get()));
     }
   }
 }
@@ -119,8 +150,10 @@ void GlobalBa::Begin(StatePointer state) {
   std::vector<MatchedPlaces> places;
   for (const Pair& pair : accepted_) {
     const auto corners = matched_.find(pair);
-    if (corners != matched_.end()) {
-      places.push_back({pair.first, pair.second, corners->second});
+    const auto record =
+        corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
+    if (record) {
+      places.push_back({pair.first, pair.second, CornersFromRecord(*record)});
     }
   }
   problem_ = std::make_unique<BaProblem>(MakeGroupWorld(*state, places, options_.world, &store_),

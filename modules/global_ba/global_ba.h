@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/record_store.h"
 #include "core/server_messages.h"
 #include "core/submap_store.h"
 #include "global_ba/ba_problem.h"
@@ -51,7 +52,8 @@ class GlobalBa {
     int64_t finished = 0;
   };
 
-  explicit GlobalBa(const GlobalBaOptions& options) : options_(options) {}
+  // `records`: for keyframes and matches.
+  explicit GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records = nullptr);
 
   // Repeats change nothing.
   void Take(Keyframe keyframe);
@@ -67,6 +69,7 @@ class GlobalBa {
 
   const Counters& counters() const { return counters_; }
   size_t num_keyframes() const { return store_.size(); }
+  const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
   using Pair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
@@ -89,8 +92,9 @@ class GlobalBa {
   MapState Refined() const;
 
   GlobalBaOptions options_;
-  SubmapStore store_{{.keep_preintegration = true}};
-  std::map<Pair, Corners> matched_;  // by place recognition
+  std::shared_ptr<RecordStore> records_;
+  SubmapStore store_;
+  std::map<Pair, Record> matched_;  // corners, by place recognition
   std::set<Pair> accepted_;
   std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
   // By group.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <utility>
 
+#include "bus/record_status.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -17,9 +18,11 @@ constexpr int64_t kQuiet_us = 3 * kSecond;
 
 }  // namespace
 
-GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options)
+GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
+                                 const std::shared_ptr<RecordStore>& records)
     : node_(bus, "global_ba"),
-      global_ba_(options),
+      records_(records),
+      global_ba_(options, records),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kAll,
@@ -77,9 +80,11 @@ void GlobalBaProcess::PublishStatus(int64_t now_utime) {
   node_.Set("adjustments_begun", counters.begun);
   node_.Set("adjustments_dropped", counters.dropped);
   node_.Set("adjustments_finished", counters.finished);
-  node_.PublishStatus(now_utime, global_ba_.HasWork() ? 1 : 0,
-                      fmt::format("{} keyframes, {} groups adjusted, {} adjustments dropped",
-                                  global_ba_.num_keyframes(), counters.finished, counters.dropped));
+  node_.PublishStatus(
+      now_utime, global_ba_.HasWork() ? 1 : 0,
+      fmt::format("{} keyframes, {} groups adjusted, {} adjustments dropped{}",
+                  global_ba_.num_keyframes(), counters.finished, counters.dropped,
+                  NoteRecords(global_ba_.store_counters(), records_.get(), &node_)));
 }
 
 }  // namespace pangea

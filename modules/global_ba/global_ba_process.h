@@ -9,6 +9,7 @@
 // What is missing is asked for (journal_follower.h). A verification result that is lost later costs
 // its matches, nothing else.
 
+#include <memory>
 #include <utility>
 
 #include "bus/node.h"
@@ -22,7 +23,9 @@ namespace pangea {
 
 class GlobalBaProcess : public Process {
  public:
-  GlobalBaProcess(Bus& bus, const GlobalBaOptions& options);
+  // `records`: for keyframes and matches (core/record_store.h).
+  GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
+                  const std::shared_ptr<RecordStore>& records = nullptr);
 
   void Tick(int64_t now_utime) override;
   // All that is due, to its end.
@@ -40,6 +43,7 @@ class GlobalBaProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
+  std::shared_ptr<const RecordStore> records_;
   GlobalBa global_ba_;
   JournalFollower journal_;
   StateChunks chunks_;

@@ -27,7 +27,6 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
   }
   BaWorld world;
   std::map<KeyframeId, int> index;
-  std::vector<std::shared_ptr<const KeyframeView>> views;
   for (const auto& [id, T_map_body] : poses) {
     const auto view = store->Find(id);
     if (view == nullptr) {
@@ -48,12 +47,11 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
         start.edge = {keyframe.edge->T_from_this, keyframe.edge->covariance};
       }
     }
-    index[id] = static_cast<int>(views.size());
-    views.push_back(view);
+    index[id] = static_cast<int>(world.keyframes.size());
     world.keyframes.push_back(std::move(start));
   }
   std::vector<MatchedKeyframes> matches;
-  std::vector<bool> needed(views.size(), false);
+  std::vector<bool> needed(world.keyframes.size(), false);
   for (const MatchedPlaces& place : places) {
     const auto query = index.find(place.query);
     const auto match = index.find(place.match);
@@ -62,7 +60,7 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
       needed[query->second] = needed[match->second] = true;
     }
   }
-  AddLandmarks(views, matches, options.landmarks, &world);
+  AddLandmarks(matches, options.landmarks, store, &world);
   return WithoutRedundant(world, needed, options.redundancy);
 }
 

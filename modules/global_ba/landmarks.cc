@@ -23,22 +23,26 @@ struct Track {
 
 class Builder {
  public:
-  Builder(const std::vector<std::shared_ptr<const KeyframeView>>& views,
-          const LandmarkOptions& options, BaWorld* world)
-      : views_(views), options_(options), world_(world) {
+  Builder(const LandmarkOptions& options, SubmapStore* store, BaWorld* world)
+      : options_(options), store_(store), world_(world) {
     for (const BaKeyframe& keyframe : world->keyframes) {
       T_map_cam_.push_back(keyframe.imu.T_odom_body * world->T_body_cam[keyframe.camera]);
     }
   }
 
   void AddTracks() {
-    for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
-      const Keyframe& keyframe = views_[i]->keyframe();
+    for (int i = 0; i < static_cast<int>(world_->keyframes.size()); ++i) {
+      const Seen seen = See(i);
+      if (seen.view == nullptr) {
+        continue;
+      }
+      const Keyframe& keyframe = seen.view->keyframe();
       int32_t last = kNoLandmark;  // of several corners of one landmark the first
       for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
         const int32_t id = keyframe.corners[corner].landmark_id;
-        if (id != kNoLandmark && id != last && views_[i]->has_ray(corner)) {
-          tracks_[{keyframe.id.map, id}].own.push_back(Observe(i, corner, options_.track_sigma_px));
+        if (id != kNoLandmark && id != last && seen.view->has_ray(corner)) {
+          tracks_[{keyframe.id.map, id}].own.push_back(
+              Observe(seen, corner, options_.track_sigma_px));
         }
         last = id;
       }
@@ -46,13 +50,17 @@ class Builder {
   }
 
   void AddMatches(const MatchedKeyframes& match) {
+    const Seen seen_a = See(match.a);
+    const Seen seen_b = See(match.b);
+    if (seen_a.view == nullptr || seen_b.view == nullptr) {
+      return;
+    }
     for (const auto& [corner_a, corner_b] : match.corners) {
-      if (corner_a >= NumCorners(match.a) || corner_b >= NumCorners(match.b) ||
-          !views_[match.a]->has_ray(corner_a) || !views_[match.b]->has_ray(corner_b)) {
+      if (!seen_a.Shows(corner_a) || !seen_b.Shows(corner_b)) {
         continue;
       }
-      const TrackId a = TrackOf(match.a, corner_a);
-      const TrackId b = TrackOf(match.b, corner_b);
+      const TrackId a = seen_a.TrackOf(corner_a);
+      const TrackId b = seen_b.TrackOf(corner_b);
       const bool both = a.second != kNoLandmark && b.second != kNoLandmark;
       // However many keyframes see two tracks meet, it is one place that they share or miss.
       if (both && (a == b || !met_.insert(std::minmax(a, b)).second)) {
@@ -60,8 +68,8 @@ class Builder {
       }
       // Each seen at the other's corner is the same measurement twice.
       const double share = both ? std::sqrt(0.5) : 1;
-      AddMatch(a, match.b, corner_b, share);
-      AddMatch(b, match.a, corner_a, share);
+      AddMatch(a, seen_b, corner_b, share);
+      AddMatch(b, seen_a, corner_a, share);
     }
   }
 
@@ -85,28 +93,32 @@ class Builder {
   }
 
  private:
-  int NumCorners(int keyframe) const {
-    return static_cast<int>(views_[keyframe]->keyframe().corners.size());
-  }
-  const Corner& CornerAt(int keyframe, int corner) const {
-    return views_[keyframe]->keyframe().corners[corner];
-  }
-  TrackId TrackOf(int keyframe, int corner) const {
-    return {views_[keyframe]->keyframe().id.map, CornerAt(keyframe, corner).landmark_id};
+  // A keyframe of the world and what it sees; null where it cannot be read.
+  struct Seen {
+    int keyframe = 0;
+    std::shared_ptr<const KeyframeView> view;
+
+    const Corner& CornerAt(int corner) const { return view->keyframe().corners[corner]; }
+    bool Shows(int corner) const {
+      return corner < static_cast<int>(view->keyframe().corners.size()) && view->has_ray(corner);
+    }
+    TrackId TrackOf(int corner) const {
+      return {view->keyframe().id.map, CornerAt(corner).landmark_id};
+    }
+  };
+  Seen See(int keyframe) const { return {keyframe, store_->Find(world_->keyframes[keyframe].id)}; }
+
+  static BaObservation Observe(const Seen& seen, int corner, double sigma) {
+    return {seen.keyframe, -1, seen.view->ray(corner), seen.view->pixel_jacobian(corner) / sigma};
   }
 
-  BaObservation Observe(int keyframe, int corner, double sigma) const {
-    return {keyframe, -1, views_[keyframe]->ray(corner),
-            views_[keyframe]->pixel_jacobian(corner) / sigma};
-  }
-
-  void AddMatch(const TrackId& track, int keyframe, int corner, double share) {
+  void AddMatch(const TrackId& track, const Seen& seen, int corner, double share) {
     const auto known = tracks_.find(track);
     // A corner that several keyframes of one track are matched with is one measurement of it.
     if (track.second != kNoLandmark && known != tracks_.end() &&
-        matched_.insert({track, keyframe, corner}).second) {
-      const double sigma = CornerSigma(CornerAt(keyframe, corner), options_.match_sigma_px);
-      known->second.matched.push_back(Observe(keyframe, corner, sigma / share));
+        matched_.insert({track, seen.keyframe, corner}).second) {
+      const double sigma = CornerSigma(seen.CornerAt(corner), options_.match_sigma_px);
+      known->second.matched.push_back(Observe(seen, corner, sigma / share));
     }
   }
 
@@ -144,8 +156,8 @@ class Builder {
            (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < options_.max_start_sigmas;
   }
 
-  const std::vector<std::shared_ptr<const KeyframeView>>& views_;
   const LandmarkOptions& options_;
+  SubmapStore* store_;
   BaWorld* world_;
   std::vector<Rigid3> T_map_cam_;
   std::map<TrackId, Track> tracks_;
@@ -155,10 +167,9 @@ class Builder {
 
 }  // namespace
 
-void AddLandmarks(const std::vector<std::shared_ptr<const KeyframeView>>& views,
-                  const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
-                  BaWorld* world) {
-  Builder builder(views, options, world);
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
+                  SubmapStore* store, BaWorld* world) {
+  Builder builder(options, store, world);
   builder.AddTracks();
   for (const MatchedKeyframes& match : matches) {
     builder.AddMatches(match);

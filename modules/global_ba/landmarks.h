@@ -43,9 +43,9 @@ struct MatchedKeyframes {
   std::vector<std::pair<int, int>> corners;  // (of a, of b)
 };
 
-// Adds landmarks and observations to a world that has its keyframes; `views` are theirs.
-void AddLandmarks(const std::vector<std::shared_ptr<const KeyframeView>>& views,
-                  const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
-                  BaWorld* world);
+// Adds landmarks and observations to a world that has its keyframes, which `store` has too: one is
+// looked at after the other, not all are held at once.
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
+                  SubmapStore* store, BaWorld* world);
 
 }  // namespace pangea

@@ -34,8 +34,8 @@ struct Group {
       }
     }
   }
-  BaWorld World() const {
-    SubmapStore store({.keep_preintegration = true});
+  BaWorld World(int max_views = 256) const {
+    SubmapStore store({.max_views = max_views, .keep_preintegration = true});
     for (const Keyframe& keyframe : messages.keyframes) {
       store.Add(keyframe);
     }
@@ -70,6 +70,18 @@ TEST(Landmarks, AreWhereTheirRaysMeet) {
       nearest = std::min(nearest, (landmark - point).norm());
     }
     EXPECT_LT(nearest, 1e-4);
+  }
+}
+
+TEST(Landmarks, AreTheSameHoweverFewKeyframesAreHeld) {
+  const Group group;
+  const BaWorld all = group.World(), few = group.World(1);
+  EXPECT_EQ(all.landmarks, few.landmarks);
+  ASSERT_EQ(all.observations.size(), few.observations.size());
+  for (size_t i = 0; i < all.observations.size(); ++i) {
+    EXPECT_EQ(all.observations[i].keyframe, few.observations[i].keyframe);
+    EXPECT_EQ(all.observations[i].landmark, few.observations[i].landmark);
+    EXPECT_EQ(all.observations[i].ray, few.observations[i].ray);
   }
 }
 

@@ -6,11 +6,15 @@
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE --> GlobalBaProcess --> REFINEMENT
 int main(int argc, char** argv) {
   pangea::GlobalBaOptions options;
+  pangea::ScratchFileOptions scratch;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-global-ba",
-       "Adjusts all keyframes and landmarks of a group at once while it is quiet", yaml},
-      [&](pangea::Bus& bus) { return std::make_unique<pangea::GlobalBaProcess>(bus, options); });
+       "Adjusts all keyframes and landmarks of a group at once while it is quiet", yaml, &scratch},
+      [&](pangea::Bus& bus) {
+        return std::make_unique<pangea::GlobalBaProcess>(
+            bus, options, std::make_shared<pangea::ScratchFile>(scratch));
+      });
 }

@@ -26,8 +26,9 @@ struct InterMapBaOptions {
 
 class InterMapBa : public LoopVerifier {
  public:
-  explicit InterMapBa(const InterMapBaOptions& options)
-      : LoopVerifier(options.alignment, options.drift) {}
+  explicit InterMapBa(const InterMapBaOptions& options,
+                      std::shared_ptr<RecordStore> records = nullptr)
+      : LoopVerifier(options.alignment, options.drift, std::move(records)) {}
 
   Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                     LoopVerificationReport* report = nullptr) override {

@@ -9,9 +9,10 @@ namespace pangea {
 
 class InterMapBaProcess : public CandidateProcess {
  public:
-  InterMapBaProcess(Bus& bus, const InterMapBaOptions& options)
+  InterMapBaProcess(Bus& bus, const InterMapBaOptions& options,
+                    const std::shared_ptr<RecordStore>& records = nullptr)
       : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra,
-                         std::make_unique<InterMapBa>(options)) {}
+                         std::make_unique<InterMapBa>(options, records), records) {}
 };
 
 }  // namespace pangea

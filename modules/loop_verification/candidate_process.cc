@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <functional>
+
+#include "bus/record_status.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -16,10 +18,12 @@ constexpr char kJournalOwner[] = "agent_handler";
 }  // namespace
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                                   std::unique_ptr<LoopVerifier> verifier)
+                                   std::unique_ptr<LoopVerifier> verifier,
+                                   std::shared_ptr<const RecordStore> records)
     : node_(bus, name),
       kind_(kind),
       verifier_(std::move(verifier)),
+      records_(std::move(records)),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kOfFormerRuns},
@@ -124,8 +128,9 @@ void CandidateProcess::PublishStatus(int64_t now_utime) {
   node_.PublishStatus(
       now_utime, static_cast<int64_t>(num_pending()),
       fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes, {} for their "
-                  "turn",
-                  num_accepted_, verified_.size(), waiting_.size(), ready_.size()));
+                  "turn{}",
+                  num_accepted_, verified_.size(), waiting_.size(), ready_.size(),
+                  NoteRecords(verifier_->store_counters(), records_.get(), &node_)));
 }
 
 }  // namespace pangea

@@ -36,7 +36,8 @@ namespace pangea {
 class CandidateProcess : public Process {
  public:
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                   std::unique_ptr<LoopVerifier> verifier);
+                   std::unique_ptr<LoopVerifier> verifier,
+                   std::shared_ptr<const RecordStore> records = nullptr);
   void Tick(int64_t now_utime) override;
 
  private:
@@ -55,6 +56,7 @@ class CandidateProcess : public Process {
   Node node_;
   PlaceKind kind_;
   std::unique_ptr<LoopVerifier> verifier_;
+  std::shared_ptr<const RecordStore> records_;  // the verifier's
   JournalFollower journal_;
   // Which wait for keyframes, by (query, match); and with the query, which wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;

@@ -5,6 +5,10 @@
 // map, the odometry edges between them; so it is the same whatever the order of arrival. Not thread
 // safe.
 
+#include <memory>
+#include <string>
+#include <utility>
+
 #include "core/submap_store.h"
 #include "loop_verification/aligner.h"
 #include "loop_verification/drift_gate.h"
@@ -13,8 +17,10 @@ namespace pangea {
 
 class LoopVerifier {
  public:
-  LoopVerifier(const LoopVerificationOptions& alignment, const DriftGateOptions& drift)
-      : drift_(drift), aligner_(alignment) {}
+  // `records`: for keyframes (submap_store.h).
+  LoopVerifier(const LoopVerificationOptions& alignment, const DriftGateOptions& drift,
+               std::shared_ptr<RecordStore> records = nullptr)
+      : drift_(drift), aligner_(alignment), store_({}, std::move(records)) {}
   virtual ~LoopVerifier() = default;
 
   // In any order; a repeat changes nothing.
@@ -29,6 +35,8 @@ class LoopVerifier {
   // anyhow to each other.
   virtual Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                             LoopVerificationReport* report = nullptr);
+
+  const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
   DriftGateOptions drift_;

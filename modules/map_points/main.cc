@@ -6,11 +6,15 @@
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_* --> MapPointsProcess --> LANDMARKS_k
 int main(int argc, char** argv) {
   pangea::MapPointsOptions options;
+  pangea::ScratchFileOptions scratch;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
-       yaml},
-      [&](pangea::Bus& bus) { return std::make_unique<pangea::MapPointsProcess>(bus, options); });
+       yaml, &scratch},
+      [&](pangea::Bus& bus) {
+        return std::make_unique<pangea::MapPointsProcess>(
+            bus, options, std::make_shared<pangea::ScratchFile>(scratch));
+      });
 }

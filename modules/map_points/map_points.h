@@ -71,7 +71,10 @@ struct AgentPose {
 
 class MapPoints {
  public:
-  explicit MapPoints(const MapPointsOptions& options) : options_(options) {}
+  // `records`: for keyframes.
+  explicit MapPoints(const MapPointsOptions& options,
+                     std::shared_ptr<RecordStore> records = nullptr)
+      : options_(options), store_({.max_views = 512}, std::move(records)) {}
 
   void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
   // Whole; the highest revision wins, map by map.
@@ -81,6 +84,7 @@ class MapPoints {
   std::optional<MapLandmarks> Choose(const AgentPose& agent);
 
   size_t num_keyframes() const { return store_.size(); }
+  const RecordCounters& store_counters() const { return store_.counters(); }
   size_t num_refined() const { return refined_.size(); }
 
  private:
@@ -117,7 +121,7 @@ class MapPoints {
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
 
   MapPointsOptions options_;
-  SubmapStore store_{{.max_views = 512}};
+  SubmapStore store_;
   std::map<MapId, std::shared_ptr<const Group>> groups_;  // of each map
   std::set<KeyframeId> refined_;
   std::map<MapId, SentPoints> sent_points_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "bus/record_status.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -17,9 +18,11 @@ constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
-MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options)
+MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options,
+                                   const std::shared_ptr<RecordStore>& records)
     : node_(bus, "map_points"),
-      points_(options),
+      records_(records),
+      points_(options, records),
       journal_(node_, {},
                {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }}) {
   node_.Listen<map_state_t>(channels::kMapState,
@@ -81,8 +84,9 @@ void MapPointsProcess::Tick(int64_t now_utime) {
 void MapPointsProcess::PublishStatus(int64_t now_utime) {
   node_.Set("keyframes_refined", static_cast<int64_t>(points_.num_refined()));
   node_.PublishStatus(now_utime, 0,
-                      fmt::format("{} keyframes, {} of them bundle adjusted",
-                                  points_.num_keyframes(), points_.num_refined()));
+                      fmt::format("{} keyframes, {} of them bundle adjusted{}",
+                                  points_.num_keyframes(), points_.num_refined(),
+                                  NoteRecords(points_.store_counters(), records_.get(), &node_)));
 }
 
 }  // namespace pangea

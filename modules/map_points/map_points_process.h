@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 
 #include "bus/node.h"
 #include "bus/process.h"
@@ -22,7 +23,9 @@ class MapPointsProcess : public Process {
  public:
   static constexpr int64_t kInterval_us = 500'000;  // between two messages to one agent
 
-  MapPointsProcess(Bus& bus, const MapPointsOptions& options);
+  // `records`: for keyframes (core/submap_store.h).
+  MapPointsProcess(Bus& bus, const MapPointsOptions& options,
+                   const std::shared_ptr<RecordStore>& records = nullptr);
 
   void Tick(int64_t now_utime) override;
 
@@ -33,6 +36,7 @@ class MapPointsProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
+  std::shared_ptr<const RecordStore> records_;
   MapPoints points_;
   JournalFollower journal_;
   StateChunks states_;

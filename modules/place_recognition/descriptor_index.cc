@@ -30,20 +30,7 @@ uint32_t DescriptorIndex::Table::Signature(const Descriptor& descriptor) const {
 }
 
 void DescriptorIndex::Table::Add(const Descriptor& descriptor, int keyframe) {
-  const uint32_t word = Word(descriptor);
-  std::unique_ptr<Page>& page = pages[word >> kPageBits];
-  if (!page) {
-    page = std::make_unique<Page>();
-  }
-  (*page)[word % page->size()].push_back({keyframe, Signature(descriptor)});
-}
-
-const std::vector<DescriptorIndex::Posting>& DescriptorIndex::Table::Postings(
-    const Descriptor& descriptor) const {
-  static const std::vector<Posting> none;
-  const uint32_t word = Word(descriptor);
-  const std::unique_ptr<Page>& page = pages[word >> kPageBits];
-  return page ? (*page)[word % page->size()] : none;
+  postings.Add(Word(descriptor), keyframe, Signature(descriptor));
 }
 
 DescriptorIndex::DescriptorIndex() {
@@ -60,7 +47,6 @@ DescriptorIndex::DescriptorIndex() {
     for (int i = 0; i < kSignatureBits; ++i) {
       table.signature_bits[i] = order[kWordBits + i];
     }
-    table.pages.resize(size_t{1} << (kWordBits - kPageBits));
   }
 }
 
@@ -72,6 +58,9 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
       table.Add(corner.descriptor, keyframe);
     }
   }
+  if (size() % kPackEvery == 0) {
+    tables_[size() / kPackEvery % kTables].postings.Pack();
+  }
   return keyframe;
 }
 
@@ -79,11 +68,10 @@ template <typename Visit>
 void DescriptorIndex::Probe(const Descriptor& descriptor, size_t phase, Visit visit) const {
   for (const Table& table : tables_) {
     const uint32_t signature = table.Signature(descriptor);
-    const std::vector<Posting>& postings = table.Postings(descriptor);
-    const size_t stride = 1 + postings.size() / kMaxPostingsPerWord;
-    for (size_t i = phase % stride; i < postings.size(); i += stride) {
-      visit(postings[i], signature);
-    }
+    table.postings.Sample(table.Word(descriptor), kMaxPostingsPerWord, phase,
+                          [&](int32_t keyframe, uint32_t posted) {
+                            visit(keyframe, std::popcount(posted ^ signature));
+                          });
   }
 }
 
@@ -94,11 +82,10 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
   const double most = std::log(1.0 + size());
   for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
     met.clear();
-    Probe(corners[i].descriptor, i, [&](const Posting& posting, uint32_t signature) {
-      if (last_voter[posting.keyframe] != i &&
-          std::popcount(posting.signature ^ signature) <= kMaxSignatureDistance) {
-        last_voter[posting.keyframe] = i;
-        met.push_back(posting.keyframe);
+    Probe(corners[i].descriptor, i, [&](int32_t keyframe, int distance) {
+      if (last_voter[keyframe] != i && distance <= kMaxSignatureDistance) {
+        last_voter[keyframe] = i;
+        met.push_back(keyframe);
       }
     });
     if (met.empty()) {
@@ -118,7 +105,7 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
 int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
   int64_t count = 0;
   for (size_t i = 0; i < corners.size(); ++i) {
-    Probe(corners[i].descriptor, i, [&](const Posting&, uint32_t) { ++count; });
+    Probe(corners[i].descriptor, i, [&](int32_t, int) { ++count; });
   }
   return count;
 }

@@ -7,13 +7,16 @@
 
 int main(int argc, char** argv) {
   pangea::PlaceRecognitionOptions options;
+  pangea::ScratchFileOptions scratch;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-place-recognition",
-       "Finds, for each keyframe, the older keyframes of all maps that show the same place.", yaml},
+       "Finds, for each keyframe, the older keyframes of all maps that show the same place.", yaml,
+       &scratch},
       [&](pangea::Bus& bus) {
-        return std::make_unique<pangea::PlaceRecognitionProcess>(bus, options);
+        return std::make_unique<pangea::PlaceRecognitionProcess>(
+            bus, options, std::make_shared<pangea::ScratchFile>(scratch));
       });
 }

@@ -15,18 +15,6 @@ constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
 // Runs of keyframes looked at before they are spread over the maps.
 constexpr size_t kMaxPlaces = 100;
 
-bool ShareAnElement(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
-  auto i = a.begin();
-  auto j = b.begin();
-  while (i != a.end() && j != b.end()) {
-    if (*i == *j) {
-      return true;
-    }
-    *i < *j ? ++i : ++j;
-  }
-  return false;
-}
-
 std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRay>& a,
                                                       const std::vector<CornerRay>& b,
                                                       const std::vector<CornerMatch>& matches) {
@@ -40,10 +28,12 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 
 }  // namespace
 
-PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options) : options_(options) {}
+PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options,
+                                   std::shared_ptr<RecordStore> records)
+    : options_(options), stored_(std::move(records)) {}
 
 PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceReport>* report) {
-  Stored query = MakeStored(keyframe);
+  const RecognisedKeyframe query(keyframe);
   PlaceMatch match;
   match.query = query.id;
 
@@ -54,20 +44,20 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceRepo
     if (scores[i] <= 0) {
       continue;
     }
-    if (stored_[i].id.map != query.id.map) {
+    if (stored_.id(i).map != query.id.map) {
       others.push_back({i, scores[i]});
-    } else if (!IsRecent(query, stored_[i])) {
+    } else if (!IsRecent(query, i)) {
       own.push_back({i, scores[i]});
     }
   }
   Search(query, own, options_.own, &match, report);
   Search(query, others, options_.others, &match, report);
   RememberPlaces(match);
-  Store(std::move(query));
+  Store(query);
   return match;
 }
 
-void PlaceRecognition::Search(const Stored& query, const std::vector<Place>& hits,
+void PlaceRecognition::Search(const RecognisedKeyframe& query, const std::vector<Place>& hits,
                               const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
                               std::vector<PlaceReport>* report) {
   std::vector<Place> places = Spread(Places(hits), options.places);
@@ -120,7 +110,7 @@ void PlaceRecognition::Publish(std::vector<PlaceCandidate> verified, int limit, 
 
 void PlaceRecognition::Remember(const Keyframe& keyframe, const PlaceMatch& known) {
   RememberPlaces(known);
-  Store(MakeStored(keyframe));
+  Store(RecognisedKeyframe(keyframe));
 }
 
 void PlaceRecognition::SetGroup(const MapId& group, int64_t revision,
@@ -139,36 +129,16 @@ void PlaceRecognition::SetGroup(const MapId& group, int64_t revision,
   }
 }
 
-PlaceRecognition::Stored PlaceRecognition::MakeStored(const Keyframe& keyframe) {
-  Stored stored{keyframe.id, keyframe.corners, {}, {}};
-  const Eigen::Quaterniond q_odom_cam = keyframe.T_odom_cam().q;
-  stored.rays.reserve(keyframe.corners.size());
-  for (const Corner& corner : keyframe.corners) {
-    CornerRay ray{Eigen::Vector3d::Zero(), 0};
-    if (const auto xy = keyframe.camera.Unproject(corner.pixel.cast<double>())) {
-      ray.direction = q_odom_cam * Eigen::Vector3d(xy->x(), xy->y(), 1.0).normalized();
-      ray.sigma = CornerSigma(corner, keyframe.camera.PixelAngle());
-    }
-    stored.rays.push_back(ray);
-    if (corner.landmark_id != kNoLandmark) {
-      stored.landmarks.push_back(corner.landmark_id);
-    }
-  }
-  std::sort(stored.landmarks.begin(), stored.landmarks.end());
-  return stored;
-}
-
-void PlaceRecognition::Store(Stored stored) {
+void PlaceRecognition::Store(const RecognisedKeyframe& keyframe) {
   ++counters_.keyframes;
-  if (index_.size() < options_.max_keyframes) {
-    index_.Add(stored.corners);
-    stored_.push_back(std::move(stored));
+  if (index_.size() < options_.max_keyframes && stored_.Add(keyframe)) {
+    index_.Add(keyframe.corners);
   }
 }
 
-bool PlaceRecognition::IsRecent(const Stored& query, const Stored& other) const {
-  return std::abs(query.id.seq - other.id.seq) < options_.min_seq_gap ||
-         ShareAnElement(query.landmarks, other.landmarks);
+bool PlaceRecognition::IsRecent(const RecognisedKeyframe& query, int other) const {
+  return std::abs(query.id.seq - stored_.id(other).seq) < options_.min_seq_gap ||
+         stored_.SharesLandmark(other, query);
 }
 
 std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
@@ -179,7 +149,7 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
   std::vector<Place> places;
   std::map<MapId, std::vector<int32_t>> taken;
   for (const Place& hit : sorted) {
-    const KeyframeId& id = stored_[hit.keyframe].id;
+    const KeyframeId& id = stored_.id(hit.keyframe);
     std::vector<int32_t>& seqs = taken[id.map];
     if (std::none_of(seqs.begin(), seqs.end(), [&](int32_t seq) {
           return std::abs(seq - id.seq) <= 2 * options_.place_half_width;
@@ -203,14 +173,14 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Spread(const std::vector<
   const auto choose = [&](size_t i) {
     used[i] = true;
     chosen.push_back(places[i]);
-    maps.push_back(stored_[places[i].keyframe].id.map);
+    maps.push_back(stored_.id(places[i].keyframe).map);
   };
   const auto full = [&](int size) { return static_cast<int>(chosen.size()) >= size; };
   for (size_t i = 0; i < places.size() && !full(limit / 2); ++i) {
     choose(i);
   }
   for (size_t i = 0; i < places.size() && !full(limit); ++i) {
-    const MapId& map = stored_[places[i].keyframe].id.map;
+    const MapId& map = stored_.id(places[i].keyframe).map;
     if (!used[i] && std::find(maps.begin(), maps.end(), map) == maps.end()) {
       choose(i);
     }
@@ -234,7 +204,7 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(const KeyframeI
   for (const KeyframeId& match : last->second) {
     Place best{-1, 0};
     for (const Place& hit : hits) {
-      const KeyframeId& id = stored_[hit.keyframe].id;
+      const KeyframeId& id = stored_.id(hit.keyframe);
       if (id.map == match.map && std::abs(id.seq - match.seq) <= options_.place_half_width &&
           hit.score > best.score) {
         best = hit;
@@ -252,11 +222,17 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(const KeyframeI
   return continued;
 }
 
-std::optional<PlaceCandidate> PlaceRecognition::Verify(const Stored& query, const Place& place,
-                                                       PlaceMatch* match, PlaceReport* report) {
-  const Stored& other = stored_[place.keyframe];
-  report->match = other.id;
+std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe& query,
+                                                       const Place& place, PlaceMatch* match,
+                                                       PlaceReport* report) {
+  report->match = stored_.id(place.keyframe);
   report->score = place.score;
+  const auto stored = stored_.Find(place.keyframe);
+  if (stored == nullptr) {
+    match->rejected.push_back(ToString(report->match) + ": cannot be read");
+    return std::nullopt;
+  }
+  const RecognisedKeyframe& other = *stored;
   std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, options_.matching);
   std::erase_if(matches, [&](const CornerMatch& m) {
     return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
 #include "place_recognition/epipolar_check.h"
+#include "place_recognition/stored_keyframes.h"
 
 namespace pangea {
 
@@ -46,8 +48,8 @@ struct PlaceRecognitionOptions {
   };
   Search own{.places = 5, .continued_places = 2, .candidates = 3};
   Search others{.places = 8, .continued_places = 3, .candidates = 5};
-  // Keyframes beyond this many are still recognised but no longer remembered (about 90 kB each).
-  int max_keyframes = 20000;
+  // Keyframes beyond this many are still recognised but no longer remembered (about 20 kB each).
+  int max_keyframes = 100000;
   // Wider than usual: the epipolar check copes with wrong matches, and measures their chance.
   MatchingOptions matching{
       .max_distance = kCandidateHamming, .max_ratio = 0.85, .other_corner_px = 5.0};
@@ -65,7 +67,7 @@ struct PlaceRecognitionOptions {
     archive.Section("own", &own, "in the query's own map");
     archive.Section("others", &others, "in other maps");
     archive.Add("max_keyframes", &max_keyframes, {1, 1000000}, "",
-                "that are remembered, about 90 kB each");
+                "that are remembered, about 20 kB each");
     archive.Section("matching", &matching, "descriptors of two keyframes");
     archive.Section("guided_matching", &guided_matching, "along the epipolar lines");
     archive.Section("epipolar", &epipolar, "two-view check");
@@ -92,7 +94,9 @@ class PlaceRecognition {
     int64_t rejected_surplus = 0;
   };
 
-  explicit PlaceRecognition(const PlaceRecognitionOptions& options);
+  // `records`: for corners and rays (stored_keyframes.h).
+  explicit PlaceRecognition(const PlaceRecognitionOptions& options,
+                            std::shared_ptr<RecordStore> records = nullptr);
 
   // Recognises, then remembers. `report` gets every place that was looked at.
   PlaceMatch Add(const Keyframe& keyframe, std::vector<PlaceReport>* report = nullptr);
@@ -103,15 +107,9 @@ class PlaceRecognition {
   void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps);
 
   const Counters& counters() const { return counters_; }
+  const RecordCounters& store_counters() const { return stored_.counters(); }
 
  private:
-  // What is kept of a keyframe.
-  struct Stored {
-    KeyframeId id;
-    std::vector<Corner> corners;
-    std::vector<CornerRay> rays;     // zero direction where a pixel cannot be undistorted
-    std::vector<int32_t> landmarks;  // ascending
-  };
   struct Place {
     int keyframe = 0;  // index into stored_
     float score = 0;
@@ -122,9 +120,8 @@ class PlaceRecognition {
     bool fused = false;
   };
 
-  static Stored MakeStored(const Keyframe& keyframe);
-  void Store(Stored stored);
-  bool IsRecent(const Stored& query, const Stored& other) const;
+  void Store(const RecognisedKeyframe& keyframe);
+  bool IsRecent(const RecognisedKeyframe& query, int other) const;
   // Best first, one per run of neighbouring keyframes.
   std::vector<Place> Places(const std::vector<Place>& hits) const;
   // Of places in many maps, so that no map crowds out another.
@@ -133,18 +130,18 @@ class PlaceRecognition {
   std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits,
                                int limit) const;
   // One of the two searches: from keyframes that share descriptors to published candidates.
-  void Search(const Stored& query, const std::vector<Place>& hits,
+  void Search(const RecognisedKeyframe& query, const std::vector<Place>& hits,
               const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
               std::vector<PlaceReport>* report);
-  std::optional<PlaceCandidate> Verify(const Stored& query, const Place& place, PlaceMatch* match,
-                                       PlaceReport* report);
+  std::optional<PlaceCandidate> Verify(const RecognisedKeyframe& query, const Place& place,
+                                       PlaceMatch* match, PlaceReport* report);
   void Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match);
   PlaceKind Kind(const MapId& a, const MapId& b) const;
   void RememberPlaces(const PlaceMatch& match);
 
   PlaceRecognitionOptions options_;
   DescriptorIndex index_;
-  std::vector<Stored> stored_;                             // numbered as in index_
+  StoredKeyframes stored_;                                 // numbered as in index_
   std::map<MapId, std::vector<KeyframeId>> last_matches_;  // of each map's newest keyframe
   std::map<MapId, MapGroup> groups_;
   Counters counters_;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <utility>
 
+#include "bus/record_status.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -22,9 +23,11 @@ constexpr size_t kMaxKnownMatches = 100'000;
 
 }  // namespace
 
-PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options)
+PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options,
+                                                 const std::shared_ptr<RecordStore>& records)
     : node_(bus, "place_recognition"),
-      recognition_(options),
+      records_(records),
+      recognition_(options, records),
       journal_(node_,
                {.in_order = true, .matches = JournalFollower::Which::kOfFormerRuns, .states = true},
                {.keyframe = std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this),
@@ -79,7 +82,7 @@ void PlaceRecognitionProcess::Recognise(const Keyframe& keyframe) {
   const place_match_t message = ToMessage(recognition_.Add(keyframe));
   node_.Publish(std::string(channels::kPlaceMatch), message);
   auto& sent = sent_[keyframe.id.map];
-  sent[keyframe.id.seq] = message;
+  sent.insert_or_assign(keyframe.id.seq, Record(EncodeMessage(message), records_.get()));
   if (sent.size() > kMaxSentPerMap) {
     sent.erase(sent.begin());
   }
@@ -99,6 +102,11 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
 bool PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
   const KeyframeId query = match.query;
   if (query.seq >= journal_.next(query.map) && known_matches_.size() < kMaxKnownMatches) {
+    // Which places it names is all that Remember needs.
+    match.rejected.clear();
+    for (PlaceCandidate& candidate : match.candidates) {
+      candidate.corner_matches = {};
+    }
     known_matches_.insert_or_assign(query, std::move(match));
   }
   return true;
@@ -121,7 +129,11 @@ void PlaceRecognitionProcess::OnResendRequest(const ResendRequest& request) {
   }
   for (auto it = sent->second.lower_bound(range.from_seq);
        it != sent->second.end() && it->first <= range.to_seq; ++it) {
-    Retransmit(node_, request.requester, request.channel, it->second);
+    const auto record = it->second.Bytes(records_.get());
+    place_match_t message{};
+    if (record && DecodeMessage(*record, &message)) {
+      Retransmit(node_, request.requester, request.channel, message);
+    }
   }
 }
 
@@ -137,8 +149,9 @@ void PlaceRecognitionProcess::PublishStatus(int64_t now_utime) {
   const auto waiting = static_cast<int64_t>(journal_.parked() + held_.size());
   node_.PublishStatus(
       now_utime, waiting,
-      fmt::format("{} keyframes, {} candidates in own maps, {} in others", counters.keyframes,
-                  counters.candidates_own, counters.candidates_other));
+      fmt::format("{} keyframes, {} candidates in own maps, {} in others{}", counters.keyframes,
+                  counters.candidates_own, counters.candidates_other,
+                  NoteRecords(recognition_.store_counters(), records_.get(), &node_)));
 }
 
 }  // namespace pangea

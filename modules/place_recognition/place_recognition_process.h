@@ -13,6 +13,7 @@
 
 #include <deque>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,14 +21,15 @@
 #include "bus/process.h"
 #include "bus/retransmission/journal_follower.h"
 #include "messages/catch_up_messages.h"
-#include "pangea/place_match_t.hpp"
 #include "place_recognition/place_recognition.h"
 
 namespace pangea {
 
 class PlaceRecognitionProcess : public Process {
  public:
-  PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options);
+  // `records`: for corners, and messages to send again (core/record_store.h).
+  PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options,
+                          const std::shared_ptr<RecordStore>& records = nullptr);
 
   void Tick(int64_t now_utime) override;
 
@@ -45,12 +47,13 @@ class PlaceRecognitionProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
+  std::shared_ptr<RecordStore> records_;
   PlaceRecognition recognition_;
   JournalFollower journal_;
   bool was_catching_up_ = false;
   std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
   std::deque<Keyframe> held_;                       // without a match, in order
-  std::map<MapId, std::map<int32_t, place_match_t>> sent_;  // newest of this run, to send again
+  std::map<MapId, std::map<int32_t, Record>> sent_;  // newest of this run, to send again
   int64_t next_status_utime_ = 0;
 };
 

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
+#include "core/testing/test_record_store.h"
 #include "place_recognition/test_world.h"
 
 namespace pangea {
@@ -187,6 +190,45 @@ TEST(PlaceRecognition, AKeyframeWithoutCornersIsAnsweredToo) {
   EXPECT_TRUE(recognition.Add(keyframe).candidates.empty());
   keyframe.id = {kMapA, 30};
   EXPECT_TRUE(recognition.Add(keyframe).candidates.empty());
+}
+
+// Two maps of one place.
+std::vector<PlaceMatch> MatchesOf(PlaceRecognition recognition) {
+  test::TestWorld world(7);
+  std::vector<PlaceMatch> matches;
+  for (int seq = 0; seq < 40; ++seq) {
+    matches.push_back(recognition.Add(OnTheRound(world, kMapA, seq, {})));
+    matches.push_back(recognition.Add(OnTheRound(world, kMapB, seq, kOdomB, 17)));
+  }
+  return matches;
+}
+
+TEST(PlaceRecognition, SaysTheSameWhereverTheCornersLie) {
+  const std::vector<PlaceMatch> in_memory = MatchesOf(PlaceRecognition({}));
+  for (const size_t max_records : {30, 10000}) {
+    const auto records = std::make_shared<test::TestRecordStore>(max_records);
+    const std::vector<PlaceMatch> matches = MatchesOf(PlaceRecognition({}, records));
+    EXPECT_EQ(records->size(), std::min<size_t>(80, max_records));
+    int candidates = 0;
+    for (size_t i = 0; i < matches.size(); ++i) {
+      EXPECT_TRUE(SameMatch(matches[i], in_memory[i])) << i;
+      candidates += static_cast<int>(matches[i].candidates.size());
+    }
+    EXPECT_GT(candidates, 0);
+  }
+}
+
+TEST(PlaceRecognition, APlaceThatCannotBeReadIsRefused) {
+  test::TestWorld world(8);
+  const auto records = std::make_shared<test::TestRecordStore>(1000);
+  PlaceRecognition recognition({}, records);
+  recognition.Add(OnTheRound(world, kMapA, 0, {}));
+  records->broken = true;
+  const PlaceMatch match = recognition.Add(OnTheRound(world, kMapB, 0, kOdomB));
+  EXPECT_TRUE(match.candidates.empty());
+  ASSERT_EQ(match.rejected.size(), 1u);
+  EXPECT_NE(match.rejected[0].find("cannot be read"), std::string::npos);
+  EXPECT_EQ(recognition.store_counters().unreadable, 1);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "anchors/anchors_process.h"
 #include "bus/bus.h"
+#include "files/scratch_file.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -71,20 +72,21 @@ class Server {
   Server(LocalBus& bus, const ServerOptions& options, const std::set<std::string>& processes)
       : bus_(bus) {
     const auto wanted = [&processes](const char* process) { return processes.contains(process); };
+    const auto scratch = std::make_shared<ScratchFile>();
     if (wanted("place_recognition")) {
-      place_recognition_.emplace(bus, options.place_recognition);
+      place_recognition_.emplace(bus, options.place_recognition, scratch);
     }
     if (wanted("inter_map_ba")) {
-      inter_map_ba_.emplace(bus, options.inter_map_ba);
+      inter_map_ba_.emplace(bus, options.inter_map_ba, scratch);
     }
     if (wanted("fusion")) {
-      fusion_.emplace(bus, options.fusion);
+      fusion_.emplace(bus, options.fusion, scratch);
     }
     if (wanted("posegraph")) {
       posegraph_.emplace(bus, options.posegraph);
     }
     if (wanted("global_ba")) {
-      global_ba_.emplace(bus, options.global_ba);
+      global_ba_.emplace(bus, options.global_ba, scratch);
     }
     if (wanted("anchors")) {
       anchors_.emplace(bus, options.anchors);

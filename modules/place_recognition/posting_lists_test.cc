@@ -1,0 +1,64 @@
+#include "place_recognition/posting_lists.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+using Postings = std::vector<std::pair<int32_t, uint32_t>>;
+
+Postings Visited(const PostingLists& lists, uint32_t word, size_t most, size_t phase) {
+  Postings visited;
+  lists.Sample(word, most, phase, [&](int32_t keyframe, uint32_t signature) {
+    visited.emplace_back(keyframe, signature);
+  });
+  std::ranges::sort(visited);
+  return visited;
+}
+
+// As plain lists would have it.
+Postings Expected(const Postings& list, size_t most, size_t phase) {
+  Postings expected;
+  const size_t stride = 1 + list.size() / most;
+  for (size_t i = phase % stride; i < list.size(); i += stride) {
+    expected.push_back(list[i]);
+  }
+  std::ranges::sort(expected);
+  return expected;
+}
+
+// Few words, so that lists are long; keyframes far apart, so that gaps take one to five bytes.
+TEST(PostingLists, VisitsWhatPlainListsWouldWheneverItIsPacked) {
+  constexpr uint32_t kWords = 12;
+  std::mt19937_64 rng(1);
+  for (const int pack_every : {1, 7, 50, 1000}) {
+    PostingLists lists(kWords);
+    std::map<uint32_t, Postings> plain;
+    int32_t keyframe = 0;
+    for (int n = 0; n < 120; ++n) {
+      for (int i = 0; i < 20; ++i) {
+        const auto word = static_cast<uint32_t>(rng() % (kWords - 1));  // the last has none
+        const auto signature = static_cast<uint32_t>(rng());
+        lists.Add(word, keyframe, signature);
+        plain[word].emplace_back(keyframe, signature);
+      }
+      keyframe += static_cast<int32_t>(1 + rng() % (1ULL << (n % 24)));
+      if (n % pack_every == 0) {
+        lists.Pack();
+      }
+      for (uint32_t word = 0; word < kWords; ++word) {
+        for (const size_t most : {1000, 10, 3}) {
+          ASSERT_EQ(Visited(lists, word, most, n), Expected(plain[word], most, n));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pangea
