@@ -30,7 +30,7 @@ class AnchorsTest(unittest.TestCase):
     def test_anchors_are_spread_over_time_and_image(self):
         anchors = self.session("good")["anchors"]
         self.assertEqual(len({anchor["name"] for anchor in anchors}), 20)
-        self.assertEqual((anchors[0]["at"], anchors[-1]["at"]), (6, 45))
+        self.assertEqual((anchors[0]["at"], anchors[-1]["at"]), (6, 36))
         self.assertEqual(anchors[0]["pixel"], [376, 240])
         for u, v in (anchor["pixel"] for anchor in anchors):
             self.assertTrue(0 < u < 752 and 0 < v < 480)

@@ -11,7 +11,8 @@ LOSSY = {"loss": 0.2, "delay_ms": 2000}
 
 # Where in the image, as shares of its width and height: what people tap on.
 SPOTS = [(0.5, 0.5), (0.35, 0.6), (0.65, 0.45), (0.5, 0.7), (0.6, 0.6)]
-FIRST_S, LAST = 6, 0.75  # when: after the start-up, and early enough for the other to come by
+# When: after the start-up, and early enough to reach the other while it walks, also where keyframes are 20 s late.
+FIRST_S, LAST = 6, 0.6
 
 
 def image_size(recording):

@@ -257,9 +257,9 @@ TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
     answers.emplace_back(answer->requester, answer->places.at(0).offset);
   }
   EXPECT_THAT(answers,
-              testing::ElementsAre(testing::Pair("fusion", 1), testing::Pair("fusion", 2),
-                                   testing::Pair("fusion", 3), testing::Pair("fusion", 4),
-                                   testing::Pair("fusion", 5), testing::Pair("posegraph", 5)));
+              testing::ElementsAre(testing::Pair("fusion", 1), testing::Pair("posegraph", 5),
+                                   testing::Pair("fusion", 2), testing::Pair("fusion", 3),
+                                   testing::Pair("fusion", 4), testing::Pair("fusion", 5)));
 }
 
 // Of the verification results that are asked for by name those that are there, and nothing else.
@@ -305,7 +305,7 @@ TEST(ResendQueue, RefusesTheAbsurdAndStaysBounded) {
   for (int i = 0; i < 1000; ++i) {
     queue.Add(RequestOf(fmt::format("p{}", i), 0, 0), index);
   }
-  EXPECT_EQ(queue.waiting(), ResendQueue::kMaxRequests);
+  EXPECT_EQ(queue.waiting(), ResendQueue::kMaxRequesters);
 }
 
 }  // namespace

@@ -17,11 +17,7 @@ std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex
     return parsed.refused;
   }
   const auto& [map, from_seq, to_seq] = parsed.value->range;
-  Request request{parsed.value->requester,
-                  parsed.value->channel,
-                  JournalChannel::kKeyframe,
-                  map,
-                  from_seq,
+  Request request{parsed.value->channel, JournalChannel::kKeyframe, map, from_seq,
                   std::min(to_seq, index.Highest(map))};
   if (request.channel_name == channels::kPlaceMatch) {
     request.channel = JournalChannel::kPlaceMatch;
@@ -30,23 +26,38 @@ std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex
   } else if (request.channel_name != channels::Keyframe(map.agent_id)) {
     return "resend request for a channel that is not journalled";
   }
-  const bool covered = std::any_of(requests_.begin(), requests_.end(), [&](const Request& r) {
-    return r.requester == request.requester && r.channel == request.channel &&
-           r.map == request.map && r.next_seq <= request.next_seq && request.to_seq <= r.to_seq;
-  });
-  if (covered || request.to_seq < request.next_seq) {
+  if (request.to_seq < request.next_seq) {
     return "";
   }
-  if (waiting() >= kMaxRequests) {
+  const std::string& requester = parsed.value->requester;
+  if (!requests_.contains(requester) && requests_.size() >= kMaxRequesters) {
+    return "resend requests of too many requesters are waiting";
+  }
+  std::deque<Request>& waiting = requests_[requester];
+  const bool covered = std::ranges::any_of(waiting, [&](const Request& r) {
+    return r.channel == request.channel && r.map == request.map && r.next_seq <= request.next_seq &&
+           request.to_seq <= r.to_seq;
+  });
+  if (!covered && waiting.size() >= kMaxRequests) {
     return "too many resend requests are waiting";
   }
-  requests_.push_back(std::move(request));
+  if (!covered) {
+    waiting.push_back(std::move(request));
+  }
   return "";
+}
+
+size_t ResendQueue::waiting() const {
+  size_t count = named_.size();
+  for (const auto& [requester, requests] : requests_) {
+    count += requests.size();
+  }
+  return count;
 }
 
 bool ResendQueue::Add(const VerificationRequest& request, const JournalIndex& index) {
   std::vector<JournalPlace> places = index.Find(request.names);
-  if (!places.empty() && waiting() >= kMaxRequests) {
+  if (!places.empty() && named_.size() >= kMaxNamed) {
     return false;
   }
   if (!places.empty()) {
@@ -64,11 +75,17 @@ std::optional<ResendQueue::Answer> ResendQueue::Next(const JournalIndex& index) 
   if (requests_.empty()) {
     return std::nullopt;
   }
-  Request& request = requests_.front();
-  Answer answer{request.requester, request.channel_name,
+  auto turn = requests_.upper_bound(answered_);
+  turn = turn == requests_.end() ? requests_.begin() : turn;
+  answered_ = turn->first;
+  Request& request = turn->second.front();
+  Answer answer{turn->first, request.channel_name,
                 index.Find(request.channel, {request.map, request.next_seq})};
   if (++request.next_seq > request.to_seq) {
-    requests_.pop_front();
+    turn->second.pop_front();
+    if (turn->second.empty()) {
+      requests_.erase(turn);
+    }
   }
   return answer;
 }
