@@ -36,14 +36,14 @@ FrameColumns ColumnsOf(const WindowState& state, int frame) {
   return {pose, state.frames[frame].has_stamp_error() ? pose + kStampError : -1};
 }
 
-// One ray's derivatives, whitened and weighted. kRay columns of a frame: its pose, and perhaps its
-// stamp.
+// One ray's derivatives, whitened, weighted and transposed: products of them then are of whole
+// columns. kRay rows of a frame: its pose, and perhaps its stamp.
 template <int kRay>
 struct RayTerms {
   size_t ray = 0;  // index of the landmark's
   Vector2d r;
-  Matrix<double, 2, kC> J_calibration;
-  Matrix<double, 2, kRay> J_anchor, J_frame;
+  Matrix<double, kC, 2> Jt_calibration;
+  Matrix<double, kRay, 2> Jt_anchor, Jt_frame;
 };
 
 // A landmark before it is eliminated. Rows of W: as the columns of NormalEquations::Elimination.
@@ -60,14 +60,14 @@ struct LandmarkTerms {
 };
 
 template <int kRay>
-Matrix<double, 2, kRay> FrameJacobian(const Matrix<double, 2, kPoseSize>& J_pose,
+Matrix<double, kRay, 2> FrameJacobian(const Matrix<double, 2, kPoseSize>& J_pose,
                                       const Vector2d& J_stamp, const WindowFrame& frame) {
-  Matrix<double, 2, kRay> J;
-  J.template leftCols<kPoseSize>() = J_pose;
+  Matrix<double, kRay, 2> Jt;
+  Jt.template topRows<kPoseSize>() = J_pose.transpose();
   if constexpr (kRay > kPoseSize) {
-    J.col(kPoseSize) = frame.has_stamp_error() ? J_stamp : Vector2d::Zero();
+    Jt.row(kPoseSize) = (frame.has_stamp_error() ? J_stamp : Vector2d::Zero()).transpose();
   }
-  return J;
+  return Jt;
 }
 
 template <int kRay>
@@ -96,20 +96,20 @@ LandmarkTerms<kRay> LineariseLandmark(const WindowState& state, const Landmark& 
     RayTerms<kRay>& terms = out.rays.emplace_back();
     terms.ray = j;
     terms.r = root * r;
-    terms.J_calibration = scale * predicted->J_calibration;
+    terms.Jt_calibration = scale * predicted->J_calibration.transpose();
     const Matrix<double, 2, 3> J_point = scale * predicted->J_point;
     out.V += J_point.transpose() * J_point;
     out.g_point += J_point.transpose() * terms.r;
-    out.W.template topRows<kC>() += terms.J_calibration.transpose() * J_point;
+    out.W.template topRows<kC>() += terms.Jt_calibration * J_point;
     if (j == out.anchor) {
       continue;  // in its own anchor a point is where its ray is, wherever the frames are
     }
-    terms.J_anchor =
+    terms.Jt_anchor =
         scale * FrameJacobian<kRay>(predicted->J_anchor, predicted->J_anchor_stamp, anchor_frame);
-    terms.J_frame = scale * FrameJacobian<kRay>(predicted->J_frame, predicted->J_frame_stamp,
-                                                state.frames[seen.frame]);
-    out.W.template middleRows<kRay>(Terms::Row(out.anchor)) += terms.J_anchor.transpose() * J_point;
-    out.W.template middleRows<kRay>(Terms::Row(j)) += terms.J_frame.transpose() * J_point;
+    terms.Jt_frame = scale * FrameJacobian<kRay>(predicted->J_frame, predicted->J_frame_stamp,
+                                                 state.frames[seen.frame]);
+    out.W.template middleRows<kRay>(Terms::Row(out.anchor)) += terms.Jt_anchor * J_point;
+    out.W.template middleRows<kRay>(Terms::Row(j)) += terms.Jt_frame * J_point;
   }
   return out;
 }
@@ -171,23 +171,32 @@ template <int kRay>
 void AddRays(const LandmarkTerms<kRay>& terms, const std::vector<FrameColumns>& columns,
              NormalEquations* out) {
   const FrameColumns& anchor = columns[terms.anchor];
+  // Of the blocks that all rays share.
+  Matrix<double, kC, kC> H_cc = Matrix<double, kC, kC>::Zero();
+  Matrix<double, kC, kRay> H_ca = Matrix<double, kC, kRay>::Zero();
+  Matrix<double, kRay, kRay> H_aa = Matrix<double, kRay, kRay>::Zero();
+  Matrix<double, kRay, 1> g_a = Matrix<double, kRay, 1>::Zero();
   for (const RayTerms<kRay>& ray : terms.rays) {
-    const auto& J_c = ray.J_calibration;
-    out->H.topLeftCorner<kC, kC>() += J_c.transpose() * J_c;
-    out->g.head<kC>() += J_c.transpose() * ray.r;
+    const auto& Jt_c = ray.Jt_calibration;
+    H_cc += Jt_c * Jt_c.transpose();
+    out->g.head<kC>() += Jt_c * ray.r;
     if (ray.ray == terms.anchor) {
       continue;
     }
-    const auto &J_a = ray.J_anchor, &J_f = ray.J_frame;
+    const auto &Jt_a = ray.Jt_anchor, &Jt_f = ray.Jt_frame;
     const FrameColumns& frame = columns[ray.ray];
-    AddGradient<kRay>(anchor, J_a.transpose() * ray.r, &out->g);
-    AddGradient<kRay>(frame, J_f.transpose() * ray.r, &out->g);
-    AddToCalibration<kRay>(anchor, J_c.transpose() * J_a, &out->H);
-    AddToCalibration<kRay>(frame, J_c.transpose() * J_f, &out->H);
-    AddBlock<kRay>(anchor, anchor, J_a.transpose() * J_a, &out->H);
-    AddBlock<kRay>(frame, frame, J_f.transpose() * J_f, &out->H);
-    AddBlock<kRay>(anchor, frame, J_a.transpose() * J_f, &out->H);
+    H_ca += Jt_c * Jt_a.transpose();
+    H_aa += Jt_a * Jt_a.transpose();
+    g_a += Jt_a * ray.r;
+    AddGradient<kRay>(frame, Jt_f * ray.r, &out->g);
+    AddToCalibration<kRay>(frame, Jt_c * Jt_f.transpose(), &out->H);
+    AddBlock<kRay>(frame, frame, Jt_f * Jt_f.transpose(), &out->H);
+    AddBlock<kRay>(anchor, frame, Jt_a * Jt_f.transpose(), &out->H);
   }
+  out->H.topLeftCorner<kC, kC>() += H_cc;
+  AddGradient<kRay>(anchor, g_a, &out->g);
+  AddToCalibration<kRay>(anchor, H_ca, &out->H);
+  AddBlock<kRay>(anchor, anchor, H_aa, &out->H);
 }
 
 // What it costs them that the point is not: the Schur complement.
