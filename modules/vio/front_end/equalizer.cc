@@ -6,24 +6,31 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kOne = 256;  // a weight of 1
+constexpr int kOne = 128;  // a weight of 1: a grey value times it fits 16 bits
 
-// The tiles whose centres are beside a row or column, and the weight of the second of them.
-struct Between {
-  int first = 0, second = 0;
-  int weight = 0;
+// The rows (or columns) between the centres of two neighbouring tiles; beyond the outermost centre
+// there is one tile only.
+struct Strip {
+  int begin = 0, end = 0;
+  int first = 0, second = 0;  // tile
 };
 
-std::vector<Between> BetweenCentres(int size, int tiles) {
-  std::vector<Between> between;
-  between.reserve(size);
-  for (int i = 0; i < size; ++i) {
-    const float at = static_cast<float>(i * tiles) / static_cast<float>(size) - 0.5F;
-    const int first = static_cast<int>(std::floor(at));
-    const int weight = cvRound(kOne * (at - static_cast<float>(first)));
-    between.push_back({std::max(first, 0), std::min(first + 1, tiles - 1), weight});
+std::vector<Strip> StripsOf(int size, int tiles) {
+  std::vector<Strip> strips;
+  for (int k = 0; k <= tiles; ++k) {
+    const auto centre = [&](int tile) {  // the first pixel that is not before it
+      return ((2 * tile + 1) * size + 2 * tiles - 1) / (2 * tiles);
+    };
+    strips.push_back({k == 0 ? 0 : centre(k - 1), k == tiles ? size : centre(k), std::max(k - 1, 0),
+                      std::min(k, tiles - 1)});
   }
-  return between;
+  return strips;
+}
+
+// Weight of the second tile.
+int16_t WeightAt(int i, int size, int tiles) {
+  const float at = static_cast<float>(i * tiles) / static_cast<float>(size) + 0.5F;
+  return static_cast<int16_t>(cvRound(kOne * (at - std::floor(at))));
 }
 
 }  // namespace
@@ -62,6 +69,14 @@ Equalizer::Table Equalizer::TableOf(const cv::Mat& tile) const {
   return table;
 }
 
+void Equalizer::Blend(const Table& first, const Table& second, int16_t weight,
+                      std::array<int16_t, kGreys>* out) {
+  for (int grey = 0; grey < kGreys; ++grey) {
+    const auto difference = static_cast<int16_t>(second[grey] - first[grey]);
+    (*out)[grey] = static_cast<int16_t>(kOne * first[grey] + weight * difference);
+  }
+}
+
 cv::Mat Equalizer::Apply(const cv::Mat& image) {
   const int width = image.cols, height = image.rows;
   for (int row = 0; row < kTiles; ++row) {
@@ -71,29 +86,31 @@ cv::Mat Equalizer::Apply(const cv::Mat& image) {
           cv::Rect(x, y, (column + 1) * width / kTiles - x, (row + 1) * height / kTiles - y)));
     }
   }
-  const std::vector<Between> rows = BetweenCentres(height, kTiles);
-  const std::vector<Between> columns = BetweenCentres(width, kTiles);
+  const std::vector<Strip> columns = StripsOf(width, kTiles);
+  std::vector<int16_t> weights(width);
+  for (int x = 0; x < width; ++x) {
+    weights[x] = WeightAt(x, width, kTiles);
+  }
   cv::Mat out(image.size(), CV_8U);
-  // The tables of a row's height, of all columns of tiles: a pixel then blends two values.
-  std::array<std::array<uint16_t, kGreys>, kTiles> of_row;
-  for (int y = 0; y < height; ++y) {
-    const int weight = rows[y].weight;
-    for (int column = 0; column < kTiles; ++column) {
-      const Table& above = tables_[rows[y].first][column];
-      const Table& below = tables_[rows[y].second][column];
-      for (int grey = 0; grey < kGreys; ++grey) {
-        of_row[column][grey] =
-            static_cast<uint16_t>(above[grey] * (kOne - weight) + below[grey] * weight);
+  // The tables at a row's height, of all columns of tiles: a pixel then blends two values.
+  std::array<std::array<int16_t, kGreys>, kTiles> of_row;
+  for (const Strip& rows : StripsOf(height, kTiles)) {
+    for (int y = rows.begin; y < rows.end; ++y) {
+      const int16_t weight = WeightAt(y, height, kTiles);
+      for (int column = 0; column < kTiles; ++column) {
+        Blend(tables_[rows.first][column], tables_[rows.second][column], weight, &of_row[column]);
       }
-    }
-    const uint8_t* from = image.ptr<uint8_t>(y);
-    uint8_t* to = out.ptr<uint8_t>(y);
-    for (int x = 0; x < width; ++x) {
-      const Between& column = columns[x];
-      const int left = of_row[column.first][from[x]];
-      const int right = of_row[column.second][from[x]];
-      const int sum = left * (kOne - column.weight) + right * column.weight;
-      to[x] = static_cast<uint8_t>((sum + kOne * kOne / 2) / (kOne * kOne));
+      const uint8_t* from = image.ptr<uint8_t>(y);
+      uint8_t* to = out.ptr<uint8_t>(y);
+      for (const Strip& strip : columns) {
+        const int16_t* left = of_row[strip.first].data();
+        const int16_t* right = of_row[strip.second].data();
+        for (int x = strip.begin; x < strip.end; ++x) {
+          const int value = left[from[x]], other = right[from[x]];
+          const int sum = kOne * value + weights[x] * (other - value);
+          to[x] = static_cast<uint8_t>((sum + kOne * kOne / 2) / (kOne * kOne));
+        }
+      }
     }
   }
   return out;

@@ -25,6 +25,8 @@ class Equalizer {
   using Table = std::array<uint8_t, kGreys>;
 
   Table TableOf(const cv::Mat& tile) const;
+  static void Blend(const Table& first, const Table& second, int16_t weight,
+                    std::array<int16_t, kGreys>* out);
 
   double clip_;
   std::array<std::array<Table, kTiles>, kTiles> tables_;  // row, column

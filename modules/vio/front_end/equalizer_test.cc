@@ -9,14 +9,14 @@
 namespace pangea::vio {
 namespace {
 
-// OpenCV blends the same tables in floating point.
-TEST(Equalizer, IsOpenCvsToAGreyLevel) {
+// OpenCV blends the same tables in floating point; here a weight is a whole number of 128ths.
+TEST(Equalizer, IsOpenCvsToTwoGreyLevels) {
   for (const double clip : {0.5, 3.0, 40.0}) {
     cv::Mat image = RandomTexture(752, 480, 1);
     image.colRange(0, 200).convertTo(image.colRange(0, 200), CV_8U, 0.2, 10);  // a dark side
     cv::Mat expected;
     cv::createCLAHE(clip, cv::Size(8, 8))->apply(image, expected);
-    EXPECT_LE(cv::norm(Equalizer(clip).Apply(image), expected, cv::NORM_INF), 1) << clip;
+    EXPECT_LE(cv::norm(Equalizer(clip).Apply(image), expected, cv::NORM_INF), 2) << clip;
   }
 }
 

@@ -262,16 +262,19 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
     return kGradientScale * static_cast<float>(sum);
   };
   cv::Mat1f response(cell.size());
+  Eigen::ArrayXf discriminant(cell.width);
   for (int y = 0; y < gradients.rows; ++y) {
     add_row(y, 1);
     if (y < 2 * kReach) {
       continue;
     }
-    float* row = response[y - 2 * kReach];
+    Eigen::Map<Eigen::ArrayXf> row(response[y - 2 * kReach], cell.width);
     for (int x = 0; x < cell.width; ++x) {
       const float a = 0.5F * block(xx, x), b = block(xy, x), c = 0.5F * block(yy, x);
-      row[x] = a + c - std::sqrt((a - c) * (a - c) + b * b);
+      row[x] = a + c;
+      discriminant[x] = (a - c) * (a - c) + b * b;
     }
+    row -= discriminant.sqrt();
     add_row(y - 2 * kReach, -1);
   }
   return response;

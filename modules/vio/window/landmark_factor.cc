@@ -178,15 +178,15 @@ void AddRays(const LandmarkTerms<kRay>& terms, const std::vector<FrameColumns>& 
   Matrix<double, kRay, 1> g_a = Matrix<double, kRay, 1>::Zero();
   for (const RayTerms<kRay>& ray : terms.rays) {
     const auto& Jt_c = ray.Jt_calibration;
-    H_cc += Jt_c * Jt_c.transpose();
+    H_cc.noalias() += Jt_c.lazyProduct(Jt_c.transpose());
     out->g.head<kC>() += Jt_c * ray.r;
     if (ray.ray == terms.anchor) {
       continue;
     }
     const auto &Jt_a = ray.Jt_anchor, &Jt_f = ray.Jt_frame;
     const FrameColumns& frame = columns[ray.ray];
-    H_ca += Jt_c * Jt_a.transpose();
-    H_aa += Jt_a * Jt_a.transpose();
+    H_ca.noalias() += Jt_c.lazyProduct(Jt_a.transpose());
+    H_aa.noalias() += Jt_a.lazyProduct(Jt_a.transpose());
     g_a += Jt_a * ray.r;
     AddGradient<kRay>(frame, Jt_f * ray.r, &out->g);
     AddToCalibration<kRay>(frame, Jt_c * Jt_f.transpose(), &out->H);
