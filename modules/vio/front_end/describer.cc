@@ -68,6 +68,7 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
 
 void Describer::BuildPyramid(const cv::Mat& image) {
   pyramid_.resize(scales_.size());
+  fast_.resize(scales_.size());
   for (size_t octave = 0; octave < scales_.size(); ++octave) {
     if (octave == 0) {
       pyramid_[0] = image;
@@ -76,6 +77,7 @@ void Describer::BuildPyramid(const cv::Mat& image) {
                           static_cast<int>(std::lround(image.rows / scales_[octave])));
       cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
     }
+    cv::FAST(pyramid_[octave], fast_[octave], options_.fast_threshold_low, true);
   }
 }
 
@@ -83,8 +85,7 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
   const cv::Mat& level = pyramid_[octave];
   const int cell_px = options_.cell_px;
   const int columns = (level.cols + cell_px - 1) / cell_px;
-  std::vector<cv::KeyPoint> found;
-  cv::FAST(level, found, options_.fast_threshold_low, true);
+  const std::vector<cv::KeyPoint>& found = fast_[octave];
   // A cell with strong corners keeps only those.
   std::vector<bool> has_strong;
   const auto cell_of = [&](const cv::KeyPoint& corner) {
@@ -115,23 +116,14 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
 }
 
 float Describer::CornerStrength(int octave, const cv::Point2f& level_pixel, cv::Point2f* at) const {
-  constexpr int kReach = 3;       // of the window the score is computed in
-  constexpr int kFastRadius = 4;  // FAST looks at 3 px around and ignores the image's rim
-  const cv::Mat& level = pyramid_[octave];
-  const cv::Point centre(cvRound(level_pixel.x), cvRound(level_pixel.y));
-  const int reach = kReach + kFastRadius;
-  const cv::Rect window(centre.x - reach, centre.y - reach, 2 * reach + 1, 2 * reach + 1);
-  if ((window & cv::Rect(0, 0, level.cols, level.rows)) != window) {
-    return 0;
-  }
-  std::vector<cv::KeyPoint> found;
-  cv::FAST(level(window), found, options_.fast_threshold_low, true);
+  const std::vector<cv::KeyPoint>& found = fast_[octave];  // row by row
+  auto corner = std::lower_bound(found.begin(), found.end(), level_pixel.y - kSnapRadius,
+                                 [](const cv::KeyPoint& one, float y) { return one.pt.y < y; });
   float best = 0;
-  for (const cv::KeyPoint& corner : found) {
-    const cv::Point2f position = corner.pt + cv::Point2f(window.tl());
-    if (corner.response > best && cv::norm(position - level_pixel) <= kSnapRadius) {
-      best = corner.response;
-      *at = position;
+  for (; corner != found.end() && corner->pt.y <= level_pixel.y + kSnapRadius; ++corner) {
+    if (corner->response > best && cv::norm(corner->pt - level_pixel) <= kSnapRadius) {
+      best = corner->response;
+      *at = corner->pt;
     }
   }
   return best;

@@ -68,6 +68,7 @@ class Describer {
   DescriberOptions options_;
   std::vector<double> scales_;  // nominal, of each octave
   std::vector<cv::Mat> pyramid_;
+  std::vector<std::vector<cv::KeyPoint>> fast_;  // all corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;
 };
 

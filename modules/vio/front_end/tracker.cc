@@ -7,10 +7,15 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kEqualizeTiles = 8;
 constexpr int kCornerBlock_px = 5;
+// From products of the pyramid's derivatives (Scharr's filter) to the units of
+// cv::cornerMinEigenVal.
+constexpr float kGradientScale = 1.F / (4 * 4 * 5 * 255.F) / (4 * 4 * 5 * 255.F);
 // Features may come closer to each other while tracked than they were found, down to this share.
 constexpr double kMergeShare = 0.4;
+
+constexpr int kKltIterations = 20;
+constexpr double kKltConverged_px = 0.03;
 
 Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -19,11 +24,7 @@ Eigen::Vector2f ToEigenF(const cv::Point2f& p) { return {p.x, p.y}; }
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
-    : camera_(camera), options_(options) {
-  if (options_.equalize) {
-    equalizer_ = cv::createCLAHE(options_.equalize_clip, cv::Size(kEqualizeTiles, kEqualizeTiles));
-  }
-}
+    : camera_(camera), options_(options), equalizer_(options.equalize_clip) {}
 
 void Tracker::Reset() {
   features_.clear();
@@ -44,8 +45,7 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
   Prepare(image);
   if (!features_.empty()) {
     const std::vector<Bearing> before = Bearings();
-    TrackFeatures(q_cam_lastcam);
-    RefineWithPatches(image);
+    TrackFeatures(image, q_cam_lastcam, 1e-6F * static_cast<float>(utime - frame_.utime));
     RejectOutliers(q_cam_lastcam, before);
   }
   statistics_.tracked = static_cast<int>(features_.size());
@@ -57,12 +57,7 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
 
 void Tracker::Prepare(const cv::Mat& image) {
   std::swap(pyramid_, last_pyramid_);
-  cv::Mat prepared = image;
-  if (equalizer_) {
-    cv::Mat equalized;  // its own memory: the caller keeps the image
-    equalizer_->apply(image, equalized);
-    prepared = equalized;
-  }
+  const cv::Mat prepared = options_.equalize ? equalizer_.Apply(image) : image;
   pyramid_.clear();
   cv::buildOpticalFlowPyramid(prepared, pyramid_, cv::Size(options_.window_px, options_.window_px),
                               options_.pyramid_levels - 1, true);
@@ -80,64 +75,127 @@ std::vector<Tracker::Bearing> Tracker::Bearings() const {
   return bearings;
 }
 
-void Tracker::TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam) {
-  std::vector<Feature> predicted;
-  std::vector<cv::Point2f> from, to;
-  for (Feature& feature : features_) {
+std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
+                                std::vector<cv::Point2f> from, Levels levels,
+                                std::vector<cv::Point2f>* to) const {
+  std::vector<uchar> ok;
+  if (from.empty()) {
+    return ok;
+  }
+  const auto part = [&levels](const Pyramid& pyramid) {
+    const int coarsest = std::min(levels.coarsest, static_cast<int>(pyramid.size()) / 2 - 1);
+    return Pyramid(pyramid.begin() + 2 * levels.finest, pyramid.begin() + 2 * coarsest + 2);
+  };
+  const float scale = 1.F / static_cast<float>(1 << levels.finest);
+  for (size_t i = 0; i < from.size(); ++i) {
+    from[i] *= scale;
+    (*to)[i] *= scale;
+  }
+  cv::calcOpticalFlowPyrLK(part(from_pyramid), part(to_pyramid), from, *to, ok, cv::noArray(),
+                           cv::Size(options_.window_px, options_.window_px),
+                           levels.coarsest - levels.finest,
+                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
+                                            kKltIterations, kKltConverged_px),
+                           cv::OPTFLOW_USE_INITIAL_FLOW);
+  for (cv::Point2f& pixel : *to) {
+    pixel /= scale;
+  }
+  return ok;
+}
+
+// Where the camera's rotation takes the features; those it takes out of the image end.
+std::vector<cv::Point2f> Tracker::Rotated(const Eigen::Quaterniond& q_cam_lastcam) {
+  std::vector<cv::Point2f> rotated;
+  std::erase_if(features_, [&](const Feature& feature) {
     const auto pixel = camera_.Project(q_cam_lastcam * feature.ray.homogeneous());
     if (!pixel || !camera_.Contains(*pixel)) {
       ++statistics_.lost_klt;
-      continue;
+      return true;
     }
-    from.push_back(feature.pixel);
-    to.emplace_back(static_cast<float>(pixel->x()), static_cast<float>(pixel->y()));
-    predicted.push_back(std::move(feature));
+    rotated.emplace_back(static_cast<float>(pixel->x()), static_cast<float>(pixel->y()));
+    return false;
+  });
+  return rotated;
+}
+
+// Where a feature is found that goes on moving as it did, and looks as it did at first.
+std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
+                                                     const std::vector<cv::Point2f>& rotated,
+                                                     float dt_s) {
+  std::vector<cv::Point2f> from, to;
+  for (size_t i = 0; i < features_.size(); ++i) {
+    from.push_back(features_[i].pixel);
+    to.push_back(rotated[i] + dt_s * features_[i].flow);
   }
-  features_.clear();
-  if (predicted.empty()) {
-    return;
+  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevels, &to);
+  std::vector<Found> found(features_.size());
+  for (size_t i = 0; i < features_.size(); ++i) {
+    if (ok[i] && features_[i].patch) {
+      found[i] = features_[i].patch->Find(image, ToEigenF(to[i]));
+    }
   }
-  const cv::Size window(options_.window_px, options_.window_px);
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01);
-  std::vector<uchar> forward_ok, backward_ok;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(last_pyramid_, pyramid_, from, to, forward_ok, error, window,
-                           options_.pyramid_levels - 1, stop, cv::OPTFLOW_USE_INITIAL_FLOW);
+  return found;
+}
+
+// The others: anywhere near, forward and back. A patch that does not agree is worth nothing.
+void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
+                         std::vector<Found>* found) {
+  std::vector<size_t> which;
+  std::vector<cv::Point2f> from, to;
+  for (size_t i = 0; i < features_.size(); ++i) {
+    if (!(*found)[i]) {
+      which.push_back(i);
+      from.push_back(features_[i].pixel);
+      to.push_back(rotated[i]);
+    }
+  }
+  const Levels all{0, options_.pyramid_levels - 1};
+  const std::vector<uchar> forward_ok = Klt(last_pyramid_, pyramid_, from, all, &to);
   // Back from the result with the start as the guess: only the finest levels have work to do.
   std::vector<cv::Point2f> back = from;
-  cv::calcOpticalFlowPyrLK(pyramid_, last_pyramid_, to, back, backward_ok, error, window, 1, stop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW);
-  for (size_t i = 0; i < predicted.size(); ++i) {
-    const auto ray = camera_.Unproject(ToEigen(to[i]));
-    if (!forward_ok[i] || !Inside(to[i]) || !ray) {
+  const std::vector<uchar> backward_ok = Klt(pyramid_, last_pyramid_, to, {0, 1}, &back);
+  for (size_t k = 0; k < which.size(); ++k) {
+    Feature& feature = features_[which[k]];
+    if (!forward_ok[k]) {
       ++statistics_.lost_klt;
-    } else if (!backward_ok[i] || cv::norm(back[i] - from[i]) > options_.max_forward_backward_px) {
+    } else if (!backward_ok[k] || cv::norm(back[k] - from[k]) > options_.max_forward_backward_px) {
       ++statistics_.lost_backward;
     } else {
-      Feature& feature = predicted[i];
-      feature.pixel = to[i];
-      feature.ray = *ray;
-      features_.push_back(std::move(feature));
+      const Eigen::Vector2f pixel = ToEigenF(to[k]);
+      Found refined = feature.patch ? feature.patch->Find(image, pixel) : std::nullopt;
+      if (!refined) {
+        feature.patch.reset();
+      }
+      (*found)[which[k]] = refined ? refined : pixel;
     }
   }
 }
 
-// Image-to-image tracking has brought each feature to within a pixel or so.
-void Tracker::RefineWithPatches(const cv::Mat& image) {
-  for (Feature& feature : features_) {
-    if (!feature.patch) {
+void Tracker::TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_cam_lastcam,
+                            float dt_s) {
+  const std::vector<cv::Point2f> rotated = Rotated(q_cam_lastcam);
+  std::vector<Found> found = FindAsPredicted(image, rotated, dt_s);
+  FindOthers(image, rotated, &found);
+  std::vector<Feature> tracked;
+  for (size_t i = 0; i < features_.size(); ++i) {
+    if (!found[i]) {
       continue;
     }
-    const auto found = feature.patch->Find(image, ToEigenF(feature.pixel));
-    const auto ray = found ? camera_.Unproject(found->cast<double>()) : std::nullopt;
-    if (ray) {
-      feature.pixel = {found->x(), found->y()};
-      feature.ray = *ray;
+    const cv::Point2f pixel((*found[i]).x(), (*found[i]).y());
+    const auto ray = camera_.Unproject(found[i]->cast<double>());
+    if (!Inside(pixel) || !ray) {
+      ++statistics_.lost_klt;
+      continue;
     }
-    if (!ray || feature.patch->IsWornOut()) {
+    Feature& feature = tracked.emplace_back(std::move(features_[i]));
+    feature.flow = (pixel - rotated[i]) / dt_s;
+    feature.pixel = pixel;
+    feature.ray = *ray;
+    if (feature.patch && feature.patch->IsWornOut()) {
       feature.patch.reset();
     }
   }
+  features_ = std::move(tracked);
 }
 
 void Tracker::TakePatches(const cv::Mat& image) {
@@ -179,11 +237,51 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
   features_ = std::move(kept);
 }
 
+// Shi and Tomasi's: the smaller eigenvalue of the gradients' second moments, summed over a block
+// around each pixel.
+cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
+  // The derivatives of level 0 are a view into a larger image with a border, so that the blocks see
+  // the true neighbourhood of the cell.
+  constexpr int kReach = kCornerBlock_px / 2;
+  cv::Mat gradients = pyramid_[1](cell);
+  gradients.adjustROI(kReach, kReach, kReach, kReach);
+  // Sums over the last kCornerBlock_px rows, of each column.
+  std::vector<int> xx(gradients.cols, 0), xy(gradients.cols, 0), yy(gradients.cols, 0);
+  const auto add_row = [&](int y, int sign) {
+    const auto* gradient = gradients.ptr<int16_t>(y);
+    for (int x = 0; x < gradients.cols; ++x) {
+      const int dx = gradient[2 * x], dy = gradient[2 * x + 1];
+      xx[x] += sign * dx * dx;
+      xy[x] += sign * dx * dy;
+      yy[x] += sign * dy * dy;
+    }
+  };
+  const auto block = [](const std::vector<int>& sums, int x) {
+    static_assert(kCornerBlock_px == 5);
+    const int sum = sums[x] + sums[x + 1] + sums[x + 2] + sums[x + 3] + sums[x + 4];
+    return kGradientScale * static_cast<float>(sum);
+  };
+  cv::Mat1f response(cell.size());
+  Eigen::ArrayXf discriminant(cell.width);
+  for (int y = 0; y < gradients.rows; ++y) {
+    add_row(y, 1);
+    if (y < 2 * kReach) {
+      continue;
+    }
+    Eigen::Map<Eigen::ArrayXf> row(response[y - 2 * kReach], cell.width);
+    for (int x = 0; x < cell.width; ++x) {
+      const float a = 0.5F * block(xx, x), b = block(xy, x), c = 0.5F * block(yy, x);
+      row[x] = a + c;
+      discriminant[x] = (a - c) * (a - c) + b * b;
+    }
+    row -= discriminant.sqrt();
+    add_row(y - 2 * kReach, -1);
+  }
+  return response;
+}
+
 std::vector<std::pair<float, cv::Point>> Tracker::FindCorners(const cv::Rect& cell) const {
-  // Level 0 of the pyramid is a view into a larger image with a border, so that the filters see the
-  // true neighbourhood of the cell.
-  cv::Mat response;
-  cv::cornerMinEigenVal(pyramid_[0](cell), response, kCornerBlock_px, 3);
+  const cv::Mat1f response = CornerResponse(cell);
   std::vector<std::pair<float, cv::Point>> corners;
   for (int y = 1; y + 1 < response.rows; ++y) {
     const float* above = response.ptr<float>(y - 1);
@@ -247,7 +345,7 @@ void Tracker::AddFeatures() {
     if (near || !ray || !Inside(pixel)) {
       continue;
     }
-    features_.push_back({next_id_++, pixel, *ray, nullptr});
+    features_.push_back({next_id_++, pixel, *ray, {}, nullptr});
     ++statistics_.added;
   }
 }

@@ -1,9 +1,10 @@
 #pragma once
 
-// Feature tracks through an image stream: Shi-Tomasi corners on a grid, pyramidal KLT with the
-// gyro's rotation as the first guess, forward-backward check, alignment with how the feature looked
-// at first (reference_patch.h), two-view outlier rejection on undistorted rays (the paper, section
-// III-A, and VINS-Mono's front end, which it builds on).
+// Feature tracks through an image stream: Shi-Tomasi corners on a grid, KLT from where the gyro's
+// rotation and the feature's own motion lead, alignment with how the feature looked at first
+// (reference_patch.h), pyramidal KLT with a forward-backward check for what that does not confirm,
+// two-view outlier rejection on undistorted rays (the paper, section III-A, and VINS-Mono's front
+// end, which it builds on).
 //
 // In: grey images and the rotation of the camera since the last one. Out: the tracked frame.
 // Landmark ids count up from 0 and are never used twice until Reset. One thread; deterministic.
@@ -12,11 +13,12 @@
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/camera_model.h"
+#include "vio/front_end/equalizer.h"
 #include "vio/front_end/reference_patch.h"
 #include "vio/front_end/tracks.h"
 #include "vio/front_end/two_view_check.h"
@@ -92,6 +94,7 @@ class Tracker {
     int32_t id = 0;
     cv::Point2f pixel;
     Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+    cv::Point2f flow;                       // px/s, beside the camera's rotation
     std::unique_ptr<ReferencePatch> patch;  // null: to be taken anew
   };
   struct Bearing {
@@ -99,22 +102,38 @@ class Tracker {
     Eigen::Vector2d ray;
   };
 
+  using Pyramid = std::vector<cv::Mat>;  // each level and its derivatives, in turn
+  struct Levels {
+    int finest, coarsest;
+  };
+  // Of the first search: the prediction is good, and the patch finds what KLT has come near.
+  static constexpr Levels kNearLevels{0, 1};
+  using Found = std::optional<Eigen::Vector2f>;  // where in the newest image
+
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
-  void TrackFeatures(const Eigen::Quaterniond& q_cam_lastcam);
-  void RefineWithPatches(const cv::Mat& image);
+  std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
+                         std::vector<cv::Point2f> from, Levels levels,
+                         std::vector<cv::Point2f>* to) const;
+  std::vector<cv::Point2f> Rotated(const Eigen::Quaterniond& q_cam_lastcam);
+  std::vector<Found> FindAsPredicted(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
+                                     float dt_s);
+  void FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
+                  std::vector<Found>* found);
+  void TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_cam_lastcam, float dt_s);
   void TakePatches(const cv::Mat& image);
   void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
   void AddFeatures();
+  cv::Mat1f CornerResponse(const cv::Rect& cell) const;
   std::vector<std::pair<float, cv::Point>> FindCorners(const cv::Rect& cell) const;
   bool Inside(const cv::Point2f& pixel) const;
   void FillFrame(int64_t utime);
 
   CameraModel camera_;
   TrackerOptions options_;
-  cv::Ptr<cv::CLAHE> equalizer_;
-  std::vector<cv::Mat> pyramid_;  // of the newest image
-  std::vector<cv::Mat> last_pyramid_;
+  Equalizer equalizer_;
+  Pyramid pyramid_;  // of the newest image
+  Pyramid last_pyramid_;
   std::vector<Feature> features_;  // oldest first
   int32_t next_id_ = 0;
   double strongest_ = 0;  // eigenvalue, running

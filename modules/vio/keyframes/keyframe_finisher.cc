@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vio/window/landmark_factor.h"
 #include "vio/window/point_geometry.h"
-#include "vio/window/window_factors.h"
 
 namespace pangea::vio {
 namespace {
@@ -25,11 +25,7 @@ constexpr double kMinRelativeSigma = 0.005;
 // What the window's error does to the inverse depth.
 Eigen::RowVectorXd DepthJacobian(const WindowState& state, const Triangulated& point,
                                  const std::vector<FrameRay>& rays) {
-  NormalEquations unused;
-  unused.H.setZero(state.size(), state.size());
-  unused.g.setZero(state.size());
-  AddLandmark(state, {0, point.point, rays}, 0, &unused);
-  const NormalEquations::Elimination& elimination = unused.eliminations.front();
+  const NormalEquations::Elimination elimination = EliminateLandmark(state, {0, point.point, rays});
   const Eigen::RowVectorXd gain = elimination.gain.row(2);
   Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
   J.head<kCalibrationSize>() = gain.head<kCalibrationSize>();

@@ -12,6 +12,7 @@
 #include "vio/keyframes/frame_choice.h"
 #include "vio/keyframes/keyframe_finisher.h"
 #include "vio/keyframes/track_history.h"
+#include "vio/window/landmark_factor.h"
 #include "vio/window/landmark_store.h"
 #include "vio/window/stamp_jitter.h"
 #include "vio/window/window_problem.h"
@@ -55,8 +56,9 @@ struct LandmarkError {
 };
 LandmarkError ErrorOf(const WindowState& state, const Landmark& landmark) {
   LandmarkError error;
+  const Eigen::Vector3d p_odom = InOdom(state, landmark.point);
   for (const FrameRay& ray : landmark.rays) {
-    const double e = RayError(state, landmark.point, ray);
+    const double e = RayError(state, p_odom, ray);
     error.sum += e * e;
     error.worst = std::max(error.worst, e);
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <vector>
 
 namespace pangea::vio {
 namespace {
@@ -32,36 +33,33 @@ Eigen::Matrix<double, 2, 3> RayJacobian(const Vector3d& y) {
   return J;
 }
 
-// The error (dtheta, xi) of a frame's pose that a second more of its motion makes.
-Eigen::Matrix<double, kPoseSize, 1> Motion(const WindowFrame& frame, const Rigid3& T_odom_body) {
-  const Vector3d omega_odom = T_odom_body.q * frame.omega_body;
-  Eigen::Matrix<double, kPoseSize, 1> motion;
-  motion << omega_odom, frame.imu.v_odom_body + T_odom_body.t.cross(omega_odom);
-  return motion;
+// How fast a point moves that a frame carries along, m/s.
+Vector3d CarriedBy(const WindowFrame& frame, const Rigid3& T_odom_body, const Vector3d& p_odom) {
+  return frame.imu.v_odom_body + (T_odom_body.q * frame.omega_body).cross(p_odom - T_odom_body.t);
 }
 
-// A point of the anchor's camera in the camera of another frame.
-Vector3d InOther(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen) {
-  const Rigid3 T_a = state.PoseAhead(point.anchor, state.Ahead(point.anchor, point.anchor_row_s));
-  const Rigid3 T_c = state.PoseAhead(seen.frame, state.Ahead(seen.frame, seen.row_s));
-  return (T_c * state.T_body_cam).Inverse() * (T_a * (state.T_body_cam * point.InCamera()));
+Rigid3 BodyPose(const WindowState& state, const FrameRay& seen) {
+  return state.PoseAhead(seen.frame, state.Ahead(seen.frame, seen.row_s));
+}
+
+Rigid3 AnchorPose(const WindowState& state, const AnchoredPoint& point) {
+  return state.PoseAhead(point.anchor, state.Ahead(point.anchor, point.anchor_row_s));
 }
 
 Rigid3 CameraPose(const WindowState& state, const FrameRay& seen) {
-  return state.PoseAhead(seen.frame, state.Ahead(seen.frame, seen.row_s)) * state.T_body_cam;
+  return BodyPose(state, seen) * state.T_body_cam;
 }
 
 // Where the rays meet, linear: minimises the distance to all of them. In odom.
-std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const FrameRay> rays) {
+std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const FrameRay> rays,
+                                 const std::vector<Rigid3>& T_odom_cam) {
   Matrix3d A = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
-  for (const FrameRay& seen : rays) {
-    const Rigid3 T_odom_cam = CameraPose(state, seen);
-    const Vector2d ray = seen.RayBy(state);
-    const Vector3d d = (T_odom_cam.q * Vector3d(ray.x(), ray.y(), 1)).normalized();
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const Vector3d d = (T_odom_cam[i].q * rays[i].RayBy(state).homogeneous()).normalized();
     const Matrix3d across = Matrix3d::Identity() - d * d.transpose();
     A += across;
-    b += across * T_odom_cam.t;
+    b += across * T_odom_cam[i].t;
   }
   const Eigen::LDLT<Matrix3d> ldlt(A);
   if (ldlt.info() != Eigen::Success || ldlt.vectorD().minCoeff() < 1e-9) {
@@ -72,59 +70,72 @@ std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const Frame
 
 }  // namespace
 
-std::optional<Vector2d> PredictRayOnly(const WindowState& state, const AnchoredPoint& point,
+PointInOdom::PointInOdom(const WindowState& state, const AnchoredPoint& point) {
+  const Rigid3 T_a = AnchorPose(state, point);
+  const Vector3d x_body = state.T_body_cam.q * point.InCamera();
+  p_odom = T_a * (x_body + state.T_body_cam.t);
+  by_translation = T_a.R();
+  by_rotation = by_translation * Hat(-x_body);
+  by_point = by_translation * state.T_body_cam.R() * PointJacobian(point.ray_rho);
+  by_anchor_stamp = CarriedBy(state.frames[point.anchor], T_a, p_odom);
+}
+
+Vector3d InOdom(const WindowState& state, const AnchoredPoint& point) {
+  return AnchorPose(state, point) * (state.T_body_cam * point.InCamera());
+}
+
+std::optional<Vector2d> PredictRayOnly(const WindowState& state, const Vector3d& p_odom,
                                        const FrameRay& seen) {
-  const Vector3d y = InOther(state, point, seen);
+  const Vector3d y = state.T_body_cam.Inverse() * (BodyPose(state, seen).Inverse() * p_odom);
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
   }
   return seen.AsGiven(state, y.head<2>() / y.z());
 }
 
-std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredPoint& point,
+std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOdom& point,
                                        const FrameRay& seen) {
-  const WindowFrame& anchor = state.frames[point.anchor];
-  const WindowFrame& frame = state.frames[seen.frame];
-  const Rigid3 T_a = state.PoseAhead(point.anchor, state.Ahead(point.anchor, point.anchor_row_s));
-  const Rigid3 T_c = state.PoseAhead(seen.frame, state.Ahead(seen.frame, seen.row_s));
-  const Rigid3& T_bc = state.T_body_cam;
-  const Vector3d x_cam = point.InCamera();
-  const Vector3d p_odom = T_a * (T_bc * x_cam);
-  const Vector3d y_body = T_c.Inverse() * p_odom;
-  const Matrix3d R_cam_body = T_bc.q.conjugate().toRotationMatrix();
-  const Vector3d y = R_cam_body * (y_body - T_bc.t);
+  const Rigid3 T_c = BodyPose(state, seen);
+  const Matrix3d R_body_odom = T_c.R().transpose();
+  const Matrix3d R_cam_body = state.T_body_cam.R().transpose();
+  const Vector3d y_body = R_body_odom * (point.p_odom - T_c.t) - state.T_body_cam.t;
+  const Vector3d y = R_cam_body * y_body;
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
   }
-  const Matrix3d R_cam_odom = R_cam_body * T_c.R().transpose();
-  const Matrix3d R_body_anchor = (T_c.q.conjugate() * T_a.q).toRotationMatrix();
-  const Eigen::Matrix<double, 2, 3> J = (1 + state.intrinsics.x()) * RayJacobian(y);
-  const Eigen::Matrix<double, 2, 3> J_odom = J * R_cam_odom;
+  // d(ray) by a shift of the point in the body's axes and in odom's.
+  const Eigen::Matrix<double, 2, 3> J_body =
+      (1 + state.intrinsics.x()) * RayJacobian(y) * R_cam_body;
+  const Eigen::Matrix<double, 2, 3> J_odom = J_body * R_body_odom;
 
   PredictedRay out;
   const Vector2d ray = y.head<2>() / y.z();
   out.ray = seen.AsGiven(state, ray);
-  out.J_frame << J_odom * Hat(p_odom), -J_odom;
+  out.J_frame << J_odom * Hat(point.p_odom), -J_odom;
   out.J_anchor = -out.J_frame;
-  out.J_calibration.leftCols<3>() =
-      J * R_cam_body * (Hat(y_body - T_bc.t) - R_body_anchor * Hat(T_bc.q * x_cam));
-  out.J_calibration.middleCols<3>(3) = J * R_cam_body * (R_body_anchor - Matrix3d::Identity());
-  out.J_frame_stamp = out.J_frame * Motion(frame, T_c);
-  out.J_anchor_stamp = out.J_anchor * Motion(anchor, T_a);
+  out.J_calibration.leftCols<3>() = J_body * Hat(y_body) + J_odom * point.by_rotation;
+  out.J_calibration.middleCols<3>(3) = J_odom * point.by_translation - J_body;
+  out.J_frame_stamp = -(J_odom * CarriedBy(state.frames[seen.frame], T_c, point.p_odom));
+  out.J_anchor_stamp = J_odom * point.by_anchor_stamp;
   out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
   out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;
   out.J_calibration.col(kIntrinsics) += ray - seen.ray;
-  out.J_point = J * R_cam_body * R_body_anchor * T_bc.R() * PointJacobian(point.ray_rho);
+  out.J_point = J_odom * point.by_point;
   return out;
 }
 
 std::optional<Triangulated> Triangulate(const WindowState& state, std::span<const FrameRay> rays,
                                         size_t anchor) {
-  const auto p_odom = MeetRays(state, rays);
+  std::vector<Rigid3> T_odom_cam;
+  T_odom_cam.reserve(rays.size());
+  for (const FrameRay& seen : rays) {
+    T_odom_cam.push_back(CameraPose(state, seen));
+  }
+  const auto p_odom = MeetRays(state, rays, T_odom_cam);
   if (!p_odom) {
     return std::nullopt;
   }
-  const Vector3d p_anchor = CameraPose(state, rays[anchor]).Inverse() * *p_odom;
+  const Vector3d p_anchor = T_odom_cam[anchor].Inverse() * *p_odom;
   if (!(p_anchor.z() > kMinDepth)) {
     return std::nullopt;
   }
@@ -132,21 +143,23 @@ std::optional<Triangulated> Triangulate(const WindowState& state, std::span<cons
   out.point.anchor = rays[anchor].frame;
   out.point.anchor_row_s = rays[anchor].row_s;
   out.point.ray_rho = {p_anchor.x() / p_anchor.z(), p_anchor.y() / p_anchor.z(), 1 / p_anchor.z()};
-  const Matrix3d R_odom_anchor = CameraPose(state, rays[anchor]).R();
+  const Matrix3d R_odom_anchor = T_odom_cam[anchor].R();
   double cost = 0, last_cost = 1e300;
   for (int iteration = 0; iteration < 10; ++iteration) {
     Matrix3d A = Matrix3d::Zero();
     Vector3d b = Vector3d::Zero();
     cost = 0;
-    for (const FrameRay& seen : rays) {
-      const Vector3d y = InOther(state, out.point, seen);
+    const Vector3d x_odom = R_odom_anchor * out.point.InCamera() + T_odom_cam[anchor].t;
+    const Matrix3d odom_by_point = R_odom_anchor * PointJacobian(out.point.ray_rho);
+    for (size_t i = 0; i < rays.size(); ++i) {
+      const Matrix3d R_cam_odom = T_odom_cam[i].R().transpose();
+      const Vector3d y = R_cam_odom * (x_odom - T_odom_cam[i].t);
       if (!(y.z() > kMinDepth)) {
         return std::nullopt;
       }
-      const Vector2d r = (seen.RayBy(state) - y.head<2>() / y.z()) / seen.sigma;
+      const Vector2d r = (rays[i].RayBy(state) - y.head<2>() / y.z()) / rays[i].sigma;
       const Eigen::Matrix<double, 2, 3> J =
-          RayJacobian(y) * CameraPose(state, seen).R().transpose() * R_odom_anchor *
-          PointJacobian(out.point.ray_rho) / seen.sigma;
+          RayJacobian(y) * R_cam_odom * odom_by_point / rays[i].sigma;
       A += J.transpose() * J;
       b += J.transpose() * r;
       cost += r.squaredNorm();

@@ -53,10 +53,21 @@ struct PredictedRay {
   Eigen::Matrix<double, 2, kCalibrationSize> J_calibration;
   Eigen::Matrix<double, 2, 3> J_point;
 };
+// A point as all its rays need it: where it is in odom, and how the errors of its anchor's side
+// move it there.
+struct PointInOdom {
+  PointInOdom(const WindowState& state, const AnchoredPoint& point);
+  Eigen::Vector3d p_odom;
+  Eigen::Matrix3d by_point;         // (alpha, beta, rho)
+  Eigen::Matrix3d by_rotation;      // of T_body_cam
+  Eigen::Matrix3d by_translation;   // of T_body_cam
+  Eigen::Vector3d by_anchor_stamp;  // m/s
+};
+Eigen::Vector3d InOdom(const WindowState& state, const AnchoredPoint& point);
 // Nothing when the point is behind the camera.
-std::optional<Eigen::Vector2d> PredictRayOnly(const WindowState& state, const AnchoredPoint& point,
-                                              const FrameRay& seen);
-std::optional<PredictedRay> PredictRay(const WindowState& state, const AnchoredPoint& point,
+std::optional<Eigen::Vector2d> PredictRayOnly(const WindowState& state,
+                                              const Eigen::Vector3d& p_odom, const FrameRay& seen);
+std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOdom& point,
                                        const FrameRay& seen);
 
 struct Triangulated {

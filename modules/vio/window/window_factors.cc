@@ -1,10 +1,8 @@
 #include "vio/window/window_factors.h"
 
-#include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <utility>
+
+#include "vio/window/landmark_factor.h"
 
 namespace pangea::vio {
 namespace {
@@ -15,139 +13,15 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// A ray this many sigmas off is pulled at with constant force (Huber, 1964).
-constexpr double kHuber = 2.0;
-// What a point behind a camera that saw it costs, as a ray this many sigmas off: nothing is gained
-// by throwing it there.
-constexpr double kBehind = 100;
 // Stationary: what may pass for it within the noise of a hundred tracks together.
 constexpr double kStationaryVelocitySigma = 0.02;    // m/s
 constexpr double kStationaryPositionSigma = 0.002;   // m, between two stationary frames
 constexpr double kStationaryRotationSigma = 0.0003;  // rad
 
-double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
-double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
-
 VectorXd PriorError(const WindowProblem& problem) {
   WindowState state = problem.state;
   state.frames.resize(problem.prior.at.frames.size());
   return Difference(state, problem.prior.at);
-}
-
-// One landmark's part of the normal equations, before it is eliminated. Columns as in
-// NormalEquations::Elimination, kRay of them for each ray.
-struct LandmarkSystem {
-  double cost = 0;
-  MatrixXd H;
-  VectorXd g;
-  Matrix3d V = Matrix3d::Zero();
-  Eigen::Matrix<double, 3, Eigen::Dynamic> W;
-  Vector3d g_point = Vector3d::Zero();
-};
-
-// d(ray) by what an anchor or a frame contributes: its pose's error and its stamp's.
-template <int kRay>
-Eigen::Matrix<double, 2, kRay> FrameJacobian(const Eigen::Matrix<double, 2, kPoseSize>& J_pose,
-                                             const Vector2d& J_stamp, const WindowFrame& frame) {
-  Eigen::Matrix<double, 2, kRay> J;
-  J.template leftCols<kPoseSize>() = J_pose;
-  if constexpr (kRay > kPoseSize) {
-    J.col(kPoseSize) = frame.has_stamp_error() ? J_stamp : Vector2d::Zero();
-  }
-  return J;
-}
-
-template <int kRay>
-void AddRay(const PredictedRay& predicted, const Eigen::Matrix<double, 2, kRay>& J_anchor,
-            const Eigen::Matrix<double, 2, kRay>& J_frame, const Vector2d& r, double scale,
-            int at_anchor, int at_frame, LandmarkSystem* out) {
-  const Eigen::Matrix<double, 2, 3> J_point = scale * predicted.J_point;
-  out->V += J_point.transpose() * J_point;
-  out->g_point += J_point.transpose() * r;
-  const Eigen::Matrix<double, 2, kCalibrationSize> J_c = scale * predicted.J_calibration;
-  out->H.topLeftCorner<kCalibrationSize, kCalibrationSize>() += J_c.transpose() * J_c;
-  out->W.leftCols<kCalibrationSize>() += J_point.transpose() * J_c;
-  out->g.head<kCalibrationSize>() += J_c.transpose() * r;
-  if (at_anchor == at_frame) {
-    return;  // in its own anchor a point is where its ray is, wherever the frames are
-  }
-  const Eigen::Matrix<double, 2, kRay> J_a = scale * J_anchor, J_f = scale * J_frame;
-  MatrixXd& H = out->H;
-  for (const auto& [J, at] : {std::pair(&J_a, at_anchor), std::pair(&J_f, at_frame)}) {
-    const Eigen::Matrix<double, kCalibrationSize, kRay> C = J_c.transpose() * *J;
-    H.block<kCalibrationSize, kRay>(0, at) += C;
-    H.block<kRay, kCalibrationSize>(at, 0) += C.transpose();
-    H.block<kRay, kRay>(at, at) += J->transpose() * *J;
-    out->W.middleCols<kRay>(at) += J_point.transpose() * *J;
-    out->g.segment<kRay>(at) += J->transpose() * r;
-  }
-  const Eigen::Matrix<double, kRay, kRay> A = J_a.transpose() * J_f;
-  H.block<kRay, kRay>(at_anchor, at_frame) += A;
-  H.block<kRay, kRay>(at_frame, at_anchor) += A.transpose();
-}
-
-template <int kRay>
-LandmarkSystem LineariseLandmark(const WindowState& state, const Landmark& landmark) {
-  const int m = static_cast<int>(landmark.rays.size());
-  const int n = kCalibrationSize + kRay * m;
-  LandmarkSystem out;
-  out.H.setZero(n, n);
-  out.g.setZero(n);
-  out.W.setZero(3, n);
-  int at_anchor = -1;
-  for (int j = 0; j < m; ++j) {
-    at_anchor =
-        landmark.rays[j].frame == landmark.point.anchor ? kCalibrationSize + kRay * j : at_anchor;
-  }
-  for (int j = 0; j < m; ++j) {
-    const FrameRay& seen = landmark.rays[j];
-    const auto predicted = PredictRay(state, landmark.point, seen);
-    if (!predicted) {
-      out.cost += HuberCost(kBehind);  // and no derivative: it says nothing of where to go
-      continue;
-    }
-    const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
-    const double e = r.norm();
-    const double root = std::sqrt(HuberWeight(e));
-    out.cost += HuberCost(e);
-    AddRay<kRay>(
-        *predicted,
-        FrameJacobian<kRay>(predicted->J_anchor, predicted->J_anchor_stamp,
-                            state.frames[landmark.point.anchor]),
-        FrameJacobian<kRay>(predicted->J_frame, predicted->J_frame_stamp, state.frames[seen.frame]),
-        root * r, root / seen.sigma, at_anchor, kCalibrationSize + kRay * j, &out);
-  }
-  return out;
-}
-
-// From a landmark's own columns to the window's.
-template <int kRay>
-void Scatter(const WindowState& state, const Landmark& landmark, const LandmarkSystem& part,
-             NormalEquations* out) {
-  struct Block {
-    int from, to, size;
-  };
-  std::vector<Block> blocks;
-  int from = kCalibrationSize;
-  for (const FrameRay& seen : landmark.rays) {
-    const int to = state.Offset(seen.frame);
-    blocks.push_back({from, to, kPoseSize});
-    if (kRay > kPoseSize && state.frames[seen.frame].has_stamp_error()) {
-      blocks.push_back({from + kPoseSize, to + kStampError, 1});
-    }
-    from += kRay;
-  }
-  constexpr int kC = kCalibrationSize;
-  out->H.topLeftCorner<kC, kC>() += part.H.topLeftCorner<kC, kC>();
-  out->g.head<kC>() += part.g.head<kC>();
-  for (const Block& j : blocks) {
-    out->g.segment(j.to, j.size) += part.g.segment(j.from, j.size);
-    out->H.block(0, j.to, kC, j.size) += part.H.block(0, j.from, kC, j.size);
-    out->H.block(j.to, 0, j.size, kC) += part.H.block(j.from, 0, j.size, kC);
-    for (const Block& i : blocks) {
-      out->H.block(i.to, j.to, i.size, j.size) += part.H.block(i.from, j.from, i.size, j.size);
-    }
-  }
 }
 
 Vector6d ZeroMotionResidual(const WindowState& state, int to) {
@@ -158,35 +32,7 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
   return r;
 }
 
-template <int kRay>
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out) {
-  LandmarkSystem part = LineariseLandmark<kRay>(state, landmark);
-  Matrix3d V = part.V;
-  V.diagonal() *= 1 + damping;
-  V.diagonal().array() += 1e-9;
-  const Matrix3d V_inverse = V.inverse();
-  NormalEquations::Elimination elimination;
-  elimination.offset = -V_inverse * part.g_point;
-  elimination.gain = -V_inverse * part.W;
-  elimination.stamps = kRay > kPoseSize;
-  part.H.noalias() += part.W.transpose() * elimination.gain;
-  part.g.noalias() += part.W.transpose() * elimination.offset;
-  out->cost += part.cost;
-  Scatter<kRay>(state, landmark, part, out);
-  out->eliminations.push_back(std::move(elimination));
-}
-
 }  // namespace
-
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out) {
-  const bool stamps =
-      std::any_of(landmark.rays.begin(), landmark.rays.end(),
-                  [&](const FrameRay& seen) { return state.frames[seen.frame].has_stamp_error(); });
-  stamps ? AddLandmark<kPoseSize + 1>(state, landmark, damping, out)
-         : AddLandmark<kPoseSize>(state, landmark, damping, out);
-}
 
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
   const ImuState& from = state.frames[to - 1].imu;
@@ -306,17 +152,9 @@ double Cost(const WindowProblem& problem) {
     }
   }
   for (const Landmark& landmark : problem.landmarks) {
-    for (const FrameRay& seen : landmark.rays) {
-      const double error = RayError(state, landmark.point, seen);
-      cost += HuberCost(std::isfinite(error) ? error : kBehind);
-    }
+    cost += LandmarkCost(state, landmark);
   }
   return cost;
-}
-
-double RayError(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen) {
-  const auto ray = PredictRayOnly(state, point, seen);
-  return ray ? (*ray - seen.ray).norm() / seen.sigma : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace pangea::vio

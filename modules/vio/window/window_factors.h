@@ -1,17 +1,13 @@
 #pragma once
 
-// The terms of the window's cost, each added to the normal equations with its derivatives
-// (docs/maths_vio.md). None of them changes when all frames are shifted together, or rotated
-// together about the vertical.
+// The terms of the window's cost beside its landmarks (landmark_factor.h), each added to the normal
+// equations with its derivatives (docs/maths_vio.md). None of them changes when all frames are
+// shifted together, or rotated together about the vertical.
 
 #include "vio/window/window_problem.h"
 
 namespace pangea::vio {
 
-// All rays of a landmark, the landmark eliminated (Schur complement). Rays that are far off pull
-// with constant force (Huber, 1964).
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out);
 // The inertial measurement between frames to - 1 and to.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out);
 // The velocity of a stationary frame is zero.
@@ -23,7 +19,7 @@ void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out)
 void AddStampError(const WindowState& state, int frame, NormalEquations* out);
 void AddPrior(const WindowProblem& problem, NormalEquations* out);
 
-// The sum of them all, without derivatives.
+// The sum of them all and of the landmarks, without derivatives.
 double Cost(const WindowProblem& problem);
 
 }  // namespace pangea::vio

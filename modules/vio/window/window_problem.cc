@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vio/window/landmark_factor.h"
 #include "vio/window/window_factors.h"
 
 namespace pangea::vio {
@@ -44,9 +45,18 @@ template <typename Rhs>
 MatrixXd SolveScaled(const MatrixXd& H, const Rhs& b) {
   const VectorXd scale = H.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
   const MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
-  const MatrixXd y = S.ldlt().solve(scale.asDiagonal() * MatrixXd(b));
+  MatrixXd y = scale.asDiagonal() * MatrixXd(b);
+  const Eigen::LLT<MatrixXd> llt(S);
+  if (llt.info() == Eigen::Success) {
+    llt.solveInPlace(y);
+  } else {
+    y = S.ldlt().solve(y).eval();  // pivots, for what is not quite positive
+  }
   return scale.asDiagonal() * y;
 }
+
+// Landmarks fill the upper triangle only.
+void MirrorUpper(MatrixXd* H) { H->triangularView<Eigen::StrictlyLower>() = H->transpose(); }
 
 // All that is said of the oldest full frame.
 NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
@@ -72,6 +82,7 @@ NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
       AddLandmark(state, landmark, 0, &out);
     }
   }
+  MirrorUpper(&out.H);
   return out;
 }
 
@@ -112,6 +123,7 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
   for (const Landmark& landmark : problem.landmarks) {
     AddLandmark(problem.state, landmark, damping, &out);
   }
+  MirrorUpper(&out.H);
   return out;
 }
 

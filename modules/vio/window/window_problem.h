@@ -67,9 +67,6 @@ NormalEquations Linearise(const WindowProblem& problem, double damping);
 // Optimises state and landmarks in place; the final cost.
 double Optimise(WindowProblem& problem, int max_iterations);
 
-// Whitened distance of a ray from where it should be; infinite for a point behind the camera.
-double RayError(const WindowState& state, const AnchoredPoint& point, const FrameRay& seen);
-
 // Marginal covariance of the window's error.
 Eigen::MatrixXd WindowCovariance(const WindowProblem& problem);
 

@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""What the odometry costs: its instructions on a short rendered recording, counted by valgrind, against a number that is committed.
+
+    tests/vio_instructions_test.py PANGEA_VIO RECORDING [--print]
+
+Without decoding and start of the program. Fails from 5 % more on, and from 5 % less on: then the number below is lowered. Skipped (77)
+without valgrind, and with libraries other than those that it was counted with.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+MILLIONS = 5829  # of instructions, 6 s at 20 images a second
+TOLERANCE = 0.05
+COUNTED_WITH = "libopencv_video.so.406"
+SECONDS = 6
+# The same machine code on every processor: without AVX, in OpenCV and in the C library.
+PLAIN = {"OPENCV_CPU_DISABLE": "AVX,FP16,AVX2,FMA3,AVX512-COMMON,AVX512-SKX",
+         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable,-ERMS"}
+
+
+def skip(why):
+    print(f"skipped: {why}")
+    sys.exit(77)
+
+
+def counted(vio, recording, folder):
+    profile = folder / "callgrind.out"
+    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--toggle-collect=pangea::vio::Vio::AddImage*",
+               vio, "--agent", "1", "--bus", "none", "--rate", "max", "--map-utime", "1", "--recording", recording,
+               "--duration", str(SECONDS), "--out-tum", str(folder / "vio.tum")]
+    run = subprocess.run(command, env={**os.environ, **PLAIN}, capture_output=True, text=True)
+    if run.returncode != 0:
+        sys.exit(f"pangea-vio failed under valgrind:\n{run.stderr}")
+    poses = len((folder / "vio.tum").read_text().splitlines())
+    if poses < 10 * SECONDS:
+        sys.exit(f"only {poses} poses: it is not the odometry that was counted")
+    return int(re.search(r"^totals: (\d+)", profile.read_text(), re.MULTILINE).group(1)) / 1e6
+
+
+def main():
+    vio, recording = sys.argv[1:3]
+    if not shutil.which("valgrind"):
+        skip("valgrind is not installed")
+    if COUNTED_WITH not in subprocess.run(["ldd", vio], capture_output=True, text=True).stdout:
+        skip(f"the number is for {COUNTED_WITH}")
+    with tempfile.TemporaryDirectory() as folder:
+        millions = counted(vio, recording, Path(folder))
+    print(f"{millions:.0f} million instructions; {MILLIONS} are committed")
+    if "--print" not in sys.argv and abs(millions - MILLIONS) > TOLERANCE * MILLIONS:
+        sys.exit(f"{100 * (millions / MILLIONS - 1):+.1f} %: more than {100 * TOLERANCE:.0f} % off")
+
+
+if __name__ == "__main__":
+    main()
