@@ -11,10 +11,23 @@
 
 namespace pangea {
 
+struct LoopVerifierOptions {
+  LoopVerificationOptions alignment;
+  // For a candidate within one map.
+  DriftGateOptions drift;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
+    archive.Section("drift", &drift,
+                    "the odometry's drift that a constraint within one map may claim");
+  }
+};
+
 class LoopVerifier {
  public:
-  LoopVerifier(const LoopVerificationOptions& alignment, const DriftGateOptions& drift)
-      : drift_(drift), aligner_(alignment) {}
+  explicit LoopVerifier(const LoopVerifierOptions& options)
+      : drift_(options.drift), aligner_(options.alignment) {}
   virtual ~LoopVerifier() = default;
 
   // In any order; a repeat changes nothing.
