@@ -40,7 +40,7 @@ constexpr double kMinCostRatio = 2;  // the next best rotation's over the best o
 
 // First without the lens: focal length and distortion run away together while the rotation is
 // rough.
-Solution Refined(const Solver& solver, const Hypothesis& hypothesis, Prior prior) {
+Solution Refined(const Solver& solver, const Hypothesis& hypothesis, const Prior& prior) {
   Prior first = prior;
   first.sigma.tail<kSize - kLogFocal>().setZero();
   return solver.Solve(solver.Solve(hypothesis.parameters, first).parameters, prior);
