@@ -23,9 +23,8 @@ constexpr double kOtherRotation = 0.5;  // rad
 constexpr CameraModel::Kind kLenses[] = {CameraModel::Kind::kRadtan,
                                          CameraModel::Kind::kEquidistant};
 
-constexpr double kMaxGap_s = 0.8;  // of a pair
-constexpr double kSearchGap_s =
-    0.12;  // of those searched on: what is not yet known adds up over time
+// Of the pairs searched on: what is not yet known adds up over time.
+constexpr double kSearchGap_s = 0.12;
 constexpr double kVelocityChange = 1;  // within a pair (epipolar.h)
 constexpr size_t kMaxRefined = 9;      // hypotheses, on a part of the pairs
 constexpr size_t kChooseOnEvery = 3;   // that part

@@ -20,6 +20,7 @@ struct FramePair {
 };
 
 constexpr double kPairStep_s = 0.1;  // between the first images of pairs
+constexpr double kMaxGap_s = 0.8;    // within a pair, at most
 
 // The second image of a pair comes as soon as points have moved far, at most `max_gap_s` later.
 std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, int64_t origin_utime,
