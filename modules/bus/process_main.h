@@ -17,11 +17,11 @@ class App;
 namespace pangea {
 
 struct ProcessDescription {
-  std::string name;                                   // "pangea-fusion"; on the bus it is "fusion"
-  std::string summary;                                // for --help
-  YamlOptions& options;                               // of --options FILE.yaml
-  std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
+  std::string name;                       // "pangea-fusion"; on the bus it is "fusion"
+  std::string summary;                    // for --help
+  YamlOptions& options;                   // of --options FILE.yaml
   ScratchFileOptions* scratch = nullptr;  // of --scratch-mb; null: it sets nothing aside
+  std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
 };
 
 // Reads the command line (--bus URL, --options FILE.yaml, --print-options, --scratch-mb), then
