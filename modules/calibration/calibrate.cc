@@ -5,7 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "calibration/frame_pairs.h"
+#include "calibration/priors.h"
+#include "calibration/search.h"
+#include "calibration/solver.h"
 #include "core/median.h"
 #include "core/rigid3.h"
 
@@ -18,63 +23,46 @@ constexpr double kOtherRotation = 0.5;  // rad
 constexpr CameraModel::Kind kLenses[] = {CameraModel::Kind::kRadtan,
                                          CameraModel::Kind::kEquidistant};
 
-CameraModel Nominal(const Input& input, const Options& options, CameraModel::Kind lens) {
-  CameraModel camera;
-  camera.kind = lens;
-  camera.width = input.width;
-  camera.height = input.height;
-  camera.cx = 0.5 * (input.width - 1);
-  camera.cy = 0.5 * (input.height - 1);
-  camera.readout_s = options.readout_s;
-  return camera;
-}
-
-Prior PriorOf(const Input& input, const Options& options, const Parameters& mean) {
-  Prior prior;
-  prior.mean = mean;
-  prior.sigma.segment<3>(kRotation).setConstant(input.q_body_cam ? options.sigma_given_rotation
-                                                                 : options.sigma_axis_aligned);
-  prior.sigma.segment<3>(kGyroBias).setConstant(options.sigma_gyro_bias);
-  prior.sigma[kTimeOffset] = options.sigma_time_offset_s;
-  prior.sigma[kLogFocal] =
-      input.field_of_view ? options.sigma_given_log_focal : options.sigma_log_focal;
-  prior.sigma.segment<2>(kCentre).setConstant(options.sigma_centre *
-                                              std::max(input.width, input.height));
-  prior.sigma.segment<2>(kDistortion)
-      .setConstant(mean.camera.kind == CameraModel::Kind::kEquidistant
-                       ? options.sigma_distortion_equidistant
-                       : options.sigma_distortion);
-  prior.sigma[kReadout] = options.sigma_readout_s;
-  return prior;
-}
+// Of the pairs searched on: what is not yet known adds up over time.
+constexpr double kSearchGap_s = 0.12;
+constexpr double kVelocityChange = 1;  // within a pair (epipolar.h)
+constexpr size_t kMaxRefined = 9;      // hypotheses, on a part of the pairs
+constexpr size_t kChooseOnEvery = 3;   // that part
+constexpr double kMinSeconds = 8;      // of pairs
+// The result is refused beyond these.
+constexpr double kMaxSigmaRotation = 0.06;  // rad
+constexpr double kMaxSigmaLogFocal = 0.05;
+constexpr double kMaxSigmaTimeOffset_s = 0.01;
+constexpr double kMaxSigma_px = 2.5;
+constexpr double kMinFieldOfView = 0.7, kMaxFieldOfView = 2.3;  // rad
+constexpr double kMinCostRatio = 2;  // the next best rotation's over the best one's
 
 // First without the lens: focal length and distortion run away together while the rotation is
 // rough.
-Solution Refined(const Solver& solver, const Hypothesis& hypothesis, Prior prior) {
+Solution Refined(const Solver& solver, const Hypothesis& hypothesis, const Prior& prior) {
   Prior first = prior;
   first.sigma.tail<kSize - kLogFocal>().setZero();
   return solver.Solve(solver.Solve(hypothesis.parameters, first).parameters, prior);
 }
 
 // With inertial samples all around, wherever the clocks are.
-std::vector<FramePair> Pairs(const Input& input, const Options& options, const FramePairOptions& of,
-                             int64_t origin) {
-  std::vector<FramePair> pairs = MakePairs(input.frames, origin, of);
+std::vector<FramePair> Pairs(const Input& input, double max_gap_s, int64_t origin) {
+  std::vector<FramePair> pairs = MakePairs(input.frames, origin, max_gap_s);
   const OrientationCurve curve(input.imu, origin, Eigen::Vector3d::Zero());
-  const double margin_s = options.search.max_offset_s + 2 * options.sigma_time_offset_s;
+  constexpr double kMargin_s = kMaxOffset_s + 2 * kSigmaTimeOffset_s;
   std::erase_if(pairs, [&](const FramePair& pair) {
-    return !curve.Covers(pair.a_s - margin_s, pair.b_s + margin_s);
+    return !curve.Covers(pair.a_s - kMargin_s, pair.b_s + kMargin_s);
   });
   return pairs;
 }
 
 // Half of what lies between the results of the recording's halves: what the residuals do not show,
 // such as a focus or a delay that changes.
-Tangent HalfDifference(const Input& input, const Options& options, std::span<const FramePair> pairs,
-                       int64_t origin, const Solution& solution, const Prior& prior) {
+Tangent HalfDifference(const Input& input, std::span<const FramePair> pairs, int64_t origin,
+                       const Solution& solution, const Prior& prior) {
   const size_t middle = pairs.size() / 2;
   const auto part = [&](std::span<const FramePair> half) {
-    return Solver(half, input.imu, origin, options.solver).Solve(solution.parameters, prior);
+    return Solver(half, input.imu, origin, kVelocityChange).Solve(solution.parameters, prior);
   };
   const Parameters first = part(pairs.first(middle)).parameters;
   const Parameters second = part(pairs.subspan(middle)).parameters;
@@ -97,7 +85,8 @@ Eigen::Vector3d RotationRms(std::span<const FramePair> pairs, std::span<const Im
 }
 
 // A gyroscope that reads too little makes lenses too long, by the same share.
-void AddFloors(const ImuNoise& noise, double gyro_scale_sigma, Result& result) {
+void AddFloors(const Input& input, Result& result) {
+  const ImuNoise& noise = input.imu_noise;
   const auto add = [&result](int row, double sigma) {
     result.covariance(row, row) += sigma * sigma;
   };
@@ -108,55 +97,50 @@ void AddFloors(const ImuNoise& noise, double gyro_scale_sigma, Result& result) {
   constexpr double kLensSigma = 0.001;
   add(kDistortion, kLensSigma);
   add(kDistortion + 1, kLensSigma);
-  add(kLogFocal, std::max(gyro_scale_sigma, noise.gyro_scale_sigma));
+  add(kLogFocal, std::max(input.least_gyro_scale_sigma, noise.gyro_scale_sigma));
   result.sigma = result.covariance.diagonal().cwiseSqrt();
 }
 
-std::string Refusal(const Result& result, const Options& options) {
+std::string Refusal(const Result& result) {
   const Tangent& sigma = result.sigma;
   const double offset_s = std::abs(result.parameters.MiddleRowOffset_s());
   const double field = FieldOfView(result.parameters.camera);
-  if (offset_s > options.search.max_offset_s || field < options.min_field_of_view ||
-      field > options.max_field_of_view) {
+  if (offset_s > kMaxOffset_s || field < kMinFieldOfView || field > kMaxFieldOfView) {
     return fmt::format(
         "what fits best is no phone's: a field of view of {:.0f} degrees, a time offset of {:.0f} "
         "ms: rotate more, about all three axes",
         field / kDegree, 1e3 * offset_s);
   }
-  if (result.sigma_px > options.max_sigma_px) {
+  if (result.sigma_px > kMaxSigma_px) {
     return fmt::format(
         "points are {:.1f} px off what the gyroscope says (at most {} are plausible): stamps, "
         "units "
         "or axes of the IMU are wrong, or much in the image moves by itself",
-        result.sigma_px, options.max_sigma_px);
+        result.sigma_px, kMaxSigma_px);
   }
-  if (result.next_cost > 0 && result.next_cost < options.min_cost_ratio) {
+  if (result.next_cost > 0 && result.next_cost < kMinCostRatio) {
     return fmt::format(
         "another rotation of the camera fits as well ({:.1f} % worse): rotate more, "
         "about all three axes",
         100 * (result.next_cost - 1));
   }
   const double rotation = sigma.segment<3>(kRotation).maxCoeff();
-  if (rotation > options.max_sigma_rotation) {
+  if (rotation > kMaxSigmaRotation) {
     return fmt::format(
         "the rotation camera to IMU is known to {:.1f} degrees only: rotate more, "
         "about at least two axes",
         rotation / kDegree);
   }
-  if (sigma[kLogFocal] > options.max_sigma_log_focal) {
+  if (sigma[kLogFocal] > kMaxSigmaLogFocal) {
     return fmt::format("the focal length is known to {:.0f} % only: rotate more, to and fro",
                        100 * sigma[kLogFocal]);
   }
-  if (sigma[kTimeOffset] > options.max_sigma_time_offset_s) {
+  if (sigma[kTimeOffset] > kMaxSigmaTimeOffset_s) {
     return fmt::format(
         "the time offset is known to {:.0f} ms only: begin and end rotations briskly",
         1e3 * sigma[kTimeOffset]);
   }
   return "";
-}
-
-double SecondsOf(std::span<const FramePair> pairs, double step_s) {
-  return step_s * static_cast<double>(pairs.size());
 }
 
 void Fill(const Solution& solution, Result& result) {
@@ -172,48 +156,39 @@ void Fill(const Solution& solution, Result& result) {
   result.inlier_share = solution.inlier_share;
 }
 
-}  // namespace
-
 // What best explains a part of the pairs, among the rotations searched.
 struct Choice {
   Hypothesis best;
   double next_cost = 0;  // of the best other rotation, over the best one's; 0: there is none
 };
 
-Choice ChooseRotation(const Input& input, const Options& options, std::span<const FramePair> pairs,
-                      int64_t origin) {
+Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int64_t origin) {
   const std::vector<Eigen::Quaterniond> rotations =
       input.q_body_cam ? std::vector{*input.q_body_cam} : AxisAlignedRotations();
   const std::vector<double> fields =
       input.field_of_view ? std::vector{*input.field_of_view}
                           : std::vector<double>(std::begin(kFieldsOfView), std::end(kFieldsOfView));
-  FramePairOptions shorter = options.pairs;
-  shorter.max_gap_s = options.search_gap_s;
-  const std::vector<FramePair> searched =
-      WithMostMotion(Pairs(input, options, shorter, origin), options.search);
+  const std::vector<FramePair> searched = WithMostMotion(Pairs(input, kSearchGap_s, origin));
   std::vector<Hypothesis> found =
-      Search(searched, input.imu, origin, Nominal(input, options, CameraModel::Kind::kRadtan),
-             rotations, fields, options.search);
-  SolverOptions stiff = options.solver;
-  stiff.velocity_change = options.search.velocity_change;
+      Search(searched, input.imu, origin, NominalCamera(input, CameraModel::Kind::kRadtan),
+             rotations, fields);
   // The gyroscope's bias may hide the right one: each is refined a little before most are dropped.
-  const Solver roughly(searched, input.imu, origin, stiff);
+  const Solver roughly(searched, input.imu, origin, kSearchVelocityChange);
   for (Hypothesis& hypothesis : found) {
-    Prior first = PriorOf(input, options, hypothesis.parameters);
+    Prior first = PriorOf(input, hypothesis.parameters);
     first.sigma.tail<kSize - kLogFocal>().setZero();
     const Solution solution = roughly.Solve(hypothesis.parameters, first);
     hypothesis = {solution.parameters, solution.cost};
   }
   std::ranges::stable_sort(found, {}, &Hypothesis::cost);
-  found.resize(std::min(found.size(), static_cast<size_t>(options.max_refined)));
+  found.resize(std::min(found.size(), kMaxRefined));
   std::vector<FramePair> some;
-  for (size_t i = 0; i < pairs.size(); i += static_cast<size_t>(options.choose_on_every)) {
+  for (size_t i = 0; i < pairs.size(); i += kChooseOnEvery) {
     some.push_back(pairs[i]);
   }
-  const Solver solver(some, input.imu, origin, stiff);
+  const Solver solver(some, input.imu, origin, kSearchVelocityChange);
   for (Hypothesis& hypothesis : found) {
-    const Solution solution =
-        Refined(solver, hypothesis, PriorOf(input, options, hypothesis.parameters));
+    const Solution solution = Refined(solver, hypothesis, PriorOf(input, hypothesis.parameters));
     hypothesis = {solution.parameters, solution.cost};
   }
   std::ranges::stable_sort(found, {}, &Hypothesis::cost);
@@ -230,9 +205,9 @@ Choice ChooseRotation(const Input& input, const Options& options, std::span<cons
 }
 
 // With either kind of lens; the one that explains more.
-Solution SolveAll(const Input& input, const Options& options, std::span<const FramePair> pairs,
-                  int64_t origin, const Parameters& start) {
-  const Solver solver(pairs, input.imu, origin, options.solver);
+Solution SolveAll(const Input& input, std::span<const FramePair> pairs, int64_t origin,
+                  const Parameters& start) {
+  const Solver solver(pairs, input.imu, origin, kVelocityChange);
   Solution best;
   best.cost = std::numeric_limits<double>::infinity();
   for (const CameraModel::Kind lens : kLenses) {
@@ -244,13 +219,12 @@ Solution SolveAll(const Input& input, const Options& options, std::span<const Fr
           FocalOf(2 * std::atan(half_px / start.camera.fx), mean.camera);
     }
     mean.camera.distortion.setZero();
-    const Solution solution = Refined(solver, {mean, 0}, PriorOf(input, options, mean));
+    const Solution solution = Refined(solver, {mean, 0}, PriorOf(input, mean));
     if (solution.cost < best.cost) {
       best = solution;
     }
   }
-  const Tangent apart =
-      HalfDifference(input, options, pairs, origin, best, PriorOf(input, options, best.parameters));
+  const Tangent apart = HalfDifference(input, pairs, origin, best, PriorOf(input, best.parameters));
   for (int row = 0; row < kSize; ++row) {
     const double scale = std::max(1.0, std::abs(apart[row]) / std::sqrt(best.covariance(row, row)));
     best.covariance.row(row) *= scale;
@@ -259,7 +233,9 @@ Solution SolveAll(const Input& input, const Options& options, std::span<const Fr
   return best;
 }
 
-Result Calibrate(const Input& input, const Options& options) {
+}  // namespace
+
+Result Calibrate(const Input& input) {
   Result result;
   if (input.frames.empty() || input.imu.size() < 2) {
     result.refused = "there are no images or no inertial samples";
@@ -269,14 +245,14 @@ Result Calibrate(const Input& input, const Options& options) {
   result.image_rate_hz =
       static_cast<double>(input.frames.size()) /
       std::max(1e-3, 1e-6 * static_cast<double>(input.frames.back().utime - origin));
-  const std::vector<FramePair> pairs = Pairs(input, options, options.pairs, origin);
-  result.seconds = SecondsOf(pairs, options.pairs.step_s);
-  if (result.seconds < options.min_seconds) {
+  const std::vector<FramePair> pairs = Pairs(input, kMaxGap_s, origin);
+  result.seconds = kPairStep_s * static_cast<double>(pairs.size());
+  if (result.seconds < kMinSeconds) {
     result.refused = fmt::format(
         "points could be followed for {:.0f} s, at least {:.0f} are needed: record longer, with "
         "more "
         "light or more to see",
-        result.seconds, options.min_seconds);
+        result.seconds, kMinSeconds);
     return result;
   }
   std::vector<size_t> counts;
@@ -284,12 +260,12 @@ Result Calibrate(const Input& input, const Options& options) {
     counts.push_back(pair.points.size());
   }
   result.points = static_cast<double>(Median(counts));
-  const Choice choice = ChooseRotation(input, options, pairs, origin);
+  const Choice choice = ChooseRotation(input, pairs, origin);
   result.next_cost = choice.next_cost;
-  Fill(SolveAll(input, options, pairs, origin, choice.best.parameters), result);
+  Fill(SolveAll(input, pairs, origin, choice.best.parameters), result);
   result.rotation_rms = RotationRms(pairs, input.imu, origin, result.parameters);
-  AddFloors(input.imu_noise, options.sigma_gyro_scale, result);
-  result.refused = Refusal(result, options);
+  AddFloors(input, result);
+  result.refused = Refusal(result);
   return result;
 }
 

@@ -8,14 +8,12 @@
 // what to record instead. Translation camera to body is not asked: the odometry finds it.
 
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "calibration/frame_pairs.h"
 #include "calibration/parameters.h"
-#include "calibration/search.h"
-#include "calibration/solver.h"
+#include "core/imu/imu.h"
+#include "vio/front_end/tracks.h"
 
 namespace pangea::calibration {
 
@@ -27,36 +25,8 @@ struct Input {
   ImuNoise imu_noise;
   std::optional<double> field_of_view;           // of the wider side, radians
   std::optional<Eigen::Quaterniond> q_body_cam;  // to some degrees
-};
-
-struct Options {
-  FramePairOptions pairs;
-  double search_gap_s = 0.12;  // of the pairs searched on: what is not yet known adds up over time
-  SearchOptions search;
-  SolverOptions solver;
-  int max_refined = 9;      // hypotheses, on a part of the pairs
-  int choose_on_every = 3;  // that part
-  double min_seconds = 8;   // of pairs
-  // What is known of any phone: standard deviations.
-  double sigma_axis_aligned = 0.25;  // rad: of a rotation found among the 24
-  double sigma_given_rotation = 0.1;
-  double sigma_gyro_bias = 0.1;     // rad/s
-  double sigma_gyro_scale = 0.005;  // as sold; larger where the recording says so
-  double sigma_time_offset_s = 0.1;
-  double sigma_log_focal = 0.3;  // 0.1 with a field of view
-  double sigma_given_log_focal = 0.1;
-  double sigma_centre = 0.02;  // of the wider side
-  double sigma_distortion = 0.15;
-  double sigma_distortion_equidistant = 0.03;
-  double readout_s = 0.015;
-  double sigma_readout_s = 0.012;
-  // The result is refused beyond these.
-  double max_sigma_rotation = 0.06;  // rad
-  double max_sigma_log_focal = 0.05;
-  double max_sigma_time_offset_s = 0.01;
-  double max_sigma_px = 2.5;
-  double min_field_of_view = 0.7, max_field_of_view = 2.3;  // rad
-  double min_cost_ratio = 2;  // the next best rotation's over the best one's
+  // Of a gyroscope as sold; `imu_noise` counts where it says more.
+  double least_gyro_scale_sigma = 0.005;
 };
 
 struct Result {
@@ -73,6 +43,6 @@ struct Result {
   std::string refused;                                     // why; empty: it holds
 };
 
-Result Calibrate(const Input& input, const Options& options);
+Result Calibrate(const Input& input);
 
 }  // namespace pangea::calibration

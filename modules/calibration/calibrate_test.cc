@@ -30,9 +30,8 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
     TestWorld world = MakeTestWorld(Short(seed));
     // This one is exact.
     world.input.imu_noise.axes_sigma = world.input.imu_noise.gyro_scale_sigma = 0;
-    Options options;
-    options.sigma_gyro_scale = 0;
-    const Result result = Calibrate(world.input, options);
+    world.input.least_gyro_scale_sigma = 0;
+    const Result result = Calibrate(world.input);
     EXPECT_EQ(result.refused, "") << seed;
     const Tangent off = result.parameters.Minus(world.truth);
     nees += off.cwiseQuotient(result.sigma).cwiseAbs2() / kWorlds;
@@ -51,10 +50,10 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
 // Stamps shift a whole image, so its residuals are no independent witnesses.
 TEST(Calibrate, StampsThatJitterMakeItLessSure) {
   TestWorldOptions options = Short(3);
-  const Result exact = Calibrate(MakeTestWorld(options).input, {});
+  const Result exact = Calibrate(MakeTestWorld(options).input);
   options.stamp_sigma_s = 0.004;
   const TestWorld world = MakeTestWorld(options);
-  const Result result = Calibrate(world.input, {});
+  const Result result = Calibrate(world.input);
   EXPECT_EQ(result.refused, "");
   EXPECT_GT(result.sigma[kTimeOffset], 2 * exact.sigma[kTimeOffset]);
   const Tangent off = result.parameters.Minus(world.truth).cwiseQuotient(result.sigma);
@@ -64,14 +63,14 @@ TEST(Calibrate, StampsThatJitterMakeItLessSure) {
 TEST(Calibrate, RefusesRotationAboutOneAxis) {
   TestWorldOptions options = Short(5);
   options.rotation_rms = {1e-4, 0.6, 1e-4};
-  const Result result = Calibrate(MakeTestWorld(options).input, {});
+  const Result result = Calibrate(MakeTestWorld(options).input);
   EXPECT_THAT(result.refused, HasSubstr("rotate more"));
 }
 
 TEST(Calibrate, RefusesACameraThatDoesNotRotate) {
   TestWorldOptions options = Short(6);
   options.rotation_rms.setConstant(1e-4);
-  EXPECT_THAT(Calibrate(MakeTestWorld(options).input, {}).refused, Not(""));
+  EXPECT_THAT(Calibrate(MakeTestWorld(options).input).refused, Not(""));
 }
 
 TEST(Calibrate, RefusesAGyroscopeInDegrees) {
@@ -79,14 +78,14 @@ TEST(Calibrate, RefusesAGyroscopeInDegrees) {
   for (ImuSample& sample : world.input.imu) {
     sample.gyro *= 180 / M_PI;
   }
-  EXPECT_THAT(Calibrate(world.input, {}).refused, Not(""));
+  EXPECT_THAT(Calibrate(world.input).refused, Not(""));
 }
 
 TEST(Calibrate, TakesWhatIsKnown) {
   TestWorld world = MakeTestWorld(Short(8));
   world.input.q_body_cam = world.truth.camera.T_body_cam.q;
   world.input.field_of_view = 2 * std::atan(0.5 * world.truth.camera.width / world.truth.camera.fx);
-  const Result result = Calibrate(world.input, {});
+  const Result result = Calibrate(world.input);
   EXPECT_EQ(result.refused, "");
   EXPECT_EQ(result.next_cost, 0);  // no other rotation was tried
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "calibration/search.h"
 #include "core/rigid3.h"
 
 namespace pangea::calibration {

@@ -71,9 +71,8 @@ int Run(const Arguments& a) {
   if (a.field_of_view_deg > 0) {
     input.field_of_view = kDegree * a.field_of_view_deg;
   }
-  const Options options;
-  const Result result = Calibrate(input, options);
-  const std::string summary = Summary(input, options, result);
+  const Result result = Calibrate(input);
+  const std::string summary = Summary(input, result);
   std::cout << summary;
   if (!result.refused.empty()) {
     std::filesystem::remove_all(std::filesystem::path(a.out) / "mav0");

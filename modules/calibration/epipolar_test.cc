@@ -11,7 +11,7 @@ namespace {
 TEST(Epipolar, NoResidualAtTheTruth) {
   const TestWorld world = MakeTestWorld({.seconds = 2, .pixel_sigma = 0, .exact_gyro = true});
   const int64_t origin = world.input.frames.front().utime;
-  const auto pairs = MakePairs(world.input.frames, origin, {});
+  const auto pairs = MakePairs(world.input.frames, origin, kMaxGap_s);
   const OrientationCurve curve(world.input.imu, origin, world.truth.gyro_bias);
   ASSERT_GT(pairs.size(), 10U);
   for (const FramePair& pair : pairs) {
@@ -28,7 +28,7 @@ TEST(Epipolar, ResidualsArePixels) {
   TestWorld world = MakeTestWorld({.seconds = 2, .pixel_sigma = 0, .exact_gyro = true});
   world.truth.camera.distortion.setZero();
   const int64_t origin = world.input.frames.front().utime;
-  std::vector<FramePair> pairs = MakePairs(world.input.frames, origin, {});
+  std::vector<FramePair> pairs = MakePairs(world.input.frames, origin, kMaxGap_s);
   const OrientationCurve curve(world.input.imu, origin, world.truth.gyro_bias);
   FramePair& pair = pairs.front();
   const Eigen::VectorXd weights =

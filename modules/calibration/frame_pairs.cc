@@ -8,6 +8,12 @@
 namespace pangea::calibration {
 namespace {
 
+constexpr double kEnoughMotion_px = 60;  // median
+constexpr int kMinPoints = 25;
+constexpr int kMaxPoints = 50;  // kept of a pair, evenly
+constexpr double kMinShare =
+    0.4;  // of the first image's points: the second is as late as this allows
+
 std::vector<PointPair> Common(const vio::TrackedFrame& a, const vio::TrackedFrame& b) {
   std::unordered_map<int32_t, Eigen::Vector2d> in_a;
   for (const vio::Observation& o : a.observations) {
@@ -43,7 +49,7 @@ void Thin(int max_points, FramePair* pair) {
 }
 
 std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, int64_t origin_utime,
-                                 const FramePairOptions& options) {
+                                 double max_gap_s) {
   const auto seconds = [origin_utime](const vio::TrackedFrame& frame) {
     return 1e-6 * static_cast<double>(frame.utime - origin_utime);
   };
@@ -55,25 +61,23 @@ std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, i
       continue;
     }
     FramePair pair;
-    for (size_t j = i + 1; j < frames.size() && seconds(frames[j]) - a_s <= options.max_gap_s;
-         ++j) {
+    for (size_t j = i + 1; j < frames.size() && seconds(frames[j]) - a_s <= max_gap_s; ++j) {
       std::vector<PointPair> points = Common(frames[i], frames[j]);
-      const auto enough =
-          std::max<size_t>(static_cast<size_t>(options.min_points),
-                           static_cast<size_t>(options.min_share *
-                                               static_cast<double>(frames[i].observations.size())));
+      const auto enough = std::max<size_t>(
+          static_cast<size_t>(kMinPoints),
+          static_cast<size_t>(kMinShare * static_cast<double>(frames[i].observations.size())));
       if (points.size() < enough) {
         break;
       }
       pair = {a_s, seconds(frames[j]), std::move(points)};
-      if (MedianMotion(pair.points) > options.enough_motion_px) {
+      if (MedianMotion(pair.points) > kEnoughMotion_px) {
         break;
       }
     }
     if (!pair.points.empty()) {
-      Thin(options.max_points, &pair);
+      Thin(kMaxPoints, &pair);
       pairs.push_back(std::move(pair));
-      next_s = a_s + options.step_s;
+      next_s = a_s + kPairStep_s;
     }
   }
   return pairs;

@@ -19,17 +19,12 @@ struct FramePair {
   std::vector<PointPair> points;
 };
 
-struct FramePairOptions {
-  double max_gap_s = 0.8;
-  double enough_motion_px = 60;  // median: the second image is no later than it takes
-  double step_s = 0.1;           // between the first images of pairs
-  int min_points = 25;
-  int max_points = 50;     // kept of a pair, evenly
-  double min_share = 0.4;  // of the first image's points: the second is as late as this allows
-};
+constexpr double kPairStep_s = 0.1;  // between the first images of pairs
+constexpr double kMaxGap_s = 0.8;    // within a pair, at most
 
+// The second image of a pair comes as soon as points have moved far, at most `max_gap_s` later.
 std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, int64_t origin_utime,
-                                 const FramePairOptions& options);
+                                 double max_gap_s);
 
 // At most so many of a pair's points, evenly chosen.
 void Thin(int max_points, FramePair* pair);

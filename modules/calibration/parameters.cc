@@ -1,5 +1,6 @@
 #include "calibration/parameters.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/rigid3.h"
@@ -33,6 +34,18 @@ Tangent Parameters::Minus(const Parameters& other) const {
   d.segment<2>(kDistortion) = (a.distortion - b.distortion).head<2>();
   d[kReadout] = a.readout_s - b.readout_s;
   return d;
+}
+
+double FieldOfView(const CameraModel& camera) {
+  const double half_px = 0.5 * std::max(camera.width, camera.height);
+  return 2 * (camera.kind == CameraModel::Kind::kEquidistant ? half_px / camera.fx
+                                                             : std::atan(half_px / camera.fx));
+}
+
+double FocalOf(double field_of_view, const CameraModel& camera) {
+  const double half_px = 0.5 * std::max(camera.width, camera.height);
+  return camera.kind == CameraModel::Kind::kEquidistant ? half_px / (0.5 * field_of_view)
+                                                        : half_px / std::tan(0.5 * field_of_view);
 }
 
 }  // namespace pangea::calibration

@@ -35,6 +35,11 @@ struct Parameters {
   Tangent Minus(const Parameters& other) const;
 };
 
+// Of the wider side, radians.
+double FieldOfView(const CameraModel& camera);
+// Focal length, pixels, of a field of view over the wider side.
+double FocalOf(double field_of_view, const CameraModel& camera);
+
 // What is known before: a normal distribution about `mean`, independent rows.
 struct Prior {
   Parameters mean;

@@ -93,16 +93,16 @@ TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
   EXPECT_THROW(MakeFolder(Path("in"), Path("out")), std::runtime_error);
   const Input input = TracksOf(recording, {});
   EXPECT_EQ(input.frames.size(), 3U);
-  EXPECT_THAT(Calibrate(input, {}).refused, HasSubstr("record longer"));
+  EXPECT_THAT(Calibrate(input).refused, HasSubstr("record longer"));
 }
 
 TEST(Summary, SaysWhatToDoBetter) {
   Result result = Some();
-  EXPECT_THAT(Summary({}, {}, result), Not(HasSubstr("better:")));
+  EXPECT_THAT(Summary({}, result), Not(HasSubstr("better:")));
   result.rotation_rms = {0.5, 0.05, 0.5};
   result.points = 20;
   result.refused = "the focal length is known to 9 % only";
-  const std::string text = Summary({}, {}, result);
+  const std::string text = Summary({}, result);
   EXPECT_THAT(text, HasSubstr("better: rotate more left and right"));
   EXPECT_THAT(text, HasSubstr("better: more light"));
   EXPECT_THAT(text, HasSubstr("no calibration: the focal length"));
@@ -113,9 +113,9 @@ TEST(Summary, SaysWhatTheMotionDidNotTell) {
   Input input;
   input.width = 640;
   input.height = 480;
-  EXPECT_THAT(Summary(input, {}, result), Not(HasSubstr("not told")));
+  EXPECT_THAT(Summary(input, result), Not(HasSubstr("not told")));
   result.sigma[kReadout] = 0.011;
-  EXPECT_THAT(Summary(input, {}, result), HasSubstr("as assumed"));
+  EXPECT_THAT(Summary(input, result), HasSubstr("as assumed"));
 }
 
 }  // namespace

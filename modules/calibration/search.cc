@@ -1,12 +1,16 @@
 #include "calibration/search.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "calibration/solver.h"
 
 namespace pangea::calibration {
 namespace {
+
+constexpr double kOffsetStep_s = 0.015;
+constexpr size_t kMaxPairs = 50;
+constexpr int kMaxPoints = 25;       // of each
+constexpr double kGridSigma_px = 3;  // what the grid leaves
 
 double Motion(const FramePair& pair) {
   double squared = 0;
@@ -18,13 +22,12 @@ double Motion(const FramePair& pair) {
 
 }  // namespace
 
-std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs,
-                                      const SearchOptions& options) {
+std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs) {
   std::vector<FramePair> most(pairs.begin(), pairs.end());
   std::ranges::stable_sort(most, std::ranges::greater{}, Motion);
-  most.resize(std::min(most.size(), static_cast<size_t>(options.max_pairs)));
+  most.resize(std::min(most.size(), kMaxPairs));
   for (FramePair& pair : most) {
-    Thin(options.max_points, &pair);
+    Thin(kMaxPoints, &pair);
   }
   return most;
 }
@@ -46,42 +49,26 @@ std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
   return rotations;
 }
 
-double FieldOfView(const CameraModel& camera) {
-  const double half_px = 0.5 * std::max(camera.width, camera.height);
-  return 2 * (camera.kind == CameraModel::Kind::kEquidistant ? half_px / camera.fx
-                                                             : std::atan(half_px / camera.fx));
-}
-
-double FocalOf(double field_of_view, const CameraModel& camera) {
-  const double half_px = 0.5 * std::max(camera.width, camera.height);
-  return camera.kind == CameraModel::Kind::kEquidistant ? half_px / (0.5 * field_of_view)
-                                                        : half_px / std::tan(0.5 * field_of_view);
-}
-
 std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
                                int64_t origin_utime, const CameraModel& camera,
                                std::span<const Eigen::Quaterniond> rotations,
-                               std::span<const double> fields_of_view,
-                               const SearchOptions& options) {
+                               std::span<const double> fields_of_view) {
   size_t num_residuals = 0;
   for (const FramePair& pair : pairs) {
     num_residuals += pair.points.size();
   }
-  SolverOptions stiff;
-  stiff.velocity_change = options.velocity_change;
-  const Solver solver(pairs, imu, origin_utime, stiff);
+  const Solver solver(pairs, imu, origin_utime, kSearchVelocityChange);
   std::vector<Hypothesis> hypotheses;
   for (const Eigen::Quaterniond& rotation : rotations) {
     for (const double field_of_view : fields_of_view) {
       Hypothesis best{.parameters = {}, .cost = 1e300};
-      for (double offset = -options.max_offset_s; offset <= options.max_offset_s + 1e-9;
-           offset += options.offset_step_s) {
+      for (double offset = -kMaxOffset_s; offset <= kMaxOffset_s + 1e-9; offset += kOffsetStep_s) {
         Parameters trial;
         trial.camera = camera;
         trial.camera.fx = trial.camera.fy = FocalOf(field_of_view, camera);
         trial.camera.T_body_cam.q = rotation;
         trial.camera.time_offset_s = offset - 0.5 * camera.readout_s;
-        const double cost = solver.Cost(trial, options.sigma_px) /
+        const double cost = solver.Cost(trial, kGridSigma_px) /
                             static_cast<double>(std::max<size_t>(1, num_residuals));
         if (cost < best.cost) {
           best = {trial, cost};

@@ -14,14 +14,9 @@
 
 namespace pangea::calibration {
 
-struct SearchOptions {
-  double max_offset_s = 0.15;
-  double offset_step_s = 0.015;
-  int max_pairs = 50;
-  int max_points = 25;           // of each
-  double velocity_change = 0.2;  // so short are the pairs
-  double sigma_px = 3;           // what the grid leaves
-};
+constexpr double kMaxOffset_s = 0.15;  // searched to either side
+// Of the pairs searched on (epipolar.h): so short they are.
+constexpr double kSearchVelocityChange = 0.2;
 
 // Rotations camera to body.
 std::vector<Eigen::Quaterniond> AxisAlignedRotations();
@@ -35,16 +30,9 @@ struct Hypothesis {
 std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
                                int64_t origin_utime, const CameraModel& camera,
                                std::span<const Eigen::Quaterniond> rotations,
-                               std::span<const double> fields_of_view,
-                               const SearchOptions& options);
+                               std::span<const double> fields_of_view);
 
 // The pairs with most motion, each thinned.
-std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs,
-                                      const SearchOptions& options);
-
-// Of the wider side, radians.
-double FieldOfView(const CameraModel& camera);
-// Focal length, pixels, of a field of view over the wider side.
-double FocalOf(double field_of_view, const CameraModel& camera);
+std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs);
 
 }  // namespace pangea::calibration

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 
-#include "calibration/search.h"
 #include "core/median.h"
 
 namespace pangea::calibration {
@@ -18,6 +17,14 @@ constexpr double kTranslationStep = 1e-5;  // of its numeric derivative
 constexpr double kDirectionDamping = 1e-3;
 constexpr double kConverged = 0.01;  // of a step, in standard deviations
 constexpr double kInlierSigmas = 3;
+constexpr double kRobustAt = 2.4;  // of the Cauchy loss, in standard deviations
+constexpr int kMaxIterations = 25;
+constexpr double kBlock_s = 1.0;  // of residuals that may share an error
+constexpr int kLongBlocks = 8;  // of the whole recording: for what changes slowly, as exposure does
+// Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
+constexpr double kMinFieldOfView = 0.6, kMaxFieldOfView = 2.4;  // rad, of the wider side
+constexpr double kMaxDistortion = 0.6;
+constexpr double kMaxDistortionEquidistant = 0.15;  // a lens that is far from equidistant is none
 
 // Step of the numeric derivative of each row: small against what a residual is linear in.
 Tangent DerivativeSteps() {
@@ -73,8 +80,8 @@ struct Solver::Linearised {
 };
 
 Solver::Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
-               int64_t origin_utime, const SolverOptions& options)
-    : pairs_(pairs), imu_(imu), origin_utime_(origin_utime), options_(options) {}
+               int64_t origin_utime, double velocity_change)
+    : pairs_(pairs), imu_(imu), origin_utime_(origin_utime), velocity_change_(velocity_change) {}
 
 std::vector<PairRays> Solver::Rays(const CameraModel& camera) const {
   std::vector<PairRays> rays;
@@ -89,13 +96,13 @@ std::vector<PairGeometry> Solver::Geometries(const Parameters& parameters,
   const OrientationCurve curve(imu_, origin_utime_, parameters.gyro_bias);
   std::vector<PairGeometry> geometries;
   for (size_t p = 0; p < pairs_.size(); ++p) {
-    geometries.emplace_back(pairs_[p], rays[p], parameters, curve, options_.velocity_change);
+    geometries.emplace_back(pairs_[p], rays[p], parameters, curve, velocity_change_);
   }
   return geometries;
 }
 
 double Solver::RobustCost(const Eigen::VectorXd& residuals, double sigma_px) const {
-  const double c = options_.robust_at;
+  const double c = kRobustAt;
   return 0.5 * c * c * (1 + (residuals / (c * sigma_px)).array().square()).log().sum();
 }
 
@@ -142,7 +149,7 @@ void Solver::AddPair(const PairGeometry& geometry, const PairTerms& terms,
                      const Eigen::MatrixXd& jacobian, Linearised* at) const {
   const Eigen::VectorXd& r = terms.residuals;
   const Eigen::VectorXd root_weights =
-      (1 + (r / (options_.robust_at * at->sigma_px)).array().square()).rsqrt() / at->sigma_px;
+      (1 + (r / (kRobustAt * at->sigma_px)).array().square()).rsqrt() / at->sigma_px;
   const Eigen::Matrix<double, 9, 8> steps = Steps(terms.translation);
   Eigen::MatrixXd B(r.size(), 8);
   for (int k = 0; k < 8; ++k) {
@@ -195,10 +202,10 @@ Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& 
 
 bool Solver::Plausible(const CameraModel& camera) const {
   const bool equidistant = camera.kind == CameraModel::Kind::kEquidistant;
-  const double most = equidistant ? options_.max_distortion_equidistant : options_.max_distortion;
+  const double most = equidistant ? kMaxDistortionEquidistant : kMaxDistortion;
   const double field = FieldOfView(camera);
-  return camera.fx > 0 && field > options_.min_field_of_view &&
-         field < options_.max_field_of_view && camera.distortion.cwiseAbs().maxCoeff() < most;
+  return camera.fx > 0 && field > kMinFieldOfView && field < kMaxFieldOfView &&
+         camera.distortion.cwiseAbs().maxCoeff() < most;
 }
 
 // Of the sum of all pairs' gradients, from how those of blocks of time scatter.
@@ -224,8 +231,8 @@ Information Solver::Covariance(const Linearised& at) const {
   }
   const Information usual = h.ldlt().solve(Information::Identity());
   const double seconds = pairs_.back().b_s - pairs_.front().a_s;
-  Information covariance = usual * (Scatter(at, options_.block_s) + at.prior) * usual;
-  const Information slow = usual * (Scatter(at, seconds / options_.long_blocks) + at.prior) * usual;
+  Information covariance = usual * (Scatter(at, kBlock_s) + at.prior) * usual;
+  const Information slow = usual * (Scatter(at, seconds / kLongBlocks) + at.prior) * usual;
   // The largest of the three for each row: blocks may agree by chance.
   for (int i = 0; i < kSize; ++i) {
     const double largest = std::max({usual(i, i), covariance(i, i), slow(i, i)});
@@ -241,7 +248,7 @@ Solution Solver::Solve(const Parameters& start, const Prior& prior) const {
   solution.parameters = start;
   Linearised at = Linearise(start, prior);
   double damping = 1e-3;
-  for (; solution.iterations < options_.max_iterations; ++solution.iterations) {
+  for (; solution.iterations < kMaxIterations; ++solution.iterations) {
     Information h = at.hessian + at.prior;
     for (int i = 0; i < kSize; ++i) {
       h(i, i) += damping * h(i, i) + (prior.sigma[i] > 0 ? 0 : 1e12);

@@ -16,19 +16,6 @@
 
 namespace pangea::calibration {
 
-struct SolverOptions {
-  int max_iterations = 25;
-  double velocity_change = 1;  // within a pair (epipolar.h)
-  double block_s = 1.0;        // of residuals that may share an error
-  int long_blocks = 8;         // of the whole recording: for what changes slowly, as exposure does
-  double robust_at = 2.4;      // of the Cauchy loss, in standard deviations
-  // Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
-  double min_field_of_view = 0.6, max_field_of_view = 2.4;  // rad, of the wider side
-  double max_distortion = 0.6;
-  // A lens that is far from equidistant is none.
-  double max_distortion_equidistant = 0.15;
-};
-
 struct Solution {
   Parameters parameters;
   Information covariance = Information::Identity();
@@ -40,8 +27,9 @@ struct Solution {
 
 class Solver {
  public:
+  // `velocity_change` within a pair: epipolar.h.
   Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu, int64_t origin_utime,
-         const SolverOptions& options);
+         double velocity_change);
 
   // Rows whose prior's sigma is 0 stay as they are.
   Solution Solve(const Parameters& start, const Prior& prior) const;
@@ -71,7 +59,7 @@ class Solver {
   std::span<const FramePair> pairs_;
   std::span<const ImuSample> imu_;
   int64_t origin_utime_;
-  SolverOptions options_;
+  double velocity_change_;
 };
 
 }  // namespace pangea::calibration

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "calibration/priors.h"
+
 namespace pangea::calibration {
 namespace {
 
@@ -23,13 +25,13 @@ std::string Row(const std::string& what, const std::string& value, const std::st
                      told ? "" : "  (not told by the motion: as assumed)");
 }
 
-std::string Values(const Input& input, const Options& options, const Result& result) {
+std::string Values(const Input& input, const Result& result) {
   const CameraModel& c = result.parameters.camera;
   const Tangent& s = result.sigma;
   const bool fisheye = c.kind == CameraModel::Kind::kEquidistant;
   const double field = FieldOfView(c) / kDegree;
   const Eigen::Vector3d rotation = s.segment<3>(kRotation) / kDegree;
-  const double centre_prior = options.sigma_centre * std::max(input.width, input.height);
+  const double centre_prior = kSigmaCentre * std::max(input.width, input.height);
   std::string text;
   text += Row("focal length, px", fmt::format("{:.1f} ({:.1f} degrees)", c.fx, field),
               fmt::format("{:.2f} %", 100 * s[kLogFocal]));
@@ -39,7 +41,7 @@ std::string Values(const Input& input, const Options& options, const Result& res
   text += Row(fisheye ? "distortion (equidistant)" : "distortion (radial-tangential)",
               fmt::format("{:.4f}, {:.4f}", c.distortion[0], c.distortion[1]),
               fmt::format("{:.4f}, {:.4f}", s[kDistortion], s[kDistortion + 1]),
-              s[kDistortion] < kTold * options.sigma_distortion);
+              s[kDistortion] < kTold * kSigmaDistortion);
   const Eigen::Matrix3d R = c.T_body_cam.R();
   for (int axis = 0; axis < 3; ++axis) {
     text += Row(fmt::format("camera's {} in the IMU's axes", kAxisNames[axis]),
@@ -49,9 +51,8 @@ std::string Values(const Input& input, const Options& options, const Result& res
   text += Row("time offset, ms (middle row)",
               fmt::format("{:.1f}", 1e3 * result.parameters.MiddleRowOffset_s()),
               fmt::format("{:.2f}", 1e3 * s[kTimeOffset]));
-  text +=
-      Row("read-out, ms", fmt::format("{:.1f}", 1e3 * c.readout_s),
-          fmt::format("{:.1f}", 1e3 * s[kReadout]), s[kReadout] < kTold * options.sigma_readout_s);
+  text += Row("read-out, ms", fmt::format("{:.1f}", 1e3 * c.readout_s),
+              fmt::format("{:.1f}", 1e3 * s[kReadout]), s[kReadout] < kTold * kSigmaReadout_s);
   const Eigen::Vector3d& bias = result.parameters.gyro_bias;
   text += Row("gyroscope bias, rad/s",
               fmt::format("{:.4f} {:.4f} {:.4f}", bias.x(), bias.y(), bias.z()),
@@ -86,13 +87,13 @@ std::vector<std::string> Advice(const Result& result) {
 
 }  // namespace
 
-std::string Summary(const Input& input, const Options& options, const Result& result) {
+std::string Summary(const Input& input, const Result& result) {
   std::string text;
   if (!result.refused.empty()) {
     text += fmt::format("no calibration: {}\n", result.refused);
   }
   if (result.sigma_px > 0) {
-    text += Values(input, options, result);
+    text += Values(input, result);
     text += fmt::format(
         "{:.0f} s, {:.0f} points in a pair of images, {:.2f} px off, {:.0f} % within three "
         "standard deviations\n",

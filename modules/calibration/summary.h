@@ -8,6 +8,6 @@
 
 namespace pangea::calibration {
 
-std::string Summary(const Input& input, const Options& options, const Result& result);
+std::string Summary(const Input& input, const Result& result);
 
 }  // namespace pangea::calibration

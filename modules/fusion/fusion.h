@@ -11,23 +11,11 @@
 
 namespace pangea {
 
-struct FusionOptions {
-  LoopVerificationOptions alignment;
-  // For a candidate within one map that is in a group with others.
-  DriftGateOptions drift;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
-    archive.Section("drift", &drift,
-                    "the odometry's drift that a constraint within one map may claim");
-  }
-};
+using FusionOptions = LoopVerifierOptions;
 
 class Fusion : public LoopVerifier {
  public:
-  explicit Fusion(const FusionOptions& options, std::shared_ptr<RecordStore> records = nullptr)
-      : LoopVerifier(options.alignment, options.drift, std::move(records)) {}
+  using LoopVerifier::LoopVerifier;
 };
 
 }  // namespace pangea

@@ -12,23 +12,11 @@
 
 namespace pangea {
 
-struct InterMapBaOptions {
-  LoopVerificationOptions alignment;
-  DriftGateOptions drift;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
-    archive.Section("drift", &drift,
-                    "the odometry's drift that a constraint within one map may claim");
-  }
-};
+using InterMapBaOptions = LoopVerifierOptions;
 
 class InterMapBa : public LoopVerifier {
  public:
-  explicit InterMapBa(const InterMapBaOptions& options,
-                      std::shared_ptr<RecordStore> records = nullptr)
-      : LoopVerifier(options.alignment, options.drift, std::move(records)) {}
+  using LoopVerifier::LoopVerifier;
 
   Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                     LoopVerificationReport* report = nullptr) override {

@@ -67,7 +67,7 @@ TEST(InterMapBa, RefusesNeighbours) {
 
 TEST(InterMapBa, IsReadyOnlyWithTheWholeWay) {
   const TestAgent agent = RoundTrip(32, 0.01);
-  InterMapBa verifier({});
+  InterMapBa verifier(InterMapBaOptions{});
   const PlaceCandidate candidate{agent.keyframes[11].id, PlaceKind::kIntra, 0.5f, {}};
   const KeyframeId query = agent.keyframes[kRound + 10].id;
   for (const Keyframe& keyframe : agent.keyframes) {

@@ -15,12 +15,25 @@
 
 namespace pangea {
 
+struct LoopVerifierOptions {
+  LoopVerificationOptions alignment;
+  // For a candidate within one map.
+  DriftGateOptions drift;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Section("alignment", &alignment, "verification of a candidate, step by step");
+    archive.Section("drift", &drift,
+                    "the odometry's drift that a constraint within one map may claim");
+  }
+};
+
 class LoopVerifier {
  public:
   // `records`: for keyframes (submap_store.h).
-  LoopVerifier(const LoopVerificationOptions& alignment, const DriftGateOptions& drift,
-               std::shared_ptr<RecordStore> records = nullptr)
-      : drift_(drift), aligner_(alignment), store_({}, std::move(records)) {}
+  explicit LoopVerifier(const LoopVerifierOptions& options,
+                        std::shared_ptr<RecordStore> records = nullptr)
+      : drift_(options.drift), aligner_(options.alignment), store_({}, std::move(records)) {}
   virtual ~LoopVerifier() = default;
 
   // In any order; a repeat changes nothing.

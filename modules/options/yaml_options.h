@@ -63,30 +63,19 @@ class YamlOptions {
            const std::string& unit, const std::string& help);
 
   void Add(const std::string& key, bool* value, const std::string& help = "");
-  void Add(const std::string& key, int32_t* value);
-  void Add(const std::string& key, int64_t* value);
   void Add(const std::string& key, uint64_t* value);
-  void Add(const std::string& key, float* value);
-  void Add(const std::string& key, double* value);
   void Add(const std::string& key, std::string* value);
-  void Add(const std::string& key, std::optional<double>* value);  // "~": none
-  void AddPositive(const std::string& key, double* value);         // and finite
-  void AddNotNegative(const std::string& key, double* value);      // and finite
+
   // From `low` to `high`, both taken.
   void AddBetween(const std::string& key, double low, double high, double* value);
   void AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value);
   void AddBetween(const std::string& key, double low, double high,
                   std::optional<double>* value);  // "~": none
-  // Where `is_within` says so, and finite; `type` tells people what that is: "a number above 0".
-  void AddWithin(const std::string& key, const std::string& type,
-                 const std::function<bool(double)>& is_within, double* value);
-  void Add(const std::string& key, std::vector<double>* value);
   // A list of two numbers, both from `low` to `high`.
   void AddPairBetween(const std::string& key, double low, double high, double* first,
                       double* second);
   // At most so many bytes.
   void AddText(const std::string& key, size_t max_bytes, std::string* value);
-  void Add(const std::string& key, std::vector<std::string>* value);
 
   // An enum by names.
   template <typename Enum>
@@ -188,11 +177,10 @@ class YamlOptions {
   void AddOptionalSection(const std::string& key, std::function<YamlOptions()> start,
                           std::function<std::optional<YamlOptions>()> current);
   template <typename T>
-  void AddWhole(const std::string& key, T low, T high, T* value);
-  template <typename T>
   void AddScalar(const std::string& key, const std::string& type, T* value);
+  // `of`: "a number", for messages.
   template <typename T>
-  void AddScalars(const std::string& key, const std::string& type, std::vector<T>* value);
+  void AddNumber(const std::string& key, const std::string& of, T low, T high, T* value);
   Entry& NewEntry(const std::string& key);
   void Read(const YAML::Node& node, const std::string& file, const std::string& path);
   Entry* Find(const std::string& key) const;

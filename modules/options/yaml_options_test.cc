@@ -10,7 +10,6 @@ namespace pangea {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -26,10 +25,7 @@ struct Options {
   int count = 3;
   uint64_t seed = 7;
   double gate_m = 0.1;
-  float weight = 2;
   std::string file = "a: \"b\"";
-  std::vector<double> numbers = {1, 0.5};
-  std::vector<std::string> names;
   Scope scope = Scope::kAll;
   struct Window {
     int keyframes = 10;
@@ -41,25 +37,22 @@ struct Options {
 
 void Bind(YamlOptions& yaml, Options& o) {
   yaml.Add("flag", &o.flag);
-  yaml.Add("count", &o.count);
+  yaml.AddBetween("count", -10, 10, &o.count);
   yaml.Add("seed", &o.seed);
-  yaml.Add("gate_m", &o.gate_m);
-  yaml.Add("weight", &o.weight);
+  yaml.AddBetween("gate_m", 0, 10, &o.gate_m);
   yaml.Add("file", &o.file);
-  yaml.Add("numbers", &o.numbers);
-  yaml.Add("names", &o.names);
   yaml.AddChoice<Scope>("scope", &o.scope, {{"all", Scope::kAll}, {"paper", Scope::kPaper}});
-  yaml.Section("window").Add("keyframes", &o.window.keyframes);
+  yaml.Section("window").AddBetween("keyframes", 1, 100, &o.window.keyframes);
   yaml.AddList("items", &o.items, [](YamlOptions& y, Item& item) {
-    y.Add("id", &item.id);
+    y.AddBetween("id", 0, 9, &item.id);
     y.Add("name", &item.name);
     y.Require("id");
   });
   yaml.AddOptional("extra", &o.extra, [](YamlOptions& y, Item& item) {
-    y.Add("id", &item.id);
+    y.AddBetween("id", 0, 9, &item.id);
     y.Add("name", &item.name);
   });
-  yaml.Add("bound", &o.bound);
+  yaml.AddBetween("bound", 0, 1, &o.bound);
 }
 
 Options Read(const std::string& text) {
@@ -82,16 +75,13 @@ std::string Complaint(const std::string& text) {
 TEST(YamlOptions, ReadsEveryTypeAndKeepsDefaults) {
   const Options o = Read(
       "flag: false\ncount: -4\nseed: 18446744073709551615\ngate_m: 1e-3\nfile: x y\n"
-      "numbers: [1, 2.5]\nnames: [a, b]\nscope: paper\nwindow: {keyframes: 4}\n"
+      "scope: paper\nwindow: {keyframes: 4}\n"
       "items:\n  - {id: 1, name: one}\n  - {id: 2}\n");
   EXPECT_FALSE(o.flag);
   EXPECT_EQ(o.count, -4);
   EXPECT_EQ(o.seed, 18446744073709551615U);
   EXPECT_EQ(o.gate_m, 1e-3);
-  EXPECT_EQ(o.weight, 2);
   EXPECT_EQ(o.file, "x y");
-  EXPECT_THAT(o.numbers, ElementsAre(1, 2.5));
-  EXPECT_THAT(o.names, ElementsAre("a", "b"));
   EXPECT_EQ(o.scope, Scope::kPaper);
   EXPECT_EQ(o.window.keyframes, 4);
   ASSERT_EQ(o.items.size(), 2U);
@@ -122,7 +112,8 @@ TEST(YamlOptions, AnOptionalNumberIsThereOnlyWhenGiven) {
   EXPECT_FALSE(Read("count: 4").bound);
   EXPECT_FALSE(Read("bound: ~").bound);
   EXPECT_EQ(Read("bound: 0").bound, 0.0);
-  EXPECT_THAT(Complaint("bound: high"), HasSubstr("'bound' must be a number, not 'high'"));
+  EXPECT_THAT(Complaint("bound: high"),
+              HasSubstr("'bound' must be a number from 0 to 1, not 'high'"));
   for (const char* text : {"count: 4", "bound: 0.1"}) {
     Options options = Read(text);
     YamlOptions yaml;
@@ -151,39 +142,12 @@ TEST(YamlOptions, WrongTypeNamesKeyAndExpectation) {
   EXPECT_THAT(Complaint("seed: -1"), HasSubstr("whole number >= 0"));
   EXPECT_THAT(Complaint("flag: 3"), HasSubstr("true or false"));
   EXPECT_THAT(Complaint("gate_m: near"), HasSubstr("a number"));
-  EXPECT_THAT(Complaint("gate_m: [1]"), HasSubstr("a number, not a list"));
-  EXPECT_THAT(Complaint("gate_m:"), HasSubstr("a number, not nothing"));
-  EXPECT_THAT(Complaint("numbers: 1"), HasSubstr("a list"));
-  EXPECT_THAT(Complaint("numbers: [1, x]"), HasSubstr("'numbers[1]'"));
+  EXPECT_THAT(Complaint("gate_m: [1]"), HasSubstr("a number from 0 to 10, not a list"));
+  EXPECT_THAT(Complaint("gate_m:"), HasSubstr("a number from 0 to 10, not nothing"));
   EXPECT_THAT(Complaint("scope: some"), HasSubstr("one of all, paper"));
   EXPECT_THAT(Complaint("window: 3"), HasSubstr("'window' must be a section of keys"));
   EXPECT_THAT(Complaint("items: {id: 3}"), HasSubstr("'items' must be a list"));
   EXPECT_THAT(Complaint("- 1"), HasSubstr("section of keys"));
-}
-
-TEST(YamlOptions, ANumberOutOfItsRangeIsRefused) {
-  double density = 1, sigma = 1;
-  YamlOptions yaml;
-  yaml.AddPositive("density", &density);
-  yaml.AddNotNegative("sigma", &sigma);
-  yaml.ReadText("density: 0.5\nsigma: 0", "test.yaml");
-  EXPECT_EQ(density, 0.5);
-  EXPECT_EQ(sigma, 0);
-  const auto complaint = [&yaml](const std::string& text) -> std::string {
-    try {
-      yaml.ReadText(text, "test.yaml");
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  for (const char* text : {"density: 0", "density: -1", "density: .nan", "density: .inf"}) {
-    EXPECT_THAT(complaint(text), HasSubstr("'density' must be a number above 0")) << text;
-  }
-  for (const char* text : {"sigma: -0.1", "sigma: .nan"}) {
-    EXPECT_THAT(complaint(text), HasSubstr("'sigma' must be a number, 0 or above")) << text;
-  }
-  EXPECT_EQ(density, 0.5);
 }
 
 TEST(YamlOptions, ARangeTakesItsEndsAndIsNamed) {
@@ -213,7 +177,10 @@ TEST(YamlOptions, ARangeTakesItsEndsAndIsNamed) {
   EXPECT_EQ(complaint("id: 65536"),
             "test.yaml:1: key 'id' must be a whole number from 1 to 65535, not '65536'");
   EXPECT_THAT(complaint("id: 1.5"), HasSubstr("'id' must be a whole number from 1 to 65535"));
-  EXPECT_THAT(complaint("bound: .nan"), HasSubstr("'bound' must be a number from 0 to 1, not"));
+  for (const char* text : {"bound: .nan", "bound: .inf", "bound: -0.1"}) {
+    EXPECT_THAT(complaint(text), HasSubstr("'bound' must be a number from 0 to 1, not")) << text;
+  }
+  EXPECT_EQ(delay, 1e6);
 }
 
 TEST(YamlOptions, APairAndATextHaveTheirBounds) {
@@ -267,18 +234,15 @@ TEST(YamlOptions, MissingFileIsNamed) {
 TEST(YamlOptions, WhatIsPrintedReadsBackTheSame) {
   Options o;
   o.gate_m = 0.1 + 0.2;  // needs all 17 digits
-  o.weight = 1e-7F;
   o.scope = Scope::kPaper;
-  o.names = {"x: y", "#"};
+  o.file = "x: y #";
   o.items = {{4, "four"}, {5, "five"}};
   YamlOptions yaml;
   Bind(yaml, o);
   const std::string printed = yaml.Print();
   const Options back = Read(printed);
   EXPECT_EQ(back.gate_m, o.gate_m);
-  EXPECT_EQ(back.weight, o.weight);
   EXPECT_EQ(back.file, o.file);
-  EXPECT_EQ(back.names, o.names);
   EXPECT_EQ(back.scope, o.scope);
   ASSERT_EQ(back.items.size(), 2U);
   EXPECT_EQ(back.items[1].name, "five");
@@ -356,7 +320,7 @@ TEST(YamlOptions, OneValueIsSetByItsPath) {
 
 TEST(YamlOptions, BindingAKeyTwiceIsAProgrammersMistake) {
   YamlOptions yaml;
-  int value = 0;
+  bool value = false;
   yaml.Add("a", &value);
   EXPECT_THROW(yaml.Add("a", &value), std::logic_error);
   EXPECT_THROW(yaml.Require("b"), std::logic_error);

@@ -26,7 +26,7 @@ struct SiteDescription {
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("format", &format);
+    archive.Add("format", &format, {1, 1e9}, "", "");
     archive.Add("name", &name);
     archive.Add("created", &created);
     archive.Add("bus", &bus);

@@ -1,0 +1,19 @@
+#pragma once
+
+// What is known of any phone before: standard deviations, and where the solver starts.
+
+#include "calibration/calibrate.h"
+
+namespace pangea::calibration {
+
+constexpr double kSigmaTimeOffset_s = 0.1;
+constexpr double kSigmaCentre = 0.02;  // of the wider side
+constexpr double kSigmaDistortion = 0.15;
+constexpr double kSigmaReadout_s = 0.012;
+
+// Without a focal length.
+CameraModel NominalCamera(const Input& input, CameraModel::Kind lens);
+
+Prior PriorOf(const Input& input, const Parameters& mean);
+
+}  // namespace pangea::calibration
