@@ -75,16 +75,16 @@ std::optional<ResendQueue::Answer> ResendQueue::Next(const JournalIndex& index) 
   if (requests_.empty()) {
     return std::nullopt;
   }
-  auto turn = requests_.upper_bound(answered_);
-  turn = turn == requests_.end() ? requests_.begin() : turn;
-  answered_ = turn->first;
-  Request& request = turn->second.front();
-  Answer answer{turn->first, request.channel_name,
+  auto next = requests_.upper_bound(answered_);
+  next = next == requests_.end() ? requests_.begin() : turn;
+  answered_ = next->first;
+  Request& request = next->second.front();
+  Answer answer{next->first, request.channel_name,
                 index.Find(request.channel, {request.map, request.next_seq})};
   if (++request.next_seq > request.to_seq) {
-    turn->second.pop_front();
-    if (turn->second.empty()) {
-      requests_.erase(turn);
+    next->second.pop_front();
+    if (next->second.empty()) {
+      requests_.erase(next);
     }
   }
   return answer;
