@@ -76,7 +76,7 @@ std::optional<ResendQueue::Answer> ResendQueue::Next(const JournalIndex& index) 
     return std::nullopt;
   }
   auto next = requests_.upper_bound(answered_);
-  next = next == requests_.end() ? requests_.begin() : turn;
+  next = next == requests_.end() ? requests_.begin() : next;
   answered_ = next->first;
   Request& request = next->second.front();
   Answer answer{next->first, request.channel_name,
