@@ -92,6 +92,8 @@ for day in 1 2; do
   serve_until day_$day "pangea-site info day_$day | grep -q 'matches *3[12]$'"
 done
 pangea-site merge day_1 day_2 --out both
+serve_until both "pangea-log info both/journal.lcm | grep -qE '^ +[2-9][0-9] +accepted'"
+# A log says what is there after the start, and nothing of numbers that change later.
 serve_until both "grep -q 'posegraph: 2 maps in 1 groups' both/logs/posegraph.txt"
 )",
       folder.string(), Buses(), PANGEA_SOURCE_DIR);
