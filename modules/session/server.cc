@@ -45,6 +45,9 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
   } else {
     argv.insert(argv.end(), {"--bus", options.bus});
   }
+  if (process == "anchors" && !options.http.empty()) {
+    argv.insert(argv.end(), {"--http", options.http});
+  }
   if (const auto file = options.options.find(process); file != options.options.end()) {
     argv.insert(argv.end(), {"--options", file->second.string()});
   }

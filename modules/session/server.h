@@ -15,6 +15,7 @@ struct ServerOptions {
   std::filesystem::path journal;
   std::filesystem::path keys;
   std::filesystem::path logs;
+  std::string http;  // ADDRESS:PORT of the anchors' API; empty: none
   std::map<std::string, std::filesystem::path> options;  // of each process, its file
 };
 

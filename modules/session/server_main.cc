@@ -47,6 +47,8 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
       ->excludes(site);
   app.add_option("--options", arguments->option_files,
                  "PROCESS=FILE.yaml, before what the folder has");
+  app.add_option("--http", options.http,
+                 "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
 }
 
 // What the command line leaves open is the site's.
