@@ -281,16 +281,10 @@ std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group
     if (GroupAndRevision(map).first != group) {
       continue;
     }
-    const Rigid3 T_map_newest_odom = T_map_odom(map);
-    const Group* const state = GroupOf(map);
     for (const auto& [seq, keyframe] : track.keyframes()) {
-      Rigid3 T_map_body = T_map_newest_odom * keyframe.T_odom_body;
-      if (state != nullptr) {
-        const auto found = state->T_map_body.find({map, seq});
-        T_map_body = found != state->T_map_body.end() ? found->second : T_map_body;
-      }
-      if (!nearest || (T_map_body.t - p_map).norm() < (nearest->T_map_body.t - p_map).norm()) {
-        nearest = {{map, seq}, T_map_body};
+      const Rigid3 T = T_map_body(map, seq);
+      if (!nearest || (T.t - p_map).norm() < (nearest->T_map_body.t - p_map).norm()) {
+        nearest = {{map, seq}, T};
       }
     }
   }

@@ -63,9 +63,6 @@ void AnchorsProcess::OnEdit(AnchorEdit edit) {
       on_edit_taken_(next, refused);
     }
   }
-  for (const std::string& reason : anchors_.TakeNotPlaced()) {
-    node_.Refuse(reason);
-  }
 }
 
 bool AnchorsProcess::OnRetransmission(const again_t& again) {
@@ -134,6 +131,10 @@ void AnchorsProcess::Tick(int64_t now_utime) {
 }
 
 void AnchorsProcess::PublishStatus(int64_t now_utime) {
+  // Also of those that waited for a keyframe.
+  for (const std::string& reason : anchors_.TakeNotPlaced()) {
+    node_.Refuse(reason);
+  }
   node_.Set("anchors", static_cast<int64_t>(anchors_.num_anchors()));
   node_.Set("anchors_placed", static_cast<int64_t>(anchors_.num_placed()));
   node_.PublishStatus(
