@@ -32,6 +32,9 @@ struct PlaceMatch {
   std::vector<std::string> rejected;  // dropped before publication, and why: for people
 };
 
+// Why a candidate was not verified: the map knows the relative pose well enough already.
+inline constexpr char kRedundant[] = "redundant";
+
 // Exactly one per candidate.
 struct Constraint {
   KeyframeId from;  // the candidate's match

@@ -20,8 +20,29 @@ bool LoopVerifier::Ready(const KeyframeId& query, const PlaceCandidate& candidat
   return query.map != candidate.match.map || store_.ChainIsComplete(candidate.match, query);
 }
 
+void LoopVerifier::NoteVerified(const Constraint& result) {
+  if (result.accepted) {
+    known_.Add(result);
+  }
+}
+
+bool LoopVerifier::IsRedundant(const KeyframeId& query, const KeyframeId& match) const {
+  return (query.map == match.map || groups_.AreFused(query.map, match.map)) &&
+         known_.IsRedundant(query, match, store_);
+}
+
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                                 LoopVerificationReport* report) {
+  if (IsRedundant(query, candidate.match)) {
+    return RefusedConstraint(query, candidate, kRedundant);
+  }
+  Constraint result = Align(query, candidate, report);
+  NoteVerified(result);
+  return result;
+}
+
+Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& candidate,
+                               LoopVerificationReport* report) {
   const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
   const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
   if (frames_c.empty() || frames_m.empty()) {

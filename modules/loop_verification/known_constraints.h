@@ -1,0 +1,61 @@
+#pragma once
+
+// What the map knows already of two keyframes' relative pose, and whether another constraint would
+// be worth its verification: measurement selection by information gain (Ila et al., "Information-
+// based compact pose SLAM", TRO 2010).
+//
+// Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
+// the position to sigma^2 + (drift * path)^2; their information adds up. A constraint of their
+// median sigma would add 0.5 * log2(1 + I_new / I_known) bits to each coordinate. Where that is
+// little it is redundant. Only near ones count, so the pose graph knows at least so much.
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "core/server_messages.h"
+#include "core/submap_store.h"
+
+namespace pangea {
+
+struct KnownConstraintOptions {
+  double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
+  double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("min_gain_bits", &min_gain_bits, {0, 100}, "bit",
+                "that another constraint must bring to each coordinate; 1 halves its sigma; "
+                "0: all are verified");
+    archive.Add("drift_per_m", &drift_per_m, {0, 1}, "",
+                "sigma of the odometry, of its path, between keyframes verified and this one");
+  }
+};
+
+class KnownConstraints {
+ public:
+  // Of keyframes that are further away in seq nothing is asked.
+  static constexpr int kMaxSeqDistance = 30;
+
+  explicit KnownConstraints(const KnownConstraintOptions& options) : options_(options) {}
+
+  // An accepted constraint. A repeat must not come.
+  void Add(const Constraint& constraint);
+  // What a constraint between the two would add to each coordinate, bits; infinite where nothing
+  // is known. Odometry is `store`'s.
+  double GainBits(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
+  bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const {
+    return GainBits(a, b, store) < options_.min_gain_bits;
+  }
+
+ private:
+  struct Known {
+    int32_t seq_a = 0, seq_b = 0;
+    double sigma_m = 0;  // of the position, its worst direction
+  };
+
+  KnownConstraintOptions options_;
+  std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // by seq_a
+};
+
+}  // namespace pangea
