@@ -32,7 +32,8 @@ struct PlaceMatch {
   std::vector<std::string> rejected;  // dropped before publication, and why: for people
 };
 
-// Why a candidate was not verified: the map knows the relative pose well enough already.
+// Why a candidate was not verified: constraints beside it tell the relative pose well enough. Its
+// matched corners are good for bundle adjustment.
 inline constexpr char kRedundant[] = "redundant";
 
 // Exactly one per candidate.
