@@ -28,8 +28,8 @@ export type ToWorker =
 
 export const kImuStride = 7;
 
-// refused: the gateway does not, or no longer, know the agent's key.
-export type LinkState = "connecting" | "open" | "refused";
+// refused: the gateway does not, or no longer, know the agent's key. replaced: the same agent runs in another page.
+export type LinkState = "connecting" | "open" | "refused" | "replaced";
 
 export type FromWorker =
   | { kind: "opened" }

@@ -7,6 +7,9 @@ const kFirstRetry_ms = 1000;
 const kLongestRetry_ms = 15_000;
 const kMaxWaiting_bytes = 256_000; // in the socket: what is beyond is dropped, the link repeats it
 
+// Why the gateway closes for good, by its close codes: the key is unknown or revoked; another page of this agent came.
+const kFinal = new Map<number, LinkState>([[4401, "refused"], [4409, "replaced"]]);
+
 export function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16));
 }
@@ -24,7 +27,6 @@ export class GatewayLink {
   state: LinkState = "connecting";
   private socket?: WebSocket;
   private retry_ms = kFirstRetry_ms;
-  private retryTimer?: ReturnType<typeof setTimeout>;
   private proven = false;
   private openedAt = -Infinity; // ms
 
@@ -44,19 +46,13 @@ export class GatewayLink {
     return true;
   }
 
-  close() {
-    clearTimeout(this.retryTimer);
-    if (this.socket) this.socket.onclose = null;
-    this.socket?.close();
-  }
-
   private connect() {
     this.proven = false;
     const socket = new WebSocket(`${this.origin}/link?agent=${this.agent}`);
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => this.take(socket, new Uint8Array(data));
-    socket.onclose = () => this.lost();
+    socket.onclose = ({ code }) => this.lost(code);
   }
 
   private take(socket: WebSocket, message: Uint8Array) {
@@ -70,12 +66,12 @@ export class GatewayLink {
     });
   }
 
-  private lost() {
+  private lost(code: number) {
     const openFor_ms = performance.now() - this.openedAt;
     if (this.state === "open" && openFor_ms > kLongestRetry_ms) this.retry_ms = kFirstRetry_ms;
-    // A gateway that closes right after the proof has refused it.
-    this.state = this.state === "open" && openFor_ms < kFirstRetry_ms ? "refused" : "connecting";
-    this.retryTimer = setTimeout(() => this.connect(), this.retry_ms);
+    this.state = kFinal.get(code) ?? "connecting";
+    if (kFinal.has(code)) return;
+    setTimeout(() => this.connect(), this.retry_ms);
     this.retry_ms = Math.min(2 * this.retry_ms, kLongestRetry_ms);
   }
 }

@@ -21,6 +21,7 @@ test("what to do comes before what is good", () => {
   assert.match(says({ pose: { ...pose, numTracked: 10 } }), /Little to see/);
   assert.match(says({ link: "connecting", together: ["Anna"] }), /No connection/);
   assert.match(says({ link: "refused" }), /new invite/);
+  assert.match(says({ link: "replaced" }), /open elsewhere/);
 });
 
 test("with whom the map is one", () => {

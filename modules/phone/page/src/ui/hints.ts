@@ -28,6 +28,7 @@ export function hintOf({ pose, brightness, link, together, motionSilent }: Situa
   if (!tracking) return { text: "Lost. Look at something with detail, and move sideways, slowly.", tone: "bad" };
   if (pose.numTracked < kFewFeatures) return { text: "Little to see here: look at something with more detail.", tone: "do" };
   if (link === "refused") return { text: "The server does not know this phone any more: ask for a new invite.", tone: "bad" };
+  if (link === "replaced") return { text: "The page is open elsewhere too, and works there. Stop and start here.", tone: "bad" };
   if (link === "connecting") return { text: "No connection. Walk on: your map is kept, and sent later.", tone: "do" };
   if (together.length > 0) return { text: `In one map with ${listed(together)}. Tap to place an anchor.`, tone: "good" };
   if (link === "open") return { text: "Walk where others have been, to join their map.", tone: "do" };
