@@ -5,13 +5,17 @@ import { kImuStride } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
 import type { ImuSample } from "./recording/euroc";
 
+const kLongestClose_ms = 3000; // of an agent that answers no more
+
 type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride">;
 
 export class AgentClient {
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
 
+  private closed = () => {};
+
   constructor(open: OpenAgent, onMessage: (message: FromWorker) => void) {
-    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => onMessage(data);
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => (data.kind === "closed" ? this.closed() : onMessage(data));
     this.worker.onerror = ({ message }) => onMessage({ kind: "failed", text: message || "The agent's script cannot be loaded." });
     this.say(open);
   }
@@ -31,7 +35,11 @@ export class AgentClient {
     this.worker.postMessage(message, transfer);
   }
 
-  close() {
+  // Resolves when all that is unsent is stored.
+  async close(): Promise<void> {
+    const closed = new Promise<void>((done) => (this.closed = done));
+    this.say({ kind: "close" });
+    await Promise.race([closed, new Promise((done) => setTimeout(done, kLongestClose_ms))]);
     this.worker.terminate();
   }
 }

@@ -49,6 +49,7 @@ async function ensureMembership() {
 async function startLive() {
   await askForMotion(); // first: iOS asks within the tap only
   await ensureMembership();
+  await walk?.close();
   walk = await Walk.live(membership, calibrationOf, stage, events);
   isLive = true;
   enter();
@@ -58,6 +59,7 @@ async function startLive() {
 async function startRecorded(files: Files) {
   const recording = await openRecording(files);
   await ensureMembership();
+  await walk?.close();
   isLive = false;
   walk = Walk.play(recording, options.get("rate") !== "max", membership, stage, events, (share) => (played = share));
   enter();
@@ -204,7 +206,11 @@ byId("record").onclick = async () => {
   walk.recorder = undefined;
   download(await recorder.finish(), `${recorder.name}.zip`);
 };
-byId("open_zip").onclick = () => byId("zip").click();
+for (const what of ["folder", "zip"]) byId(`open_${what}`).onclick = () => byId(what).click();
+byId<HTMLInputElement>("folder").onchange = ({ target }) => {
+  const files = [...((target as HTMLInputElement).files ?? [])];
+  if (files.length > 0) attempt(startRecorded(filesOf(new Map(files.map((file) => [file.webkitRelativePath, file])))));
+};
 byId<HTMLInputElement>("zip").onchange = ({ target }) => {
   const [file] = (target as HTMLInputElement).files ?? [];
   if (file) attempt(filesOfZip(file).then(startRecorded));
@@ -237,7 +243,6 @@ document.addEventListener("visibilitychange", () => {
 // Images stand otherwise in the device from now on: another camera, for the odometry.
 screen.orientation?.addEventListener("change", () => {
   if (!isLive || byId("bar").hidden) return;
-  walk?.stop();
   attempt(startLive());
 });
 

@@ -24,7 +24,8 @@ export type ToWorker =
   | { kind: "image"; utime: number; luma: Uint8Array; width: number; height: number; stride: number }
   | { kind: "place"; edit: AnchorEdit }
   | { kind: "remove"; id: string }
-  | { kind: "end_map" }; // the keyframes of the window are finished; what comes next is a new map
+  | { kind: "end_map" } // the keyframes of the window are finished; what comes next is a new map
+  | { kind: "close" }; // ends the map; what the server does not have is stored for the next time
 
 export const kImuStride = 7;
 
@@ -40,4 +41,5 @@ export type FromWorker =
   | { kind: "status"; vio?: ProcessStatus; uplink?: ProcessStatus; link?: LinkState }
   | { kind: "placed"; id: string }
   | { kind: "refused"; text: string } // an anchor
-  | { kind: "storage_failed"; text: string };
+  | { kind: "storage_failed"; text: string }
+  | { kind: "closed" };

@@ -104,10 +104,15 @@ export class Walk {
     this.client.say({ kind: "end_map" });
   }
 
-  // The agent lives on, to send what the server does not have yet.
+  // The agent lives on until close, to send what the server does not have yet.
   stop() {
     this.stopSensors();
     this.endMap();
+  }
+
+  async close() {
+    this.stopSensors();
+    await this.client.close();
   }
 
   startRecording() {

@@ -17,6 +17,8 @@ const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now
 class AgentHost {
   private link?: GatewayLink;
   private spool?: SpoolStore;
+  private stored = Promise.resolve(); // what was given to the spool so far
+  private polling?: ReturnType<typeof setInterval>;
 
   private constructor(private readonly agent: PhoneAgent) {}
 
@@ -32,7 +34,7 @@ class AgentHost {
     });
     const host = new AgentHost(agent);
     if (membership) await host.connect(membership.agent, membership.key);
-    setInterval(() => host.take(agent.poll(now_us())), kPoll_ms);
+    host.polling = setInterval(() => host.take(agent.poll(now_us())), kPoll_ms);
     return host;
   }
 
@@ -56,7 +58,17 @@ class AgentHost {
       case "end_map":
         this.take(this.agent.flush());
         return this.agent.startAnew();
+      case "close":
+        return void this.close();
     }
+  }
+
+  private async close() {
+    clearInterval(this.polling);
+    this.take(this.agent.flush());
+    this.take(this.agent.poll(now_us()));
+    await this.stored;
+    say({ kind: "closed" });
   }
 
   private addImu(samples: Float64Array) {
@@ -81,8 +93,8 @@ class AgentHost {
 
   private take(events: AgentEvents) {
     for (const packet of events.linkUp) this.link?.send(packet);
-    if (events.spool.length > 0) {
-      this.spool?.apply(events.spool).catch((error) => say({ kind: "storage_failed", text: String(error) }));
+    if (this.spool && events.spool.length > 0) {
+      this.stored = this.spool.apply(events.spool).catch((error) => say({ kind: "storage_failed", text: String(error) }));
     }
     if (events.pose) say({ kind: "pose", pose: events.pose });
     if (events.anchors) say({ kind: "anchors", anchors: events.anchors });

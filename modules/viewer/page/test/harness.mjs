@@ -10,6 +10,7 @@ export const { values: options } = parseArgs({
     chromium: { type: "string" },
     log: { type: "string" },
     page: { type: "string" }, // folder of the phone's page
+    recordings: { type: "string" }, // of phones: phone_1, phone_2, phone_3
     out: { type: "string" }, // for screenshots
   },
 });
