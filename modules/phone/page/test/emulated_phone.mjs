@@ -23,7 +23,9 @@ export function cameraFile(recording) {
   for (let i = 0; i < kBeginAt; ++i) write(Buffer.alloc(pixels, i === kFlashAt ? 255 : 0));
   for (const name of names) {
     const { data } = PNG.sync.read(readFileSync(`${recording}/mav0/cam0/data/${name}`));
-    write(Buffer.from({ length: pixels }, (_, i) => data[4 * i]));
+    const luma = Buffer.alloc(pixels);
+    for (let i = 0; i < pixels; ++i) luma[i] = data[4 * i];
+    write(luma);
   }
   closeSync(out);
   renameSync(`${file}.part`, file);
@@ -31,6 +33,13 @@ export function cameraFile(recording) {
 }
 
 export class EmulatedPhone {
+  begun = new Promise((done) => (this.onBegun = done)); // when offset_us is known
+
+  // From the page's stamps to the recording's.
+  get offset_us() {
+    return this.firstImage - this.began_us;
+  }
+
   // `page` is not yet started: its camera begins when it is.
   static async on(page, recording) {
     const phone = new EmulatedPhone();
@@ -43,32 +52,30 @@ export class EmulatedPhone {
     }
     phone.set(phone.samples[0].values);
     await page.evaluate(() => {
-      const seen = setInterval(() => {
-        if (!(pangea.walk?.brightness > 200)) return;
-        window.flash_us = 1000 * (performance.timeOrigin + performance.now());
-        clearInterval(seen);
-      }, 2);
+      const { stage } = pangea;
+      const keep = stage.keep;
+      stage.keep = (utime, picture) => {
+        if (pangea.walk?.brightness > 200) window.flash_us ??= utime;
+        keep.call(stage, utime, picture);
+      };
     });
     return phone;
   }
 
-  // From the flash on, until the recording's end. `at_us`: the clock of the page at the recording's first image.
+  // From the flash on, until the recording's end.
   async play(page) {
     await page.waitForFunction(() => window.flash_us, undefined, { polling: 5, timeout: 120_000 });
     this.began_us = (await page.evaluate(() => flash_us)) + ((kBeginAt - kFlashAt) * 1e6) / kRate_hz;
+    this.onBegun();
     await new Promise((done) => {
       let next = 0;
       const feed = setInterval(() => {
-        const utime = this.recordedTime(1000 * (performance.timeOrigin + performance.now()));
+        const utime = 1000 * (performance.timeOrigin + performance.now()) + this.offset_us;
         while (next < this.samples.length && this.samples[next].utime < utime) ++next;
         if (next === this.samples.length) return clearInterval(feed), done();
         this.set(this.samples[next].values);
       }, kFeed_ms);
     });
-  }
-
-  recordedTime(page_us) {
-    return this.firstImage + (page_us - this.began_us);
   }
 
   set([gx, gy, gz, ax, ay, az]) {
