@@ -11,19 +11,30 @@ const done = <T>(request: IDBRequest<T>) =>
     request.onerror = () => reject(request.error);
   });
 
+interface Entry {
+  id: string;
+  order: number; // in which it was put
+  bytes: Uint8Array;
+}
+
 export class SpoolStore {
-  private constructor(private readonly database: IDBDatabase) {}
+  private constructor(
+    private readonly database: IDBDatabase,
+    private nextOrder: number,
+  ) {}
 
   static async open(name: string): Promise<SpoolStore> {
     const request = indexedDB.open(name, 1);
-    // Numbered as they come, so that they come back in that order.
-    request.onupgradeneeded = () =>
-      request.result.createObjectStore(kStore, { autoIncrement: true }).createIndex("id", "id", { unique: true });
-    return new SpoolStore(await done(request));
+    request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
+    const store = new SpoolStore(await done(request), 0);
+    store.nextOrder = ((await store.entries()).at(-1)?.order ?? -1) + 1;
+    return store;
   }
 
-  entries(): Promise<{ id: string; bytes: Uint8Array }[]> {
-    return done(this.database.transaction(kStore).objectStore(kStore).getAll());
+  // In the order in which they were put.
+  async entries(): Promise<Entry[]> {
+    const all: Entry[] = await done(this.database.transaction(kStore).objectStore(kStore).getAll());
+    return all.sort((a, b) => a.order - b.order);
   }
 
   // All or nothing; transactions of one store happen in the order of these calls.
@@ -31,11 +42,8 @@ export class SpoolStore {
     const transaction = this.database.transaction(kStore, "readwrite");
     const store = transaction.objectStore(kStore);
     for (const { op, id, bytes } of changes) {
-      if (op === "put") store.add({ id, bytes });
-      else store.index("id").getKey(id).onsuccess = ({ target }) => {
-        const key = (target as IDBRequest<IDBValidKey | undefined>).result;
-        if (key !== undefined) store.delete(key);
-      };
+      if (op === "put") store.put({ id, order: this.nextOrder++, bytes });
+      else store.delete(id);
     }
     await new Promise((resolve, reject) => {
       transaction.oncomplete = resolve;
