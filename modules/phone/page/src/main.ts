@@ -14,6 +14,7 @@ import type { CameraKind } from "./sensors/calibration";
 import { askForMotion } from "./sensors/motion";
 import { hintOf } from "./ui/hints";
 import { SmallMap } from "./ui/small_map";
+import { parseCamera } from "./view/camera_model";
 import { Stage } from "./view/stage";
 import { Walk } from "./walk";
 import type { WalkEvents } from "./walk";
@@ -231,6 +232,10 @@ async function openDrop(items: DataTransferItemList) {
 // A sensor.yaml of this phone's camera, as pangea-calibrate writes it.
 async function keepCalibration(yaml: string) {
   if (!camera) throw new Error("Start once, so that the camera is known; then drop its sensor.yaml again.");
+  const { width, height } = parseCamera(yaml, "sensor.yaml");
+  if (width !== camera.width || height !== camera.height) {
+    throw new Error(`sensor.yaml: field 'resolution' is ${width} x ${height}, the camera gives ${camera.width} x ${camera.height}`);
+  }
   storeCalibration(camera, yaml);
   notice("The calibration is kept for this camera.");
 }

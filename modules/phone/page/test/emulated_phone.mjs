@@ -1,12 +1,14 @@
 // A rendered recording as the sensors of an emulated phone: its images as the file of Chromium's fake camera, its motion as
-// DevTools' virtual sensors. Before it begins the camera is black, with one flash from which everything else is timed.
+// DevTools' virtual sensors. Before it begins, images of one grey each count up to it: from any of them it is known when it begins.
 
 import { closeSync, existsSync, openSync, readdirSync, readFileSync, renameSync, writeSync } from "node:fs";
 import { PNG } from "pngjs";
 
 const kRate_hz = 20;
-const kFlashAt = 2 * kRate_hz; // image
-const kBeginAt = 4 * kRate_hz;
+const kLeadIn = 4 * kRate_hz; // images
+const kDarkest = 10; // of the lead-in, whose every image is kBrighter brighter than the one before
+const kBrighter = 3;
+const kKnownAt = kLeadIn - kRate_hz; // when its begin is told
 const kFeed_ms = 8; // twice as often as browsers look
 
 // Every image of the recording as YUV 4:2:0 with all 256 grey levels, written once.
@@ -20,7 +22,7 @@ export function cameraFile(recording) {
   const out = openSync(`${file}.part`, "w");
   const write = (luma) => [Buffer.from("FRAME\n"), luma, chroma].forEach((bytes) => writeSync(out, bytes));
   writeSync(out, `YUV4MPEG2 W${width} H${height} F${kRate_hz}:1 Ip A1:1 C420jpeg\n`);
-  for (let i = 0; i < kBeginAt; ++i) write(Buffer.alloc(pixels, i === kFlashAt ? 255 : 0));
+  for (let i = 0; i < kLeadIn; ++i) write(Buffer.alloc(pixels, kDarkest + kBrighter * i));
   for (const name of names) {
     const { data } = PNG.sync.read(readFileSync(`${recording}/mav0/cam0/data/${name}`));
     const luma = Buffer.alloc(pixels);
@@ -51,21 +53,25 @@ export class EmulatedPhone {
       await phone.devtools.send("Emulation.setSensorOverrideEnabled", { enabled: true, type, metadata: { available: true } });
     }
     phone.set(phone.samples[0].values);
-    await page.evaluate(() => {
+    await page.evaluate(([leadIn, darkest, brighter, knownAt, period_us]) => {
       const { stage } = pangea;
       const keep = stage.keep;
+      let begin_us = Infinity;
       stage.keep = (utime, picture) => {
-        if (pangea.walk?.brightness > 200) window.flash_us ??= utime;
+        const i = ((pangea.walk?.brightness ?? 0) - darkest) / brighter;
+        // A stamp may be late, and is never early.
+        if (Number.isInteger(i) && i > 0) begin_us = Math.min(begin_us, utime + (leadIn - i) * period_us);
+        if (i > knownAt) window.begin_us ??= begin_us;
         keep.call(stage, utime, picture);
       };
-    });
+    }, [kLeadIn, kDarkest, kBrighter, kKnownAt, 1e6 / kRate_hz]);
     return phone;
   }
 
-  // From the flash on, until the recording's end.
+  // Waits for the begin, and feeds motion until the recording's end.
   async play(page) {
-    await page.waitForFunction(() => window.flash_us, undefined, { polling: 5, timeout: 120_000 });
-    this.began_us = (await page.evaluate(() => flash_us)) + ((kBeginAt - kFlashAt) * 1e6) / kRate_hz;
+    await page.waitForFunction(() => window.begin_us, undefined, { polling: 5, timeout: 120_000 });
+    this.began_us = await page.evaluate(() => begin_us);
     this.onBegun();
     await new Promise((done) => {
       let next = 0;

@@ -26,7 +26,7 @@ async function started(server, name, n) {
   await page.locator("#name").fill(name);
   await page.locator("#start").click();
   const playing = phone.play(page);
-  await page.waitForFunction(() => window.flash_us, undefined, { timeout: 60_000 });
+  await phone.begun;
   await noteDrawn(page);
   return { browser, page, phone, playing };
 }
@@ -44,7 +44,6 @@ await run(async () => {
   await server.start();
   const anna = await started(server, "Anna", 1);
   void photograph(anna.page, `${options.out}/phone_emulated_1.png`);
-  await anna.phone.begun;
   check("page 1 places an anchor", await placeAt(anna.page, first, target, anna.phone.offset_us));
   await anna.playing;
   await rates(anna.page);

@@ -31,7 +31,7 @@ export class Server {
 
   async start() {
     this.run("pangea-server", "--site", this.site, "--bus", this.bus, "--link", this.link);
-    await until("the site", () => existsSync(`${this.site}/site.yaml`) || existsSync(`${this.site}/keys`));
+    await until("the site", () => existsSync(`${this.site}/site.yaml`) && existsSync(`${this.site}/keys`));
     this.run("pangea-gateway", "--site", this.site, "--bus", this.bus, "--link", this.link, "--listen", "127.0.0.1", "--port", String(this.port), "--host", "localhost", "--page", options.page);
     await until("the gateway", () => answers(this.port));
   }
