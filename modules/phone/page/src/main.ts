@@ -82,6 +82,7 @@ function attempt(what: Promise<void>) {
 }
 
 function enter() {
+  imagesBefore = rate_hz = 0;
   byId("welcome").hidden = true;
   byId("hint").hidden = byId("bar").hidden = false;
   byId("record").hidden = !isLive;
@@ -123,6 +124,7 @@ function together(): string[] {
 }
 
 let imagesBefore = 0;
+let rate_hz = 0; // of images, smoothed
 
 function drawPanels() {
   if (!walk || byId("bar").hidden) return;
@@ -130,10 +132,10 @@ function drawPanels() {
   byId("hint").textContent = hint.text;
   byId("hint").className = hint.tone;
   byId<HTMLMeterElement>("quality").value = walk.pose?.state === "tracking" ? walk.pose.numTracked : 0;
-  const rate = ((walk.numImages - imagesBefore) * 1000) / kPanels_ms;
+  rate_hz += 0.3 * (((walk.numImages - imagesBefore) * 1000) / kPanels_ms - rate_hz);
   imagesBefore = walk.numImages;
   byId("numbers").textContent = [
-    `${rate.toFixed(0)} Hz`,
+    `${rate_hz.toFixed(0)} Hz`,
     `${walk.pose?.numTracked ?? 0} features`,
     walk.numUnsent > 0 ? `${walk.numUnsent} unsent` : "",
     isLive ? (walk.recorder ? `${walk.recorder.numImages} recorded` : "") : `${(100 * played).toFixed(0)} %`,

@@ -20,7 +20,6 @@ export class Stage {
   drawn?: Drawn;
   private readonly waiting = new Map<number, Picture>();
   private readonly overlay: Overlay;
-  private fit?: Fit;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -44,9 +43,9 @@ export class Stage {
   show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[]) {
     const picture = this.waiting.get(pose.utime);
     if (!picture) return;
-    this.fit = new Fit(camera, this.canvas);
-    const [left, top] = this.fit.toScreen([-0.5, -0.5]);
-    const { scale } = this.fit;
+    const fit = new Fit(camera, this.canvas);
+    const [left, top] = fit.toScreen([-0.5, -0.5]);
+    const { scale } = fit;
     this.canvas.getContext("2d")!.drawImage(picture, left, top, scale * camera.width, scale * camera.height);
     const tracking = pose.state === "tracking";
     const seen = tracking ? anchorsBefore(camera, pose, anchors) : [];
