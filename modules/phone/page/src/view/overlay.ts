@@ -47,6 +47,7 @@ export class Overlay {
   private readonly positions = this.attribute("position");
   private readonly colours = this.attribute("color");
   private readonly labels: HTMLElement[] = [];
+  private isClear = true; // nothing is drawn: then a frame costs nothing
 
   constructor(canvas: HTMLCanvasElement, private readonly labelParent: HTMLElement) {
     this.renderer = new WebGLRenderer({ canvas, alpha: true, antialias: true });
@@ -66,6 +67,8 @@ export class Overlay {
   }
 
   draw(camera: CameraModel, fit: Fit, seen: Seen[], colourOf: (owner: number) => string) {
+    if (seen.length === 0) return this.clear();
+    this.isClear = false;
     let n = 0;
     for (const { T_cam_anchor, owner } of seen) n = this.addAnchor(camera, fit, T_cam_anchor, new Color(colourOf(owner)), n);
     this.geometry.setDrawRange(0, n);
@@ -75,6 +78,8 @@ export class Overlay {
   }
 
   clear() {
+    if (this.isClear) return;
+    this.isClear = true;
     this.geometry.setDrawRange(0, 0);
     this.renderer.render(this.scene, this.camera);
     for (const label of this.labels) label.hidden = true;

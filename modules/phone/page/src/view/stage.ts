@@ -47,10 +47,8 @@ export class Stage {
     const [left, top] = fit.toScreen([-0.5, -0.5]);
     const { scale } = fit;
     this.canvas.getContext("2d")!.drawImage(picture, left, top, scale * camera.width, scale * camera.height);
-    const tracking = pose.state === "tracking";
-    const seen = tracking ? anchorsBefore(camera, pose, anchors) : [];
-    if (tracking) this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf);
-    else this.overlay.clear();
+    const seen = pose.state === "tracking" ? anchorsBefore(camera, pose, anchors) : [];
+    this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf);
     this.drawn = { utime: pose.utime, anchors: seen.map(({ T_cam_anchor: _, ...drawn }) => drawn) };
     for (const utime of [...this.waiting.keys()]) if (utime <= pose.utime) this.forget(utime);
   }
