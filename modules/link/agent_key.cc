@@ -29,6 +29,12 @@ struct RightWord {
 constexpr RightWord kRightWords[] = {
     {"read", AnchorRight::kRead}, {"own", AnchorRight::kEditOwn}, {"write", AnchorRight::kEditAll}};
 
+std::string_view WordOf(AnchorRight anchors) {
+  return std::find_if(std::begin(kRightWords), std::end(kRightWords),
+                      [anchors](const RightWord& right) { return right.right == anchors; })
+      ->word;
+}
+
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
 }
@@ -119,7 +125,9 @@ AnchorRight ReadRight(const fs::path& file, std::string_view word) {
 }  // namespace
 
 std::optional<AnchorRight> AnchorRightOf(std::string_view word) {
-  const auto* const found = std::ranges::find(kRightWords, word, &RightWord::word);
+  const auto* const found =
+      std::find_if(std::begin(kRightWords), std::end(kRightWords),
+                   [word](const RightWord& right) { return right.word == word; });
   return found == std::end(kRightWords) ? std::nullopt : std::optional(found->right);
 }
 
@@ -136,8 +144,7 @@ void MakeKeyFile(const fs::path& file, int32_t agent_id, AnchorRight anchors) {
       "{1}\n"
       "# What the agent may do with anchors, by the server's copy: read, own (edit those it made), "
       "write (edit all).\n{2}anchors: {3}\n",
-      agent_id, hex, anchors == AnchorRight::kEditOwn ? "# " : "",
-      std::ranges::find(kRightWords, anchors, &RightWord::right)->word);
+      agent_id, hex, anchors == AnchorRight::kEditOwn ? "# " : "", WordOf(anchors));
   const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (fd < 0) {
     Fail(file, errno == EEXIST ? "exists already, and is left as it is: give another --out"

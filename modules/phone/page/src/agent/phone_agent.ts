@@ -104,7 +104,7 @@ interface NativeAgent {
   addImu(utime: number, gx: number, gy: number, gz: number, ax: number, ay: number, az: number): void;
   addImage(utime: number, width: number, height: number): void;
   onLinkDown(packet: Uint8Array): void;
-  restore(bytes: Uint8Array): void;
+  restore(id: string, bytes: Uint8Array): void;
   placeAnchor(edit: AnchorEdit): string;
   removeAnchor(id: string): void;
   poll(nowUs: number): void;
@@ -163,8 +163,8 @@ export class PhoneAgent {
 
   /** What an earlier run has put and not deleted, in the order of putting; before the first image. */
   restoreSpool(entries: Array<{ id: string; bytes: Uint8Array }>): void {
-    for (const { bytes } of entries) {
-      this.native.restore(bytes);
+    for (const { id, bytes } of entries) {
+      this.native.restore(id, bytes);
     }
   }
 
