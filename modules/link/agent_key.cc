@@ -31,12 +31,6 @@ struct RightWord {
 constexpr RightWord kRightWords[] = {
     {"read", AnchorRight::kRead}, {"own", AnchorRight::kEditOwn}, {"write", AnchorRight::kEditAll}};
 
-std::string_view WordOf(AnchorRight anchors) {
-  return std::find_if(std::begin(kRightWords), std::end(kRightWords),
-                      [anchors](const RightWord& right) { return right.right == anchors; })
-      ->word;
-}
-
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
   throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
 }
@@ -134,7 +128,10 @@ std::optional<AnchorRight> AnchorRightOf(std::string_view word) {
 }
 
 std::string WordOf(AnchorRight right) {
-  return std::string(std::ranges::find(kRightWords, right, &RightWord::right)->word);
+  return std::string(
+      std::find_if(std::begin(kRightWords), std::end(kRightWords), [right](const RightWord& known) {
+        return known.right == right;
+      })->word);
 }
 
 std::string ToHex(const SecretKey& key) {
