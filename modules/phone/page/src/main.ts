@@ -23,7 +23,7 @@ const kNotice_ms = 6000;
 const kTapRadius = 36; // CSS pixels around an anchor
 const kPanels_ms = 250;
 
-const options = new URLSearchParams(location.search);
+const options = new URLSearchParams(location.hash.slice(1));
 const people = new People();
 const colourOf = (owner: number) => (owner > 0 ? agentColour(owner) : colours().anchor);
 const picture = byId<HTMLCanvasElement>("picture");
@@ -43,7 +43,7 @@ async function ensureMembership() {
   if (code === "") return;
   membership = await join(code, byId<HTMLInputElement>("name").value.trim());
   // The code works once: a page that is loaded again must not offer it.
-  history.replaceState(null, "", location.pathname + location.search);
+  history.replaceState(null, "", location.pathname);
   byId<HTMLInputElement>("code").value = "";
 }
 

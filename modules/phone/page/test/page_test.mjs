@@ -99,7 +99,7 @@ async function testRecording(page) {
 }
 
 async function testPlaying(browser, url, zip) {
-  const page = await openPage(browser, `${url}?rate=max`, { colorScheme: "dark" });
+  const page = await openPage(browser, `${url}#rate=max`, { colorScheme: "dark" });
   await screenshot(page, "welcome_dark");
   await page.locator("#zip").setInputFiles(zip);
   await becomes(page, "what was recorded is played to its end", () =>
