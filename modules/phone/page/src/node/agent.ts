@@ -20,7 +20,7 @@ import type { Arguments } from "./arguments";
 import { KeyframeLog, TumFiles } from "./outputs";
 
 const kPoll_ms = 10;
-const kMaxLag_us = 1_000_000; // of an image, in real time, before it is left out
+const kMaxLag_ms = 1000; // of an image, in real time, before it is left out
 const kImuBeforeStart_us = 500_000;
 const kAhead_us = 60_000; // samples go before their image, past its last row
 const kNoPose = 2; // exit code
@@ -117,15 +117,15 @@ class Session {
     const began_ms = performance.now();
     let next = imu.findIndex(({ utime }) => utime >= played[0].utime - kImuBeforeStart_us);
     for (const { utime, name } of played) {
-      const picture = lumaOf(await files.read(name));
-      if (rate > 0) await this.waitUntil(began_ms + (utime - played[0].utime) / 1000 / rate);
-      for (; next < imu.length && imu[next].utime <= utime + kAhead_us; ++next) {
-        this.agent.addImu(imu[next].utime, imu[next].gyro, imu[next].accel);
-      }
-      const lag_us = rate > 0 && rate <= 1 ? 1000 * (performance.now() - began_ms) * rate - (utime - played[0].utime) : 0;
-      if (lag_us > kMaxLag_us) {
+      const due_ms = began_ms + (utime - played[0].utime) / 1000 / rate;
+      if (rate > 0 && rate <= 1 && rate * (performance.now() - due_ms) > kMaxLag_ms) {
         ++this.dropped;
         continue;
+      }
+      const picture = lumaOf(await files.read(name));
+      if (rate > 0) await this.waitUntil(due_ms);
+      for (; next < imu.length && imu[next].utime <= utime + kAhead_us; ++next) {
+        this.agent.addImu(imu[next].utime, imu[next].gyro, imu[next].accel);
       }
       const begin = process.cpuUsage();
       const events = this.agent.addImage(utime, picture.luma, picture.width, picture.height, picture.width);
