@@ -33,6 +33,7 @@ inline constexpr std::string_view kAllAnchors = "ANCHOR_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 inline constexpr std::string_view kAllLinkUps = "LINK_UP_[0-9]+";
+inline constexpr std::string_view kAllLinkDowns = "LINK_DOWN_[0-9]+";
 inline constexpr std::string_view kAllStatus = "STATUS_.*";
 inline constexpr std::string_view kAllOptions = "OPTIONS_.*";
 

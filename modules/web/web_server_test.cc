@@ -238,12 +238,12 @@ TEST_F(WebServerTest, APeerIsSentWhatThereIsAndWhatItShouldNotSayEndsIt) {
 
 TEST_F(WebServerTest, PeersAreCounted) {
   std::vector<std::unique_ptr<WebClient>> clients;
-  for (int i = 0; i <= WebServer::kMaxPeers; ++i) {
+  for (int i = 0; i <= WebOptions().max_peers; ++i) {
     clients.push_back(std::make_unique<WebClient>(server_.port()));
     clients.back()->Send(UpgradeRequest("/socket", "http://127.0.0.1:1"));
     Serve();
     EXPECT_THAT(clients.back()->Received(),
-                StartsWith(i < WebServer::kMaxPeers ? "HTTP/1.1 101" : "HTTP/1.1 503"));
+                StartsWith(i < WebOptions().max_peers ? "HTTP/1.1 101" : "HTTP/1.1 503"));
   }
   clients.clear();
   Serve();
