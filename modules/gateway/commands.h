@@ -3,26 +3,12 @@
 // The command line of pangea-gateway.
 
 #include <CLI/CLI.hpp>
-#include <string>
-#include <vector>
 
-#include "web/web_server.h"
+#include "gateway/run_gateway.h"
 
 namespace pangea {
 
-struct GatewayArguments {
-  std::string site;
-  std::string bus, link;  // LCM URLs; empty: the site's
-  web::WebOptions web{"0.0.0.0", 8443, {}};
-  std::string certificate, key;  // files; empty: the gateway's own authority
-  std::string page;              // folder; empty: the installed one
-  std::vector<std::string> hosts;
-};
-
 // Adds the options of the gateway itself, and its sub-commands, which run when the app has parsed.
 void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments);
-
-// Serves until a signal. Throws std::runtime_error when it cannot begin.
-void RunGateway(const GatewayArguments& arguments);
 
 }  // namespace pangea

@@ -294,7 +294,6 @@ TEST_F(HostileTest, GarbageOnASocket) {
     Serve();
     EXPECT_THAT(talker->Received(), HasSubstr("\x03\xf1")) << "1009: too large";
   }
-  EXPECT_EQ(NumRefused("socket: a message is too large"), 1);
   ExpectLinkWorks();
 }
 

@@ -1,4 +1,4 @@
-// The gateway's buses, its page, its names; and its loop.
+#include "gateway/run_gateway.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,6 @@
 #include "bus/process.h"
 #include "bus/status_log.h"
 #include "files/text_file.h"
-#include "gateway/commands.h"
 #include "gateway/gateway_process.h"
 #include "gateway/machine_names.h"
 

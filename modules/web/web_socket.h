@@ -86,9 +86,7 @@ class Socket : public AnySocket, public std::enable_shared_from_this<Socket<Stre
   }
 
   void OnReadError(beast::error_code error) {
-    if (error == websocket::error::message_too_big) {
-      site_.Refused("socket: a message is too large");
-    } else if (error == beast::error::timeout && open_) {
+    if (error == beast::error::timeout && open_) {
       site_.Refused("socket: silent for 30 s");
     }
     open_ = false;
