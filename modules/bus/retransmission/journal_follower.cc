@@ -91,6 +91,7 @@ void JournalFollower::OnResult(const Constraint& result) {
 }
 
 void JournalFollower::OnHave(const Have& have) {
+  have_received_ = true;
   if (handlers_.have) {
     handlers_.have(have);
   }
@@ -182,11 +183,19 @@ void JournalFollower::CatchUp(int64_t now_utime) {
   }
 }
 
+void JournalFollower::NoteReady(int64_t now_utime) {
+  if (!ready_ && have_received_ && !catching_up()) {
+    ready_ = true;
+    node_.Set("ready_utime", now_utime);
+  }
+}
+
 void JournalFollower::Tick(int64_t now_utime, bool ask_for_matches) {
   if (!goal_.empty()) {
     CatchUp(now_utime);
     Handled();
   }
+  NoteReady(now_utime);
   AskForKeyframes(now_utime);
   if (ask_for_matches) {
     for (const SeqGap& gap : matches_.Due(now_utime)) {

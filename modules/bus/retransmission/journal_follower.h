@@ -11,6 +11,7 @@
 //
 // A process is catching up while keyframes and matches are missing that the journal had of a map
 // when this process knew nothing of it; not for longer than kCatchUpSilence_us without progress.
+// When it first is not, the status says so: counter `ready_utime`, wall clock.
 // Bounds: InOrder's. One thread; lives as long as its node.
 
 #include <cstdint>
@@ -96,6 +97,7 @@ class JournalFollower {
   void AskForKeyframes(int64_t now_utime);
   int64_t NumMissing() const;
   void CatchUp(int64_t now_utime);
+  void NoteReady(int64_t now_utime);
 
   Node& node_;
   const Follows follows_;
@@ -109,6 +111,8 @@ class JournalFollower {
   std::map<MapId, int32_t> goal_;
   int64_t num_to_catch_up_ = 0;
   int64_t progress_utime_ = 0;  // when that fell last
+  bool have_received_ = false;
+  bool ready_ = false;  // once, at least
 };
 
 }  // namespace pangea
