@@ -42,7 +42,7 @@ def ready_utime(status):
     return next((counter.count for counter in status.counters if counter.name == READY), None)
 
 
-def figures(status, begin):
+def metrics(status, begin):
     ready = status and ready_utime(status)
     return {"ready_s": None if not ready else 1e-6 * ready - begin, "cpu_s": status.cpu_s if status else 0,
             "memory_mb": status.memory_mb if status else 0}
@@ -60,11 +60,11 @@ def start(options, site):
         server.terminate()
         server.wait()
         bus.close()
-    return {name: figures(newest.get(name), begin) for name in PROCESSES}
+    return {name: metrics(newest.get(name), begin) for name in PROCESSES}
 
 
 def measure(options, keyframes):
-    """One of {keyframes, start, processes: {name: figures}} for each start."""
+    """One of {keyframes, start, processes: {name: metrics}} for each start."""
     sys.path.insert(0, os.fspath(options.build.resolve() / "python"))
     site = make_site(options, keyframes)
     for number in range(1, options.starts + 1):
