@@ -98,7 +98,7 @@ void CandidateProcess::CollectReady() {
       ++it;
     }
   }
-  if (!ready_.empty()) {
+  if (!ready_.empty() && !journal_.reading()) {
     node_.WorkWhenIdle([this] { return VerifyNext(); });
   }
 }
