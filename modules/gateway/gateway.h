@@ -38,7 +38,7 @@ struct JoinResult {
 class Gateway : public web::WebSite, public LinkSocketOwner {
  public:
   static constexpr size_t kMaxAgentsAtOnce = 100;
-  static constexpr size_t kMaxUnproven = 30;
+  static constexpr size_t kMaxUnproven = kMaxAgentsAtOnce;  // all come back at once
   // Both, and as many that are being told to go.
   static constexpr int kMaxPeers = 2 * (kMaxAgentsAtOnce + kMaxUnproven);
 
