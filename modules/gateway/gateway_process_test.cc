@@ -9,7 +9,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "bus/process.h"
-#include "gateway/gateway_test_client.h"
+#include "gateway/test_client.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
 #include "pangea/status_t.hpp"

@@ -14,8 +14,8 @@
 #include "core/testing/program.h"
 #include "files/text_file.h"
 #include "gateway/admission.h"
-#include "gateway/gateway_test_client.h"
 #include "gateway/identity.h"
+#include "gateway/test_client.h"
 #include "link/agent_key.h"
 
 namespace pangea {
