@@ -48,23 +48,11 @@ class VerificationProcesses : public testing::Test {
       bus_.Drain();
     }
   }
-  // Of agent_c_'s keyframe with agent_m_'s.
-  void SendMatch(PlaceKind kind, int query = 9, int match_with = 10) {
-    PlaceMatch match{agent_c_.keyframes[query].id,
-                     {MakeTestCandidate(agent_c_, query, agent_m_, match_with, 40, 10)},
-                     {}};
+  void SendMatch(PlaceKind kind) {
+    PlaceMatch match{
+        agent_c_.keyframes[9].id, {MakeTestCandidate(agent_c_, 9, agent_m_, 10, 40, 10)}, {}};
     match.candidates[0].kind = kind;
     PublishMessage(bus_, std::string(channels::kPlaceMatch), ToMessage(match));
-    bus_.Drain();
-  }
-  void SendFused() {
-    MapState state;
-    state.group = agent_m_.keyframes[0].id.map;
-    state.revision = 1;
-    state.maps = {agent_m_.keyframes[0].id.map, agent_c_.keyframes[0].id.map};
-    for (const map_state_t& chunk : ToMessages(state)) {
-      PublishMessage(bus_, std::string(channels::kMapState), chunk);
-    }
     bus_.Drain();
   }
 
@@ -235,37 +223,23 @@ TEST_F(VerificationProcesses, AfterARestartKnownResultsAreNotRepeated) {
   EXPECT_TRUE(constraints_.empty());
 }
 
-// Once the maps are fused, a candidate beside a verified one says nothing new; before, it is
-// evidence.
-TEST_F(VerificationProcesses, OfFusedMapsACandidateBesideAVerifiedOneIsRedundant) {
+// What former runs verified is known: a candidate beside it says nothing new.
+TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
-  SendMatch(PlaceKind::kInter);
-  SendMatch(PlaceKind::kInter, 8, 9);
-  ASSERT_EQ(constraints_.size(), 2u);
-  EXPECT_NE(constraints_[1].reason, kRedundant);
-  SendFused();
-  SendMatch(PlaceKind::kInter, 10, 11);
-  ASSERT_EQ(constraints_.size(), 3u);
-  EXPECT_EQ(constraints_[2].reason, kRedundant);
-  EXPECT_FALSE(constraints_[2].accepted);
-}
-
-// What a former run verified is known too.
-TEST_F(VerificationProcesses, BesideAResultOfTheJournalItIsRedundant) {
-  SendKeyframes(agent_m_, 0, 12);
-  SendKeyframes(agent_c_, 0, 12);
-  SendFused();
   Constraint known;
-  known.from = agent_m_.keyframes[10].id;
   known.to = agent_c_.keyframes[9].id;
   known.kind = PlaceKind::kInter;
   known.accepted = true;
   known.covariance *= 0.02 * 0.02;
-  Retransmit(listener_, "fusion", std::string(channels::kConstraint), ToMessage(known));
+  for (int i = 0; i < KnownConstraintOptions{}.min_between_maps; ++i) {
+    known.from = agent_m_.keyframes[i].id;
+    Retransmit(listener_, "fusion", std::string(channels::kConstraint), ToMessage(known));
+  }
   bus_.Drain();
-  SendMatch(PlaceKind::kInter, 10, 11);
+  SendMatch(PlaceKind::kInter);
   ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_FALSE(constraints_[0].accepted);
   EXPECT_EQ(constraints_[0].reason, kRedundant);
 }
 

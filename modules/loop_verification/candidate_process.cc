@@ -32,9 +32,6 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
                 .result = std::bind_front(&CandidateProcess::OnFormerResult, this),
                 .have = std::bind_front(&CandidateProcess::OnHave, this),
                 .handled = [this] { CollectReady(); }}) {
-  node_.Listen<map_state_t>(channels::kMapState, [this](const MapState& state) {
-    verifier_->SetGroup(state.group, state.revision, state.maps);
-  });
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&CandidateProcess::OnVerificationRequest, this));
 }

@@ -30,6 +30,18 @@ void KnownConstraints::Add(const Constraint& constraint) {
   by_maps_[{a.map, b.map}].insert({a.seq, {a.seq, b.seq, WorstSigma(constraint.covariance)}});
 }
 
+bool KnownConstraints::IsRedundant(const KeyframeId& a, const KeyframeId& b,
+                                   const SubmapStore& store) const {
+  if (a.map != b.map) {
+    const auto between = by_maps_.find(std::minmax(a.map, b.map));
+    if (between == by_maps_.end() ||
+        between->second.size() < static_cast<size_t>(options_.min_between_maps)) {
+      return false;
+    }
+  }
+  return GainBits(a, b, store) < options_.min_gain_bits;
+}
+
 double KnownConstraints::GainBits(const KeyframeId& one, const KeyframeId& other,
                                   const SubmapStore& store) const {
   const auto [a, b] = std::minmax(one, other);

@@ -7,7 +7,8 @@
 // Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
 // the position to sigma^2 + (drift * path)^2; their information adds up. A constraint of their
 // median sigma would add 0.5 * log2(1 + I_new / I_known) bits to each coordinate. Where that is
-// little it is redundant. Only near ones count, so the pose graph knows at least so much.
+// little it is redundant. Only near ones count, so the pose graph knows at least so much. The first
+// constraints between two maps are never redundant: whether the maps are one rests on them.
 
 #include <map>
 #include <utility>
@@ -21,6 +22,7 @@ namespace pangea {
 struct KnownConstraintOptions {
   double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
   double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
+  int min_between_maps = 10;  // several times the viewpoints that a fusion takes
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -29,6 +31,8 @@ struct KnownConstraintOptions {
                 "0: all are verified");
     archive.Add("drift_per_m", &drift_per_m, {0, 1}, "",
                 "sigma of the odometry, of its path, between keyframes verified and this one");
+    archive.Add("min_between_maps", &min_between_maps, {0, 1000000}, "",
+                "constraints between two maps before any is redundant");
   }
 };
 
@@ -44,9 +48,7 @@ class KnownConstraints {
   // What a constraint between the two would add to each coordinate, bits; infinite where nothing
   // is known. Odometry is `store`'s.
   double GainBits(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
-  bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const {
-    return GainBits(a, b, store) < options_.min_gain_bits;
-  }
+  bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
 
  private:
   struct Known {

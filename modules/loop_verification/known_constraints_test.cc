@@ -47,7 +47,8 @@ class KnownConstraintsTest : public testing::Test {
   }
 
   SubmapStore store_;
-  KnownConstraints known_{KnownConstraintOptions{.min_gain_bits = 1, .drift_per_m = 0.02}};
+  KnownConstraints known_{
+      KnownConstraintOptions{.min_gain_bits = 1, .drift_per_m = 0.02, .min_between_maps = 1}};
 };
 
 TEST_F(KnownConstraintsTest, WhereNothingIsKnownAnythingIsWorthIt) {
@@ -75,6 +76,17 @@ TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   EXPECT_NEAR(GainBits({kA, 12}, {kB, 9}), expected, 1e-9);
   EXPECT_TRUE(known_.IsRedundant({kA, 11}, {kB, 11}, store_));
   EXPECT_FALSE(known_.IsRedundant({kA, 14}, {kB, 14}, store_));
+}
+
+// Whether two maps are one rests on them; within one map nothing does.
+TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
+  KnownConstraints known({.min_between_maps = 2});
+  known.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
+  known.Add(Accepted({kA, 10}, {kA, 50}, 0.02));
+  EXPECT_FALSE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
+  EXPECT_TRUE(known.IsRedundant({kA, 10}, {kA, 51}, store_));
+  known.Add(Accepted({kA, 10}, {kB, 12}, 0.02));
+  EXPECT_TRUE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
 }
 
 TEST_F(KnownConstraintsTest, AMapThatNoOdometryCrossesIsNotKnown) {

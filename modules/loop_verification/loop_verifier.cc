@@ -26,14 +26,9 @@ void LoopVerifier::NoteVerified(const Constraint& result) {
   }
 }
 
-bool LoopVerifier::IsRedundant(const KeyframeId& query, const KeyframeId& match) const {
-  return (query.map == match.map || groups_.AreFused(query.map, match.map)) &&
-         known_.IsRedundant(query, match, store_);
-}
-
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                                 LoopVerificationReport* report) {
-  if (IsRedundant(query, candidate.match)) {
+  if (known_.IsRedundant(query, candidate.match, store_)) {
     return RefusedConstraint(query, candidate, kRedundant);
   }
   Constraint result = Align(query, candidate, report);

@@ -9,9 +9,7 @@
 #include <memory>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include "core/map_groups.h"
 #include "core/submap_store.h"
 #include "loop_verification/aligner.h"
 #include "loop_verification/drift_gate.h"
@@ -53,10 +51,6 @@ class LoopVerifier {
   }
   // A verification result of a former run.
   void NoteVerified(const Constraint& result);
-  // The maps of one group (a MAP_STATE): of maps that are not fused the map knows nothing.
-  void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps) {
-    groups_.Set(group, revision, maps);
-  }
   // Whether every keyframe the verification result depends on is there.
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
   // Only when ready. Keyframes of one map pass the drift gate too; two maps' odom frames lie
@@ -67,14 +61,12 @@ class LoopVerifier {
   const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
-  bool IsRedundant(const KeyframeId& query, const KeyframeId& match) const;
   Constraint Align(const KeyframeId& query, const PlaceCandidate& candidate,
                    LoopVerificationReport* report);
 
   DriftGateOptions drift_;
   Aligner aligner_;
   KnownConstraints known_;
-  MapGroups groups_;
   SubmapStore store_;
 };
 

@@ -20,11 +20,11 @@
 #include <vector>
 
 #include "core/keyframe.h"
-#include "core/map_groups.h"
 #include "core/matching.h"
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
 #include "place_recognition/epipolar_check.h"
+#include "place_recognition/map_groups.h"
 #include "place_recognition/stored_keyframes.h"
 
 namespace pangea {

@@ -16,7 +16,6 @@ class MapGroups {
 
   // Whether the map is one with others.
   bool IsFused(const MapId& map) const;
-  bool AreFused(const MapId& a, const MapId& b) const;
 
  private:
   struct State {

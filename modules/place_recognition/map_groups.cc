@@ -1,4 +1,4 @@
-#include "core/map_groups.h"
+#include "place_recognition/map_groups.h"
 
 namespace pangea {
 
@@ -20,10 +20,6 @@ void MapGroups::Set(const MapId& group, int64_t revision, const std::vector<MapI
 bool MapGroups::IsFused(const MapId& map) const {
   const auto state = states_.find(map);
   return state != states_.end() && state->second.fused;
-}
-
-bool MapGroups::AreFused(const MapId& a, const MapId& b) const {
-  return IsFused(a) && IsFused(b) && states_.at(a).group == states_.at(b).group;
 }
 
 }  // namespace pangea
