@@ -84,6 +84,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.v_odom_body = result.v_odom_body;
   output.omega_body = result.omega_body;
   output.is_keyframe = result.is_keyframe;
+  output.imu_contradicted = result.imu_contradicted;
   output.num_tracked = static_cast<int>(frame.observations.size());
   for (const FinishedKeyframe& finished : result.finished) {
     scale_sigma_ = finished.scale_sigma ? finished.scale_sigma : scale_sigma_;

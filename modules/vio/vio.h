@@ -51,6 +51,7 @@ struct VioOutput {
   int num_tracked = 0;
   // How well the scale is known, a share: of the newest keyframe that tells.
   std::optional<double> scale_sigma;
+  bool imu_contradicted = false;    // it feels an acceleration that the images do not show
   bool is_keyframe = false;         // it was described, and will be finished as a keyframe later
   std::vector<Keyframe> keyframes;  // finished by this image
 };

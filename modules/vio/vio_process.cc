@@ -20,6 +20,9 @@ constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int64_t kLagToldInterval_us = 10'000'000;
 constexpr int64_t kNotableLag_us = 500'000;
 
+constexpr char kContradicted[] =
+    "the IMU feels an acceleration that the images do not show: a lift, a vehicle?";
+
 // In words, when the motion has not told the scale; else nothing.
 std::string UnknownScale(const std::optional<double>& sigma) {
   constexpr double kUnknown = 0.03;
@@ -100,7 +103,12 @@ void VioProcess::Handle(const VioOutput& output) {
   if (tracking && state_text_ != "tracking") {
     node_.Set("initialised_ms", (output.utime - *first_image_utime_) / 1000);
   }
-  unknown_scale_ = tracking ? UnknownScale(output.scale_sigma) : "";
+  doubt_ = !tracking                 ? ""
+           : output.imu_contradicted ? kContradicted
+                                     : UnknownScale(output.scale_sigma);
+  if (output.imu_contradicted) {
+    node_.Count("imu_contradicted");
+  }
   if (output.scale_sigma) {
     node_.Set("scale_sigma_permille", std::llround(1000 * *output.scale_sigma));
   }
@@ -152,7 +160,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
   pose_t message{};
   message.utime = output.utime;
   message.state = ToMessage(output.state);
-  message.reason = output.state == EstimatorState::kTracking ? unknown_scale_ : output.reason;
+  message.reason = output.state == EstimatorState::kTracking ? doubt_ : output.reason;
   message.map = pangea::ToMessage(output.map);
   message.T_odom_body = pangea::ToMessage(output.T_odom_body);
   message.v_odom_body = pangea::ToMessage(output.v_odom_body);
@@ -237,7 +245,7 @@ void VioProcess::Tick(int64_t now_utime) {
 
 std::string VioProcess::Summary() const {
   return fmt::format("agent {}: {}{}{}", options_.agent_id, state_text_,
-                     unknown_scale_.empty() ? "" : "; " + unknown_scale_,
+                     doubt_.empty() ? "" : "; " + doubt_,
                      lag_us_ >= kNotableLag_us ? "; " + LagText() : "");
 }
 

@@ -104,7 +104,7 @@ class VioProcess : public Process {
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
-  std::string unknown_scale_;     // that, in words
+  std::string doubt_;             // while tracking
   std::string why_not_tracking_;  // at the newest image
   int64_t num_images_ = 0;
   int64_t lag_us_ = 0;

@@ -72,7 +72,8 @@ InertialResidual ComputeInertialResidual(const Preintegration& measured, const I
   return out;
 }
 
-Matrix15d InertialInformation(const Preintegration& measured, const ImuNoise& noise) {
+Matrix15d InertialInformation(const Preintegration& measured, const ImuNoise& noise,
+                              double unmodelled_accel_sigma) {
   Eigen::Matrix<double, 9, 9> covariance = measured.covariance;
   Eigen::Matrix<double, 9, 1> floor;
   floor << Vector3d::Constant(kFloorTheta), Vector3d::Constant(kFloorVelocity),
@@ -85,6 +86,12 @@ Matrix15d InertialInformation(const Preintegration& measured, const ImuNoise& no
   covariance.diagonal().segment<3>(kRowTheta).array() += gyro_walk * dt * dt / 3;
   covariance.diagonal().segment<3>(kRowVelocity).array() += accel_walk * dt * dt / 3;
   covariance.diagonal().segment<3>(kRowPosition).array() += accel_walk * std::pow(dt, 4) / 20;
+  Eigen::Matrix<double, 9, 3> of_accel = Eigen::Matrix<double, 9, 3>::Zero();
+  of_accel.middleRows<3>(kRowVelocity).diagonal().setConstant(unmodelled_accel_sigma * dt);
+  of_accel.middleRows<3>(kRowPosition)
+      .diagonal()
+      .setConstant(0.5 * unmodelled_accel_sigma * dt * dt);
+  covariance += of_accel * of_accel.transpose();
   Matrix15d information = Matrix15d::Zero();
   information.topLeftCorner<9, 9>() =
       covariance.llt().solve(Eigen::Matrix<double, 9, 9>::Identity());

@@ -34,8 +34,11 @@ struct InertialResidual {
 InertialResidual ComputeInertialResidual(const Preintegration& measured, const ImuState& from,
                                          const ImuState& to);
 
+// `unmodelled_accel_sigma`: m/s^2, of an acceleration that only the IMU feels, constant in the
+// span.
 Eigen::Matrix<double, 15, 15> InertialInformation(const Preintegration& measured,
-                                                  const ImuNoise& noise);
+                                                  const ImuNoise& noise,
+                                                  double unmodelled_accel_sigma = 0);
 
 // Where the measured motion leads.
 ImuState Predict(const Preintegration& measured, const ImuState& from);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
@@ -15,6 +16,7 @@
 #include "vio/window/landmark_factor.h"
 #include "vio/window/landmark_store.h"
 #include "vio/window/stamp_jitter.h"
+#include "vio/window/unmodelled_acceleration.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_start.h"
 
@@ -94,6 +96,7 @@ struct Estimator::Impl {
   void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropNonKeyframe();
+  bool ContradictedWithin(int64_t after_utime, int64_t to_utime) const;
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
   void FoldLandmarks(int frame);
@@ -130,6 +133,7 @@ struct Estimator::Impl {
   std::optional<FinishedKeyframe> previous;         // the last published keyframe
   Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
   int64_t last_tracked = 0;                         // utime of the newest image that is one
+  std::set<int64_t> contradicted_utimes;            // ends of such IMU factors since then
   bool lost = false;
 };
 
@@ -216,10 +220,23 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
   return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 
+bool Estimator::Impl::ContradictedWithin(int64_t after_utime, int64_t to_utime) const {
+  return std::ranges::any_of(
+      contradicted_utimes, [&](int64_t utime) { return utime > after_utime && utime <= to_utime; });
+}
+
 // Optimises the window; the tracks that turned out to be outliers.
 std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   problem.landmarks = landmarks.Gather(problem.state, history);
   Optimise(problem, max_iterations);
+  if (AllowForUnmodelledAcceleration(noise, &problem)) {
+    Optimise(problem, max_iterations);
+  }
+  for (int to = 1; to <= problem.state.Newest(); ++to) {
+    if (problem.imu_factors[to] && problem.imu_factors[to]->contradicted) {
+      contradicted_utimes.insert(problem.state.frames[to].utime);
+    }
+  }
   std::vector<int32_t> outliers;
   const int newest = problem.state.Newest();
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
@@ -255,12 +272,14 @@ FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
     ScaledPreintegration span =
         imu_samples.Integrate(TakenAt(state.frames[*from]), TakenAt(state.frames[index]),
                               state.imu_intrinsics, previous->gyro_bias, previous->accel_bias);
-    if (span.measured.duration_s > 0) {
+    if (span.measured.duration_s > 0 && !ContradictedWithin(previous->utime, keyframe.utime)) {
       span.measured.covariance.diagonal().array() += 1e-14;
       keyframe.preintegration = span.measured;
     }
   }
   state.frames[index].is_published = true;
+  contradicted_utimes.erase(contradicted_utimes.begin(),
+                            contradicted_utimes.upper_bound(keyframe.utime));
   previous = keyframe;
   previous_covariance = P.block<6, 6>(at, at);
   return keyframe;
@@ -386,6 +405,8 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   result.gyro_bias = Newest().imu.gyro_bias;
   result.accel_bias = Newest().imu.accel_bias;
   result.is_keyframe = Newest().is_keyframe;
+  const auto& factor = problem.imu_factors.back();
+  result.imu_contradicted = factor && factor->contradicted;
   return result;
 }
 

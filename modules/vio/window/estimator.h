@@ -88,7 +88,8 @@ struct FinishedKeyframe {
     Matrix6d covariance = Matrix6d::Identity();  // (translation, rotation) in previous' body frame
   };
   std::optional<Edge> edge;
-  std::optional<Preintegration> preintegration;  // the same span
+  // The same span; none where the images contradict it (unmodelled_acceleration.h).
+  std::optional<Preintegration> preintegration;
   std::vector<LandmarkDepth> landmarks;
   // Of the scale of what it sees, as a share; none with too few depths to tell.
   std::optional<double> scale_sigma;
@@ -102,7 +103,8 @@ struct FrameResult {
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-  bool is_keyframe = false;  // this frame will be finished as a keyframe later
+  bool is_keyframe = false;       // this frame will be finished as a keyframe later
+  bool imu_contradicted = false;  // the IMU feels an acceleration that the images do not show
   std::vector<FinishedKeyframe> finished;
   std::vector<int32_t> outlier_landmarks;  // the tracker should drop these
 };

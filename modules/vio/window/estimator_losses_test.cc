@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "vio/window/estimator.h"
@@ -92,6 +93,47 @@ TEST(Estimator, ALensCoveredForLongIsALoss) {
   EXPECT_LE(keyframes, 1);     // nobody can do anything with a picture of noise
   EXPECT_NEAR(images, 51, 2);  // 5 s
   EXPECT_THAT(ride.last.reason, HasSubstr("nothing trackable"));
+}
+
+// The cabin stands still in the images, the samples feel how it starts and stops. Without the
+// allowance for it the pose is 0.4 m to 15 m off.
+TEST(Estimator, InALiftThePoseIsThatInTheCabin) {
+  for (const bool stands : {true, false}) {
+    for (uint64_t seed = 1; seed <= 2; ++seed) {
+      VioTestWorldOptions options;
+      options.seed = seed;
+      options.imu_noise = {5e-4, 5e-5, 1e-2, 3e-3, 200};  // a phone's
+      if (stands) {
+        options.stationary_begin_s = 6;
+        options.stationary_end_s = 30;
+      }
+      Ride ride(options);
+      ride.Advance(80);
+      const size_t keyframes_before = ride.finished.size();
+      int contradicted = 0;
+      for (int i = 0; i < 140; ++i) {
+        VioTestWorld::Input input = ride.world.Next();
+        const double t = 0.1 * i;
+        const double lift_accel = t < 1.5 ? 1.0 : t >= 6 && t < 7.5 ? -1.0 : 0.0;
+        const ImuState truth = ride.world.TruthAt(input.taken_utime);
+        for (ImuSample& sample : input.imu) {
+          sample.accel += truth.T_odom_body.q.conjugate() * Vector3d(0, 0, lift_accel);
+        }
+        ride.Feed(input);
+        contradicted += ride.last.imu_contradicted ? 1 : 0;
+        const Rigid3 T = ride.T_odom_truth() * truth.T_odom_body;
+        ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+        ASSERT_LT((T.t - ride.last.T_odom_body.t).norm(), i < 139 ? 0.5 : 0.2) << "at " << t;
+      }
+      EXPECT_GT(contradicted, 0);
+      // Such samples are no measurement for the server either.
+      ride.Flush();
+      EXPECT_TRUE(std::any_of(ride.finished.begin() + static_cast<long>(keyframes_before),
+                              ride.finished.end(), [](const FinishedKeyframe& keyframe) {
+                                return keyframe.edge && !keyframe.preintegration;
+                              }));
+    }
+  }
 }
 
 TEST(Estimator, AGapInTheImagesIsALoss) {

@@ -14,7 +14,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 // Stationary: what may pass for it within the noise of a hundred tracks together.
-constexpr double kStationaryVelocitySigma = 0.02;    // m/s
 constexpr double kStationaryPositionSigma = 0.002;   // m, between two stationary frames
 constexpr double kStationaryRotationSigma = 0.0003;  // rad
 

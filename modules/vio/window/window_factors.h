@@ -11,6 +11,7 @@ namespace pangea::vio {
 // The inertial measurement between frames to - 1 and to.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out);
 // The velocity of a stationary frame is zero.
+inline constexpr double kStationaryVelocitySigma = 0.02;  // m/s
 void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations* out);
 // Two neighbours that are both stationary have one pose: r = (Log(R_i^T R_j), R_i^T (p_j - p_i)).
 bool StationaryTogether(const WindowProblem& problem, int to);
