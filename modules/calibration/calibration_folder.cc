@@ -122,7 +122,7 @@ void WriteSensorYaml(const std::string& out, const Result& result, const ImuNois
 
 void MakeFolder(const std::string& recording, const std::string& out) {
   if (fs::exists(out)) {
-    throw std::runtime_error(fmt::format("{}: there is something of this name already", out));
+    throw std::runtime_error(fmt::format("{}: exists already; give another --out", out));
   }
   const fs::path from = Mav0Of(recording), to = fs::path(out) / "mav0";
   const cv::Size size = SizeOfImages(from);
