@@ -25,7 +25,13 @@ constexpr double kGuessedField = 1.13;  // rad
 constexpr double kTranslationSigma_m = 0.05;
 
 fs::path Mav0Of(const std::string& folder) {
-  return fs::exists(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  const fs::path mav0 =
+      fs::exists(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  if (!fs::exists(mav0 / "cam0") || !fs::exists(mav0 / "imu0")) {
+    throw std::runtime_error(fmt::format(
+        "{}: not a recording in EuRoC's format; it must hold mav0/cam0 and mav0/imu0", folder));
+  }
+  return mav0;
 }
 
 cv::Size SizeOfImages(const fs::path& mav0) {
