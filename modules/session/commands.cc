@@ -17,10 +17,10 @@
 #include "replay/replay.h"
 #include "report/compare.h"
 #include "report/session_record.h"
-#include "session/session_file.h"
-#include "session/session_list.h"
+#include "session/run/session_runner.h"
+#include "session/session_file/session_file.h"
+#include "session/session_file/session_list.h"
 #include "session/session_report.h"
-#include "session/session_runner.h"
 
 namespace pangea::session {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "bus/node.h"
 #include "server_options/server_options.h"
-#include "session/session_monitor.h"
+#include "session/run/session_monitor.h"
 
 namespace pangea::session {
 namespace {

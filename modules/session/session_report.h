@@ -9,8 +9,8 @@
 
 #include "report/report.h"
 #include "report/session_record.h"
-#include "session/session_file.h"
-#include "session/session_runner.h"
+#include "session/run/session_runner.h"
+#include "session/session_file/session_file.h"
 
 namespace pangea::session {
 

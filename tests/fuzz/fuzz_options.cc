@@ -10,7 +10,7 @@
 #include "map_points/map_points.h"
 #include "options/yaml_options.h"
 #include "posegraph/posegraph.h"
-#include "session/session_file.h"
+#include "session/session_file/session_file.h"
 #include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "vio/least_squares/levenberg_marquardt.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -194,6 +196,7 @@ double StartProblem::RayError(const StartPoint& point, const StartRay& seen) con
 
 Equations StartProblem::Linearise(double damping) const {
   Equations out;
+  out.cost = Cost();
   out.H.setZero(size(), size());
   out.g.setZero(size());
   out.H.diagonal().head<3>().setConstant(1 / (kGyroBiasSigma * kGyroBiasSigma));
@@ -229,35 +232,18 @@ void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
 }
 
 bool StartProblem::Optimise(int max_iterations) {
-  double damping = 0;
-  double cost = Cost();
-  for (int iteration = 0, retries = 0; iteration < max_iterations; ++iteration) {
-    const Equations equations = Linearise(damping);
-    // The units differ by orders of magnitude.
-    const VectorXd scale = equations.H.diagonal().cwiseSqrt().cwiseInverse();
-    MatrixXd H = scale.asDiagonal() * equations.H * scale.asDiagonal();
-    H.diagonal().array() += damping;
-    const VectorXd step =
-        -(scale.asDiagonal() * H.llt().solve(scale.asDiagonal() * equations.g)).eval();
-    StartProblem moved = *this;
-    moved.Retract(equations, step);
-    const double new_cost = moved.Cost();
-    if (new_cost <= cost + 1e-9 * (1 + cost)) {
-      const bool is_last = damping == 0 && -0.5 * equations.g.dot(step) < kEnough;
-      *this = std::move(moved);
-      cost = new_cost;
-      damping = damping < 1e-5 ? 0 : 0.1 * damping;
-      retries = 0;
-      if (is_last) {
-        return true;
-      }
-    } else if (++retries > kMaxRetries) {
-      return false;
-    } else {
-      damping = damping == 0 ? 1e-4 : 10 * damping;
-    }
-  }
-  return true;
+  const LevenbergMarquardtOptions options = {.max_iterations = max_iterations,
+                                             .max_retries = kMaxRetries,
+                                             .enough = kEnough,
+                                             .tolerance = 1e-9};
+  const auto linearise = [](const StartProblem& problem, double damping) {
+    return problem.Linearise(damping);
+  };
+  const auto retract = [](const Equations& equations, const VectorXd& step, StartProblem* problem) {
+    problem->Retract(equations, step);
+  };
+  const auto cost = [](const StartProblem& problem) { return problem.Cost(); };
+  return LevenbergMarquardt(options, linearise, retract, cost, this).converged;
 }
 
 std::optional<Matrix6d> StartProblem::NewestCovariance() const {

@@ -61,6 +61,7 @@ class StartProblem {
   double RayError(const StartPoint& point, const StartRay& seen) const;  // sigmas; or infinite
   // The cost's derivatives by the error, points eliminated; of H only the lower triangle.
   struct Equations {
+    double cost = 0;
     Eigen::MatrixXd H;
     Eigen::VectorXd g;
     // Of each point: its step = offset + gain * (step of the poses from `first_frame` on).
@@ -75,7 +76,7 @@ class StartProblem {
   Equations Linearise(double damping) const;
   // Moves the frames by `step`, the points with them, and lets those settle.
   void Retract(const Equations& equations, const Eigen::VectorXd& step);
-  // False when no step is left that makes it better, though one was promised.
+  // False when no step makes it better, though one was promised.
   bool Optimise(int max_iterations);
   // Marginal covariance of the newest frame's (dtheta, dv), dv plain; nothing when something is not
   // determined at all.

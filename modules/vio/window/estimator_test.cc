@@ -1,11 +1,9 @@
 #include "vio/window/estimator.h"
 #include "core/median.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "core/imu/preintegration.h"
 #include "vio/window/test_nees.h"
@@ -15,7 +13,6 @@ namespace pangea::vio {
 namespace {
 
 using Eigen::Vector3d;
-using ::testing::HasSubstr;
 
 // Root mean square position error after the best alignment in position and yaw.
 double Ate(const Ride& ride) {
@@ -264,126 +261,6 @@ TEST(Estimator, StandsStillWithoutDrift) {
             << std::sqrt(squared_speed) << " m/s\n";
   EXPECT_LT(std::sqrt(squared_distance), 0.05);  // one image's noise: 0.02
   EXPECT_LT(std::sqrt(squared_speed), 0.02);
-}
-
-// What a tracker finds in the noise of a covered lens, guided by the gyro: new features all over,
-// of which a tenth goes on by chance; and one that goes on for long, far away but creeping.
-class CoveredLens {
- public:
-  explicit CoveredLens(Ride* ride) : ride_(*ride) {}
-  void Advance() {
-    VioTestWorld::Input input = ride_.world.Next();
-    std::uniform_real_distribution<double> uniform;
-    std::erase_if(noise_, [&](const Observation&) { return uniform(rng_) > 0.1; });
-    while (noise_.size() < 150) {
-      noise_.push_back(At(next_id_++, {20 + uniform(rng_) * (camera_.width - 40),
-                                       20 + uniform(rng_) * (camera_.height - 40)}));
-    }
-    input.frame.observations = noise_;
-    const ImuState truth = ride_.world.TruthAt(input.frame.utime);
-    const Eigen::Quaterniond q_cam_odom =
-        (truth.T_odom_body.q * ride_.world.true_T_body_cam().q).conjugate();
-    if (creeping_.isZero()) {
-      creeping_ = q_cam_odom.conjugate() * Vector3d::UnitZ();
-    }
-    creeping_ = ExpSo3({0, 0, 0.005}) * creeping_;
-    if (const auto pixel = camera_.Project(q_cam_odom * creeping_);
-        pixel && camera_.Contains(*pixel, 5)) {
-      input.frame.observations.push_back(At(kCreeping, *pixel));
-    }
-    ride_.Feed(input);
-  }
-
- private:
-  static constexpr int32_t kCreeping = 1'000'000;
-  Observation At(int32_t id, const Eigen::Vector2d& pixel) const {
-    return {id, pixel.cast<float>(), *camera_.Unproject(pixel), 1.0};
-  }
-
-  Ride& ride_;
-  CameraModel camera_ = ride_.world.camera();
-  std::mt19937_64 rng_{1};
-  std::vector<Observation> noise_;
-  Vector3d creeping_ = Vector3d::Zero();
-  int32_t next_id_ = kCreeping + 1;
-};
-
-// The noise says nothing: the pose is that of a camera that sees nothing at all.
-TEST(Estimator, ACoveredLensIsBridged) {
-  for (uint64_t seed = 1; seed <= 3; ++seed) {
-    VioTestWorldOptions options;
-    options.seed = seed;
-    options.imu_noise = {5e-4, 5e-5, 1e-2, 3e-3, 200};  // a phone's
-    Ride covered(options), blind(options);
-    covered.Advance(60);
-    blind.Advance(60);
-    ASSERT_EQ(covered.last.state, EstimatorState::kTracking) << covered.last.reason;
-    CoveredLens lens(&covered);
-    for (int i = 0; i < 30; ++i) {
-      lens.Advance();
-      VioTestWorld::Input nothing = blind.world.Next();
-      nothing.frame.observations.clear();
-      blind.Feed(nothing);
-    }
-    const Vector3d& p = covered.last.T_odom_body.t;
-    EXPECT_LT((p - blind.last.T_odom_body.t).norm(), 0.01) << "seed " << seed;
-    covered.Advance(20);
-    EXPECT_EQ(covered.last.state, EstimatorState::kTracking) << covered.last.reason;
-  }
-}
-
-TEST(Estimator, ALensCoveredForLongIsALoss) {
-  Ride ride({});
-  ride.Advance(50);
-  CoveredLens lens(&ride);
-  int images = 0, keyframes = 0;
-  for (; images < 80 && ride.last.state == EstimatorState::kTracking; ++images) {
-    lens.Advance();
-    keyframes += ride.last.is_keyframe ? 1 : 0;
-  }
-  EXPECT_LE(keyframes, 1);     // nobody can do anything with a picture of noise
-  EXPECT_NEAR(images, 51, 2);  // 5 s
-  EXPECT_THAT(ride.last.reason, HasSubstr("nothing trackable"));
-}
-
-TEST(Estimator, AGapInTheImagesIsALoss) {
-  Ride ride({});
-  ride.Advance(50);
-  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
-  VioTestWorld::Input gap;
-  for (int i = 0; i < 15; ++i) {  // 1.5 s of images never come, their samples do
-    const VioTestWorld::Input next = ride.world.Next();
-    gap.frame = next.frame;
-    gap.imu.insert(gap.imu.end(), next.imu.begin(), next.imu.end());
-  }
-  ride.Feed(gap);
-  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
-  EXPECT_THAT(ride.last.reason, HasSubstr("no images"));
-  ride.Advance(1);  // and stays one
-  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
-}
-
-TEST(Estimator, AGapInTheInertialSamplesIsALoss) {
-  Ride ride({});
-  ride.Advance(50);
-  ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
-  for (int i = 0; i < 5; ++i) {
-    ride.world.Next();
-  }
-  VioTestWorld::Input late = ride.world.Next();
-  ride.Feed(late);
-  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
-  EXPECT_THAT(ride.last.reason, HasSubstr("inertial samples have a gap"));
-}
-
-TEST(Estimator, NoInertialSamplesAreALoss) {
-  Ride ride({});
-  ride.Advance(50);
-  VioTestWorld::Input none = ride.world.Next();
-  none.imu.clear();
-  ride.Feed(none);
-  EXPECT_EQ(ride.last.state, EstimatorState::kLost);
-  EXPECT_THAT(ride.last.reason, HasSubstr("no inertial samples"));
 }
 
 TEST(Estimator, TheSameInputGivesTheSameOutput) {

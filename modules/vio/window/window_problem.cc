@@ -1,9 +1,9 @@
 #include "vio/window/window_problem.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "vio/least_squares/levenberg_marquardt.h"
 #include "vio/window/landmark_factor.h"
 #include "vio/window/window_factors.h"
 
@@ -20,39 +20,25 @@ constexpr double kMinInverseDepth = 1e-4;  // 1/m
 constexpr double kEnough = 0.02;
 constexpr int kMaxRetries = 6;
 
-void Step(WindowProblem& problem, const NormalEquations& equations, const VectorXd& step) {
-  for (size_t l = 0; l < problem.landmarks.size(); ++l) {
-    Landmark& landmark = problem.landmarks[l];
+void Step(const NormalEquations& equations, const VectorXd& step, WindowProblem* problem) {
+  WindowState& state = problem->state;
+  for (size_t l = 0; l < problem->landmarks.size(); ++l) {
+    Landmark& landmark = problem->landmarks[l];
     const NormalEquations::Elimination& elimination = equations.eliminations[l];
     Vector3d d = elimination.offset +
                  elimination.gain.leftCols<kCalibrationSize>() * step.head<kCalibrationSize>();
     for (size_t j = 0; j < landmark.rays.size(); ++j) {
       const int at = elimination.RayColumn(j), frame = landmark.rays[j].frame;
-      const int offset = problem.state.Offset(frame);
+      const int offset = state.Offset(frame);
       d += elimination.gain.middleCols<kPoseSize>(at) * step.segment<kPoseSize>(offset);
-      if (problem.state.frames[frame].has_stamp_error()) {
+      if (state.frames[frame].has_stamp_error()) {
         d += elimination.gain.col(at + kPoseSize) * step[offset + kStampError];
       }
     }
     landmark.point.ray_rho += d;
     landmark.point.ray_rho.z() = std::max(landmark.point.ray_rho.z(), kMinInverseDepth);
   }
-  problem.state.Retract(step);
-}
-
-// x with (D^-1/2 H D^-1/2)(D^1/2 x) = D^-1/2 b: the units differ by orders of magnitude.
-template <typename Rhs>
-MatrixXd SolveScaled(const MatrixXd& H, const Rhs& b) {
-  const VectorXd scale = H.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
-  const MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
-  MatrixXd y = scale.asDiagonal() * MatrixXd(b);
-  const Eigen::LLT<MatrixXd> llt(S);
-  if (llt.info() == Eigen::Success) {
-    llt.solveInPlace(y);
-  } else {
-    y = S.ldlt().solve(y).eval();  // pivots, for what is not quite positive
-  }
-  return scale.asDiagonal() * y;
+  state.Retract(step);
 }
 
 // Landmarks fill the upper triangle only.
@@ -128,36 +114,11 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
 }
 
 double Optimise(WindowProblem& problem, int max_iterations) {
-  double damping = 0;
-  double cost = 0;
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    bool better = false;
-    double promised = 0;
-    for (int attempt = 0; attempt < kMaxRetries && !better; ++attempt) {
-      NormalEquations equations = Linearise(problem, damping);
-      cost = equations.cost;
-      equations.H.diagonal() *= 1 + damping;
-      const VectorXd step = -SolveScaled(equations.H, equations.g);
-      promised = -0.5 * equations.g.dot(step);
-      WindowProblem moved = problem;
-      if (step.allFinite()) {
-        Step(moved, equations, step);
-        const double new_cost = Cost(moved);
-        better = new_cost <= cost + 1e-6 * (1 + std::abs(cost));
-        cost = better ? new_cost : cost;
-      }
-      if (better) {
-        problem = std::move(moved);
-        damping = damping < 1e-5 ? 0 : 0.1 * damping;
-      } else {
-        damping = damping == 0 ? 1e-4 : 10 * damping;
-      }
-    }
-    if (!better || promised < kEnough) {
-      break;
-    }
-  }
-  return cost;
+  const LevenbergMarquardtOptions options = {.max_iterations = max_iterations,
+                                             .max_retries = kMaxRetries,
+                                             .enough = kEnough,
+                                             .tolerance = 1e-6};
+  return LevenbergMarquardt(options, Linearise, Step, Cost, &problem).cost;
 }
 
 MatrixXd WindowCovariance(const WindowProblem& problem) {

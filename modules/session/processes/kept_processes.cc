@@ -1,0 +1,79 @@
+#include "session/processes/kept_processes.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace pangea::session {
+
+bool QuickDeaths::Note(const std::string& why, double ran_s) {
+  if (ran_s > kAtItsStart_s) {
+    count_ = 0;
+    return false;
+  }
+  count_ = why == why_ ? count_ + 1 : 1;
+  why_ = why;
+  return count_ >= kMaxQuickDeaths;
+}
+
+KeptProcesses::KeptProcesses(std::filesystem::path logs) : logs_(std::move(logs)) {}
+
+std::filesystem::path KeptProcesses::LogOf(const std::string& name) const {
+  return logs_ / (name + ".txt");
+}
+
+void KeptProcesses::Start(const std::string& name, std::vector<std::string> argv) {
+  Kept& kept = kept_.emplace_back();
+  kept.argv = std::move(argv);
+  kept.child.emplace(name, kept.argv, LogOf(name));
+}
+
+ChildProcess* KeptProcesses::Find(const std::string& name) {
+  const auto found =
+      std::ranges::find_if(kept_, [&](const Kept& kept) { return kept.child->name() == name; });
+  return found == kept_.end() ? nullptr : &*found->child;
+}
+
+void KeptProcesses::ExpectEnd(const std::string& name) {
+  for (Kept& kept : kept_) {
+    kept.expects_end |= kept.child->name() == name;
+  }
+}
+
+std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
+  std::vector<Revived> revived;
+  for (Kept& kept : kept_) {
+    const auto exit = kept.given_up ? std::nullopt : kept.child->Poll();
+    if (!exit) {
+      continue;
+    }
+    const std::string name = kept.child->name();
+    const std::string why = kept.child->HowItEnded();
+    if (!std::exchange(kept.expects_end, false)) {
+      ++kept.unexpected;
+      kept.given_up =
+          kept.quick_deaths.Note(why, kept.child->RanSeconds()) || kept.unexpected > kMaxRestarts;
+    }
+    if (!kept.given_up) {
+      kept.child.emplace(name, kept.argv, LogOf(name));
+    }
+    revived.push_back({name, why, kept.given_up, kept.unexpected});
+  }
+  return revived;
+}
+
+bool KeptProcesses::GivenUp(const std::string& name) const {
+  return std::ranges::any_of(
+      kept_, [&](const Kept& kept) { return kept.given_up && kept.child->name() == name; });
+}
+
+void KeptProcesses::StopAll(double grace_s) {
+  for (const bool loggers : {false, true}) {
+    for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) {
+      if (kept->child->name().starts_with("logger") == loggers) {
+        kept->child->Stop(grace_s);
+      }
+    }
+  }
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,44 @@
+#include "session/processes/player.h"
+
+#include <fmt/format.h>
+
+#include "bus/process.h"
+
+namespace pangea::session {
+
+double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
+
+bool Player::IsOver() const {
+  return script.live && script.duration_s > 0 && started > 0 &&
+         Now() - started >= script.duration_s;
+}
+
+std::vector<std::string> InputOf(const Player& player, const std::string& rate) {
+  const AgentScript& script = player.script;
+  if (script.live) {
+    return {"--live"};
+  }
+  const bool stored = !script.keyframes.empty();
+  const double before_s = stored ? 0 : player.played_before_s;
+  std::vector<std::string> arguments = {"--rate", rate};
+  if (stored) {
+    arguments.insert(arguments.end(), {"--keyframes", script.resolved_keyframes.string()});
+  } else {
+    arguments.insert(arguments.end(), {"--recording", script.resolved.string(), "--start",
+                                       fmt::format("{}", script.start_s + before_s)});
+  }
+  if (script.duration_s > 0) {
+    arguments.insert(arguments.end(),
+                     {"--duration", fmt::format("{}", script.duration_s - before_s)});
+  }
+  return arguments;
+}
+
+std::string DescribeLive(const AgentScript& script, const std::string& bus) {
+  const std::string end =
+      script.duration_s > 0 ? fmt::format("for {:g} s", script.duration_s) : "until Ctrl-C";
+  return fmt::format("agent {0} is live {1}: it takes CAMERA_{0}, IMU_{0}, IMAGE_{0} on {2}",
+                     script.id, end, bus);
+}
+
+}  // namespace pangea::session

@@ -1,0 +1,197 @@
+#include "session/run/session_monitor.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <set>
+
+#include "bus/node.h"
+#include "bus/process.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/pose_t.hpp"
+
+namespace pangea::session {
+namespace {
+
+constexpr int64_t kStatusFresh_us = 3'000'000;
+
+void NoteTime(int64_t utime, AgentProgress* progress) {
+  if (progress->first_utime == 0) {
+    progress->first_utime = utime;
+  }
+  progress->newest_utime = std::max(progress->newest_utime, utime);
+}
+
+}  // namespace
+
+SessionMonitor::SessionMonitor(const Buses& buses) : last_work_(WallUtime()) {
+  buses_.push_back(std::make_unique<LcmBus>(buses.server));
+  WatchServer(*buses_.back());
+  for (const auto& [id, url] : buses.agents) {
+    agents_[id];
+    buses_.push_back(std::make_unique<LcmBus>(url));
+    agent_buses_[id] = buses_.back().get();
+    WatchAgent(id, *buses_.back());
+  }
+}
+
+SessionMonitor::~SessionMonitor() = default;
+
+void SessionMonitor::WatchServer(Bus& bus) {
+  const auto note_work = [this](const std::string&, Bytes) { last_work_ = WallUtime(); };
+  bus.Subscribe(std::string(channels::kAllKeyframes), note_work);
+  bus.Subscribe(std::string(channels::kPlaceMatch), note_work);
+  bus.Subscribe(channels::Again(".*"), note_work);
+  bus.Subscribe(std::string(channels::kConstraint), [this](const std::string&, Bytes data) {
+    last_work_ = WallUtime();
+    constraint_t message;
+    if (DecodeMessage(data, &message)) {
+      ++(message.accepted != 0 ? accepted_ : refused_);
+    }
+  });
+  bus.Subscribe(std::string(channels::kMapState), [this](const std::string&, Bytes data) {
+    last_work_ = WallUtime();
+    OnMapState(data);
+  });
+  for (const auto& [id, progress] : agents_) {
+    bus.Subscribe(channels::Correction(id),
+                  [this, id = id](const std::string&, Bytes data) { OnCorrection(id, data); });
+  }
+  bus.Subscribe(std::string(channels::kAllStatus),
+                [this](const std::string&, Bytes data) { OnStatus(data); });
+}
+
+void SessionMonitor::WatchAgent(int32_t id, Bus& bus) {
+  bus.Subscribe(channels::Pose(id),
+                [this, id](const std::string&, Bytes data) { OnPose(id, data); });
+  bus.Subscribe(channels::Keyframe(id),
+                [this, id](const std::string&, Bytes data) { OnKeyframe(id, data); });
+  bus.Subscribe(channels::Correction(id),
+                [this, id](const std::string&, Bytes data) { OnCorrection(id, data); });
+  bus.Subscribe(std::string(channels::kAllStatus),
+                [this](const std::string&, Bytes data) { OnStatus(data); });
+}
+
+void SessionMonitor::OnMapState(Bytes data) {
+  map_state_t message;
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  const auto state = Parse(message);
+  if (!state.value) {
+    return;
+  }
+  for (const MapId& map : state.value->maps) {
+    auto& [revision, maps] = groups_[map];
+    if (state.value->revision >= revision) {
+      revision = state.value->revision;
+      maps = state.value->maps;
+    }
+  }
+  for (auto& [id, progress] : agents_) {
+    std::set<int32_t> others;
+    for (const auto& [map, group] : groups_) {
+      if (map.agent_id == id) {
+        for (const MapId& other : group.second) {
+          others.insert(other.agent_id);
+        }
+      }
+    }
+    others.erase(id);
+    progress.fused_with.assign(others.begin(), others.end());
+  }
+}
+
+void SessionMonitor::OnCorrection(int32_t agent_id, Bytes data) {
+  correction_t message;
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  const auto correction = Parse(message);
+  if (!correction.value) {
+    return;
+  }
+  Drift& drift = drifts_[correction.value->map];
+  if (drift.Take(*correction.value)) {
+    agents_[agent_id].drift_m = drift.Moved(T_odom_body_[agent_id].t);
+  }
+}
+
+void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
+  pose_t message;
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  AgentProgress& progress = agents_[agent_id];
+  with_odometry_.insert(agent_id);
+  NoteTime(message.utime, &progress);
+  progress.tracking = message.state == pose_t::STATE_TRACKING;
+  progress.reason = message.reason;
+  if (const auto T = Parse(message.T_odom_body); progress.tracking && T.value) {
+    T_odom_body_[agent_id] = *T.value;
+  }
+}
+
+// Stored keyframes come without poses between them.
+void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
+  keyframe_t message;
+  if (with_odometry_.contains(agent_id) || !DecodeMessage(data, &message)) {
+    return;
+  }
+  AgentProgress& progress = agents_[agent_id];
+  NoteTime(message.utime, &progress);
+  progress.tracking = true;
+  if (const auto T = Parse(message.T_odom_body); T.value) {
+    T_odom_body_[agent_id] = *T.value;
+  }
+}
+
+void SessionMonitor::OnStatus(Bytes data) {
+  status_t message;
+  if (!DecodeMessage(data, &message)) {
+    return;
+  }
+  for (auto& [id, progress] : agents_) {
+    if (message.process == "vio_" + std::to_string(id) ||
+        message.process == "keyframes_" + std::to_string(id)) {
+      progress.keyframes = CounterOf(message, "keyframes").value_or(0);
+    }
+  }
+  status_received_[message.process] = WallUtime();
+  statuses_[message.process] = std::move(message);
+}
+
+void SessionMonitor::Handle(int timeout_ms) {
+  std::vector<pollfd> fds;
+  for (const auto& bus : buses_) {
+    fds.push_back({bus->fd(), POLLIN, 0});
+  }
+  if (poll(fds.data(), fds.size(), timeout_ms) <= 0) {
+    return;
+  }
+  for (size_t i = 0; i < fds.size(); ++i) {
+    // Bounded, so that a flood on one bus cannot keep the session from its other work.
+    for (int n = 0; n < 200 && (fds[i].revents & POLLIN) != 0 && buses_[i]->Handle(0); ++n) {
+    }
+  }
+}
+
+const AgentProgress& SessionMonitor::agent(int32_t id) const { return agents_.at(id); }
+
+double SessionMonitor::QuietSeconds() const {
+  return 1e-6 * static_cast<double>(WallUtime() - last_work_);
+}
+
+bool SessionMonitor::Idle(const std::vector<std::string>& processes, double quiet_s) const {
+  const int64_t now = WallUtime();
+  return QuietSeconds() > quiet_s &&
+         std::all_of(processes.begin(), processes.end(), [&](const std::string& name) {
+           const auto status = statuses_.find(name);
+           return status != statuses_.end() && status->second.pending == 0 &&
+                  now - status_received_.at(name) < kStatusFresh_us;
+         });
+}
+
+}  // namespace pangea::session

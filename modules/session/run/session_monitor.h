@@ -1,0 +1,84 @@
+#pragma once
+
+// What a running session shows: listens on the server bus and the agents' buses, and tells how far
+// each agent is, who is fused with whom, and whether the server has worked everything off.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bus/bus.h"
+#include "core/drift.h"
+#include "pangea/status_t.hpp"
+#include "session/processes/buses.h"
+
+namespace pangea::session {
+
+struct AgentProgress {
+  // Of its first image, sensor clock; 0 while there is none. Where stored keyframes are played: of
+  // the first of these.
+  int64_t first_utime = 0;
+  int64_t newest_utime = 0;  // of its newest
+  bool tracking = false;
+  std::string reason;  // why it is not tracking
+  int64_t keyframes = 0;
+  std::vector<int32_t> fused_with;  // agents in its group, itself not counted
+  // How far corrections have moved the agent's newest keyframe since its map joined its group,
+  // metres.
+  double drift_m = 0;
+
+  double recorded_s() const { return 1e-6 * static_cast<double>(newest_utime - first_utime); }
+};
+
+class SessionMonitor {
+ public:
+  explicit SessionMonitor(const Buses& buses);
+  ~SessionMonitor();
+
+  // Handles what waits on all buses, at most for `timeout_ms`.
+  void Handle(int timeout_ms);
+
+  const AgentProgress& agent(int32_t id) const;
+  // Its bus, which Handle handles.
+  Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
+  // Newest status of each process by name, whichever bus it came on.
+  const std::map<std::string, status_t>& statuses() const { return statuses_; }
+  int constraints_accepted() const { return accepted_; }
+  int constraints_refused() const { return refused_; }
+  int num_results() const { return accepted_ + refused_; }
+
+  // Every named process reported within the last 3 s that nothing is pending, and the server bus
+  // has carried no work for `quiet_s`.
+  bool Idle(const std::vector<std::string>& processes, double quiet_s) const;
+  // No message of work on the server bus for this long, seconds.
+  double QuietSeconds() const;
+
+ private:
+  void WatchServer(Bus& bus);
+  void WatchAgent(int32_t id, Bus& bus);
+  void OnMapState(Bytes data);
+  void OnCorrection(int32_t agent_id, Bytes data);
+  void OnPose(int32_t agent_id, Bytes data);
+  void OnKeyframe(int32_t agent_id, Bytes data);
+  void OnStatus(Bytes data);
+
+  std::vector<std::unique_ptr<LcmBus>> buses_;
+  std::map<int32_t, Bus*> agent_buses_;
+  std::map<int32_t, AgentProgress> agents_;
+  std::map<int32_t, Rigid3> T_odom_body_;  // newest pose of each agent
+  std::set<int32_t> with_odometry_;        // agents that publish poses
+  std::map<MapId, Drift> drifts_;
+  std::map<MapId, std::pair<int64_t, std::vector<MapId>>>
+      groups_;  // revision and maps, by each map
+  std::map<std::string, status_t> statuses_;
+  std::map<std::string, int64_t> status_received_;  // wall clock
+  int64_t last_work_ = 0;                           // wall clock
+  int accepted_ = 0;
+  int refused_ = 0;
+};
+
+}  // namespace pangea::session

@@ -1,0 +1,412 @@
+#include "session/run/session_runner.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <stdexcept>
+
+#include "bus/process.h"
+#include "files/text_file.h"
+#include "link/agent_key.h"
+#include "options/yaml_options.h"
+#include "session/anchors/anchor_app.h"
+#include "session/processes/buses.h"
+#include "session/processes/child_process.h"
+#include "session/processes/kept_processes.h"
+#include "session/processes/open_files.h"
+#include "session/processes/player.h"
+#include "session/run/session_monitor.h"
+#include "session/run/session_progress.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kStartTimeout_s = 20;  // for the server processes to report
+constexpr double kStuckAfter_s =
+    300;                          // without a verification result, while the server is not idle
+constexpr double kQuiet_s = 2.5;  // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStopGrace_s = 5;
+constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
+constexpr size_t kFilesBeside = 64;
+constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no pose
+
+class Runner {
+ public:
+  Runner(const SessionScript& script, const RunOptions& options)
+      : options_(options),
+        server_options_(script.options),
+        faults_(script.faults),
+        buses_(OpenBuses(script, options)),
+        monitor_(buses_),
+        anchors_(PlanAnchors(script)),
+        progress_(isatty(STDOUT_FILENO) != 0),
+        kept_(options.out / "logs") {
+    for (const AgentScript& agent : script.agents) {
+      players_.emplace_back().script = agent;
+    }
+  }
+
+  RunSummary Run() {
+    begin_ = Now();
+    fs::create_directories(options_.out / "logs");
+    // The processes are one-threaded by design; BLAS must not start threads behind their back.
+    setenv("OMP_NUM_THREADS", "1", 1);
+    setenv("OPENBLAS_NUM_THREADS", "1", 1);
+    MakeKeys();
+    StartServer();
+    StartLinks();
+    Play();
+    Drain();
+    progress_.Finish();
+    std::ranges::copy(anchors_.NotPlaced(), std::back_inserter(summary_.failures));
+    kept_.StopAll(kStopGrace_s);
+    summary_.wall_s = Now() - begin_;
+    summary_.status = monitor_.statuses();
+    for (const Player& player : players_) {
+      summary_.vio_wall_s[player.script.id] = player.ended - player.started;
+      summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
+    }
+    return summary_;
+  }
+
+ private:
+  // The monitor listens on the server's bus and on each agent's.
+  static Buses OpenBuses(const SessionScript& script, const RunOptions& options) {
+    AllowOpenFiles(kFilesBeside + kFilesPerBus * (script.agents.size() + 1));
+    return ChooseBuses(Ids(script, false), Ids(script, true), options.first_port);
+  }
+
+  static std::vector<int32_t> Ids(const SessionScript& script, bool only_with_bad_link) {
+    std::vector<int32_t> ids;
+    for (const AgentScript& agent : script.agents) {
+      if (agent.link || !only_with_bad_link) {
+        ids.push_back(agent.id);
+      }
+    }
+    return ids;
+  }
+
+  static std::string Program(const std::string& name) {
+    const fs::path path = ProgramDirectory() / name;
+    if (!fs::exists(path)) {
+      throw std::runtime_error(
+          fmt::format("{} is missing: build it (scripts/build)", path.string()));
+    }
+    return path.string();
+  }
+
+  fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
+
+  // Only this session's processes know them.
+  void MakeKeys() {
+    fs::remove_all(options_.out / "keys");
+    fs::create_directories(options_.out / "keys");
+    for (const Player& player : players_) {
+      MakeKeyFile(KeyFile(player.script.id), player.script.id);
+    }
+  }
+
+  // The file.
+  template <typename Options>
+  std::string WriteOptions(const std::string& process, Options options) const {
+    YamlOptions yaml;
+    options.Visit(yaml);
+    return WriteOptionsText(process, yaml.Print());
+  }
+  std::string WriteOptionsText(const std::string& process, const std::string& yaml) const {
+    const fs::path file = options_.out / "logs" / (process + ".yaml");
+    WriteTextFile(file, yaml);
+    return file.string();
+  }
+
+  // lcm-logger refuses an existing file, and a restarted one must go on in it: append.
+  void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
+    const auto logger = FindOnPath("lcm-logger");
+    if (!logger) {
+      throw std::runtime_error("lcm-logger is not on PATH: install liblcm-bin");
+    }
+    kept_.Start(name, {logger->string(), "--append", "--lcm-url=" + url, file.string()});
+  }
+
+  void StartServer() {
+    KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
+    kept_.Start("agent_handler",
+                {Program("pangea-agent-handler"), "--link", buses_.link, "--server", buses_.server,
+                 "--journal", options_.journal.string(), "--keys", (options_.out / "keys").string(),
+                 "--options", WriteOptions("agent_handler", server_options_.agent_handler)});
+    const std::map<std::string, std::string> options = TextsByProcess(server_options_);
+    for (const std::string name : kServerProcesses) {
+      if (name != "agent_handler") {
+        std::string program = "pangea-" + name;
+        std::ranges::replace(program, '_', '-');
+        kept_.Start(name, {Program(program), "--bus", buses_.server, "--options",
+                           WriteOptionsText(name, options.at(name))});
+      }
+      server_names_.push_back(name);
+    }
+    const double deadline = Now() + kStartTimeout_s;
+    while (!monitor_.Idle(server_names_, 0) && !StopRequested()) {
+      if (Now() > deadline) {
+        throw std::runtime_error(
+            fmt::format("the server processes did not come up within {} s; their output is in {}",
+                        kStartTimeout_s, (options_.out / "logs").string()));
+      }
+      monitor_.Handle(50);
+      Revive();
+      if (!summary_.failures.empty()) {
+        throw std::runtime_error(summary_.failures.front());
+      }
+    }
+  }
+
+  void StartLinks() {
+    for (const Player& player : players_) {
+      const int32_t id = player.script.id;
+      const std::string bus = buses_.agents.at(id);
+      KeepLogger(fmt::format("logger_agent_{}", id), bus,
+                 options_.out / fmt::format("agent_{}.lcm", id));
+      if (player.script.link) {
+        StartLinkEmulator(id, *player.script.link);
+      }
+      anchors_.Join(player.script, &monitor_.agent_bus(id));
+      const std::string name = fmt::format("uplink_{}", id);
+      kept_.Start(name, {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
+                         KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--spool",
+                         (options_.out / fmt::format("spool_{}", id)).string(), "--options",
+                         WriteOptions(name, player.script.uplink)});
+    }
+  }
+
+  void StartLinkEmulator(int32_t id, const LinkConditions& conditions) {
+    const std::string name = fmt::format("link_emulator_{}", id);
+    kept_.Start(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id),
+                       "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
+                       buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
+  }
+
+  // A killed player of stored keyframes begins again: what the uplink has is a repeat.
+  void StartPlayer(Player& player) {
+    const int32_t id = player.script.id;
+    const bool stored = !player.script.keyframes.empty();
+    std::vector<std::string> argv = {Program(stored ? "pangea-keyframe-player" : "pangea-vio"),
+                                     "--agent", std::to_string(id), "--bus", buses_.agents.at(id)};
+    const std::vector<std::string> input = InputOf(player, options_.rate);
+    argv.insert(argv.end(), input.begin(), input.end());
+    const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
+    if (player.script.vio_options) {
+      argv.insert(argv.end(), {"--options", WriteOptions(name, *player.script.vio_options)});
+    }
+    player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
+    if (player.started == 0) {
+      player.started = Now();
+      if (player.script.live) {
+        progress_.PrintLine(DescribeLive(player.script, buses_.agents.at(id)));
+      }
+    }
+  }
+
+  // Seconds of session time: wall time scaled by the rate; at rate max, how far the furthest agent
+  // is.
+  double SessionTime() const {
+    if (options_.rate != "max") {
+      return (Now() - play_begin_) * std::stod(options_.rate);
+    }
+    double furthest = 0;
+    bool any_playing = false;
+    for (const Player& player : players_) {
+      if (player.child) {
+        furthest = std::max(furthest,
+                            player.script.delay_s + monitor_.agent(player.script.id).recorded_s());
+        any_playing = any_playing || !player.done();
+      }
+    }
+    // With nobody playing, session time would stand still: the next agent starts at once.
+    return any_playing ? furthest : 1e18;
+  }
+
+  void Play() {
+    play_begin_ = Now();
+    const auto done = [](const Player& player) { return player.done(); };
+    // At rate max nothing happens after the last recording: there is no time any more.
+    const auto faults_to_come = [&] {
+      return options_.rate != "max" && SessionTime() < faults_.end_s();
+    };
+    while ((!std::all_of(players_.begin(), players_.end(), done) || faults_to_come()) &&
+           !StopRequested()) {
+      for (Player& player : players_) {
+        const bool due = player.script.delay_s <= 0 || SessionTime() >= player.script.delay_s;
+        if (!player.child && due) {
+          StartPlayer(player);
+        }
+        WatchPlayer(player);
+      }
+      Step();
+    }
+    EndPlayers();
+  }
+
+  // Ctrl-C is how a live agent ends; of recordings it is an interruption.
+  void EndPlayers() {
+    bool ends_live = false, ends_others = false;
+    for (Player& player : players_) {
+      if (!player.done()) {
+        (player.script.live ? ends_live : ends_others) = true;
+      }
+      if (player.child && !player.done()) {
+        player.child->Stop(kStopGrace_s);
+        player.ended = Now();
+      }
+    }
+    summary_.interrupted = StopRequested() && (ends_others || !ends_live);
+    if (StopRequested() && !summary_.interrupted) {
+      progress_.PrintLine("the server works off what has come; Ctrl-C again ends it at once");
+    }
+  }
+
+  void WatchPlayer(Player& player) {
+    if (player.child && player.IsOver() && !player.is_told_to_end) {
+      player.is_told_to_end = true;
+      player.child->Signal(SIGINT);
+    }
+    const auto exit = player.child ? player.child->Poll() : std::nullopt;
+    if (!exit || player.done()) {
+      return;
+    }
+    // What a killed vio left may be too short to start in.
+    const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
+    if (exit->code == 0 || is_rest || player.is_told_to_end || StopRequested()) {
+      player.ended = Now();
+    } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
+      // Killed: the same agent goes on where it was, in a new map.
+      ++player.restarts;
+      summary_.restarted.push_back(player.child->name());
+      player.played_before_s = monitor_.agent(player.script.id).recorded_s();
+      StartPlayer(player);
+    } else {
+      player.ended = Now();
+      summary_.failures.push_back(
+          fmt::format("agent {}: {}", player.script.id, player.child->LastLine()));
+      progress_.PrintLine(summary_.failures.back());
+    }
+  }
+
+  void Revive() {
+    for (const KeptProcesses::Revived& revived : kept_.Revive()) {
+      if (revived.given_up) {
+        summary_.failures.push_back(fmt::format(
+            "{} ended {} times and was given up ({}); its output is in {}", revived.name,
+            revived.unexpected, revived.why, (options_.out / "logs").string()));
+        progress_.PrintLine(summary_.failures.back());
+      } else {
+        progress_.PrintLine(
+            fmt::format("{} ended ({}); starting it again", revived.name, revived.why));
+        summary_.restarted.push_back(revived.name);
+      }
+    }
+  }
+
+  ChildProcess* Find(const std::string& name) {
+    if (ChildProcess* kept = kept_.Find(name)) {
+      return kept;
+    }
+    for (Player& player : players_) {
+      if (player.child && player.child->name() == name && !player.done()) {
+        return &*player.child;
+      }
+    }
+    return nullptr;
+  }
+
+  void InjectFaults() {
+    for (const std::string& name : faults_.TakeKills(SessionTime())) {
+      if (ChildProcess* child = Find(name)) {
+        child->Signal(SIGKILL);
+      }
+      kept_.ExpectEnd(name);
+    }
+    const std::set<std::string> full = faults_.DisksFull(SessionTime());
+    for (const std::string& name : faults_.DisksEverFull()) {
+      if (ChildProcess* child = Find(name)) {
+        SetDiskFull(child->pid(), full.contains(name));
+      }
+    }
+  }
+
+  void Step() {
+    InjectFaults();
+    monitor_.Handle(100);
+    anchors_.Step();
+    Revive();
+    std::vector<AgentLine> lines;
+    for (const Player& player : players_) {
+      lines.push_back({player.script.id, player.child.has_value(), player.done()});
+    }
+    progress_.Update(lines, monitor_, Now() - begin_);
+  }
+
+  // The processes that say when they have nothing to do.
+  std::vector<std::string> Working() const {
+    std::vector<std::string> names = server_names_;
+    for (const Player& player : players_) {
+      names.push_back(fmt::format("uplink_{}", player.script.id));
+    }
+    std::erase_if(names, [this](const std::string& name) { return kept_.GivenUp(name); });
+    return names;
+  }
+
+  // Until every process has worked off what has come. A server that goes on verifying is slow, not
+  // stuck: it is waited for.
+  void Drain() {
+    const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
+    // Of a live session, whose first one only ended the agents.
+    const auto ended_at_once = [] { return StopSignals() > 1; };
+    double deadline = Now() + patience_s;
+    int results = monitor_.num_results();
+    while (!monitor_.Idle(Working(), kQuiet_s) && !ended_at_once()) {
+      if (!summary_.interrupted && monitor_.num_results() > results) {
+        results = monitor_.num_results();
+        deadline = Now() + patience_s;
+      }
+      if (Now() > deadline) {
+        if (!summary_.interrupted) {
+          summary_.failures.push_back(fmt::format(
+              "the server is not idle {} s after its last verification result", kStuckAfter_s));
+        }
+        return;
+      }
+      Step();
+    }
+  }
+
+  RunOptions options_;
+  SessionServerOptions server_options_;
+  FaultSchedule faults_;
+  Buses buses_;
+  SessionMonitor monitor_;
+  AnchorApp anchors_;
+  SessionProgress progress_;
+  KeptProcesses kept_;
+  std::vector<Player> players_;
+  std::vector<std::string> server_names_;
+  RunSummary summary_;
+  double begin_ = 0;
+  double play_begin_ = 0;
+};
+
+}  // namespace
+
+RunSummary RunSession(const SessionScript& script, const RunOptions& options) {
+  InstallSignalHandlers();
+  return Runner(script, options).Run();
+}
+
+}  // namespace pangea::session

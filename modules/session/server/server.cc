@@ -1,0 +1,130 @@
+#include "session/server/server.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "bus/process.h"
+#include "session/processes/kept_processes.h"
+#include "session/session_file/session_file.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kStopGrace_s = 5;
+constexpr const char* kGateway = "gateway";
+constexpr std::chrono::milliseconds kLookInterval{100};
+
+void Say(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+std::string Program(const std::string& process) {
+  std::string name = "pangea-" + process;
+  std::ranges::replace(name, '_', '-');
+  const fs::path path = ProgramDirectory() / name;
+  if (!fs::exists(path)) {
+    throw std::runtime_error(
+        fmt::format("{} is missing: it belongs beside pangea-server", path.string()));
+  }
+  return path.string();
+}
+
+std::vector<std::string> Command(const std::string& process, const ServerOptions& options) {
+  std::vector<std::string> argv{Program(process)};
+  if (process == "agent_handler") {
+    argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
+                             options.journal.string(), "--keys", options.keys.string()});
+  } else {
+    argv.insert(argv.end(), {"--bus", options.bus});
+  }
+  if (process == "anchors" && !options.http.empty()) {
+    argv.insert(argv.end(), {"--http", options.http});
+  }
+  if (const auto file = options.options.find(process); file != options.options.end()) {
+    argv.insert(argv.end(), {"--options", file->second.string()});
+  }
+  return argv;
+}
+
+std::vector<std::string> GatewayCommand(const ServerOptions& options) {
+  return {Program(kGateway), "--site",    options.site.string(),
+          "--bus",           options.bus, "--link",
+          options.link,      "--port",    std::to_string(*options.phone_port)};
+}
+
+// Whether one was given up: a server that lacks a process is none. It is one without the gateway.
+bool ReviveAll(KeptProcesses* kept) {
+  bool given_up = false;
+  for (const KeptProcesses::Revived& revived : kept->Revive()) {
+    Say(fmt::format("{} ended ({}); {}", revived.name, revived.why,
+                    revived.given_up ? fmt::format("given up after {} times", revived.unexpected)
+                                     : "starting it again"));
+    given_up |= revived.given_up && revived.name != kGateway;
+  }
+  return given_up;
+}
+
+}  // namespace
+
+void AddProcessOptions(const std::string& text, ServerOptions* options) {
+  const size_t equals = text.find('=');
+  const std::string process = text.substr(0, equals);
+  if (equals == std::string::npos ||
+      std::ranges::find(kServerProcesses, process) == std::end(kServerProcesses)) {
+    throw std::runtime_error(fmt::format("--options {}: give PROCESS=FILE, PROCESS one of {}", text,
+                                         fmt::join(kServerProcesses, ", ")));
+  }
+  const fs::path file = text.substr(equals + 1);
+  if (!fs::is_regular_file(file)) {
+    throw std::runtime_error(fmt::format("--options {}: there is no file {}", text, file.string()));
+  }
+  options->options[process] = file;
+}
+
+void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
+  if (!fs::is_directory(folder)) {
+    throw std::runtime_error(
+        fmt::format("--options-dir {}: there is no such folder", folder.string()));
+  }
+  for (const std::string process : kServerProcesses) {
+    if (const fs::path file = folder / (process + ".yaml"); fs::exists(file)) {
+      options->options[process] = file;
+    }
+  }
+}
+
+int Serve(const ServerOptions& options) {
+  InstallSignalHandlers();
+  fs::create_directories(options.logs);
+  KeptProcesses kept(options.logs);
+  const auto start = [&kept](const std::string& process, const std::vector<std::string>& argv) {
+    kept.Start(process, argv);
+    Say(fmt::format("started {}", fmt::join(argv, " ")));
+  };
+  for (const std::string process : kServerProcesses) {
+    start(process, Command(process, options));
+  }
+  if (options.phone_port) {
+    start(kGateway, GatewayCommand(options));
+  }
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  bool given_up = false;
+  while (!StopRequested() && !given_up) {
+    std::this_thread::sleep_for(kLookInterval);
+    given_up = ReviveAll(&kept);
+  }
+  kept.StopAll(kStopGrace_s);
+  Say("ended");
+  return given_up ? 1 : 0;
+}
+
+}  // namespace pangea::session
