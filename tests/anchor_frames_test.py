@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The conversions of docs/anchors.md to the frames of Unity, three.js and WebXR, as they stand there: points transform alike."""
+"""The conversions of examples/anchors to the frames of Unity, three.js and WebXR, as they stand there: points transform alike."""
 
 import ast
 import math
@@ -8,12 +8,13 @@ import re
 import unittest
 from pathlib import Path
 
-DOC = (Path(__file__).resolve().parents[1] / "docs/anchors.md").read_text()
+FOLDER = Path(__file__).resolve().parents[1] / "examples/anchors"
+CODE = "".join((FOLDER / name).read_text() for name in ("unity.cs", "three.js"))
 
 
 def evaluated(pattern, **names):
-    """The arguments of a call in docs/anchors.md that is spelt so, as numbers."""
-    found = re.search(re.escape(pattern) + r"\(([^)]*)\)", DOC)
+    """The arguments of a call in the examples that is spelt so, as numbers."""
+    found = re.search(re.escape(pattern) + r"\(([^)]*)\)", CODE)
     assert found, pattern
     tree = ast.parse(found[1].replace("p.position", "t"), mode="eval")
     return eval(compile(tree, pattern, "eval"), {}, names)  # noqa: S307: of our own page
@@ -32,7 +33,7 @@ def rotated(q, v):
 
 
 class Frames(unittest.TestCase):
-    """The conversions of docs/anchors.md, as they stand there."""
+    """The conversions of the examples, as they stand there."""
 
     @staticmethod
     def unity(t, q):

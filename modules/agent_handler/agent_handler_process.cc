@@ -130,7 +130,7 @@ int64_t AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes pack
 void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   const auto found = agents_.find(channels::AgentOf(channel, channels::kLinkUpPrefix));
   if (found == agents_.end()) {
-    return node_.Refuse("packet of an agent without a key");
+    return node_.Refuse("packet of an agent whose key is not in the folder of keys");
   }
   const int32_t agent_id = found->first;
   Agent& agent = found->second;

@@ -147,7 +147,8 @@ TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
   EXPECT_GT(accepted, sent / 2);
   shout();
   Run(2);
-  EXPECT_EQ(refused["packet of an agent without a key"], static_cast<int64_t>(recorded.size()));
+  EXPECT_EQ(refused["packet of an agent whose key is not in the folder of keys"],
+            static_cast<int64_t>(recorded.size()));
   EXPECT_GT(refused["repeated or too old"], 50);
   EXPECT_GT(refused["not sealed for this session: forged, damaged, or of an earlier one"], 0);
   EXPECT_GT(refused["packet before there is a session"], 50) << "agent 2 has a key, but no uplink";

@@ -25,7 +25,13 @@ constexpr double kGuessedField = 1.13;  // rad
 constexpr double kTranslationSigma_m = 0.05;
 
 fs::path Mav0Of(const std::string& folder) {
-  return fs::exists(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  const fs::path mav0 =
+      fs::exists(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  if (!fs::exists(mav0 / "cam0") || !fs::exists(mav0 / "imu0")) {
+    throw std::runtime_error(fmt::format(
+        "{}: not a recording in EuRoC's format; it must hold mav0/cam0 and mav0/imu0", folder));
+  }
+  return mav0;
 }
 
 cv::Size SizeOfImages(const fs::path& mav0) {
@@ -122,7 +128,7 @@ void WriteSensorYaml(const std::string& out, const Result& result, const ImuNois
 
 void MakeFolder(const std::string& recording, const std::string& out) {
   if (fs::exists(out)) {
-    throw std::runtime_error(fmt::format("{}: there is something of this name already", out));
+    throw std::runtime_error(fmt::format("{}: exists already; give another --out", out));
   }
   const fs::path from = Mav0Of(recording), to = fs::path(out) / "mav0";
   const cv::Size size = SizeOfImages(from);

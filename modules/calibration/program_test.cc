@@ -96,6 +96,21 @@ TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
   EXPECT_THAT(Calibrate(input).refused, HasSubstr("record longer"));
 }
 
+TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {
+  const auto complaint = [&](const std::string& from, const std::string& to) -> std::string {
+    try {
+      MakeFolder(Path(from), Path(to));
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  };
+  MakeRecording();
+  EXPECT_THAT(complaint(".", "out"), HasSubstr("must hold mav0/cam0 and mav0/imu0"));
+  EXPECT_THAT(complaint("in", "in"), HasSubstr("give another --out"));
+  EXPECT_EQ(complaint("in", "out"), "");
+}
+
 TEST(Summary, SaysWhatToDoBetter) {
   Result result = Some();
   EXPECT_THAT(Summary({}, result), Not(HasSubstr("better:")));

@@ -100,8 +100,8 @@ void RunCompact(const Arguments& arguments) {
 
 void RunDelete(const Arguments& arguments) {
   const Site site = ReadSite(arguments.site);
-  std::cout << fmt::format("{}: type the site's name, {}, to {} it: ", site.folder.string(),
-                           site.description.name, arguments.now ? "remove" : "move away")
+  std::cout << fmt::format("{}: type the site's name, {}, to {}: ", site.folder.string(),
+                           site.description.name, arguments.now ? "remove it" : "move it away")
             << std::flush;
   std::string typed;
   std::getline(std::cin, typed);

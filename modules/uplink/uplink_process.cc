@@ -66,6 +66,10 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
                       [this](const std::string&, Bytes data) { OnPose(data); });
   link_bus.Subscribe(channels::LinkDown(agent_id),
                      [this](const std::string&, Bytes data) { OnLinkDown(data); });
+  // On one bus the server would take each keyframe from the odometry too, before it is journalled.
+  agent_bus.Subscribe(channels::Status("agent_handler"), [this](const std::string&, Bytes) {
+    node_.Refuse("the server is on this bus too: give the agent's processes another one (--bus)");
+  });
   node_.Subscribe<again_t>(channels::Again(node_.name()),
                            [this](const std::string&, const again_t& again) {
                              if (again.channel == channels::Keyframe(agent_id_)) {

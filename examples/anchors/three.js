@@ -1,0 +1,41 @@
+// Anchors in three.js, and in WebXR below a node that `align` places (docs/anchors.md).
+
+function place(object, pose) {
+  const [x, y, z] = pose.position;
+  const [qw, qx, qy, qz] = pose.orientation;
+  object.position.set(-y, z, -x);
+  object.quaternion.set(-qy, qz, -qx, qw);
+}
+
+function listen(url, map, makeObject) {  // map: the Object3D that stands for our frame
+  const shown = new Map();
+  const socket = new WebSocket(url);     // 'ws://127.0.0.1:8090/v1/events', with --allow-origin for this page
+  socket.onmessage = ({data}) => {
+    const anchor = JSON.parse(data);
+    if (anchor.type === 'gone' || !anchor.pose) {
+      shown.get(anchor.id)?.removeFromParent();
+      shown.delete(anchor.id);
+      return;
+    }
+    if (!shown.has(anchor.id)) {
+      shown.set(anchor.id, makeObject(anchor));
+      map.add(shown.get(anchor.id));
+    }
+    place(shown.get(anchor.id), anchor.pose);
+  };
+}
+
+// Sets `map` (a child of the scene in the XR reference space) so that our map frame lies where it belongs. `T_map_body`: {position, orientation} of POSE_k;
+// `T_body_viewer`: a Matrix4, the viewer (y up, −z forward) in the body, both in three.js' axes; from the calibration.
+function align(map, T_map_body, T_body_viewer, viewerPose) {
+  const body = new THREE.Object3D();
+  place(body, T_map_body);
+  body.updateMatrix();
+  const T_map_viewer = body.matrix.clone().multiply(T_body_viewer);
+  const T_xr_viewer = new THREE.Matrix4().fromArray(viewerPose.transform.matrix);
+  const T_xr_map = T_xr_viewer.multiply(T_map_viewer.invert());
+  const forward = new THREE.Vector3(0, 0, 1).transformDirection(T_xr_map);
+  const origin = new THREE.Vector3().setFromMatrixPosition(T_xr_map);
+  map.position.copy(origin);
+  map.rotation.set(0, Math.atan2(forward.x, forward.z), 0);  // gravity is known: yaw alone
+}

@@ -1,0 +1,45 @@
+#include "uplink/uplink_process.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "bus/bus.h"
+#include "bus/node.h"
+#include "messages/channels.h"
+#include "pangea/status_t.hpp"
+
+namespace pangea {
+namespace {
+
+// The reasons in the uplink's status after a second on a bus of which a server has a process, or
+// not.
+std::string RefusedBeside(const std::string& process) {
+  LocalBus agent_bus, link_bus;
+  UplinkProcess uplink(agent_bus, link_bus, 1, SecretKey::Random(), UplinkOptions{});
+  Node other(agent_bus, process);
+  std::string refused;
+  agent_bus.Subscribe(channels::Status("uplink_1"), [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    for (const counter_t& counter : status.refused) {
+      refused += counter.name;
+    }
+  });
+  for (const int64_t utime : {1'000'000, 2'500'000, 4'000'000}) {
+    other.Publish(channels::Status(process), status_t{});
+    uplink.Poll(utime);
+    uplink.Tick(utime);
+    agent_bus.Drain();
+  }
+  return refused;
+}
+
+TEST(UplinkProcess, AServerOnTheAgentsBusIsNamed) {
+  EXPECT_NE(RefusedBeside("agent_handler").find("--bus"), std::string::npos);
+  EXPECT_EQ(RefusedBeside("vio_1"), "");
+}
+
+}  // namespace
+}  // namespace pangea
