@@ -1,0 +1,2 @@
+#include "checkpoint/checkpoint_file.h"
+#include <gtest/gtest.h>
