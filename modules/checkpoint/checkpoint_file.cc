@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
@@ -21,18 +21,11 @@ namespace fs = std::filesystem;
 constexpr uint64_t kMagic = 0x54504b4341474e50;  // "PNGACKPT"
 constexpr uint32_t kFileFormat = 1;
 constexpr size_t kBufferBytes = 1 << 20;
-using Digest = std::array<uint8_t, 16>;
-// The number of bytes before it, and their hash.
-constexpr int64_t kTailBytes = sizeof(int64_t) + sizeof(Digest);
+// The number of bytes before it, and their CRC-32.
+constexpr int64_t kTailBytes = sizeof(int64_t) + sizeof(uint32_t);
 
-void Begin(crypto_generichash_state* hash) {
-  crypto_generichash_init(hash, nullptr, 0, sizeof(Digest));
-}
-
-Digest End(crypto_generichash_state* hash) {
-  Digest digest{};
-  crypto_generichash_final(hash, digest.data(), digest.size());
-  return digest;
+uint32_t Checksum(uint32_t of_bytes_before, const std::vector<uint8_t>& bytes) {
+  return static_cast<uint32_t>(crc32_z(of_bytes_before, bytes.data(), bytes.size()));
 }
 
 // All of it; false with errno set, 0 for the end of the file.
@@ -73,7 +66,6 @@ CheckpointWriter::CheckpointWriter(const fs::path& file, const CheckpointKey& ke
   if (fd_ < 0) {
     Fail();
   }
-  Begin(&hash_);
   Put(kMagic);
   Put(kFileFormat);
   pangea::Put(key.process, this);
@@ -105,7 +97,7 @@ void CheckpointWriter::PutBytes(const void* data, size_t size) {
 }
 
 void CheckpointWriter::Flush() {
-  crypto_generichash_update(&hash_, buffer_.data(), buffer_.size());
+  crc32_ = Checksum(crc32_, buffer_);
   for (size_t written = 0; written < buffer_.size();) {
     const ssize_t count = write(fd_, buffer_.data() + written, buffer_.size() - written);
     if (count < 0 && errno != EINTR) {
@@ -120,9 +112,9 @@ void CheckpointWriter::Flush() {
 void CheckpointWriter::Commit() {
   Flush();
   const int64_t num_bytes = num_bytes_;
-  const Digest digest = End(&hash_);
+  const uint32_t crc32 = crc32_;
   Put(num_bytes);
-  PutBytes(digest.data(), digest.size());
+  Put(crc32);
   Flush();
   if (fsync(fd_) != 0 || rename(made_.c_str(), file_.c_str()) != 0) {
     Fail();
@@ -167,24 +159,23 @@ void CheckpointReader::CheckWhole() {
     throw std::runtime_error("it is no file");
   }
   end_ = std::max<int64_t>(info.st_size - kTailBytes, 0);
-  crypto_generichash_state hash;
-  Begin(&hash);
+  uint32_t computed = 0;
   std::vector<uint8_t> piece(kBufferBytes);
   for (int64_t at = 0; at < end_; at += static_cast<int64_t>(piece.size())) {
     piece.resize(std::min(piece.size(), static_cast<size_t>(end_ - at)));
     if (!ReadAt(fd_, at, piece.data(), piece.size())) {
       throw std::runtime_error(std::strerror(errno));
     }
-    crypto_generichash_update(&hash, piece.data(), piece.size());
+    computed = Checksum(computed, piece);
   }
   int64_t num_bytes = 0;
-  Digest digest{};
+  uint32_t written = 0;
   if (!ReadAt(fd_, end_, &num_bytes, sizeof(num_bytes)) ||
-      !ReadAt(fd_, end_ + static_cast<int64_t>(sizeof(num_bytes)), digest.data(), digest.size()) ||
+      !ReadAt(fd_, end_ + static_cast<int64_t>(sizeof(num_bytes)), &written, sizeof(written)) ||
       num_bytes != end_) {
     throw std::runtime_error("it is torn");
   }
-  if (digest != End(&hash)) {
+  if (written != computed) {
     throw std::runtime_error("it is damaged");
   }
 }

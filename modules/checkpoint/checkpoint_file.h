@@ -5,11 +5,9 @@
 // of another version, of other options or of another journal is not used, and is written anew.
 //
 // In it: what it is of (CheckpointKey), up to where in the journal (JournalState), and the process'
-// own bytes; behind them their number and a hash of it all. Written beside its place and renamed
-// once it is on the disk: a process that is killed, or a disk that is full, leaves the one before.
-// Bytes are as this machine has them in memory (core/byte_record.h). One thread.
-
-#include <sodium.h>
+// own bytes; behind them their number and a checksum of it all. Written beside its place and
+// renamed once it is on the disk: a process that is killed, or a disk that is full, leaves the one
+// before. Bytes are as this machine has them in memory (core/byte_record.h). One thread.
 
 #include <cstdint>
 #include <filesystem>
@@ -54,7 +52,7 @@ class CheckpointWriter final : public ByteWriter {
   int fd_ = -1;
   int64_t num_bytes_ = 0;
   std::vector<uint8_t> buffer_;
-  crypto_generichash_state hash_;
+  uint32_t crc32_ = 0;  // of these
 };
 
 // What a checkpoint is of.

@@ -281,16 +281,23 @@ bool JournalFollower::TakeOfFile(const std::string& channel, Bytes data, int64_t
 // One behind a gap waits for what may still come: what is kept ends before it.
 bool JournalFollower::MayBeKept(const Keyframe& keyframe) const {
   const int32_t next = keyframes_.next(keyframe.id.map);
+  if (keyframe.id.seq < next) {
+    return true;  // a repeat
+  }
   const bool in_order =
-      keyframe.id.seq <= next || (keyframe.edge && keyframe.edge->from_seq < next);
+      keyframe.id.seq == next || (keyframe.edge && keyframe.edge->from_seq < next);
   return (in_order || !follows_.in_order) &&
          (!checkpoint_.keyframe_is_complete || checkpoint_.keyframe_is_complete(keyframe.id));
 }
 
 void JournalFollower::RestoreCheckpoint() {
   const std::filesystem::path& file = checkpoint_.place.file;
-  if (file.empty() || !std::filesystem::exists(file)) {
-    return;
+  bool knows_keyframes = false;
+  keyframes_.VisitStreams([&](const MapId&, int32_t next, const std::vector<int32_t>& waiting) {
+    knows_keyframes |= next > 0 || !waiting.empty();
+  });
+  if (file.empty() || knows_keyframes || !std::filesystem::exists(file)) {
+    return;  // it would replace what the process has
   }
   try {
     CheckpointReader reader(file, {node_.name(), checkpoint_.format, checkpoint_.place.options});
