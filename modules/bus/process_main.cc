@@ -1,7 +1,6 @@
 #include "bus/process_main.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -17,8 +16,6 @@
 
 namespace pangea {
 namespace {
-
-constexpr int kBehindOthers = 10;  // a nice value: whoever writes a checkpoint has time
 
 // "pangea-global-ba" is global_ba.
 std::string NameOnTheBus(const std::string& program) {
@@ -55,7 +52,6 @@ void WriteCheckpoint(const CheckpointPlace& checkpoint, const std::string& journ
   } catch (const std::runtime_error&) {
     // All of the journal is read.
   }
-  setpriority(PRIO_PROCESS, 0, kBehindOthers);
   LocalBus bus;
   const auto process = factory(bus);
   PublishMessage(bus, std::string(channels::kJournalFile),

@@ -1,6 +1,7 @@
 #include "session/checkpoints.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -24,6 +25,7 @@ constexpr double kFirstAfter_s = 60;
 // each checkpoint.
 constexpr int64_t kLeastBytes = 20'000'000;
 constexpr int64_t kShare = 20;
+constexpr int kBehindTheServer = 10;
 constexpr std::chrono::milliseconds kLookInterval{20};
 
 }  // namespace
@@ -56,7 +58,7 @@ void Checkpoints::BeginRound() {
   to_run_ = {writers_.begin(), writers_.end()};
 }
 
-bool Checkpoints::Advance() {
+bool Checkpoints::Advance(int niceness) {
   if (running_ && running_->running()) {
     return true;
   }
@@ -67,12 +69,13 @@ bool Checkpoints::Advance() {
   const Writer next = std::move(to_run_.front());
   to_run_.pop_front();
   running_.emplace(next.process, next.argv, log_);
+  setpriority(PRIO_PROCESS, static_cast<id_t>(running_->pid()), niceness);
   return true;
 }
 
 void Checkpoints::Tick(double now_s) {
   began_s_ = began_s_.value_or(now_s);
-  if (Advance()) {
+  if (Advance(kBehindTheServer)) {
     return;
   }
   const int64_t bytes = JournalBytes();
@@ -87,7 +90,7 @@ void Checkpoints::Finish() {
   if (journal_bytes_ != JournalBytes()) {
     BeginRound();
   }
-  for (const int signals = StopSignals(); StopSignals() == signals && Advance();) {
+  for (const int signals = StopSignals(); StopSignals() == signals && Advance(0);) {
     std::this_thread::sleep_for(kLookInterval);
   }
 }

@@ -39,8 +39,8 @@ class Checkpoints {
   };
   int64_t JournalBytes() const;
   void BeginRound();
-  // Whether one is still at work, or to be.
-  bool Advance();
+  // Whether one is still at work, or to be. Those that it starts get this nice value.
+  bool Advance(int niceness);
 
   const std::filesystem::path folder_;
   const std::filesystem::path journal_;
