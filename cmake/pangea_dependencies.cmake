@@ -10,6 +10,7 @@ find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
 
 # Debian's LCM has no CMake package.
 find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)

@@ -36,6 +36,9 @@ class AgentHandlerProcess : public PolledProcess {
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
 
+  // When it was opened.
+  bool journal_was_damaged() const { return !archive_.Damage().empty(); }
+
  private:
   struct Agent {
     HandlerSession session;

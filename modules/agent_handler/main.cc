@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 
 #include "agent_handler/agent_handler_process.h"
@@ -18,11 +19,15 @@ int main(int argc, char** argv) {
   std::string server = pangea::kDefaultBusUrl;
   std::string journal;
   std::string keys;
+  std::string checkpoints;
   pangea::AgentHandlerOptions options;
   app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
   app.add_option("--server", server, "LCM URL of the server bus")->capture_default_str();
   app.add_option("--journal", journal, "LCM log to append to; an existing one is loaded");
   app.add_option("--keys", keys, "folder with the key of each agent that may join");
+  app.add_option("--checkpoints", checkpoints,
+                 "folder of the other processes' checkpoints; removed when the journal is damaged, "
+                 "as they have what it lost");
   pangea::OptionsArguments options_arguments(app);
   pangea::KeygenArguments keygen_arguments;
   const CLI::App* keygen = pangea::AddKeygen(app, &keygen_arguments);
@@ -44,6 +49,9 @@ int main(int argc, char** argv) {
     pangea::LcmBus server_bus(server);
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),
                                         options);
+    if (process.journal_was_damaged() && !checkpoints.empty()) {
+      std::filesystem::remove_all(checkpoints);
+    }
     pangea::StartLog("pangea-agent-handler",
                      fmt::format("bus {}, link {}, journal {}, keys {}, {}", server, link, journal,
                                  keys, options_arguments.Source()));

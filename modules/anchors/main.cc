@@ -36,6 +36,6 @@ int main(int argc, char** argv) {
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-anchors", "Holds anchors in the maps, and tells agents and apps where they are",
-       yaml, nullptr, add_arguments},
+       yaml, nullptr, nullptr, add_arguments},
       make);
 }

@@ -4,11 +4,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 
 #include "bus/options_announcer.h"
 #include "bus/retransmission/journal_first.h"
+#include "bus/retransmission/journal_reader.h"
 #include "bus/status_log.h"
+#include "messages/channels.h"
 #include "options/options_arguments.h"
 
 namespace pangea {
@@ -29,6 +32,32 @@ void AddScratchOption(CLI::App& app, ScratchFileOptions* scratch) {
                                    "comes beyond stays in memory")
       ->check(CLI::Range(int64_t{0}, int64_t{1'000'000'000}))
       ->default_str(fmt::format("{}", scratch->max_bytes / kMega));
+}
+
+void AddCheckpointOptions(CLI::App& app, CheckpointPlace* checkpoint, std::string* journal) {
+  CLI::Option* file =
+      app.add_option("--checkpoint", checkpoint->file,
+                     "what was made of the journal, so that a start reads only the rest of it");
+  app.add_option("--write-checkpoint", *journal,
+                 "the journal's file: reads it, brings the checkpoint up to it, and ends")
+      ->needs(file);
+}
+
+// Of a journal that nobody need be writing.
+void WriteCheckpoint(const CheckpointPlace& checkpoint, const std::string& journal,
+                     const ProcessFactory& factory) {
+  JournalState known;
+  try {
+    known = CheckpointReader(checkpoint.file).head().journal;
+  } catch (const std::runtime_error&) {
+    // All of the journal is read.
+  }
+  LocalBus bus;
+  const auto process = factory(bus);
+  PublishMessage(bus, std::string(channels::kJournalFile),
+                 ToMessage(JournalFile{std::filesystem::absolute(journal).string(),
+                                       ReadJournalState(journal, known)}));
+  bus.Drain();
 }
 
 // A process that tells its options beside what it does.
@@ -62,6 +91,10 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
   if (description.scratch != nullptr) {
     AddScratchOption(app, description.scratch);
   }
+  std::string journal;
+  if (description.checkpoint != nullptr) {
+    AddCheckpointOptions(app, description.checkpoint, &journal);
+  }
   OptionsArguments options(app);
   CLI11_PARSE(app, argc, argv);
   try {
@@ -70,6 +103,15 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
       return 0;
     }
     UseOneThread();
+    if (description.checkpoint != nullptr) {
+      description.checkpoint->options = description.options.PrintWithoutHelp();
+      description.checkpoint->writes = !journal.empty();
+    }
+    if (!journal.empty()) {
+      StartLog(description.name, fmt::format("writes {}", description.checkpoint->file.string()));
+      WriteCheckpoint(*description.checkpoint, journal, factory);
+      return 0;
+    }
     LcmBus bus(url);
     JournalFirstBus journal_first(bus, WallUtime());
     WithOptions process(factory(journal_first),

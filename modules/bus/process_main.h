@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bus/process.h"
+#include "bus/retransmission/journal_follower.h"
 #include "files/scratch_file.h"
 #include "options/yaml_options.h"
 
@@ -21,13 +22,15 @@ struct ProcessDescription {
   std::string summary;                    // for --help
   YamlOptions& options;                   // of --options FILE.yaml
   ScratchFileOptions* scratch = nullptr;  // of --scratch-mb; null: it sets nothing aside
+  CheckpointPlace* checkpoint = nullptr;  // of --checkpoint; null: it keeps none
   std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
 };
 
 // Reads the command line (--bus URL, --options FILE.yaml, --print-options, --scratch-mb), then
 // makes the process, whose options are set by now, and runs it: the journal's HAVE first
 // (journal_first.h), messages and ticks until a signal. It tells its options on the bus
-// (options_announcer.h). Errors become one line and exit code 1.
+// (options_announcer.h). With --write-checkpoint it reads the journal, writes the checkpoint and
+// ends. Errors become one line and exit code 1.
 using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory);

@@ -1,7 +1,8 @@
 #pragma once
 
 // Values one after the other as bytes, exactly as they lie in memory: for records that the same run
-// reads again, never for a file that stays or a message.
+// reads again and for checkpoints, which the same binary on the same machine reads or nobody; never
+// for a message, or a file that people keep.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -13,12 +14,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/ids.h"
 #include "core/rigid3.h"
 
 namespace pangea {
 
-class ByteRecordWriter {
+class ByteWriter {
  public:
+  virtual ~ByteWriter() = default;
+
   template <typename T>
   requires std::is_trivially_copyable_v<T>
   void Put(const T& value) { PutBytes(&value, sizeof(T)); }
@@ -31,23 +35,36 @@ class ByteRecordWriter {
     Put(T.q);
     Put(T.t);
   }
-
-  void Reserve(size_t num_bytes) { bytes_.reserve(num_bytes); }
-  std::vector<uint8_t> Take() { return std::move(bytes_); }
-
- private:
-  void PutBytes(const void* data, size_t size) {
-    const auto* const first = static_cast<const uint8_t*>(data);
-    bytes_.insert(bytes_.end(), first, first + size);
+  // By their fields: what lies between these has no value.
+  void Put(const MapId& id) {
+    Put(id.agent_id);
+    Put(id.opened_utime);
+  }
+  void Put(const KeyframeId& id) {
+    Put(id.map);
+    Put(id.seq);
+  }
+  void PutCount(size_t count) { Put(static_cast<uint32_t>(count)); }
+  template <typename T>
+  void Put(const std::vector<T>& values) {
+    PutCount(values.size());
+    if constexpr (std::is_arithmetic_v<T>) {
+      PutBytes(values.data(), sizeof(T) * values.size());
+    } else {
+      for (const T& value : values) {
+        Put(value);
+      }
+    }
   }
 
-  std::vector<uint8_t> bytes_;
+ protected:
+  virtual void PutBytes(const void* data, size_t size) = 0;
 };
 
 // Past the end nothing is read, and ok() is false from then on.
-class ByteRecordReader {
+class ByteReader {
  public:
-  explicit ByteRecordReader(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+  virtual ~ByteReader() = default;
 
   template <typename T>
   requires std::is_trivially_copyable_v<T>
@@ -61,28 +78,79 @@ class ByteRecordReader {
     Get(&T->q);
     Get(&T->t);
   }
+  void Get(MapId* id) {
+    Get(&id->agent_id);
+    Get(&id->opened_utime);
+  }
+  void Get(KeyframeId* id) {
+    Get(&id->map);
+    Get(&id->seq);
+  }
   // A count of things that take at least `min_bytes` each; 0 where so many cannot follow.
   size_t GetCount(size_t min_bytes) {
     uint32_t count = 0;
     Get(&count);
-    ok_ = ok_ && count <= bytes_.size() / min_bytes;
+    ok_ = ok_ && count <= bytes_left() / min_bytes;
     return ok_ ? count : 0;
   }
-
-  bool ok() const { return ok_; }
-  bool at_end() const { return bytes_.empty(); }
-
- private:
-  void GetBytes(void* data, size_t size) {
-    ok_ = ok_ && size <= bytes_.size();
-    if (ok_) {
-      std::memcpy(data, bytes_.data(), size);
-      bytes_ = bytes_.subspan(size);
+  template <typename T>
+  void Get(std::vector<T>* values) {
+    values->resize(GetCount(std::is_arithmetic_v<T> ? sizeof(T) : 1));
+    if constexpr (std::is_arithmetic_v<T>) {
+      GetBytes(values->data(), sizeof(T) * values->size());
+    } else {
+      for (T& value : *values) {
+        Get(&value);
+      }
     }
   }
 
-  std::span<const uint8_t> bytes_;
+  bool ok() const { return ok_; }
+  bool at_end() const { return bytes_left() == 0; }
+
+ protected:
+  virtual size_t bytes_left() const = 0;
+  // At most bytes_left(); false when they cannot be read.
+  virtual bool Read(void* data, size_t size) = 0;
+
+ private:
+  void GetBytes(void* data, size_t size) { ok_ = ok_ && size <= bytes_left() && Read(data, size); }
+
   bool ok_ = true;
+};
+
+// In memory.
+class ByteRecordWriter final : public ByteWriter {
+ public:
+  void Reserve(size_t num_bytes) { bytes_.reserve(num_bytes); }
+  std::vector<uint8_t> Take() { return std::move(bytes_); }
+
+ protected:
+  void PutBytes(const void* data, size_t size) override {
+    const auto* const first = static_cast<const uint8_t*>(data);
+    bytes_.insert(bytes_.end(), first, first + size);
+  }
+
+ private:
+  std::vector<uint8_t> bytes_;
+};
+
+class ByteRecordReader final : public ByteReader {
+ public:
+  explicit ByteRecordReader(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+
+ protected:
+  size_t bytes_left() const override { return bytes_.size(); }
+  bool Read(void* data, size_t size) override {
+    if (size > 0) {
+      std::memcpy(data, bytes_.data(), size);
+      bytes_ = bytes_.subspan(size);
+    }
+    return true;
+  }
+
+ private:
+  std::span<const uint8_t> bytes_;
 };
 
 }  // namespace pangea

@@ -56,7 +56,7 @@ void VisitPreintegration(PreintegrationType& p, const Visit& visit) {
 
 }  // namespace
 
-void PutCorners(const std::vector<Corner>& corners, ByteRecordWriter* writer) {
+void PutCorners(const std::vector<Corner>& corners, ByteWriter* writer) {
   writer->Put(static_cast<uint32_t>(corners.size()));
   for (const Corner& corner : corners) {
     writer->Put(corner.pixel);
@@ -66,7 +66,7 @@ void PutCorners(const std::vector<Corner>& corners, ByteRecordWriter* writer) {
   }
 }
 
-void GetCorners(ByteRecordReader* reader, std::vector<Corner>* corners) {
+void GetCorners(ByteReader* reader, std::vector<Corner>* corners) {
   corners->resize(reader->GetCount(kCornerBytes));
   for (Corner& corner : *corners) {
     reader->Get(&corner.pixel);

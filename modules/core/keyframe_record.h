@@ -18,7 +18,7 @@ std::vector<uint8_t> ToRecord(const Keyframe& keyframe);
 std::optional<Keyframe> KeyframeFromRecord(std::span<const uint8_t> record);
 
 // Of a part of it.
-void PutCorners(const std::vector<Corner>& corners, ByteRecordWriter* writer);
-void GetCorners(ByteRecordReader* reader, std::vector<Corner>* corners);
+void PutCorners(const std::vector<Corner>& corners, ByteWriter* writer);
+void GetCorners(ByteReader* reader, std::vector<Corner>* corners);
 
 }  // namespace pangea

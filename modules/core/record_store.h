@@ -37,6 +37,11 @@ class Record {
  public:
   // `store` may be null.
   Record(std::vector<uint8_t> bytes, RecordStore* store);
+  // In a store that has it there.
+  Record(int64_t offset, uint32_t size) : offset_(offset), size_(size) {}
+
+  int64_t offset() const { return offset_; }  // in the store
+  uint32_t size() const { return size_; }
 
   bool in_memory() const { return offset_ == kInMemory; }
   // From the same store; nothing when it cannot be read.

@@ -48,15 +48,60 @@ std::vector<int> KeyframeView::CornersOfLandmark(int32_t landmark_id) const {
   return corners;
 }
 
+std::vector<uint8_t> SubmapStore::RecordOf(Keyframe keyframe, const SubmapStoreOptions& options) {
+  if (!options.keep_preintegration) {
+    keyframe.preintegration.reset();
+  }
+  return ToRecord(keyframe);
+}
+
+void SubmapStore::Save(ByteWriter* writer) const {
+  writer->PutCount(keyframes_.size());
+  for (const auto& [id, stored] : keyframes_) {
+    writer->Put(id);
+    writer->Put(stored.record.offset());
+    writer->Put(stored.record.size());
+    writer->Put(stored.p_odom_body);
+    writer->Put(stored.edge_from_seq.has_value());
+    writer->Put(stored.edge_from_seq.value_or(0));
+    writer->Put(stored.edge_m);
+  }
+}
+
+bool SubmapStore::Restore(ByteReader* reader) {
+  constexpr size_t kLeastBytes = 60;
+  std::map<KeyframeId, Stored> keyframes;
+  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+    KeyframeId id;
+    int64_t offset = 0;
+    uint32_t size = 0;
+    Eigen::Vector3d p_odom_body = Eigen::Vector3d::Zero();
+    bool has_edge = false;
+    int32_t edge_from_seq = 0;
+    double edge_m = 0;
+    reader->Get(&id);
+    reader->Get(&offset);
+    reader->Get(&size);
+    reader->Get(&p_odom_body);
+    reader->Get(&has_edge);
+    reader->Get(&edge_from_seq);
+    reader->Get(&edge_m);
+    keyframes.emplace_hint(keyframes.end(), id,
+                           Stored{Record(offset, size), p_odom_body,
+                                  has_edge ? std::optional(edge_from_seq) : std::nullopt, edge_m});
+  }
+  if (reader->ok()) {
+    keyframes_ = std::move(keyframes);
+  }
+  return reader->ok();
+}
+
 void SubmapStore::Add(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   if (keyframes_.contains(id)) {
     return;
   }
-  if (!options_.keep_preintegration) {
-    keyframe.preintegration.reset();
-  }
-  Stored stored{Record(ToRecord(keyframe), records_.get()), keyframe.T_odom_body.t, {}};
+  Stored stored{Record(RecordOf(keyframe, options_), records_.get()), keyframe.T_odom_body.t, {}};
   if (keyframe.edge) {
     stored.edge_from_seq = keyframe.edge->from_seq;
     stored.edge_m = keyframe.edge->T_from_this.t.norm();

@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/keyframe.h"
 #include "core/matching.h"
 #include "core/recent_cache.h"
@@ -75,8 +76,16 @@ class SubmapStore {
                        std::shared_ptr<RecordStore> records = nullptr)
       : options_(options), records_(std::move(records)), views_(options.max_views) {}
 
+  // What it keeps of a keyframe in the RecordStore.
+  static std::vector<uint8_t> RecordOf(Keyframe keyframe, const SubmapStoreOptions& options);
+
   // A keyframe that is already there stays as it is.
   void Add(Keyframe keyframe);
+
+  // Where the records are, not these themselves, none of which is in memory: whoever restores it
+  // has them at the same places. False, and nothing has changed, if these are not its bytes.
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
 
   // Nobody has these keyframes any more (the gaps in HAVE): nothing waits for them.
   void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq);

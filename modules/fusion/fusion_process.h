@@ -2,6 +2,8 @@
 
 // KEYFRAME_*, PLACE_MATCH (candidates of kind inter) in; CONSTRAINT, STATUS_fusion out.
 
+#include <memory>
+
 #include "fusion/fusion.h"
 #include "loop_verification/candidate_process.h"
 
@@ -10,9 +12,14 @@ namespace pangea {
 class FusionProcess : public CandidateProcess {
  public:
   FusionProcess(Bus& bus, const FusionOptions& options,
-                const std::shared_ptr<RecordStore>& records = nullptr)
-      : CandidateProcess(bus, "fusion", PlaceKind::kInter,
-                         std::make_unique<Fusion>(options, records), records) {}
+                const std::shared_ptr<RecordStore>& records = nullptr,
+                const CheckpointPlace& checkpoint = {})
+      : CandidateProcess(
+            bus, "fusion", PlaceKind::kInter,
+            [&options](const std::shared_ptr<RecordStore>& of_verifier) {
+              return std::make_unique<Fusion>(options, of_verifier);
+            },
+            records, checkpoint) {}
 };
 
 }  // namespace pangea

@@ -54,9 +54,47 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
 }  // namespace
 
 GlobalBa::GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records)
-    : options_(options),
-      records_(std::move(records)),
-      store_({.keep_preintegration = true}, records_) {}
+    : options_(options), records_(std::move(records)), store_(kStore, records_) {}
+
+void GlobalBa::Save(ByteWriter* writer) const {
+  writer->PutCount(matched_.size());
+  for (const auto& [pair, corners] : matched_) {
+    writer->Put(pair.first);
+    writer->Put(pair.second);
+    writer->Put(corners.Bytes(records_.get()).value_or(std::vector<uint8_t>{}));
+  }
+  writer->PutCount(tied_.size());
+  for (const Pair& pair : tied_) {
+    writer->Put(pair.first);
+    writer->Put(pair.second);
+  }
+  store_.Save(writer);
+}
+
+bool GlobalBa::Restore(ByteReader* reader) {
+  std::map<Pair, Record> matched;
+  for (size_t left = reader->GetCount(1); left > 0; --left) {
+    Pair pair;
+    std::vector<uint8_t> corners;
+    reader->Get(&pair.first);
+    reader->Get(&pair.second);
+    reader->Get(&corners);
+    matched.emplace_hint(matched.end(), pair, Record(std::move(corners), records_.get()));
+  }
+  std::set<Pair> tied;
+  for (size_t left = reader->GetCount(1); left > 0; --left) {
+    Pair pair;
+    reader->Get(&pair.first);
+    reader->Get(&pair.second);
+    tied.insert(tied.end(), pair);
+  }
+  if (!store_.Restore(reader) || !reader->at_end()) {
+    return false;
+  }
+  matched_ = std::move(matched);
+  tied_ = std::move(tied);
+  return true;
+}
 
 void GlobalBa::Take(Keyframe keyframe) {
   if (!store_.Contains(keyframe.id)) {

@@ -55,6 +55,15 @@ class GlobalBa {
   // `records`: for keyframes and matches.
   explicit GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records = nullptr);
 
+  // Its record of a keyframe.
+  static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
+    return SubmapStore::RecordOf(keyframe, kStore);
+  }
+  // What it was given but for states. Restored: false, and nothing has changed, if these are not
+  // its bytes.
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
+
   // Repeats change nothing.
   void Take(Keyframe keyframe);
   void Take(const PlaceMatch& match);
@@ -83,6 +92,7 @@ class GlobalBa {
     int constraints = 0, switched_off = 0;
     bool operator==(const Basis&) const = default;
   };
+  static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
   static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond ties nothing
 

@@ -12,6 +12,7 @@
 namespace pangea {
 namespace {
 
+constexpr uint32_t kCheckpointFormat = 1;
 constexpr int64_t kSecond = 1'000'000;
 // Longer than the pose graph waits before it solves all from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;
@@ -19,10 +20,11 @@ constexpr int64_t kQuiet_us = 3 * kSecond;
 }  // namespace
 
 GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
-                                 const std::shared_ptr<RecordStore>& records)
+                                 const std::shared_ptr<RecordStore>& records,
+                                 const CheckpointPlace& checkpoint)
     : node_(bus, "global_ba"),
-      records_(records),
-      global_ba_(options, records),
+      records_(std::make_shared<JournalRecords>(records, GlobalBa::RecordOf)),
+      global_ba_(options, records_),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kAll,
@@ -33,9 +35,29 @@ GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
                       Take(match);
                       return true;
                     },
-                .result = [this](const Constraint& result) { Take(result); }}) {
+                .result = [this](const Constraint& result) { Take(result); }},
+               {.place = checkpoint,
+                .format = kCheckpointFormat,
+                .save = std::bind_front(&GlobalBaProcess::Save, this),
+                .restore = std::bind_front(&GlobalBaProcess::Restore, this)},
+               records_) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&GlobalBaProcess::OnMapState, this));
+}
+
+void GlobalBaProcess::Save(ByteWriter* writer) const {
+  writer->Put(num_inputs_);
+  global_ba_.Save(writer);
+}
+
+bool GlobalBaProcess::Restore(ByteReader* reader) {
+  int64_t num_inputs = 0;
+  reader->Get(&num_inputs);
+  if (!global_ba_.Restore(reader)) {
+    return false;
+  }
+  num_inputs_ = num_inputs;
+  return true;
 }
 
 void GlobalBaProcess::OnMapState(MapState state, const map_state_t& message) {

@@ -25,13 +25,16 @@ class GlobalBaProcess : public Process {
  public:
   // `records`: for keyframes and matches (core/record_store.h).
   GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
-                  const std::shared_ptr<RecordStore>& records = nullptr);
+                  const std::shared_ptr<RecordStore>& records = nullptr,
+                  const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
   // All that is due, to its end.
   void Finish();
 
  private:
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
   template <typename Input>
   void Take(Input&& input) {
     ++num_inputs_;
@@ -43,7 +46,7 @@ class GlobalBaProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
-  std::shared_ptr<const RecordStore> records_;
+  std::shared_ptr<JournalRecords> records_;
   GlobalBa global_ba_;
   JournalFollower journal_;
   StateChunks chunks_;

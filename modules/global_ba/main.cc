@@ -7,14 +7,16 @@
 int main(int argc, char** argv) {
   pangea::GlobalBaOptions options;
   pangea::ScratchFileOptions scratch;
+  pangea::CheckpointPlace checkpoint;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-global-ba",
-       "Adjusts all keyframes and landmarks of a group at once while it is quiet", yaml, &scratch},
+       "Adjusts all keyframes and landmarks of a group at once while it is quiet", yaml, &scratch,
+       &checkpoint},
       [&](pangea::Bus& bus) {
         return std::make_unique<pangea::GlobalBaProcess>(
-            bus, options, std::make_shared<pangea::ScratchFile>(scratch));
+            bus, options, std::make_shared<pangea::ScratchFile>(scratch), checkpoint);
       });
 }

@@ -2,6 +2,8 @@
 
 // KEYFRAME_*, PLACE_MATCH (candidates of kind intra) in; CONSTRAINT, STATUS_inter_map_ba out.
 
+#include <memory>
+
 #include "inter_map_ba/inter_map_ba.h"
 #include "loop_verification/candidate_process.h"
 
@@ -10,9 +12,14 @@ namespace pangea {
 class InterMapBaProcess : public CandidateProcess {
  public:
   InterMapBaProcess(Bus& bus, const InterMapBaOptions& options,
-                    const std::shared_ptr<RecordStore>& records = nullptr)
-      : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra,
-                         std::make_unique<InterMapBa>(options, records), records) {}
+                    const std::shared_ptr<RecordStore>& records = nullptr,
+                    const CheckpointPlace& checkpoint = {})
+      : CandidateProcess(
+            bus, "inter_map_ba", PlaceKind::kIntra,
+            [&options](const std::shared_ptr<RecordStore>& of_verifier) {
+              return std::make_unique<InterMapBa>(options, of_verifier);
+            },
+            records, checkpoint) {}
 };
 
 }  // namespace pangea

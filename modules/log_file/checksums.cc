@@ -1,6 +1,7 @@
 #include "log_file/checksums.h"
 
-#include <boost/crc.hpp>
+#include <zlib.h>
+
 #include <string>
 
 #include "core/big_endian.h"
@@ -16,9 +17,7 @@ constexpr std::ptrdiff_t kOwnBytes = 4;  // the message's last field
 }  // namespace
 
 uint32_t EventChecksum(Bytes event) {
-  boost::crc_32_type crc;
-  crc.process_bytes(event.data(), event.size());
-  return crc.checksum();
+  return static_cast<uint32_t>(crc32_z(0, event.data(), event.size()));
 }
 
 void AppendChecksumsEvent(const Checksums& checksums, int64_t utime, std::vector<uint8_t>* out) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "bus/record_status.h"
@@ -12,18 +13,20 @@
 namespace pangea {
 namespace {
 
+constexpr uint32_t kCheckpointFormat = 1;
 constexpr int64_t kSecond = 1'000'000;
 constexpr char kJournalOwner[] = "agent_handler";
 
 }  // namespace
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                                   std::unique_ptr<LoopVerifier> verifier,
-                                   std::shared_ptr<const RecordStore> records)
+                                   const MakeVerifier& make_verifier,
+                                   const std::shared_ptr<RecordStore>& records,
+                                   const CheckpointPlace& checkpoint)
     : node_(bus, name),
       kind_(kind),
-      verifier_(std::move(verifier)),
-      records_(std::move(records)),
+      records_(std::make_shared<JournalRecords>(records, LoopVerifier::RecordOf)),
+      verifier_(make_verifier(records_)),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kOfFormerRuns},
@@ -31,7 +34,13 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
                 .match = std::bind_front(&CandidateProcess::TakeMatch, this),
                 .result = std::bind_front(&CandidateProcess::OnFormerResult, this),
                 .have = std::bind_front(&CandidateProcess::OnHave, this),
-                .handled = [this] { CollectReady(); }}) {
+                .handled = [this] { CollectReady(); }},
+               {.place = checkpoint,
+                .format = kCheckpointFormat,
+                .save = std::bind_front(&CandidateProcess::Save, this),
+                .restore = std::bind_front(&CandidateProcess::Restore, this),
+                .match_is_complete = std::bind_front(&CandidateProcess::IsComplete, this)},
+               records_) {
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&CandidateProcess::OnVerificationRequest, this));
 }
@@ -40,6 +49,28 @@ void CandidateProcess::OnFormerResult(const Constraint& result) {
   if (verified_.insert(result.Id()).second) {
     verifier_->NoteVerified(result);
   }
+}
+
+void CandidateProcess::Save(ByteWriter* writer) const {
+  writer->Put(std::vector<int64_t>(verified_.begin(), verified_.end()));
+  verifier_->Save(writer);
+}
+
+bool CandidateProcess::Restore(ByteReader* reader) {
+  std::vector<int64_t> verified;
+  reader->Get(&verified);
+  if (!verifier_->Restore(reader) || !reader->at_end()) {
+    return false;
+  }
+  verified_ = {verified.begin(), verified.end()};
+  return true;
+}
+
+bool CandidateProcess::IsComplete(const PlaceMatch& match) const {
+  return std::ranges::all_of(match.candidates, [&](const PlaceCandidate& candidate) {
+    return candidate.kind != kind_ ||
+           verified_.contains(RefusedConstraint(match.query, candidate, "").Id());
+  });
 }
 
 bool CandidateProcess::TakeMatch(const PlaceMatch& match) {

@@ -12,12 +12,15 @@
 // the order in which the candidates became ready, when no message waits: all that came is known,
 // told as pending and answered for, however far behind the verification results are.
 //
+// A checkpoint ends before the first match with a candidate that has no result in the journal.
+//
 // Bounds: at most kMaxWaiting candidates wait; beyond that a match is not taken, and asked for
 // again once half of them are verified. The newest kMaxSent verification results are kept to be
 // retransmitted.
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -35,15 +38,22 @@ namespace pangea {
 
 class CandidateProcess : public Process {
  public:
+  using MakeVerifier =
+      std::function<std::unique_ptr<LoopVerifier>(const std::shared_ptr<RecordStore>& records)>;
+
+  // `records`: for keyframes that come over the bus; may be null.
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                   std::unique_ptr<LoopVerifier> verifier,
-                   std::shared_ptr<const RecordStore> records = nullptr);
+                   const MakeVerifier& make_verifier, const std::shared_ptr<RecordStore>& records,
+                   const CheckpointPlace& checkpoint);
   void Tick(int64_t now_utime) override;
 
  private:
   static constexpr size_t kMaxWaiting = 2000;
   static constexpr size_t kMaxSent = 5000;
 
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
+  bool IsComplete(const PlaceMatch& match) const;
   bool TakeMatch(const PlaceMatch& match);
   void OnFormerResult(const Constraint& result);
   void OnHave(const Have& have);
@@ -56,8 +66,8 @@ class CandidateProcess : public Process {
 
   Node node_;
   PlaceKind kind_;
+  std::shared_ptr<JournalRecords> records_;
   std::unique_ptr<LoopVerifier> verifier_;
-  std::shared_ptr<const RecordStore> records_;  // the verifier's
   JournalFollower journal_;
   // Which wait for keyframes, by (query, match); and with the query, which wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;

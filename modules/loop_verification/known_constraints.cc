@@ -42,6 +42,37 @@ bool KnownConstraints::IsRedundant(const KeyframeId& a, const KeyframeId& b,
   return GainBits(a, b, store) < options_.min_gain_bits;
 }
 
+void KnownConstraints::Save(ByteWriter* writer) const {
+  writer->PutCount(by_maps_.size());
+  for (const auto& [maps, constraints] : by_maps_) {
+    writer->Put(maps.first);
+    writer->Put(maps.second);
+    writer->PutCount(constraints.size());
+    for (const auto& [seq_a, known] : constraints) {
+      writer->Put(known.seq_a);
+      writer->Put(known.seq_b);
+      writer->Put(known.sigma_m);
+    }
+  }
+}
+
+void KnownConstraints::Restore(ByteReader* reader) {
+  by_maps_.clear();
+  for (size_t left = reader->GetCount(1); left > 0; --left) {
+    std::pair<MapId, MapId> maps;
+    reader->Get(&maps.first);
+    reader->Get(&maps.second);
+    auto& constraints = by_maps_[maps];
+    for (size_t i = reader->GetCount(1); i > 0; --i) {
+      Known known;
+      reader->Get(&known.seq_a);
+      reader->Get(&known.seq_b);
+      reader->Get(&known.sigma_m);
+      constraints.emplace(known.seq_a, known);
+    }
+  }
+}
+
 double KnownConstraints::GainBits(const KeyframeId& one, const KeyframeId& other,
                                   const SubmapStore& store) const {
   const auto [a, b] = std::minmax(one, other);

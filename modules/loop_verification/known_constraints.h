@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/server_messages.h"
 #include "core/submap_store.h"
 
@@ -46,6 +47,8 @@ class KnownConstraints {
 
   // An accepted constraint. A repeat must not come.
   void Add(const Constraint& constraint);
+  void Save(ByteWriter* writer) const;
+  void Restore(ByteReader* reader);
   // What a constraint between the two would add to each coordinate, bits; infinite where nothing
   // is known. Odometry is `store`'s.
   double GainBits(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;

@@ -1,5 +1,7 @@
 #include "loop_verification/loop_verifier.h"
 
+#include <utility>
+
 namespace pangea {
 
 Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& candidate,
@@ -24,6 +26,21 @@ void LoopVerifier::NoteVerified(const Constraint& result) {
   if (result.accepted) {
     known_.Add(result);
   }
+}
+
+void LoopVerifier::Save(ByteWriter* writer) const {
+  known_.Save(writer);
+  store_.Save(writer);
+}
+
+bool LoopVerifier::Restore(ByteReader* reader) {
+  KnownConstraints known = known_;
+  known.Restore(reader);
+  if (!store_.Restore(reader)) {
+    return false;
+  }
+  known_ = std::move(known);
+  return true;
 }
 
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,

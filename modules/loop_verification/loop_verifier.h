@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/submap_store.h"
 #include "loop_verification/aligner.h"
@@ -57,6 +58,14 @@ class LoopVerifier {
   // anyhow to each other.
   virtual Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                             LoopVerificationReport* report = nullptr);
+
+  // Its record of a keyframe.
+  static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
+    return SubmapStore::RecordOf(keyframe, {});
+  }
+  // What it was given. Restored: false, and nothing has changed, if these are not its bytes.
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
 
   const RecordCounters& store_counters() const { return store_.counters(); }
 

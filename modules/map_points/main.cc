@@ -7,14 +7,15 @@
 int main(int argc, char** argv) {
   pangea::MapPointsOptions options;
   pangea::ScratchFileOptions scratch;
+  pangea::CheckpointPlace checkpoint;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
-       yaml, &scratch},
+       yaml, &scratch, &checkpoint},
       [&](pangea::Bus& bus) {
         return std::make_unique<pangea::MapPointsProcess>(
-            bus, options, std::make_shared<pangea::ScratchFile>(scratch));
+            bus, options, std::make_shared<pangea::ScratchFile>(scratch), checkpoint);
       });
 }

@@ -74,7 +74,15 @@ class MapPoints {
   // `records`: for keyframes.
   explicit MapPoints(const MapPointsOptions& options,
                      std::shared_ptr<RecordStore> records = nullptr)
-      : options_(options), store_({.max_views = 512}, std::move(records)) {}
+      : options_(options), store_(kStore, std::move(records)) {}
+
+  // Its record of a keyframe.
+  static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
+    return SubmapStore::RecordOf(keyframe, kStore);
+  }
+  // The keyframes. Restored: false, and nothing has changed, if these are not its bytes.
+  void Save(ByteWriter* writer) const { store_.Save(writer); }
+  bool Restore(ByteReader* reader) { return store_.Restore(reader) && reader->at_end(); }
 
   void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
   // Whole; the highest revision wins, map by map.
@@ -88,6 +96,8 @@ class MapPoints {
   size_t num_refined() const { return refined_.size(); }
 
  private:
+  static constexpr SubmapStoreOptions kStore{.max_views = 512};
+
   struct Group {
     MapId id;
     int64_t revision = 0;

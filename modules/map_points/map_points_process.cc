@@ -14,17 +14,24 @@
 namespace pangea {
 namespace {
 
+constexpr uint32_t kCheckpointFormat = 1;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
 MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options,
-                                   const std::shared_ptr<RecordStore>& records)
+                                   const std::shared_ptr<RecordStore>& records,
+                                   const CheckpointPlace& checkpoint)
     : node_(bus, "map_points"),
-      records_(records),
-      points_(options, records),
+      records_(std::make_shared<JournalRecords>(records, MapPoints::RecordOf)),
+      points_(options, records_),
       journal_(node_, {},
-               {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }}) {
+               {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }},
+               {.place = checkpoint,
+                .format = kCheckpointFormat,
+                .save = std::bind_front(&MapPoints::Save, &points_),
+                .restore = std::bind_front(&MapPoints::Restore, &points_)},
+               records_) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&MapPointsProcess::OnMapState, this));
   node_.Listen<map_state_t>(channels::kRefinement,

@@ -25,7 +25,8 @@ class MapPointsProcess : public Process {
 
   // `records`: for keyframes (core/submap_store.h).
   MapPointsProcess(Bus& bus, const MapPointsOptions& options,
-                   const std::shared_ptr<RecordStore>& records = nullptr);
+                   const std::shared_ptr<RecordStore>& records = nullptr,
+                   const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
 
@@ -36,7 +37,7 @@ class MapPointsProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
-  std::shared_ptr<const RecordStore> records_;
+  std::shared_ptr<JournalRecords> records_;
   MapPoints points_;
   JournalFollower journal_;
   StateChunks states_;

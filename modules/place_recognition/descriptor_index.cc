@@ -69,6 +69,20 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   return keyframe;
 }
 
+void DescriptorIndex::Save(ByteWriter* writer) {
+  writer->Put(num_corners_);
+  for (Table& table : tables_) {
+    table.postings.Pack();
+    table.postings.Save(writer);
+  }
+}
+
+bool DescriptorIndex::Restore(ByteReader* reader) {
+  reader->Get(&num_corners_);
+  return std::ranges::all_of(tables_,
+                             [reader](Table& table) { return table.postings.Restore(reader); });
+}
+
 template <typename Visit>
 void DescriptorIndex::Probe(const Descriptor& descriptor, size_t phase, Visit visit) const {
   for (const Table& table : tables_) {

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/keyframe.h"
 #include "place_recognition/posting_lists.h"
 
@@ -28,6 +29,10 @@ class DescriptorIndex {
   // Keyframes are numbered in the order they come: the first Add returns 0.
   int Add(const std::vector<Corner>& corners);
   int size() const { return static_cast<int>(num_corners_.size()); }
+
+  // Packs what waits first. Restored: false if these are not its bytes.
+  void Save(ByteWriter* writer);
+  bool Restore(ByteReader* reader);
 
   // For each keyframe how much of the query it shares: its votes as a share of what it would have
   // if every query corner met it alone, 0 .. 1.

@@ -113,6 +113,40 @@ void PlaceRecognition::Remember(const Keyframe& keyframe, const PlaceMatch& know
   Store(RecognisedKeyframe(keyframe));
 }
 
+void PlaceRecognition::Save(ByteWriter* writer) {
+  writer->Put(counters_.keyframes);
+  writer->PutCount(last_matches_.size());
+  for (const auto& [map, matches] : last_matches_) {
+    writer->Put(map);
+    writer->Put(matches);
+  }
+  stored_.Save(writer);
+  index_.Save(writer);
+}
+
+bool PlaceRecognition::Restore(ByteReader* reader) {
+  constexpr size_t kLeastBytes = 16;
+  Counters counters;
+  reader->Get(&counters.keyframes);
+  std::map<MapId, std::vector<KeyframeId>> last_matches;
+  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+    MapId map;
+    reader->Get(&map);
+    reader->Get(&last_matches[map]);
+  }
+  StoredKeyframes stored(stored_.records());
+  DescriptorIndex index;
+  if (!stored.Restore(reader) || !index.Restore(reader) || stored.size() != index.size() ||
+      !reader->at_end()) {
+    return false;
+  }
+  counters_ = counters;
+  last_matches_ = std::move(last_matches);
+  stored_ = std::move(stored);
+  index_ = std::move(index);
+  return true;
+}
+
 void PlaceRecognition::Store(const RecognisedKeyframe& keyframe) {
   ++counters_.keyframes;
   if (index_.size() < options_.max_keyframes && stored_.Add(keyframe)) {

@@ -104,6 +104,11 @@ class PlaceRecognition {
   // Remembers only: for keyframes whose match is known from an earlier run.
   void Remember(const Keyframe& keyframe, const PlaceMatch& known);
 
+  // All it remembers, but for the groups, and the records of keyframes, of which it says where they
+  // are. Restored: false, and nothing has changed, if these are not the bytes of one.
+  void Save(ByteWriter* writer);
+  bool Restore(ByteReader* reader);
+
   // The maps of one group (a MAP_STATE).
   void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps) {
     groups_.Set(group, revision, maps);

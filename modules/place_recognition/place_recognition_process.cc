@@ -14,6 +14,7 @@
 namespace pangea {
 namespace {
 
+constexpr uint32_t kCheckpointFormat = 1;
 constexpr int64_t kStatusInterval_us = 1'000'000;
 // Bounds: of matches kept to be retransmitted (then the oldest go), and of what waits in a catch-up
 // or for its turn (then the first is worked off at once).
@@ -24,15 +25,23 @@ constexpr size_t kMaxKnownMatches = 100'000;
 }  // namespace
 
 PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options,
-                                                 const std::shared_ptr<RecordStore>& records)
+                                                 const std::shared_ptr<RecordStore>& records,
+                                                 const CheckpointPlace& checkpoint)
     : node_(bus, "place_recognition"),
-      records_(records),
-      recognition_(options, records),
+      records_(std::make_shared<JournalRecords>(records, CornersRecord)),
+      recognition_(options, records_),
       journal_(node_,
                {.in_order = true, .matches = JournalFollower::Which::kOfFormerRuns, .states = true},
                {.keyframe = std::bind_front(&PlaceRecognitionProcess::OnKeyframe, this),
                 .match = std::bind_front(&PlaceRecognitionProcess::OnKnownMatch, this),
-                .handled = [this] { ReleaseHeldIfCaughtUp(); }}) {
+                .handled = [this] { ReleaseHeldIfCaughtUp(); }},
+               {.place = checkpoint,
+                .format = kCheckpointFormat,
+                .save = std::bind_front(&PlaceRecognition::Save, &recognition_),
+                .restore = std::bind_front(&PlaceRecognition::Restore, &recognition_),
+                .keyframe_is_complete =
+                    [this](const KeyframeId& id) { return known_matches_.contains(id); }},
+               records_) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&PlaceRecognitionProcess::OnMapState, this));
   node_.Listen<resend_request_t>(channels::kResendRequest,

@@ -9,6 +9,8 @@
 // which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
 // PLACE_MATCHes itself.
 //
+// A checkpoint ends before the first keyframe without a match in the journal.
+//
 // Live, keyframes are recognised one at a time, when no message waits: after a catch-up there may
 // be many, and meanwhile groups are to be heard and requests answered.
 
@@ -30,7 +32,8 @@ class PlaceRecognitionProcess : public Process {
  public:
   // `records`: for corners, and messages to send again (core/record_store.h).
   PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options,
-                          const std::shared_ptr<RecordStore>& records = nullptr);
+                          const std::shared_ptr<RecordStore>& records = nullptr,
+                          const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
 
@@ -48,7 +51,7 @@ class PlaceRecognitionProcess : public Process {
   void PublishStatus(int64_t now_utime);
 
   Node node_;
-  std::shared_ptr<RecordStore> records_;
+  std::shared_ptr<JournalRecords> records_;
   PlaceRecognition recognition_;
   JournalFollower journal_;
   bool was_catching_up_ = false;

@@ -1,5 +1,6 @@
 #include "place_recognition/posting_lists.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace pangea {
@@ -45,6 +46,31 @@ void PostingLists::Pack() {
   num_packed_ += waiting_.size();
   waiting_.clear();
   newest_.assign(newest_.size(), kNone);
+}
+
+void PostingLists::Save(ByteWriter* writer) const {
+  writer->Put(static_cast<uint64_t>(num_packed_));
+  writer->Put(begin_);
+  writer->Put(packed_);
+}
+
+bool PostingLists::Restore(ByteReader* reader) {
+  uint64_t num_packed = 0;
+  std::vector<uint32_t> begin;
+  std::vector<uint8_t> packed;
+  reader->Get(&num_packed);
+  reader->Get(&begin);
+  reader->Get(&packed);
+  if (!reader->ok() || begin.size() != begin_.size() || !std::ranges::is_sorted(begin) ||
+      begin.back() != packed.size()) {
+    return false;
+  }
+  num_packed_ = num_packed;
+  begin_ = std::move(begin);
+  packed_ = std::move(packed);
+  waiting_.clear();
+  newest_.assign(newest_.size(), kNone);
+  return true;
 }
 
 void PostingLists::PackWord(uint32_t word, std::vector<uint8_t>* packed) const {

@@ -13,6 +13,8 @@
 #include <cstring>
 #include <vector>
 
+#include "core/byte_record.h"
+
 namespace pangea {
 
 class PostingLists {
@@ -24,6 +26,10 @@ class PostingLists {
   void Add(uint32_t word, int32_t keyframe, uint32_t signature);
   // Packs what waits. Takes the time to copy all of it: so it is worth while when much waits.
   void Pack();
+  // With nothing waiting. False, and nothing has changed, if these are not the bytes of lists of so
+  // many words.
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
   size_t num_packed() const { return num_packed_; }
   size_t num_waiting() const { return waiting_.size(); }
 

@@ -58,6 +58,10 @@ RecognisedKeyframe::RecognisedKeyframe(const Keyframe& keyframe)
   std::sort(landmarks.begin(), landmarks.end());
 }
 
+std::vector<uint8_t> CornersRecord(const Keyframe& keyframe) {
+  return ToRecord(RecognisedKeyframe(keyframe));
+}
+
 bool StoredKeyframes::Add(const RecognisedKeyframe& keyframe) {
   Record corners(ToRecord(keyframe), records_.get());
   if (corners.in_memory()) {
@@ -70,6 +74,36 @@ bool StoredKeyframes::Add(const RecognisedKeyframe& keyframe) {
   std::vector<int32_t> landmarks(keyframe.landmarks.begin(), keyframe.landmarks.end());
   keyframes_.push_back({keyframe.id, std::move(landmarks), std::move(corners)});
   return true;
+}
+
+void StoredKeyframes::Save(ByteWriter* writer) const {
+  writer->PutCount(keyframes_.size());
+  for (const Stored& keyframe : keyframes_) {
+    writer->Put(keyframe.id);
+    writer->Put(keyframe.landmarks);
+    writer->Put(keyframe.corners.offset());
+    writer->Put(keyframe.corners.size());
+  }
+}
+
+bool StoredKeyframes::Restore(ByteReader* reader) {
+  constexpr size_t kLeastBytes = 32;
+  std::vector<Stored> keyframes;
+  const size_t count = reader->GetCount(kLeastBytes);
+  keyframes.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    KeyframeId id;
+    std::vector<int32_t> landmarks;
+    int64_t offset = 0;
+    uint32_t size = 0;
+    reader->Get(&id);
+    reader->Get(&landmarks);
+    reader->Get(&offset);
+    reader->Get(&size);
+    keyframes.push_back({id, std::move(landmarks), Record(offset, size)});
+  }
+  keyframes_ = std::move(keyframes);
+  return reader->ok();
 }
 
 bool StoredKeyframes::SharesLandmark(int number, const RecognisedKeyframe& other) const {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/keyframe.h"
 #include "core/recent_cache.h"
 #include "core/record_store.h"
@@ -30,6 +31,9 @@ struct RecognisedKeyframe {
   RecognisedKeyframe() = default;
 };
 
+// What StoredKeyframes keeps of a keyframe in the RecordStore.
+std::vector<uint8_t> CornersRecord(const Keyframe& keyframe);
+
 class StoredKeyframes {
  public:
   // Without a RecordStore everything stays in memory.
@@ -39,7 +43,12 @@ class StoredKeyframes {
   // nothing of it is kept.
   bool Add(const RecognisedKeyframe& keyframe);
   int size() const { return static_cast<int>(keyframes_.size()); }
+  // Where the records are, not these themselves: whoever restores it has them at the same places.
+  // False if these are not its bytes.
+  void Save(ByteWriter* writer) const;
+  bool Restore(ByteReader* reader);
 
+  const std::shared_ptr<RecordStore>& records() const { return records_; }
   const KeyframeId& id(int number) const { return keyframes_[number].id; }
   bool SharesLandmark(int number, const RecognisedKeyframe& other) const;
   // Null when it cannot be read. Its landmarks are empty.

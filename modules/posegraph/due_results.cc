@@ -14,9 +14,35 @@ void DueResults::Promise(const PlaceMatch& match, int64_t now_utime) {
     promised.to = match.query;
     promised.kind = candidate.kind;
     if (!came_.contains(promised.Id()) && due_.size() < kMax) {
-      due_.try_emplace(promised.Id(), Due{match.query, now_utime + timeouts::kResultWait_us,
-                                          timeouts::kResultWait_us});
+      Watch(promised.Id(), match.query, now_utime);
     }
+  }
+}
+
+void DueResults::Watch(int64_t constraint_id, const KeyframeId& query, int64_t now_utime) {
+  due_.try_emplace(constraint_id,
+                   Due{query, now_utime + timeouts::kResultWait_us, timeouts::kResultWait_us});
+}
+
+void DueResults::Save(ByteWriter* writer) const {
+  writer->Put(std::vector<int64_t>(came_.begin(), came_.end()));
+  writer->PutCount(due_.size());
+  for (const auto& [id, due] : due_) {
+    writer->Put(id);
+    writer->Put(due.query);
+  }
+}
+
+void DueResults::Restore(ByteReader* reader, int64_t now_utime) {
+  std::vector<int64_t> came;
+  reader->Get(&came);
+  came_ = {came.begin(), came.end()};
+  for (size_t left = reader->GetCount(1); left > 0; --left) {
+    int64_t id = 0;
+    KeyframeId query;
+    reader->Get(&id);
+    reader->Get(&query);
+    Watch(id, query, now_utime);
   }
 }
 

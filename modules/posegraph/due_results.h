@@ -9,6 +9,7 @@
 
 #include "bus/node.h"
 #include "bus/retransmission/journal_follower.h"
+#include "core/byte_record.h"
 #include "core/server_messages.h"
 
 namespace pangea {
@@ -21,12 +22,18 @@ class DueResults {
   // Looked at once a second.
   void RequestOverdue(Node& node, int64_t now_utime);
 
+  void Save(ByteWriter* writer) const;
+  // As if they were promised now.
+  void Restore(ByteReader* reader, int64_t now_utime);
+
   size_t size() const { return due_.size(); }
   // Of the journal, still to come.
   int64_t NumToCatchUp(const JournalFollower& journal) const;
 
  private:
   static constexpr size_t kMax = 20000;
+
+  void Watch(int64_t constraint_id, const KeyframeId& query, int64_t now_utime);
 
   struct Due {
     KeyframeId query;

@@ -7,12 +7,14 @@
 int main(int argc, char** argv) {
   pangea::PoseGraphOptions options;
   pangea::YamlOptions yaml;
+  pangea::CheckpointPlace checkpoint;
   options.Visit(yaml);
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-posegraph", "Groups maps, optimises every keyframe's pose, tells agents their drift",
-       yaml},
+       yaml, nullptr, &checkpoint},
       [&](pangea::Bus& bus) {
-        return std::make_unique<pangea::PoseGraphProcess>(bus, options, pangea::WallUtime());
+        return std::make_unique<pangea::PoseGraphProcess>(bus, options, pangea::WallUtime(),
+                                                          checkpoint);
       });
 }

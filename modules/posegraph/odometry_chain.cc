@@ -49,6 +49,28 @@ bool OdometryChain::Add(const Keyframe& keyframe) {
   return true;
 }
 
+void OdometryChain::Save(ByteWriter* writer) const {
+  writer->Put(num_bridged_);
+  writer->PutCount(nodes_.size());
+  for (const Node& node : nodes_) {
+    VisitParts(node, [writer](const auto* part) { writer->Put(*part); });
+  }
+}
+
+bool OdometryChain::Restore(ByteReader* reader) {
+  constexpr size_t kLeastBytes = 100;
+  reader->Get(&num_bridged_);
+  nodes_.resize(reader->GetCount(kLeastBytes));
+  int number = 0;
+  for (Node& node : nodes_) {
+    VisitParts(node, [reader](auto* part) { reader->Get(part); });
+    if (node.edge_from >= number++) {
+      return false;
+    }
+  }
+  return reader->ok();
+}
+
 void OdometryChain::JoinByEdge(const OdometryEdge& edge, int from, Node* node) const {
   node->edge_from = from;
   node->edge = MakeRelative4(edge.T_from_this, edge.covariance, nodes_[from].T_odom_body.q,

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/keyframe.h"
 #include "posegraph/solver/four_dof.h"
 
@@ -35,6 +36,10 @@ class OdometryChain {
   // and the usual covariance of this map's edges for each keyframe that is missing.
   bool Add(const Keyframe& keyframe);
 
+  void Save(ByteWriter* writer) const;
+  // False if these are not the bytes of one.
+  bool Restore(ByteReader* reader);
+
   size_t size() const { return nodes_.size(); }
   bool empty() const { return nodes_.empty(); }
   const Node& operator[](size_t index) const { return nodes_[index]; }
@@ -50,6 +55,22 @@ class OdometryChain {
   void JoinByEdge(const OdometryEdge& edge, int from, Node* node) const;
   void Bridge(Node* node);
   void Accumulate(Node* node) const;
+
+  // The one list of a node's parts, for writing and reading.
+  template <typename NodeType, typename Visit>
+  static void VisitParts(NodeType& node, const Visit& visit) {
+    visit(&node.seq);
+    visit(&node.utime);
+    visit(&node.T_odom_body);
+    visit(&node.roll_pitch_covariance);
+    visit(&node.scene_odom);
+    visit(&node.edge_from);
+    visit(&node.edge.t);
+    visit(&node.edge.yaw);
+    visit(&node.edge.covariance);
+    visit(&node.path_m);
+    visit(&node.drift_sum);
+  }
 
   std::vector<Node> nodes_;
   int num_bridged_ = 0;

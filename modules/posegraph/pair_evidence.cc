@@ -6,6 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "posegraph/solver/four_dof_record.h"
+
 namespace pangea {
 namespace {
 
@@ -81,6 +83,56 @@ void PairEvidence::Add(int64_t id, int node_a, int node_b, const Relative4& rela
   }
   candidates_.push_back(std::move(candidate));
   Decide();
+}
+
+void PairEvidence::Save(ByteWriter* writer) const {
+  writer->PutCount(candidates_.size());
+  for (const Candidate& candidate : candidates_) {
+    writer->Put(candidate.id);
+    writer->Put(candidate.node_a);
+    writer->Put(candidate.node_b);
+    Put(candidate.relative, writer);
+    writer->Put(candidate.num_inliers);
+    Put(candidate.T_odom_a_odom_b, writer);
+    for (const bool agrees : candidate.agrees) {
+      writer->Put(agrees);
+    }
+  }
+  writer->Put(agreeing_);
+  writer->Put(decision_.merge);
+  writer->Put(decision_.agreeing);
+  writer->Put(decision_.viewpoints);
+  writer->Put(decision_.rival_viewpoints);
+}
+
+bool PairEvidence::Restore(ByteReader* reader) {
+  candidates_.resize(reader->GetCount(1));
+  for (size_t i = 0; i < candidates_.size(); ++i) {
+    Candidate& candidate = candidates_[i];
+    reader->Get(&candidate.id);
+    reader->Get(&candidate.node_a);
+    reader->Get(&candidate.node_b);
+    Get(reader, &candidate.relative);
+    reader->Get(&candidate.num_inliers);
+    Get(reader, &candidate.T_odom_a_odom_b);
+    for (size_t earlier = 0; earlier < i; ++earlier) {
+      bool agrees = false;
+      reader->Get(&agrees);
+      candidate.agrees.push_back(agrees);
+    }
+    if (candidate.node_a < 0 || candidate.node_a >= static_cast<int>(a_->size()) ||
+        candidate.node_b < 0 || candidate.node_b >= static_cast<int>(b_->size())) {
+      return false;
+    }
+  }
+  reader->Get(&agreeing_);
+  reader->Get(&decision_.merge);
+  reader->Get(&decision_.agreeing);
+  reader->Get(&decision_.viewpoints);
+  reader->Get(&decision_.rival_viewpoints);
+  return reader->ok() && std::ranges::all_of(agreeing_, [this](int k) {
+           return k >= 0 && k < static_cast<int>(candidates_.size());
+         });
 }
 
 std::vector<int> PairEvidence::LargestAgreeing(std::vector<int> among) const {

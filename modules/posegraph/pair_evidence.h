@@ -80,6 +80,10 @@ class PairEvidence {
   // `relative` from node_a of map a to node_b of map b.
   void Add(int64_t id, int node_a, int node_b, const Relative4& relative, int num_inliers);
 
+  void Save(ByteWriter* writer) const;
+  // Of the same two maps. False if these are not the bytes of their evidence.
+  bool Restore(ByteReader* reader);
+
   struct Decision {
     bool merge = false;
     std::vector<int64_t> agreeing;  // constraint ids, ascending

@@ -178,7 +178,7 @@ bool PoseGraph::SolveIsDue(const Group& group) const {
          (group.waiting_loops > 0 && group.keyframes_waiting >= options_.max_keyframes_waiting);
 }
 
-PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
+void PoseGraph::SolveDue(bool from_the_beginning) {
   const auto due = [&](const auto& entry) {
     const Group& group = entry.second;
     return (group.regrouped && group.stale) || SolveIsDue(group) ||
@@ -191,6 +191,10 @@ PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
       Regroup();
     }
   }
+}
+
+PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
+  SolveDue(from_the_beginning);
   PoseGraphUpdate update;
   for (auto& [oldest, group] : groups_) {
     if (group.publish_now || (from_the_beginning && group.unpublished)) {

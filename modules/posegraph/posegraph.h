@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/byte_record.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
 #include "posegraph/loop.h"
@@ -109,6 +110,12 @@ class PoseGraph {
   // The map's group is published again with the next solve, or by Settle alone.
   void Republish(const MapId& map);
 
+  // All that was taken but refinements, and its solution: solves first what is due, and publishes
+  // nothing. Restored, it publishes as one that took all that: false, and nothing has changed, if
+  // these are not the bytes of a graph. Not for one that has published.
+  void Save(ByteWriter* writer);
+  bool Restore(ByteReader* reader);
+
   Counters counters() const;
   // As the next state would say it.
   std::vector<MapState> States() const;
@@ -154,7 +161,9 @@ class PoseGraph {
   std::vector<Loop*> LoopsOf(const Group& group);
   void Regroup();
   bool SolveIsDue(const Group& group) const;
-  // Solves what is due until nothing is, then publishes.
+  // Solves what is due until nothing is.
+  void SolveDue(bool from_the_beginning);
+  // Then publishes.
   PoseGraphUpdate Settle(bool from_the_beginning);
   // Merges that their loops no longer carry; whether there were any.
   bool UndoMerges(const Group& group);
@@ -176,6 +185,12 @@ class PoseGraph {
   std::map<int, RefinedMap> RefinedMaps(const Group& group) const;
   MapState StateOf(const Group& group) const;
   void Publish(Group* group, PoseGraphUpdate* update);
+
+  void SaveGroups(ByteWriter* writer) const;
+  bool Read(ByteReader* reader);
+  bool ReadPairs(ByteReader* reader);
+  bool ReadGroups(ByteReader* reader);
+  bool ReadSeen(ByteReader* reader);
 
   PoseGraphOptions options_;
   int64_t next_revision_;

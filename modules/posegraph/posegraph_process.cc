@@ -12,12 +12,13 @@
 namespace pangea {
 namespace {
 
+constexpr uint32_t kCheckpointFormat = 1;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
 PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
-                                   int64_t first_revision)
+                                   int64_t first_revision, const CheckpointPlace& checkpoint)
     : node_(bus, "posegraph"),
       graph_(options, first_revision),
       journal_(node_,
@@ -35,11 +36,35 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                 .result = std::bind_front(&PoseGraphProcess::OnConstraint, this),
                 .have = std::bind_front(&PoseGraphProcess::OnHave, this),
                 .more_to_catch_up = [this] { return results_.NumToCatchUp(journal_); },
-                .handled = [this] { SettleUnlessMoreWaits(); }}) {
+                .handled = [this] { SettleUnlessMoreWaits(); }},
+               {.place = checkpoint,
+                .format = kCheckpointFormat,
+                .save = std::bind_front(&PoseGraphProcess::Save, this),
+                .restore = std::bind_front(&PoseGraphProcess::Restore, this)}) {
   node_.Listen<map_state_t>(channels::kRefinement,
                             std::bind_front(&PoseGraphProcess::OnRefinement, this));
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&PoseGraphProcess::OnResendRequest, this));
+}
+
+void PoseGraphProcess::Save(ByteWriter* writer) {
+  writer->Put(num_arrived_);
+  results_.Save(writer);
+  graph_.Save(writer);
+}
+
+bool PoseGraphProcess::Restore(ByteReader* reader) {
+  int64_t num_arrived = 0;
+  DueResults results;
+  reader->Get(&num_arrived);
+  results.Restore(reader, now_utime_);
+  if (!graph_.Restore(reader) || !reader->at_end()) {
+    return false;
+  }
+  results_ = std::move(results);
+  num_arrived_ = num_arrived;
+  num_unsettled_ = 1;
+  return true;
 }
 
 void PoseGraphProcess::OnKeyframe(const Keyframe& keyframe) {

@@ -39,7 +39,8 @@ namespace pangea {
 class PoseGraphProcess : public Process {
  public:
   // Live, the first revision is the wall clock at the start, so that revisions rise over restarts.
-  PoseGraphProcess(Bus& bus, const PoseGraphOptions& options, int64_t first_revision = 1);
+  PoseGraphProcess(Bus& bus, const PoseGraphOptions& options, int64_t first_revision = 1,
+                   const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
   // Solves and publishes all that is not yet; a second call adds nothing.
@@ -49,6 +50,9 @@ class PoseGraphProcess : public Process {
 
  private:
   static constexpr int kMaxUnsettled = 100;
+
+  void Save(ByteWriter* writer);
+  bool Restore(ByteReader* reader);
 
   void OnKeyframe(const Keyframe& keyframe);
   void OnConstraint(const Constraint& constraint);

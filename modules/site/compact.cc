@@ -90,6 +90,7 @@ CompactSummary Compact(const Site& site, const std::function<void(CompactStep)>&
     fs::remove(made);
     throw;
   }
+  fs::remove_all(site.checkpoints());  // they are of what it was
   fs::rename(made, journal);
   on_step(CompactStep::kSwapped);
   SyncToDisk(site.folder);

@@ -45,9 +45,11 @@ std::vector<StoredEvent> Lean() {
 
 TEST(Compact, KeepsWhatCountsInItsOrder) {
   const Site site = MakeSite(FreshFolder("compact") / "hall", Wasteful());
+  fs::create_directories(site.checkpoints());
   const CompactSummary summary = Compact(site);
   EXPECT_EQ(EventsOf(site), Lean());
   EXPECT_EQ(FoundAtOpening(site), "");
+  EXPECT_FALSE(fs::exists(site.checkpoints()));
   EXPECT_EQ(summary.events_before, std::ssize(Wasteful()));
   EXPECT_EQ(summary.events_after, std::ssize(Lean()));
   EXPECT_LT(summary.bytes_after, 0.55 * static_cast<double>(summary.bytes_before));

@@ -7,6 +7,7 @@
 //   keys/         a key for each agent that may join; mode 0700
 //   options/      <process>.yaml
 //   logs/         what the server's processes print
+//   checkpoint/   what they made of the journal; without it they read all of that again
 //   gateway/      what pangea-gateway keeps (admission.h, identity.h there); mode 0700
 //   lock          held by the server, and by what changes the site
 
@@ -44,6 +45,7 @@ struct Site {
   std::filesystem::path keys() const { return folder / "keys"; }
   std::filesystem::path options() const { return folder / "options"; }
   std::filesystem::path logs() const { return folder / "logs"; }
+  std::filesystem::path checkpoints() const { return folder / "checkpoint"; }
   std::filesystem::path gateway() const { return folder / "gateway"; }
 };
 

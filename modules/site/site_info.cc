@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "anchors/anchor_book.h"
+#include "checkpoint/checkpoint_file.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -112,6 +113,23 @@ std::string Line(const std::string& what, const std::string& value) {
   return fmt::format("{:<12} {}\n", what, value);
 }
 
+std::map<std::string, std::string> ReadCheckpoints(const Site& site) {
+  std::map<std::string, std::string> checkpoints;
+  std::error_code error;
+  const auto journal_bytes = static_cast<double>(fs::file_size(site.journal(), error));
+  for (const auto& entry : fs::directory_iterator(site.checkpoints(), error)) {
+    std::string& said = checkpoints[entry.path().filename()];
+    try {
+      const JournalState journal = CheckpointReader(entry.path()).head().journal;
+      said = fmt::format("{:.0f} % of the journal",
+                         100 * static_cast<double>(journal.num_bytes) / journal_bytes);
+    } catch (const std::runtime_error& unusable) {
+      said = fmt::format("not used, {}", unusable.what());
+    }
+  }
+  return checkpoints;
+}
+
 }  // namespace
 
 SiteInfo ReadInfo(const Site& site) {
@@ -127,6 +145,7 @@ SiteInfo ReadInfo(const Site& site) {
         site.journal(), [&counter](const LogEvent& event) { counter.Take(event); }, &readings);
     info.anchors = counter.anchors();
     info.reading = readings.at(site.journal());
+    info.checkpoints = ReadCheckpoints(site);
   }
   return info;
 }
@@ -156,6 +175,9 @@ std::string ToText(const SiteInfo& info) {
                                       info.constraints_refused)) +
       Line("anchors", fmt::format("{}", info.anchors)) + Line("first", Date(info.first_utime)) +
       Line("last", Date(info.last_utime)) + Line("damage", DamageOf(info));
+  for (const auto& [process, said] : info.checkpoints) {
+    text += Line("checkpoint", fmt::format("{}: {}", process, said));
+  }
   for (const auto& [map, seqs] : info.keyframes) {
     text +=
         Line("map", fmt::format("{}: {} keyframes{}", ToString(map), seqs.size(), Missing(seqs)));

@@ -27,6 +27,7 @@ struct SiteInfo {
   int64_t anchors = 0;                             // that are not deleted
   std::optional<int64_t> first_utime, last_utime;  // of what is in the journal, wall clock
   LogReading reading;
+  std::map<std::string, std::string> checkpoints;  // of each process: what it covers, for people
 };
 
 // Reads all of the journal. Throws std::runtime_error when it cannot be read.

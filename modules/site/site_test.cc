@@ -7,6 +7,7 @@
 
 #include <fstream>
 
+#include "checkpoint/checkpoint_file.h"
 #include "site/site_delete.h"
 #include "site/site_info.h"
 #include "site/site_test_world.h"
@@ -106,9 +107,20 @@ TEST(SiteInfo, CountsWhatIsThere) {
   EXPECT_EQ(info.constraints_refused, 9);
   EXPECT_EQ(info.anchors, 1);
   EXPECT_TRUE(info.reading.whole());
+  EXPECT_TRUE(info.checkpoints.empty());
   EXPECT_GT(info.free_bytes, 0);
   EXPECT_THAT(ToText(info), HasSubstr("damage       none\n"));
   EXPECT_THAT(ListSites(site.folder.parent_path()), HasSubstr("not in use"));
+}
+
+TEST(SiteInfo, TellsHowMuchOfTheJournalACheckpointCovers) {
+  const Site site = MakeSite(FreshFolder("info_checkpoint") / "hall", WalksOf({1}));
+  const auto half = static_cast<int64_t>(fs::file_size(site.journal())) / 2;
+  CheckpointWriter(site.checkpoints() / "fusion", {"fusion", 1, ""}, {half, 0, 0}).Commit();
+  std::ofstream(site.checkpoints() / "posegraph") << "none";
+  const std::string text = ToText(ReadInfo(site));
+  EXPECT_THAT(text, HasSubstr("fusion: 50 % of the journal\n"));
+  EXPECT_THAT(text, HasSubstr("posegraph: not used, it is torn"));
 }
 
 TEST(SiteInfo, TellsDamageButNotWhatAServerIsWriting) {

@@ -4,6 +4,7 @@
 // Bounded: at most kMaxParked items wait per map; beyond that the newest are dropped (they will be
 // asked for again).
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -81,6 +82,27 @@ class InOrder {
       count += stream.parked.size();
     }
     return count;
+  }
+
+  // visit(map, next, the seqs that wait behind a gap) for each map.
+  template <typename Visit>
+  void VisitStreams(Visit visit) const {
+    for (const auto& [map, stream] : streams_) {
+      std::vector<int32_t> waiting;
+      for (const auto& [seq, item] : stream.parked) {
+        waiting.push_back(seq);
+      }
+      visit(map, stream.next, waiting);
+    }
+  }
+  // As it was visited, of items that have no value of their own.
+  void Restore(const MapId& map, int32_t next, const std::vector<int32_t>& waiting) {
+    Stream& stream = streams_[map];
+    stream.next = next;
+    stream.highest = waiting.empty() ? next - 1 : waiting.back();
+    for (const int32_t seq : waiting) {
+      stream.parked.emplace(seq, T{});
+    }
   }
 
  private:

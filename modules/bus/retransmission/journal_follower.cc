@@ -13,8 +13,14 @@
 
 namespace pangea {
 
-JournalFollower::JournalFollower(Node& node, const Follows& follows, Handlers handlers)
-    : node_(node), follows_(follows), handlers_(std::move(handlers)) {
+JournalFollower::JournalFollower(Node& node, const Follows& follows, Handlers handlers,
+                                 JournalCheckpoint checkpoint,
+                                 std::shared_ptr<JournalRecords> records)
+    : node_(node),
+      follows_(follows),
+      handlers_(std::move(handlers)),
+      checkpoint_(std::move(checkpoint)),
+      records_(std::move(records)) {
   node_.Listen<keyframe_t>(channels::kAllKeyframes,
                            std::bind_front(&JournalFollower::OnKeyframe, this));
   if (follows_.matches == Which::kAll) {
@@ -44,7 +50,7 @@ void JournalFollower::OnKeyframe(Keyframe keyframe) {
     AddInOrder(std::move(keyframe));
   } else {
     keyframes_.Add(keyframe.id.map, keyframe.id.seq, std::nullopt);
-    handlers_.keyframe(std::move(keyframe));
+    HandOn({std::move(keyframe), event_});
   }
   Handled();
 }
@@ -55,7 +61,7 @@ void JournalFollower::AddInOrder(Keyframe keyframe) {
   if (keyframe.edge && keyframe.edge->from_seq < id.seq - 1) {
     Lose({id.map, keyframe.edge->from_seq + 1, id.seq - 1});
   }
-  HandOn(keyframes_.Add(id.map, id.seq, std::move(keyframe)));
+  HandOn(keyframes_.Add(id.map, id.seq, Waiting{std::move(keyframe), event_}));
 }
 
 void JournalFollower::Lose(const SeqGap& gap) {
@@ -79,10 +85,20 @@ void JournalFollower::Skip(const SeqGap& gap) {
 void JournalFollower::HandOn(std::vector<Item> ready) {
   for (Item& item : ready) {
     if (item) {
-      handlers_.keyframe(*std::move(item));
+      HandOn(*std::move(item));
     } else {
       node_.NoteDropped();
     }
+  }
+}
+
+void JournalFollower::HandOn(Waiting waiting) {
+  if (records_ != nullptr) {
+    records_->SetEvent(waiting.event);
+  }
+  handlers_.keyframe(std::move(waiting.keyframe));
+  if (records_ != nullptr) {
+    records_->SetEvent(std::nullopt);
   }
 }
 
@@ -168,11 +184,16 @@ void JournalFollower::OnJournalFile(const JournalFile& file) {
   }
   try {
     reader_ = std::make_unique<JournalReader>(file);
+    if (records_ != nullptr) {
+      records_->Open(file.path);
+    }
   } catch (const std::runtime_error& error) {
     Log(node_.name(), fmt::format("the journal comes over the bus; its file here, {}: {}",
                                   file.path, error.what()));
+    reader_.reset();
     return;
   }
+  RestoreCheckpoint();
   reads_former_runs_ =
       follows_.matches == Which::kOfFormerRuns || follows_.results == Which::kOfFormerRuns;
   node_.WorkWhenIdle([this] { return ReadPiece(); });
@@ -180,17 +201,26 @@ void JournalFollower::OnJournalFile(const JournalFile& file) {
 
 // Whether some of the file is left.
 bool JournalFollower::ReadPiece() {
-  const auto take =
-      reads_former_runs_ ? &JournalFollower::TakeOfFormerRuns : &JournalFollower::TakeOfFile;
+  const auto take_of_former_runs = [this](const std::string& channel, Bytes data, int64_t) {
+    TakeOfFormerRuns(channel, data);
+    return true;
+  };
+  const JournalReader::Handler take = std::bind_front(&JournalFollower::TakeOfFile, this);
   try {
-    if (reader_->Next(std::bind_front(take, this))) {
+    if (reader_->Next(reads_former_runs_ ? take_of_former_runs : take)) {
       return true;
     }
     if (std::exchange(reads_former_runs_, false)) {
       reader_->Rewind();
       return true;
     }
+    if (checkpoint_.place.writes) {
+      WriteCheckpoint();
+    }
   } catch (const std::runtime_error& error) {
+    if (checkpoint_.place.writes) {
+      throw;
+    }
     Log(node_.name(), fmt::format("the rest of the journal comes over the bus: {}", error.what()));
   }
   EndReading();
@@ -219,19 +249,33 @@ void JournalFollower::TakeOfFormerRuns(const std::string& channel, Bytes data) {
   }
 }
 
-void JournalFollower::TakeOfFile(const std::string& channel, Bytes data) {
+// Whether it may be part of a checkpoint, where one is made.
+bool JournalFollower::TakeOfFile(const std::string& channel, Bytes data, int64_t offset) {
+  bool taken = true;
   if (channel.starts_with(channels::kKeyframePrefix)) {
-    TakeBytes<keyframe_t>(data, [this](Keyframe keyframe) {
-      NoteMapOfFile(keyframe.id.map);
-      OnKeyframe(std::move(keyframe));
+    event_ = offset;
+    TakeBytes<keyframe_t>(data, [&](Keyframe keyframe) {
+      taken = !checkpoint_.place.writes || MayBeKept(keyframe);
+      if (taken) {
+        NoteMapOfFile(keyframe.id.map);
+        OnKeyframe(std::move(keyframe));
+      }
     });
+    event_.reset();
   } else if (channel == channels::kPlaceMatch && follows_.matches == Which::kAll) {
-    TakeBytes<place_match_t>(data, std::bind_front(&JournalFollower::OnMatch, this));
+    TakeBytes<place_match_t>(data, [&](PlaceMatch match) {
+      taken = !checkpoint_.place.writes || !checkpoint_.match_is_complete ||
+              checkpoint_.match_is_complete(match);
+      if (taken) {
+        OnMatch(std::move(match));
+      }
+    });
   } else if (channel == channels::kConstraint && follows_.results == Which::kAll) {
     TakeBytes<constraint_t>(data, std::bind_front(&JournalFollower::OnResult, this));
   } else if (channel == channels::kAnchorEdit && handlers_.anchor_edit) {
     TakeBytes<anchor_edit_t>(data, handlers_.anchor_edit);
   }
+  return taken;
 }
 
 void JournalFollower::NoteStates(const std::vector<MapId>& maps) {

@@ -13,6 +13,12 @@
 // It is read in pieces when no message waits (Bus::WorkWhenIdle); until then the process has no
 // such work of its own (`reading`).
 //
+// A checkpoint (checkpoint/checkpoint_file.h) is what the process and its follower are when they
+// have read the file up to some point, and nothing else: whoever restores it and reads the rest is
+// where whoever read all of the file is. So none is made of a process at work: one that `writes`
+// reads the file, makes the checkpoint and is done. It reads up to the first event that `completes`
+// says no to. A checkpoint that cannot be used is told in one line, and all of the file is read.
+//
 // In order: keyframes come in seq order, map by map. Those that are lost (an edge or HAVE says so)
 // are passed over and counted as dropped; with `gives_up` also those that nobody sends.
 //
@@ -23,22 +29,45 @@
 // Bounds: InOrder's. One thread; lives as long as its node.
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "bus/node.h"
 #include "bus/retransmission/gap_requests.h"
 #include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_reader.h"
+#include "bus/retransmission/journal_records.h"
 #include "bus/retransmission/missing.h"
+#include "checkpoint/checkpoint_file.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 
 namespace pangea {
+
+// Where a process has its checkpoint.
+struct CheckpointPlace {
+  std::filesystem::path file;  // empty: nowhere
+  std::string options;         // that the process' state depends on
+  bool writes = false;         // is here to write it
+};
+
+// What a process keeps in a checkpoint.
+struct JournalCheckpoint {
+  CheckpointPlace place;
+  uint32_t format = 0;                            // of what `save` writes
+  std::function<void(ByteWriter*)> save = {};     // after reading the file, so much of it
+  std::function<bool(ByteReader*)> restore = {};  // all of that or nothing
+  // Whether the process has what it makes of this keyframe or match itself.
+  std::function<bool(const KeyframeId&)> keyframe_is_complete = {};
+  std::function<bool(const PlaceMatch&)> match_is_complete = {};
+};
 
 class JournalFollower {
  public:
@@ -68,7 +97,11 @@ class JournalFollower {
     std::function<void()> handled = {};  // after each message
   };
 
-  JournalFollower(Node& node, const Follows& follows, Handlers handlers);
+  // `records`: where the process has the records of keyframes, which those of the file need not;
+  // may be null.
+  JournalFollower(Node& node, const Follows& follows, Handlers handlers,
+                  JournalCheckpoint checkpoint = {},
+                  std::shared_ptr<JournalRecords> records = nullptr);
 
   // At about 10 Hz. `ask_for_matches`: not while the process has no room for them.
   void Tick(int64_t now_utime, bool ask_for_matches = true);
@@ -92,8 +125,12 @@ class JournalFollower {
   size_t parked() const { return keyframes_.parked(); }
 
  private:
+  struct Waiting {
+    Keyframe keyframe;
+    std::optional<int64_t> event;  // of the file
+  };
   // Nothing: a seq that will never come, or that was handed on out of order.
-  using Item = std::optional<Keyframe>;
+  using Item = std::optional<Waiting>;
 
   void OnKeyframe(Keyframe keyframe);
   void OnMatch(PlaceMatch match);
@@ -105,12 +142,18 @@ class JournalFollower {
   bool ReadPiece();
   void EndReading();
   void TakeOfFormerRuns(const std::string& channel, Bytes data);
-  void TakeOfFile(const std::string& channel, Bytes data);
+  bool TakeOfFile(const std::string& channel, Bytes data, int64_t offset);
+  bool MayBeKept(const Keyframe& keyframe) const;
+  void RestoreCheckpoint();
+  bool RestoreFollower(ByteReader* reader);
+  void WriteCheckpoint();
+  void SaveFollower(ByteWriter* writer) const;
   // If the bytes are such a message and the process takes it.
   template <typename Message, typename Handler>
   void TakeBytes(Bytes data, const Handler& handler);
   void NoteMapOfFile(const MapId& map);
   void TakeNewMap(const MapId& map, int32_t highest_seq);
+  void HandOn(Waiting waiting);
   void AddInOrder(Keyframe keyframe);
   void Lose(const SeqGap& gap);
   void Skip(const SeqGap& gap);
@@ -124,6 +167,8 @@ class JournalFollower {
   Node& node_;
   const Follows follows_;
   const Handlers handlers_;
+  const JournalCheckpoint checkpoint_;
+  const std::shared_ptr<JournalRecords> records_;
   InOrder<Item> keyframes_;
   GapRequests keyframe_requests_;
   MissingMessages matches_;
@@ -136,6 +181,8 @@ class JournalFollower {
   int64_t progress_utime_ = 0;             // when that fell last
   std::unique_ptr<JournalReader> reader_;  // while the file is read
   bool reads_former_runs_ = false;         // so far
+  std::optional<int64_t> event_;           // of the file, that is being taken
+  JournalState checkpoint_journal_;        // what of the file the checkpoint has
   bool file_known_ = false;
   bool stopped_ = false;
   bool have_received_ = false;

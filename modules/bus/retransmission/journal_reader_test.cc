@@ -78,6 +78,9 @@ class TestJournal {
     }
   }
 
+  // Its file was emptied.
+  void Restart() { state_ = {}; }
+
   std::string path() const { return folder_ + "/journal.lcm"; }
   JournalFile file() const { return {path(), state_}; }
 
@@ -104,7 +107,8 @@ class IdleBus : public LocalBus {
 
 // A follower, what it hands on ("k0 m0 r0"), and what it asks for.
 struct Follower {
-  explicit Follower(const JournalFollower::Follows& follows)
+  explicit Follower(const JournalFollower::Follows& follows,
+                    const JournalCheckpoint& checkpoint = {})
       : node(bus, "test"),
         journal(node, follows,
                 {.keyframe = [this](const Keyframe& k) { Took("k", k.id.seq); },
@@ -115,7 +119,8 @@ struct Follower {
                      },
                  .result = [this](const Constraint& r) { Took("r", r.to.seq); },
                  .anchor_edit =
-                     [this](const AnchorEdit& e) { Took("e", static_cast<int32_t>(e.seq)); }}) {
+                     [this](const AnchorEdit& e) { Took("e", static_cast<int32_t>(e.seq)); }},
+                checkpoint) {
     bus.Subscribe("RESEND_REQUEST", [this](const std::string&, Bytes data) {
       resend_request_t request{};
       ASSERT_TRUE(DecodeMessage(data, &request));
@@ -273,6 +278,69 @@ TEST(JournalReader, AFileThatIsNotTheJournalIsLeftAndTheBusAsked) {
     EXPECT_EQ(follower.taken, "");
     EXPECT_THAT(follower.requests, ElementsAre("CONSTRAINT 0-1", "KEYFRAME_1 0-1"));
   }
+}
+
+// What a follower takes of a journal that has a checkpoint of its own state, and writes it anew.
+class JournalCheckpoints : public testing::Test {
+ protected:
+  std::string Write() { return Taken(true); }
+  std::string Taken(bool writes = false) {
+    Follower follower(follows_, {.place = {journal_.path() + ".checkpoint", options_, writes},
+                                 .save = [](ByteWriter* writer) { writer->Put(7); },
+                                 .restore =
+                                     [](ByteReader* reader) {
+                                       int seven = 0;
+                                       reader->Get(&seven);
+                                       return seven == 7 && reader->at_end();
+                                     },
+                                 .keyframe_is_complete = is_complete_});
+    follower.Tell(journal_.file());
+    follower.bus.DoAll();
+    return follower.taken;
+  }
+
+  TestJournal journal_;
+  JournalFollower::Follows follows_{.in_order = true, .matches = Which::kAll};
+  std::function<bool(const KeyframeId&)> is_complete_;
+  std::string options_;
+};
+
+TEST_F(JournalCheckpoints, OnlyWhatCameSinceIsRead) {
+  journal_.AddKeyframes(2);
+  EXPECT_EQ(Write(), "k0 m0 k1 m1 ");
+  EXPECT_EQ(Taken(), "");
+  journal_.AddKeyframe(2);
+  journal_.AddMatch(2);
+  journal_.AddKeyframe(1);  // a repeat
+  EXPECT_EQ(Taken(), "k2 m2 ");
+  EXPECT_EQ(Write(), "k2 m2 ");
+  EXPECT_EQ(Taken(), "");
+}
+
+TEST_F(JournalCheckpoints, EndsBeforeWhatIsNotCompleteOrWaitsBehindAGap) {
+  journal_.AddKeyframes(3);
+  is_complete_ = [](const KeyframeId& id) { return id.seq < 1; };
+  EXPECT_EQ(Write(), "k0 m0 ");
+  EXPECT_EQ(Taken(), "k1 m1 k2 m2 ");
+  is_complete_ = nullptr;
+  journal_.AddKeyframe(4);
+  journal_.AddKeyframe(3);
+  EXPECT_EQ(Write(), "k1 m1 k2 m2 ");
+  EXPECT_EQ(Taken(), "k3 k4 ");
+}
+
+TEST_F(JournalCheckpoints, OfAnotherJournalOrOtherOptionsIsNotUsed) {
+  journal_.AddKeyframes(2);
+  Write();
+  options_ = "other";
+  EXPECT_EQ(Taken(), "k0 m0 k1 m1 ");
+  options_ = "";
+  EXPECT_EQ(Taken(), "");
+  std::filesystem::resize_file(journal_.path(), 0);  // another one of the same length, and more
+  journal_.Restart();
+  journal_.AddMatch(0);
+  journal_.AddKeyframes(3);
+  EXPECT_EQ(Taken(), "m0 k0 m0 k1 m1 k2 m2 ");
 }
 
 }  // namespace

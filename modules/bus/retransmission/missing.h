@@ -63,6 +63,10 @@ class MissingMessages {
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;
   }
+  const InOrder<std::monostate>& stream() const { return stream_; }
+  void Restore(const MapId& map, int32_t next, const std::vector<int32_t>& waiting) {
+    stream_.Restore(map, next, waiting);
+  }
   // What is to be asked for now (gap_requests.h).
   std::vector<SeqGap> Due(int64_t now_utime) { return requests_.Due(stream_.Gaps(), now_utime); }
 

@@ -11,6 +11,7 @@
 
 #include "bus/process.h"
 #include "session/processes/kept_processes.h"
+#include "session/server/checkpoints.h"
 #include "session/session_file/session_file.h"
 
 namespace pangea::session {
@@ -42,7 +43,8 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
   std::vector<std::string> argv{Program(process)};
   if (process == "agent_handler") {
     argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
-                             options.journal.string(), "--keys", options.keys.string()});
+                             options.journal.string(), "--keys", options.keys.string(),
+                             "--checkpoints", options.checkpoints.string()});
   } else {
     argv.insert(argv.end(), {"--bus", options.bus});
   }
@@ -59,6 +61,10 @@ std::vector<std::string> GatewayCommand(const ServerOptions& options) {
   return {Program(kGateway), "--site",    options.site.string(),
           "--bus",           options.bus, "--link",
           options.link,      "--port",    std::to_string(*options.phone_port)};
+}
+
+double SteadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 // Whether one was given up: a server that lacks a process is none. It is one without the gateway.
@@ -110,8 +116,13 @@ int Serve(const ServerOptions& options) {
     kept.Start(process, argv);
     Say(fmt::format("started {}", fmt::join(argv, " ")));
   };
+  Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);
   for (const std::string process : kServerProcesses) {
-    start(process, Command(process, options));
+    std::vector<std::string> argv = Command(process, options);
+    const std::vector<std::string> checkpoint = checkpoints.ArgumentsOf(process);
+    argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());
+    start(process, argv);
+    checkpoints.Add(process, argv);
   }
   if (options.phone_port) {
     start(kGateway, GatewayCommand(options));
@@ -121,8 +132,11 @@ int Serve(const ServerOptions& options) {
   while (!StopRequested() && !given_up) {
     std::this_thread::sleep_for(kLookInterval);
     given_up = ReviveAll(&kept);
+    checkpoints.Tick(SteadySeconds());
   }
   kept.StopAll(kStopGrace_s);
+  Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
+  checkpoints.Finish();
   Say("ended");
   return given_up ? 1 : 0;
 }

@@ -18,7 +18,8 @@ struct ServerOptions {
   std::filesystem::path journal;
   std::filesystem::path keys;
   std::filesystem::path logs;
-  std::string http;  // ADDRESS:PORT of the anchors' API; empty: none
+  std::filesystem::path checkpoints;  // folder
+  std::string http;                   // ADDRESS:PORT of the anchors' API; empty: none
   // Of the gateway for phones' browsers, which needs a site; nothing: none. The server runs without
   // it when it cannot start.
   std::optional<uint16_t> phone_port;

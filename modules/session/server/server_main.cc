@@ -63,6 +63,7 @@ void UseSite(const site::Site& site, Arguments* arguments) {
   options.journal = site.journal();
   options.keys = site.keys();
   options.logs = site.logs();
+  options.checkpoints = site.checkpoints();
   arguments->options_folder = site.options();
   options.bus = options.bus.empty() ? site.description.bus : options.bus;
   options.link = options.link.empty() ? site.description.link : options.link;
@@ -74,6 +75,9 @@ void UseDefaults(ServerOptions* options) {
   }
   options->bus = options->bus.empty() ? kDefaultBusUrl : options->bus;
   options->link = options->link.empty() ? kDefaultLinkUrl : options->link;
+  if (options->checkpoints.empty()) {
+    options->checkpoints = options->journal.string() + ".checkpoints";
+  }
   if (options->logs.empty()) {
     options->logs = options->journal.string() + ".logs";
   }
