@@ -342,6 +342,17 @@ std::vector<MapState> PoseGraph::States() const {
   return states;
 }
 
+std::vector<int64_t> PoseGraph::InForce() const {
+  std::vector<int64_t> ids;
+  for (const Loop& loop : loops_) {
+    if (loop.on && group_of_[loop.from.map] == group_of_[loop.to.map]) {
+      ids.push_back(loop.id);
+    }
+  }
+  std::ranges::sort(ids);
+  return ids;
+}
+
 PoseGraph::Counters PoseGraph::counters() const {
   Counters counters;
   counters.maps = static_cast<int64_t>(maps_.size());
