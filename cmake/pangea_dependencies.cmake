@@ -1,6 +1,7 @@
 # Every package that a module links; scripts/packages.txt lists the Debian names. Installed too: it
 # is how find_package(pangea) finds them again.
 find_package(Boost 1.74 REQUIRED)
+find_package(OpenSSL 3.0 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(Ceres 2.1 REQUIRED)
 find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d video calib3d)
@@ -17,8 +18,8 @@ add_library(lcm::lcm UNKNOWN IMPORTED)
 set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION ${LCM_LIBRARY}
   INTERFACE_INCLUDE_DIRECTORIES ${LCM_INCLUDE_DIR})
 
-# Neither have libsodium and zstd.
-foreach(package sodium zstd)
+# Neither have libqrencode, libsodium and zstd.
+foreach(package qrencode sodium zstd)
   find_path(${package}_INCLUDE_DIR ${package}.h REQUIRED)
   find_library(${package}_LIBRARY ${package} REQUIRED)
   add_library(${package}::${package} UNKNOWN IMPORTED)

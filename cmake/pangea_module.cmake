@@ -91,6 +91,9 @@ endfunction()
 
 # pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
 function(pangea_program name)
+  if(EMSCRIPTEN)
+    return()
+  endif()
   cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   pangea_include_root(root)
@@ -117,6 +120,9 @@ file(MAKE_DIRECTORY ${test_files})
 
 # pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one GoogleTest binary.
 function(pangea_test name)
+  if(EMSCRIPTEN)
+    return()
+  endif()
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)

@@ -54,6 +54,31 @@ TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
   EXPECT_TRUE(fs::exists(folder / "map.lcm.logs" / "fusion.txt"));
 }
 
+// The server's own gateway finds its port taken the second time.
+TEST(Server, StartsTheGatewayForPhonesAndRunsOnWithoutIt) {
+  const fs::path folder = FreshFolder("server_phone");
+  const int port = 20000 + getpid() % 6000 * 2;
+  const std::string on_site = fmt::format(
+      "--site {}/hall --bus 'udpm://239.255.76.67:{}?ttl=0&recv_buf_size=4194304' "
+      "--link 'udpm://239.255.76.67:{}?ttl=0&recv_buf_size=4194304'",
+      folder.string(), port, port + 1);
+  std::ofstream(folder / "run.sh") << fmt::format(
+      "pangea-server {0} --phone {2} & server=$!; for i in $(seq 100); do "
+      "[ -e {1}/hall/gateway/address.json ] && break; sleep 0.1; done; "
+      "pangea-gateway invite --site {1}/hall --name Anna; "
+      "kill -INT $server; wait $server; echo exit code $?\n"
+      "pangea-gateway {0} --port {2} & gateway=$!; sleep 2; "
+      "pangea-server {0} --phone {2} & server=$!; sleep 4; "
+      "kill -INT $server; wait $server; echo second exit code $?; kill $gateway\n",
+      on_site, folder.string(), port);
+  const Outcome outcome = RunCommand("sh " + (folder / "run.sh").string());
+  EXPECT_THAT(outcome.output, testing::ContainsRegex("started .*pangea-gateway "));
+  EXPECT_THAT(outcome.output, testing::ContainsRegex(fmt::format("https://.*:{}/#join=", port)));
+  EXPECT_THAT(outcome.output, HasSubstr("ended\nexit code 0\n"));
+  EXPECT_THAT(outcome.output, HasSubstr("give another port); given up after 3 times"));
+  EXPECT_THAT(outcome.output, HasSubstr("second exit code 0"));
+}
+
 TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
   const fs::path folder = FreshFolder("server_keys");
   const Outcome outcome = RunCommand(ServerCommand(folder));

@@ -117,8 +117,10 @@ class Stages {
   const std::map<int32_t, Trajectory>& truth_;
   PlaceRecognitionOptions options_;
   PlaceRecognition recognition_{options_};
-  InterMapBa intra_{InterMapBaOptions{}};
-  Fusion inter_{FusionOptions{}};
+  // Every candidate on its own: none is redundant.
+  static constexpr KnownConstraintOptions kVerifyAll{.min_gain_bits = 0};
+  InterMapBa intra_{InterMapBaOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
+  Fusion inter_{FusionOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
   std::map<KeyframeId, Known> known_;
   Outcome outcome_;
 };

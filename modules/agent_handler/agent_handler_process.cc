@@ -285,6 +285,9 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {
   archive_.set_now_utime(now_utime);
+  if (next_status_utime_ == 0) {
+    node_.Set("ready_utime", now_utime);
+  }
   if (now_utime >= next_have_utime_) {
     next_have_utime_ = now_utime + kSecond_us;
     LookForKeys();

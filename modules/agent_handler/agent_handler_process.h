@@ -26,7 +26,7 @@ namespace pangea {
 class AgentHandlerProcess : public PolledProcess {
  public:
   // Beyond it, keys are refused: 210 MB of receive caches when all are full.
-  static constexpr size_t kMaxAgents = 1000;
+  static constexpr size_t kMaxAgents = KeyFolder::kMaxKeys;
 
   // `now_utime`: wall clock. Throws if the journal or a key cannot be used.
   AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path,

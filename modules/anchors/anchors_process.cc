@@ -32,14 +32,12 @@ AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options)
       journal_(node_, {.in_order = true, .gives_up = true, .states = true},
                {.keyframe = [this](const Keyframe& keyframe) { anchors_.Take(keyframe); },
                 .have = [this](const Have&) { have_received_ = true; },
-                .other = std::bind_front(&AnchorsProcess::OnRetransmission, this)}),
+                .anchor_edit = std::bind_front(&AnchorsProcess::OnEdit, this)}),
       for_watchers_(options.moved_m, options.moved_rad) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&AnchorsProcess::OnMapState, this));
   node_.Listen<correction_t>(channels::kAllCorrections,
                              [this](const Correction& correction) { anchors_.Take(correction); });
-  node_.Listen<anchor_edit_t>(channels::kAnchorEdit,
-                              std::bind_front(&AnchorsProcess::OnEdit, this));
 }
 
 void AnchorsProcess::OnMapState(MapState state, const map_state_t& message) {
@@ -63,11 +61,6 @@ void AnchorsProcess::OnEdit(AnchorEdit edit) {
       on_edit_taken_(next, refused);
     }
   }
-}
-
-bool AnchorsProcess::OnRetransmission(const again_t& again) {
-  return TakeRetransmission<anchor_edit_t>(node_, again,
-                                           std::bind_front(&AnchorsProcess::OnEdit, this));
 }
 
 void AnchorsProcess::Request(const AnchorEdit& edit) {

@@ -46,7 +46,6 @@ class AnchorsProcess : public Process {
  private:
   void OnMapState(MapState state, const map_state_t& message);
   void OnEdit(AnchorEdit edit);
-  bool OnRetransmission(const again_t& again);
   void RequestMissingEdits(int64_t now_utime);
   void PublishDue(int64_t now_utime);
   void PublishStatus(int64_t now_utime);

@@ -85,6 +85,22 @@ TEST(LcmBus, WorksWhileNoMessageWaits) {
   EXPECT_EQ(done, "wopopopo");
 }
 
+TEST(LcmBus, WorkThatGivesOtherWorkAtItsEndIsFollowedByIt) {
+  LcmBus bus("memq://");
+  std::string done;
+  bus.WorkWhenIdle([&] {
+    done += "a";
+    bus.WorkWhenIdle([&] {
+      done += "b";
+      return done != "abb";
+    });
+    return false;
+  });
+  while (bus.Handle(0)) {
+  }
+  EXPECT_EQ(done, "abb");
+}
+
 TEST(LcmBus, AFloodDoesNotKeepItFromItsWork) {
   LcmBus bus("memq://");
   bool worked = false;

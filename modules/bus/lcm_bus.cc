@@ -186,8 +186,9 @@ bool LcmBus::Handle(int timeout_ms) {
     return handled;
   }
   handled_since_work_ = 0;
-  if (!work_()) {
-    work_ = nullptr;
+  std::function<bool()> piece = std::exchange(work_, nullptr);
+  if (piece() && !work_) {  // it may have given other work
+    work_ = std::move(piece);
   }
   return true;
 }

@@ -64,7 +64,9 @@ void AddUndelivered(const std::vector<Bus*>& buses, std::map<std::string, int64_
 }  // namespace
 
 std::optional<int64_t> CounterOf(const status_t& status, std::string_view name) {
-  const auto found = std::ranges::find(status.counters, name, &counter_t::name);
+  const auto found =
+      std::find_if(status.counters.begin(), status.counters.end(),
+                   [name](const counter_t& counter) { return counter.name == name; });
   return found == status.counters.end() ? std::nullopt : std::optional(found->count);
 }
 

@@ -2,7 +2,6 @@
 
 #include <dlfcn.h>
 
-#include <chrono>
 #include <csignal>
 
 #include "bus/retransmission/journal_first.h"
@@ -14,20 +13,7 @@ volatile std::sig_atomic_t stop_signals = 0;
 
 constexpr int64_t kTickInterval_us = 100'000;
 
-template <typename Clock>
-int64_t MicrosOf() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
-
-int64_t WallUtime() {
-  static const int64_t begin = MicrosOf<std::chrono::system_clock>() - SteadyMicros();
-  return begin + SteadyMicros();
-}
-
-int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
 
 void InstallSignalHandlers() {
   struct sigaction action {};

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "bus/bus.h"
+#include "bus/wall_clock.h"
 
 namespace pangea {
 
@@ -20,14 +21,6 @@ class Process {
   virtual void BetweenMessages(int64_t) {}
   virtual int longest_wait_ms() const { return 50; }
 };
-
-// Microseconds since 1970 that never step: the wall clock as it was when the process first asked,
-// and from there as SteadyMicros goes. So what is paced by it goes on as it should when somebody
-// sets the clock; what is stamped by it (statuses, maps, the journal) is of the new time from the
-// next start on.
-int64_t WallUtime();
-// Monotonic clock, microseconds.
-int64_t SteadyMicros();
 
 // Set by SIGINT and SIGTERM once InstallSignalHandlers has run.
 void InstallSignalHandlers();

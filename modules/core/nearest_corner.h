@@ -4,7 +4,7 @@
 // somewhere else in the image, which a match must be clearly nearer than. Equal distances are
 // settled by the lower index.
 
-#include <ranges>
+#include <numeric>
 #include <vector>
 
 #include "core/matching.h"
@@ -56,6 +56,8 @@ std::vector<CornerMatch> MutualNearest(size_t num_a, const std::vector<Corner>& 
                                        const MatchingOptions& options) {
   std::vector<CornerMatch> nearest_to_b(b.size(), {-1, -1, kNoDistance});
   std::vector<CornerMatch> matches;
+  std::vector<int> all_b(b.size());
+  std::iota(all_b.begin(), all_b.end(), 0);
   for (int i = 0; i < static_cast<int>(num_a); ++i) {
     const auto distance_from_i = [&](int j) {
       const int distance = distance_of(i, j);
@@ -65,8 +67,7 @@ std::vector<CornerMatch> MutualNearest(size_t num_a, const std::vector<Corner>& 
       return distance;
     };
     const NearestCorner nearest =
-        FindNearest(b, std::views::iota(0, static_cast<int>(b.size())), distance_from_i,
-                    options.max_distance, options.other_corner_px);
+        FindNearest(b, all_b, distance_from_i, options.max_distance, options.other_corner_px);
     if (nearest.index >= 0 && nearest.PassesRatio(options.max_ratio)) {
       matches.push_back({i, nearest.index, nearest.distance});
     }

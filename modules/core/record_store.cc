@@ -11,7 +11,7 @@ Record::Record(std::vector<uint8_t> bytes, RecordStore* store)
   }
   if (in_memory()) {
     bytes_ = std::make_unique<uint8_t[]>(size_);
-    std::ranges::copy(bytes, bytes_.get());
+    std::copy(bytes.begin(), bytes.end(), bytes_.get());
   }
 }
 

@@ -32,6 +32,10 @@ struct PlaceMatch {
   std::vector<std::string> rejected;  // dropped before publication, and why: for people
 };
 
+// Why a candidate was not verified: constraints beside it tell the relative pose well enough. Its
+// matched corners are good for bundle adjustment.
+inline constexpr char kRedundant[] = "redundant";
+
 // Exactly one per candidate.
 struct Constraint {
   KeyframeId from;  // the candidate's match

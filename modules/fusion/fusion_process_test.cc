@@ -223,6 +223,26 @@ TEST_F(VerificationProcesses, AfterARestartKnownResultsAreNotRepeated) {
   EXPECT_TRUE(constraints_.empty());
 }
 
+// What former runs verified is known: a candidate beside it says nothing new.
+TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  Constraint known;
+  known.to = agent_c_.keyframes[9].id;
+  known.kind = PlaceKind::kInter;
+  known.accepted = true;
+  known.covariance *= 0.02 * 0.02;
+  for (int i = 0; i < KnownConstraintOptions{}.min_between_maps; ++i) {
+    known.from = agent_m_.keyframes[i].id;
+    Retransmit(listener_, "fusion", std::string(channels::kConstraint), ToMessage(known));
+  }
+  bus_.Drain();
+  SendMatch(PlaceKind::kInter);
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_FALSE(constraints_[0].accepted);
+  EXPECT_EQ(constraints_[0].reason, kRedundant);
+}
+
 // What nobody has any more is not waited for: the windows end there.
 TEST_F(VerificationProcesses, WhatIsLostIsNotWaitedFor) {
   SendKeyframes(agent_m_, 4, 12);

@@ -76,10 +76,14 @@ void GlobalBa::Take(const PlaceMatch& match) {
 
 void GlobalBa::Take(const Constraint& constraint) {
   const Pair pair(constraint.to, constraint.from);
-  if (!constraint.accepted) {
+  if (constraint.accepted) {
+    if (tied_.insert(pair).second) {
+      DropIfAbout(constraint.to.map);
+    }
+  } else if (constraint.reason == kRedundant) {
+    tied_.insert(pair);
+  } else {
     matched_.erase(pair);
-  } else if (accepted_.insert(pair).second) {
-    DropIfAbout(constraint.to.map);
   }
 }
 
@@ -148,7 +152,7 @@ std::optional<MapState> GlobalBa::Advance() {
 
 void GlobalBa::Begin(StatePointer state) {
   std::vector<MatchedPlaces> places;
-  for (const Pair& pair : accepted_) {
+  for (const Pair& pair : tied_) {
     const auto corners = matched_.find(pair);
     const auto record =
         corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());

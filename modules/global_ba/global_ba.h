@@ -95,7 +95,8 @@ class GlobalBa {
   std::shared_ptr<RecordStore> records_;
   SubmapStore store_;
   std::map<Pair, Record> matched_;  // corners, by place recognition
-  std::set<Pair> accepted_;
+  // Whose matched corners tie landmarks: accepted, or beside accepted ones and so redundant.
+  std::set<Pair> tied_;
   std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
   // By group.
   std::map<MapId, std::pair<Basis, std::vector<KeyframePose>>> refined_;

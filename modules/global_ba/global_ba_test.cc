@@ -68,6 +68,26 @@ TEST(GlobalBa, TheOrderOfMessagesDoesNotMatter) {
   }
 }
 
+// What was not verified, because constraints beside it tell as much, still ties landmarks; what was
+// refused does not.
+TEST(GlobalBa, RedundantMatchesTieLandmarks) {
+  BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  const auto accepted = Server(messages).Finish();
+  const auto with_reason = [&](const std::string& reason) {
+    for (Constraint& constraint : messages.constraints) {
+      constraint.accepted = false;
+      constraint.reason = reason;
+    }
+    return Server(messages).Finish();
+  };
+  const auto redundant = with_reason(kRedundant);
+  const auto refused = with_reason("too few inliers");
+  ASSERT_TRUE(accepted && redundant && refused);
+  const auto newest = [](const MapState& state) { return state.keyframes.back().T_map_body.t; };
+  EXPECT_EQ(newest(*accepted), newest(*redundant));
+  EXPECT_NE(newest(*accepted), newest(*refused));
+}
+
 TEST(GlobalBa, AMessageOfTheGroupDropsTheWorkAndOtherMessagesDoNot) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   Server server(messages);

@@ -14,6 +14,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "files/whole_file.h"
+
 namespace pangea {
 namespace {
 
@@ -119,36 +121,42 @@ AnchorRight ReadRight(const fs::path& file, std::string_view word) {
 }  // namespace
 
 std::optional<AnchorRight> AnchorRightOf(std::string_view word) {
-  const auto* const found = std::ranges::find(kRightWords, word, &RightWord::word);
+  const auto* const found =
+      std::find_if(std::begin(kRightWords), std::end(kRightWords),
+                   [word](const RightWord& right) { return right.word == word; });
   return found == std::end(kRightWords) ? std::nullopt : std::optional(found->right);
+}
+
+std::string WordOf(AnchorRight right) {
+  return std::string(
+      std::find_if(std::begin(kRightWords), std::end(kRightWords), [right](const RightWord& known) {
+        return known.right == right;
+      })->word);
+}
+
+std::string ToHex(const SecretKey& key) {
+  std::string hex(kHexBytes + 1, '\0');  // with the end that C wants
+  sodium_bin2hex(hex.data(), hex.size(), key.bytes().data(), key.bytes().size());
+  hex.resize(kHexBytes);
+  return hex;
 }
 
 std::string KeyFileName(int32_t agent_id) { return fmt::format("agent_{}.key", agent_id); }
 
 void MakeKeyFile(const fs::path& file, int32_t agent_id, AnchorRight anchors) {
-  const SecretKey key = SecretKey::Random();
-  char hex[kHexBytes + 1];
-  sodium_bin2hex(hex, sizeof(hex), key.bytes().data(), key.bytes().size());
-  const std::string text = fmt::format(
+  std::string text = fmt::format(
       "# Lets agent {0} into a Pangea server. Secret: a copy for the agent (pangea-uplink --key), "
       "a "
       "copy for the\n# server's folder of keys (pangea-agent-handler --keys).\nagent: {0}\nkey: "
       "{1}\n"
       "# What the agent may do with anchors, by the server's copy: read, own (edit those it made), "
       "write (edit all).\n{2}anchors: {3}\n",
-      agent_id, hex, anchors == AnchorRight::kEditOwn ? "# " : "",
-      std::ranges::find(kRightWords, anchors, &RightWord::right)->word);
-  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (fd < 0) {
-    Fail(file, errno == EEXIST ? "exists already, and is left as it is: give another --out"
-                               : std::strerror(errno));
-  }
-  const bool written = write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  const bool closed = close(fd) == 0;
-  sodium_memzero(hex, sizeof(hex));
-  if (!written || !closed) {
-    unlink(file.c_str());
-    Fail(file, "cannot be written");
+      agent_id, ToHex(SecretKey::Random()), anchors == AnchorRight::kEditOwn ? "# " : "",
+      WordOf(anchors));
+  const bool is_new = WriteNewFile(file, text, S_IRUSR | S_IWUSR);
+  sodium_memzero(text.data(), text.size());
+  if (!is_new) {
+    Fail(file, "exists already, and is left as it is: give another --out");
   }
 }
 

@@ -26,11 +26,16 @@ struct AgentKey {
 
 // "read", "own" or "write"; nothing of another word.
 std::optional<AnchorRight> AnchorRightOf(std::string_view word);
+std::string WordOf(AnchorRight right);
+
+// 64 hexadecimal digits, as in the file.
+std::string ToHex(const SecretKey& key);
 
 // "agent_4.key"
 std::string KeyFileName(int32_t agent_id);
 
-// A new random key. Throws std::runtime_error if the file exists or cannot be written.
+// A new random key; the file is there whole or not at all. Throws std::runtime_error if it exists
+// or cannot be written.
 void MakeKeyFile(const std::filesystem::path& file, int32_t agent_id,
                  AnchorRight anchors = AnchorRight::kEditOwn);
 
@@ -44,6 +49,8 @@ SecretKey ReadKeyFileOf(const std::filesystem::path& file, int32_t agent_id);
 // agents can be let in and shut out while the server runs.
 class KeyFolder {
  public:
+  static constexpr size_t kMaxKeys = 1000;  // that a server takes
+
   explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   // Throws std::runtime_error: no such folder, a file of it cannot be used, two of one agent.

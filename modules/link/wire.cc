@@ -22,8 +22,8 @@ using messages_checks::Refused;
 
 // For people: nothing that moves a terminal's cursor.
 bool Printable(const std::string& text) {
-  return std::ranges::all_of(text,
-                             [](char c) { return static_cast<uint8_t>(c) >= ' ' && c != 0x7F; });
+  return std::all_of(text.begin(), text.end(),
+                     [](char c) { return static_cast<uint8_t>(c) >= ' ' && c != 0x7F; });
 }
 
 int32_t ReadInt32(ByteReader* reader, uint64_t max = kMaxInt32) {

@@ -39,11 +39,13 @@ class LogScan {
  public:
   // `fd`: open for reading, and stays the caller's. Its length is what it is now.
   explicit LogScan(int fd);
+  // The part of it from `begin`, where an event begins, to `end`, where one ends.
+  LogScan(int fd, int64_t begin, int64_t end) : fd_(fd), file_bytes_(end), at_(begin) {}
 
   // The pieces of the file in order, without gaps; nothing at its end. Throws std::runtime_error
   // if the file cannot be read.
   std::optional<LogPiece> Next();
-  int64_t file_bytes() const { return file_bytes_; }
+  int64_t file_bytes() const { return file_bytes_; }  // or the part's end
 
  private:
   // The file from there on, at least `size` bytes of it but at its end. Valid until the next call.
@@ -58,7 +60,7 @@ class LogScan {
   LogPiece Event(const LogEventHeader& header);
   LogPiece Gap();
 
-  const int fd_;
+  int fd_;
   int64_t file_bytes_ = 0;
   int64_t at_ = 0;
   std::vector<uint8_t> window_;

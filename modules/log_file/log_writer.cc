@@ -4,22 +4,21 @@
 
 #include <stdexcept>
 
+#include "log_file/log_event.h"
+
 namespace pangea {
 
-LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(path, "w") {
-  if (!file_.good()) {
+LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(path, std::ios::binary) {
+  if (!file_) {
     throw std::runtime_error(fmt::format("{}: cannot be written", path));
   }
 }
 
 void LogFileWriter::Write(int64_t utime, const std::string& channel, Bytes data) {
-  lcm::LogEvent event;
-  event.eventnum = count_++;
-  event.timestamp = utime;
-  event.channel = channel;
-  event.datalen = static_cast<int32_t>(data.size());
-  event.data = const_cast<uint8_t*>(data.data());  // it is only read
-  if (file_.writeEvent(&event) != 0) {
+  event_.clear();
+  AppendLogEvent(count_++, utime, channel, data, &event_);
+  file_.write(reinterpret_cast<const char*>(event_.data()), static_cast<int64_t>(event_.size()));
+  if (!file_) {
     throw std::runtime_error(fmt::format("{}: cannot be written (disk full?)", path_));
   }
 }

@@ -3,8 +3,9 @@
 // A new LCM log, event by event.
 
 #include <cstdint>
-#include <lcm/lcm-cpp.hpp>
+#include <fstream>
 #include <string>
+#include <vector>
 
 #include "bus/bus.h"
 
@@ -20,7 +21,8 @@ class LogFileWriter {
 
  private:
   const std::string path_;
-  lcm::LogFile file_;
+  std::ofstream file_;
+  std::vector<uint8_t> event_;
   int64_t count_ = 0;
 };
 

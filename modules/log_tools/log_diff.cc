@@ -23,8 +23,8 @@ bool TellsOfTheRun(const std::string& channel) {
   return channel.starts_with(channels::kStatusPrefix) ||
          channel.starts_with(channels::kAgainPrefix) ||
          channel.starts_with(channels::kOptionsPrefix) || channel == channels::kHave ||
-         channel == channels::kResendRequest || channel == channels::kVerificationRequest ||
-         channel == "LCM_SELF_TEST";
+         channel == channels::kJournalFile || channel == channels::kResendRequest ||
+         channel == channels::kVerificationRequest || channel == "LCM_SELF_TEST";
 }
 
 Channels ReadChannels(const std::string& log, double until_s, LogReadings* readings) {

@@ -29,11 +29,17 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
                 .results = JournalFollower::Which::kOfFormerRuns},
                {.keyframe = [this](Keyframe keyframe) { verifier_->Add(std::move(keyframe)); },
                 .match = std::bind_front(&CandidateProcess::TakeMatch, this),
-                .result = [this](const Constraint& result) { verified_.insert(result.Id()); },
+                .result = std::bind_front(&CandidateProcess::OnFormerResult, this),
                 .have = std::bind_front(&CandidateProcess::OnHave, this),
                 .handled = [this] { CollectReady(); }}) {
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&CandidateProcess::OnVerificationRequest, this));
+}
+
+void CandidateProcess::OnFormerResult(const Constraint& result) {
+  if (verified_.insert(result.Id()).second) {
+    verifier_->NoteVerified(result);
+  }
 }
 
 bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
@@ -89,7 +95,7 @@ void CandidateProcess::CollectReady() {
       ++it;
     }
   }
-  if (!ready_.empty()) {
+  if (!ready_.empty() && !journal_.reading()) {
     node_.WorkWhenIdle([this] { return VerifyNext(); });
   }
 }

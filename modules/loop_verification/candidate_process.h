@@ -4,9 +4,9 @@
 // candidate of its kind. A candidate about a keyframe not seen yet waits for it; what is missing is
 // asked for (journal_follower.h). Verification results of this run
 // that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
-// everyone else asks; of those that are still to be made nothing is said, they will come. A
-// verification result depends on the keyframes alone, not on when they came: live and replay agree,
-// and a restart that repeats one repeats it exactly.
+// everyone else asks; of those that are still to be made nothing is said, they will come. Which
+// candidates are redundant depends on the results before; any other verification result on the
+// keyframes alone, not on when they came.
 //
 // A verification result takes long (tens of milliseconds), so live they are made one at a time, in
 // the order in which the candidates became ready, when no message waits: all that came is known,
@@ -45,6 +45,7 @@ class CandidateProcess : public Process {
   static constexpr size_t kMaxSent = 5000;
 
   bool TakeMatch(const PlaceMatch& match);
+  void OnFormerResult(const Constraint& result);
   void OnHave(const Have& have);
   void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();

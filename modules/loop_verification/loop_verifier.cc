@@ -20,8 +20,24 @@ bool LoopVerifier::Ready(const KeyframeId& query, const PlaceCandidate& candidat
   return query.map != candidate.match.map || store_.ChainIsComplete(candidate.match, query);
 }
 
+void LoopVerifier::NoteVerified(const Constraint& result) {
+  if (result.accepted) {
+    known_.Add(result);
+  }
+}
+
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                                 LoopVerificationReport* report) {
+  if (known_.IsRedundant(query, candidate.match, store_)) {
+    return RefusedConstraint(query, candidate, kRedundant);
+  }
+  Constraint result = Align(query, candidate, report);
+  NoteVerified(result);
+  return result;
+}
+
+Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& candidate,
+                               LoopVerificationReport* report) {
   const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
   const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
   if (frames_c.empty() || frames_m.empty()) {

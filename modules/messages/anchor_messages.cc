@@ -19,7 +19,8 @@ constexpr double kMaxPixel = 1e5;
 // As a text for people: without control characters.
 bool IsName(const std::string& name) {
   return name.size() <= kMaxAnchorName &&
-         std::ranges::none_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+         std::none_of(name.begin(), name.end(),
+                      [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }
 
 bool IsUtime(int64_t utime) { return utime >= 0 && utime <= kMaxUtime; }

@@ -11,6 +11,7 @@ using namespace messages_checks;
 
 namespace {
 
+constexpr size_t kMaxPathBytes = 500;
 constexpr size_t kMaxProcessName = 40;  // with AGAIN_ below LCM's 63 characters
 
 bool IsProcessName(const std::string& name) {
@@ -49,6 +50,29 @@ Parsed<Have> Parse(const have_t& m) {
     have.gaps.push_back(*gap.value);
   }
   return {std::move(have), ""};
+}
+
+Parsed<JournalFile> Parse(const journal_file_t& m) {
+  if (m.path.size() > kMaxPathBytes || !m.path.starts_with('/')) {
+    return Refused<JournalFile>("journal file: path is too long, or not absolute");
+  }
+  if (m.num_bytes < 0 || m.last_event_offset < -1 ||
+      m.last_event_offset >= std::max<int64_t>(m.num_bytes, 1)) {
+    return Refused<JournalFile>("journal file: bytes or last event out of range");
+  }
+  return {
+      JournalFile{m.path,
+                  {m.num_bytes, m.last_event_offset, static_cast<uint32_t>(m.last_event_crc32)}},
+      ""};
+}
+
+journal_file_t ToMessage(const JournalFile& file) {
+  journal_file_t message{};
+  message.path = file.path;
+  message.num_bytes = file.state.num_bytes;
+  message.last_event_offset = file.state.last_event_offset;
+  message.last_event_crc32 = static_cast<int32_t>(file.state.last_event_crc32);
+  return message;
 }
 
 // "Up to the end" may be said with any number.

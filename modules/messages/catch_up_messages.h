@@ -1,8 +1,8 @@
 #pragma once
 
-// The border for what processes tell each other to catch up: what exists (have_t), and what is to
-// be sent again (resend_request_t, verdict_request_t). As in messages.h, past Parse every field is
-// bounded.
+// The border for what processes tell each other to catch up: what exists (have_t), in what file
+// (journal_file_t), and what is to be sent again (resend_request_t, verdict_request_t). As in
+// messages.h, past Parse every field is bounded.
 
 #include <string>
 #include <utility>
@@ -11,6 +11,7 @@
 #include "core/ids.h"
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
+#include "pangea/journal_file_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/verdict_request_t.hpp"
 
@@ -19,6 +20,20 @@ namespace pangea {
 struct Have {
   std::vector<std::pair<MapId, int32_t>> highest_seq;  // of each map
   std::vector<SeqGap> gaps;                            // lost for good
+};
+
+// A state of the journal: two journals that agree in it are one, up to there.
+struct JournalState {
+  int64_t num_bytes = 0;
+  int64_t last_event_offset = -1;  // of the last whole event in them; -1 for none
+  uint32_t last_event_crc32 = 0;
+
+  bool operator==(const JournalState&) const = default;
+};
+
+struct JournalFile {
+  std::string path;
+  JournalState state;
 };
 
 struct ResendRequest {
@@ -42,6 +57,8 @@ struct VerificationRequest {
 };
 
 Parsed<Have> Parse(const have_t& message);
+Parsed<JournalFile> Parse(const journal_file_t& message);
+journal_file_t ToMessage(const JournalFile& file);
 Parsed<ResendRequest> Parse(const resend_request_t& message);
 Parsed<VerificationRequest> Parse(const verdict_request_t& message);
 

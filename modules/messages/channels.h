@@ -15,6 +15,7 @@ inline constexpr std::string_view kConstraint = "CONSTRAINT";
 inline constexpr std::string_view kMapState = "MAP_STATE";
 inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
+inline constexpr std::string_view kJournalFile = "JOURNAL_FILE";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 inline constexpr std::string_view kVerificationRequest = "VERDICT_REQUEST";
 // From the journal; what apps and tools ask for is kAnchorRequestPrefix.
@@ -33,6 +34,7 @@ inline constexpr std::string_view kAllAnchors = "ANCHOR_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
 inline constexpr std::string_view kAllLinkUps = "LINK_UP_[0-9]+";
+inline constexpr std::string_view kAllLinkDowns = "LINK_DOWN_[0-9]+";
 inline constexpr std::string_view kAllStatus = "STATUS_.*";
 inline constexpr std::string_view kAllOptions = "OPTIONS_.*";
 

@@ -297,7 +297,7 @@ Parsed<ProcessOptions> Parse(const options_t& m) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
   };
   if (m.process.empty() || m.process.size() > kMaxName ||
-      !std::ranges::all_of(m.process, is_plain)) {
+      !std::all_of(m.process.begin(), m.process.end(), is_plain)) {
     return Refused<ProcessOptions>("options: no name of a process");
   }
   if (m.yaml.size() > kMaxYaml) {

@@ -18,7 +18,8 @@ std::optional<MapState> StateChunks::Add(int chunk, int num_chunks, MapState par
   }
   MapState whole = std::move(chunks.begin()->second);
   for (auto it = std::next(chunks.begin()); it != chunks.end(); ++it) {
-    std::ranges::move(it->second.keyframes, std::back_inserter(whole.keyframes));
+    std::move(it->second.keyframes.begin(), it->second.keyframes.end(),
+              std::back_inserter(whole.keyframes));
   }
   num_chunks_ -= chunks.size();
   pending_.erase(key);

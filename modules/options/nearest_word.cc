@@ -30,8 +30,10 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 
 std::string NearestWordHint(const std::string& word, const std::vector<std::string>& known,
                             const std::string& prefix) {
-  const auto nearest = std::ranges::min_element(
-      known, {}, [&word](const std::string& candidate) { return EditDistance(candidate, word); });
+  const auto nearest = std::min_element(known.begin(), known.end(),
+                                        [&word](const std::string& a, const std::string& b) {
+                                          return EditDistance(a, word) < EditDistance(b, word);
+                                        });
   if (nearest == known.end()) {
     return "; none is known here";
   }

@@ -147,7 +147,8 @@ void YamlOptions::AddNamed(const std::string& key, const std::vector<std::string
   entry.help = help.empty() ? "" : fmt::format("{}: {}", fmt::join(names, ", "), help);
   entry.read = [names, set](const YAML::Node& node, const std::string& file,
                             const std::string& path) {
-    const auto found = node.IsScalar() ? std::ranges::find(names, node.Scalar()) : names.end();
+    const auto found =
+        node.IsScalar() ? std::find(names.begin(), names.end(), node.Scalar()) : names.end();
     if (found == names.end()) {
       ThrowType(node, file, path, fmt::format("one of {}", fmt::join(names, ", ")));
     }

@@ -36,7 +36,8 @@ YamlOptions::YamlOptions(YamlOptions&&) noexcept = default;
 YamlOptions& YamlOptions::operator=(YamlOptions&&) noexcept = default;
 
 YamlOptions::Entry* YamlOptions::Find(const std::string& key) const {
-  const auto entry = std::ranges::find(entries_, key, &Entry::key);
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&key](const auto& known) { return known->key == key; });
   return entry == entries_.end() ? nullptr : entry->get();
 }
 

@@ -29,10 +29,6 @@ uint32_t DescriptorIndex::Table::Signature(const Descriptor& descriptor) const {
   return GatherBits(descriptor, signature_bits);
 }
 
-void DescriptorIndex::Table::Add(const Descriptor& descriptor, int keyframe) {
-  postings.Add(Word(descriptor), keyframe, Signature(descriptor));
-}
-
 DescriptorIndex::DescriptorIndex() {
   std::mt19937_64 rng(20200513);
   std::array<uint16_t, kDescriptorBits> order{};
@@ -53,13 +49,22 @@ DescriptorIndex::DescriptorIndex() {
 int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   const int keyframe = size();
   num_corners_.push_back(static_cast<int>(corners.size()));
+  // First all words, then all lists: these lie far apart, and the processor fetches several at
+  // once.
+  std::vector<std::pair<uint32_t, uint32_t>> hashes(corners.size());
   for (Table& table : tables_) {
-    for (const Corner& corner : corners) {
-      table.Add(corner.descriptor, keyframe);
+    std::ranges::transform(corners, hashes.begin(), [&table](const Corner& corner) {
+      return std::pair(table.Word(corner.descriptor), table.Signature(corner.descriptor));
+    });
+    for (const auto& [word, signature] : hashes) {
+      table.postings.Add(word, keyframe, signature);
     }
   }
   if (size() % kPackEvery == 0) {
-    tables_[size() / kPackEvery % kTables].postings.Pack();
+    PostingLists& postings = tables_[size() / kPackEvery % kTables].postings;
+    if (postings.num_waiting() > std::max(kNumWords, postings.num_packed() / kPackShare)) {
+      postings.Pack();
+    }
   }
   return keyframe;
 }

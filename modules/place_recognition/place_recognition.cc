@@ -102,22 +102,6 @@ void PlaceRecognition::Remember(const Keyframe& keyframe, const PlaceMatch& know
   Store(RecognisedKeyframe(keyframe));
 }
 
-void PlaceRecognition::SetGroup(const MapId& group, int64_t revision,
-                                const std::vector<MapId>& maps) {
-  // A map that has left the group stands alone again until another group names it.
-  for (auto& [map, state] : groups_) {
-    if (state.group == group && state.revision <= revision) {
-      state = {map, revision, false};
-    }
-  }
-  for (const MapId& map : maps) {
-    MapGroup& state = groups_[map];
-    if (state.revision <= revision) {
-      state = {group, revision, maps.size() > 1};
-    }
-  }
-}
-
 void PlaceRecognition::Store(const RecognisedKeyframe& keyframe) {
   ++counters_.keyframes;
   if (index_.size() < options_.max_keyframes && stored_.Add(keyframe)) {
@@ -250,9 +234,7 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
 }
 
 PlaceKind PlaceRecognition::Kind(const MapId& a, const MapId& b) const {
-  const auto group = groups_.find(a);
-  const bool fused = group != groups_.end() && group->second.fused;
-  return a == b && !fused ? PlaceKind::kIntra : PlaceKind::kInter;
+  return a == b && !groups_.IsFused(a) ? PlaceKind::kIntra : PlaceKind::kInter;
 }
 
 void PlaceRecognition::RememberPlaces(const PlaceMatch& match) {

@@ -24,6 +24,7 @@
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
 #include "place_recognition/epipolar_check.h"
+#include "place_recognition/map_groups.h"
 #include "place_recognition/stored_keyframes.h"
 
 namespace pangea {
@@ -103,8 +104,10 @@ class PlaceRecognition {
   // Remembers only: for keyframes whose match is known from an earlier run.
   void Remember(const Keyframe& keyframe, const PlaceMatch& known);
 
-  // The maps of one group (a MAP_STATE). The highest revision wins, map by map.
-  void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps);
+  // The maps of one group (a MAP_STATE).
+  void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps) {
+    groups_.Set(group, revision, maps);
+  }
 
   const Counters& counters() const { return counters_; }
   const RecordCounters& store_counters() const { return stored_.counters(); }
@@ -113,11 +116,6 @@ class PlaceRecognition {
   struct Place {
     int keyframe = 0;  // index into stored_
     float score = 0;
-  };
-  struct MapGroup {
-    MapId group;
-    int64_t revision = -1;
-    bool fused = false;
   };
 
   void Store(const RecognisedKeyframe& keyframe);
@@ -143,7 +141,7 @@ class PlaceRecognition {
   DescriptorIndex index_;
   StoredKeyframes stored_;                                 // numbered as in index_
   std::map<MapId, std::vector<KeyframeId>> last_matches_;  // of each map's newest keyframe
-  std::map<MapId, MapGroup> groups_;
+  MapGroups groups_;
   Counters counters_;
 };
 

@@ -54,9 +54,6 @@ void PlaceRecognitionProcess::OnKeyframe(const Keyframe& keyframe) {
     node_.Count("matches_of_the_journal");
   } else {
     held_.push_back(keyframe);
-    if (!journal_.catching_up()) {
-      RecogniseHeld();
-    }
   }
 }
 
@@ -64,7 +61,7 @@ void PlaceRecognitionProcess::RecogniseHeld() {
   while (held_.size() > kMaxHeld) {
     RecogniseNext();
   }
-  if (!held_.empty()) {
+  if (!held_.empty() && !journal_.reading()) {
     node_.WorkWhenIdle([this] { return RecogniseNext(); });
   }
 }
@@ -95,6 +92,8 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
   // Matches that came before any catch-up wait for their keyframes: a replay hands them on first.
   if (std::exchange(was_catching_up_, journal_.catching_up()) && !was_catching_up_) {
     known_matches_.clear();
+  }
+  if (!was_catching_up_) {
     RecogniseHeld();
   }
 }

@@ -3,10 +3,11 @@
 // place_recognition on a bus: KEYFRAME_* and MAP_STATE in, one PLACE_MATCH per keyframe out.
 //
 // Keyframes are taken in seq order, map by map (journal_follower.h). After a restart the journal's
-// PLACE_MATCHes are asked for along with its keyframes: a keyframe that has its match is only
-// remembered, and those without one wait until all the others are in, so that no pair of keyframes
-// goes unseen, and until the pose graph, which is asked for the groups, has said which maps are
-// fused: a candidate's kind hangs on it. It answers requests for the newest PLACE_MATCHes itself.
+// PLACE_MATCHes are read before its keyframes, or asked for along with them: a keyframe that has
+// its match is only remembered, and those without one wait until all the others are in, so that no
+// pair of keyframes goes unseen, and until the pose graph, which is asked for the groups, has said
+// which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
+// PLACE_MATCHes itself.
 //
 // Live, keyframes are recognised one at a time, when no message waits: after a catch-up there may
 // be many, and meanwhile groups are to be heard and requests answered.

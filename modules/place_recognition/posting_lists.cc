@@ -42,6 +42,7 @@ void PostingLists::Pack() {
   }
   begin_.back() = static_cast<uint32_t>(packed.size());
   packed_ = std::move(packed);
+  num_packed_ += waiting_.size();
   waiting_.clear();
   newest_.assign(newest_.size(), kNone);
 }

@@ -22,8 +22,10 @@ class PostingLists {
 
   // Keyframes come in ascending order.
   void Add(uint32_t word, int32_t keyframe, uint32_t signature);
-  // Packs what waits. Takes the time to copy all of it.
+  // Packs what waits. Takes the time to copy all of it: so it is worth while when much waits.
   void Pack();
+  size_t num_packed() const { return num_packed_; }
+  size_t num_waiting() const { return waiting_.size(); }
 
   // Calls visit(keyframe, signature), in any order, for the word's postings; of those that have
   // more than `most`, for an even sample of about this many, which `phase` rotates.
@@ -105,6 +107,7 @@ class PostingLists {
   void PackWord(uint32_t word, std::vector<uint8_t>* packed) const;
 
   std::vector<uint8_t> packed_;
+  size_t num_packed_ = 0;
   std::vector<uint32_t> begin_;  // of each word's list in packed_; and the end
   std::vector<Waiting> waiting_;
   std::vector<uint32_t> newest_;  // of each word, in waiting_

@@ -17,8 +17,8 @@ namespace {
   throw std::runtime_error(fmt::format("{}: {}", file, what));
 }
 
-YAML::Node Load(const std::string& path) {
-  std::string text = ReadTextFile(path);
+// `path` stands for the text in messages.
+YAML::Node Load(std::string text, const std::string& path) {
   if (text.starts_with("%YAML:")) {  // OpenCV's spelling of the directive is not YAML
     text.erase(0, text.find('\n'));
   }
@@ -121,7 +121,11 @@ double TimeOffset(const YAML::Node& root, const std::string& file, double readou
 }  // namespace
 
 CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
-  const YAML::Node root = Load(sensor_yaml);
+  return ParseEurocCamera(ReadTextFile(sensor_yaml), sensor_yaml);
+}
+
+CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml) {
+  const YAML::Node root = Load(text, sensor_yaml);
   const YAML::Node model = root["camera_model"];
   if (model && (!model.IsScalar() || model.Scalar() != "pinhole")) {
     Throw(sensor_yaml, "'camera_model' must be pinhole");
@@ -153,7 +157,12 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
 }
 
 std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml) {
-  const YAML::Node root = Load(sensor_yaml);
+  return ParseEurocCalibrationSigmas(ReadTextFile(sensor_yaml), sensor_yaml);
+}
+
+std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
+                                                             const std::string& sensor_yaml) {
+  const YAML::Node root = Load(text, sensor_yaml);
   // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0).
   const auto read = [&](const char* key, size_t size, size_t first, size_t count, double unit,
                         double* sigma) {
@@ -181,7 +190,12 @@ std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& s
 }
 
 EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
-  const YAML::Node root = Load(sensor_yaml);
+  return ParseEurocImuCalibration(ReadTextFile(sensor_yaml), sensor_yaml);
+}
+
+EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
+                                             const std::string& sensor_yaml) {
+  const YAML::Node root = Load(text, sensor_yaml);
   EurocImuCalibration calibration;
   calibration.T_s_body = Extrinsics(root, sensor_yaml);
   ImuNoise& noise = calibration.noise;
@@ -216,7 +230,7 @@ Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
   if (!Exists(sensor_yaml)) {
     return {};
   }
-  const YAML::Node root = Load(sensor_yaml);
+  const YAML::Node root = Load(ReadTextFile(sensor_yaml), sensor_yaml);
   return root["T_BS"] ? Extrinsics(root, sensor_yaml) : Rigid3();
 }
 

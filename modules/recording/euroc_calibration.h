@@ -22,6 +22,12 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml);
 // Nothing when the file says none of them (docs/recordings.md); those it does not say are as usual.
 std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml);
 EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml);
+// The same of a text at hand; `sensor_yaml` stands for it in messages.
+CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml);
+std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
+                                                             const std::string& sensor_yaml);
+EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
+                                             const std::string& sensor_yaml);
 // T_BS of any sensor; identity when the file or the key is missing.
 Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml);
 

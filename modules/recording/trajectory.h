@@ -1,8 +1,8 @@
 #pragma once
 
-// Timed poses, and the two text formats they live in: TUM ("seconds tx ty tz qx qy qz qw") and
-// EuRoC's ground-truth csv ("nanoseconds, p (3), q w x y z" and, in 17 columns, velocity and
-// biases). Readers sort by time, drop duplicates and malformed rows, and say so.
+// Trajectories read from the two text formats they live in: TUM (tum.h) and EuRoC's ground-truth
+// csv ("nanoseconds, p (3), q w x y z" and, in 17 columns, velocity and biases). Readers sort by
+// time, drop duplicates and malformed rows, and say so.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,17 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "core/rigid3.h"
+#include "recording/tum.h"
 
 namespace pangea {
-
-struct StampedPose {
-  int64_t utime = 0;  // microseconds
-  Rigid3 T;           // e.g. T_odom_body, T_map_body: as the user says
-};
-
-// Strictly ascending in time.
-using Trajectory = std::vector<StampedPose>;
 
 // Nanoseconds to microseconds, rounded down (also below zero).
 int64_t UtimeFromNs(int64_t ns);
@@ -56,8 +48,6 @@ Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string
 // Either format, told apart by the first row: EuRoC's has commas.
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings);
 
-// Stamps with six decimals, the rest with nine; the same poses give the same bytes.
-std::string ToTum(const Trajectory& trajectory);
 void WriteTum(const std::string& path, const Trajectory& trajectory);
 
 // Position linear, rotation slerp; nothing outside the trajectory, or when the two poses around

@@ -19,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStopGrace_s = 5;
+constexpr const char* kGateway = "gateway";
 constexpr std::chrono::milliseconds kLookInterval{100};
 
 void Say(const std::string& line) {
@@ -54,14 +55,20 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
   return argv;
 }
 
-// Whether one was given up: a server that lacks a process is none.
+std::vector<std::string> GatewayCommand(const ServerOptions& options) {
+  return {Program(kGateway), "--site",    options.site.string(),
+          "--bus",           options.bus, "--link",
+          options.link,      "--port",    std::to_string(*options.phone_port)};
+}
+
+// Whether one was given up: a server that lacks a process is none. It is one without the gateway.
 bool ReviveAll(KeptProcesses* kept) {
   bool given_up = false;
   for (const KeptProcesses::Revived& revived : kept->Revive()) {
     Say(fmt::format("{} ended ({}); {}", revived.name, revived.why,
                     revived.given_up ? fmt::format("given up after {} times", revived.unexpected)
                                      : "starting it again"));
-    given_up |= revived.given_up;
+    given_up |= revived.given_up && revived.name != kGateway;
   }
   return given_up;
 }
@@ -99,10 +106,15 @@ int Serve(const ServerOptions& options) {
   InstallSignalHandlers();
   fs::create_directories(options.logs);
   KeptProcesses kept(options.logs);
-  for (const std::string process : kServerProcesses) {
-    const std::vector<std::string> argv = Command(process, options);
+  const auto start = [&kept](const std::string& process, const std::vector<std::string>& argv) {
     kept.Start(process, argv);
     Say(fmt::format("started {}", fmt::join(argv, " ")));
+  };
+  for (const std::string process : kServerProcesses) {
+    start(process, Command(process, options));
+  }
+  if (options.phone_port) {
+    start(kGateway, GatewayCommand(options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
   bool given_up = false;

@@ -1,10 +1,13 @@
 #pragma once
 
-// The server of a site by one command: the eight server processes, each started again when it ends,
-// until Ctrl-C or SIGTERM ends them in order (what they say goes to files).
+// The server of a site by one command: the eight server processes and, if wanted, the gateway, each
+// started again when it ends, until Ctrl-C or SIGTERM ends them in order (what they say goes to
+// files).
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace pangea::session {
@@ -16,6 +19,10 @@ struct ServerOptions {
   std::filesystem::path keys;
   std::filesystem::path logs;
   std::string http;  // ADDRESS:PORT of the anchors' API; empty: none
+  // Of the gateway for phones' browsers, which needs a site; nothing: none. The server runs without
+  // it when it cannot start.
+  std::optional<uint16_t> phone_port;
+  std::filesystem::path site;
   std::map<std::string, std::filesystem::path> options;  // of each process, its file
 };
 

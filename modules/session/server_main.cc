@@ -49,11 +49,17 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
                  "PROCESS=FILE.yaml, before what the folder has");
   app.add_option("--http", options.http,
                  "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
+  app.add_option("--phone", options.phone_port,
+                 "pangea-gateway too, which lets phones' browsers in, on this TCP port")
+      ->expected(0, 1)
+      ->default_str("8443")
+      ->needs(site);
 }
 
 // What the command line leaves open is the site's.
 void UseSite(const site::Site& site, Arguments* arguments) {
   ServerOptions& options = arguments->options;
+  options.site = site.folder;
   options.journal = site.journal();
   options.keys = site.keys();
   options.logs = site.logs();

@@ -16,6 +16,7 @@
 #include <stdexcept>
 
 #include "files/progress.h"
+#include "files/whole_file.h"
 #include "log_file/log_event.h"
 #include "site/archive_file.h"
 #include "site/site_files.h"
@@ -55,11 +56,16 @@ Source SourceOf(const fs::path& path, const std::string& name) {
 
 std::vector<Source> SourcesOf(const Site& site, bool with_keys, const WholePart& journal) {
   std::vector<Source> sources{SourceOf(site.file(), "site.yaml")};
-  for (const fs::path& file : OptionFiles(site)) {
-    sources.push_back(SourceOf(file, "options/" + file.filename().string()));
-  }
-  for (const fs::path& file : with_keys ? KeyFiles(site) : std::vector<fs::path>()) {
-    sources.push_back(SourceOf(file, "keys/" + file.filename().string()));
+  const auto add = [&sources](const std::vector<fs::path>& files, const std::string& folder) {
+    for (const fs::path& file : files) {
+      sources.push_back(SourceOf(file, folder + file.filename().string()));
+    }
+  };
+  add(OptionFiles(site), "options/");
+  add(GatewayAgentFiles(site), "gateway/agents/");
+  if (with_keys) {
+    add(KeyFiles(site), "keys/");
+    add(GatewayIdentityFiles(site), "gateway/");
   }
   if (fs::exists(site.journal())) {
     sources.push_back(SourceOf(site.journal(), "journal.lcm"));

@@ -1,7 +1,7 @@
 #pragma once
 
-// Copies of a site, made while its server runs: site.yaml, options, the journal up to what is
-// written to its end, and, if wanted, the agents' keys.
+// Copies of a site, made while its server runs: site.yaml, options, who joined, the journal up to
+// what is written to its end, and, if wanted, the keys: the agents' and the gateway's.
 
 #include <cstdint>
 #include <filesystem>

@@ -28,6 +28,12 @@ class BackupTest : public testing::TestWithParam<const char*> {
     std::ofstream(site.keys() / "agent_4.key") << "secret";
     fs::permissions(site.keys() / "agent_4.key", fs::perms::owner_read | fs::perms::owner_write);
     std::ofstream(site.logs() / "fusion.txt") << "said";
+    fs::create_directories(site.gateway() / "agents");
+    fs::create_directories(site.gateway() / "invites");
+    std::ofstream(site.gateway() / "agents" / "1001.json") << "Anna";
+    std::ofstream(site.gateway() / "invites" / "00ff.json") << "Ben";
+    std::ofstream(site.gateway() / "ca.pem") << "authority";
+    std::ofstream(site.gateway() / "ca.key") << "its key";
   }
 };
 
@@ -42,6 +48,9 @@ TEST_P(BackupTest, ComesBackWithoutKeysAndLogs) {
   EXPECT_EQ(FoundAtOpening(again), "");
   EXPECT_EQ(ReadTextFile(again.options() / "fusion.yaml"), "{}\n");
   EXPECT_TRUE(fs::is_empty(again.keys()));
+  EXPECT_EQ(ReadTextFile(again.gateway() / "agents" / "1001.json"), "Anna");
+  EXPECT_FALSE(fs::exists(again.gateway() / "ca.key"));
+  EXPECT_FALSE(fs::exists(again.gateway() / "invites"));
   EXPECT_TRUE(fs::is_empty(again.logs()));
 }
 
@@ -52,6 +61,9 @@ TEST_P(BackupTest, BringsKeysIfWantedReadableByTheirOwnerAlone) {
   EXPECT_EQ(ReadTextFile(key), "secret");
   EXPECT_EQ(fs::status(key).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_EQ(fs::status(key.parent_path()).permissions(), fs::perms::owner_all);
+  EXPECT_EQ(ReadTextFile(folder / "again" / "gateway" / "ca.key"), "its key");
+  EXPECT_EQ(ReadTextFile(folder / "again" / "gateway" / "ca.pem"), "authority");
+  EXPECT_FALSE(fs::exists(folder / "again" / "gateway" / "invites")) << "a code is good once";
 }
 
 TEST_P(BackupTest, EndsBehindTheLastGroupThatIsWrittenToItsEnd) {

@@ -168,6 +168,16 @@ void CopyOptions(const Site& site, const fs::path& options) {
   }
 }
 
+// Who joined either by an invite; of two with one id the first.
+void CopyAgents(const std::vector<Site>& sites, const fs::path& agents) {
+  for (const Site& site : sites) {
+    for (const fs::path& file : GatewayAgentFiles(site)) {
+      fs::create_directories(agents);
+      fs::copy_file(file, agents / file.filename(), fs::copy_options::skip_existing);
+    }
+  }
+}
+
 }  // namespace
 
 MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& out,
@@ -190,6 +200,7 @@ MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& o
   fs::permissions(made_site.keys(), fs::perms::owner_all);
   fs::create_directories(made_site.options());
   CopyOptions(first, made_site.options());
+  CopyAgents({first, second}, made_site.gateway() / "agents");
   if (options.with_keys) {
     CopyKeys(first, made_site.keys());
     CopyKeys(second, made_site.keys());

@@ -114,8 +114,15 @@ TEST_F(MergeTest, BringsTheFirstsOptionsAndKeysIfWanted) {
   std::ofstream(first.keys() / "agent_1.key") << "one";
   std::ofstream(second.keys() / "agent_1.key") << "one";
   std::ofstream(second.keys() / "agent_2.key") << "two";
+  for (const Site& site : {first, second}) {
+    fs::create_directories(site.gateway() / "agents");
+    std::ofstream(site.gateway() / "agents" / "1001.json") << site.description.name;
+  }
+  std::ofstream(second.gateway() / "agents" / "1002.json") << "Ben";
   MergeSites(first, second, folder / "no_keys", {});
   EXPECT_TRUE(fs::is_empty(folder / "no_keys/keys"));
+  EXPECT_EQ(ReadTextFile(folder / "no_keys/gateway/agents/1001.json"), first.description.name);
+  EXPECT_EQ(ReadTextFile(folder / "no_keys/gateway/agents/1002.json"), "Ben");
   MergeSites(first, second, out, {.name = "Both", .with_keys = true});
   EXPECT_EQ(ReadSite(out).description.name, "Both");
   EXPECT_TRUE(fs::exists(out / "options/fusion.yaml"));

@@ -14,6 +14,7 @@
 
 #include "bus/bus.h"
 #include "files/text_file.h"
+#include "files/whole_file.h"
 #include "link/wire.h"
 #include "options/yaml_options.h"
 
@@ -28,7 +29,8 @@ constexpr size_t kMaxName = 100;
 // What stands in a site: only this may be in a folder that becomes one.
 bool IsOurs(const std::string& name) {
   return std::ranges::find(kFolders, name) != std::end(kFolders) || name == "lock" ||
-         name == "site.yaml" || name == "site.yaml.new" || name.starts_with("journal.lcm");
+         name == "gateway" || name == "site.yaml" || name == "site.yaml.new" ||
+         name.starts_with("journal.lcm");
 }
 
 void CheckDescription(const fs::path& file, const SiteDescription& description) {
@@ -224,19 +226,6 @@ std::optional<int> UserOf(const Site& site) {
   }
   close(fd);
   return user;
-}
-
-void SyncToDisk(const fs::path& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool synced = fd >= 0 && fsync(fd) == 0;
-  const int error = errno;
-  if (fd >= 0) {
-    close(fd);
-  }
-  if (!synced) {
-    throw std::runtime_error(
-        fmt::format("{}: cannot be brought to the disk: {}", path.string(), std::strerror(error)));
-  }
 }
 
 std::string TimeForFileName() {

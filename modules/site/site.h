@@ -7,6 +7,7 @@
 //   keys/         a key for each agent that may join; mode 0700
 //   options/      <process>.yaml
 //   logs/         what the server's processes print
+//   gateway/      what pangea-gateway keeps (admission.h, identity.h there); mode 0700
 //   lock          held by the server, and by what changes the site
 
 #include <cstdint>
@@ -43,6 +44,7 @@ struct Site {
   std::filesystem::path keys() const { return folder / "keys"; }
   std::filesystem::path options() const { return folder / "options"; }
   std::filesystem::path logs() const { return folder / "logs"; }
+  std::filesystem::path gateway() const { return folder / "gateway"; }
 };
 
 // What a site is called that nobody gave a name.
@@ -95,10 +97,6 @@ class SiteLock {
 
 // Whose lock is on the site; nothing if nobody has one.
 std::optional<int> UserOf(const Site& site);
-
-// All that was written to the file or folder is on the disk when this returns. Throws
-// std::runtime_error.
-void SyncToDisk(const std::filesystem::path& path);
 
 // "20261123T055342Z"
 std::string TimeForFileName();

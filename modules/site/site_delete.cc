@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "files/whole_file.h"
+
 namespace pangea::site {
 
 namespace fs = std::filesystem;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 
 #include "files/progress.h"
@@ -59,13 +60,23 @@ bool IsPlainName(const std::string& name) {
 std::vector<fs::path> KeyFiles(const Site& site) { return FilesIn(site.keys(), ".key"); }
 std::vector<fs::path> OptionFiles(const Site& site) { return FilesIn(site.options(), ".yaml"); }
 
+std::vector<fs::path> GatewayAgentFiles(const Site& site) {
+  return FilesIn(site.gateway() / "agents", ".json");
+}
+std::vector<fs::path> GatewayIdentityFiles(const Site& site) {
+  std::vector<fs::path> files = FilesIn(site.gateway(), ".key");
+  std::ranges::copy(FilesIn(site.gateway(), ".pem"), std::back_inserter(files));
+  return files;
+}
+
 bool IsFileOfSite(const std::string& name) {
   const auto is_in = [&name](const std::string& folder, const std::string& extension) {
     return name.starts_with(folder) && name.ends_with(extension) &&
            IsPlainName(name.substr(folder.size()));
   };
   return name == "site.yaml" || name == "journal.lcm" || is_in("keys/", ".key") ||
-         is_in("options/", ".yaml");
+         is_in("options/", ".yaml") || is_in("gateway/agents/", ".json") ||
+         is_in("gateway/", ".key") || is_in("gateway/", ".pem");
 }
 
 WholePart FindWholePart(const fs::path& journal) {

@@ -15,6 +15,10 @@ namespace pangea::site {
 // agent_<id>.key and <process>.yaml: sorted; empty where there is no folder.
 std::vector<std::filesystem::path> KeyFiles(const Site& site);
 std::vector<std::filesystem::path> OptionFiles(const Site& site);
+// Who joined by an invite: each copy has them, so that nobody gets the id of another. Invites stay
+// here: a code is good once. And by what the gateway is known, which goes where keys go.
+std::vector<std::filesystem::path> GatewayAgentFiles(const Site& site);
+std::vector<std::filesystem::path> GatewayIdentityFiles(const Site& site);
 
 // Whether a copy of a site may have a file of that name, relative to its folder: what comes from
 // elsewhere is not written anywhere else.

@@ -14,9 +14,11 @@ std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorId& id) {
   if (anchors_.contains(id) || anchors_.size() < kMaxAnchors) {
     return std::nullopt;
   }
-  auto found = std::ranges::find_if(anchors_, [](const auto& a) { return a.second.state.gone; });
+  auto found = std::find_if(anchors_.begin(), anchors_.end(),
+                            [](const auto& a) { return a.second.state.gone; });
   if (found == anchors_.end()) {
-    found = std::ranges::find_if(anchors_, [](const auto& a) { return a.second.number == 0; });
+    found = std::find_if(anchors_.begin(), anchors_.end(),
+                         [](const auto& a) { return a.second.number == 0; });
   }
   if (found == anchors_.end()) {
     return std::nullopt;

@@ -14,6 +14,14 @@ double Share(int64_t utime, int64_t from, int64_t to) {
   return static_cast<double>(utime - from) / static_cast<double>(to - from);
 }
 
+// The first at or after that time.
+template <typename Stamped>
+typename std::deque<Stamped>::const_iterator FirstFrom(const std::deque<Stamped>& items,
+                                                       int64_t utime) {
+  return std::lower_bound(items.begin(), items.end(), utime,
+                          [](const Stamped& item, int64_t time) { return item.utime < time; });
+}
+
 }  // namespace
 
 void PoseHistory::Open(const MapId& map) {
@@ -47,7 +55,7 @@ void PoseHistory::AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_o
 }
 
 std::optional<Rigid3> PoseHistory::Live(int64_t utime) const {
-  const auto after = std::ranges::lower_bound(poses_, utime, {}, &Entry::utime);
+  const auto after = FirstFrom(poses_, utime);
   if (after == poses_.end()) {
     return std::nullopt;
   }
@@ -66,7 +74,7 @@ std::optional<Rigid3> PoseHistory::At(int64_t utime, const MapId& map) const {
   if (!live || corrections_.empty()) {
     return live;
   }
-  const auto after = std::ranges::lower_bound(corrections_, utime, {}, &Correction::utime);
+  const auto after = FirstFrom(corrections_, utime);
   if (after == corrections_.begin()) {
     return after->T_odom_live * *live;
   }

@@ -60,7 +60,7 @@ void ShownAnchorsBlend::OnKeyframe(int64_t utime, const MapId& map) {
 }
 
 void ShownAnchorsBlend::Look() {
-  moving_ = std::ranges::any_of(anchors_, [this](const auto& item) {
+  moving_ = std::any_of(anchors_.begin(), anchors_.end(), [this](const auto& item) {
     return item.second.map == map_ && item.second.speed > 0;
   });
 }

@@ -158,7 +158,7 @@ std::vector<MapId> Uplink::Announced() const {
       announced.push_back(it->first);
     }
   }
-  std::ranges::reverse(announced);
+  std::reverse(announced.begin(), announced.end());
   return announced;
 }
 
@@ -184,7 +184,7 @@ void Uplink::GiveSlots(const std::vector<MapId>& announced) {
 // The journal knew the map before a hello of this run named it.
 bool Uplink::LacksSlot() const {
   const std::vector<MapId> announced = Announced();
-  return std::ranges::any_of(announced, [&](const MapId& id) {
+  return std::any_of(announced.begin(), announced.end(), [&](const MapId& id) {
     const OutgoingMap& map = maps_.at(id);
     return map.listed && !map.slot;
   });

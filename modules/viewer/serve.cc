@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kServe_ms = 20;
 constexpr int kMaxMessagesAtOnce = 500;
+constexpr const char* kNoPage = "scripts/viewer builds it (with npm), or give --page FOLDER";
 
 void Announce(const web::WebServer& server, const web::WebOptions& options) {
   std::cout << fmt::format("http://{}:{}/\n", options.listen, server.port()) << std::flush;
@@ -35,7 +36,7 @@ void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls
     agent_buses.push_back(std::make_unique<LcmBus>(agent_url));
     process.WatchAgent(*agent_buses.back());
   }
-  PageSite site(ReadPage(page), process);
+  PageSite site(web::ReadPage(page, kNoPage), process);
   web::WebServer server(options, site);
   Announce(server, options);
   while (!StopRequested()) {
@@ -51,7 +52,7 @@ void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls
 int ServeLog(const std::string& log, const web::WebOptions& options, const std::string& page) {
   LogShow show(log);
   const int exit_code = TellLosses("pangea-viewer", show.readings(), 0);
-  PageSite site(ReadPage(page), show);
+  PageSite site(web::ReadPage(page, kNoPage), show);
   web::WebServer server(options, site);
   Announce(server, options);
   int64_t now = WallUtime();

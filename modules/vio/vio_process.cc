@@ -11,7 +11,7 @@
 #include "messages/messages.h"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
-#include "recording/trajectory.h"
+#include "recording/tum.h"
 
 namespace pangea::vio {
 namespace {

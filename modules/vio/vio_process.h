@@ -20,7 +20,6 @@
 #include "bus/process.h"
 #include "bus/retransmission/keyframe_outlet.h"
 #include "log_file/log_writer.h"
-#include "recording/euroc.h"
 #include "vio/live/map_localization.h"
 #include "vio/live/shown_pose.h"
 #include "vio/vio.h"

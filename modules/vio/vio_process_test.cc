@@ -12,6 +12,7 @@
 #include "files/text_file.h"
 #include "messages/channels.h"
 #include "pangea/keyframe_t.hpp"
+#include "recording/trajectory.h"
 #include "vio/command_line.h"
 #include "vio/front_end/test_images.h"
 #include "vio/vio_process_test_world.h"

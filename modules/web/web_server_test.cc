@@ -143,6 +143,14 @@ TEST_F(WebServerTest, TheSiteHearsMethodBodyAndCondition) {
   EXPECT_EQ(site_.last_.if_match, "\"3\"");
 }
 
+TEST_F(WebServerTest, TheSiteHearsWhoAsksAndWhetherTheyTakeGzip) {
+  Ask("GET / HTTP/1.1\r\nHost: localhost:1\r\n\r\n");
+  EXPECT_EQ(site_.last_.address, "127.0.0.1");
+  EXPECT_FALSE(site_.last_.takes_gzip);
+  Ask("GET / HTTP/1.1\r\nHost: localhost:1\r\nAccept-Encoding: br, gzip\r\n\r\n");
+  EXPECT_TRUE(site_.last_.takes_gzip);
+}
+
 TEST_F(WebServerTest, ALargeBodyIsRefusedWithTheReason) {
   const std::string body(WebServer::kMaxBody + 1, 'x');
   const std::string answer = Ask("POST /echo HTTP/1.1\r\nHost: localhost:1\r\nContent-Length: " +
@@ -238,12 +246,12 @@ TEST_F(WebServerTest, APeerIsSentWhatThereIsAndWhatItShouldNotSayEndsIt) {
 
 TEST_F(WebServerTest, PeersAreCounted) {
   std::vector<std::unique_ptr<WebClient>> clients;
-  for (int i = 0; i <= WebServer::kMaxPeers; ++i) {
+  for (int i = 0; i <= WebOptions().max_peers; ++i) {
     clients.push_back(std::make_unique<WebClient>(server_.port()));
     clients.back()->Send(UpgradeRequest("/socket", "http://127.0.0.1:1"));
     Serve();
     EXPECT_THAT(clients.back()->Received(),
-                StartsWith(i < WebServer::kMaxPeers ? "HTTP/1.1 101" : "HTTP/1.1 503"));
+                StartsWith(i < WebOptions().max_peers ? "HTTP/1.1 101" : "HTTP/1.1 503"));
   }
   clients.clear();
   Serve();
@@ -332,6 +340,9 @@ TEST_F(ForProgramsTest, PagesOfOthersEmbedNothing) {
   EXPECT_THAT(get("cross-site"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(get("same-site"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(get("none"), StartsWith("HTTP/1.1 201")) << "typed by the user";
+  EXPECT_THAT(get("cross-site\r\nSec-Fetch-Dest: iframe"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("cross-site\r\nSec-Fetch-Dest: document"), StartsWith("HTTP/1.1 201"))
+      << "a link in another's page, which the user leaves";
 }
 
 TEST_F(ForProgramsTest, PagesOfAnAllowedOriginMay) {

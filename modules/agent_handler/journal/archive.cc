@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <utility>
@@ -311,6 +312,9 @@ std::string Archive::Damage() const {
 }
 
 void Archive::PublishHave() {
+  node_.Publish(std::string(channels::kJournalFile),
+                ToMessage(JournalFile{std::filesystem::absolute(journal_->path()).string(),
+                                      journal_->state()}));
   auto it = by_age_.begin();
   do {
     have_t message{};

@@ -115,6 +115,7 @@ bool Journal::Take(const CheckedScan::Piece& piece, const Visitor& visitor) {
     return false;
   }
   Note(piece.header.number, piece.header.utime, piece.crc32());
+  last_event_ = {piece.offset, static_cast<int32_t>(piece.bytes), piece.crc32()};
   KeepNewest(kRepeated);
   return true;
 }
@@ -160,7 +161,10 @@ bool Journal::Sync() {
     queue_.resize(queued);
     return false;
   }
-  Note(next_event_, last_utime_, EventChecksum(Bytes(queue_).subspan(queued)));
+  last_event_ = {synced_bytes_ + static_cast<int64_t>(queued),
+                 static_cast<int32_t>(queue_.size() - queued),
+                 EventChecksum(Bytes(queue_).subspan(queued))};
+  Note(next_event_, last_utime_, last_event_.crc32);
   KeepNewest(kRepeated);
   synced_bytes_ += static_cast<int64_t>(queue_.size());
   queue_.clear();

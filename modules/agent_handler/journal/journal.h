@@ -54,6 +54,11 @@ class Journal {
   std::vector<uint8_t> Read(const JournalPlace& place) const;
 
   int64_t size() const { return synced_bytes_; }
+  // For who reads the file beside us.
+  const std::string& path() const { return path_; }
+  JournalState state() const {
+    return {synced_bytes_, last_event_.size > 0 ? last_event_.offset : -1, last_event_.crc32};
+  }
   // What was found when it was opened.
   const JournalMend& mend() const { return mend_; }
 
@@ -70,6 +75,7 @@ class Journal {
   JournalMend mend_;
   int64_t next_event_ = 0;
   int64_t last_utime_ = 0;
+  JournalPlace last_event_;            // on the disk; of no size: none
   std::deque<uint32_t> newest_crc32_;  // of the events up to next_event_, without a gap
   std::vector<uint8_t> queue_;
 };

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 
+#include "bus/retransmission/journal_reader.h"
 #include "log_file/log_event.h"
 
 namespace pangea {
@@ -70,6 +71,16 @@ class JournalTest : public testing::Test {
     ASSERT_TRUE(journal->Sync());
   }
 
+  // Whether a reader of the file agrees (journal_reader.h).
+  bool ReadsTo(const JournalState& state) const {
+    try {
+      JournalReader reader({path, state});
+      return true;
+    } catch (const std::runtime_error&) {
+      return false;
+    }
+  }
+
   std::string folder, path;
   std::vector<Seen> seen;
 };
@@ -111,6 +122,25 @@ TEST_F(JournalTest, ReadsBackByPlaceBeforeAndAfterSyncAndReopening) {
 }
 
 // Cut at every byte: what was complete is kept, the rest is kept beside, and appending goes on.
+TEST_F(JournalTest, ItsStateIsWhatIsOnTheDisk) {
+  EXPECT_EQ(Open()->state(), JournalState());
+  Write(3);
+  const auto journal = Open();
+  const JournalState state = journal->state();
+  EXPECT_EQ(state.num_bytes, static_cast<int64_t>(std::filesystem::file_size(path)));
+  journal->Append(4, "A", Payload(1));
+  EXPECT_EQ(journal->state(), state) << "not yet on the disk";
+  ASSERT_TRUE(journal->Sync());
+  const JournalState after = journal->state();
+  EXPECT_EQ(after.num_bytes, static_cast<int64_t>(std::filesystem::file_size(path)));
+  EXPECT_GT(after.last_event_offset, state.num_bytes);
+  EXPECT_TRUE(ReadsTo(after));
+  EXPECT_TRUE(ReadsTo(state)) << "what it was is what it begins with";
+  JournalState other = state;
+  ++other.last_event_crc32;
+  EXPECT_FALSE(ReadsTo(other));
+}
+
 TEST_F(JournalTest, ATornTailIsCutAndKeptBeside) {
   Write(3);
   const Contents whole = ContentsOf(path);

@@ -9,7 +9,7 @@ namespace pangea {
 void JournalFirstBus::Subscribe(const std::string& channel_regex, Handler handler) {
   const Handler* kept = &handlers_.emplace_back(std::move(handler));
   bus_.Subscribe(channel_regex, [this, kept](const std::string& channel, Bytes data) {
-    if (open_ || channel == channels::kHave) {
+    if (open_ || channel == channels::kHave || channel == channels::kJournalFile) {
       have_received_ = have_received_ || channel == channels::kHave;
       (*kept)(channel, data);
     } else if (waiting_.size() < kMaxWaiting) {

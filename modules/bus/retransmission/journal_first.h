@@ -1,6 +1,7 @@
 #pragma once
 
-// A bus on which a server process that starts hears the journal's HAVE before anything else: what
+// A bus on which a server process that starts hears of the journal (JOURNAL_FILE, HAVE) before
+// anything else: what
 // others say meanwhile waits, in order. So a process that comes late knows that it does before the
 // first message that would mislead it, and learns the maps in the journal's order.
 //

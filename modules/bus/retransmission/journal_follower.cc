@@ -1,6 +1,10 @@
 #include "bus/retransmission/journal_follower.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <functional>
+#include <stdexcept>
 #include <utility>
 
 #include "bus/retransmission/timeouts.h"
@@ -21,6 +25,11 @@ JournalFollower::JournalFollower(Node& node, const Follows& follows, Handlers ha
     node_.Listen<constraint_t>(channels::kConstraint,
                                std::bind_front(&JournalFollower::OnResult, this));
   }
+  if (handlers_.anchor_edit) {
+    node_.Listen<anchor_edit_t>(channels::kAnchorEdit, handlers_.anchor_edit);
+  }
+  node_.Listen<journal_file_t>(channels::kJournalFile,
+                               std::bind_front(&JournalFollower::OnJournalFile, this));
   node_.Listen<have_t>(channels::kHave, std::bind_front(&JournalFollower::OnHave, this));
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
@@ -91,8 +100,12 @@ void JournalFollower::OnResult(const Constraint& result) {
 }
 
 void JournalFollower::OnHave(const Have& have) {
+  have_received_ = true;
   if (handlers_.have) {
     handlers_.have(have);
+  }
+  if (reading()) {
+    return;  // it comes again
   }
   for (const auto& [map, highest_seq] : have.highest_seq) {
     if (named_.insert(map).second) {
@@ -132,7 +145,8 @@ void JournalFollower::OnRetransmission(const again_t& again) {
                      (follows_.results != Which::kNone &&
                       TakeRetransmission<constraint_t>(
                           node_, again, std::bind_front(&JournalFollower::OnResult, this))) ||
-                     (handlers_.other && handlers_.other(again));
+                     (handlers_.anchor_edit &&
+                      TakeRetransmission<anchor_edit_t>(node_, again, handlers_.anchor_edit));
   if (!known) {
     node_.Refuse("again: not what was asked for");
   }
@@ -147,6 +161,93 @@ void JournalFollower::Handled() {
   }
 }
 
+// Once: what comes later than the first of these comes over the bus.
+void JournalFollower::OnJournalFile(const JournalFile& file) {
+  if (std::exchange(file_known_, true)) {
+    return;
+  }
+  try {
+    reader_ = std::make_unique<JournalReader>(file);
+  } catch (const std::runtime_error& error) {
+    Log(node_.name(), fmt::format("the journal comes over the bus; its file here, {}: {}",
+                                  file.path, error.what()));
+    return;
+  }
+  reads_former_runs_ =
+      follows_.matches == Which::kOfFormerRuns || follows_.results == Which::kOfFormerRuns;
+  node_.WorkWhenIdle([this] { return ReadPiece(); });
+}
+
+// Whether some of the file is left.
+bool JournalFollower::ReadPiece() {
+  const auto take =
+      reads_former_runs_ ? &JournalFollower::TakeOfFormerRuns : &JournalFollower::TakeOfFile;
+  try {
+    if (reader_->Next(std::bind_front(take, this))) {
+      return true;
+    }
+    if (std::exchange(reads_former_runs_, false)) {
+      reader_->Rewind();
+      return true;
+    }
+  } catch (const std::runtime_error& error) {
+    Log(node_.name(), fmt::format("the rest of the journal comes over the bus: {}", error.what()));
+  }
+  EndReading();
+  return false;
+}
+
+void JournalFollower::EndReading() {
+  reader_.reset();
+  early_states_.clear();
+  Handled();
+}
+
+template <typename Message, typename Handler>
+void JournalFollower::TakeBytes(Bytes data, const Handler& handler) {
+  Message message{};
+  if (DecodeMessage(data, &message)) {
+    node_.Take(message, handler);
+  }
+}
+
+void JournalFollower::TakeOfFormerRuns(const std::string& channel, Bytes data) {
+  if (channel == channels::kPlaceMatch && follows_.matches == Which::kOfFormerRuns) {
+    TakeBytes<place_match_t>(data, std::bind_front(&JournalFollower::OnMatch, this));
+  } else if (channel == channels::kConstraint && follows_.results == Which::kOfFormerRuns) {
+    TakeBytes<constraint_t>(data, std::bind_front(&JournalFollower::OnResult, this));
+  }
+}
+
+void JournalFollower::TakeOfFile(const std::string& channel, Bytes data) {
+  if (channel.starts_with(channels::kKeyframePrefix)) {
+    TakeBytes<keyframe_t>(data, [this](Keyframe keyframe) {
+      NoteMapOfFile(keyframe.id.map);
+      OnKeyframe(std::move(keyframe));
+    });
+  } else if (channel == channels::kPlaceMatch && follows_.matches == Which::kAll) {
+    TakeBytes<place_match_t>(data, std::bind_front(&JournalFollower::OnMatch, this));
+  } else if (channel == channels::kConstraint && follows_.results == Which::kAll) {
+    TakeBytes<constraint_t>(data, std::bind_front(&JournalFollower::OnResult, this));
+  } else if (channel == channels::kAnchorEdit && handlers_.anchor_edit) {
+    TakeBytes<anchor_edit_t>(data, handlers_.anchor_edit);
+  }
+}
+
+void JournalFollower::NoteStates(const std::vector<MapId>& maps) {
+  states_.Note(maps);
+  if (reading()) {  // the pose graph is faster than we are
+    early_states_.insert(maps.begin(), maps.end());
+  }
+}
+
+// Known from the file: all of it, and its results; but not where it is in the fused map.
+void JournalFollower::NoteMapOfFile(const MapId& map) {
+  if (named_.insert(map).second && follows_.states && !stopped_ && !early_states_.contains(map)) {
+    states_.Announce(map);
+  }
+}
+
 int64_t JournalFollower::NumMissing() const {
   int64_t count = 0;
   for (const auto& [map, seq] : goal_) {
@@ -157,10 +258,13 @@ int64_t JournalFollower::NumMissing() const {
 }
 
 int64_t JournalFollower::num_to_catch_up() const {
-  return NumMissing() + (handlers_.more_to_catch_up ? handlers_.more_to_catch_up() : 0);
+  constexpr int64_t kKeyframeBytes = 30'000;
+  const int64_t of_file = reading() ? 1 + reader_->bytes_left() / kKeyframeBytes : 0;
+  return of_file + NumMissing() + (handlers_.more_to_catch_up ? handlers_.more_to_catch_up() : 0);
 }
 
 void JournalFollower::StopCatchingUp() {
+  stopped_ = true;
   goal_.clear();
   states_.Forget();
 }
@@ -182,10 +286,21 @@ void JournalFollower::CatchUp(int64_t now_utime) {
   }
 }
 
+void JournalFollower::NoteReady(int64_t now_utime) {
+  if (!ready_ && have_received_ && !catching_up()) {
+    ready_ = true;
+    node_.Set("ready_utime", now_utime);
+  }
+}
+
 void JournalFollower::Tick(int64_t now_utime, bool ask_for_matches) {
   if (!goal_.empty()) {
     CatchUp(now_utime);
     Handled();
+  }
+  NoteReady(now_utime);
+  if (reading()) {
+    return;
   }
   AskForKeyframes(now_utime);
   if (ask_for_matches) {

@@ -1,28 +1,40 @@
 #pragma once
 
-// What a server process needs to follow the journal: keyframes, PLACE_MATCHes and verification
-// results reach it once they come, whether they were published, retransmitted, or written before it
-// started. In: KEYFRAME_*, PLACE_MATCH, CONSTRAINT, HAVE, AGAIN_<process>. Out: RESEND_REQUEST at
-// ticks, for what a gap or HAVE tells of; once per map for the results of former runs; and for the
-// states of maps that were there before this process. The time-outs: timeouts.h.
+// What a server process needs to follow the journal: keyframes, PLACE_MATCHes, verification results
+// and edits of anchors reach it once they come, whether they were published, retransmitted, or
+// written before it started. In: KEYFRAME_*, PLACE_MATCH, CONSTRAINT, ANCHOR_EDIT, HAVE,
+// JOURNAL_FILE, AGAIN_<process>. Out: RESEND_REQUEST at ticks, for what a gap or HAVE tells of;
+// once per map for the results of former runs; and for the states of maps that were there before
+// this process. The time-outs: timeouts.h.
+//
+// The journal's file, where there is one on this host (journal_reader.h), is read when JOURNAL_FILE
+// first tells of it: first all that a process made itself in former runs, then the rest, in the
+// journal's order. Meanwhile nothing is asked for; what the file did not have is asked for after.
+// It is read in pieces when no message waits (Bus::WorkWhenIdle); until then the process has no
+// such work of its own (`reading`).
 //
 // In order: keyframes come in seq order, map by map. Those that are lost (an edge or HAVE says so)
 // are passed over and counted as dropped; with `gives_up` also those that nobody sends.
 //
-// A process is catching up while keyframes and matches are missing that the journal had of a map
-// when this process knew nothing of it; not for longer than kCatchUpSilence_us without progress.
+// A process is catching up while it reads the file, and while keyframes and matches are missing
+// that the journal had of a map when this process knew nothing of it; for these not for longer than
+// kCatchUpSilence_us without progress.
+// When it first is not, the status says so: counter `ready_utime`, wall clock.
 // Bounds: InOrder's. One thread; lives as long as its node.
 
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 
 #include "bus/node.h"
 #include "bus/retransmission/gap_requests.h"
 #include "bus/retransmission/in_order.h"
+#include "bus/retransmission/journal_reader.h"
 #include "bus/retransmission/missing.h"
+#include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 
@@ -50,8 +62,7 @@ class JournalFollower {
     std::function<bool(PlaceMatch)> match = {};
     std::function<void(const Constraint&)> result = {};
     std::function<void(const Have&)> have = {};  // before what follows from it
-    // A retransmission of something else; whether it was asked for.
-    std::function<bool(const again_t&)> other = {};
+    std::function<void(AnchorEdit)> anchor_edit = {};
     // What else of the journal is still to come, in a catch-up.
     std::function<int64_t()> more_to_catch_up = {};
     std::function<void()> handled = {};  // after each message
@@ -61,12 +72,15 @@ class JournalFollower {
 
   // At about 10 Hz. `ask_for_matches`: not while the process has no room for them.
   void Tick(int64_t now_utime, bool ask_for_matches = true);
-  void NoteStates(const std::vector<MapId>& maps) { states_.Note(maps); }
+  void NoteStates(const std::vector<MapId>& maps);
 
-  bool catching_up() const { return !goal_.empty() || !states_.empty(); }
-  // Keyframes, maps' matches and what the process has to add.
+  bool catching_up() const {
+    return (reading() && !stopped_) || !goal_.empty() || !states_.empty();
+  }
+  bool reading() const { return reader_ != nullptr; }
+  // Keyframes (of the file about how many), maps' matches and what the process has to add.
   int64_t num_to_catch_up() const;
-  // The process goes on with what it has.
+  // The process goes on with what it has; what the file still has comes nevertheless.
   void StopCatchingUp();
 
   // The map's first seq that did not come.
@@ -87,6 +101,15 @@ class JournalFollower {
   void OnHave(const Have& have);
   void OnRetransmission(const again_t& again);
 
+  void OnJournalFile(const JournalFile& file);
+  bool ReadPiece();
+  void EndReading();
+  void TakeOfFormerRuns(const std::string& channel, Bytes data);
+  void TakeOfFile(const std::string& channel, Bytes data);
+  // If the bytes are such a message and the process takes it.
+  template <typename Message, typename Handler>
+  void TakeBytes(Bytes data, const Handler& handler);
+  void NoteMapOfFile(const MapId& map);
   void TakeNewMap(const MapId& map, int32_t highest_seq);
   void AddInOrder(Keyframe keyframe);
   void Lose(const SeqGap& gap);
@@ -96,6 +119,7 @@ class JournalFollower {
   void AskForKeyframes(int64_t now_utime);
   int64_t NumMissing() const;
   void CatchUp(int64_t now_utime);
+  void NoteReady(int64_t now_utime);
 
   Node& node_;
   const Follows follows_;
@@ -104,11 +128,18 @@ class JournalFollower {
   GapRequests keyframe_requests_;
   MissingMessages matches_;
   MissingStates states_;
-  std::set<MapId> named_;  // maps that HAVE told of
+  std::set<MapId> named_;         // maps that HAVE or the file told of
+  std::set<MapId> early_states_;  // that came before the file's keyframes of these maps
   // What the journal had of each map when this process came, until that is in.
   std::map<MapId, int32_t> goal_;
   int64_t num_to_catch_up_ = 0;
-  int64_t progress_utime_ = 0;  // when that fell last
+  int64_t progress_utime_ = 0;             // when that fell last
+  std::unique_ptr<JournalReader> reader_;  // while the file is read
+  bool reads_former_runs_ = false;         // so far
+  bool file_known_ = false;
+  bool stopped_ = false;
+  bool have_received_ = false;
+  bool ready_ = false;  // once, at least
 };
 
 }  // namespace pangea

@@ -74,8 +74,9 @@ void KeyframeOutlet::OnResendRequest(const ResendRequest& request) {
   if (published != published_.end() && range.from_seq < published->second) {
     return;
   }
-  const auto later = std::ranges::find_if(
-      kept_, [&](const KeptKeyframe& keyframe) { return range.map < keyframe.id.map; });
+  const auto later = std::find_if(kept_.begin(), kept_.end(), [&](const KeptKeyframe& keyframe) {
+    return range.map < keyframe.id.map;
+  });
   if (later != kept_.end()) {
     Answer(request.requester, *later);
   }

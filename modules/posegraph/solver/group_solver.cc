@@ -6,6 +6,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "posegraph/solver/pose_cost.h"
 
@@ -24,6 +25,30 @@ double GraduatedWeight(double squared_residual, double c2, double mu) {
     return 0;
   }
   return std::clamp(std::sqrt(c2 / squared_residual * mu * (mu + 1)) - mu, 0.0, 1.0);
+}
+
+using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
+// Of the inverse of P' L D L' P, the 4x4 block on the diagonal at `column`: Y' D^-1 Y with
+// L Y = P e. Y has few rows: those above the four columns in the elimination tree (Davis, Direct
+// Methods for Sparse Linear Systems, 2006, section 3.2).
+Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int column) {
+  const Eigen::SparseMatrix<double>& L = factor.matrixL().nestedExpression();
+  std::map<int, Eigen::RowVector4d> Y;
+  for (int k = 0; k < 4; ++k) {
+    const int row = factor.permutationP().indices()[column + k];
+    Y.try_emplace(row, Eigen::RowVector4d::Zero()).first->second[k] = 1;
+  }
+  Matrix4d block = Matrix4d::Zero();
+  for (; !Y.empty(); Y.erase(Y.begin())) {
+    const auto& [j, y] = *Y.begin();
+    block += y.transpose() * y / D[j];
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(L, j); entry; ++entry) {
+      Y.try_emplace(static_cast<int>(entry.row()), Eigen::RowVector4d::Zero()).first->second -=
+          entry.value() * y;
+    }
+  }
+  return block;
 }
 
 }  // namespace
@@ -163,16 +188,15 @@ std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) cons
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
       crs.cols.data(), crs.values.data());
   const Eigen::SparseMatrix<double> H = J.transpose() * J;
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(H);
+  const SparseFactor factor(H);
+  if (factor.info() != Eigen::Success) {
+    return marginals;
+  }
+  const Eigen::VectorXd D = factor.vectorD();
   for (size_t i = 0; i < nodes.size(); ++i) {
-    if (column[nodes[i]] < 0 || factor.info() != Eigen::Success) {
-      continue;
+    if (column[nodes[i]] >= 0) {
+      marginals[i] = InverseBlock(factor, D, column[nodes[i]]);
     }
-    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(H.rows(), 4);
-    unit.middleRows<4>(column[nodes[i]]).setIdentity();
-    const Eigen::MatrixXd solution = factor.solve(unit);
-    const Matrix4d block = solution.middleRows<4>(column[nodes[i]]);
-    marginals[i] = 0.5 * (block + block.transpose());
   }
   return marginals;
 }

@@ -62,7 +62,7 @@ class GroupSolver {
   bool loop_on(int loop) const { return loops_[loop].weight > 0.5; }
 
   // Covariances of (p, yaw) of some nodes: 4x4 blocks of the inverse of J^T J, by one sparse
-  // factorisation and four solves each. Zero for a fixed node.
+  // factorisation, and of a solve what each needs. Zero for a fixed node.
   std::vector<Matrix4d> Marginals(const std::vector<int>& nodes) const;
 
  private:

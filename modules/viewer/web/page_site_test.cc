@@ -5,8 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
+#include <memory>
 #include <string>
 
 #include "viewer/viewer_test_world.h"
@@ -23,18 +22,6 @@ using web::MaskedFrame;
 using web::UpgradeRequest;
 using web::WebClient;
 
-TEST(ReadPage, APageIsReadOnceAndNothingElse) {
-  const std::filesystem::path folder = testing::TempDir() + "/viewer_page";
-  std::filesystem::create_directories(folder / "assets");
-  std::ofstream(folder / "index.html") << "<p>";
-  std::ofstream(folder / "assets" / "a.js") << "1";
-  const auto page = ReadPage(folder);
-  EXPECT_EQ(page.at("/").body, "<p>");
-  EXPECT_EQ(page.at("/assets/a.js").type, "text/javascript; charset=utf-8");
-  EXPECT_EQ(page.size(), 3U);
-  EXPECT_THROW(ReadPage(folder / "assets"), std::runtime_error);
-}
-
 class PageSiteTest : public testing::Test {
  protected:
   void Serve() {
@@ -50,7 +37,10 @@ class PageSiteTest : public testing::Test {
   }
 
   TestShow show_;
-  PageSite site_{{{"/", {"text/html; charset=utf-8", "<p>page"}}}, show_};
+  PageSite site_{
+      {{"/",
+        {"text/html; charset=utf-8", std::make_shared<const std::string>("<p>page"), nullptr}}},
+      show_};
   web::WebServer server_{{"127.0.0.1", 0, {}}, site_};
 };
 

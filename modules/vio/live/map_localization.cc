@@ -164,7 +164,7 @@ MapLocalization::Seen MapLocalization::SeenIn(const WindowPoses& window) const {
 void MapLocalization::AddKeyframe(const CameraModel& camera, const std::vector<Corner>& corners,
                                   const WindowPoses& window) {
   std::erase_if(matches_, [&](const auto& seen) {
-    return std::ranges::find(window.utimes, seen.first) == window.utimes.end();
+    return std::find(window.utimes.begin(), window.utimes.end(), seen.first) == window.utimes.end();
   });
   const auto prior = correction_ ? PriorAt(window) : std::nullopt;
   if (!prior) {

@@ -56,9 +56,9 @@ inline std::string UpgradeRequest(const std::string& target, const std::string& 
          "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
 }
 
-// A text frame as a browser masks it, here with zeros.
-inline std::string MaskedFrame(const std::string& text) {
-  std::string frame = "\x81";
+// A text frame as a browser masks it, here with zeros; or a binary one, of opcode 2.
+inline std::string MaskedFrame(const std::string& text, char opcode = 1) {
+  std::string frame(1, static_cast<char>(0x80 | opcode));
   if (text.size() < 126) {
     frame += static_cast<char>(0x80 | text.size());
   } else {

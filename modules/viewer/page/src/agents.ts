@@ -5,7 +5,7 @@ import {
   BufferAttribute, BufferGeometry, Camera, Group, Line, LineBasicMaterial, LineLoop, LineSegments, Matrix4, Vector3,
 } from "three";
 import { Keyframe, Pose } from "./model";
-import { agentColour } from "./palette";
+import { agentColour } from "../../../web/page/palette";
 import type { AgentSaid } from "./protocol";
 
 // 95 % of a two-dimensional Gaussian lie within this many standard deviations.

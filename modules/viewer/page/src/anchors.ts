@@ -6,7 +6,7 @@ import {
   Vector3,
 } from "three";
 import type { Pose } from "./model";
-import { colours } from "./palette";
+import { colours } from "../../../web/page/palette";
 
 const kMarkerSize = 0.009; // of the distance to the camera
 const kAxesSize = 0.06;

@@ -5,7 +5,7 @@ import { Model } from "./model";
 import {
   byId, clock, drawAgents, drawHealth, drawLegend, drawMarks, fusionText, tipOf,
 } from "./panels";
-import { onThemeChange } from "./palette";
+import { onThemeChange } from "../../../web/page/palette";
 import type { Update } from "./protocol";
 import { Stage } from "./stage";
 import { drawView } from "./view";

@@ -2,7 +2,7 @@
 
 import type { Model } from "./model";
 import type { ConstraintSaid, ProcessSaid } from "./protocol";
-import { agentColour, colours } from "./palette";
+import { agentColour, colours } from "../../../web/page/palette";
 
 // A process that was not heard for this long, or an agent, is marked. Processes speak once a
 // second.

@@ -10,7 +10,7 @@ import { AnchorDrawings } from "./anchors";
 import { Lines, PointCloud } from "./buffers";
 import { Model } from "./model";
 import type { AgentSaid, ConstraintSaid, Update } from "./protocol";
-import { agentColour, colours } from "./palette";
+import { agentColour, colours } from "../../../web/page/palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
 const kHoverPixels = 8;

@@ -1,6 +1,6 @@
 // What the chosen agent's camera saw at its newest keyframe: its tracks, on the image if there is one.
 
-import { agentColour } from "./palette";
+import { agentColour } from "../../../web/page/palette";
 import { byId } from "./panels";
 import type { ViewSaid } from "./protocol";
 

@@ -9,6 +9,8 @@ export const { values: options } = parseArgs({
     bin: { type: "string" }, // folder of the programs
     chromium: { type: "string" },
     log: { type: "string" },
+    page: { type: "string" }, // folder of the phone's page
+    recordings: { type: "string" }, // of phones: phone_1, phone_2, phone_3
     out: { type: "string" }, // for screenshots
   },
 });
@@ -35,11 +37,11 @@ export function startViewer(...args) {
   });
 }
 
-export const launch = () =>
+export const launch = (more = []) =>
   chromium.launch({
     executablePath: options.chromium,
     // Software rendering: there is no graphics card where CI runs.
-    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", ...more],
   });
 
 const consoleErrors = [];

@@ -1,0 +1,34 @@
+# The agent as WebAssembly (preset wasm): the compiler's flags, and the packages that its modules link.
+# PANGEA_WASM_LIBRARIES is the folder that scripts/wasm_libraries prints; headers without a library are this machine's.
+set(PANGEA_WASM_LIBRARIES "" CACHE PATH "What scripts/wasm_libraries has built")
+if(NOT EXISTS ${PANGEA_WASM_LIBRARIES}/complete)
+  message(FATAL_ERROR "Build with scripts/build wasm: PANGEA_WASM_LIBRARIES='${PANGEA_WASM_LIBRARIES}' holds no libraries")
+endif()
+add_compile_options(-msimd128 -fwasm-exceptions -ffp-contract=off)
+add_link_options(-msimd128 -fwasm-exceptions)
+
+# Of /usr/include these alone: the rest is of another machine.
+set(wasm_headers ${CMAKE_BINARY_DIR}/headers)
+file(MAKE_DIRECTORY ${wasm_headers})
+foreach(package boost CLI fmt lcm nlohmann)
+  file(CREATE_LINK /usr/include/${package} ${wasm_headers}/${package} SYMBOLIC)
+endforeach()
+
+# wasm_package(target [LIBRARY]...): as pangea_dependencies.cmake has it.
+function(wasm_package target)
+  add_library(${target} INTERFACE IMPORTED)
+  target_include_directories(${target} SYSTEM INTERFACE ${wasm_headers} ${PANGEA_WASM_LIBRARIES}/include)
+  list(TRANSFORM ARGN REPLACE "(.+)" "${PANGEA_WASM_LIBRARIES}/lib/lib\\1.a" OUTPUT_VARIABLE libraries)
+  target_link_libraries(${target} INTERFACE ${libraries})
+endfunction()
+wasm_package(pangea_opencv opencv_video opencv_features2d opencv_imgproc opencv_core z)
+wasm_package(sodium::sodium sodium)
+wasm_package(zstd::zstd zstd)
+wasm_package(yaml-cpp yaml-cpp)
+wasm_package(Boost::headers)
+wasm_package(CLI11::CLI11)
+wasm_package(fmt::fmt)
+target_compile_definitions(fmt::fmt INTERFACE FMT_HEADER_ONLY)
+wasm_package(lcm::lcm)
+wasm_package(Eigen3::Eigen)
+target_include_directories(Eigen3::Eigen SYSTEM INTERFACE /usr/include/eigen3)

@@ -1,0 +1,23 @@
+#include "bus/wall_clock.h"
+
+#include <chrono>
+
+namespace pangea {
+namespace {
+
+template <typename Clock>
+int64_t MicrosOf() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+int64_t WallUtime() {
+  static const int64_t begin = MicrosOf<std::chrono::system_clock>() - SteadyMicros();
+  return begin + SteadyMicros();
+}
+
+int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
+
+}  // namespace pangea

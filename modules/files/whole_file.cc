@@ -1,0 +1,99 @@
+#include "files/whole_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void Fail(const fs::path& path, const char* what, int error) {
+  throw std::runtime_error(fmt::format("{}: {}: {}", path.string(), what, std::strerror(error)));
+}
+
+fs::path FolderOf(const fs::path& file) { return fs::absolute(file).parent_path(); }
+
+// Beside the file, under a name that nobody looks for; gone at the end.
+class FileInTheMaking {
+ public:
+  FileInTheMaking(const fs::path& file, std::string_view text, mode_t mode)
+      : path_(fmt::format("{}.new-{}", file.string(), getpid())) {
+    unlink(path_.c_str());
+    const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    if (fd < 0) {
+      Fail(file, "cannot be written", errno);
+    }
+    errno = 0;
+    const bool written = fchmod(fd, mode) == 0 &&
+                         write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                         fsync(fd) == 0;
+    const int error = errno;
+    if (close(fd) != 0 || !written) {
+      unlink(path_.c_str());
+      Fail(file, "cannot be written", error == 0 ? ENOSPC : error);
+    }
+  }
+  ~FileInTheMaking() { unlink(path_.c_str()); }
+  FileInTheMaking(const FileInTheMaking&) = delete;
+  FileInTheMaking& operator=(const FileInTheMaking&) = delete;
+
+  const fs::path& path() const { return path_; }
+
+ private:
+  const fs::path path_;
+};
+
+}  // namespace
+
+void SyncToDisk(const fs::path& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool synced = fd >= 0 && fsync(fd) == 0;
+  const int error = errno;
+  if (fd >= 0) {
+    close(fd);
+  }
+  if (!synced) {
+    Fail(path, "cannot be brought to the disk", error);
+  }
+}
+
+bool WriteNewFile(const fs::path& file, std::string_view text, mode_t mode) {
+  const FileInTheMaking made(file, text, mode);
+  if (link(made.path().c_str(), file.c_str()) != 0) {
+    if (errno == EEXIST) {
+      return false;
+    }
+    Fail(file, "cannot be written", errno);
+  }
+  SyncToDisk(FolderOf(file));
+  return true;
+}
+
+void ReplaceFile(const fs::path& file, std::string_view text, mode_t mode) {
+  const FileInTheMaking made(file, text, mode);
+  if (rename(made.path().c_str(), file.c_str()) != 0) {
+    Fail(file, "cannot be written", errno);
+  }
+  SyncToDisk(FolderOf(file));
+}
+
+bool RemoveFile(const fs::path& file) {
+  if (unlink(file.c_str()) != 0) {
+    if (errno == ENOENT) {
+      return false;
+    }
+    Fail(file, "cannot be removed", errno);
+  }
+  SyncToDisk(FolderOf(file));
+  return true;
+}
+
+}  // namespace pangea

@@ -1,0 +1,14 @@
+#pragma once
+
+// The command line of pangea-gateway.
+
+#include <CLI/CLI.hpp>
+
+#include "gateway/run_gateway.h"
+
+namespace pangea {
+
+// Adds the options of the gateway itself, and its sub-commands, which run when the app has parsed.
+void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments);
+
+}  // namespace pangea

@@ -1,0 +1,175 @@
+#include "gateway/gateway.h"
+
+#include <fmt/format.h>
+#include <sodium.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+namespace pangea {
+namespace {
+
+using nlohmann::json;
+using web::WebAnswer;
+using web::WebRequest;
+
+WebAnswer Json(int status, const json& body) {
+  return {status, "application/json", body.dump() + "\n"};
+}
+
+WebAnswer Error(int status, const std::string& error) { return Json(status, {{"error", error}}); }
+
+// What the page may load and do. `host` is one that HostAllowed has let through: Safari takes
+// 'self' for wss: only of late.
+std::string PagePolicy(const std::string& host) {
+  return fmt::format(
+      "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
+      "connect-src 'self' wss://{}; img-src 'self' blob: data:; media-src 'self' blob:; style-src "
+      "'self' 'unsafe-inline'; object-src 'none'; base-uri 'none'; form-action 'none'; "
+      "frame-ancestors 'none'",
+      host);
+}
+
+// "/link?agent=7" is 7.
+std::optional<int32_t> AgentOfLink(std::string_view target) {
+  constexpr std::string_view kLink = "/link?agent=";
+  if (!target.starts_with(kLink)) {
+    return std::nullopt;
+  }
+  const std::string_view digits = target.substr(kLink.size());
+  int32_t agent_id = 0;
+  const char* const last = digits.data() + digits.size();
+  const auto [end, error] = std::from_chars(digits.data(), last, agent_id);
+  return error == std::errc() && end == last && agent_id >= 1 && agent_id <= 65535
+             ? std::optional(agent_id)
+             : std::nullopt;
+}
+
+}  // namespace
+
+void Gateway::SetAgents(std::map<int32_t, Agent> agents) {
+  for (auto connected = connected_.begin(); connected != connected_.end();) {
+    LinkSocket* const socket = connected->second;
+    const auto before = agents_.find(socket->agent_id());
+    const auto after = agents.find(socket->agent_id());
+    if (after != agents.end() && after->second.key == before->second.key) {
+      ++connected;
+    } else {
+      connected = connected_.erase(connected);
+      socket->End(kNotKnown);
+    }
+  }
+  agents_ = std::move(agents);
+}
+
+void Gateway::SendDown(int32_t agent_id, Bytes packet) {
+  if (const auto connected = connected_.find(agent_id); connected != connected_.end()) {
+    connected->second->SendDown(packet);
+  }
+}
+
+void Gateway::Answer(const WebRequest& request, Reply reply) {
+  if (request.target == "/v1/join") {
+    reply(Join(request));
+  } else if (request.target == "/v1/info") {
+    reply(request.method == "GET" ? Info() : Error(405, "Only GET here."));
+  } else {
+    reply(File(request));
+  }
+}
+
+WebAnswer Gateway::Join(const WebRequest& request) {
+  if (request.method != "POST") {
+    return Error(405, "Only POST here.");
+  }
+  if (!wrong_codes_.MayTry(request.address, now_us_)) {
+    events_.refused("join: too many wrong codes");
+    WebAnswer answer = Error(429, "There were too many wrong codes. Wait a minute.");
+    answer.headers.emplace_back("Retry-After", "60");
+    return answer;
+  }
+  const auto parsed = ParseJoinRequest(request.body);
+  if (const auto* const wrong = std::get_if<std::string>(&parsed)) {
+    wrong_codes_.NoteWrong(request.address, now_us_);
+    events_.refused("join: the request is malformed");
+    return Error(400, *wrong);
+  }
+  const JoinResult result = events_.join(std::get<JoinRequest>(parsed));
+  if (result.status == 200) {
+    return Json(200, {{"agent", result.agent_id}, {"key", result.key_hex}, {"site", public_.site}});
+  }
+  if (result.status == JoinResult::kWrongCode) {
+    wrong_codes_.NoteWrong(request.address, now_us_);
+  }
+  events_.refused("join: " + result.error);
+  return Error(result.status, result.error);
+}
+
+WebAnswer Gateway::Info() const {
+  json agents = json::array();
+  for (const auto& [agent_id, agent] : agents_) {
+    agents.push_back(
+        {{"agent", agent_id}, {"name", agent.name}, {"connected", connected_.contains(agent_id)}});
+  }
+  return Json(
+      200, {{"site", public_.site}, {"version", public_.version}, {"agents", std::move(agents)}});
+}
+
+WebAnswer Gateway::File(const WebRequest& request) const {
+  if (request.target == "/ca.crt" && request.method == "GET" && !public_.authority_der.empty()) {
+    return {200, "application/x-x509-ca-cert", public_.authority_der};
+  }
+  WebAnswer answer = web::AnswerFile(public_.page, request, PagePolicy(request.host));
+  // So that the page may use shared memory; and tells nobody where it was.
+  answer.headers.emplace_back("Cross-Origin-Opener-Policy", "same-origin");
+  answer.headers.emplace_back("Cross-Origin-Embedder-Policy", "require-corp");
+  answer.headers.emplace_back("Referrer-Policy", "no-referrer");
+  return answer;
+}
+
+std::unique_ptr<web::WebPeer> Gateway::Open(const WebRequest& request) {
+  const auto agent_id = AgentOfLink(request.target);
+  if (!agent_id) {
+    return nullptr;
+  }
+  if (unproven_.size() >= kMaxUnproven) {
+    unproven_.front()->End(kTooMany);
+    unproven_.pop_front();
+  }
+  auto socket = std::make_unique<LinkSocket>(*this, *agent_id);
+  unproven_.push_back(socket.get());
+  return socket;
+}
+
+bool Gateway::OnProof(LinkSocket* socket, Bytes proof) {
+  unproven_.remove(socket);
+  const int32_t agent_id = socket->agent_id();
+  const auto agent = agents_.find(agent_id);
+  // The same work for an agent that nobody knows.
+  const SecretKey key = agent == agents_.end() ? SecretKey::Random() : agent->second.key;
+  const auto expected = GatewayProof(key, agent_id, socket->nonce());
+  if (proof.size() != expected.size() ||
+      sodium_memcmp(proof.data(), expected.data(), expected.size()) != 0) {
+    socket->End(kNotKnown);
+    return false;
+  }
+  if (const auto former = connected_.find(agent_id); former != connected_.end()) {
+    former->second->End(kReplaced);
+  } else if (connected_.size() >= kMaxAgentsAtOnce) {
+    socket->End(kTooMany);
+    return false;
+  }
+  connected_[agent_id] = socket;
+  return true;
+}
+
+void Gateway::OnGone(LinkSocket* socket) {
+  unproven_.remove(socket);
+  std::erase_if(connected_, [&](const auto& item) { return item.second == socket; });
+}
+
+}  // namespace pangea

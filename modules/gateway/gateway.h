@@ -1,0 +1,96 @@
+#pragma once
+
+// The gateway as a web site: the phone's page, joining, and each agent's link socket. No socket,
+// bus, clock or file: the owner gives requests, the time, the keys and the packets that go down,
+// and gets those that come up.
+//
+//   GET  /...                the page
+//   GET  /ca.crt             the certificate authority, for a phone that is to trust it
+//   GET  /v1/info            {"site", "version", "agents": [{"agent", "name", "connected"}]}
+//   POST /v1/join            {"code", "name"}: {"agent", "key", "site"}, or {"error"}
+//   WS   /link?agent=K       link_socket.h
+//
+// Bounded: kMaxAgentsAtOnce have proven their key; of those that have not, the oldest gives way to
+// the one after kMaxUnproven.
+
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "gateway/attempt_limit.h"
+#include "gateway/join_request.h"
+#include "gateway/link_socket.h"
+#include "web/page_files.h"
+
+namespace pangea {
+
+// What becomes of a good request to join.
+struct JoinResult {
+  static constexpr int kWrongCode = 403;
+  int status = 200;
+  std::string error;  // for the visitor, unless the status is 200
+  int32_t agent_id = 0;
+  std::string key_hex;
+};
+
+class Gateway : public web::WebSite, public LinkSocketOwner {
+ public:
+  static constexpr size_t kMaxAgentsAtOnce = 100;
+  static constexpr size_t kMaxUnproven = kMaxAgentsAtOnce;  // all come back at once
+  // Both, and as many that are being told to go.
+  static constexpr int kMaxPeers = 2 * (kMaxAgentsAtOnce + kMaxUnproven);
+
+  struct Public {
+    std::string site;  // its name
+    std::string version;
+    web::Page page;
+    std::string authority_der;  // empty: a certificate of the user's own
+  };
+  struct Agent {
+    SecretKey key;
+    std::string name;
+  };
+  struct Events {
+    std::function<JoinResult(const JoinRequest&)> join;
+    std::function<void(int32_t agent_id, Bytes packet)> packet_up;
+    std::function<void(const std::string& why)> refused;
+    std::function<void()> dropped;
+  };
+
+  Gateway(Public what, Events events) : public_(std::move(what)), events_(std::move(events)) {}
+
+  // Often; a clock that never steps.
+  void SetNow(int64_t now_us) { now_us_ = now_us; }
+  // Those who may connect. Whoever is not among them any more, or has another key, is cut off.
+  void SetAgents(std::map<int32_t, Agent> agents);
+  void SendDown(int32_t agent_id, Bytes packet);
+  int64_t num_connected() const { return static_cast<int64_t>(connected_.size()); }
+
+  void Answer(const web::WebRequest& request, Reply reply) override;
+  std::unique_ptr<web::WebPeer> Open(const web::WebRequest& request) override;
+  void Refused(const std::string& why) override { events_.refused(why); }
+
+ private:
+  web::WebAnswer Join(const web::WebRequest& request);
+  web::WebAnswer Info() const;
+  web::WebAnswer File(const web::WebRequest& request) const;
+
+  bool OnProof(LinkSocket* socket, Bytes proof) override;
+  void OnPacketUp(int32_t agent_id, Bytes packet) override { events_.packet_up(agent_id, packet); }
+  void OnRefused(const std::string& why) override { events_.refused(why); }
+  void OnDropped() override { events_.dropped(); }
+  void OnGone(LinkSocket* socket) override;
+  int64_t now_us() const override { return now_us_; }
+
+  const Public public_;
+  const Events events_;
+  int64_t now_us_ = 0;
+  std::map<int32_t, Agent> agents_;
+  std::map<int32_t, LinkSocket*> connected_;
+  std::list<LinkSocket*> unproven_;  // oldest first
+  AttemptLimit wrong_codes_;
+};
+
+}  // namespace pangea

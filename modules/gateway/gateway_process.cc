@@ -1,0 +1,131 @@
+#include "gateway/gateway_process.h"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <utility>
+
+#include "bus/process.h"
+#include "link/wire.h"
+#include "messages/channels.h"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond_us = 1'000'000;
+
+web::WebOptions WithIdentity(const GatewayProcess::Options& options) {
+  web::WebOptions web = options.web;
+  web.tls = options.identity.server;
+  web.for_programs = true;  // pages of other origins get nothing; an agent that is no page may come
+  web.max_peers = Gateway::kMaxPeers;
+  return web;
+}
+
+Gateway::Public PublicOf(const site::Site& site, const GatewayProcess::Options& options) {
+  const std::string& authority = options.identity.authority_pem;
+  return {site.description.name, OurSoftware(), options.page,
+          authority.empty() ? "" : ToDer(authority)};
+}
+
+GatewayAddress AddressOf(const GatewayProcess::Options& options, uint16_t port) {
+  const GatewayIdentity& identity = options.identity;
+  const bool is_ipv6 = options.url_host.find(':') != std::string::npos;
+  const std::string host = is_ipv6 ? fmt::format("[{}]", options.url_host) : options.url_host;
+  return {fmt::format("https://{}:{}/", host, port),
+          Fingerprint(identity.authority_pem.empty() ? identity.server.certificate_chain_pem
+                                                     : identity.authority_pem)};
+}
+
+}  // namespace
+
+GatewayProcess::GatewayProcess(Bus& link_bus, Bus& server_bus, const site::Site& site,
+                               const Options& options)
+    : link_bus_(link_bus),
+      node_(server_bus, "gateway"),
+      admission_(site),
+      key_folder_(site.keys()),
+      gateway_(PublicOf(site, options), Events()),
+      server_(WithIdentity(options), gateway_),
+      address_(AddressOf(options, server_.port())) {
+  node_.Watch(link_bus);
+  link_bus.Subscribe(
+      std::string(channels::kAllLinkDowns), [this](const std::string& channel, Bytes data) {
+        gateway_.SendDown(channels::AgentOf(channel, channels::kLinkDownPrefix), data);
+      });
+  gateway_.SetNow(SteadyMicros());
+  ReadAgents();
+  WriteAddress(site, address_);
+}
+
+Gateway::Events GatewayProcess::Events() {
+  return {[this](const JoinRequest& request) { return Join(request); },
+          [this](int32_t agent_id, Bytes packet) {
+            node_.Count("packets_up");
+            link_bus_.Publish(channels::LinkUp(agent_id), packet);
+          },
+          [this](const std::string& why) { node_.Refuse(why); }, [this] { node_.NoteDropped(); }};
+}
+
+JoinResult GatewayProcess::Join(const JoinRequest& request) {
+  try {
+    JoinResult result = admission_.Join(request, now_utime_ / kSecond_us);
+    if (result.status == 200) {
+      node_.Count("joined");
+      LookForKeys();  // so that it may connect at once
+    }
+    return result;
+  } catch (const std::exception& error) {
+    Log(node_.name(), error.what());
+    return {500, "The server could not write your key. Tell whoever runs it.", 0, ""};
+  }
+}
+
+void GatewayProcess::ReadAgents() {
+  const auto joined = admission_.Agents();
+  const auto keys = key_folder_.Read();
+  agents_.clear();
+  for (const auto& [agent_id, read] : keys) {
+    const auto named = joined.find(agent_id);
+    agents_.insert_or_assign(
+        agent_id, Gateway::Agent{read.key, named == joined.end() ? "" : named->second.name});
+  }
+  gateway_.SetAgents(agents_);
+}
+
+// As agent_handler does: with a file that cannot be read the others stay as they were, but none
+// keeps in whose own file was taken away.
+void GatewayProcess::LookForKeys() {
+  try {
+    if (key_folder_.Changed()) {
+      ReadAgents();
+    }
+  } catch (const std::exception& error) {
+    node_.Refuse(error.what());
+    std::erase_if(agents_, [&](const auto& item) { return key_folder_.IsGone(item.first); });
+    gateway_.SetAgents(agents_);
+  }
+}
+
+void GatewayProcess::Serve(int timeout_ms) {
+  gateway_.SetNow(SteadyMicros());
+  server_.Serve(timeout_ms);
+}
+
+void GatewayProcess::Tick(int64_t now_utime) {
+  now_utime_ = now_utime;
+  if (now_utime >= next_look_utime_) {
+    next_look_utime_ = now_utime + kSecond_us;
+    LookForKeys();
+    PublishStatus(now_utime);
+  }
+}
+
+void GatewayProcess::PublishStatus(int64_t now_utime) {
+  node_.Set("connected", gateway_.num_connected());
+  node_.PublishStatus(now_utime, 0,
+                      fmt::format("{}: {} of {} agents connected", address_.url,
+                                  gateway_.num_connected(), agents_.size()));
+}
+
+}  // namespace pangea

@@ -1,0 +1,60 @@
+#pragma once
+
+// The gateway between phones' browsers and the link bus, on one thread.
+//   HTTPS, WSS  gateway.h
+//   link bus    LINK_DOWN_* in; LINK_UP_k out
+//   server bus  STATUS_gateway out
+// Keys and names are looked at each second, so that agents come and go while it runs.
+
+#include <cstdint>
+#include <string>
+
+#include "bus/node.h"
+#include "gateway/admission.h"
+#include "gateway/gateway.h"
+#include "gateway/identity.h"
+#include "link/agent_key.h"
+#include "web/web_server.h"
+
+namespace pangea {
+
+class GatewayProcess {
+ public:
+  struct Options {
+    web::WebOptions web;  // without `tls`, which is the identity's
+    web::Page page;
+    GatewayIdentity identity;
+    std::string url_host;  // by which phones reach it
+  };
+
+  // Throws std::runtime_error: it cannot listen there, the site's folder cannot be used.
+  GatewayProcess(Bus& link_bus, Bus& server_bus, const site::Site& site, const Options& options);
+
+  // Handles requests and sockets, for `timeout_ms` or what there is.
+  void Serve(int timeout_ms);
+  // About 10 times a second; the wall clock, as process.h has it.
+  void Tick(int64_t now_utime);
+
+  const GatewayAddress& address() const { return address_; }
+  uint16_t port() const { return server_.port(); }
+
+ private:
+  Gateway::Events Events();
+  JoinResult Join(const JoinRequest& request);
+  void ReadAgents();
+  void LookForKeys();
+  void PublishStatus(int64_t now_utime);
+
+  Bus& link_bus_;
+  Node node_;
+  Admission admission_;
+  KeyFolder key_folder_;
+  std::map<int32_t, Gateway::Agent> agents_;
+  Gateway gateway_;
+  web::WebServer server_;
+  GatewayAddress address_;
+  int64_t now_utime_ = 0;
+  int64_t next_look_utime_ = 0;
+};
+
+}  // namespace pangea

@@ -1,0 +1,98 @@
+#include "gateway/identity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "files/text_file.h"
+#include "files/whole_file.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr mode_t kSecret = 0600;
+constexpr mode_t kPublic = 0644;
+constexpr int kRenewBefore_days = 30;
+
+// The key first: a certificate that is there has its key.
+void WriteIdentity(const fs::path& folder, const std::string& name, const Identity& identity) {
+  ReplaceFile(folder / (name + ".key"), identity.private_key_pem, kSecret);
+  ReplaceFile(folder / (name + ".pem"), identity.certificate_chain_pem, kPublic);
+}
+
+Identity ReadPair(const fs::path& certificate, const fs::path& key) {
+  return {ReadTextFile(certificate), ReadTextFile(key)};
+}
+
+Identity OpenAuthority(const site::Site& site, const MachineNames& names, int64_t now_s) {
+  const fs::path folder = site.gateway();
+  if (!Exists(folder / "ca.pem")) {
+    const Identity made =
+        MakeAuthority(fmt::format("Pangea {}", site.description.name), names, now_s);
+    WriteIdentity(folder, "ca", made);
+  }
+  Identity read = ReadPair(folder / "ca.pem", folder / "ca.key");
+  if (!CanVouch(read, now_s, kRenewBefore_days)) {
+    throw std::runtime_error(
+        fmt::format("{}: is too old, or of another key than ca.key: move both away, and each phone "
+                    "has to trust the new ones",
+                    (folder / "ca.pem").string()));
+  }
+  return read;
+}
+
+}  // namespace
+
+GatewayIdentity OpenIdentity(const site::Site& site, const MachineNames& names, int64_t now_s) {
+  const fs::path folder = site.gateway();
+  const Identity authority = OpenAuthority(site, names, now_s);
+  MadeCertificate made = MakeServerCertificate(authority, names, now_s);
+  MachineNames covered = names;
+  const auto is_left_out = [&](const std::string& name) {
+    return std::ranges::count(made.left_out, name) > 0;
+  };
+  std::erase_if(covered.hosts, is_left_out);
+  std::erase_if(covered.addresses, is_left_out);
+  if (Exists(folder / "server.pem") && Exists(folder / "server.key")) {
+    const Identity kept = ReadPair(folder / "server.pem", folder / "server.key");
+    if (IsGoodFor(kept, authority, covered, now_s, kRenewBefore_days)) {
+      return {kept, authority.certificate_chain_pem, made.left_out};
+    }
+  }
+  WriteIdentity(folder, "server", made.identity);
+  return {made.identity, authority.certificate_chain_pem, made.left_out};
+}
+
+GatewayIdentity ReadIdentity(const std::string& certificate_file, const std::string& key_file) {
+  return {ReadPair(certificate_file, key_file), "", {}};
+}
+
+void WriteAddress(const site::Site& site, const GatewayAddress& address) {
+  const json written = {{"url", address.url}, {"fingerprint", address.fingerprint}};
+  ReplaceFile(site.gateway() / "address.json", written.dump() + "\n", kPublic);
+}
+
+GatewayAddress ReadAddress(const site::Site& site) {
+  const fs::path file = site.gateway() / "address.json";
+  if (!Exists(file)) {
+    throw std::runtime_error(
+        fmt::format("{}: is not there: the gateway never ran on this site; start it first: "
+                    "pangea-server --site {} --phone",
+                    file.string(), site.folder.string()));
+  }
+  const json read = json::parse(ReadTextFile(file), nullptr, false);
+  if (!read.is_object() || !read.contains("url") || !read["url"].is_string() ||
+      !read.contains("fingerprint") || !read["fingerprint"].is_string()) {
+    throw std::runtime_error(
+        fmt::format("{}: is not as the gateway wrote it: remove it, and start the gateway again",
+                    file.string()));
+  }
+  return {read["url"], read["fingerprint"]};
+}
+
+}  // namespace pangea

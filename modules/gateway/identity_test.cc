@@ -1,0 +1,137 @@
+#include "gateway/identity.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <stdexcept>
+
+#include "files/text_file.h"
+#include "gateway/admission.h"
+#include "gateway/machine_names.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
+
+constexpr int64_t kDay_s = 86'400;
+constexpr int64_t kNow_s = 1'700'000'000;
+const MachineNames kNames{{"localhost", "robot.local"}, {"127.0.0.1", "192.168.1.7", "fd00::7"}};
+
+TEST(Certificates, TheAuthorityVouchesForTheServer) {
+  const Identity authority = MakeAuthority("Pangea hall", {}, kNow_s);
+  const MadeCertificate made = MakeServerCertificate(authority, kNames, kNow_s);
+  EXPECT_THAT(made.left_out, IsEmpty());
+  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kNow_s, 30));
+  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kNow_s, kServerDays - 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, kNames, kNow_s, kServerDays));
+  EXPECT_LT(kServerDays + 1, 398) << "more than browsers take";
+  EXPECT_FALSE(
+      IsGoodFor(made.identity, MakeAuthority("Pangea hall", {}, kNow_s), kNames, kNow_s, 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{}, {"192.168.1.8"}}, kNow_s, 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{"other.local"}, {}}, kNow_s, 1));
+  EXPECT_FALSE(IsGoodFor({"nonsense", "nonsense"}, authority, kNames, kNow_s, 1));
+}
+
+// A phone that trusts it does not trust it for a bank.
+TEST(Certificates, TheAuthorityVouchesForPrivateNetworksOnly) {
+  const Identity authority =
+      MakeAuthority("Pangea hall", {{"robot", "hall.example.org"}, {"8.8.8.7"}}, kNow_s);
+  const MachineNames names{
+      {"robot", "hall.example.org", "a.lan", "bank.example.org", "example.org", "robot.evil"},
+      {"10.1.2.3", "8.8.8.7", "8.8.8.8", "2001:db8::1", "fe80::1"}};
+  const MadeCertificate made = MakeServerCertificate(authority, names, kNow_s);
+  EXPECT_THAT(made.left_out, UnorderedElementsAre("bank.example.org", "example.org", "robot.evil",
+                                                  "8.8.8.8", "2001:db8::1"));
+  EXPECT_TRUE(IsGoodFor(
+      made.identity, authority,
+      {{"robot", "hall.example.org", "a.lan"}, {"10.1.2.3", "8.8.8.7", "fe80::1"}}, kNow_s, 1));
+}
+
+TEST(Certificates, HaveFingerprintsAndAFormForPhones) {
+  const Identity authority = MakeAuthority("Pangea hall", {}, kNow_s);
+  const std::string fingerprint = Fingerprint(authority.certificate_chain_pem);
+  EXPECT_EQ(fingerprint.size(), 32U * 3 - 1);
+  EXPECT_NE(fingerprint,
+            Fingerprint(MakeAuthority("Pangea hall", {}, kNow_s).certificate_chain_pem));
+  EXPECT_EQ(ToDer(authority.certificate_chain_pem).substr(0, 2), "\x30\x82") << "an ASN.1 sequence";
+  EXPECT_THROW(Fingerprint("nonsense"), std::runtime_error);
+}
+
+class IdentityTest : public testing::Test {
+ protected:
+  IdentityTest() {
+    fs::remove_all(folder_);
+    site_ = site::OpenSite(folder_);
+    MakeGatewayFolders(site_);
+  }
+  GatewayIdentity Open(int64_t now_s = kNow_s, const MachineNames& names = kNames) {
+    return OpenIdentity(site_, names, now_s);
+  }
+
+  const fs::path folder_ = testing::TempDir() + "/identity";
+  site::Site site_;
+};
+
+TEST_F(IdentityTest, IsKeptAndItsKeysAreSecret) {
+  const GatewayIdentity first = Open();
+  const GatewayIdentity second = Open(kNow_s + kDay_s);
+  EXPECT_EQ(first.server.certificate_chain_pem, second.server.certificate_chain_pem);
+  EXPECT_EQ(first.authority_pem, second.authority_pem);
+  for (const char* key : {"ca.key", "server.key"}) {
+    EXPECT_EQ(fs::status(site_.gateway() / key).permissions(),
+              fs::perms::owner_read | fs::perms::owner_write)
+        << key;
+  }
+}
+
+TEST_F(IdentityTest, IsRenewedBeforeItRunsOutAndForNewAddresses) {
+  const GatewayIdentity first = Open();
+  const GatewayIdentity late = Open(kNow_s + (kServerDays - 29) * kDay_s);
+  EXPECT_NE(first.server.certificate_chain_pem, late.server.certificate_chain_pem);
+  EXPECT_EQ(first.authority_pem, late.authority_pem) << "phones need not trust another";
+  MachineNames moved = kNames;
+  moved.addresses.emplace_back("192.168.2.7");
+  const GatewayIdentity elsewhere = Open(kNow_s + (kServerDays - 29) * kDay_s, moved);
+  EXPECT_NE(late.server.certificate_chain_pem, elsewhere.server.certificate_chain_pem);
+  moved.addresses.emplace_back("8.8.8.8");
+  const GatewayIdentity partly = Open(kNow_s + (kServerDays - 29) * kDay_s, moved);
+  EXPECT_EQ(elsewhere.server.certificate_chain_pem, partly.server.certificate_chain_pem);
+  EXPECT_THAT(partly.left_out, Contains("8.8.8.8"));
+}
+
+TEST_F(IdentityTest, SaysWhatIsWrongWithTheAuthority) {
+  Open();
+  const std::string key = ReadTextFile(site_.gateway() / "server.key");
+  std::ofstream(site_.gateway() / "ca.key") << key;
+  try {
+    Open();
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("ca.pem: is too old, or of another key than ca.key"));
+  }
+}
+
+TEST_F(IdentityTest, TheAddressIsToldToThoseWhoInvite) {
+  EXPECT_THROW(ReadAddress(site_), std::runtime_error);
+  WriteAddress(site_, {"https://192.168.1.7:8443/", "AB:CD"});
+  EXPECT_EQ(ReadAddress(site_).url, "https://192.168.1.7:8443/");
+  EXPECT_EQ(ReadAddress(site_).fingerprint, "AB:CD");
+  std::ofstream(site_.gateway() / "address.json") << "{}";
+  EXPECT_THROW(ReadAddress(site_), std::runtime_error);
+}
+
+TEST(MachineNames, AreThoseOfThisMachine) {
+  const MachineNames names = NamesOfThisMachine();
+  EXPECT_THAT(names.hosts, Contains("localhost"));
+  EXPECT_THAT(names.addresses, Contains("127.0.0.1"));
+  EXPECT_THAT(names.addresses, Contains(AddressForOthers(names)));
+}
+
+}  // namespace
+}  // namespace pangea

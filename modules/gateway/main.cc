@@ -1,0 +1,33 @@
+// pangea-gateway: lets phones' browsers in, over HTTPS and WebSockets.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <stdexcept>
+
+#include "gateway/commands.h"
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Serves the phone's page, lets agents join by a code, and carries their link packets",
+      "pangea-gateway");
+  pangea::GatewayArguments arguments;
+  pangea::AddGatewayCommands(app, &arguments);
+  try {
+    app.parse(argc, argv);
+    if (!app.get_subcommands().empty()) {
+      return 0;  // it has run
+    }
+    if (arguments.site.empty()) {
+      throw std::runtime_error("give --site FOLDER");
+    }
+    pangea::RunGateway(arguments);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::cerr << fmt::format("pangea-gateway: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

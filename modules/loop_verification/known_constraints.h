@@ -1,0 +1,64 @@
+#pragma once
+
+// What the map knows already of two keyframes' relative pose, and whether another constraint would
+// be worth its verification: measurement selection by information gain (Ila et al., "Information-
+// based compact pose SLAM", TRO 2010).
+//
+// Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
+// the position to sigma^2 + (drift * path)^2; their information adds up as if they were
+// independent, though they share odometry. A constraint of their median sigma would add
+// 0.5 * log2(1 + I_new / I_known) bits to each coordinate. Where that is little it is redundant.
+// The first constraints between two maps are never redundant: whether the maps are one rests on
+// them.
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "core/server_messages.h"
+#include "core/submap_store.h"
+
+namespace pangea {
+
+struct KnownConstraintOptions {
+  double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
+  double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
+  int min_between_maps = 10;  // chosen, not measured; a fusion takes 3 viewpoints, 6 at one spot
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("min_gain_bits", &min_gain_bits, {0, 100}, "bit",
+                "that another constraint must bring to each coordinate; 1 halves its sigma; "
+                "0: all are verified");
+    archive.Add("drift_per_m", &drift_per_m, {0, 1}, "",
+                "sigma of the odometry, of its path, between keyframes verified and this one");
+    archive.Add("min_between_maps", &min_between_maps, {0, 1000000}, "",
+                "constraints between two maps before any is redundant");
+  }
+};
+
+class KnownConstraints {
+ public:
+  // Of keyframes that are further away in seq nothing is asked.
+  static constexpr int kMaxSeqDistance = 30;
+
+  explicit KnownConstraints(const KnownConstraintOptions& options) : options_(options) {}
+
+  // An accepted constraint. A repeat must not come.
+  void Add(const Constraint& constraint);
+  // What a constraint between the two would add to each coordinate, bits; infinite where nothing
+  // is known. Odometry is `store`'s.
+  double GainBits(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
+  bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
+
+ private:
+  struct Known {
+    int32_t seq_a = 0, seq_b = 0;
+    double sigma_m = 0;  // of the position, its worst direction
+  };
+
+  KnownConstraintOptions options_;
+  std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // by seq_a
+};
+
+}  // namespace pangea

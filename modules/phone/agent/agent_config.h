@@ -1,0 +1,43 @@
+#pragma once
+
+// What a phone's agent is started with, and how it is read from texts.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/calibration_sigmas.h"
+#include "core/camera_model.h"
+#include "core/imu/imu.h"
+#include "link/seal.h"
+#include "uplink/uplink.h"
+#include "vio/vio.h"
+
+namespace pangea::phone {
+
+struct AgentConfig {
+  int32_t agent_id = 0;
+  int64_t opened_utime = 0;  // of its first map, one more for each further one
+  std::optional<SecretKey> key;
+  CameraModel camera;
+  std::optional<CalibrationSigmas> sigmas;  // of the camera; else as `vio` says
+  ImuNoise imu_noise;
+  vio::VioOptions vio;
+  UplinkOptions uplink;
+};
+
+// The same as people and files have it; an empty text leaves the defaults.
+struct AgentTexts {
+  double agent = 0;
+  double opened_utime = 0;
+  std::string key_hex;      // empty: no uplink
+  std::string camera_yaml;  // of mav0/cam0/sensor.yaml
+  std::string imu_yaml;     // of mav0/imu0/sensor.yaml; empty: live_imu of the options
+  std::string vio_options_yaml;
+  std::string uplink_options_yaml;
+};
+
+// Throws std::runtime_error that names the field and the mend.
+AgentConfig ReadAgentConfig(const AgentTexts& texts);
+
+}  // namespace pangea::phone

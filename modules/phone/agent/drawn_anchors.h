@@ -1,0 +1,35 @@
+#pragma once
+
+// The agent's anchors as an app draws them: what they are (ANCHOR_k), and where they are shown now
+// (SHOWN_ANCHORS_k).
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/anchor.h"
+
+namespace pangea::phone {
+
+struct DrawnAnchor {
+  AnchorId id;
+  std::string name;
+  std::string payload;
+  Rigid3 T_odom_anchor;
+  double sigma_m = 0;  // of the position, along its least certain direction
+  int64_t revision = 0;
+};
+
+class DrawnAnchors {
+ public:
+  void Take(const AnchorState& state);
+  // Those of them that are to be drawn.
+  std::vector<DrawnAnchor> Draw(const ShownAnchors& shown) const;
+  const AnchorState* Find(const AnchorId& id) const;
+
+ private:
+  std::map<AnchorId, AnchorState> states_;  // as many as the uplink keeps
+};
+
+}  // namespace pangea::phone

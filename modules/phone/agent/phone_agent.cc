@@ -1,0 +1,212 @@
+#include "phone/agent/phone_agent.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "messages/anchor_messages.h"
+#include "messages/catch_up_messages.h"
+#include "messages/channels.h"
+#include "pangea/keyframe_t.hpp"
+#include "pangea/pose_t.hpp"
+
+namespace pangea::phone {
+namespace {
+
+constexpr int64_t kTickInterval_us = 100'000;
+
+vio::VioProcessOptions ProcessOptions(const AgentConfig& config) {
+  vio::VioProcessOptions options;
+  options.agent_id = config.agent_id;
+  options.vio = config.vio;
+  options.map_utime = config.opened_utime;
+  return options;
+}
+
+std::optional<KeyframeId> IdOf(Bytes keyframe) {
+  keyframe_t message{};
+  return DecodeMessage(keyframe, &message) ? Parse(message.id).value : std::nullopt;
+}
+
+}  // namespace
+
+PhoneAgent::PhoneAgent(const AgentConfig& config)
+    : agent_id_(config.agent_id),
+      image_size_(config.camera.width, config.camera.height),
+      node_(agent_bus_, fmt::format("phone_{}", config.agent_id)),
+      vio_(agent_bus_, ProcessOptions(config), config.opened_utime),
+      sensors_(vio_),
+      now_us_(config.opened_utime) {
+  if (config.key) {
+    uplink_.emplace(agent_bus_, link_bus_, agent_id_, *config.key, config.uplink);
+  }
+  vio_.Open(config.camera, config.imu_noise, config.sigmas);
+  Listen();
+}
+
+void PhoneAgent::Listen() {
+  agent_bus_.Subscribe(channels::Keyframe(agent_id_),
+                       [this](const std::string&, Bytes data) { OnKeyframe(data); });
+  link_bus_.Subscribe(channels::LinkUp(agent_id_), [this](const std::string&, Bytes data) {
+    events_.link_up.emplace_back(data.begin(), data.end());
+  });
+  node_.Subscribe<pose_t>(channels::Pose(agent_id_),
+                          [this](const std::string&, const pose_t& message) { OnPose(message); });
+  node_.Listen<correction_t>(channels::Correction(agent_id_), [this](const Correction& correction) {
+    if (!correction_ || correction_->map != correction.map ||
+        correction_->revision < correction.revision) {
+      correction_ = correction;
+    }
+  });
+  node_.Listen<have_t>(channels::kHave, [this](const Have& have) { Release(have); });
+  node_.Listen<anchor_t>(channels::Anchor(agent_id_),
+                         [this](const AnchorState& state) { anchors_.Take(state); });
+  node_.Listen<shown_anchors_t>(
+      channels::ShownAnchors(agent_id_),
+      [this](const ShownAnchors& shown) { events_.anchors = anchors_.Draw(shown); });
+  node_.Subscribe<status_t>(
+      channels::Status(vio_.node().name()),
+      [this](const std::string&, const status_t& status) { events_.vio_status = status; });
+  node_.Subscribe<status_t>(
+      channels::Status(fmt::format("uplink_{}", agent_id_)),
+      [this](const std::string&, const status_t& status) { events_.uplink_status = status; });
+}
+
+void PhoneAgent::AddImage(int64_t utime, const cv::Mat& image) {
+  if (image.type() != CV_8U || image.size() != image_size_) {
+    vio_.node().Refuse("image: its size is not the calibration's");
+  } else if (sensors_.TakeImageStamp(utime)) {
+    sensors_.AddImage(utime, image.clone());
+  }
+  agent_bus_.Drain();
+}
+
+void PhoneAgent::OnLinkDown(Bytes packet) {
+  link_bus_.Publish(channels::LinkDown(agent_id_), packet);
+  link_bus_.Drain();
+}
+
+// The uplink takes it as if the odometry had just finished it.
+void PhoneAgent::Restore(const std::string& id, Bytes bytes) {
+  const std::optional<KeyframeId> keyframe = IdOf(bytes);
+  if (!keyframe) {
+    events_.spool.push_back({id, {}});
+  } else if (keyframe->map.agent_id == agent_id_ && uplink_) {
+    spooled_.insert(*keyframe);
+    agent_bus_.Publish(channels::Keyframe(agent_id_), bytes);
+    agent_bus_.Drain();
+  }
+}
+
+void PhoneAgent::OnKeyframe(Bytes data) {
+  const std::optional<KeyframeId> id = IdOf(data);
+  const std::vector<uint8_t> bytes(data.begin(), data.end());
+  if (!id || spooled_.contains(*id)) {
+    return;
+  }
+  if (uplink_) {
+    spooled_.insert(*id);
+    events_.spool.push_back({ToString(*id), bytes});
+  }
+  events_.keyframes.push_back(bytes);
+}
+
+void PhoneAgent::Release(const Have& have) {
+  for (const auto& [map, highest_seq] : have.highest_seq) {
+    auto it = spooled_.lower_bound({map, 0});
+    while (it != spooled_.end() && it->map == map && it->seq <= highest_seq) {
+      events_.spool.push_back({ToString(*it), {}});
+      it = spooled_.erase(it);
+    }
+  }
+}
+
+void PhoneAgent::OnPose(const pose_t& message) {
+  PhonePose pose;
+  pose.utime = message.utime;
+  pose.state = message.state;
+  pose.reason = message.reason;
+  pose.map = Parse(message.map).value.value_or(MapId{});
+  pose.T_odom_body = Parse(message.T_odom_body).value.value_or(Rigid3{});
+  pose.num_tracked = message.num_tracked;
+  if (correction_ && correction_->map == pose.map && message.group_revision > 0) {
+    pose.in_group = {correction_->group,
+                     Parse(message.T_map_body).value.value_or(pose.T_odom_body)};
+  }
+  const bool tracks = pose.state == pose_t::STATE_TRACKING;
+  tracked_map_ = tracks ? std::optional(pose.map) : std::nullopt;
+  events_.pose = std::move(pose);
+}
+
+AnchorId PhoneAgent::PlaceAnchor(const NewAnchor& anchor) {
+  if (!tracked_map_) {
+    throw std::runtime_error("the odometry does not track: an anchor has no place yet");
+  }
+  last_created_utime_ = std::max(now_us_, last_created_utime_ + 1);
+  AnchorEdit edit;
+  edit.anchor = {agent_id_, last_created_utime_};
+  edit.agent_id = agent_id_;
+  edit.name = anchor.name;
+  edit.payload = anchor.payload;
+  edit.map = *tracked_map_;
+  edit.utime = anchor.utime;
+  edit.placement = anchor.pixel ? AnchorEdit::Placement::kPixel : AnchorEdit::Placement::kBody;
+  edit.pixel = anchor.pixel.value_or(Eigen::Vector2d::Zero());
+  edit.T_ref_anchor = anchor.T_body_anchor;
+  const anchor_edit_t message = ToMessage(edit);
+  if (const auto parsed = Parse(message); !parsed.value) {
+    throw std::runtime_error(parsed.refused);
+  }
+  node_.Publish(channels::AnchorRequest(agent_id_), message);
+  agent_bus_.Drain();
+  return edit.anchor;
+}
+
+void PhoneAgent::RemoveAnchor(const AnchorId& id) {
+  const AnchorState* const state = anchors_.Find(id);
+  if (state == nullptr) {
+    return;
+  }
+  AnchorEdit edit;
+  edit.anchor = id;
+  edit.revision = state->revision + 1;
+  edit.agent_id = agent_id_;
+  edit.deleted = true;
+  edit.name = state->name;
+  edit.payload = state->payload;
+  node_.Publish(channels::AnchorRequest(agent_id_), ToMessage(edit));
+  agent_bus_.Drain();
+}
+
+void PhoneAgent::Poll(int64_t now_us) {
+  now_us_ = now_us;
+  agent_bus_.Drain();
+  if (uplink_) {
+    uplink_->Poll(now_us);
+  }
+  if (now_us >= next_tick_us_) {
+    next_tick_us_ = now_us + kTickInterval_us;
+    vio_.Tick(now_us);
+    if (uplink_) {
+      uplink_->Tick(now_us);
+    }
+  }
+  agent_bus_.Drain();
+  link_bus_.Drain();
+}
+
+void PhoneAgent::StartAnew() {
+  sensors_.StartAnew();
+  agent_bus_.Drain();
+}
+
+void PhoneAgent::Flush() {
+  vio_.Flush();
+  agent_bus_.Drain();
+}
+
+PhoneEvents PhoneAgent::Take() { return std::exchange(events_, {}); }
+
+}  // namespace pangea::phone

@@ -1,0 +1,217 @@
+// The agent with a server's end of the link beside it; no images.
+
+#include "phone/agent/phone_agent.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "agent_handler/agent_handler_process.h"
+#include "link/agent_key.h"
+#include "messages/testing/test_anchors.h"
+#include "messages/testing/test_keyframes.h"
+
+namespace pangea::phone {
+namespace {
+
+constexpr int64_t kStart_us = 1'700'000'000'000'000;
+constexpr char kKeyHex[] = "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f";
+const MapId kOldMap{7, kStart_us - 60'000'000};
+
+AgentTexts Texts() {
+  AgentTexts texts;
+  texts.agent = 7;
+  texts.opened_utime = kStart_us;
+  texts.key_hex = kKeyHex;
+  texts.camera_yaml =
+      "T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n"
+      "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\n"
+      "distortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n";
+  return texts;
+}
+
+std::string RefusedFor(const AgentTexts& texts) {
+  try {
+    ReadAgentConfig(texts);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+int64_t Refused(const status_t& status, const std::string& reason) {
+  for (const counter_t& counter : status.refused) {
+    if (counter.name == reason) {
+      return counter.count;
+    }
+  }
+  return 0;
+}
+
+// A server that has the agent's key.
+class PhoneAgentTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_ / "keys");
+    const std::filesystem::path file = folder_ / "keys" / KeyFileName(7);
+    std::ofstream(file) << "agent: 7\nkey: " << kKeyHex << "\n";
+    std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+    handler_.emplace(link_bus_, server_bus_, (folder_ / "journal.lcm").string(),
+                     (folder_ / "keys").string(), now_us_, AgentHandlerOptions{});
+    link_bus_.Subscribe("LINK_DOWN_7",
+                        [this](const std::string&, Bytes packet) { agent_.OnLinkDown(packet); });
+    server_bus_.Subscribe("KEYFRAME_7", [this](const std::string&, Bytes data) {
+      delivered_.emplace_back(data.begin(), data.end());
+    });
+  }
+  void TearDown() override {
+    handler_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  void Run(double seconds) {
+    for (const int64_t end = now_us_ + static_cast<int64_t>(1e6 * seconds); now_us_ < end;
+         now_us_ += 10'000) {
+      agent_.Poll(now_us_);
+      const PhoneEvents events = agent_.Take();
+      for (const std::vector<uint8_t>& packet : events.link_up) {
+        link_bus_.Publish("LINK_UP_7", packet);
+      }
+      spool_.insert(spool_.end(), events.spool.begin(), events.spool.end());
+      keyframes_ += events.keyframes.size();
+      anchors_ = events.anchors ? events.anchors : anchors_;
+      uplink_status_ = events.uplink_status ? events.uplink_status : uplink_status_;
+      vio_status_ = events.vio_status ? events.vio_status : vio_status_;
+      link_bus_.Drain();
+      handler_->Poll(now_us_);
+      handler_->Tick(now_us_);
+      link_bus_.Drain();
+      server_bus_.Drain();
+    }
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / "pangea_phone_agent";
+  int64_t now_us_ = kStart_us;
+  PhoneAgent agent_{ReadAgentConfig(Texts())};
+  LocalBus link_bus_, server_bus_;
+  std::optional<AgentHandlerProcess> handler_;
+  std::vector<std::vector<uint8_t>> delivered_;
+  std::vector<SpoolChange> spool_;
+  std::optional<std::vector<DrawnAnchor>> anchors_;
+  std::optional<status_t> uplink_status_, vio_status_;
+  size_t keyframes_ = 0;
+};
+
+TEST_F(PhoneAgentTest, KeyframesOfAnEarlierRunReachTheServerAndAreDeletedThen) {
+  std::vector<std::string> ids;
+  for (int32_t seq = 0; seq < 3; ++seq) {
+    const KeyframeId id{kOldMap, seq};
+    ids.push_back(ToString(id));
+    agent_.Restore(ids.back(), EncodeTestKeyframe(id));
+  }
+  Run(3);
+  ASSERT_EQ(delivered_.size(), 3u);
+  for (int32_t seq = 0; seq < 3; ++seq) {
+    EXPECT_EQ(delivered_[seq], EncodeTestKeyframe({kOldMap, seq}));
+  }
+  ASSERT_EQ(spool_.size(), 3u);  // and none was put again
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(spool_[i].id, ids[i]);
+    EXPECT_TRUE(spool_[i].bytes.empty());
+  }
+  EXPECT_EQ(keyframes_, 0u);
+  ASSERT_TRUE(uplink_status_);
+  EXPECT_EQ(CounterOf(*uplink_status_, "keyframes_acked"), 3);
+}
+
+TEST_F(PhoneAgentTest, WithoutAServerNothingIsDeleted) {
+  agent_.Restore("a", EncodeTestKeyframe({kOldMap, 0}));
+  for (; now_us_ < kStart_us + 5'000'000; now_us_ += 10'000) {
+    agent_.Poll(now_us_);
+  }
+  const PhoneEvents events = agent_.Take();
+  EXPECT_TRUE(events.spool.empty());
+  EXPECT_GE(events.link_up.size(), 5u);  // hellos
+  ASSERT_TRUE(events.uplink_status);
+  EXPECT_EQ(CounterOf(*events.uplink_status, "spool"), 1);
+}
+
+TEST_F(PhoneAgentTest, ADamagedKeyframeIsDeletedAndAnothersIsLeft) {
+  std::vector<uint8_t> damaged = EncodeTestKeyframe({kOldMap, 0});
+  damaged[3] ^= 1;
+  agent_.Restore("damaged", damaged);
+  agent_.Restore("another's", EncodeTestKeyframe({{8, 1000}, 0}));
+  Run(2);
+  ASSERT_EQ(spool_.size(), 1u);
+  EXPECT_EQ(spool_[0].id, "damaged");
+  EXPECT_TRUE(spool_[0].bytes.empty());
+  EXPECT_TRUE(delivered_.empty());
+}
+
+TEST_F(PhoneAgentTest, AnchorsOfTheServerAreDrawnAndRemoved) {
+  agent_.Restore("a", EncodeTestKeyframe({kOldMap, 0}));
+  Run(2);
+  const AnchorId id{3, 1000};
+  PublishMessage(server_bus_, "ANCHOR_7", ToMessage(TestAnchor(id, 1, kOldMap)));
+  Run(3);
+  ASSERT_TRUE(anchors_ && anchors_->size() == 1);
+  const DrawnAnchor& drawn = anchors_->front();
+  EXPECT_EQ(drawn.id, id);
+  EXPECT_EQ(drawn.name, "kettle");
+  EXPECT_NEAR(drawn.sigma_m, 0.01, 1e-6);
+  EXPECT_LT((drawn.T_odom_anchor.t - Eigen::Vector3d(1, 2, 3)).norm(), 1e-3);
+  agent_.RemoveAnchor(id);
+  agent_.RemoveAnchor({3, 1001});  // there is none
+  Run(3);
+  EXPECT_EQ(CounterOf(*uplink_status_, "anchor_edits"), 1);
+}
+
+TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCounted) {
+  agent_.AddImage(1'000, cv::Mat(10, 10, CV_8U, cv::Scalar(0)));
+  Run(2);
+  ASSERT_TRUE(vio_status_);
+  EXPECT_EQ(Refused(*vio_status_, "image: its size is not the calibration's"), 1);
+}
+
+TEST_F(PhoneAgentTest, AnAnchorNeedsAPose) {
+  EXPECT_THROW(agent_.PlaceAnchor({"kettle", "", 1000, Eigen::Vector2d(1, 1), {}}),
+               std::runtime_error);
+}
+
+TEST(AgentConfigTest, WhatIsWrongIsNamed) {
+  EXPECT_EQ(RefusedFor(Texts()), "");
+  AgentTexts texts = Texts();
+  texts.agent = 0;
+  EXPECT_EQ(RefusedFor(texts), "agent: a whole number from 1 to 65535, not 0");
+  texts = Texts();
+  texts.opened_utime = std::nan("");
+  EXPECT_TRUE(RefusedFor(texts).starts_with("openedUtime: a whole number"));
+  texts = Texts();
+  texts.key_hex.back() = 'x';
+  EXPECT_EQ(RefusedFor(texts), "keyHex: must be 64 hexadecimal digits");
+  texts = Texts();
+  texts.camera_yaml = "resolution: [64, 48]";
+  EXPECT_TRUE(RefusedFor(texts).starts_with("cameraYaml: "));
+  texts = Texts();
+  texts.vio_options_yaml = "tracker: {max_feature: 3}";
+  EXPECT_NE(RefusedFor(texts).find("vioOptionsYaml"), std::string::npos);
+}
+
+TEST(AgentConfigTest, WithoutImuYamlTheOptionsNoiseCounts) {
+  AgentTexts texts = Texts();
+  texts.vio_options_yaml = "live_imu: {gyro_noise_density: 0.5}";
+  EXPECT_EQ(ReadAgentConfig(texts).imu_noise.gyro_noise_density, 0.5);
+  texts.imu_yaml =
+      "T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n"
+      "gyroscope_noise_density: 0.25\ngyroscope_random_walk: 1\naccelerometer_noise_density: 1\n"
+      "accelerometer_random_walk: 1\nrate_hz: 100\n";
+  const AgentConfig config = ReadAgentConfig(texts);
+  EXPECT_EQ(config.imu_noise.gyro_noise_density, 0.25);
+  EXPECT_EQ(config.camera.T_body_cam.t.x(), -2);
+}
+
+}  // namespace
+}  // namespace pangea::phone

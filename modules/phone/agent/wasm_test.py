@@ -1,0 +1,76 @@
+#!/usr/bin/env python3
+"""The agent as WebAssembly, in Node, against pangea-vio on a rendered recording of a phone.
+
+wasm_test.py PROGRAMS WASM WORK
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+MAX_WASM_BYTES = 3_000_000
+MAX_HEAP_MB = 64
+MAX_ATE_RATIO = 1.1
+
+
+def run(*command, expect=0):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == expect, f"{command[0]}: {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout + done.stderr
+
+
+def seqs(programs, log):
+    """Of the keyframes in a log, as our own decoder reads them."""
+    lines = run(programs / "pangea-log", "list", "--json", "--channels", "KEYFRAME_1", log).splitlines()
+    return [json.loads(line)["message"]["id"]["seq"] for line in lines]
+
+
+def ate_m(programs, tum, recording):
+    metrics = json.loads(run(programs / "pangea-eval", "ate", "--json", "-", tum, recording))["SE(3)"]
+    assert metrics["trajectories"][0]["coverage"] > 0.5, metrics
+    return metrics["ate_m"]["rmse"]
+
+
+def refuses(agent, words, message):
+    said = run("node", agent, *words, expect=1)
+    assert message in said, said
+
+
+def main(programs, wasm, work):
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    recording = work / "walk"
+    run(programs / "pangea-sim", "--no-cache", "--shrink", "2", "--generate", "walk", "--camera", "phone", "--duration", "14",
+        "--path-seed", "1", "--seed", "1", "--out", recording)
+    agent = wasm / "pangea-agent.mjs"
+    common = ["--agent", "1", "--recording", recording, "--rate", "max"]
+    of_native = ["--out-tum", work / "native.tum", "--out-keyframes", work / "native.lcm"]
+    of_wasm = ["--out-tum", work / "wasm.tum", "--out-keyframes", work / "wasm.lcm"]
+    run(programs / "pangea-vio", "--bus", "none", *common, *of_native)
+    said = run("node", agent, *common, *of_wasm)
+    print(said)
+
+    expected, found = seqs(programs, work / "native.lcm"), seqs(programs, work / "wasm.lcm")
+    assert len(expected) > 10
+    assert found == expected, f"keyframes {found}, and pangea-vio's are {expected}"
+    native_m, wasm_m = (ate_m(programs, work / tum, recording) for tum in ("native.tum", "wasm.tum"))
+    print(f"ATE: native {native_m:.4f} m, wasm {wasm_m:.4f} m")
+    assert wasm_m < MAX_ATE_RATIO * native_m, f"ATE {wasm_m} m, and pangea-vio's is {native_m} m"
+    heap_mb = float(re.search(r"heap ([\d.]+) MB", said)[1])
+    assert heap_mb < MAX_HEAP_MB, heap_mb
+    assert (wasm / "pangea_agent.wasm").stat().st_size < MAX_WASM_BYTES
+
+    refuses(agent, ["--agent", "1"], "--recording DIR is missing")
+    refuses(agent, ["--recording", recording], "--agent ID is missing")
+    refuses(agent, ["--recording", recording, "--agent", "70000"], "agent: a whole number from 1 to 65535")
+    refuses(agent, ["--recording", work / "none", "--agent", "1"], "no such file")
+    options = work / "options.yaml"
+    options.write_text("tracker: {max_feature: 3}\n")
+    refuses(agent, ["--recording", recording, "--agent", "1", "--options", options], "max_feature")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

@@ -1,0 +1,32 @@
+import "fake-indexeddb/auto";
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { SpoolStore } from "./spool_store";
+
+const put = (id: string, byte: number) => ({ op: "put" as const, id, bytes: new Uint8Array([byte]) });
+const remove = (id: string) => ({ op: "delete" as const, id });
+const ids = async (store: SpoolStore) => (await store.entries()).map(({ id }) => id);
+
+test("what was put and not deleted is there again, in its order", async () => {
+  const store = await SpoolStore.open("a");
+  await store.apply([put("9", 9), put("10", 10), put("1", 1)]);
+  await store.apply([remove("10"), put("2", 2)]);
+  store.close();
+  const again = await SpoolStore.open("a");
+  assert.deepEqual(await ids(again), ["9", "1", "2"]);
+  assert.deepEqual([...(await again.entries())[0].bytes], [9]);
+});
+
+test("changes take effect in the order of their calls, also those that nobody waits for", async () => {
+  const store = await SpoolStore.open("b");
+  void store.apply([put("1", 1)]);
+  void store.apply([remove("1"), put("1", 2)]);
+  await store.apply([put("3", 3)]);
+  assert.deepEqual((await store.entries()).map(({ id, bytes }) => [id, bytes[0]]), [["1", 2], ["3", 3]]);
+});
+
+test("agents do not see each other's; what is not there may be deleted", async () => {
+  const store = await SpoolStore.open("c");
+  await store.apply([remove("nobody")]);
+  assert.deepEqual(await ids(store), []);
+});

@@ -1,0 +1,57 @@
+// Keyframes that wait for the server, in the browser's IndexedDB: what was put and not deleted is there again when the page is
+// opened anew.
+
+import type { SpoolChange } from "./phone_agent";
+
+const kStore = "keyframes";
+
+const done = <T>(request: IDBRequest<T>) =>
+  new Promise<T>((resolve, reject) => {
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+
+interface Entry {
+  id: string;
+  order: number; // in which it was put
+  bytes: Uint8Array;
+}
+
+export class SpoolStore {
+  private constructor(
+    private readonly database: IDBDatabase,
+    private nextOrder: number,
+  ) {}
+
+  static async open(name: string): Promise<SpoolStore> {
+    const request = indexedDB.open(name, 1);
+    request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
+    const store = new SpoolStore(await done(request), 0);
+    store.nextOrder = ((await store.entries()).at(-1)?.order ?? -1) + 1;
+    return store;
+  }
+
+  // In the order in which they were put.
+  async entries(): Promise<Entry[]> {
+    const all: Entry[] = await done(this.database.transaction(kStore).objectStore(kStore).getAll());
+    return all.sort((a, b) => a.order - b.order);
+  }
+
+  // All or nothing; transactions of one store happen in the order of these calls.
+  async apply(changes: SpoolChange[]): Promise<void> {
+    const transaction = this.database.transaction(kStore, "readwrite");
+    const store = transaction.objectStore(kStore);
+    for (const { op, id, bytes } of changes) {
+      if (op === "put") store.put({ id, order: this.nextOrder++, bytes });
+      else store.delete(id);
+    }
+    await new Promise((resolve, reject) => {
+      transaction.oncomplete = resolve;
+      transaction.onabort = () => reject(transaction.error);
+    });
+  }
+
+  close() {
+    this.database.close();
+  }
+}

@@ -1,0 +1,45 @@
+// The page's side of the worker: sensors go in, what the agent says comes out.
+
+import type { CameraImage } from "./sensors/camera";
+import { kImuStride } from "./messages";
+import type { FromWorker, OpenAgent, ToWorker } from "./messages";
+import type { ImuSample } from "./recording/euroc";
+
+const kLongestClose_ms = 3000; // of an agent that answers no more
+
+type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride">;
+
+export class AgentClient {
+  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+
+  private closed = () => {};
+
+  constructor(open: OpenAgent, onMessage: (message: FromWorker) => void) {
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => (data.kind === "closed" ? this.closed() : onMessage(data));
+    this.worker.onerror = ({ message }) => onMessage({ kind: "failed", text: message || "The agent's script cannot be loaded." });
+    this.say(open);
+  }
+
+  addImu(samples: ImuSample[]) {
+    const values = new Float64Array(kImuStride * samples.length);
+    samples.forEach(({ utime, gyro, accel }, i) => values.set([utime, ...gyro, ...accel], kImuStride * i));
+    this.say({ kind: "imu", samples: values }, [values.buffer]);
+  }
+
+  // The image's luma is the worker's afterwards.
+  addImage({ utime, luma, width, height, stride }: Image) {
+    this.say({ kind: "image", utime, luma, width, height, stride }, [luma.buffer]);
+  }
+
+  say(message: ToWorker, transfer: Transferable[] = []) {
+    this.worker.postMessage(message, transfer);
+  }
+
+  // Resolves when all that is unsent is stored.
+  async close(): Promise<void> {
+    const closed = new Promise<void>((done) => (this.closed = done));
+    this.say({ kind: "close" });
+    await Promise.race([closed, new Promise((done) => setTimeout(done, kLongestClose_ms))]);
+    this.worker.terminate();
+  }
+}

@@ -1,0 +1,77 @@
+// The agent's WebSocket to the gateway: sealed packets, one a message, in both directions. The gateway first sends a nonce and
+// gets proof of the agent's key for it. Opened again when it is lost.
+
+import type { LinkState } from "../messages";
+
+const kFirstRetry_ms = 1000;
+const kLongestRetry_ms = 15_000;
+const kMaxWaiting_bytes = 256_000; // in the socket: what is beyond is dropped, the link repeats it
+
+// Why the gateway closes for good, by its close codes: the key is unknown or revoked; another page of this agent came.
+const kFinal = new Map<number, LinkState>([[4401, "refused"], [4409, "replaced"]]);
+
+export function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
+  return Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16));
+}
+
+// HMAC-SHA-256(key, "pangea-gateway-v1:" + agent + ":" + nonce).
+export async function proofOf(keyHex: string, agent: number, nonce: Uint8Array): Promise<Uint8Array<ArrayBuffer>> {
+  const hmac = { name: "HMAC", hash: "SHA-256" };
+  const key = await crypto.subtle.importKey("raw", bytesOfHex(keyHex), hmac, false, ["sign"]);
+  const prefix = new TextEncoder().encode(`pangea-gateway-v1:${agent}:`);
+  const message = new Uint8Array([...prefix, ...nonce]);
+  return new Uint8Array(await crypto.subtle.sign("HMAC", key, message));
+}
+
+export class GatewayLink {
+  state: LinkState = "connecting";
+  private socket?: WebSocket;
+  private retry_ms = kFirstRetry_ms;
+  private proven = false;
+  private openedAt = -Infinity; // ms
+
+  constructor(
+    private readonly origin: string, // "wss://host:port"
+    private readonly agent: number,
+    private readonly keyHex: string,
+    private readonly onPacket: (packet: Uint8Array) => void,
+  ) {
+    this.connect();
+  }
+
+  // False: it is not sent, the link sends it another time.
+  send(packet: Uint8Array): boolean {
+    if (this.state !== "open" || !this.socket || this.socket.bufferedAmount > kMaxWaiting_bytes) return false;
+    this.socket.send(packet as Uint8Array<ArrayBuffer>);
+    return true;
+  }
+
+  private connect() {
+    this.proven = false;
+    const socket = new WebSocket(`${this.origin}/link?agent=${this.agent}`);
+    this.socket = socket;
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => this.take(socket, new Uint8Array(data));
+    socket.onclose = ({ code }) => this.lost(code);
+  }
+
+  private take(socket: WebSocket, message: Uint8Array) {
+    if (this.proven) return this.onPacket(message);
+    this.proven = true;
+    void proofOf(this.keyHex, this.agent, message).then((proof) => {
+      if (socket.readyState !== WebSocket.OPEN) return;
+      socket.send(proof);
+      this.state = "open";
+      this.openedAt = performance.now();
+    });
+  }
+
+  private lost(code: number) {
+    const openFor_ms = performance.now() - this.openedAt;
+    if (this.state === "open" && openFor_ms > kLongestRetry_ms) this.retry_ms = kFirstRetry_ms;
+    this.state = kFinal.get(code) ?? "connecting";
+    if (kFinal.has(code)) return;
+    setTimeout(() => this.connect(), this.retry_ms);
+    this.retry_ms = Math.min(2 * this.retry_ms, kLongestRetry_ms);
+  }
+}

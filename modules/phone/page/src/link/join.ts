@@ -1,0 +1,39 @@
+// Joining a site: a one-time code for an agent's key, which stays in this browser's storage.
+
+import type { Membership } from "../messages";
+
+const kStorageKey = "pangea.membership";
+
+// The code in a link of `pangea-gateway invite`: https://server:8443/#join=CODE
+export function codeIn(hash: string): string | undefined {
+  return new URLSearchParams(hash.replace(/^#/, "")).get("join") ?? undefined;
+}
+
+// What is stored, if it is one; anything else is as if nothing were there.
+export function parseMembership(json: string | null): Membership | undefined {
+  try {
+    const { agent, key, site, name } = JSON.parse(json ?? "null") ?? {};
+    const good = Number.isInteger(agent) && agent >= 1 && agent <= 65535 && /^[0-9a-f]{64}$/.test(key);
+    return good ? { agent, key, site: String(site ?? ""), name: String(name ?? "") } : undefined;
+  } catch {
+    return undefined;
+  }
+}
+
+export const storedMembership = () => parseMembership(localStorage.getItem(kStorageKey));
+export const forgetMembership = () => localStorage.removeItem(kStorageKey);
+
+// Throws what the server says, for the visitor.
+export async function join(code: string, name: string): Promise<Membership> {
+  const answer = await fetch("/v1/join", {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ code, name }),
+  });
+  const said = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Error(said.error ?? `The server does not answer (${answer.status}).`);
+  const membership = parseMembership(JSON.stringify({ ...said, name }));
+  if (!membership) throw new Error("The server's answer has no key in it.");
+  localStorage.setItem(kStorageKey, JSON.stringify(membership));
+  return membership;
+}

@@ -1,0 +1,87 @@
+// A recording in EuRoC's format (docs/recordings.md): calibration, inertial samples, and which images there are.
+
+import { parseCamera, parseExtrinsics } from "../view/camera_model";
+import type { CameraModel } from "../view/camera_model";
+import type { Files } from "./files";
+
+export interface ImuSample {
+  utime: number; // us
+  gyro: [number, number, number]; // rad/s, body
+  accel: [number, number, number]; // m/s^2, body
+}
+
+export interface RecordedImage {
+  utime: number;
+  name: string; // among the files
+}
+
+export interface Recording {
+  files: Files;
+  camera: CameraModel;
+  cameraYaml: string;
+  imuYaml: string;
+  imu: ImuSample[];
+  images: RecordedImage[];
+}
+
+const text = async (files: Files, name: string) => new TextDecoder().decode(await files.read(name));
+
+// The folder that holds cam0 and imu0, with its slash.
+function rootOf(names: string[]): string {
+  const roots = names
+    .map((name) => /^(.*?)cam0\/data\.csv$/.exec(name)?.[1])
+    .filter((root) => root !== undefined);
+  if (roots.length === 0) throw new Error("no EuRoC recording: there is no cam0/data.csv");
+  if (roots.length > 1) throw new Error(`drop one recording at a time: there are ${roots.join(", ")}`);
+  return roots[0];
+}
+
+// Stamps are nanoseconds, more than a double holds: their last three digits are left out before they are numbers.
+const utimeOf = (nanoseconds: string) => Number(nanoseconds.trim().slice(0, -3));
+
+function rows(csv: string, file: string, columns: number): string[][] {
+  const lines = csv.split("\n").map((line) => line.trim()).filter((line) => line !== "" && !line.startsWith("#"));
+  const good = lines.map((line) => line.split(",")).filter((row) =>
+    row.length >= columns && /^\s*\d{4,}\s*$/.test(row[0]));
+  if (good.length === 0 || lines.length - good.length > Math.max(1, lines.length / 10)) {
+    throw new Error(`${file}: ${lines.length - good.length} of ${lines.length} rows are not ` +
+      `a stamp in nanoseconds and ${columns - 1} more columns`);
+  }
+  return good;
+}
+
+function growing<T extends { utime: number }>(items: T[]): T[] {
+  const sorted = [...items].sort((a, b) => a.utime - b.utime);
+  return sorted.filter(({ utime }, i) => i === 0 || utime > sorted[i - 1].utime);
+}
+
+function parseImu(csv: string, file: string): ImuSample[] {
+  const samples = rows(csv, file, 7).map((row) => {
+    const values = row.slice(1, 7).map(Number);
+    return {
+      utime: utimeOf(row[0]),
+      gyro: values.slice(0, 3) as ImuSample["gyro"],
+      accel: values.slice(3, 6) as ImuSample["accel"],
+    };
+  });
+  return growing(samples.filter(({ gyro, accel }) => [...gyro, ...accel].every(Number.isFinite)));
+}
+
+export async function openRecording(files: Files): Promise<Recording> {
+  const root = rootOf(files.names);
+  const present = new Set(files.names);
+  for (const name of ["cam0/sensor.yaml", "imu0/sensor.yaml", "imu0/data.csv"]) {
+    if (!present.has(root + name)) throw new Error(`${root}${name} is missing`);
+  }
+  const cameraYaml = await text(files, `${root}cam0/sensor.yaml`);
+  const imuYaml = await text(files, `${root}imu0/sensor.yaml`);
+  const imu = parseImu(await text(files, `${root}imu0/data.csv`), `${root}imu0/data.csv`);
+  const images = growing(
+    rows(await text(files, `${root}cam0/data.csv`), `${root}cam0/data.csv`, 2)
+      .map(([stamp, name]) => ({ utime: utimeOf(stamp), name: `${root}cam0/data/${name.trim()}` }))
+      .filter(({ name }) => present.has(name)),
+  );
+  if (images.length === 0) throw new Error(`${root}cam0/data: none of the images of data.csv is there`);
+  const T_rig_body = parseExtrinsics(imuYaml, `${root}imu0/sensor.yaml`);
+  return { files, camera: parseCamera(cameraYaml, `${root}cam0/sensor.yaml`, T_rig_body), cameraYaml, imuYaml, imu, images };
+}

@@ -1,0 +1,62 @@
+// What was dropped onto the page: a folder or a zip, as names and contents.
+
+import { unzipSync } from "fflate";
+
+export interface Files {
+  names: string[]; // with their folders: "walk/mav0/imu0/data.csv"
+  read(name: string): Promise<Uint8Array>;
+}
+
+export async function filesOfZip(zip: Blob): Promise<Files> {
+  const bytes = new Uint8Array(await zip.arrayBuffer());
+  const names: string[] = [];
+  const listing = { filter: ({ name }: { name: string }) => (names.push(name), false) };
+  try {
+    unzipSync(bytes, listing);
+  } catch (error) {
+    throw new Error(`this zip cannot be read: ${(error as Error).message}`);
+  }
+  return {
+    names,
+    // One file at a time: all images of a recording unpacked would not fit a phone's memory.
+    read: async (name) => {
+      const found = unzipSync(bytes, { filter: (file) => file.name === name })[name];
+      if (!found) throw new Error(`${name} is not in the zip`);
+      return found;
+    },
+  };
+}
+
+export function filesOf(byName: Map<string, Blob>): Files {
+  return {
+    names: [...byName.keys()],
+    read: async (name) => {
+      const blob = byName.get(name);
+      if (!blob) throw new Error(`${name} is missing`);
+      return new Uint8Array(await blob.arrayBuffer());
+    },
+  };
+}
+
+// Everything below a dropped folder. Must be called within the drop's event: its items are gone afterwards.
+export async function filesOfDrop(items: DataTransferItemList): Promise<Map<string, Blob>> {
+  const entries = [...items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
+  const byName = new Map<string, Blob>();
+  for (const entry of entries) await addEntry(entry, byName);
+  return byName;
+}
+
+async function addEntry(entry: FileSystemEntry, byName: Map<string, Blob>) {
+  if (entry.isFile) {
+    const file = await new Promise<File>((done, failed) => (entry as FileSystemFileEntry).file(done, failed));
+    byName.set(entry.fullPath.replace(/^\//, ""), file);
+    return;
+  }
+  const reader = (entry as FileSystemDirectoryEntry).createReader();
+  for (;;) {
+    // A reader gives a hundred or so at a time, and none at the end.
+    const some = await new Promise<FileSystemEntry[]>((done, failed) => reader.readEntries(done, failed));
+    if (some.length === 0) return;
+    for (const child of some) await addEntry(child, byName);
+  }
+}

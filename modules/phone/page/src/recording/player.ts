@@ -1,0 +1,60 @@
+// Plays a recording as if its sensors were there: at the speed at which it was made, or as fast as the agent takes it. No image
+// is left out: an agent that is slower slows the player down.
+
+import { lumaOfPicture } from "../sensors/luma";
+import type { Luma } from "../sensors/luma";
+import type { ImuSample, Recording } from "./euroc";
+
+const kAhead_us = 60_000; // samples go before their image, past its last row
+
+export interface RecordedPicture extends Luma {
+  utime: number;
+  picture: ImageBitmap;
+}
+
+export interface PlayerSink {
+  addImu(samples: ImuSample[]): void;
+  // Resolves when the agent is done with it.
+  addImage(image: RecordedPicture): Promise<void>;
+}
+
+export class Player {
+  private stopped = false;
+
+  constructor(
+    private readonly recording: Recording,
+    private readonly sink: PlayerSink,
+    private readonly realTime: boolean,
+  ) {}
+
+  stop() {
+    this.stopped = true;
+  }
+
+  // To the end, or until it is stopped. `onImage`: the share that is played.
+  async play(onImage: (share: number) => void): Promise<void> {
+    const { images, imu } = this.recording;
+    const began_ms = performance.now();
+    let next = 0;
+    for (let i = 0; i < images.length && !this.stopped; ++i) {
+      const { utime, name } = images[i];
+      const image = await this.load(name, utime);
+      if (this.realTime) await until(began_ms + (utime - images[0].utime) / 1000);
+      const from = next;
+      while (next < imu.length && imu[next].utime <= utime + kAhead_us) ++next;
+      this.sink.addImu(imu.slice(from, next));
+      if (image) await this.sink.addImage(image);
+      onImage((i + 1) / images.length);
+    }
+  }
+
+  // Nothing where the browser cannot read it.
+  private async load(name: string, utime: number): Promise<RecordedPicture | undefined> {
+    const encoded = await this.recording.files.read(name);
+    const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" } as const;
+    const picture = await createImageBitmap(new Blob([encoded as Uint8Array<ArrayBuffer>]), options).catch(() => undefined);
+    return picture && { utime, picture, ...lumaOfPicture(picture, picture.width, picture.height) };
+  }
+}
+
+const until = (time_ms: number) => new Promise((done) => setTimeout(done, Math.max(0, time_ms - performance.now())));

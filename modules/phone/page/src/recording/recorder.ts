@@ -1,0 +1,60 @@
+// Records what the phone senses: every image the camera gives as JPEG, every inertial sample, and the calibration that was used.
+
+import type { CameraImage } from "../sensors/camera";
+import type { ImuSample } from "./euroc";
+import { RecordingWriter } from "./writer";
+
+const kMaxEncoding = 4; // images at once; what comes beyond is left out, and counted
+const kQuality = 0.92;
+
+export class Recorder {
+  numLeftOut = 0;
+  private readonly writer: RecordingWriter;
+  private readonly encoding = new Set<Promise<void>>();
+
+  constructor(
+    readonly name: string,
+    private readonly cameraYaml: string,
+    private readonly imuYaml: string,
+  ) {
+    this.writer = new RecordingWriter(name);
+  }
+
+  get numImages(): number {
+    return this.writer.numImages;
+  }
+
+  addImu(sample: ImuSample) {
+    this.writer.addImu(sample);
+  }
+
+  // The picture may be closed as soon as this has returned.
+  addImage({ utime, picture, width, height }: CameraImage) {
+    if (this.encoding.size >= kMaxEncoding) {
+      ++this.numLeftOut;
+      return;
+    }
+    const canvas = new OffscreenCanvas(width, height);
+    canvas.getContext("2d")!.drawImage(picture, 0, 0, width, height);
+    const task: Promise<void> = this.encode(canvas, utime).finally(() => this.encoding.delete(task));
+    this.encoding.add(task);
+  }
+
+  async finish(): Promise<Blob> {
+    await Promise.all(this.encoding);
+    return this.writer.finish(this.cameraYaml, this.imuYaml);
+  }
+
+  private async encode(canvas: OffscreenCanvas, utime: number) {
+    const jpeg = await canvas.convertToBlob({ type: "image/jpeg", quality: kQuality });
+    this.writer.addImage(utime, new Uint8Array(await jpeg.arrayBuffer()), "jpg");
+  }
+}
+
+export function download(blob: Blob, name: string) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}

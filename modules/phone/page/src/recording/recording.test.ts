@@ -1,0 +1,65 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { openRecording } from "./euroc";
+import { filesOf, filesOfZip } from "./files";
+import { RecordingWriter } from "./writer";
+
+const kCamera = `T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+resolution: [640, 480]
+intrinsics: [500, 500, 320, 240]
+distortion_model: equidistant
+distortion_coefficients: [0, 0, 0, 0]
+`;
+const kImu = "T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\nrate_hz: 60\n";
+
+function folder(changes: Record<string, string | undefined> = {}) {
+  const contents: Record<string, string | undefined> = {
+    "walk/mav0/cam0/sensor.yaml": kCamera,
+    "walk/mav0/cam0/data.csv": "#timestamp,filename\n1700000000105000999,b.png\n1700000000055000000,a.png\n",
+    "walk/mav0/cam0/data/a.png": "A",
+    "walk/mav0/cam0/data/b.png": "B",
+    "walk/mav0/imu0/sensor.yaml": kImu,
+    "walk/mav0/imu0/data.csv": "#\n1700000000050000000,1,2,3,4,5,6\r\n1700000000060000000,0,0,0,0,0,9.8\n",
+    ...changes,
+  };
+  const present = Object.entries(contents).filter((entry): entry is [string, string] => entry[1] !== undefined);
+  return filesOf(new Map(present.map(([name, content]) => [name, new Blob([content])])));
+}
+
+test("reads a folder: microseconds, sorted", async () => {
+  const { images, imu, camera } = await openRecording(folder());
+  assert.deepEqual(images.map(({ utime }) => utime), [1700000000055000, 1700000000105000]);
+  assert.equal(images[0].name, "walk/mav0/cam0/data/a.png");
+  assert.deepEqual(imu[0], { utime: 1700000000050000, gyro: [1, 2, 3], accel: [4, 5, 6] });
+  assert.equal(camera.width, 640);
+});
+
+test("an image that is not there is left out; none at all is refused", async () => {
+  const some = await openRecording(folder({ "walk/mav0/cam0/data/a.png": undefined }));
+  assert.equal(some.images.length, 1);
+  const none = folder({ "walk/mav0/cam0/data/a.png": undefined, "walk/mav0/cam0/data/b.png": undefined });
+  await assert.rejects(openRecording(none), /none of the images/);
+});
+
+test("what is wrong is named with its file", async () => {
+  const refused = (changes: Record<string, string | undefined>, says: RegExp) =>
+    assert.rejects(openRecording(folder(changes)), says);
+  await refused({ "walk/mav0/cam0/data.csv": undefined }, /no cam0\/data.csv/);
+  await refused({ "walk/mav0/imu0/data.csv": undefined }, /walk\/mav0\/imu0\/data.csv is missing/);
+  await refused({ "walk/mav0/imu0/data.csv": "1,2,3\n4,5,6\n" }, /imu0\/data.csv: 2 of 2 rows/);
+  await refused({ "walk/mav0/cam0/sensor.yaml": "a: 1" }, /walk\/mav0\/cam0\/sensor.yaml: field/);
+  await refused({ "two/mav0/cam0/data.csv": "" }, /one recording at a time/);
+  await assert.rejects(filesOfZip(new Blob(["no zip"])), /this zip cannot be read/);
+});
+
+test("what the writer writes, the reader reads", async () => {
+  const writer = new RecordingWriter("mine");
+  writer.addImage(1700000000055000, new Uint8Array([1, 2, 3]), "jpg");
+  writer.addImu({ utime: 1700000000050001, gyro: [0.1, -0.2, 0.3], accel: [0, 0, 9.8] });
+  const files = await filesOfZip(writer.finish(kCamera, kImu));
+  const { images, imu, cameraYaml, imuYaml } = await openRecording(files);
+  assert.deepEqual(imu, [{ utime: 1700000000050001, gyro: [0.1, -0.2, 0.3], accel: [0, 0, 9.8] }]);
+  assert.equal(images[0].utime, 1700000000055000);
+  assert.deepEqual([...(await files.read(images[0].name))], [1, 2, 3]);
+  assert.deepEqual([cameraYaml, imuYaml], [kCamera, kImu]);
+});

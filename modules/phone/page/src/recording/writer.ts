@@ -1,0 +1,70 @@
+// Writes a recording in EuRoC's format as a zip, as it comes: images stay compressed as they are, in pieces that the
+// browser may put on its disk.
+
+import { strToU8, Zip, ZipDeflate, ZipPassThrough } from "fflate";
+import type { ImuSample } from "./euroc";
+
+const kPartBytes = 4_000_000;
+
+const nanoseconds = (utime: number) => `${utime}000`;
+
+export class RecordingWriter {
+  private readonly parts: Blob[] = [];
+  private recent: Uint8Array<ArrayBuffer>[] = [];
+  private recentBytes = 0;
+  private readonly zip: Zip;
+  private readonly imageRows = ["#timestamp [ns],filename"];
+  private readonly imuRows = [
+    "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1]," +
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
+  ];
+  private failure?: Error;
+  numImages = 0;
+
+  // `folder`: the name of the recording, which holds mav0.
+  constructor(private readonly folder: string) {
+    this.zip = new Zip((error, data) => {
+      if (error) this.failure = error;
+      else this.keep(data as Uint8Array<ArrayBuffer>);
+    });
+  }
+
+  // `extension`: jpg or png, what `encoded` is.
+  addImage(utime: number, encoded: Uint8Array, extension: string) {
+    const name = `${nanoseconds(utime)}.${extension}`;
+    this.imageRows.push(`${nanoseconds(utime)},${name}`);
+    this.add(new ZipPassThrough(`${this.folder}/mav0/cam0/data/${name}`), encoded);
+    ++this.numImages;
+  }
+
+  addImu({ utime, gyro, accel }: ImuSample) {
+    this.imuRows.push([nanoseconds(utime), ...[...gyro, ...accel].map((v) => v.toFixed(9))].join(","));
+  }
+
+  // Nothing can be added afterwards.
+  finish(cameraYaml: string, imuYaml: string): Blob {
+    const text = (name: string, content: string) =>
+      this.add(new ZipDeflate(`${this.folder}/mav0/${name}`), strToU8(content));
+    text("cam0/data.csv", `${this.imageRows.join("\n")}\n`);
+    text("cam0/sensor.yaml", cameraYaml);
+    text("imu0/data.csv", `${this.imuRows.join("\n")}\n`);
+    text("imu0/sensor.yaml", imuYaml);
+    this.zip.end();
+    if (this.failure) throw this.failure;
+    return new Blob([...this.parts, ...this.recent], { type: "application/zip" });
+  }
+
+  private keep(data: Uint8Array<ArrayBuffer>) {
+    this.recent.push(data);
+    this.recentBytes += data.length;
+    if (this.recentBytes < kPartBytes) return;
+    this.parts.push(new Blob(this.recent));
+    this.recent = [];
+    this.recentBytes = 0;
+  }
+
+  private add(file: ZipPassThrough | ZipDeflate, content: Uint8Array) {
+    this.zip.add(file);
+    file.push(content, true);
+  }
+}

@@ -1,0 +1,70 @@
+// From what browsers say of motion to the body frame. Body: the device's own axes, whatever the screen shows: x to the
+// right of the device held upright, y to its top, z out of its screen.
+
+export type Vector3 = [number, number, number];
+
+// Row-major rotation of T_a_b.
+export type Matrix3 = [Vector3, Vector3, Vector3];
+
+const kDegree = Math.PI / 180;
+
+// DeviceMotionEvent, its nullable fields resolved.
+export interface MotionReading {
+  acceleration: Vector3; // accelerationIncludingGravity, m/s^2, with the platform's sign
+  rate: Vector3; // rotationRate: alpha, beta, gamma, which are about x, y, z, deg/s
+}
+
+export interface BodyMotion {
+  gyro: Vector3; // rad/s
+  accel: Vector3; // specific force, m/s^2: +9.81 upwards when stationary
+}
+
+// `sign`: 1 as the specification says, -1 where up is negative (iOS).
+export function toBody(reading: MotionReading, sign: 1 | -1): BodyMotion {
+  return {
+    gyro: reading.rate.map((value) => value * kDegree) as Vector3,
+    accel: reading.acceleration.map((value) => value * sign) as Vector3,
+  };
+}
+
+// Where up is in the body, by DeviceOrientationEvent's beta and gamma (deg; rotations about x, then y).
+export function upInBody(beta_deg: number, gamma_deg: number): Vector3 {
+  const [b, g] = [beta_deg * kDegree, gamma_deg * kDegree];
+  return [-Math.cos(b) * Math.sin(g), Math.sin(b), Math.cos(b) * Math.cos(g)];
+}
+
+// Which sign a platform gives to gravity: decided by the first readings that agree with its orientation, and then kept.
+export class GravitySign {
+  private static readonly kReadings = 10;
+  private static readonly kMinAcceleration = 5; // m/s^2: less is no gravity
+  private votes = 0;
+  private numVotes = 0;
+
+  add(acceleration: Vector3, up: Vector3) {
+    if (this.decided) return;
+    const along = acceleration.reduce((sum, value, i) => sum + value * up[i], 0);
+    if (Math.abs(along) < GravitySign.kMinAcceleration) return;
+    this.votes += Math.sign(along);
+    ++this.numVotes;
+  }
+
+  get decided(): boolean {
+    return this.numVotes >= GravitySign.kReadings;
+  }
+
+  // As the specification says until something speaks against it.
+  get sign(): 1 | -1 {
+    return this.votes < 0 ? -1 : 1;
+  }
+}
+
+// R_body_cam of the back camera: browsers deliver its image upright for the screen, which stands at `angle_deg`
+// (screen.orientation.angle) to the device. Camera: x right, y down, z forward, away from the screen.
+export function cameraInBody(angle_deg: number): Matrix3 {
+  const [c, s] = [Math.round(Math.cos(angle_deg * kDegree)), Math.round(Math.sin(angle_deg * kDegree))];
+  return [
+    [c, -s, 0],
+    [-s, -c, 0],
+    [0, 0, -1],
+  ];
+}

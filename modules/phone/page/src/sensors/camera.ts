@@ -1,0 +1,90 @@
+// The back camera: images as they come, stamped on the page's clock.
+
+import { ArrivalClock, utimeOf } from "./clock";
+import { lumaOfFrame } from "./luma";
+import type { Luma } from "./luma";
+
+export interface CameraImage extends Luma {
+  utime: number; // us
+  picture: VideoFrame; // what to draw; whoever has the image closes it
+}
+
+const kSettle_ms = 1500; // of focus and exposure, before they are locked
+
+// Not in TypeScript's library: Chromium's.
+declare class MediaStreamTrackProcessor {
+  constructor(init: { track: MediaStreamTrack; maxBufferSize?: number });
+  readonly readable: ReadableStream<VideoFrame>;
+}
+
+export class Camera {
+  private stopped = false;
+
+  private constructor(
+    private readonly stream: MediaStream,
+    readonly video: HTMLVideoElement,
+  ) {}
+
+  // Throws what the browser says: no camera, no permission.
+  static async open(onImage: (image: CameraImage) => void): Promise<Camera> {
+    const stream = await navigator.mediaDevices.getUserMedia({
+      audio: false,
+      video: { facingMode: "environment", width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
+    });
+    const video = document.createElement("video");
+    video.playsInline = video.muted = true;
+    video.srcObject = stream;
+    await video.play();
+    const camera = new Camera(stream, video);
+    setTimeout(() => void camera.lock(), kSettle_ms);
+    if ("MediaStreamTrackProcessor" in window) void camera.readTrack(onImage);
+    else camera.readVideo(onImage);
+    return camera;
+  }
+
+  get track(): MediaStreamTrack {
+    return this.stream.getVideoTracks()[0];
+  }
+
+  stop() {
+    this.stopped = true;
+    for (const track of this.stream.getTracks()) track.stop();
+  }
+
+  // What moves the focus changes the focal length. Browsers that cannot lock say so, and nothing is lost.
+  private async lock() {
+    const can = (this.track.getCapabilities?.() ?? {}) as Record<string, unknown>;
+    for (const mode of ["focusMode", "exposureMode"]) {
+      if (!Array.isArray(can[mode]) || !can[mode].includes("manual")) continue;
+      await this.track.applyConstraints({ advanced: [{ [mode]: "manual" } as MediaTrackConstraintSet] }).catch(() => {});
+    }
+  }
+
+  private async readTrack(onImage: (image: CameraImage) => void) {
+    const clock = new ArrivalClock();
+    const reader = new MediaStreamTrackProcessor({ track: this.track, maxBufferSize: 2 }).readable.getReader();
+    while (!this.stopped) {
+      const { value: picture, done } = await reader.read();
+      if (done) return;
+      const utime = clock.map(picture.timestamp, utimeOf(performance.now()));
+      if (utime === undefined) picture.close();
+      else onImage({ utime, picture, ...(await lumaOfFrame(picture)) });
+    }
+  }
+
+  // Safari and Firefox. captureTime is when the camera had it; without it there is the time of its presentation.
+  private readVideo(onImage: (image: CameraImage) => void) {
+    let newest = 0;
+    const next = async (now: number, { captureTime }: VideoFrameCallbackMetadata) => {
+      if (this.stopped) return;
+      const utime = utimeOf(captureTime ?? now);
+      if (utime > newest) {
+        newest = utime;
+        const picture = new VideoFrame(this.video);
+        onImage({ utime, picture, ...(await lumaOfFrame(picture)) });
+      }
+      this.video.requestVideoFrameCallback(next);
+    };
+    this.video.requestVideoFrameCallback(next);
+  }
+}

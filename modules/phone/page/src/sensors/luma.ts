@@ -1,0 +1,44 @@
+// The grey image of what a camera or a decoder gives, as the agent takes it.
+
+export interface Luma {
+  luma: Uint8Array;
+  width: number;
+  height: number;
+  stride: number; // bytes a row
+}
+
+const kPlanar = ["I420", "I420A", "NV12", "I422", "I444"]; // the first plane is the luma
+
+// Without a canvas where the frame has a luma plane.
+export async function lumaOfFrame(frame: VideoFrame): Promise<Luma> {
+  if (!frame.format || !kPlanar.includes(frame.format)) return lumaOfPicture(frame, frame.displayWidth, frame.displayHeight);
+  const { width, height } = frame.visibleRect!;
+  const bytes = new Uint8Array(frame.allocationSize());
+  const [{ offset, stride }] = await frame.copyTo(bytes);
+  return { luma: bytes.subarray(offset, offset + stride * height), width, height, stride };
+}
+
+export function lumaOfPicture(picture: CanvasImageSource, width: number, height: number): Luma {
+  const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true })!;
+  context.drawImage(picture, 0, 0, width, height);
+  return { luma: lumaOfRgba(context.getImageData(0, 0, width, height).data), width, height, stride: width };
+}
+
+// BT.601, in 256ths. Grey stays exactly as it is.
+export function lumaOfRgba(rgba: Uint8ClampedArray): Uint8Array {
+  const luma = new Uint8Array(rgba.length / 4);
+  for (let i = 0; i < luma.length; ++i) {
+    luma[i] = (77 * rgba[4 * i] + 150 * rgba[4 * i + 1] + 29 * rgba[4 * i + 2] + 128) >> 8;
+  }
+  return luma;
+}
+
+// Of every 16th pixel of every 16th row.
+export function brightnessOf({ luma, width, height, stride }: Luma): number {
+  let sum = 0;
+  let count = 0;
+  for (let y = 0; y < height; y += 16) {
+    for (let x = 0; x < width; x += 16, ++count) sum += luma[y * stride + x];
+  }
+  return sum / count;
+}

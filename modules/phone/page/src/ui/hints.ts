@@ -1,0 +1,45 @@
+// The one line that tells the visitor what to do next.
+
+import type { AgentPose } from "../agent/phone_agent";
+import type { LinkState } from "../messages";
+
+export interface Situation {
+  pose?: AgentPose; // the newest
+  brightness: number; // of the newest image, 0 to 255
+  link?: LinkState; // nothing: the agent runs by itself
+  together: string[]; // names of those whose map is one with this
+  motionSilent: boolean;
+}
+
+export interface Hint {
+  text: string;
+  tone: "do" | "good" | "bad";
+}
+
+const kDark = 25;
+const kFewFeatures = 25;
+
+export function hintOf({ pose, brightness, link, together, motionSilent }: Situation): Hint {
+  if (motionSilent) return { text: "The phone tells no motion. Allow it in the browser's settings.", tone: "bad" };
+  if (!pose) return { text: "Starting…", tone: "do" };
+  const tracking = pose.state === "tracking";
+  if (brightness < kDark && (!tracking || pose.numTracked < kFewFeatures)) return { text: "Too dark: find more light.", tone: "bad" };
+  if (pose.state === "initialising") return starting(pose.reason);
+  if (!tracking) return { text: "Lost. Look at something with detail, and move sideways, slowly.", tone: "bad" };
+  if (pose.numTracked < kFewFeatures) return { text: "Little to see here: look at something with more detail.", tone: "do" };
+  if (link === "refused") return { text: "The server does not know this phone any more: ask for a new invite.", tone: "bad" };
+  if (link === "replaced") return { text: "The page is open elsewhere too, and works there. Stop and start here.", tone: "bad" };
+  if (link === "connecting") return { text: "No connection. Walk on: your map is kept, and sent later.", tone: "do" };
+  if (together.length > 0) return { text: `In one map with ${listed(together)}. Tap to place an anchor.`, tone: "good" };
+  if (link === "open") return { text: "Walk where others have been, to join their map.", tone: "do" };
+  return { text: "Tracking.", tone: "good" };
+}
+
+function starting(reason: string): Hint {
+  if (/too few features/.test(reason)) return { text: "Look at something with more detail.", tone: "do" };
+  if (/accelerometer shows/.test(reason)) return { text: "Hold the phone more quietly for a moment.", tone: "do" };
+  return { text: "Move sideways, slowly.", tone: "do" };
+}
+
+const listed = (names: string[]) =>
+  names.length === 1 ? names[0] : `${names.slice(0, -1).join(", ")} and ${names.at(-1)}`;

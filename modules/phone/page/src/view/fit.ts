@@ -1,0 +1,27 @@
+// Where an image's pixels are on the screen: the image covers the view, and what does not fit is cut off evenly.
+
+export interface Size {
+  width: number;
+  height: number;
+}
+
+export class Fit {
+  readonly scale: number; // pixels of the screen for one of the image
+  private readonly left: number;
+  private readonly top: number;
+
+  constructor(image: Size, view: Size) {
+    this.scale = Math.max(view.width / image.width, view.height / image.height);
+    this.left = (view.width - this.scale * image.width) / 2;
+    this.top = (view.height - this.scale * image.height) / 2;
+  }
+
+  // The centre of the first pixel is (0, 0) in the image; the corner of the view is on the screen.
+  toScreen([u, v]: [number, number]): [number, number] {
+    return [this.left + this.scale * (u + 0.5), this.top + this.scale * (v + 0.5)];
+  }
+
+  toPixel([x, y]: [number, number]): [number, number] {
+    return [(x - this.left) / this.scale - 0.5, (y - this.top) / this.scale - 0.5];
+  }
+}

@@ -1,0 +1,91 @@
+// The camera image over the whole screen, with what belongs onto it. An image is shown when its pose is known, so that anchors
+// stand still in it: a tenth of a second late at most, and nobody looks past the phone to notice.
+
+import type { AgentPose, ShownAnchor } from "../agent/phone_agent";
+import type { CameraModel } from "./camera_model";
+import { Fit } from "./fit";
+import { anchorsBefore, Overlay } from "./overlay";
+import type { DrawnAnchor } from "./overlay";
+
+type Picture = VideoFrame | ImageBitmap;
+
+const kMaxWaiting = 4; // pictures whose pose has not come
+
+export interface Drawn {
+  utime: number; // of the image that is shown
+  anchors: DrawnAnchor[];
+}
+
+export class Stage {
+  drawn?: Drawn;
+  private readonly waiting = new Map<number, Picture>();
+  private readonly overlay: Overlay;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    overlayCanvas: HTMLCanvasElement,
+    labels: HTMLElement,
+    private readonly colourOf: (owner: number) => string,
+  ) {
+    this.overlay = new Overlay(overlayCanvas, labels);
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  // The agent has the image of `utime`.
+  keep(utime: number, picture: Picture) {
+    this.waiting.set(utime, picture);
+    const [oldest] = this.waiting.keys();
+    if (this.waiting.size > kMaxWaiting) this.forget(oldest);
+  }
+
+  // Shows the picture of the pose. Nothing when it is not there any more.
+  show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[]) {
+    const picture = this.waiting.get(pose.utime);
+    if (!picture) return;
+    const fit = new Fit(camera, this.canvas);
+    const [left, top] = fit.toScreen([-0.5, -0.5]);
+    const { scale } = fit;
+    this.canvas.getContext("2d")!.drawImage(picture, left, top, scale * camera.width, scale * camera.height);
+    const seen = pose.state === "tracking" ? anchorsBefore(camera, pose, anchors) : [];
+    this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf);
+    this.drawn = { utime: pose.utime, anchors: seen.map(({ T_cam_anchor: _, ...drawn }) => drawn) };
+    for (const utime of [...this.waiting.keys()]) if (utime <= pose.utime) this.forget(utime);
+  }
+
+  // The pixel of the shown image at a place of the screen; nothing outside.
+  pixelAt(camera: CameraModel, x: number, y: number): [number, number] | undefined {
+    const [u, v] = this.onScreen(camera).toPixel([x, y]);
+    return u >= 0 && v >= 0 && u <= camera.width - 1 && v <= camera.height - 1 ? [u, v] : undefined;
+  }
+
+  // Where a pixel of the shown image is on the screen.
+  screenOf(camera: CameraModel, pixel: [number, number]): [number, number] {
+    return this.onScreen(camera).toScreen(pixel);
+  }
+
+  clear() {
+    for (const utime of [...this.waiting.keys()]) this.forget(utime);
+    this.drawn = undefined;
+    this.overlay.clear();
+    this.canvas.getContext("2d")!.clearRect(0, 0, this.canvas.width, this.canvas.height);
+  }
+
+  // In CSS pixels; the canvas has more.
+  private onScreen(camera: CameraModel): Fit {
+    return new Fit(camera, { width: this.canvas.clientWidth, height: this.canvas.clientHeight });
+  }
+
+  private forget(utime: number) {
+    this.waiting.get(utime)?.close();
+    this.waiting.delete(utime);
+  }
+
+  private resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    const ratio = Math.min(devicePixelRatio, 2);
+    [this.canvas.width, this.canvas.height] = [Math.round(ratio * width), Math.round(ratio * height)];
+    this.overlay.resize({ width, height });
+  }
+}

@@ -1,0 +1,179 @@
+// One agent while it walks: its sensors, live or played, its worker, and what is known of it. The page draws from here.
+
+import { AgentClient } from "./agent_client";
+import type { AgentPose, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { FromWorker, LinkState, Membership } from "./messages";
+import type { ImuSample, Recording } from "./recording/euroc";
+import { Player } from "./recording/player";
+import type { RecordedPicture } from "./recording/player";
+import { Recorder } from "./recording/recorder";
+import { kPhoneImu } from "./sensors/calibration";
+import { Camera } from "./sensors/camera";
+import type { CameraImage } from "./sensors/camera";
+import { brightnessOf } from "./sensors/luma";
+import { Motion } from "./sensors/motion";
+import { NewestFrame } from "./sensors/newest_frame";
+import { parseCamera } from "./view/camera_model";
+import type { CameraModel } from "./view/camera_model";
+import type { Stage } from "./view/stage";
+
+export interface WalkEvents {
+  onPose(pose: AgentPose): void;
+  onNotice(text: string): void;
+  onFailure(text: string): void;
+}
+
+export class Walk {
+  pose?: AgentPose;
+  anchors: ShownAnchor[] = [];
+  link?: LinkState;
+  vio?: ProcessStatus;
+  uplink?: ProcessStatus;
+  brightness = 255;
+  motionSilent = false;
+  numImages = 0; // that the agent is done with
+  recorder?: Recorder;
+  private stopSensors = () => {};
+  private readonly client: AgentClient;
+  private taken = () => {}; // the image at the agent
+
+  private constructor(
+    readonly camera: CameraModel,
+    private readonly yaml: { camera: string; imu: string },
+    readonly membership: Membership | undefined,
+    private readonly stage: Stage,
+    private readonly events: WalkEvents,
+  ) {
+    this.link = membership && "connecting";
+    const open = { kind: "open", membership, cameraYaml: yaml.camera, imuYaml: yaml.imu } as const;
+    this.client = new AgentClient(open, (message) => this.take(message));
+  }
+
+  // With the phone's own sensors. `calibrationOf`: a sensor.yaml for a camera that delivers such images.
+  static async live(
+    membership: Membership | undefined,
+    calibrationOf: (track: MediaStreamTrack, width: number, height: number) => string,
+    stage: Stage,
+    events: WalkEvents,
+  ): Promise<Walk> {
+    let walk: Walk | undefined;
+    const camera = await Camera.open((image) => (walk ? walk.onCamera(image) : image.picture.close()));
+    const { videoWidth, videoHeight } = camera.video;
+    const cameraYaml = calibrationOf(camera.track, videoWidth, videoHeight);
+    const model = parseCamera(cameraYaml, "the stored calibration");
+    walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
+    const motion = new Motion((sample) => walk.addImu(sample), () => (walk.motionSilent = true));
+    walk.stopSensors = () => {
+      camera.stop();
+      motion.stop();
+    };
+    return walk;
+  }
+
+  // A recording in place of sensors; `onImage` is told the share that is played.
+  static play(
+    recording: Recording, realTime: boolean, membership: Membership | undefined, stage: Stage, events: WalkEvents,
+    onImage: (share: number) => void,
+  ): Walk {
+    const yaml = { camera: recording.cameraYaml, imu: recording.imuYaml };
+    const walk = new Walk(recording.camera, yaml, membership, stage, events);
+    const sink = {
+      addImu: (samples: ImuSample[]) => walk.client.addImu(samples),
+      addImage: (image: RecordedPicture) => {
+        const taken = new Promise<void>((done) => (walk.taken = done));
+        walk.giveToAgent(image);
+        return taken;
+      },
+    };
+    const player = new Player(recording, sink, realTime);
+    walk.stopSensors = () => player.stop();
+    player.play(onImage).then(() => walk.endMap(), (error) => events.onFailure(error.message));
+    return walk;
+  }
+
+  placeAnchor(name: string, utime: number, pixel: [number, number]) {
+    this.client.say({ kind: "place", edit: { name, payload: "", utime, pixel } });
+  }
+
+  removeAnchor(id: string) {
+    this.client.say({ kind: "remove", id });
+  }
+
+  // Sensors pause, or are at their end: the map ends cleanly, what comes afterwards is a new one.
+  endMap() {
+    this.client.say({ kind: "end_map" });
+  }
+
+  // The agent lives on until close, to send what the server does not have yet.
+  stop() {
+    this.stopSensors();
+    this.endMap();
+  }
+
+  async close() {
+    this.stopSensors();
+    await this.client.close();
+  }
+
+  startRecording() {
+    this.recorder = new Recorder(`walk_${new Date().toISOString().replace(/[:.]/g, "-")}`, this.yaml.camera, this.yaml.imu);
+  }
+
+  // Keyframes that the server has not acknowledged.
+  get numUnsent(): number {
+    return this.uplink?.counters.pending ?? 0;
+  }
+
+  private readonly frames = new NewestFrame<CameraImage>(
+    (image) => this.giveToAgent(image),
+    ({ picture }) => picture.close(),
+  );
+
+  private onCamera(image: CameraImage) {
+    this.recorder?.addImage(image);
+    this.frames.add(image);
+  }
+
+  private addImu(sample: ImuSample) {
+    this.motionSilent = false;
+    this.recorder?.addImu(sample);
+    this.client.addImu([sample]);
+  }
+
+  private giveToAgent(image: CameraImage | RecordedPicture) {
+    this.brightness = brightnessOf(image);
+    this.stage.keep(image.utime, image.picture);
+    this.client.addImage(image);
+  }
+
+  private take(message: FromWorker) {
+    switch (message.kind) {
+      case "failed":
+        this.stopSensors();
+        return this.events.onFailure(message.text);
+      case "taken":
+        ++this.numImages;
+        this.taken();
+        return this.frames.done();
+      case "pose":
+        this.pose = message.pose;
+        this.stage.show(this.camera, message.pose, this.anchors);
+        return this.events.onPose(message.pose);
+      case "anchors":
+        this.anchors = message.anchors;
+        return;
+      case "status":
+        return this.takeStatus(message);
+      case "refused":
+        return this.events.onNotice(`The anchor was not placed: ${message.text}`);
+      case "storage_failed":
+        return this.events.onNotice(`This browser does not keep what is unsent: ${message.text}`);
+    }
+  }
+
+  private takeStatus({ vio, uplink, link }: Extract<FromWorker, { kind: "status" }>) {
+    this.vio = vio ?? this.vio;
+    this.uplink = uplink ?? this.uplink;
+    this.link = link;
+  }
+}

@@ -1,0 +1,115 @@
+// The agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of keyframes that wait for it.
+
+import { PhoneAgent } from "./agent/phone_agent";
+import type { AgentEvents, AnchorEdit, WasmModuleFactory } from "./agent/phone_agent";
+import { SpoolStore } from "./agent/spool_store";
+import { GatewayLink } from "./link/gateway_link";
+import { kImuStride } from "./messages";
+import type { FromWorker, OpenAgent, ToWorker } from "./messages";
+
+const kPoll_ms = 10;
+const kModule = "/pangea_agent.mjs"; // lies beside the page
+const kAlone = 1; // the id of an agent without a membership: nobody hears it
+
+const say = (message: FromWorker) => postMessage(message);
+const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now()));
+
+class AgentHost {
+  private link?: GatewayLink;
+  private spool?: SpoolStore;
+  private stored = Promise.resolve(); // what was given to the spool so far
+  private polling?: ReturnType<typeof setInterval>;
+
+  private constructor(private readonly agent: PhoneAgent) {}
+
+  static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml }: OpenAgent): Promise<AgentHost> {
+    const module: { default: WasmModuleFactory } = await import(/* @vite-ignore */ kModule);
+    const agent = await PhoneAgent.load(module.default, {
+      agent: membership?.agent ?? kAlone,
+      keyHex: membership?.key ?? "",
+      cameraYaml,
+      imuYaml,
+      vioOptionsYaml,
+      openedUtime: now_us(),
+    });
+    const host = new AgentHost(agent);
+    if (membership) await host.connect(membership.agent, membership.key);
+    host.polling = setInterval(() => host.take(agent.poll(now_us())), kPoll_ms);
+    return host;
+  }
+
+  private async connect(agent: number, key: string) {
+    this.spool = await SpoolStore.open(`pangea.spool.${agent}`);
+    this.agent.restoreSpool(await this.spool.entries());
+    const origin = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
+    this.link = new GatewayLink(origin, agent, key, (packet) => this.agent.onLinkDown(packet));
+  }
+
+  on(message: Exclude<ToWorker, OpenAgent>) {
+    switch (message.kind) {
+      case "imu":
+        return this.addImu(message.samples);
+      case "image":
+        return this.addImage(message);
+      case "place":
+        return this.place(message.edit);
+      case "remove":
+        return this.agent.removeAnchor(message.id);
+      case "end_map":
+        this.take(this.agent.flush());
+        return this.agent.startAnew();
+      case "close":
+        return void this.close();
+    }
+  }
+
+  private async close() {
+    clearInterval(this.polling);
+    this.take(this.agent.flush());
+    this.take(this.agent.poll(now_us()));
+    await this.stored;
+    say({ kind: "closed" });
+  }
+
+  private addImu(samples: Float64Array) {
+    for (let i = 0; i < samples.length; i += kImuStride) {
+      const [utime, gx, gy, gz, ax, ay, az] = samples.subarray(i, i + kImuStride);
+      this.agent.addImu(utime, [gx, gy, gz], [ax, ay, az]);
+    }
+  }
+
+  private addImage({ utime, luma, width, height, stride }: Extract<ToWorker, { kind: "image" }>) {
+    this.take(this.agent.addImage(utime, luma, width, height, stride));
+    say({ kind: "taken", utime });
+  }
+
+  private place(edit: AnchorEdit) {
+    try {
+      say({ kind: "placed", id: this.agent.placeAnchor(edit) });
+    } catch (error) {
+      say({ kind: "refused", text: (error as Error).message });
+    }
+  }
+
+  private take(events: AgentEvents) {
+    for (const packet of events.linkUp) this.link?.send(packet);
+    if (this.spool && events.spool.length > 0) {
+      this.stored = this.spool.apply(events.spool).catch((error) => say({ kind: "storage_failed", text: String(error) }));
+    }
+    if (events.pose) say({ kind: "pose", pose: events.pose });
+    if (events.anchors) say({ kind: "anchors", anchors: events.anchors });
+    if (events.status) say({ kind: "status", ...events.status, link: this.link?.state });
+  }
+}
+
+let host: Promise<AgentHost> | undefined;
+
+onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.kind === "open") {
+    host = AgentHost.open(data);
+    host.then(() => say({ kind: "opened" }), (error) => say({ kind: "failed", text: String(error.message ?? error) }));
+  } else {
+    // What comes while it is being opened waits, in order.
+    host?.then((opened) => opened.on(data), () => {});
+  }
+};

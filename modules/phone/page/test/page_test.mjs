@@ -1,0 +1,129 @@
+// The page in headless Chromium, with an agent that is none (fake_agent.mjs): camera and motion as the browser emulates them, what
+// is drawn where, tapping, recording, and playing what was recorded.
+
+import { createServer } from "node:http";
+import { readFile } from "node:fs/promises";
+import { extname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { becomes, check, launch, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
+
+const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
+const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }] };
+
+// The page, and as much of the gateway as it asks.
+async function serve() {
+  const server = createServer(async ({ url }, answer) => {
+    const path = new URL(url, "http://x").pathname;
+    if (path === "/v1/info") return answer.end(JSON.stringify(kAgents));
+    if (path === "/v1/join") {
+      answer.statusCode = 403;
+      return answer.end(JSON.stringify({ error: "This code is not known, or was used." }));
+    }
+    const file = path === "/pangea_agent.mjs" ? kFake : join(options.page, path === "/" ? "index.html" : path);
+    answer.setHeader("Content-Type", kTypes[extname(file)] ?? "application/octet-stream");
+    answer.end(await readFile(file).catch(() => ((answer.statusCode = 404), "")));
+  });
+  await new Promise((done) => server.listen(0, "127.0.0.1", done));
+  return `http://localhost:${server.address().port}/`;
+}
+
+const screenshot = (page, name) => page.screenshot({ path: `${options.out}/phone_${name}.png` });
+const told = (page) => page.evaluate(() => JSON.parse(pangea.walk.vio.text));
+
+// A phone that is held upright and rotates about its x.
+async function senseMotion(page) {
+  const devtools = await page.context().newCDPSession(page);
+  const readings = [["accelerometer", 0, 9.8, 0.3], ["linear-acceleration", 0, 0, 0.3], ["gyroscope", 0.5, 0, -0.25]];
+  for (const [type] of readings) {
+    await devtools.send("Emulation.setSensorOverrideEnabled", { enabled: true, type, metadata: { available: true } });
+  }
+  for (const [type, x, y, z] of readings) {
+    await devtools.send("Emulation.setSensorOverrideReadings", { type, reading: { xyz: { x, y, z } } });
+  }
+}
+
+async function testLive(browser, url) {
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"], hasTouch: true });
+  await screenshot(page, "welcome");
+  check("nothing is wider than a phone", await page.evaluate(() => document.documentElement.scrollWidth <= 360));
+  await senseMotion(page);
+  await page.locator("#start").click();
+
+  await becomes(page, "camera images reach the agent", () => pangea.walk?.vio?.counters.images > 20);
+  await becomes(page, "motion reaches the agent", () => pangea.walk.vio.counters.imu > 20);
+  const { imu, range, cameraYaml } = await told(page);
+  const expected = [0.5, 0, -0.25, 0, 9.8, 0.3];
+  check("in rad/s and m/s^2", imu.every((value, i) => Math.abs(value - expected[i]) < 0.06), String(imu));
+  check("the image has something in it", range[1] - range[0] > 100, String(range));
+  check("an unknown camera has a rough calibration", /intrinsics_sigma/.test(cameraYaml));
+  await testAnchor(page);
+  const zip = await testRecording(page);
+  await page.locator("#stop").click();
+  check("stopping leads back", await page.locator("#welcome").isVisible());
+  await page.close();
+  return zip;
+}
+
+async function testAnchor(page) {
+  await becomes(page, "somebody else's anchor is named", () =>
+    /^kettle · 3\.\d m$/.test(document.querySelector("#labels span")?.textContent));
+  await becomes(page, "the hint says who", () => document.getElementById("hint").textContent.startsWith("In one map with Anna"));
+  const [drawn, expected] = await page.evaluate(() => {
+    const { walk, stage } = pangea;
+    const { utime, anchors } = stage.drawn;
+    const [fx, , cx, cy] = walk.camera.intrinsics;
+    return [anchors[0].pixel, [cx - (fx * walk.pose.T_odom_body[0]) / 3, cy], utime];
+  });
+  const error = Math.hypot(drawn[0] - expected[0], drawn[1] - expected[1]);
+  check("it is where it belongs in the image", error < 2, `${error.toFixed(2)} px`);
+  await page.mouse.click(90, 300);
+  await page.locator("#anchor_name").fill("tap");
+  await screenshot(page, "place");
+  await page.locator("#anchor_dialog [value=place]").click();
+  await becomes(page, "a tap places an anchor", () => JSON.parse(pangea.walk.vio.text).edits.length === 1);
+  const { edits: [edit] } = await told(page);
+  // 360 x 720 shows the middle of 640 x 480, 1.5 times as large.
+  const [u, v] = [(90 + 300) / 1.5 - 0.5, 300 / 1.5 - 0.5];
+  check("at the pixel that was tapped", edit.name === "tap" && Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
+}
+
+async function testRecording(page) {
+  await page.locator("#record").click();
+  await becomes(page, "images are recorded", () => pangea.walk.recorder?.numImages > 10);
+  const downloading = page.waitForEvent("download");
+  await page.locator("#record").click();
+  const zip = `${options.out}/phone_recorded.zip`;
+  await (await downloading).saveAs(zip);
+  return zip;
+}
+
+async function testPlaying(browser, url, zip) {
+  const page = await openPage(browser, `${url}#rate=max`, { colorScheme: "dark" });
+  await screenshot(page, "welcome_dark");
+  await page.locator("#zip").setInputFiles(zip);
+  await becomes(page, "what was recorded is played to its end", () =>
+    /100 %/.test(document.getElementById("numbers").textContent) && pangea.walk.vio.counters.images > 10);
+  const { imu } = await told(page);
+  check("with its motion", Math.abs(imu[0] - 0.5) < 0.01 && Math.abs(imu[4] - 9.8) < 0.06, String(imu));
+  await becomes(page, "the end ends the map", () => pangea.walk.numImages === pangea.walk.vio.counters.images);
+  await screenshot(page, "playing_dark");
+  await page.close();
+}
+
+async function testRefusals(browser, url) {
+  const page = await openPage(browser, `${url}#join=ABCD-EFGH`);
+  check("the code of the link is there", (await page.locator("#code").inputValue()) === "ABCD-EFGH");
+  await page.locator("#zip").setInputFiles({ name: "a.zip", mimeType: "application/zip", buffer: Buffer.from("no zip") });
+  await becomes(page, "what is no zip is refused with words", () => /zip cannot be read/.test(document.getElementById("notice").textContent));
+  await page.close();
+}
+
+await run(async () => {
+  const url = await serve();
+  const browser = await launch(["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]);
+  const zip = await testLive(browser, url);
+  await testPlaying(browser, url, zip);
+  await testRefusals(browser, url);
+  await browser.close();
+});

@@ -1,0 +1,40 @@
+// Two pages that play rendered phones, by invite, over TLS, at a real server with its gateway, beside an agent that is a program:
+// they fuse; page 1 places an anchor on something of the scene; page 2 shows it where that is in its own images.
+
+import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
+import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
+import { Server } from "./server.mjs";
+import { Truth } from "./truth.mjs";
+
+const recording = (n) => `${options.recordings}/phone_${n}`;
+
+async function joined(browser, server, name, folder) {
+  const page = await openPage(browser, server.invite(name), { viewport: { width: 960, height: 720 } });
+  await page.locator("#name").fill(name);
+  await page.locator("#folder").setInputFiles(folder);
+  await page.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 60_000 });
+  check(`${name} has joined, and the link is open`, true);
+  await noteDrawn(page);
+  return page;
+}
+
+const atEnd = (page) => page.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
+
+await run(async () => {
+  const [first, second] = [1, 2].map((n) => new Truth(recording(n)));
+  const target = chooseTarget(first, second);
+  const server = new Server();
+  await server.start();
+  const browser = await server.browser();
+  server.startNative(3, recording(3));
+  const anna = await joined(browser, server, "Anna", recording(1));
+  const placing = placeAt(anna, first, target);
+  const ben = await joined(browser, server, "Ben", recording(2));
+  void photograph(anna, `${options.out}/phone_anchor_1.png`);
+  void photograph(ben, `${options.out}/phone_anchor_2.png`);
+  check("page 1 places an anchor", await placing, `${target.distance.toFixed(1)} m away`);
+  await Promise.all([atEnd(anna), atEnd(ben)]);
+  await checkFused([anna, ben]);
+  await checkShown(ben, second, target);
+  await browser.close();
+});
