@@ -1,5 +1,6 @@
 #include "bench/visits/server.h"
 
+#include <algorithm>
 #include <type_traits>
 #include <utility>
 
@@ -7,6 +8,10 @@
 #include "files/scratch_file.h"
 
 namespace pangea::bench {
+
+size_t Journal::num_accepted() const {
+  return std::ranges::count_if(constraints, [](const auto& item) { return item.second.accepted; });
+}
 
 size_t Journal::num_keyframes() const {
   size_t count = 0;
@@ -21,7 +26,6 @@ ThinnedMaps Journal::Thin(const Thinning::Options& options, int64_t now_utime) {
   for (const auto& entries : maps) {
     for (const Entry& entry : entries) {
       thinning.Take(entry.keyframe, entry.journalled_utime);
-      thinning.Take(entry.match);
     }
   }
   for (const auto& [id, constraint] : constraints) {
@@ -43,10 +47,10 @@ ThinnedMaps Journal::Thin(const Thinning::Options& options, int64_t now_utime) {
   std::erase_if(maps, [](const auto& entries) { return entries.empty(); });
   std::erase_if(constraints, [&](const auto& item) {
     const auto& [id, constraint] = item;
-    return thinned.constraints_gone.contains(id) || gone(constraint.from) || gone(constraint.to);
+    return constraint.kind == PlaceKind::kDerived || gone(constraint.from) || gone(constraint.to);
   });
-  for (const auto& [id, constraint] : thinned.derived) {
-    constraints[id] = constraint;
+  for (const Constraint& constraint : thinned.derived) {
+    constraints.emplace(constraint.Id(), constraint);
   }
   return thinned;
 }
@@ -135,17 +139,14 @@ std::vector<Constraint> Server::Take(const Keyframe& keyframe, Journal* journal)
     journal->maps.emplace_back();
   }
   journal->maps.back().push_back({keyframe, match, keyframe.id.map.opened_utime});
-  std::vector<Constraint> accepted;
+  std::vector<Constraint> results;
   for (const PlaceCandidate& candidate : match.candidates) {
-    const Constraint constraint = Verify(keyframe.id, candidate);
-    journal->constraints.try_emplace(constraint.Id(), constraint);
-    Measured("posegraph", [&] { graph_->Take(constraint); });
-    if (constraint.accepted && constraint.from.map != constraint.to.map) {
-      accepted.push_back(constraint);
-    }
+    results.push_back(Verify(keyframe.id, candidate));
+    journal->constraints.try_emplace(results.back().Id(), results.back());
+    Measured("posegraph", [&] { graph_->Take(results.back()); });
   }
   TellGroups(Measured("posegraph", [&] { return graph_->Settle(); }));
-  return accepted;
+  return results;
 }
 
 std::map<std::string, Use> Server::TakeUse() {

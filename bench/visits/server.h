@@ -29,6 +29,7 @@ struct Journal {
   std::map<int64_t, Constraint> constraints;
 
   size_t num_keyframes() const;
+  size_t num_accepted() const;
   // As pangea-site does with the events of a file; what it left out and put in.
   ThinnedMaps Thin(const Thinning::Options& options, int64_t now_utime);
 };
@@ -43,8 +44,8 @@ class Server {
   // With what the journal has.
   explicit Server(const Journal& journal);
 
-  // The keyframe as it comes from an agent; what follows goes into the journal too. The accepted
-  // constraints to other maps.
+  // The keyframe as it comes from an agent; what follows goes into the journal too. The results of
+  // its candidates.
   std::vector<Constraint> Take(const Keyframe& keyframe, Journal* journal);
   // Every group from the beginning.
   void Finish();

@@ -55,11 +55,16 @@ JournalContents WriteWhatCounts(const fs::path& from, const JournalContents& con
   return written;
 }
 
-// Owner and mode: the server's user goes on writing it, whoever compacts.
+// Owner and mode: the server's user goes on writing it, whoever compacts. A user may not even ask
+// to change the owner where systemd filters system calls.
 void TakeOwner(const fs::path& from, const fs::path& to) {
-  struct stat info {};
-  if (stat(from.c_str(), &info) != 0 || chown(to.c_str(), info.st_uid, info.st_gid) != 0 ||
-      chmod(to.c_str(), info.st_mode & 07777) != 0) {
+  struct stat wanted {
+  }, made{};
+  bool done = stat(from.c_str(), &wanted) == 0 && stat(to.c_str(), &made) == 0;
+  if (done && (wanted.st_uid != made.st_uid || wanted.st_gid != made.st_gid)) {
+    done = chown(to.c_str(), wanted.st_uid, wanted.st_gid) == 0;
+  }
+  if (!done || chmod(to.c_str(), wanted.st_mode & 07777) != 0) {
     throw std::runtime_error(fmt::format("{}: cannot be given the owner of {}: {}; run as that one",
                                          to.string(), from.string(), std::strerror(errno)));
   }

@@ -42,8 +42,6 @@ void Take(const LogEvent& event, Thinning* thinning) {
     if (const auto keyframe = ParseEvent<keyframe_t>(event)) {
       thinning->Take(*keyframe, event.utime);
     }
-  } else if (event.channel == channels::kPlaceMatch) {
-    take(ParseEvent<place_match_t>(event));
   } else if (event.channel == channels::kConstraint) {
     take(ParseEvent<constraint_t>(event));
   } else if (event.channel == channels::kAnchorEdit) {
@@ -106,26 +104,19 @@ void ThinnedJournal::RewriteMatch(const LogEvent& event, const Write& write) con
   }
 }
 
-void ThinnedJournal::RewriteConstraint(const LogEvent& event, const Write& write) {
+// Derived ones are all written anew at the end.
+void ThinnedJournal::RewriteConstraint(const LogEvent& event, const Write& write) const {
   const auto constraint = ParseEvent<constraint_t>(event);
-  if (!constraint) {
-    return write(event);
-  }
-  const int64_t id = constraint->Id();
-  if (const auto derived = thinned_.derived.find(id); derived != thinned_.derived.end()) {
-    written_.insert(id);
-    WriteMessage(event.utime, event.channel, ToMessage(derived->second), write);
-  } else if (!thinned_.constraints_gone.contains(id) && !thinned_.gone.contains(constraint->from) &&
-             !thinned_.gone.contains(constraint->to)) {
+  if (!constraint ||
+      (constraint->kind != PlaceKind::kDerived && !thinned_.gone.contains(constraint->from) &&
+       !thinned_.gone.contains(constraint->to))) {
     write(event);
   }
 }
 
-void ThinnedJournal::Finish(const Write& write) {
-  for (const auto& [id, constraint] : thinned_.derived) {
-    if (!written_.contains(id)) {
-      WriteMessage(latest_utime_, std::string(channels::kConstraint), ToMessage(constraint), write);
-    }
+void ThinnedJournal::Finish(const Write& write) const {
+  for (const Constraint& constraint : thinned_.derived) {
+    WriteMessage(latest_utime_, std::string(channels::kConstraint), ToMessage(constraint), write);
   }
 }
 

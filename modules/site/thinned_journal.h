@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <set>
 
 #include "log_file/log_reader.h"
 #include "site/compact.h"
@@ -22,7 +21,7 @@ class ThinnedJournal {
   // Call it for each event in order: writes what is left of it, if anything is.
   void Rewrite(const LogEvent& event, const Write& write);
   // What is new, behind the last event.
-  void Finish(const Write& write);
+  void Finish(const Write& write) const;
 
   int64_t keyframes_gone() const { return std::ssize(thinned_.gone); }
   int64_t constraints_derived() const { return std::ssize(thinned_.derived); }
@@ -30,10 +29,9 @@ class ThinnedJournal {
  private:
   void RewriteKeyframe(const LogEvent& event, const Write& write) const;
   void RewriteMatch(const LogEvent& event, const Write& write) const;
-  void RewriteConstraint(const LogEvent& event, const Write& write);
+  void RewriteConstraint(const LogEvent& event, const Write& write) const;
 
   ThinnedMaps thinned_;
-  std::set<int64_t> written_;  // of the derived
   int64_t latest_utime_ = 0;
 };
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <optional>
-#include <tuple>
+#include <ranges>
 #include <utility>
 
 #include "thinning/thinning.h"
@@ -73,11 +73,11 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   }
   for (const auto& [id, constraint] : constraints_) {
     if (!without.gone.contains(constraint.from) && !without.gone.contains(constraint.to) &&
-        !without.derived.contains(id) && !without.constraints_gone.contains(id)) {
+        (constraint.kind != PlaceKind::kDerived || without.gone.empty())) {
       graph.Take(constraint);
     }
   }
-  for (const auto& [id, constraint] : without.derived) {
+  for (const Constraint& constraint : without.derived) {
     graph.Take(constraint);
   }
   graph.Finish();
@@ -107,10 +107,11 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
       }
     }
   }
-  std::set<std::pair<KeyframeId, KeyframeId>> added;
   for (const auto& [id, constraint] : constraints_) {
-    if (solution.in_force.contains(id) &&
-        added.insert(std::minmax(constraint.from, constraint.to)).second) {
+    // A measured one whose keyframes both stay, stays as it is.
+    const bool changes = constraint.kind == PlaceKind::kDerived || gone.contains(constraint.from) ||
+                         gone.contains(constraint.to);
+    if (changes && solution.in_force.contains(id)) {
       graph.AddConstraint(constraint);
     }
   }
@@ -136,79 +137,77 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
   return graph;
 }
 
-void Thinning::Derive(const Solution& solution, const std::set<MapId>& all_derived,
-                      ThinnedMaps* thinned) const {
-  using Pair = std::pair<KeyframeId, KeyframeId>;
-  // Measured ones, by their keyframes: of these each stays, whatever is averaged with it.
-  std::map<Pair, int64_t> measured;
-  for (const auto& [id, constraint] : constraints_) {
-    if (!thinned->gone.contains(constraint.from) && !thinned->gone.contains(constraint.to)) {
-      if (candidates_.contains(id)) {
-        measured.emplace(Pair(constraint.from, constraint.to), id);
-      } else {
-        thinned->constraints_gone.insert(id);  // an earlier thinning's, derived anew
-      }
-    }
-  }
+// Between keyframes that stay, from the older map or keyframe to the newer one; the best known
+// first.
+std::vector<Constraint> Thinning::BestKnownFirst(const NodeRemoval& removed) const {
   std::map<MapId, size_t> age;
   for (const MapId& map : maps_) {
     age.emplace(map, age.size());
   }
-  const auto older = [&age](const KeyframeId& a, const KeyframeId& b) {
-    return std::pair(age.at(a.map), a.seq) < std::pair(age.at(b.map), b.seq);
-  };
-  std::vector<std::pair<double, Constraint>> new_ones;  // by how well they are known
-  const NodeRemoval removed = Removed(solution, thinned->gone);
+  const auto rank = [&age](const KeyframeId& id) { return std::pair(age.at(id.map), id.seq); };
+  std::vector<std::pair<double, Constraint>> constraints;
   for (const auto& [from, neighbours] : removed.factors()) {
     for (const auto& [to, factor] : neighbours) {
+      if (factor.odometry || rank(to) < rank(from)) {
+        continue;
+      }
       Constraint constraint;
       constraint.from = from;
       constraint.to = to;
-      constraint.kind = from.map == to.map ? PlaceKind::kIntra : PlaceKind::kInter;
+      constraint.kind = PlaceKind::kDerived;
       constraint.accepted = true;
       constraint.T_from_to = factor.relative.T_from_to;
       constraint.covariance = factor.relative.covariance;
       constraint.num_inliers = factor.num_inliers;
       constraint.inlier_ratio = factor.inlier_ratio;
       constraint.rms_px = factor.rms_px;
-      const auto real = measured.find({from, to});
-      if (factor.odometry || (real == measured.end() && !older(from, to))) {
-        continue;
-      }
-      if (real != measured.end()) {
-        const Constraint& was = constraints_.at(real->second);
-        if (factor.derived && was.accepted) {
-          constraint.kind = was.kind;
-          thinned->derived[real->second] = constraint;
-        }
-      } else if (!measured.contains({to, from})) {
-        new_ones.emplace_back(LogDeterminant(factor.relative), constraint);
-      }
+      constraints.emplace_back(LogDeterminant(factor.relative), constraint);
     }
   }
-  std::ranges::stable_sort(new_ones, {}, &std::pair<double, Constraint>::first);
+  std::ranges::stable_sort(constraints, {}, &std::pair<double, Constraint>::first);
+  std::vector<Constraint> sorted;
+  std::ranges::move(constraints | std::views::values, std::back_inserter(sorted));
+  return sorted;
+}
+
+// So many at a keyframe; and one that joins maps that no better known one has joined, always: what
+// was one group stays one.
+std::vector<Constraint> Thinning::Derive(const Solution& solution,
+                                         const std::set<KeyframeId>& gone) const {
+  std::map<MapId, MapId> joined;  // each to one that it is joined with; the last of them to itself
+  const auto find = [&joined](MapId map) {
+    for (auto next = joined.find(map); next != joined.end(); next = joined.find(map)) {
+      map = next->second;
+    }
+    return map;
+  };
   std::map<KeyframeId, int> num_derived;
-  for (const auto& [known, constraint] : new_ones) {
-    if (all_derived.contains(constraint.from.map) || all_derived.contains(constraint.to.map) ||
-        std::max(num_derived[constraint.from], num_derived[constraint.to]) <
-            options_.thinning.max_derived) {
-      ++num_derived[constraint.from];
-      ++num_derived[constraint.to];
-      thinned->derived[constraint.Id()] = constraint;
-      thinned->constraints_gone.erase(constraint.Id());
+  std::vector<Constraint> derived;
+  for (const Constraint& constraint : BestKnownFirst(Removed(solution, gone))) {
+    const MapId a = find(constraint.from.map), b = find(constraint.to.map);
+    if (a == b && std::max(num_derived[constraint.from], num_derived[constraint.to]) >=
+                      options_.thinning.max_derived) {
+      continue;
     }
+    if (a != b) {
+      joined[a] = b;
+    }
+    ++num_derived[constraint.from];
+    ++num_derived[constraint.to];
+    derived.push_back(constraint);
   }
+  return derived;
 }
 
 std::set<MapId> Thinning::ComeApart(const Solution& before, const ThinnedMaps& thinned) const {
   const Solution after = Solve(thinned);
-  std::set<MapId> apart;  // the oldest map of each group is whole: it names the group
+  std::set<MapId> groups;  // the oldest map of each is whole: it names the group
   for (const auto& [map, group] : after.group_of) {
     if (group != before.group_of.at(map)) {
-      apart.insert(map);
+      groups.insert(before.group_of.at(map));
     }
   }
-  return apart;
+  return groups;
 }
 
 }  // namespace pangea

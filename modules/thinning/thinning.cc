@@ -57,16 +57,6 @@ void Thinning::Take(const Keyframe& keyframe, int64_t journalled_utime) {
   map.journalled_utime = std::max(map.journalled_utime, journalled_utime);
 }
 
-void Thinning::Take(const PlaceMatch& match) {
-  for (const PlaceCandidate& candidate : match.candidates) {
-    Constraint promised;
-    promised.from = candidate.match;
-    promised.to = match.query;
-    promised.kind = candidate.kind;
-    candidates_.insert(promised.Id());
-  }
-}
-
 void Thinning::Take(const Constraint& constraint) {
   constraints_.try_emplace(constraint.Id(), constraint);
 }
@@ -75,40 +65,24 @@ void Thinning::Take(const AnchorEdit& edit) { anchors_.Take(edit); }
 
 ThinnedMaps Thinning::Thin(int64_t now_utime) {
   const Solution before = Solve({});
-  Exempt exempt{Whole(before, now_utime), {}};
-  while (true) {
-    ThinnedMaps thinned = Make(before, exempt);
-    const std::set<MapId> apart = ComeApart(before, thinned);
-    if (apart.empty()) {
-      return thinned;
+  std::set<MapId> whole = Whole(before, now_utime);
+  ThinnedMaps thinned = Make(before, whole);
+  if (const std::set<MapId> groups = ComeApart(before, thinned); !groups.empty()) {
+    for (const auto& [map, group] : before.group_of) {
+      if (groups.contains(group)) {
+        whole.insert(map);
+      }
     }
-    HoldTogether(before, apart, &exempt);
+    thinned = Make(before, whole);
   }
+  return thinned;
 }
 
-// What is left of a map may have too few constraints to be fused by: then it gets all that can be
-// derived, and if that is not enough, it stays whole.
-void Thinning::HoldTogether(const Solution& before, const std::set<MapId>& apart,
-                            Exempt* exempt) const {
-  bool changed = false;
-  for (const MapId& map : apart) {
-    changed |= exempt->all_derived.insert(map).second || exempt->whole.insert(map).second;
-  }
-  for (const auto& [map, group] : before.group_of) {
-    // What held them together went: nothing of their groups goes.
-    if (!changed && std::ranges::any_of(apart, [&group = group, &before](const MapId& one) {
-          return before.group_of.at(one) == group;
-        })) {
-      exempt->whole.insert(map);
-    }
-  }
-}
-
-ThinnedMaps Thinning::Make(const Solution& solution, const Exempt& exempt) {
+ThinnedMaps Thinning::Make(const Solution& solution, const std::set<MapId>& whole) {
   ThinnedMaps thinned;
-  thinned.gone = Gone(solution, exempt.whole);
+  thinned.gone = Gone(solution, whole);
   JoinEdges(&thinned);
-  Derive(solution, exempt.all_derived, &thinned);
+  thinned.derived = Derive(solution, thinned.gone);
   return thinned;
 }
 

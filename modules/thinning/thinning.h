@@ -2,14 +2,15 @@
 
 // A journal's maps without the keyframes of places that newer maps show as well.
 //
-// In: what the journal has, in its order: keyframes, matches, verification results, anchor edits.
+// In: what the journal has, in its order: keyframes, verification results, anchor edits.
 // Out: which keyframes stay (view_coverage.h), the odometry edges over the gaps, and the
 // constraints that take the place of those whose keyframes go (node_removal.h).
 //
 // Whole stay the maps of the last `keep_hours`, which an agent may still be walking, and the oldest
 // map of each group, whose odom is the map frame. So do the keyframes that place an anchor, and
-// those that hold evidence between maps that are not fused yet. Maps that are fused stay fused:
-// that is tried with the pose graph, and where it does not hold more maps stay whole.
+// those that hold evidence between maps that are not fused yet. Maps that are fused stay fused by
+// derived constraints, which the pose graph trusts (posegraph/pair_evidence.h). That is tried: of a
+// group that would come apart nothing goes.
 //
 // Deterministic. One thread.
 
@@ -55,9 +56,8 @@ struct ThinnedMaps {
     std::optional<Preintegration> preintegration;
   };
   std::map<KeyframeId, Edge> edges;
-  // In place of others; of those between keyframes that stay by their id.
-  std::map<int64_t, Constraint> derived;
-  std::set<int64_t> constraints_gone;  // ids; those of keyframes that go are not among them
+  // All of kind kDerived; those of earlier thinnings are among them, or gone.
+  std::vector<Constraint> derived;
 };
 
 class Thinning {
@@ -73,7 +73,6 @@ class Thinning {
 
   // `journalled_utime`: wall clock.
   void Take(const Keyframe& keyframe, int64_t journalled_utime);
-  void Take(const PlaceMatch& match);
   void Take(const Constraint& constraint);
   void Take(const AnchorEdit& edit);
 
@@ -95,22 +94,16 @@ class Thinning {
     double odometry_scale = 1;  // standard deviations
   };
 
-  struct Exempt {
-    std::set<MapId> whole;        // stay whole
-    std::set<MapId> all_derived;  // have any number of derived constraints
-  };
-
   Solution Solve(const ThinnedMaps& without) const;
   std::set<MapId> Whole(const Solution& solution, int64_t now_utime) const;
   std::set<KeyframeId> MustStay(const Solution& solution) const;
-  ThinnedMaps Make(const Solution& solution, const Exempt& exempt);
-  void HoldTogether(const Solution& before, const std::set<MapId>& apart, Exempt* exempt) const;
+  ThinnedMaps Make(const Solution& solution, const std::set<MapId>& whole);
   std::set<KeyframeId> Gone(const Solution& solution, const std::set<MapId>& whole);
   void JoinEdges(ThinnedMaps* thinned) const;
-  void Derive(const Solution& solution, const std::set<MapId>& all_derived,
-              ThinnedMaps* thinned) const;
   NodeRemoval Removed(const Solution& solution, const std::set<KeyframeId>& gone) const;
-  // Maps that are no longer in the group they were in.
+  std::vector<Constraint> BestKnownFirst(const NodeRemoval& removed) const;
+  std::vector<Constraint> Derive(const Solution& solution, const std::set<KeyframeId>& gone) const;
+  // Groups of which a map is no longer in.
   std::set<MapId> ComeApart(const Solution& before, const ThinnedMaps& thinned) const;
   bool LookAlike(int a, int b);
 
@@ -119,7 +112,6 @@ class Thinning {
   std::vector<MapId> maps_;  // in the order they came: the oldest first
   std::map<MapId, StoredMap> stored_;
   std::map<int64_t, Constraint> constraints_;  // by id
-  std::set<int64_t> candidates_;               // ids of the constraints that matches promise
   AnchorBook anchors_;
 };
 

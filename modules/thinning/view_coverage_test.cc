@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
+#include <random>
 
 namespace pangea {
 namespace {
@@ -93,6 +95,40 @@ TEST(ViewCoverage, StaysInRows) {
   std::fill(expected.begin() + 16, expected.begin() + 29, true);
   expected[0] = true;
   EXPECT_EQ(kept[2], expected);
+}
+
+// Visitors who begin and end anywhere, and walk and look a little otherwise each time.
+TEST(ViewCoverage, WhatStaysOfOneHallDoesNotGrowWithVisits) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> start_m(0, 20);
+  std::normal_distribution<double> aside_m(0, 0.5), yaw(0, 0.2);
+  std::vector<MapViews> maps;
+  std::vector<int64_t> stays;
+  for (int visit = 0; visit < 60; ++visit) {
+    MapViews walk = Walk(start_m(random), 20);
+    for (View& view : walk.views) {
+      view.T_map_cam.t.y() += aside_m(random);
+      view.T_map_cam.q = YawRotation(yaw(random)) * view.T_map_cam.q;
+    }
+    maps.insert(maps.begin(), std::move(walk));
+    const auto kept = ChooseViews(maps, Always, {});
+    stays.push_back(0);
+    for (size_t m = 0; m < maps.size(); ++m) {
+      std::vector<View> left;
+      for (size_t i = 0; i < kept[m].size(); ++i) {
+        if (kept[m][i]) {
+          left.push_back(maps[m].views[i]);
+        }
+      }
+      maps[m].views = std::move(left);
+      stays.back() += std::ssize(maps[m].views);
+    }
+    std::erase_if(maps, [](const MapViews& map) { return map.views.empty(); });
+  }
+  const auto sum = [&stays](int from, int to) {
+    return std::accumulate(stays.begin() + from, stays.begin() + to, 0.0);
+  };
+  EXPECT_LT(sum(40, 60), 1.2 * sum(20, 40));
 }
 
 TEST(ViewCoverage, LeavesNoGapThatProcessesWouldNotBelieve) {
