@@ -86,6 +86,9 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   const std::vector<int64_t> in_force = graph.InForce();
   solution.in_force = {in_force.begin(), in_force.end()};
   for (const MapState& state : graph.States()) {
+    if (state.keyframes.empty()) {
+      continue;  // a map of which nothing stays
+    }
     for (const MapId& map : state.maps) {
       solution.group_of[map] = state.group;
     }
