@@ -141,8 +141,10 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
 }
 
 // Between keyframes that stay, from the older map or keyframe to the newer one; the best known
-// first.
-std::vector<Constraint> Thinning::BestKnownFirst(const NodeRemoval& removed) const {
+// first. Their mean is the solution's, in which all that was measured has its part: so no two
+// contradict each other, whatever they share.
+std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
+                                                 const NodeRemoval& removed) const {
   std::map<MapId, size_t> age;
   for (const MapId& map : maps_) {
     age.emplace(map, age.size());
@@ -159,7 +161,7 @@ std::vector<Constraint> Thinning::BestKnownFirst(const NodeRemoval& removed) con
       constraint.to = to;
       constraint.kind = PlaceKind::kDerived;
       constraint.accepted = true;
-      constraint.T_from_to = factor.relative.T_from_to;
+      constraint.T_from_to = solution.T_map_body.at(from).Inverse() * solution.T_map_body.at(to);
       constraint.covariance = factor.relative.covariance;
       constraint.num_inliers = factor.num_inliers;
       constraint.inlier_ratio = factor.inlier_ratio;
@@ -186,7 +188,7 @@ std::vector<Constraint> Thinning::Derive(const Solution& solution,
   };
   std::map<KeyframeId, int> num_derived;
   std::vector<Constraint> derived;
-  for (const Constraint& constraint : BestKnownFirst(Removed(solution, gone))) {
+  for (const Constraint& constraint : BestKnownFirst(solution, Removed(solution, gone))) {
     const MapId a = find(constraint.from.map), b = find(constraint.to.map);
     if (a == b && std::max(num_derived[constraint.from], num_derived[constraint.to]) >=
                       options_.thinning.max_derived) {

@@ -101,7 +101,8 @@ class Thinning {
   std::set<KeyframeId> Gone(const Solution& solution, const std::set<MapId>& whole);
   void JoinEdges(ThinnedMaps* thinned) const;
   NodeRemoval Removed(const Solution& solution, const std::set<KeyframeId>& gone) const;
-  std::vector<Constraint> BestKnownFirst(const NodeRemoval& removed) const;
+  std::vector<Constraint> BestKnownFirst(const Solution& solution,
+                                         const NodeRemoval& removed) const;
   std::vector<Constraint> Derive(const Solution& solution, const std::set<KeyframeId>& gone) const;
   // Groups of which a map is no longer in.
   std::set<MapId> ComeApart(const Solution& before, const ThinnedMaps& thinned) const;
