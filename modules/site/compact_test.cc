@@ -134,8 +134,10 @@ void ExpectOldOrNew(const std::vector<StoredEvent>& before, const std::vector<St
     const bool swapped = step >= CompactStep::kSwapped;
     EXPECT_EQ(EventsOf(site), swapped ? after : before) << static_cast<int>(step);
     EXPECT_EQ(FoundAtOpening(site), "");
-    Compact(site);  // what was left over is no obstacle
-    EXPECT_EQ(EventsOf(site), swapped || !thin ? after : before);
+    if (!swapped) {
+      Compact(site, thin);  // what was left over is no obstacle
+      EXPECT_EQ(EventsOf(site), after);
+    }
     EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));
   }
 }

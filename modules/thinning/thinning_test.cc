@@ -171,8 +171,11 @@ TEST_F(ThinningTest, EdgesLeadOverTheGaps) {
 
 TEST_F(ThinningTest, DerivedConstraintsAreTrueToTheirCovariance) {
   const ThinnedMaps thinned = MakeThinning().Thin(kNow);
+  const std::vector<MapState> before = States({});
   double nees = 0;
   for (const Constraint& constraint : thinned.derived) {
+    const Rigid3 solved = PoseIn(before, constraint.from).Inverse() * PoseIn(before, constraint.to);
+    EXPECT_LT(constraint.T_from_to.Minus(solved).norm(), 1e-6);
     const Rigid3 T =
         world_.T_hall_body(constraint.from).Inverse() * world_.T_hall_body(constraint.to);
     const Vector6d error = constraint.T_from_to.Minus(T);
