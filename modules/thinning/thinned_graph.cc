@@ -179,7 +179,7 @@ std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
 // was one group stays one.
 std::vector<Constraint> Thinning::Derive(const Solution& solution,
                                          const std::set<KeyframeId>& gone) const {
-  std::map<MapId, MapId> joined;  // each to one that it is joined with; the last of them to itself
+  std::map<MapId, MapId> joined;  // each to another of its tree; the root has none
   const auto find = [&joined](MapId map) {
     for (auto next = joined.find(map); next != joined.end(); next = joined.find(map)) {
       map = next->second;
