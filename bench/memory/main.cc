@@ -3,11 +3,9 @@
 // bits of every descriptor flipped, as another visit would see the place.
 
 #include <fmt/format.h>
-#include <malloc.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -17,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/process_use.h"
 #include "bus/bus.h"
 #include "files/scratch_file.h"
 #include "fusion/fusion.h"
@@ -72,19 +71,12 @@ class Walk {
   std::vector<session::LoggedKeyframe> stored_;
 };
 
-double HeapBytes() {
-  const struct mallinfo2 info = mallinfo2();
-  return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
-}
-
 double ResidentBytes() {
   std::ifstream statm("/proc/self/statm");
   int64_t size = 0, resident = 0;
   statm >> size >> resident;
   return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
-
-double CpuMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // A core that takes keyframes. `look` is what it does with them later, where that is measured.
 struct Subject {

@@ -13,16 +13,6 @@ namespace {
 
 constexpr size_t kMaxNotPlaced = 100;
 
-// Covariance of T_b_a from that of T_a_b, first order.
-Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
-  const Eigen::Matrix3d R_b_a = T_a_b.R().transpose();
-  Matrix6d J = Matrix6d::Zero();
-  J.topLeftCorner<3, 3>() = -R_b_a;
-  J.topRightCorner<3, 3>() = -R_b_a * Hat(T_a_b.t);
-  J.bottomRightCorner<3, 3>() = -R_b_a;
-  return J * covariance * J.transpose();
-}
-
 // The covariance of a transform whose left frame is rotated.
 Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
   Matrix6d J = Matrix6d::Zero();

@@ -16,8 +16,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The map around a pixel is that of the keyframes up to so long before and after.
-constexpr int64_t kSurface_us = 5'000'000;
 constexpr double kMinDepth_m = 0.1;
 constexpr double kPixelSigma = 1;
 // An anchor that nobody said anything of: placed by hand.
@@ -49,7 +47,7 @@ std::vector<SurfacePoint> PointsInView(const OdometryTrack& track, int64_t utime
   // The newest keyframe that has a landmark knows it best.
   for (auto it = track.keyframes().rbegin(); it != track.keyframes().rend(); ++it) {
     const TrackedKeyframe& keyframe = it->second;
-    if (std::abs(keyframe.utime - utime) > kSurface_us) {
+    if (std::abs(keyframe.utime - utime) > kPlacementReach_us) {
       continue;
     }
     const Rigid3 T_cam_source = T_cam_odom * keyframe.T_odom_cam();
@@ -104,7 +102,7 @@ bool Sees(const TrackedKeyframe& keyframe, const Vector3d& p_odom) {
 AnchorPlacement HoldBy(const OdometryTrack& track, int64_t utime, const Pose& pose, int count) {
   std::vector<std::pair<int64_t, int32_t>> seeing, blind;  // (microseconds away, seq)
   for (const auto& [seq, keyframe] : track.keyframes()) {
-    if (const int64_t away_us = std::abs(keyframe.utime - utime); away_us <= kSurface_us) {
+    if (const int64_t away_us = std::abs(keyframe.utime - utime); away_us <= kPlacementReach_us) {
       (Sees(keyframe, pose.T_odom_anchor.t) ? seeing : blind).emplace_back(away_us, seq);
     }
   }

@@ -12,6 +12,10 @@
 
 namespace pangea {
 
+// Keyframes up to so long before and after an edit decide where it puts an anchor: they hold it,
+// and are the map around a pixel.
+inline constexpr int64_t kPlacementReach_us = 5'000'000;
+
 // One keyframe that holds an anchor.
 struct Hold {
   int32_t seq = 0;  // of the placement's map

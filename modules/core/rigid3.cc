@@ -84,4 +84,13 @@ Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const R
   return J_left * cov_a_b * J_left.transpose() + J_right * cov_b_c * J_right.transpose();
 }
 
+Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
+  const Eigen::Matrix3d R_b_a = T_a_b.R().transpose();
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = -R_b_a;
+  J.topRightCorner<3, 3>() = -R_b_a * Hat(T_a_b.t);
+  J.bottomRightCorner<3, 3>() = -R_b_a;
+  return J * covariance * J.transpose();
+}
+
 }  // namespace pangea

@@ -58,4 +58,7 @@ struct Rigid3 {
 Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const Rigid3& T_b_c,
                            const Matrix6d& cov_b_c);
 
+// Covariance of T_b_a from that of T_a_b, first order.
+Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance);
+
 }  // namespace pangea

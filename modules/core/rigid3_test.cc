@@ -87,5 +87,16 @@ TEST_F(Rigid3Test, CovarianceOfAProduct) {
   }
 }
 
+TEST_F(Rigid3Test, CovarianceOfAnInverse) {
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3 A = RandomRigid3();
+    const Matrix6d covariance = RandomCovariance();
+    const Matrix6d J = NumericJacobian(
+        6, 1e-6, [&](const Vector6d& d) { return A.Plus(d).Inverse().Minus(A.Inverse()); });
+    const Matrix6d expected = J * covariance * J.transpose();
+    EXPECT_LT((InverseCovariance(A, covariance) - expected).norm(), 1e-6 * expected.norm());
+  }
+}
+
 }  // namespace
 }  // namespace pangea

@@ -15,6 +15,9 @@ namespace pangea {
 enum class PlaceKind : int8_t {
   kIntra = 1,  // both keyframes of one map that is in no group with another
   kInter = 2,
+  // No candidate has it: a constraint in the place of those whose keyframes were thinned away
+  // (thinning/thinning.h).
+  kDerived = 3,
 };
 
 struct PlaceCandidate {

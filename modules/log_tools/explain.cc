@@ -45,6 +45,12 @@ Constraint FindResult(const std::string& log, int64_t id, LogReadings* readings)
 
 PlaceCandidate FindCandidate(const std::string& log, const Constraint& constraint,
                              LogReadings* readings) {
+  if (constraint.kind == PlaceKind::kDerived) {
+    throw std::runtime_error(fmt::format(
+        "{}: constraint {} has no candidate: it stands for those of keyframes that were thinned "
+        "away; pangea-log explain {} lists the others",
+        log, constraint.Id(), log));
+  }
   std::optional<PlaceCandidate> found;
   const auto find = [&](const LogEvent& event) {
     const auto match =

@@ -249,7 +249,8 @@ Parsed<Constraint> Parse(const constraint_t& m) {
   if (!from.value || !to.value || *from.value == *to.value) {
     return Refused<Constraint>("constraint: invalid keyframe ids");
   }
-  if (m.kind != place_candidate_t::KIND_INTRA && m.kind != place_candidate_t::KIND_INTER) {
+  if (m.kind != place_candidate_t::KIND_INTRA && m.kind != place_candidate_t::KIND_INTER &&
+      m.kind != constraint_t::KIND_DERIVED) {
     return Refused<Constraint>("constraint: unknown kind");
   }
   if (!T_from_to.value || !covariance) {

@@ -7,24 +7,13 @@
 #include <utility>
 
 #include "place_recognition/guided_matching.h"
+#include "place_recognition/two_views.h"
 
 namespace pangea {
 namespace {
 
-constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
 // Runs of keyframes looked at before they are spread over the maps.
 constexpr size_t kMaxPlaces = 100;
-
-std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRay>& a,
-                                                      const std::vector<CornerRay>& b,
-                                                      const std::vector<CornerMatch>& matches) {
-  std::vector<std::pair<CornerRay, CornerRay>> pairs;
-  pairs.reserve(matches.size());
-  for (const CornerMatch& match : matches) {
-    pairs.emplace_back(a[match.a], b[match.b]);
-  }
-  return pairs;
-}
 
 }  // namespace
 
@@ -251,26 +240,21 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
     return std::nullopt;
   }
   const RecognisedKeyframe& other = *stored;
-  std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, options_.matching);
-  std::erase_if(matches, [&](const CornerMatch& m) {
-    return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;
-  });
-  if (static_cast<int>(matches.size()) < options_.epipolar.min_inliers) {
+  const TwoViewResult views = CheckTwoViews(query, other, options_.matching, options_.epipolar);
+  if (!views.epipolar) {
     ++counters_.rejected_matching;
     match->rejected.push_back(
-        fmt::format("{}: {} corner matches", ToString(other.id), matches.size()));
+        fmt::format("{}: {} corner matches", ToString(other.id), views.num_matches));
     return std::nullopt;
   }
-  const EpipolarResult epipolar =
-      CheckEpipolar(RayPairs(query.rays, other.rays, matches),
-                    StableHash(query.id, other.id, kSeedSalt), options_.epipolar);
+  const EpipolarResult& epipolar = *views.epipolar;
   report->inliers = static_cast<int>(epipolar.inliers.size());
   report->verified = epipolar.accepted;
   if (!epipolar.accepted) {
     ++counters_.rejected_epipolar;
     match->rejected.push_back(fmt::format("{}: {} of {} matches agree on a pose",
                                           ToString(other.id), epipolar.inliers.size(),
-                                          matches.size()));
+                                          views.num_matches));
     return std::nullopt;
   }
   PlaceCandidate candidate;

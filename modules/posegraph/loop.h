@@ -21,6 +21,7 @@ struct Loop {
   NodeRef to;
   Relative4 relative;
   int num_inliers = 0;
+  bool derived = false;  // stands for constraints that merged its maps before
   // Weight it had in the last solve: in force or switched off.
   bool on = true;
 

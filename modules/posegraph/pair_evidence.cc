@@ -68,14 +68,14 @@ bool PairEvidence::AgreeAt(int k, int l) const {
   return k == l || candidates_[std::max(k, l)].agrees[std::min(k, l)];
 }
 
-void PairEvidence::Add(int64_t id, int node_a, int node_b, const Relative4& relative,
-                       int num_inliers) {
+void PairEvidence::Add(const Measurement& measurement) {
   if (candidates_.size() >= kMaxCandidates) {
     return;
   }
-  Candidate candidate{id, node_a, node_b, relative, num_inliers, {}, {}};
-  const Eigen::Vector3d& p_a = (*a_)[node_a].T_odom_body.t;
-  const Eigen::Vector3d& p_b = (*b_)[node_b].T_odom_body.t;
+  Candidate candidate{measurement, {}, {}};
+  const Relative4& relative = measurement.relative;
+  const Eigen::Vector3d& p_a = (*a_)[measurement.node_a].T_odom_body.t;
+  const Eigen::Vector3d& p_b = (*b_)[measurement.node_b].T_odom_body.t;
   candidate.T_odom_a_odom_b = {p_a + relative.t - YawRotation(relative.yaw) * p_b, relative.yaw};
   for (const Candidate& earlier : candidates_) {
     // Both ways round, so that nothing depends on which came first.
@@ -200,6 +200,10 @@ bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoin
   const auto strong = std::ranges::count_if(
       viewpoints, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
   const int count = static_cast<int>(viewpoints.size());
+  if (std::ranges::any_of(agreeing_, [&](int k) { return candidates_[k].derived; })) {
+    return rival_viewpoints <=
+           options_.max_rival_share * std::max(count, options_.min_viewpoints_at_one_spot);
+  }
   if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
     return count >= options_.min_viewpoints_at_one_spot &&
            rival_viewpoints <= options_.max_rival_share_at_one_spot * count;

@@ -6,8 +6,10 @@
 // candidates agree when the cycle through them and both maps' odometry closes within its covariance
 // (pairwise consistency: Mangelson et al., ICRA 2018; Mahalanobis distance, four degrees of
 // freedom). The largest set that agrees mutually carries the merge if it is large enough, was not
-// all won by one viewpoint, and its best rival is clearly smaller. A pure function of the evidence:
-// not of its order, and a merge once made is unmade when a rival grows.
+// all won by one viewpoint, and its best rival is clearly smaller. A constraint that thinning
+// derived stands for evidence that was enough once: it counts as the most that is ever asked for. A
+// pure function of the evidence: not of its order, and a merge once made is unmade when a rival
+// grows.
 
 #include <cstdint>
 #include <optional>
@@ -77,8 +79,14 @@ class PairEvidence {
   PairEvidence(const OdometryChain& a, const OdometryChain& b, const MergeOptions& options)
       : a_(&a), b_(&b), options_(options) {}
 
-  // `relative` from node_a of map a to node_b of map b.
-  void Add(int64_t id, int node_a, int node_b, const Relative4& relative, int num_inliers);
+  struct Measurement {
+    int64_t id = 0;
+    int node_a = 0, node_b = 0;
+    Relative4 relative;  // from node_a of map a to node_b of map b
+    int num_inliers = 0;
+    bool derived = false;  // as Loop has it
+  };
+  void Add(const Measurement& measurement);
 
   void Save(ByteWriter* writer) const;
   // Of the same two maps. False if these are not the bytes of their evidence.
@@ -105,11 +113,7 @@ class PairEvidence {
   std::vector<Innovation> Innovations() const;
 
  private:
-  struct Candidate {
-    int64_t id = 0;
-    int node_a = 0, node_b = 0;
-    Relative4 relative;
-    int num_inliers = 0;
+  struct Candidate : Measurement {
     Pose4 T_odom_a_odom_b;
     std::vector<bool> agrees;  // with each candidate before it
   };

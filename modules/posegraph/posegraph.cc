@@ -104,6 +104,7 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
   loop.from = from;
   loop.to = to;
   loop.num_inliers = constraint.num_inliers;
+  loop.derived = constraint.kind == PlaceKind::kDerived;
   loop.relative =
       MakeRelative4(constraint.T_from_to, constraint.covariance, node_from.T_odom_body.q,
                     node_from.roll_pitch_covariance, node_to.T_odom_body.q);
@@ -114,8 +115,12 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
     const auto it =
         pairs_.try_emplace(pair, maps_[pair.first].chain, maps_[pair.second].chain, options_.merge)
             .first;
-    it->second.Add(loop.id, forward ? from.node : to.node, forward ? to.node : from.node,
-                   forward ? loop.relative : loop.relative.Inverse(), loop.num_inliers);
+    it->second.Add({.id = loop.id,
+                    .node_a = forward ? from.node : to.node,
+                    .node_b = forward ? to.node : from.node,
+                    .relative = forward ? loop.relative : loop.relative.Inverse(),
+                    .num_inliers = loop.num_inliers,
+                    .derived = loop.derived});
     undone_.erase(pair);
     Regroup();
   }
@@ -208,7 +213,8 @@ bool PoseGraph::UndoMerges(const Group& group) {
   std::map<Pair, int> in_force;
   for (const Loop* loop : LoopsOf(group)) {
     const auto [a, b] = std::minmax(loop->from.map, loop->to.map);
-    in_force[{a, b}] += loop->on ? 1 : 0;
+    const int weight = loop->derived ? kMinLoopsInForce : 1;
+    in_force[{a, b}] += loop->on ? weight : 0;
   }
   bool any = false;
   for (const auto& [pair, evidence] : pairs_) {
@@ -344,6 +350,17 @@ std::vector<MapState> PoseGraph::States() const {
     states.push_back(StateOf(group));
   }
   return states;
+}
+
+std::vector<int64_t> PoseGraph::InForce() const {
+  std::vector<int64_t> ids;
+  for (const Loop& loop : loops_) {
+    if (loop.on && group_of_[loop.from.map] == group_of_[loop.to.map]) {
+      ids.push_back(loop.id);
+    }
+  }
+  std::ranges::sort(ids);
+  return ids;
 }
 
 PoseGraph::Counters PoseGraph::counters() const {

@@ -117,6 +117,8 @@ class PoseGraph {
   bool Restore(ByteReader* reader);
 
   Counters counters() const;
+  // Ids of the constraints that the last solves keep, ascending.
+  std::vector<int64_t> InForce() const;
   // As the next state would say it.
   std::vector<MapState> States() const;
 

@@ -186,6 +186,12 @@ TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   }
 }
 
+std::vector<KeyframePair> PairsBetweenMaps(const SyntheticWorld& world) {
+  std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
+  std::erase_if(pairs, [](const KeyframePair& pair) { return pair.from.map == pair.to.map; });
+  return pairs;
+}
+
 // A constraint as it would be if map b lay elsewhere by `T`: all of these agree.
 Constraint Shifted(const SyntheticWorld& world, const KeyframePair& pair, const Rigid3& T) {
   Random random(StableHash(pair.from, pair.to, 1));
@@ -198,12 +204,7 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
   PoseGraph graph({});
   AddKeyframes(world, &graph);
-  std::vector<KeyframePair> pairs;
-  for (const KeyframePair& pair : OverlappingPairs(world, 1.5, 25)) {
-    if (pair.from.map != pair.to.map) {
-      pairs.push_back(pair);
-    }
-  }
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
   const size_t stride = pairs.size() / 30;
   const Rigid3 wrong(YawRotation(0.4), {5, 3, 0});
   for (size_t i = 0; i < 6; ++i) {
@@ -223,6 +224,25 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
   }
   EXPECT_TRUE(undone);
   EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
+}
+
+TEST(PoseGraph, ADerivedConstraintMergesAloneUntilManyContradictIt) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const size_t stride = pairs.size() / 30;
+  Constraint derived = Shifted(world, pairs[0], Rigid3(YawRotation(0.4), {5, 3, 0}));
+  derived.kind = PlaceKind::kDerived;
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  graph.AddConstraint(derived);
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_EQ(graph.counters().in_force, 1);
+  for (size_t i = 1; i < 28; ++i) {
+    graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+  }
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_EQ(graph.counters().switched_off, 1);
   EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
 }
 

@@ -16,14 +16,17 @@
 namespace pangea::session {
 namespace {
 
-// Names what is missing: "map 1/17…: keyframes 12 to 15 are missing".
+// Names what is missing: "map 1/17…: keyframes 12 to 15 are missing". Where an edge leads over a
+// gap, those in it are gone for good, and nothing waits for them. `edges`: where each begins.
 void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs,
-               const LogReading& reading) {
+               const std::map<KeyframeId, int32_t>& edges, const LogReading& reading) {
   std::string gaps;
   for (const auto& [map, present] : seqs) {
     int32_t next = 0;
     for (const int32_t seq : present) {
-      if (seq != next) {
+      const auto edge = edges.find({map, seq});
+      const bool led_over = edge != edges.end() && edge->second == next - 1;
+      if (seq != next && !led_over) {
         gaps += fmt::format("\n  map {}: keyframes {} to {}", ToString(map), next, seq - 1);
       }
       next = seq + 1;
@@ -49,6 +52,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
                                             LogReadings* readings) {
   std::vector<LoggedKeyframe> keyframes;
   std::map<MapId, std::set<int32_t>> seqs;
+  std::map<KeyframeId, int32_t> edges;
   std::optional<int64_t> begin;
   int64_t latest = std::numeric_limits<int64_t>::min();
   const auto take = [&](const LogEvent& event) {
@@ -72,6 +76,9 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
     keyframe.captured_utime = latest;
     keyframe.elapsed_us = latest - *begin;
     if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
+      if (message.has_edge) {
+        edges[keyframe.id] = message.edge_from_seq;
+      }
       keyframes.push_back(std::move(keyframe));
     }
   };
@@ -79,7 +86,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
   if (keyframes.empty()) {
     throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
   }
-  CheckGaps(log, seqs, readings == nullptr ? LogReading() : readings->at(log.string()));
+  CheckGaps(log, seqs, edges, readings == nullptr ? LogReading() : readings->at(log.string()));
   return keyframes;
 }
 

@@ -22,8 +22,9 @@ struct LoggedKeyframe {
 };
 
 // All distinct keyframes of one log in log order. Throws std::runtime_error naming the log when it
-// cannot be read, a keyframe does not decode, there is none, or a map's keyframes have gaps or are
-// out of order (named). What of the log is lost is noted in `readings` (log_reader.h).
+// cannot be read, a keyframe does not decode, there is none, or a map's keyframes are out of order
+// or have gaps that no odometry edge leads over (named). What of the log is lost is noted in
+// `readings` (log_reader.h).
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
                                             LogReadings* readings = nullptr);
 

@@ -172,6 +172,9 @@ std::string Speaker(const LogEvent& event) {
   }
   constraint_t message{};
   if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message)) {
+    if (message.kind == constraint_t::KIND_DERIVED) {
+      return "thinning";  // while no process ran
+    }
     return message.kind == place_candidate_t::KIND_INTRA ? "inter_map_ba" : "fusion";
   }
   return "";
@@ -236,6 +239,26 @@ int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
   return count;
 }
 
+// Which no process makes again, by their newer keyframe.
+using DerivedConstraints = std::map<KeyframeId, std::vector<constraint_t>>;
+
+DerivedConstraints ReadDerived(const std::vector<fs::path>& logs, LogReadings* readings) {
+  DerivedConstraints derived;
+  const auto take = [&derived](const LogEvent& event) {
+    constraint_t message{};
+    if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message) &&
+        message.kind == constraint_t::KIND_DERIVED) {
+      if (const auto to = Parse(message.to).value) {
+        derived[*to].push_back(message);
+      }
+    }
+  };
+  for (const fs::path& log : logs) {
+    ReadLog(log.string(), take, readings);
+  }
+  return derived;
+}
+
 }  // namespace
 
 ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& options,
@@ -248,6 +271,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
     by_log.push_back(ReadKeyframeLog(log, readings));
     Merge(ReadAnchorEdits(log, readings), &edits);
   }
+  DerivedConstraints derived = ReadDerived(logs, readings);
   std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
   const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
   DropLater(until_s, &keyframes);
@@ -261,6 +285,10 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
     bus.Drain();
+    for (const constraint_t& constraint : derived[keyframe.id]) {
+      PublishMessage(bus, std::string(channels::kConstraint), constraint);
+      bus.Drain();
+    }
     for (anchor_edit_t& edit : edits[keyframe.id]) {
       edit.seq = next_edit++;
       PublishMessage(bus, std::string(channels::kAnchorEdit), edit);

@@ -9,6 +9,7 @@
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "messages/anchor_messages.h"
+#include "messages/messages.h"
 #include "replay/keyframe_log.h"
 
 namespace pangea::session {
@@ -118,6 +119,32 @@ TEST_F(ReplayOfAnchors, PlacesThemAgainTheSame) {
   alone.processes = {"anchors"};
   ReplayPart(log_ + ".1", alone, log_ + ".part", progress_);
   EXPECT_EQ(On("ANCHOR", log_ + ".part"), anchors);
+}
+
+// No process makes it again.
+TEST_F(ReplayOfAnchors, TakesAlongWhatAThinningDerived) {
+  const auto keyframes = ReadKeyframeLog(kSample);
+  Constraint derived;
+  derived.from = keyframes[0].id;
+  derived.to = std::ranges::find_if(keyframes, [&](const LoggedKeyframe& keyframe) {
+                 return keyframe.id.map != derived.from.map;
+               })->id;
+  derived.kind = PlaceKind::kDerived;
+  derived.accepted = true;
+  const std::vector<uint8_t> message = EncodeMessage(ToMessage(derived));
+  {
+    LogFileWriter file(log_);
+    for (const LoggedKeyframe& keyframe : keyframes) {
+      file.Write(keyframe.captured_utime, keyframe.channel, keyframe.data);
+    }
+    file.Write(keyframes.back().captured_utime, "CONSTRAINT", message);
+  }
+  Replay({log_}, {}, kUntil_s, log_ + ".1", progress_);
+  EXPECT_THAT(On("CONSTRAINT", log_ + ".1"), testing::Contains(message));
+  ReplayedPart posegraph;
+  posegraph.processes = {"posegraph"};
+  ReplayPart(log_, posegraph, log_ + ".part", progress_);
+  EXPECT_THAT(On("CONSTRAINT", log_ + ".part"), testing::Contains(message));
 }
 
 }  // namespace

@@ -4,9 +4,12 @@
 
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "bus/process.h"
+#include "options/yaml_options.h"
 #include "site/backup.h"
 #include "site/compact.h"
 #include "site/merge.h"
@@ -24,6 +27,7 @@ struct Arguments {
   std::string site, other, out, name, bus, link;
   bool with_keys = false;
   bool now = false;
+  bool thin = false;
 };
 using Shared = std::shared_ptr<Arguments>;
 
@@ -89,9 +93,29 @@ void RunMerge(const Arguments& arguments) {
   NoteLoss(arguments.out, summary.bytes_lost);
 }
 
+ThinningOptions ReadThinningOptions(const Site& site) {
+  ThinningOptions options;
+  YamlOptions yaml;
+  options.Visit(yaml);
+  if (const fs::path file = site.options() / "thinning.yaml"; fs::exists(file)) {
+    yaml.ReadFile(file);
+  }
+  return options;
+}
+
 void RunCompact(const Arguments& arguments) {
   const Site site = ReadSite(arguments.site);
-  const CompactSummary summary = Compact(site);
+  std::optional<ThinJournal> thin;
+  if (arguments.thin) {
+    thin = {ReadThinningOptions(site), WallUtime()};
+  }
+  const CompactSummary summary = Compact(site, thin);
+  if (thin) {
+    std::cout << fmt::format(
+        "{}: {} keyframes go, of places that newer ones show; {} constraints take the place of "
+        "theirs\n",
+        site.journal().string(), summary.keyframes_gone, summary.constraints_derived);
+  }
   std::cout << fmt::format("{}: {} events in {:.1f} MB, before {} in {:.1f} MB\n",
                            site.journal().string(), summary.events_after,
                            Megabytes(summary.bytes_after), summary.events_before,
@@ -184,6 +208,9 @@ void AddChanging(CLI::App& app, const Shared& arguments) {
       app, "compact",
       "Drops repeats, replaced options and filled damage from the journal; no server may run",
       arguments);
+  compact->add_flag("--thin", arguments->thin,
+                    "Also keyframes of places that newer ones show (docs/sites.md); options/"
+                    "thinning.yaml in the site says how");
   compact->callback([arguments] { RunCompact(*arguments); });
 
   CLI::App* remove = AddSiteCommand(

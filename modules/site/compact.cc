@@ -15,6 +15,7 @@
 #include "log_file/log_reader.h"
 #include "site/journal_contents.h"
 #include "site/journal_writer.h"
+#include "site/thinned_journal.h"
 
 namespace pangea::site {
 namespace {
@@ -27,27 +28,43 @@ Journal Lock(const fs::path& journal) {
                  [](const std::string&, Bytes, const JournalPlace&) { return true; });
 }
 
-int64_t WriteWhatCounts(const fs::path& from, const JournalContents& contents, const fs::path& to,
-                        const std::function<void(CompactStep)>& on_step) {
+// Returns what it wrote.
+JournalContents WriteWhatCounts(const fs::path& from, const JournalContents& contents,
+                                ThinnedJournal* thinned, const fs::path& to,
+                                const std::function<void(CompactStep)>& on_step) {
   JournalWriter writer(to);
   CountingEvents counting(contents);
   LogReadings readings;
+  JournalContents written;
+  const auto write = [&](const LogEvent& event) {
+    on_step(CompactStep::kWrite);
+    writer.Write(event.utime, event.channel, event.data);
+    written.Take(event);
+  };
   const auto copy = [&](const LogEvent& event) {
-    if (counting.Counts(event)) {
-      on_step(CompactStep::kWrite);
-      writer.Write(event.utime, event.channel, event.data);
+    if (!counting.Counts(event)) {
+      return;
     }
+    thinned == nullptr ? write(event) : thinned->Rewrite(event, write);
   };
   ReadLog(from, copy, &readings);
+  if (thinned != nullptr) {
+    thinned->Finish(write);
+  }
   writer.Finish();
-  return writer.count();
+  return written;
 }
 
-// Owner and mode: the server's user goes on writing it, whoever compacts.
+// Owner and mode: the server's user goes on writing it, whoever compacts. A user may not even ask
+// to change the owner where systemd filters system calls.
 void TakeOwner(const fs::path& from, const fs::path& to) {
-  struct stat info {};
-  if (stat(from.c_str(), &info) != 0 || chown(to.c_str(), info.st_uid, info.st_gid) != 0 ||
-      chmod(to.c_str(), info.st_mode & 07777) != 0) {
+  struct stat wanted {
+  }, made{};
+  bool done = stat(from.c_str(), &wanted) == 0 && stat(to.c_str(), &made) == 0;
+  if (done && (wanted.st_uid != made.st_uid || wanted.st_gid != made.st_gid)) {
+    done = chown(to.c_str(), wanted.st_uid, wanted.st_gid) == 0;
+  }
+  if (!done || chmod(to.c_str(), wanted.st_mode & 07777) != 0) {
     throw std::runtime_error(fmt::format("{}: cannot be given the owner of {}: {}; run as that one",
                                          to.string(), from.string(), std::strerror(errno)));
   }
@@ -55,7 +72,8 @@ void TakeOwner(const fs::path& from, const fs::path& to) {
 
 }  // namespace
 
-CompactSummary Compact(const Site& site, const std::function<void(CompactStep)>& on_step) {
+CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
+                       const std::function<void(CompactStep)>& on_step) {
   const fs::path journal = site.journal();
   const fs::path made = site.folder / "journal.lcm.compacting";
   const SiteLock lock(site);
@@ -73,12 +91,20 @@ CompactSummary Compact(const Site& site, const std::function<void(CompactStep)>&
   on_step(CompactStep::kRead);
   const JournalContents contents = ReadContents(journal);
   summary.events_before = contents.events;
+  std::optional<ThinnedJournal> thinned;
+  if (thin) {
+    thinned = Thin(journal, *thin);
+    summary.keyframes_gone = thinned->keyframes_gone();
+    summary.constraints_derived = thinned->constraints_derived();
+  }
   try {
-    summary.events_after = WriteWhatCounts(journal, contents, made, on_step);
+    const JournalContents meant =
+        WriteWhatCounts(journal, contents, thinned ? &*thinned : nullptr, made, on_step);
+    summary.events_after = meant.events;
     TakeOwner(journal, made);
     on_step(CompactStep::kWritten);
     const JournalContents written = ReadContents(made);
-    if (!written.reading.whole() || !written.SaysTheSame(contents)) {
+    if (!written.reading.whole() || !written.SaysTheSame(thin ? meant : contents)) {
       throw std::runtime_error(
           fmt::format("{}: does not say what {} says, and is thrown away; is the disk all right?",
                       made.string(), journal.string()));

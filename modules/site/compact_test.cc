@@ -101,11 +101,12 @@ TEST(Compact, HasNothingToDoWithoutAJournal) {
 }
 
 // kill -9 when a step is reached for the n-th time.
-void CompactKilledAt(const Site& site, CompactStep step, int nth) {
+void CompactKilledAt(const Site& site, const std::optional<ThinJournal>& thin, CompactStep step,
+                     int nth) {
   const pid_t child = fork();
   if (child == 0) {
     int seen = 0;
-    Compact(site, [&](CompactStep reached) {
+    Compact(site, thin, [&](CompactStep reached) {
       if (reached == step && ++seen == nth) {
         kill(getpid(), SIGKILL);
       }
@@ -117,9 +118,9 @@ void CompactKilledAt(const Site& site, CompactStep step, int nth) {
   ASSERT_TRUE(WIFSIGNALED(status)) << "the step was not reached";
 }
 
-TEST(Compact, LeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
-  const std::vector<StoredEvent> before = Wasteful();
-  const std::vector<StoredEvent> after = Lean();
+// Wherever it is killed.
+void ExpectOldOrNew(const std::vector<StoredEvent>& before, const std::vector<StoredEvent>& after,
+                    const std::optional<ThinJournal>& thin) {
   const int num_written = static_cast<int>(after.size());
   const std::vector<std::pair<CompactStep, int>> kills{{CompactStep::kRead, 1},
                                                        {CompactStep::kWrite, 1},
@@ -131,14 +132,29 @@ TEST(Compact, LeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
                                                        {CompactStep::kDone, 1}};
   for (const auto& [step, nth] : kills) {
     const Site site = MakeSite(FreshFolder("compact_killed") / "hall", before);
-    CompactKilledAt(site, step, nth);
+    CompactKilledAt(site, thin, step, nth);
     const bool swapped = step >= CompactStep::kSwapped;
     EXPECT_EQ(EventsOf(site), swapped ? after : before) << static_cast<int>(step);
     EXPECT_EQ(FoundAtOpening(site), "");
-    Compact(site);  // what was left over is no obstacle
-    EXPECT_EQ(EventsOf(site), after);
+    if (!swapped) {
+      Compact(site, thin);  // what was left over is no obstacle
+      EXPECT_EQ(EventsOf(site), after);
+    }
     EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));
   }
+}
+
+TEST(Compact, LeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
+  ExpectOldOrNew(Wasteful(), Lean(), std::nullopt);
+}
+
+TEST(Compact, ThinningLeavesTheOldOrTheNewOneWholeWhereverItIsKilled) {
+  const std::vector<StoredEvent> before = WalksAgainAndAgain();
+  const ThinJournal thin = AfterTheLast(before);
+  const Site site = MakeSite(FreshFolder("compact_thin") / "hall", before);
+  Compact(site, thin);
+  ASSERT_LT(EventsOf(site).size(), before.size());
+  ExpectOldOrNew(before, EventsOf(site), thin);
 }
 
 }  // namespace

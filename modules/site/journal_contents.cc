@@ -49,25 +49,27 @@ std::string NameOf(const LogEvent& event) {
   return event.channel.starts_with(channels::kOptionsPrefix) ? event.channel : "";
 }
 
+void JournalContents::Take(const LogEvent& event) {
+  ++events;
+  const uint32_t crc32 = EventChecksum(event.data);
+  const std::string name = NameOf(event);
+  if (name.empty()) {
+    others.push_back(crc32);
+  } else if (event.channel.starts_with(channels::kOptionsPrefix)) {
+    named[name] = crc32;
+  } else {
+    named.emplace(name, crc32);
+  }
+}
+
 JournalContents ReadContents(const std::filesystem::path& journal) {
   JournalContents contents;
   if (!std::filesystem::exists(journal)) {
     return contents;
   }
-  const auto take = [&contents](const LogEvent& event) {
-    ++contents.events;
-    const uint32_t crc32 = EventChecksum(event.data);
-    const std::string name = NameOf(event);
-    if (name.empty()) {
-      contents.others.push_back(crc32);
-    } else if (event.channel.starts_with(channels::kOptionsPrefix)) {
-      contents.named[name] = crc32;
-    } else {
-      contents.named.emplace(name, crc32);
-    }
-  };
   LogReadings readings;
-  ReadLog(journal, take, &readings);
+  ReadLog(
+      journal, [&contents](const LogEvent& event) { contents.Take(event); }, &readings);
   contents.reading = readings.at(journal);
   return contents;
 }

@@ -24,6 +24,8 @@ struct JournalContents {
   int64_t events = 0;            // all of them
   LogReading reading;
 
+  // The next event.
+  void Take(const LogEvent& event);
   bool SaysTheSame(const JournalContents& other) const {
     return named == other.named && others == other.others;
   }

@@ -120,7 +120,8 @@ class Merger {
     }
     const auto constraint =
         event.channel == channels::kConstraint ? ConstraintOf(event) : std::nullopt;
-    return constraint && constraint->from.map != constraint->to.map;
+    return constraint &&
+           (constraint->from.map != constraint->to.map || constraint->kind == PlaceKind::kDerived);
   }
 
   // Capture times go on from the first's: they do not step back from one to the next.

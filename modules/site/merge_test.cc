@@ -9,6 +9,7 @@
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/messages.h"
 #include "replay/replay.h"
 #include "report/metrics/report_groups.h"
 #include "site/site_test_world.h"
@@ -82,6 +83,23 @@ TEST_F(MergeTest, KeepsResultsBetweenTheSecondsMaps) {
       EXPECT_NE(constraint.from.map.agent_id, constraint.to.map.agent_id);
     }
   }
+}
+
+TEST_F(MergeTest, KeepsWhatAThinningDerivedWithinAMap) {
+  std::vector<StoredEvent> walk = WalksOf({2});
+  keyframe_t keyframe{};
+  ASSERT_TRUE(DecodeMessage(walk.front().data, &keyframe));
+  Constraint derived;
+  derived.from = *Parse(keyframe.id).value;
+  derived.to = derived.from;
+  ++derived.to.seq;
+  derived.kind = PlaceKind::kDerived;
+  derived.accepted = true;
+  walk.push_back({walk.back().utime, "CONSTRAINT", EncodeMessage(ToMessage(derived))});
+  MergeSites(first, MakeSite(folder / "thinned", walk), out, {});
+  EXPECT_TRUE(std::ranges::any_of(EventsOf(ReadSite(out)), [&walk](const StoredEvent& event) {
+    return event.data == walk.back().data;
+  }));
 }
 
 TEST_F(MergeTest, TakesAMapThatIsTheSameInBothOnce) {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 
 #include "log_file/log_reader.h"
@@ -42,6 +43,47 @@ bool IsOf(const LogEvent& event, const std::set<int32_t>& agents) {
   return agents.contains(channels::AgentOf(event.channel, channels::kKeyframePrefix));
 }
 
+constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
+
+// An event of the second walk as another visit's.
+template <typename Message, typename Rename>
+StoredEvent Renamed(const StoredEvent& event, const Rename& rename) {
+  Message message{};
+  DecodeMessage(event.data, &message);
+  auto value = *Parse(message).value;
+  rename(&value);
+  return {event.utime, event.channel, EncodeMessage(ToMessage(value))};
+}
+
+// Nothing where it says nothing of the second walk.
+std::optional<StoredEvent> OfVisit(const StoredEvent& event, int visit) {
+  bool says_something = false;
+  const auto rename = [&](KeyframeId* id) {
+    if (id->map.agent_id == 2) {
+      id->map.opened_utime += visit;
+      says_something = true;
+    }
+  };
+  StoredEvent again;
+  if (event.channel == channels::kPlaceMatch) {
+    again = Renamed<place_match_t>(event, [&](PlaceMatch* match) {
+      rename(&match->query);
+      for (PlaceCandidate& candidate : match->candidates) {
+        rename(&candidate.match);
+      }
+    });
+  } else if (event.channel == channels::kConstraint) {
+    again = Renamed<constraint_t>(event, [&](Constraint* constraint) {
+      rename(&constraint->from);
+      rename(&constraint->to);
+    });
+  } else {
+    again = Renamed<keyframe_t>(event, [&](Keyframe* keyframe) { rename(&keyframe->id); });
+  }
+  again.utime += visit * kDay_us;
+  return says_something ? std::optional(again) : std::nullopt;
+}
+
 }  // namespace
 
 fs::path FreshFolder(const std::string& name) {
@@ -62,6 +104,24 @@ std::vector<StoredEvent> WalksOf(const std::set<int32_t>& agents) {
   });
   EXPECT_FALSE(events.empty());
   return events;
+}
+
+std::vector<StoredEvent> WalksAgainAndAgain() {
+  const std::vector<StoredEvent> walks = WalksOf({1, 2});
+  std::vector<StoredEvent> events = walks;
+  constexpr int kVisits = 4;
+  for (int visit = 1; visit < kVisits; ++visit) {
+    for (const StoredEvent& event : walks) {
+      if (const auto again = OfVisit(event, visit)) {
+        events.push_back(*again);
+      }
+    }
+  }
+  return events;
+}
+
+ThinJournal AfterTheLast(const std::vector<StoredEvent>& events) {
+  return {{}, events.back().utime + kDay_us / 24};
 }
 
 StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/anchor.h"
+#include "site/compact.h"
 #include "site/journal_writer.h"
 #include "site/site.h"
 
@@ -28,6 +29,10 @@ struct StoredEvent {
 // What a journal would have of the two walks, of these agents: keyframes, matches and verification
 // results whose keyframes are theirs.
 std::vector<StoredEvent> WalksOf(const std::set<int32_t>& agents);
+// The first walk, then the second four times, a day apart, with what was said of each.
+std::vector<StoredEvent> WalksAgainAndAgain();
+// A thinning an hour after these.
+ThinJournal AfterTheLast(const std::vector<StoredEvent>& events);
 StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted = false);
 StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
 

@@ -1,0 +1,199 @@
+// A hundred visits of one hall: keyframes kept, memory and CPU of the server's cores, recall and
+// accuracy against the number of visits, thinned now and then.
+//
+// A visit is a recording's stored keyframes with fresh noise (visit.h), a day after the one before.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bench/process_use.h"
+#include "bench/recognition/input.h"
+#include "bench/visits/server.h"
+#include "bench/visits/visit.h"
+#include "eval/metrics.h"
+
+namespace pangea::bench {
+namespace {
+
+constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
+constexpr int64_t kFirst_utime = 1'790'000'000'000'000;
+// Of an accepted constraint that is wrong (bench/README.md).
+constexpr double kWrong_m = 0.5;
+constexpr int64_t kTruthGap_us = 100'000;
+
+struct Recording {
+  std::vector<Keyframe> keyframes;
+  Trajectory truth;
+};
+
+std::vector<Recording> ReadRecordings(const std::vector<std::string>& logs,
+                                      const std::vector<std::string>& truths) {
+  std::vector<Recording> recordings;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    const auto agent = static_cast<int32_t>(i + 1);
+    Input input = ReadInput({{agent, logs[i], truths.at(i)}});
+    recordings.push_back({std::move(input.keyframes), std::move(input.truth[agent])});
+  }
+  return recordings;
+}
+
+struct Row {
+  int visit = 0;
+  size_t keyframes = 0, maps = 0, constraints = 0;
+  std::map<std::string, Use> use;  // of the CPU, of this visit
+  size_t new_keyframes = 0, recognised = 0, wrong = 0;
+  double joint_m = 0, newest_m = 0;  // ATE of all keyframes, of the newest visit's among them
+  size_t groups = 0;
+  double thin_ms = 0;
+};
+
+class Bench {
+ public:
+  explicit Bench(std::vector<Recording> recordings) : recordings_(std::move(recordings)) {
+    server_ = std::make_unique<Server>(journal_);
+  }
+
+  Row Visit(int visit) {
+    const Recording& recording = recordings_[visit % recordings_.size()];
+    Row row;
+    row.visit = visit + 1;
+    server_->TakeUse();
+    const std::vector<Keyframe> keyframes =
+        VisitAgain(recording.keyframes, kFirst_utime + visit * kDay_us, visit);
+    truth_[keyframes.front().id.map] = &recording.truth;
+    for (const Keyframe& keyframe : keyframes) {
+      utime_[keyframe.id] = keyframe.utime;
+      bool recognised = false;
+      for (const Constraint& result : server_->Take(keyframe, &journal_)) {
+        const bool between_maps = result.from.map != result.to.map;
+        recognised |= between_maps && (result.accepted || result.reason == kRedundant);
+        row.wrong += result.accepted && IsWrong(result) ? 1 : 0;
+      }
+      row.recognised += recognised ? 1 : 0;
+    }
+    row.use = server_->TakeUse();
+    row.new_keyframes = keyframes.size();
+    server_->Finish();
+    Measure(keyframes.front().id.map, &row);
+    return row;
+  }
+
+  // An hour after a visit.
+  void Thin(const Thinning::Options& options, Row* row) {
+    const double begin = CpuMs();
+    server_.reset();
+    journal_.Thin(options, kFirst_utime + (row->visit - 1) * kDay_us + kDay_us / 24);
+    row->thin_ms = CpuMs() - begin;
+    Count(row);
+    server_ = std::make_unique<Server>(journal_);
+  }
+
+ private:
+  Rigid3 Truth(const KeyframeId& id) const {
+    return Interpolate(*truth_.at(id.map), utime_.at(id), kTruthGap_us).value_or(Rigid3());
+  }
+
+  bool IsWrong(const Constraint& constraint) const {
+    const Rigid3 T = Truth(constraint.from).Inverse() * Truth(constraint.to);
+    return (T.t - constraint.T_from_to.t).norm() > kWrong_m;
+  }
+
+  void Count(Row* row) const {
+    row->keyframes = journal_.num_keyframes();
+    row->maps = journal_.maps.size();
+    row->constraints = journal_.num_accepted();
+  }
+
+  void Measure(const MapId& newest, Row* row) const {
+    Count(row);
+    const std::vector<MapState> states = server_->States();
+    row->groups = states.size();
+    for (const MapState& state : states) {
+      std::map<MapId, std::vector<PosePair>> pairs;
+      for (const KeyframePose& pose : state.keyframes) {
+        pairs[pose.id.map].push_back({pose.utime, pose.T_map_body, Truth(pose.id)});
+      }
+      if (!pairs.contains(newest)) {
+        continue;
+      }
+      std::vector<std::vector<PosePair>> agents;
+      size_t index = 0;
+      for (auto& [map, of_map] : pairs) {
+        index = map == newest ? agents.size() : index;
+        agents.push_back(std::move(of_map));
+      }
+      if (const auto joint = JointAbsoluteError(agents, TrajectoryAlignmentKind::kYaw)) {
+        row->joint_m = joint->position_m.rmse;
+        row->newest_m = joint->agents[index].position_m.rmse;
+      }
+    }
+  }
+
+  std::vector<Recording> recordings_;
+  Journal journal_;
+  std::unique_ptr<Server> server_;
+  std::map<MapId, const Trajectory*> truth_;
+  std::map<KeyframeId, int64_t> utime_;
+};
+
+constexpr const char* kProcesses[] = {"place_recognition", "inter_map_ba", "fusion", "posegraph"};
+
+void PrintHead() {
+  fmt::print(
+      "| visits | maps | keyframes | constraints | groups | heap MB: recognition, inter_map_ba, "
+      "fusion, posegraph | CPU ms a new keyframe: the same | recall | wrong | ATE m: joint, newest "
+      "| thinning s |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+}
+
+void Print(const Row& row) {
+  std::vector<std::string> heap, cpu;
+  for (const char* process : kProcesses) {
+    const Use& use = row.use.at(process);
+    heap.push_back(fmt::format("{:.1f}", 1e-6 * use.heap_bytes));
+    cpu.push_back(fmt::format("{:.1f}", use.cpu_ms / static_cast<double>(row.new_keyframes)));
+  }
+  fmt::print("| {} | {} | {} | {} | {} | {} | {} | {:.3f} | {} | {:.4f}, {:.4f} | {:.1f} |\n",
+             row.visit, row.maps, row.keyframes, row.constraints, row.groups, fmt::join(heap, ", "),
+             fmt::join(cpu, ", "),
+             static_cast<double>(row.recognised) / static_cast<double>(row.new_keyframes),
+             row.wrong, row.joint_m, row.newest_m, 1e-3 * row.thin_ms);
+  std::fflush(stdout);
+}
+
+}  // namespace
+}  // namespace pangea::bench
+
+int main(int argc, char** argv) {
+  CLI::App app("What visit after visit of one hall costs the server, and how good its map is",
+               "pangea-visits-bench");
+  std::vector<std::string> logs, truths;
+  int visits = 20, thin_every = 5;
+  app.add_option("--logs", logs, "keyframe logs, one agent each: 1, 2, ... in this order")
+      ->required();
+  app.add_option("--truth", truths, "their ground truth: csv, TUM or a recording's folder")
+      ->required();
+  app.add_option("--visits", visits, "how many; the recordings by turns")->capture_default_str();
+  app.add_option("--thin-every", thin_every, "visits between thinnings; 0: never")
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    pangea::bench::Bench bench(pangea::bench::ReadRecordings(logs, truths));
+    pangea::bench::PrintHead();
+    for (int visit = 0; visit < visits; ++visit) {
+      pangea::bench::Row row = bench.Visit(visit);
+      if (thin_every > 0 && (visit + 1) % thin_every == 0) {
+        bench.Thin({}, &row);
+      }
+      pangea::bench::Print(row);
+    }
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "pangea-visits-bench: {}\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,70 @@
+#pragma once
+
+// The cores of the server over many visits, and the journal they would have: what a thinning leaves
+// of it is what they start with again.
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/keyframe.h"
+#include "core/server_messages.h"
+#include "fusion/fusion.h"
+#include "inter_map_ba/inter_map_ba.h"
+#include "place_recognition/place_recognition.h"
+#include "posegraph/posegraph.h"
+#include "thinning/thinning.h"
+
+namespace pangea::bench {
+
+struct Journal {
+  struct Entry {
+    Keyframe keyframe;
+    PlaceMatch match;
+    int64_t journalled_utime = 0;
+  };
+  std::vector<std::vector<Entry>> maps;  // the oldest first; ascending seq
+  std::map<int64_t, Constraint> constraints;
+
+  size_t num_keyframes() const;
+  size_t num_accepted() const;
+  // As pangea-site does with the events of a file; what it left out and put in.
+  ThinnedMaps Thin(const Thinning::Options& options, int64_t now_utime);
+};
+
+struct Use {
+  double heap_bytes = 0;
+  double cpu_ms = 0;
+};
+
+class Server {
+ public:
+  // With what the journal has.
+  explicit Server(const Journal& journal);
+
+  // The keyframe as it comes from an agent; what follows goes into the journal too. The results of
+  // its candidates.
+  std::vector<Constraint> Take(const Keyframe& keyframe, Journal* journal);
+  // Every group from the beginning.
+  void Finish();
+
+  // By process; of the CPU since it was last asked.
+  std::map<std::string, Use> TakeUse();
+  std::vector<MapState> States() const { return graph_->States(); }
+
+ private:
+  template <typename Work>
+  auto Measured(const std::string& process, const Work& work);
+  Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate);
+  void TellGroups(const PoseGraphUpdate& update);
+
+  std::unique_ptr<PlaceRecognition> recognition_;
+  std::unique_ptr<InterMapBa> inter_map_ba_;
+  std::unique_ptr<Fusion> fusion_;
+  std::unique_ptr<PoseGraph> graph_;
+  std::map<std::string, Use> use_;
+};
+
+}  // namespace pangea::bench

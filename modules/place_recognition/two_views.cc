@@ -1,0 +1,39 @@
+#include "place_recognition/two_views.h"
+
+#include <utility>
+#include <vector>
+
+namespace pangea {
+namespace {
+
+constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
+
+std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRay>& a,
+                                                      const std::vector<CornerRay>& b,
+                                                      const std::vector<CornerMatch>& matches) {
+  std::vector<std::pair<CornerRay, CornerRay>> pairs;
+  pairs.reserve(matches.size());
+  for (const CornerMatch& match : matches) {
+    pairs.emplace_back(a[match.a], b[match.b]);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
+                            const MatchingOptions& matching, const EpipolarOptions& epipolar) {
+  std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, matching);
+  std::erase_if(matches, [&](const CornerMatch& m) {
+    return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;
+  });
+  TwoViewResult result;
+  result.num_matches = static_cast<int>(matches.size());
+  if (result.num_matches >= epipolar.min_inliers) {
+    result.epipolar = CheckEpipolar(RayPairs(query.rays, other.rays, matches),
+                                    StableHash(query.id, other.id, kSeedSalt), epipolar);
+  }
+  return result;
+}
+
+}  // namespace pangea

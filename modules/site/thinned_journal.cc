@@ -1,0 +1,125 @@
+#include "site/thinned_journal.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "bus/process.h"
+#include "files/scratch_file.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "server_options/server_options.h"
+
+namespace pangea::site {
+namespace {
+
+template <typename Message>
+auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
+  Message message{};
+  return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
+}
+
+bool IsKeyframe(const LogEvent& event) {
+  return event.channel.starts_with(channels::kKeyframePrefix);
+}
+
+template <typename Message>
+void WriteMessage(int64_t utime, const std::string& channel, const Message& message,
+                  const ThinnedJournal::Write& write) {
+  const std::vector<uint8_t> data = EncodeMessage(message);
+  write({.utime = utime, .channel = channel, .data = data});
+}
+
+void Take(const LogEvent& event, Thinning* thinning) {
+  const auto take = [thinning](const auto& parsed) {
+    if (parsed) {
+      thinning->Take(*parsed);
+    }
+  };
+  if (IsKeyframe(event)) {
+    if (const auto keyframe = ParseEvent<keyframe_t>(event)) {
+      thinning->Take(*keyframe, event.utime);
+    }
+  } else if (event.channel == channels::kConstraint) {
+    take(ParseEvent<constraint_t>(event));
+  } else if (event.channel == channels::kAnchorEdit) {
+    take(ParseEvent<anchor_edit_t>(event));
+  }
+}
+
+}  // namespace
+
+ThinnedJournal Thin(const std::filesystem::path& journal, const ThinJournal& how) {
+  UseOneThread();
+  LogReadings readings;
+  const ServerOptions options = ReadLoggedOptions({journal}, &readings).options;
+  Thinning thinning({how.options, options.posegraph, options.place_recognition},
+                    std::make_shared<ScratchFile>());
+  ReadLog(
+      journal, [&thinning](const LogEvent& event) { Take(event, &thinning); }, &readings);
+  return ThinnedJournal(thinning.Thin(how.now_utime));
+}
+
+void ThinnedJournal::Rewrite(const LogEvent& event, const Write& write) {
+  latest_utime_ = std::max(latest_utime_, event.utime);
+  if (IsKeyframe(event)) {
+    RewriteKeyframe(event, write);
+  } else if (event.channel == channels::kPlaceMatch) {
+    RewriteMatch(event, write);
+  } else if (event.channel == channels::kConstraint) {
+    RewriteConstraint(event, write);
+  } else {
+    write(event);
+  }
+}
+
+void ThinnedJournal::RewriteKeyframe(const LogEvent& event, const Write& write) const {
+  auto keyframe = ParseEvent<keyframe_t>(event);
+  const auto edge = keyframe ? thinned_.edges.find(keyframe->id) : thinned_.edges.end();
+  if (edge != thinned_.edges.end()) {
+    keyframe->edge = edge->second.edge;
+    keyframe->preintegration = edge->second.preintegration;
+    WriteMessage(event.utime, event.channel, ToMessage(*keyframe), write);
+  } else if (!keyframe || !thinned_.gone.contains(keyframe->id)) {
+    write(event);
+  }
+}
+
+void ThinnedJournal::RewriteMatch(const LogEvent& event, const Write& write) const {
+  auto match = ParseEvent<place_match_t>(event);
+  if (!match) {
+    return write(event);
+  }
+  if (thinned_.gone.contains(match->query)) {
+    return;
+  }
+  const auto num_gone = std::erase_if(match->candidates, [this](const PlaceCandidate& candidate) {
+    return thinned_.gone.contains(candidate.match);
+  });
+  if (num_gone == 0) {
+    write(event);
+  } else {
+    WriteMessage(event.utime, event.channel, ToMessage(*match), write);
+  }
+}
+
+// Derived ones are all written anew at the end.
+void ThinnedJournal::RewriteConstraint(const LogEvent& event, const Write& write) const {
+  const auto constraint = ParseEvent<constraint_t>(event);
+  if (!constraint ||
+      (constraint->kind != PlaceKind::kDerived && !thinned_.gone.contains(constraint->from) &&
+       !thinned_.gone.contains(constraint->to))) {
+    write(event);
+  }
+}
+
+void ThinnedJournal::Finish(const Write& write) const {
+  for (const Constraint& constraint : thinned_.derived) {
+    WriteMessage(latest_utime_, std::string(channels::kConstraint), ToMessage(constraint), write);
+  }
+}
+
+}  // namespace pangea::site

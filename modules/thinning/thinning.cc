@@ -1,0 +1,188 @@
+#include "thinning/thinning.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "anchors/placement.h"
+#include "core/median.h"
+#include "place_recognition/two_views.h"
+
+namespace pangea {
+namespace {
+
+constexpr double kUsualDepth_m = 3;  // of a keyframe without points
+constexpr double kHour_us = 3.6e9;
+
+// Without what is large: corners, and all points but that of the median depth.
+Keyframe Skeleton(const Keyframe& keyframe) {
+  Keyframe skeleton = keyframe;
+  skeleton.corners.clear();
+  if (!keyframe.points.empty()) {
+    std::vector<float> inverse_depths;
+    for (const MapPoint& point : keyframe.points) {
+      inverse_depths.push_back(point.inverse_depth);
+    }
+    skeleton.points = {{0, Median(std::move(inverse_depths)), 1}};
+  }
+  skeleton.corners.shrink_to_fit();
+  skeleton.points.shrink_to_fit();
+  return skeleton;
+}
+
+double Depth(const Keyframe& skeleton) {
+  return skeleton.points.empty() ? kUsualDepth_m : 1.0 / skeleton.points.front().inverse_depth;
+}
+
+}  // namespace
+
+Thinning::Thinning(const Options& options, std::shared_ptr<RecordStore> records)
+    : options_(options),
+      recognised_(std::move(records)),
+      anchors_(std::numeric_limits<size_t>::max()) {}
+
+void Thinning::Take(const Keyframe& keyframe, int64_t journalled_utime) {
+  const auto [it, is_new] = stored_.try_emplace(keyframe.id.map);
+  if (is_new) {
+    maps_.push_back(keyframe.id.map);
+  }
+  StoredMap& map = it->second;
+  if (!map.keyframes.empty() && keyframe.id.seq <= map.keyframes.back().id.seq) {
+    return;
+  }
+  const bool stored = recognised_.Add(RecognisedKeyframe(keyframe));
+  map.numbers.push_back(stored ? recognised_.size() - 1 : kNotStored);
+  map.keyframes.push_back(Skeleton(keyframe));
+  map.journalled_utime = std::max(map.journalled_utime, journalled_utime);
+}
+
+void Thinning::Take(const Constraint& constraint) {
+  constraints_.try_emplace(constraint.Id(), constraint);
+}
+
+void Thinning::Take(const AnchorEdit& edit) { anchors_.Take(edit); }
+
+ThinnedMaps Thinning::Thin(int64_t now_utime) {
+  const Solution before = Solve({});
+  std::set<MapId> whole = Whole(before, now_utime);
+  ThinnedMaps thinned = Make(before, whole);
+  if (const std::set<MapId> groups = ComeApart(before, thinned); !groups.empty()) {
+    for (const auto& [map, group] : before.group_of) {
+      if (groups.contains(group)) {
+        whole.insert(map);
+      }
+    }
+    thinned = Make(before, whole);
+  }
+  return thinned;
+}
+
+ThinnedMaps Thinning::Make(const Solution& solution, const std::set<MapId>& whole) {
+  ThinnedMaps thinned;
+  thinned.gone = Gone(solution, whole);
+  JoinEdges(&thinned);
+  thinned.derived = Derive(solution, thinned.gone);
+  return thinned;
+}
+
+std::set<MapId> Thinning::Whole(const Solution& solution, int64_t now_utime) const {
+  std::set<MapId> whole;
+  for (const auto& [map, group] : solution.group_of) {
+    whole.insert(group);  // named after its oldest
+  }
+  for (const auto& [id, map] : stored_) {
+    const auto age_us = static_cast<double>(now_utime - map.journalled_utime);
+    if (age_us < kHour_us * options_.thinning.keep_hours) {
+      whole.insert(id);
+    }
+  }
+  return whole;
+}
+
+std::set<KeyframeId> Thinning::MustStay(const Solution& solution) const {
+  std::set<KeyframeId> must_stay;
+  for (const auto& [id, anchor] : anchors_.entries()) {
+    const auto map =
+        anchor.deleted || !anchor.place ? stored_.end() : stored_.find(anchor.place->map);
+    if (map == stored_.end()) {
+      continue;
+    }
+    const std::vector<Keyframe>& keyframes = map->second.keyframes;
+    int64_t utime = anchor.place->utime;
+    if (anchor.place->placement == AnchorEdit::Placement::kKeyframe) {
+      const auto at = std::ranges::lower_bound(keyframes, anchor.place->keyframe_seq, {},
+                                               [](const Keyframe& k) { return k.id.seq; });
+      utime = at == keyframes.end() ? keyframes.back().utime : at->utime;
+    }
+    // One before and one after the reach: a stationary body gives few.
+    const auto first =
+        std::ranges::lower_bound(keyframes, utime - kPlacementReach_us, {}, &Keyframe::utime);
+    const auto last =
+        std::ranges::upper_bound(keyframes, utime + kPlacementReach_us, {}, &Keyframe::utime);
+    for (auto it = first == keyframes.begin() ? first : first - 1;
+         it != keyframes.end() && it <= last; ++it) {
+      must_stay.insert(it->id);
+    }
+  }
+  for (const auto& [id, constraint] : constraints_) {
+    const auto from = solution.group_of.find(constraint.from.map);
+    const auto to = solution.group_of.find(constraint.to.map);
+    if (constraint.accepted && from != solution.group_of.end() && to != solution.group_of.end() &&
+        from->second != to->second) {
+      must_stay.insert({constraint.from, constraint.to});
+    }
+  }
+  return must_stay;
+}
+
+std::set<KeyframeId> Thinning::Gone(const Solution& solution, const std::set<MapId>& whole) {
+  const std::set<KeyframeId> must_stay = MustStay(solution);
+  std::map<MapId, int> group_numbers;
+  std::set<KeyframeId> recognised;
+  for (const auto& [id, constraint] : constraints_) {
+    if (solution.in_force.contains(id) && constraint.from.map != constraint.to.map) {
+      recognised.insert({constraint.from, constraint.to});
+    }
+  }
+  const std::vector<MapId> newest_first(maps_.rbegin(), maps_.rend());
+  std::vector<MapViews> views;
+  for (const MapId& id : newest_first) {
+    MapViews map;
+    const MapId& group = solution.group_of.at(id);
+    map.group =
+        group_numbers.try_emplace(group, static_cast<int>(group_numbers.size())).first->second;
+    for (const Keyframe& keyframe : stored_.at(id).keyframes) {
+      map.views.push_back({solution.T_map_body.at(keyframe.id) * keyframe.camera.T_body_cam,
+                           Depth(keyframe), whole.contains(id) || must_stay.contains(keyframe.id),
+                           recognised.contains(keyframe.id)});
+    }
+    views.push_back(std::move(map));
+  }
+  const auto looks_alike = [&](const ViewRef& a, const ViewRef& b) {
+    return LookAlike(stored_.at(newest_first[a.map]).numbers[a.view],
+                     stored_.at(newest_first[b.map]).numbers[b.view]);
+  };
+  const std::vector<std::vector<bool>> kept =
+      ChooseViews(views, looks_alike, options_.thinning.coverage);
+  std::set<KeyframeId> gone;
+  for (size_t m = 0; m < kept.size(); ++m) {
+    for (size_t i = 0; i < kept[m].size(); ++i) {
+      if (!kept[m][i]) {
+        gone.insert(stored_.at(newest_first[m]).keyframes[i].id);
+      }
+    }
+  }
+  return gone;
+}
+
+bool Thinning::LookAlike(int a, int b) {
+  const auto view_a = a == kNotStored ? nullptr : recognised_.Find(a);
+  const auto view_b = b == kNotStored ? nullptr : recognised_.Find(b);
+  return view_a != nullptr && view_b != nullptr &&
+         CheckTwoViews(*view_a, *view_b, options_.place_recognition.matching,
+                       options_.place_recognition.epipolar)
+             .accepted();
+}
+
+}  // namespace pangea
