@@ -18,7 +18,7 @@ import type { FromCalibration, ToCalibration } from "./messages";
 
 const kLongest_us = 60_000_000; // of a recording that is calibrated on
 
-type Image = Luma & { utime: number; picture: VideoFrame | ImageBitmap };
+type Image = Luma & { utime: number; picture: ImageBitmap };
 
 export class CalibrationWalk {
   progress: CalibrationProgress = { share: 0, missing: "time" };

@@ -7,7 +7,7 @@ import type { Luma } from "./luma";
 
 export interface CameraImage extends Luma {
   utime: number; // us
-  picture: VideoFrame; // what to draw; whoever has the image closes it
+  picture: ImageBitmap; // what to draw; whoever has the image closes it
 }
 
 const kSettle_ms = 1500; // of focus and exposure, before they are locked
@@ -72,11 +72,11 @@ export class Camera {
     const clock = new ArrivalClock();
     const reader = new MediaStreamTrackProcessor({ track: this.track, maxBufferSize: 2 }).readable.getReader();
     while (!this.stopped) {
-      const { value: picture, done } = await reader.read();
+      const { value: frame, done } = await reader.read();
       if (done) return;
-      const utime = clock.map(picture.timestamp, utimeOf(performance.now()));
-      if (utime === undefined) picture.close();
-      else await this.give(utime, picture);
+      const utime = clock.map(frame.timestamp, utimeOf(performance.now()));
+      if (utime === undefined) frame.close();
+      else await this.give(utime, frame);
     }
   }
 
@@ -95,8 +95,10 @@ export class Camera {
     this.video.requestVideoFrameCallback(next);
   }
 
-  private async give(utime: number, picture: VideoFrame) {
-    const luma = await lumaOfFrame(picture);
+  // The frame goes back to the camera at once: it has a few only, and gives no more while they are kept.
+  private async give(utime: number, frame: VideoFrame) {
+    const [luma, picture] = await Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
+    frame.close();
     if (this.onImage) this.onImage({ utime, picture, ...luma });
     else picture.close();
   }

@@ -7,8 +7,6 @@ import { Fit } from "./fit";
 import { anchorsBefore, Overlay } from "./overlay";
 import type { DrawnAnchor } from "./overlay";
 
-type Picture = VideoFrame | ImageBitmap;
-
 const kMaxWaiting = 4; // pictures whose pose has not come
 
 export interface Drawn {
@@ -18,7 +16,7 @@ export interface Drawn {
 
 export class Stage {
   drawn?: Drawn;
-  private readonly waiting = new Map<number, Picture>();
+  private readonly waiting = new Map<number, ImageBitmap>();
   private readonly overlay: Overlay;
 
   constructor(
@@ -33,7 +31,7 @@ export class Stage {
   }
 
   // The agent has the image of `utime`.
-  keep(utime: number, picture: Picture) {
+  keep(utime: number, picture: ImageBitmap) {
     this.waiting.set(utime, picture);
     const [oldest] = this.waiting.keys();
     if (this.waiting.size > kMaxWaiting) this.forget(oldest);
@@ -55,10 +53,9 @@ export class Stage {
   private present(utime: number): boolean {
     const picture = this.waiting.get(utime);
     if (!picture) return false;
-    const size = picture instanceof VideoFrame ? { width: picture.displayWidth, height: picture.displayHeight } : picture;
-    const fit = new Fit(size, this.canvas);
+    const fit = new Fit(picture, this.canvas);
     const [left, top] = fit.toScreen([-0.5, -0.5]);
-    this.canvas.getContext("2d")!.drawImage(picture, left, top, fit.scale * size.width, fit.scale * size.height);
+    this.canvas.getContext("2d")!.drawImage(picture, left, top, fit.scale * picture.width, fit.scale * picture.height);
     for (const waiting of [...this.waiting.keys()]) if (waiting <= utime) this.forget(waiting);
     return true;
   }
