@@ -9,6 +9,21 @@
 #include "core/rigid3.h"
 
 namespace pangea::calibration {
+namespace {
+
+constexpr double kLongestStep_s = 0.25;  // from pair to pair: images may come at 8 Hz
+
+// Steps are longer than kPairStep_s where images do not come at multiples of it.
+double SecondsOf(std::span<const FramePair> pairs) {
+  double seconds = kPairStep_s;
+  for (size_t i = 1; i < pairs.size(); ++i) {
+    const double step_s = pairs[i].a_s - pairs[i - 1].a_s;
+    seconds += step_s < kLongestStep_s ? step_s : kPairStep_s;
+  }
+  return seconds;
+}
+
+}  // namespace
 
 double Coverage::RotationShare(int axis) const {
   return std::min(1.0, rotation_rms[axis] * std::sqrt(seconds / kGood_s) / kGoodRotation);
@@ -37,7 +52,7 @@ Coverage CoverageOf(std::span<const FramePair> pairs, std::span<const ImuSample>
     counts.push_back(pair.points.size());
   }
   const auto count = static_cast<double>(pairs.size());
-  coverage.seconds = kPairStep_s * count;
+  coverage.seconds = SecondsOf(pairs);
   coverage.points = static_cast<double>(Median(std::move(counts)));
   coverage.rotation_rms = (squared / count).cwiseSqrt();
   return coverage;

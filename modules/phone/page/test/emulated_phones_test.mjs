@@ -14,8 +14,6 @@ const recording = (n) => `${options.recordings}/phone_${n}`;
 async function started(server, name, n) {
   const browser = await server.browser([
     "--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream", `--use-file-for-fake-video-capture=${cameraFile(recording(n))}`,
-    // An emulated GPU takes more of the processor than the odometry; without one the page draws in two dimensions as it is.
-    "--disable-gpu", "--disable-accelerated-2d-canvas",
   ]);
   const page = await openPage(browser, server.invite(name), { viewport: { width: 960, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] });
   await page.evaluate(async (yaml) => {
