@@ -93,4 +93,4 @@ await run(async () => {
   const { map, fused } = await again.evaluate(() => pangea.walk.pose);
   check("Ben's new map is another one, and fused", fused && map !== oldMap);
   await browser.close();
-});
+}, /Failed to load resource: net::ERR_TIMED_OUT/);
