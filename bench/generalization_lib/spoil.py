@@ -212,9 +212,30 @@ def exposure_steps(recording):
             recording.painted[row[1]] = lambda pixels, table=table: pixels.translate(table)
 
 
+def browser_motion(recording):
+    """The motion as Chromium gives it: 60 Hz, rounded to 0.1 m/s^2 and 0.1 degrees/s; its noise as the phone's page says."""
+    step_rad, step_mps2 = math.radians(0.1), 0.1
+    due, chosen = 0, []
+    for row in recording.imu:
+        if (at := int(row[0]) - int(recording.imu[0][0])) >= due:
+            due += NS / 60 * (1 + (at - due) // (NS / 60))
+            steps = [step_rad] * 3 + [step_mps2] * 3
+            chosen.append([row[0], *(f"{round(float(value) / step) * step:.9f}" for value, step in zip(row[1:7], steps))])
+    recording.imu = chosen
+    page = (Path(__file__).resolve().parents[2] / "modules/phone/page/src/sensors/calibration.ts").read_text()
+    recording.imu_yaml = page.split("kPhoneImu = `")[1].split("`")[0]
+
+
+def browser_stamps(recording):
+    """Stamps of images off by 8 ms (standard deviation), as where a browser stamps them."""
+    rng = random.Random("browser stamps")
+    for row in recording.images:
+        row[0] = str(int(row[0]) + int(rng.gauss(0, 8_000_000)))
+
+
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
                                     jitter, accel_bias, phone_imu, noise_10_times, noise_a_tenth, third_of_imu, large_accel_bias,
-                                    accel_scale, lost_imu, doubled_imu, covered, pocket, exposure_steps)}
+                                    accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, pocket, exposure_steps)}
 
 
 def main():

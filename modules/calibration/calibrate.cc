@@ -11,7 +11,6 @@
 #include "calibration/priors.h"
 #include "calibration/search.h"
 #include "calibration/solver.h"
-#include "core/median.h"
 #include "core/rigid3.h"
 
 namespace pangea::calibration {
@@ -69,21 +68,6 @@ Tangent HalfDifference(const Input& input, std::span<const FramePair> pairs, int
   return 0.5 * first.Minus(second);
 }
 
-// Rotation of the camera, rad/s, rms about each of its axes, while points were seen.
-Eigen::Vector3d RotationRms(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
-                            int64_t origin_utime, const Parameters& parameters) {
-  const OrientationCurve curve(imu, origin_utime, parameters.gyro_bias);
-  Eigen::Vector3d squared = Eigen::Vector3d::Zero();
-  for (const FramePair& pair : pairs) {
-    const double a_s = pair.a_s + parameters.MiddleRowOffset_s();
-    const double b_s = pair.b_s + parameters.MiddleRowOffset_s();
-    const Eigen::Vector3d rotation =
-        LogSo3(curve.At(a_s).conjugate() * curve.At(b_s)) / (b_s - a_s);
-    squared += (parameters.camera.T_body_cam.q.conjugate() * rotation).cwiseAbs2();
-  }
-  return (squared / static_cast<double>(std::max<size_t>(1, pairs.size()))).cwiseSqrt();
-}
-
 // A gyroscope that reads too little makes lenses too long, by the same share.
 void AddFloors(const Input& input, Result& result) {
   const ImuNoise& noise = input.imu_noise;
@@ -114,8 +98,7 @@ std::string Refusal(const Result& result) {
   if (result.sigma_px > kMaxSigma_px) {
     return fmt::format(
         "points are {:.1f} px off what the gyroscope says (at most {} are plausible): stamps, "
-        "units "
-        "or axes of the IMU are wrong, or much in the image moves by itself",
+        "units or axes of the IMU are wrong, or much in the image moves by itself",
         result.sigma_px, kMaxSigma_px);
   }
   if (result.next_cost > 0 && result.next_cost < kMinCostRatio) {
@@ -180,7 +163,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
     const Solution solution = roughly.Solve(hypothesis.parameters, first);
     hypothesis = {solution.parameters, solution.cost};
   }
-  std::ranges::stable_sort(found, {}, &Hypothesis::cost);
+  SortByCost(&found);
   found.resize(std::min(found.size(), kMaxRefined));
   std::vector<FramePair> some;
   for (size_t i = 0; i < pairs.size(); i += kChooseOnEvery) {
@@ -191,7 +174,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
     const Solution solution = Refined(solver, hypothesis, PriorOf(input, hypothesis.parameters));
     hypothesis = {solution.parameters, solution.cost};
   }
-  std::ranges::stable_sort(found, {}, &Hypothesis::cost);
+  SortByCost(&found);
   Choice choice{found.front(), 0};
   for (const Hypothesis& other : found) {
     const double apart = other.parameters.camera.T_body_cam.q.angularDistance(
@@ -233,7 +216,20 @@ Solution SolveAll(const Input& input, std::span<const FramePair> pairs, int64_t 
   return best;
 }
 
+Coverage RoughCoverage(const Input& input, std::span<const FramePair> pairs) {
+  Parameters roughly;
+  roughly.camera.T_body_cam.q = input.q_body_cam.value_or(Eigen::Quaterniond::Identity());
+  return CoverageOf(pairs, input.imu, input.frames.front().utime, roughly);
+}
+
 }  // namespace
+
+Coverage RoughCoverage(const Input& input) {
+  if (input.frames.empty() || input.imu.size() < 2) {
+    return {};
+  }
+  return RoughCoverage(input, Pairs(input, kMaxGap_s, input.frames.front().utime));
+}
 
 Result Calibrate(const Input& input) {
   Result result;
@@ -246,24 +242,18 @@ Result Calibrate(const Input& input) {
       static_cast<double>(input.frames.size()) /
       std::max(1e-3, 1e-6 * static_cast<double>(input.frames.back().utime - origin));
   const std::vector<FramePair> pairs = Pairs(input, kMaxGap_s, origin);
-  result.seconds = kPairStep_s * static_cast<double>(pairs.size());
-  if (result.seconds < kMinSeconds) {
+  result.coverage = RoughCoverage(input, pairs);
+  if (result.coverage.seconds < kMinSeconds) {
     result.refused = fmt::format(
         "points could be followed for {:.0f} s, at least {:.0f} are needed: record longer, with "
-        "more "
-        "light or more to see",
-        result.seconds, kMinSeconds);
+        "more light or more to see",
+        result.coverage.seconds, kMinSeconds);
     return result;
   }
-  std::vector<size_t> counts;
-  for (const FramePair& pair : pairs) {
-    counts.push_back(pair.points.size());
-  }
-  result.points = static_cast<double>(Median(counts));
   const Choice choice = ChooseRotation(input, pairs, origin);
   result.next_cost = choice.next_cost;
   Fill(SolveAll(input, pairs, origin, choice.best.parameters), result);
-  result.rotation_rms = RotationRms(pairs, input.imu, origin, result.parameters);
+  result.coverage = CoverageOf(pairs, input.imu, origin, result.parameters);
   AddFloors(input, result);
   result.refused = Refusal(result);
   return result;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/coverage.h"
 #include "calibration/parameters.h"
 #include "core/imu/imu.h"
 #include "vio/front_end/tracks.h"
@@ -36,13 +37,14 @@ struct Result {
   double sigma_px = 0;
   double inlier_share = 0;
   double image_rate_hz = 0;
-  double seconds = 0;    // of pairs
-  double points = 0;     // of a pair, median
+  Coverage coverage;
   double next_cost = 0;  // of the next best rotation, over the best one's; 0: there was none
-  Eigen::Vector3d rotation_rms = Eigen::Vector3d::Zero();  // rad/s about the camera's axes
-  std::string refused;                                     // why; empty: it holds
+  std::string refused;   // why; empty: it holds
 };
 
 Result Calibrate(const Input& input);
+
+// What Calibrate would find to work on. Without `q_body_cam` the rotation is about the body's axes.
+Coverage RoughCoverage(const Input& input);
 
 }  // namespace pangea::calibration

@@ -17,8 +17,4 @@ void MakeFolder(const std::string& recording, const std::string& out);
 // Writes both sensor.yaml files anew.
 void WriteSensorYaml(const std::string& out, const Result& result, const ImuNoise& noise);
 
-// Their text. Standard deviations stand beside the values.
-std::string CameraYaml(const Result& result, double rate_hz);
-std::string ImuYaml(const Result& result, const ImuNoise& noise);
-
 }  // namespace pangea::calibration

@@ -66,8 +66,7 @@ int Run(const Arguments& a) {
   for (const std::string& warning : recording.warnings()) {
     std::cerr << fmt::format("pangea-calibrate: {}\n", warning);
   }
-  Input input = TracksOf(recording, a.part);
-  input.q_body_cam = q_body_cam;
+  Input input = TracksOf(recording, a.part, q_body_cam);
   if (a.field_of_view_deg > 0) {
     input.field_of_view = kDegree * a.field_of_view_deg;
   }

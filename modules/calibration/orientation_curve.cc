@@ -21,7 +21,7 @@ OrientationCurve::OrientationCurve(std::span<const ImuSample> imu, int64_t origi
 }
 
 size_t OrientationCurve::IntervalOf(double t_s) const {
-  const auto after = std::ranges::upper_bound(times_, t_s);
+  const auto after = std::upper_bound(times_.begin(), times_.end(), t_s);
   return after == times_.begin() ? 0 : static_cast<size_t>(after - times_.begin()) - 1;
 }
 

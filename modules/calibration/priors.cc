@@ -12,6 +12,7 @@ constexpr double kSigmaLogFocal = 0.3;
 constexpr double kSigmaGivenLogFocal = 0.1;  // with a field of view
 constexpr double kSigmaDistortionEquidistant = 0.03;
 constexpr double kReadout_s = 0.015;
+constexpr double kGuessedField = 1.13;  // rad
 
 }  // namespace
 
@@ -23,6 +24,15 @@ CameraModel NominalCamera(const Input& input, CameraModel::Kind lens) {
   camera.cx = 0.5 * (input.width - 1);
   camera.cy = 0.5 * (input.height - 1);
   camera.readout_s = kReadout_s;
+  return camera;
+}
+
+CameraModel GuessedCamera(int width, int height) {
+  Input input;
+  input.width = width;
+  input.height = height;
+  CameraModel camera = NominalCamera(input, CameraModel::Kind::kRadtan);
+  camera.fx = camera.fy = FocalOf(kGuessedField, camera);
   return camera;
 }
 

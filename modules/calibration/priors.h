@@ -14,6 +14,9 @@ constexpr double kSigmaReadout_s = 0.012;
 // Without a focal length.
 CameraModel NominalCamera(const Input& input, CameraModel::Kind lens);
 
+// To begin with, where nothing is known but the image's size, in pixels.
+CameraModel GuessedCamera(int width, int height);
+
 Prior PriorOf(const Input& input, const Parameters& mean);
 
 }  // namespace pangea::calibration

@@ -6,6 +6,7 @@
 
 #include "calibration/calibration_folder.h"
 #include "calibration/recording_tracks.h"
+#include "calibration/sensor_yaml.h"
 #include "calibration/summary.h"
 #include "core/rigid3.h"
 #include "files/text_file.h"
@@ -63,9 +64,9 @@ Result Some() {
   result.parameters.gyro_bias = {0.01, 0.02, 0.03};
   result.sigma.setConstant(1e-3);
   result.sigma_px = 0.5;
-  result.seconds = 30;
-  result.points = 60;
-  result.rotation_rms.setConstant(0.5);
+  result.coverage.seconds = 30;
+  result.coverage.points = 60;
+  result.coverage.rotation_rms.setConstant(0.5);
   return result;
 }
 
@@ -91,7 +92,7 @@ TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
   EXPECT_TRUE(fs::is_symlink(folder_ / "out/mav0/cam0/data"));
   EXPECT_FALSE(fs::exists(folder_ / "in/mav0/cam0/sensor.yaml"));
   EXPECT_THROW(MakeFolder(Path("in"), Path("out")), std::runtime_error);
-  const Input input = TracksOf(recording, {});
+  const Input input = TracksOf(recording, {}, std::nullopt);
   EXPECT_EQ(input.frames.size(), 3U);
   EXPECT_THAT(Calibrate(input).refused, HasSubstr("record longer"));
 }
@@ -114,8 +115,8 @@ TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {
 TEST(Summary, SaysWhatToDoBetter) {
   Result result = Some();
   EXPECT_THAT(Summary({}, result), Not(HasSubstr("better:")));
-  result.rotation_rms = {0.5, 0.05, 0.5};
-  result.points = 20;
+  result.coverage.rotation_rms = {0.5, 0.05, 0.5};
+  result.coverage.points = 20;
   result.refused = "the focal length is known to 9 % only";
   const std::string text = Summary({}, result);
   EXPECT_THAT(text, HasSubstr("better: rotate more left and right"));

@@ -4,30 +4,17 @@
 
 #include <iostream>
 
+#include "calibration/collector.h"
 #include "files/progress.h"
-#include "vio/front_end/tracker.h"
 
 namespace pangea::calibration {
-namespace {
-
-// As wide as a guessed lens and an unknown rotation ask for; outliers that stay are dealt with by
-// the robust loss.
-vio::TrackerOptions Forgiving() {
-  vio::TrackerOptions options;
-  options.two_view.inlier_px = 4;
-  options.two_view.rotation_sigma = 0.2;
-  return options;
-}
-
-}  // namespace
-
-Input TracksOf(const EurocRecording& recording, const PartOfRecording& part) {
-  Input input;
-  input.width = recording.camera().width;
-  input.height = recording.camera().height;
-  input.imu = recording.imu();
-  input.imu_noise = recording.imu_noise();
-  vio::Tracker tracker(recording.camera(), Forgiving());
+Input TracksOf(const EurocRecording& recording, const PartOfRecording& part,
+               std::optional<Eigen::Quaterniond> q_body_cam) {
+  Collector collector(recording.camera().width, recording.camera().height, recording.imu_noise(),
+                      q_body_cam);
+  for (const ImuSample& sample : recording.imu()) {
+    collector.AddImu(sample);
+  }
   Progress progress("pangea-calibrate");
   const std::vector<EurocImage>& images = recording.images();
   for (size_t i = 0; i < images.size(); ++i) {
@@ -41,10 +28,10 @@ Input TracksOf(const EurocRecording& recording, const PartOfRecording& part) {
       std::cerr << fmt::format("pangea-calibrate: {}\n", why);
       continue;
     }
-    input.frames.push_back(tracker.Track(images[i].utime, image, Eigen::Quaterniond::Identity()));
+    collector.AddImage(images[i].utime, image);
     progress.Update(static_cast<int64_t>(i), static_cast<int64_t>(images.size()), "images");
   }
-  return input;
+  return collector.input();
 }
 
 }  // namespace pangea::calibration

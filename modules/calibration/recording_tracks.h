@@ -2,6 +2,8 @@
 
 // What is calibrated on, from a recording: its images' tracks and its inertial samples.
 
+#include <optional>
+
 #include "calibration/calibrate.h"
 #include "recording/euroc.h"
 
@@ -11,7 +13,8 @@ struct PartOfRecording {
   double start_s = 0, duration_s = 60;
 };
 
-// The tracker knows the image's size and a field of view only, and no rotation.
-Input TracksOf(const EurocRecording& recording, const PartOfRecording& part);
+// `q_body_cam` as of Input.
+Input TracksOf(const EurocRecording& recording, const PartOfRecording& part,
+               std::optional<Eigen::Quaterniond> q_body_cam);
 
 }  // namespace pangea::calibration

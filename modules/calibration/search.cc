@@ -22,9 +22,15 @@ double Motion(const FramePair& pair) {
 
 }  // namespace
 
+void SortByCost(std::vector<Hypothesis>* hypotheses) {
+  std::stable_sort(hypotheses->begin(), hypotheses->end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
+}
+
 std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs) {
   std::vector<FramePair> most(pairs.begin(), pairs.end());
-  std::ranges::stable_sort(most, std::ranges::greater{}, Motion);
+  std::stable_sort(most.begin(), most.end(),
+                   [](const FramePair& a, const FramePair& b) { return Motion(a) > Motion(b); });
   most.resize(std::min(most.size(), kMaxPairs));
   for (FramePair& pair : most) {
     Thin(kMaxPoints, &pair);
@@ -77,7 +83,7 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
       hypotheses.push_back(best);
     }
   }
-  std::ranges::stable_sort(hypotheses, {}, &Hypothesis::cost);
+  SortByCost(&hypotheses);
   return hypotheses;
 }
 

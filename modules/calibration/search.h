@@ -32,6 +32,9 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
                                std::span<const Eigen::Quaterniond> rotations,
                                std::span<const double> fields_of_view);
 
+// The best first.
+void SortByCost(std::vector<Hypothesis>* hypotheses);
+
 // The pairs with most motion, each thinned.
 std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs);
 

@@ -187,8 +187,8 @@ Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& 
   }
   Linearised at;
   at.sigma_px = std::max(kLeastSigma_px, kMadToSigma * Median(absolute));
-  const auto inliers =
-      std::ranges::count_if(absolute, [&at](double r) { return r < kInlierSigmas * at.sigma_px; });
+  const auto inliers = std::count_if(absolute.begin(), absolute.end(),
+                                     [&at](double r) { return r < kInlierSigmas * at.sigma_px; });
   at.inlier_share = static_cast<double>(inliers) / static_cast<double>(absolute.size());
   const std::vector<Eigen::MatrixXd> jacobians = Jacobians(parameters, prior, rays, terms);
   for (size_t p = 0; p < terms.size(); ++p) {

@@ -12,8 +12,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-constexpr double kLittleRotation = 0.1;  // rad/s, rms
-constexpr double kShort_s = 20, kFewPoints = 40, kRough_px = 1.0;
+constexpr double kRough_px = 1.0;
 constexpr double kTold = 0.7;  // of the prior's sigma: above, the data did not tell
 constexpr char kAxisNames[] = {'x', 'y', 'z'};
 constexpr const char* kAxes[] = {"up and down (the camera's x axis)",
@@ -63,18 +62,19 @@ std::string Values(const Input& input, const Result& result) {
 std::vector<std::string> Advice(const Result& result) {
   std::vector<std::string> advice;
   for (int axis = 0; axis < 3; ++axis) {
-    if (result.sigma_px > 0 && result.rotation_rms[axis] < kLittleRotation) {
-      advice.push_back(
-          fmt::format("rotate more {}: {:.2f} rad/s", kAxes[axis], result.rotation_rms[axis]));
+    if (result.sigma_px > 0 && result.coverage.rotation_rms[axis] < kGoodRotation) {
+      advice.push_back(fmt::format("rotate more {}: {:.2f} rad/s", kAxes[axis],
+                                   result.coverage.rotation_rms[axis]));
     }
   }
-  if (result.seconds < kShort_s) {
-    advice.push_back(
-        fmt::format("record longer: {:.0f} s of it could be used, 30 are good", result.seconds));
+  if (result.coverage.seconds < kGood_s) {
+    advice.push_back(fmt::format("record longer: {:.0f} s of it could be used, 30 are good",
+                                 result.coverage.seconds));
   }
-  if (result.points > 0 && result.points < kFewPoints) {
-    advice.push_back(fmt::format(
-        "more light, or more to see: {:.0f} points could be followed, 50 are good", result.points));
+  if (result.coverage.points > 0 && result.coverage.points < kGoodPoints) {
+    advice.push_back(
+        fmt::format("more light, or more to see: {:.0f} points could be followed, 50 are good",
+                    result.coverage.points));
   }
   if (result.sigma_px > kRough_px) {
     advice.push_back(fmt::format(
@@ -97,7 +97,8 @@ std::string Summary(const Input& input, const Result& result) {
     text += fmt::format(
         "{:.0f} s, {:.0f} points in a pair of images, {:.2f} px off, {:.0f} % within three "
         "standard deviations\n",
-        result.seconds, result.points, result.sigma_px, 100 * result.inlier_share);
+        result.coverage.seconds, result.coverage.points, result.sigma_px,
+        100 * result.inlier_share);
     if (result.next_cost > 0) {
       text += fmt::format("the next best rotation of the camera fits {:.1f} times worse\n",
                           result.next_cost);

@@ -1,4 +1,5 @@
-// PhoneAgent for JavaScript. Its other side, with the types, is page/src/agent/phone_agent.ts.
+// PhoneAgent and CameraCalibration for JavaScript. Their other side, with the types, is
+// page/src/agent/.
 
 #include <emscripten/bind.h>
 #include <emscripten/heap.h>
@@ -10,6 +11,7 @@
 #include <string>
 
 #include "pangea/pose_t.hpp"
+#include "phone/agent/camera_calibration.h"
 #include "phone/agent/phone_agent.h"
 
 namespace pangea::phone {
@@ -207,6 +209,61 @@ val CreateAgent(const val& config) {
   return result;
 }
 
+class Calibration {
+ public:
+  explicit Calibration(const val& config)
+      : width_(config["width"].as<int>()),
+        height_(config["height"].as<int>()),
+        image_(static_cast<size_t>(width_) * static_cast<size_t>(height_)),
+        calibration_(width_, height_, Text(config, "imuYaml"), RotationOf(config)) {}
+
+  val ImageBuffer() { return val(emscripten::typed_memory_view(image_.size(), image_.data())); }
+  void AddImu(double utime, double gx, double gy, double gz, double ax, double ay, double az) {
+    calibration_.AddImu({static_cast<int64_t>(utime), {gx, gy, gz}, {ax, ay, az}});
+  }
+  void AddImage(double utime) {
+    calibration_.AddImage(static_cast<int64_t>(utime),
+                          cv::Mat(height_, width_, CV_8U, image_.data()));
+  }
+  val Progress() const {
+    const CalibrationProgress progress = calibration_.progress();
+    val object = val::object();
+    object.set("share", progress.share);
+    object.set("missing", progress.missing);
+    return object;
+  }
+  val Solve() const {
+    const CameraCalibration::Outcome outcome = calibration_.Solve();
+    val object = val::object();
+    object.set("cameraYaml", outcome.camera_yaml);
+    object.set("refused", outcome.refused);
+    return object;
+  }
+
+ private:
+  static std::optional<Eigen::Quaterniond> RotationOf(const val& config) {
+    if (!config["q_body_cam"].isArray()) {
+      return std::nullopt;
+    }
+    const std::vector<double> q = Numbers(config, "q_body_cam", 4);
+    return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized();
+  }
+
+  int width_, height_;
+  std::vector<uint8_t> image_;
+  CameraCalibration calibration_;
+};
+
+val CreateCalibration(const val& config) {
+  val result = val::object();
+  try {
+    result.set("calibration", val(std::make_shared<Calibration>(config)));
+  } catch (const std::exception& error) {
+    result.set("error", std::string(error.what()));
+  }
+  return result;
+}
+
 EMSCRIPTEN_BINDINGS(pangea_phone_agent) {
   emscripten::class_<Agent>("Agent")
       .smart_ptr<std::shared_ptr<Agent>>("AgentPointer")
@@ -221,7 +278,15 @@ EMSCRIPTEN_BINDINGS(pangea_phone_agent) {
       .function("startAnew", &Agent::StartAnew)
       .function("flush", &Agent::Flush)
       .function("take", &Agent::Take);
+  emscripten::class_<Calibration>("Calibration")
+      .smart_ptr<std::shared_ptr<Calibration>>("CalibrationPointer")
+      .function("imageBuffer", &Calibration::ImageBuffer)
+      .function("addImu", &Calibration::AddImu)
+      .function("addImage", &Calibration::AddImage)
+      .function("progress", &Calibration::Progress)
+      .function("solve", &Calibration::Solve);
   emscripten::function("createAgent", &CreateAgent);
+  emscripten::function("createCalibration", &CreateCalibration);
   emscripten::function("heapBytes", &emscripten_get_heap_size);
 }
 

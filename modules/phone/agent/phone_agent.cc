@@ -55,8 +55,9 @@ void PhoneAgent::Listen() {
   node_.Subscribe<pose_t>(channels::Pose(agent_id_),
                           [this](const std::string&, const pose_t& message) { OnPose(message); });
   node_.Listen<correction_t>(channels::Correction(agent_id_), [this](const Correction& correction) {
-    if (!correction_ || correction_->map != correction.map ||
-        correction_->revision < correction.revision) {
+    // Maps of earlier runs are corrected too.
+    if (!correction_ || correction_->map < correction.map ||
+        (correction_->map == correction.map && correction_->revision < correction.revision)) {
       correction_ = correction;
     }
   });

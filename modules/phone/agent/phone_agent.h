@@ -109,8 +109,8 @@ class PhoneAgent {
   vio::SensorInput sensors_;
   std::optional<UplinkProcess> uplink_;  // none without a key
   DrawnAnchors anchors_;
-  std::optional<Correction> correction_;
-  std::optional<MapId> tracked_map_;  // while it tracks
+  std::optional<Correction> correction_;  // the newest one of the newest map
+  std::optional<MapId> tracked_map_;      // while it tracks
   std::set<KeyframeId> spooled_;
   int64_t now_us_ = 0;
   int64_t next_tick_us_ = 0;

@@ -84,6 +84,7 @@ class PhoneAgentTest : public testing::Test {
       anchors_ = events.anchors ? events.anchors : anchors_;
       uplink_status_ = events.uplink_status ? events.uplink_status : uplink_status_;
       vio_status_ = events.vio_status ? events.vio_status : vio_status_;
+      pose_ = events.pose ? events.pose : pose_;
       link_bus_.Drain();
       handler_->Poll(now_us_);
       handler_->Tick(now_us_);
@@ -102,6 +103,7 @@ class PhoneAgentTest : public testing::Test {
   std::vector<SpoolChange> spool_;
   std::optional<std::vector<DrawnAnchor>> anchors_;
   std::optional<status_t> uplink_status_, vio_status_;
+  std::optional<PhonePose> pose_;
   size_t keyframes_ = 0;
 };
 
@@ -167,6 +169,41 @@ TEST_F(PhoneAgentTest, AnchorsOfTheServerAreDrawnAndRemoved) {
   agent_.RemoveAnchor({3, 1001});  // there is none
   Run(3);
   EXPECT_EQ(CounterOf(*uplink_status_, "anchor_edits"), 1);
+}
+
+TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
+  const MapId map{7, kStart_us};
+  const auto pose_at = [this](int64_t utime) {
+    agent_.AddImage(utime, cv::Mat(48, 64, CV_8U, cv::Scalar(0)));
+    for (int64_t t = utime - 50'000; t <= utime + 50'000; t += 10'000) {
+      agent_.AddImu({.utime = t, .accel = {0, 0, kGravity}});
+    }
+    Run(0.1);
+    return pose_;
+  };
+  for (const MapId& known : {kOldMap, map}) {
+    agent_.Restore(ToString(known), EncodeTestKeyframe({known, 0}));
+  }
+  Run(2);
+  pose_at(1'000'000);  // opens the map
+  const Eigen::Matrix<double, 6, 6> covariance = 1e-4 * Eigen::Matrix<double, 6, 6>::Identity();
+  for (const auto& [corrected, revision] : {std::pair(map, 3), std::pair(kOldMap, 9)}) {
+    Correction correction;
+    correction.map = corrected;
+    correction.group = kOldMap;
+    correction.revision = revision;
+    correction.covariance = covariance;
+    Run(1);
+    PublishMessage(server_bus_, "CORRECTION_7", ToMessage(correction));
+  }
+  // The server tells both, again and again.
+  for (int64_t utime = 1'100'000; utime < 3'000'000; utime += 50'000) {
+    const std::optional<PhonePose> pose = pose_at(utime);
+    ASSERT_TRUE(pose && pose->utime == utime) << utime;
+    EXPECT_EQ(pose->map, map);
+    ASSERT_TRUE(pose->in_group) << utime;
+    EXPECT_EQ(pose->in_group->group, kOldMap);
+  }
 }
 
 TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCounted) {

@@ -34,6 +34,30 @@ def ate_m(programs, tum, recording):
     return metrics["ate_m"]["rmse"]
 
 
+def numbers(yaml, key):
+    return [float(number) for number in re.findall(r"[-+.\de]+", re.search(rf"^ *{key}:([^#\n]*)", yaml, re.M)[1])]
+
+
+def calibrates_as_native(programs, agent, recording, work):
+    """Without sensor.yaml of the camera: the same result as pangea-calibrate's, and as near to the truth as it says."""
+    truth = (recording / "mav0/cam0/sensor.yaml").read_text()
+    unknown = work / "unknown"
+    shutil.copytree(recording, unknown)
+    (unknown / "mav0/cam0/sensor.yaml").unlink()
+    run(programs / "pangea-calibrate", unknown, "--out", work / "calibrated")
+    run("node", agent, "--agent", "1", "--recording", unknown, "--rate", "max", "--out-camera", work / "camera.yaml")
+    native = (work / "calibrated/mav0/cam0/sensor.yaml").read_text()
+    wasm = (work / "camera.yaml").read_text()
+    print(wasm)
+    for key, sigma in (("intrinsics", "intrinsics_sigma"), ("distortion_coefficients", "distortion_sigma"),
+                       ("time_offset_s", "time_offset_sigma"), ("readout_s", "readout_sigma")):
+        for there, here, sigma_of_it in zip(numbers(native, key), numbers(wasm, key), numbers(native, sigma)):
+            assert abs(here - there) < 0.3 * sigma_of_it, f"{key}: {here}, and pangea-calibrate says {there}"
+    for key, sigma in (("intrinsics", "intrinsics_sigma"), ("readout_s", "readout_sigma")):
+        for exact, here, sigma_of_it in zip(numbers(truth, key), numbers(wasm, key), numbers(wasm, sigma)):
+            assert abs(here - exact) < 3 * sigma_of_it, f"{key}: {here} +- {sigma_of_it}, and the truth is {exact}"
+
+
 def refuses(agent, words, message):
     said = run("node", agent, *words, expect=1)
     assert message in said, said
@@ -62,6 +86,8 @@ def main(programs, wasm, work):
     heap_mb = float(re.search(r"heap ([\d.]+) MB", said)[1])
     assert heap_mb < MAX_HEAP_MB, heap_mb
     assert (wasm / "pangea_agent.wasm").stat().st_size < MAX_WASM_BYTES
+
+    calibrates_as_native(programs, agent, recording, work)
 
     refuses(agent, ["--agent", "1"], "--recording DIR is missing")
     refuses(agent, ["--recording", recording], "--agent ID is missing")

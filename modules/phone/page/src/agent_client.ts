@@ -1,7 +1,7 @@
 // The page's side of the worker: sensors go in, what the agent says comes out.
 
 import type { CameraImage } from "./sensors/camera";
-import { kImuStride } from "./messages";
+import { packImu } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
 import type { ImuSample } from "./recording/euroc";
 
@@ -21,8 +21,7 @@ export class AgentClient {
   }
 
   addImu(samples: ImuSample[]) {
-    const values = new Float64Array(kImuStride * samples.length);
-    samples.forEach(({ utime, gyro, accel }, i) => values.set([utime, ...gyro, ...accel], kImuStride * i));
+    const values = packImu(samples);
     this.say({ kind: "imu", samples: values }, [values.buffer]);
   }
 

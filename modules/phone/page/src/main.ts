@@ -5,14 +5,19 @@ import { byId } from "./dom";
 import { codeIn, forgetMembership, join, storedMembership } from "./link/join";
 import type { Membership } from "./messages";
 import { People } from "./people";
-import { openRecording } from "./recording/euroc";
+import { CalibrationWalk } from "./calibration/calibration_walk";
+import { isCalibrated, openRecording, withCamera } from "./recording/euroc";
+import type { CalibratedRecording, Recording } from "./recording/euroc";
 import { filesOf, filesOfDrop, filesOfZip } from "./recording/files";
 import type { Files } from "./recording/files";
 import { download } from "./recording/recorder";
-import { roughCalibration, storeCalibration, storedCalibration } from "./sensors/calibration";
+import { forgetCalibrations, roughCalibration, storeCalibration, storedCalibration, storedCalibrations } from "./sensors/calibration";
 import type { CameraKind } from "./sensors/calibration";
+import { Camera } from "./sensors/camera";
 import { askForMotion } from "./sensors/motion";
-import { hintOf } from "./ui/hints";
+import { calibrationHint, hintOf } from "./ui/hints";
+import type { Hint } from "./ui/hints";
+import { showRing } from "./ui/ring";
 import { SmallMap } from "./ui/small_map";
 import { parseCamera } from "./view/camera_model";
 import { Stage } from "./view/stage";
@@ -48,29 +53,69 @@ async function ensureMembership() {
 }
 
 async function startLive() {
+  endCalibration(undefined);
   await askForMotion(); // first: iOS asks within the tap only
   await ensureMembership();
   await walk?.close();
-  walk = await Walk.live(membership, calibrationOf, stage, events);
+  walk = undefined;
   isLive = true;
-  enter();
+  const sensor = await Camera.open();
+  camera = sensor.kind;
   await navigator.wakeLock?.request("screen").catch(() => {});
+  const cameraYaml = storedCalibration(camera) ?? (await calibrateLive(sensor, camera));
+  if (!cameraYaml) return;
+  walk = Walk.live(sensor, cameraYaml, membership, stage, events);
+  enter();
 }
 
 async function startRecorded(files: Files) {
   const recording = await openRecording(files);
+  endCalibration(undefined);
   await ensureMembership();
   await walk?.close();
+  walk = undefined;
   isLive = false;
-  walk = Walk.play(recording, options.get("rate") !== "max", membership, stage, events, (share) => (played = share));
+  const calibrated = isCalibrated(recording) ? recording : await calibrateRecording(recording);
+  if (!calibrated) return;
+  walk = Walk.play(calibrated, options.get("rate") !== "max", membership, stage, events, (share) => (played = share));
   enter();
 }
 
 let camera: CameraKind | undefined;
 
-function calibrationOf(track: MediaStreamTrack, width: number, height: number): string {
-  camera = { label: track.label, width, height, angle_deg: screen.orientation?.angle ?? 0 };
-  return storedCalibration(camera) ?? roughCalibration(camera);
+// --- calibrating an unknown camera
+
+let calibration: CalibrationWalk | undefined;
+let endCalibration = (_cameraYaml: string | undefined) => {};
+
+// Nothing: it was ended without. `otherwise`: what the visitor may go on with at once.
+async function cameraYamlOf(run: CalibrationWalk, otherwise?: string): Promise<string | undefined> {
+  calibration = run;
+  enter();
+  byId("skip").hidden = otherwise === undefined;
+  byId("skip").onclick = () => endCalibration(otherwise);
+  const ended = new Promise<string | undefined>((done) => (endCalibration = done));
+  try {
+    return await Promise.race([run.done, ended]);
+  } finally {
+    run.stop();
+    calibration = undefined;
+    showRing(undefined);
+  }
+}
+
+async function calibrateLive(sensor: Camera, kind: CameraKind): Promise<string | undefined> {
+  const rough = roughCalibration(kind);
+  const run = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), stage);
+  const cameraYaml = await cameraYamlOf(run, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
+  if (!cameraYaml) sensor.stop();
+  else if (cameraYaml !== rough) storeCalibration(kind, cameraYaml);
+  return cameraYaml;
+}
+
+async function calibrateRecording(recording: Recording): Promise<CalibratedRecording | undefined> {
+  const cameraYaml = await cameraYamlOf(await CalibrationWalk.ofRecording(recording, stage));
+  return cameraYaml === undefined ? undefined : withCamera(recording, cameraYaml, "the calibration");
 }
 
 function attempt(what: Promise<void>) {
@@ -85,10 +130,11 @@ function enter() {
   imagesBefore = rate_hz = 0;
   byId("welcome").hidden = true;
   byId("hint").hidden = byId("bar").hidden = false;
-  byId("record").hidden = !isLive;
+  byId("record").hidden = !isLive || !walk;
 }
 
 function leave() {
+  endCalibration(undefined);
   walk?.stop();
   byId("welcome").hidden = false;
   byId("hint").hidden = byId("bar").hidden = true;
@@ -102,6 +148,7 @@ function showWelcome() {
   const known = membership && !code;
   byId("name_row").hidden = byId("code_row").hidden = known ?? false;
   byId("forget").hidden = !membership;
+  byId("recalibrate").hidden = storedCalibrations() === 0;
   byId("invitation").textContent = known
     ? `You are ${membership!.name || `agent ${membership!.agent}`}${membership!.site ? ` at ${membership!.site}` : ""}.`
     : code ? "You are invited." : "With an invite code you join others. Without one, the phone tracks by itself.";
@@ -126,11 +173,19 @@ function together(): string[] {
 let imagesBefore = 0;
 let rate_hz = 0; // of images, smoothed
 
+function showHint({ text, tone }: Hint) {
+  byId("hint").textContent = text;
+  byId("hint").className = tone;
+}
+
 function drawPanels() {
+  if (calibration) {
+    showHint(calibrationHint(calibration));
+    showRing(calibration.progress.share);
+    byId("numbers").textContent = `${Math.round(100 * calibration.progress.share)} % calibrated`;
+  }
   if (!walk || byId("bar").hidden) return;
-  const hint = hintOf({ ...walk, together: together() });
-  byId("hint").textContent = hint.text;
-  byId("hint").className = hint.tone;
+  showHint(hintOf({ ...walk, together: together() }));
   byId<HTMLMeterElement>("quality").value = walk.pose?.state === "tracking" ? walk.pose.numTracked : 0;
   rate_hz += 0.3 * (((walk.numImages - imagesBefore) * 1000) / kPanels_ms - rate_hz);
   imagesBefore = walk.numImages;
@@ -199,6 +254,10 @@ byId("forget").onclick = () => {
   membership = undefined;
   showWelcome();
 };
+byId("recalibrate").onclick = () => {
+  forgetCalibrations();
+  showWelcome();
+};
 byId("record").onclick = async () => {
   if (!walk) return;
   const { recorder } = walk;
@@ -256,4 +315,4 @@ screen.orientation?.addEventListener("change", () => {
 showWelcome();
 
 // For tests and the curious.
-Object.assign(window, { pangea: { get walk() { return walk; }, stage } });
+Object.assign(window, { pangea: { get walk() { return walk; }, get calibration() { return calibration; }, stage } });

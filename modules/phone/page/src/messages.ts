@@ -1,6 +1,7 @@
 // What the page and the worker that holds the agent say to each other. Times are microseconds.
 
 import type { AgentPose, AnchorEdit, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { ImuSample } from "./recording/euroc";
 
 // Who this phone is at the server; from joining.
 export interface Membership {
@@ -28,6 +29,12 @@ export type ToWorker =
   | { kind: "close" }; // ends the map; what the server does not have is stored for the next time
 
 export const kImuStride = 7;
+
+export function packImu(samples: ImuSample[]): Float64Array<ArrayBuffer> {
+  const values = new Float64Array(kImuStride * samples.length);
+  samples.forEach(({ utime, gyro, accel }, i) => values.set([utime, ...gyro, ...accel], kImuStride * i));
+  return values;
+}
 
 // refused: the gateway does not, or no longer, know the agent's key. replaced: the same agent runs in another page.
 export type LinkState = "connecting" | "open" | "refused" | "replaced";

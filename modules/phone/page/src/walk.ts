@@ -3,13 +3,12 @@
 import { AgentClient } from "./agent_client";
 import type { AgentPose, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
 import type { FromWorker, LinkState, Membership } from "./messages";
-import type { ImuSample, Recording } from "./recording/euroc";
+import type { CalibratedRecording, ImuSample } from "./recording/euroc";
 import { Player } from "./recording/player";
 import type { RecordedPicture } from "./recording/player";
 import { Recorder } from "./recording/recorder";
 import { kPhoneImu } from "./sensors/calibration";
-import { Camera } from "./sensors/camera";
-import type { CameraImage } from "./sensors/camera";
+import type { Camera, CameraImage } from "./sensors/camera";
 import { brightnessOf } from "./sensors/luma";
 import { Motion } from "./sensors/motion";
 import { NewestFrame } from "./sensors/newest_frame";
@@ -49,19 +48,11 @@ export class Walk {
     this.client = new AgentClient(open, (message) => this.take(message));
   }
 
-  // With the phone's own sensors. `calibrationOf`: a sensor.yaml for a camera that delivers such images.
-  static async live(
-    membership: Membership | undefined,
-    calibrationOf: (track: MediaStreamTrack, width: number, height: number) => string,
-    stage: Stage,
-    events: WalkEvents,
-  ): Promise<Walk> {
-    let walk: Walk | undefined;
-    const camera = await Camera.open((image) => (walk ? walk.onCamera(image) : image.picture.close()));
-    const { videoWidth, videoHeight } = camera.video;
-    const cameraYaml = calibrationOf(camera.track, videoWidth, videoHeight);
+  // With the phone's own sensors; it stops the camera when it stops.
+  static live(camera: Camera, cameraYaml: string, membership: Membership | undefined, stage: Stage, events: WalkEvents): Walk {
     const model = parseCamera(cameraYaml, "the stored calibration");
-    walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
+    const walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
+    camera.onImage = (image) => walk.onCamera(image);
     const motion = new Motion((sample) => walk.addImu(sample), () => (walk.motionSilent = true));
     walk.stopSensors = () => {
       camera.stop();
@@ -72,7 +63,7 @@ export class Walk {
 
   // A recording in place of sensors; `onImage` is told the share that is played.
   static play(
-    recording: Recording, realTime: boolean, membership: Membership | undefined, stage: Stage, events: WalkEvents,
+    recording: CalibratedRecording, realTime: boolean, membership: Membership | undefined, stage: Stage, events: WalkEvents,
     onImage: (share: number) => void,
   ): Walk {
     const yaml = { camera: recording.cameraYaml, imu: recording.imuYaml };

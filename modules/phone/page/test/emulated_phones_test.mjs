@@ -31,7 +31,7 @@ async function started(server, name, n) {
   return { browser, page, phone, playing };
 }
 
-// Images a second, and the rate of motion, as the agent had them.
+// Images a second, as the agent had them.
 async function rates(page) {
   const noted = await page.evaluate(() => noted.map(({ utime }) => utime));
   console.log(`       ${((noted.length - 1) / ((noted.at(-1) - noted[0]) / 1e6)).toFixed(1)} images a second`);
@@ -47,6 +47,8 @@ await run(async () => {
   check("page 1 places an anchor", await placeAt(anna.page, first, target, anna.phone.offset_us));
   await anna.playing;
   await rates(anna.page);
+  // Her camera would begin again from the start.
+  await anna.page.locator("#stop").click();
   const ben = await started(server, "Ben", 2);
   void photograph(ben.page, `${options.out}/phone_emulated_2.png`);
   await ben.playing;

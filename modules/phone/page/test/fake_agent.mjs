@@ -1,5 +1,5 @@
 // In place of pangea_agent.mjs, for the page's own test: an agent that walks along odom's x at the height of 1.5 m, a centimetre
-// an image, and is told of an anchor that somebody else has placed. What it was given is in its status.
+// an image, and is told of an anchor that somebody else has placed. What it was given is in its status. And a calibration that is none.
 
 const kAnchor = [0, 3, 1.5]; // straight ahead at the start
 const kMap = "1/1700000000000000";
@@ -57,4 +57,41 @@ class FakeAgent {
 
 const rangeOf = (bytes) => bytes && [Math.min(...bytes.slice(0, 50_000)), Math.max(...bytes.slice(0, 50_000))];
 
-export default async () => ({ createAgent: (config) => ({ agent: new FakeAgent(config) }), heapBytes: () => 0 });
+// Knows the camera after kEnough images, three seconds in which a test can look, or at a recording's end: its focal length is kFocal.
+const kEnough = 60;
+const kFocal = 567;
+
+class FakeCalibration {
+  constructor(config) {
+    this.config = config;
+    this.numImages = 0;
+  }
+  imageBuffer() {
+    return (this.image = new Uint8Array(this.config.width * this.config.height));
+  }
+  addImu(_utime, ...values) {
+    this.imu = values;
+  }
+  addImage() {
+    ++this.numImages;
+  }
+  progress() {
+    return { share: Math.min(1, this.numImages / kEnough), missing: this.numImages < kEnough ? "rotation about z" : "" };
+  }
+  solve() {
+    const { width, height, q_body_cam } = this.config;
+    if (!this.imu) return { cameraYaml: "", refused: "rotate more" };
+    return { refused: "", cameraYaml: `comment: fake, with the rotation ${q_body_cam ?? "unknown"}
+T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]}
+resolution: [${width}, ${height}]
+intrinsics: [${kFocal}, ${kFocal}, ${(width - 1) / 2}, ${(height - 1) / 2}]
+distortion_model: radial-tangential
+distortion_coefficients: [0, 0, 0, 0]
+` };
+  }
+}
+
+export default async () => ({ 
+  createAgent: (config) => ({ agent: new FakeAgent(config) }),
+  createCalibration: (config) => ({ calibration: new FakeCalibration(config) }),
+  heapBytes: () => 0 });

@@ -5,6 +5,7 @@ import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { unzipSync, zipSync } from "fflate";
 import { becomes, check, launch, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
@@ -49,6 +50,7 @@ async function testLive(browser, url) {
   check("nothing is wider than a phone", await page.evaluate(() => document.documentElement.scrollWidth <= 360));
   await senseMotion(page);
   await page.locator("#start").click();
+  await testCalibration(page);
 
   await becomes(page, "camera images reach the agent", () => pangea.walk?.vio?.counters.images > 20);
   await becomes(page, "motion reaches the agent", () => pangea.walk.vio.counters.imu > 20);
@@ -56,13 +58,51 @@ async function testLive(browser, url) {
   const expected = [0.5, 0, -0.25, 0, 9.8, 0.3];
   check("in rad/s and m/s^2", imu.every((value, i) => Math.abs(value - expected[i]) < 0.06), String(imu));
   check("the image has something in it", range[1] - range[0] > 100, String(range));
-  check("an unknown camera has a rough calibration", /intrinsics_sigma/.test(cameraYaml));
+  check("the calibration is used", /fake, with the rotation [-\d.,]+/.test(cameraYaml), cameraYaml.split("\n")[0]);
   await testAnchor(page);
   const zip = await testRecording(page);
   await page.locator("#stop").click();
   check("stopping leads back", await page.locator("#welcome").isVisible());
+  await testKeptCalibration(page);
   await page.close();
   return zip;
+}
+
+async function testCalibration(page) {
+  await becomes(page, "an unknown camera is calibrated first: the ring fills", () =>
+    document.getElementById("ring").checkVisibility() && document.getElementById("ring").getAttribute("aria-valuenow") > 0);
+  await becomes(page, "the hint says what to do", () => /steering wheel/.test(document.getElementById("hint").textContent));
+  await screenshot(page, "calibrating");
+  await becomes(page, "then the agent starts, without the ring", () => pangea.walk && !document.getElementById("ring").checkVisibility());
+}
+
+async function testKeptCalibration(page) {
+  await page.locator("#start").click();
+  await becomes(page, "the next start has the calibration", () => pangea.walk?.vio?.counters.images > 2);
+  const { cameraYaml } = await told(page);
+  check("of this camera", /^comment: fake/.test(cameraYaml));
+  await page.locator("#stop").click();
+  await page.locator("#recalibrate").click();
+  await page.locator("#start").click();
+  await becomes(page, "it can be made anew", () => Boolean(pangea.calibration));
+  await page.locator("#skip").click();
+  await becomes(page, "or be skipped", () => pangea.walk?.vio?.counters.images > 2);
+  check("for a rough one", /rough, of no particular phone/.test((await told(page)).cameraYaml));
+  await page.locator("#stop").click();
+}
+
+// The recording that was made, without its calibration.
+async function testUncalibrated(browser, url, zip) {
+  const page = await openPage(browser, `${url}#rate=max`);
+  const files = unzipSync(new Uint8Array(await readFile(zip)));
+  for (const name of Object.keys(files)) if (name.endsWith("sensor.yaml")) delete files[name];
+  const buffer = Buffer.from(zipSync(files));
+  await page.locator("#zip").setInputFiles({ name: "a.zip", mimeType: "application/zip", buffer });
+  await becomes(page, "a recording without calibration is calibrated, then played", () => pangea.walk?.vio?.counters.images > 2);
+  check("with a rotation that nobody knew", /fake, with the rotation unknown/.test((await told(page)).cameraYaml));
+  await becomes(page, "from its begin to its end", () =>
+    /100 %/.test(document.getElementById("numbers").textContent) && pangea.walk.numImages > 15);
+  await page.close();
 }
 
 async function testAnchor(page) {
@@ -90,7 +130,7 @@ async function testAnchor(page) {
 
 async function testRecording(page) {
   await page.locator("#record").click();
-  await becomes(page, "images are recorded", () => pangea.walk.recorder?.numImages > 10);
+  await becomes(page, "images are recorded", () => pangea.walk.recorder?.numImages > 20);
   const downloading = page.waitForEvent("download");
   await page.locator("#record").click();
   const zip = `${options.out}/phone_recorded.zip`;
@@ -124,6 +164,7 @@ await run(async () => {
   const browser = await launch(["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]);
   const zip = await testLive(browser, url);
   await testPlaying(browser, url, zip);
+  await testUncalibrated(browser, url, zip);
   await testRefusals(browser, url);
   await browser.close();
 });

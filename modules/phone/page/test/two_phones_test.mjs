@@ -1,6 +1,9 @@
 // Two pages that play rendered phones, by invite, over TLS, at a real server with its gateway, beside an agent that is a program:
-// they fuse; page 1 places an anchor on something of the scene; page 2 shows it where that is in its own images.
+// they fuse; page 1 places an anchor on something of the scene; page 2 shows it where that is in its own images. Page 2 has to
+// calibrate its camera first.
 
+import { cpSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
 import { Server } from "./server.mjs";
@@ -8,11 +11,19 @@ import { Truth } from "./truth.mjs";
 
 const recording = (n) => `${options.recordings}/phone_${n}`;
 
+// The same without calibration of its camera.
+function uncalibrated(folder) {
+  const copy = `${mkdtempSync(`${tmpdir()}/pangea_uncalibrated_`)}/walk`;
+  cpSync(folder, copy, { recursive: true });
+  rmSync(`${copy}/mav0/cam0/sensor.yaml`);
+  return copy;
+}
+
 async function joined(browser, server, name, folder) {
   const page = await openPage(browser, server.invite(name), { viewport: { width: 960, height: 720 } });
   await page.locator("#name").fill(name);
   await page.locator("#folder").setInputFiles(folder);
-  await page.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 60_000 });
+  await page.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 300_000 });
   check(`${name} has joined, and the link is open`, true);
   await noteDrawn(page);
   return page;
@@ -29,7 +40,8 @@ await run(async () => {
   server.startNative(3, recording(3));
   const anna = await joined(browser, server, "Anna", recording(1));
   const placing = placeAt(anna, first, target);
-  const ben = await joined(browser, server, "Ben", recording(2));
+  const ben = await joined(browser, server, "Ben", uncalibrated(recording(2)));
+  console.log(`       calibrated: ${await ben.evaluate(() => pangea.walk.camera.intrinsics.map((value) => value.toFixed(1)).join(" "))}`);
   void photograph(anna, `${options.out}/phone_anchor_1.png`);
   void photograph(ben, `${options.out}/phone_anchor_2.png`);
   check("page 1 places an anchor", await placing, `${target.distance.toFixed(1)} m away`);

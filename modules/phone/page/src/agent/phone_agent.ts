@@ -4,6 +4,9 @@
 //
 // Frames as everywhere: p_a = T_a_b * p_b; `body` is the IMU, `odom` has z up. Times are microseconds.
 
+import type { CalibrationConfig, CalibrationOutcome, CalibrationProgress } from '../calibration/camera_calibration';
+import { packRows } from '../sensors/luma';
+
 /** x, y, z in metres; qx, qy, qz, qw. */
 export type Pose7 = [number, number, number, number, number, number, number];
 export type Vector3 = [number, number, number];
@@ -98,7 +101,7 @@ export interface AnchorEdit {
   T_body_anchor?: Pose7;
 }
 
-// The class that binding.cc exports.
+// The classes that binding.cc exports.
 interface NativeAgent {
   imageBuffer(bytes: number): Uint8Array;
   addImu(utime: number, gx: number, gy: number, gz: number, ax: number, ay: number, az: number): void;
@@ -114,8 +117,17 @@ interface NativeAgent {
   delete(): void;
 }
 
+export interface NativeCalibration {
+  imageBuffer(): Uint8Array;
+  addImu(utime: number, gx: number, gy: number, gz: number, ax: number, ay: number, az: number): void;
+  addImage(utime: number): void;
+  progress(): CalibrationProgress;
+  solve(): CalibrationOutcome;
+}
+
 interface NativeModule {
   createAgent(config: AgentConfig): { agent?: NativeAgent; error?: string };
+  createCalibration(config: CalibrationConfig): { calibration?: NativeCalibration; error?: string };
   heapBytes(): number;
 }
 
@@ -149,9 +161,7 @@ export class PhoneAgent {
    */
   addImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number): AgentEvents {
     const buffer = this.native.imageBuffer(width * height);
-    for (let row = 0; row < height; ++row) {
-      buffer.set(luma.subarray(row * stride, row * stride + width), row * width);
-    }
+    packRows(luma, width, height, stride, buffer);
     this.native.addImage(utime, width, height);
     return this.native.take();
   }

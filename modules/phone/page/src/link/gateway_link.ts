@@ -5,6 +5,7 @@ import type { LinkState } from "../messages";
 
 const kFirstRetry_ms = 1000;
 const kLongestRetry_ms = 15_000;
+const kSilent_ms = 10_000; // the server answers every second: after this the network is gone, and a new socket sooner through than an old one
 const kMaxWaiting_bytes = 256_000; // in the socket: what is beyond is dropped, the link repeats it
 
 // Why the gateway closes for good, by its close codes: the key is unknown or revoked; another page of this agent came.
@@ -29,6 +30,7 @@ export class GatewayLink {
   private retry_ms = kFirstRetry_ms;
   private proven = false;
   private openedAt = -Infinity; // ms
+  private silence?: ReturnType<typeof setTimeout>;
 
   constructor(
     private readonly origin: string, // "wss://host:port"
@@ -53,9 +55,21 @@ export class GatewayLink {
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => this.take(socket, new Uint8Array(data));
     socket.onclose = ({ code }) => this.lost(code);
+    this.listen(socket);
+  }
+
+  // From now on it may be silent for so long; closing it in a network that is gone would take longer still.
+  private listen(socket: WebSocket) {
+    clearTimeout(this.silence);
+    this.silence = setTimeout(() => {
+      socket.onmessage = socket.onclose = null;
+      socket.close();
+      this.lost();
+    }, kSilent_ms);
   }
 
   private take(socket: WebSocket, message: Uint8Array) {
+    this.listen(socket);
     if (this.proven) return this.onPacket(message);
     this.proven = true;
     void proofOf(this.keyHex, this.agent, message).then((proof) => {
@@ -66,7 +80,8 @@ export class GatewayLink {
     });
   }
 
-  private lost(code: number) {
+  private lost(code = 0) {
+    clearTimeout(this.silence);
     const openFor_ms = performance.now() - this.openedAt;
     if (this.state === "open" && openFor_ms > kLongestRetry_ms) this.retry_ms = kFirstRetry_ms;
     this.state = kFinal.get(code) ?? "connecting";

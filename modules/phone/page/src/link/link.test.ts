@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { createHmac } from "node:crypto";
-import { test } from "node:test";
-import { proofOf } from "./gateway_link";
+import { mock, test } from "node:test";
+import { GatewayLink, proofOf } from "./gateway_link";
 import { codeIn, parseMembership } from "./join";
 
 test("the proof is what the gateway computes", async () => {
@@ -23,4 +23,50 @@ test("storage that somebody else wrote is no membership", () => {
   for (const bad of [null, "", "no json", "null", JSON.stringify({ ...good, agent: 0 }), JSON.stringify({ ...good, key: "ab" })]) {
     assert.equal(parseMembership(bad), undefined);
   }
+});
+
+// A socket whose other side is the test.
+class FakeSocket {
+  static readonly OPEN = 1;
+  static all: FakeSocket[] = [];
+  readyState = FakeSocket.OPEN;
+  bufferedAmount = 0;
+  sent: Uint8Array[] = [];
+  onmessage: ((event: { data: ArrayBuffer }) => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  constructor() {
+    FakeSocket.all.push(this);
+  }
+  send(packet: Uint8Array) {
+    this.sent.push(packet);
+  }
+  close() {}
+  says(length: number) {
+    this.onmessage?.({ data: new ArrayBuffer(length) });
+  }
+}
+
+test("a socket that says nothing for ten seconds is given up for a new one", async () => {
+  const realSocket = globalThis.WebSocket;
+  globalThis.WebSocket = FakeSocket as unknown as typeof WebSocket;
+  mock.timers.enable({ apis: ["setTimeout"] });
+  const packets: number[] = [];
+  const link = new GatewayLink("wss://server", 7, "ab".repeat(32), ({ length }) => packets.push(length));
+  const [socket] = FakeSocket.all;
+  socket.says(32);
+  while (link.state !== "open") await new Promise((done) => setImmediate(done));
+  mock.timers.tick(9_000);
+  socket.says(100);
+  mock.timers.tick(9_000);
+  assert.deepEqual([link.state, packets], ["open", [100]]);
+  mock.timers.tick(1_000);
+  assert.equal(link.state, "connecting");
+  socket.says(50); // late, and of no use any more
+  mock.timers.tick(1_000);
+  assert.deepEqual([FakeSocket.all.length, packets], [2, [100]]);
+  mock.timers.tick(10_000); // nobody answers that one either
+  mock.timers.tick(2_000);
+  assert.equal(FakeSocket.all.length, 3);
+  mock.timers.reset();
+  globalThis.WebSocket = realSocket;
 });

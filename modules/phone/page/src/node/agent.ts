@@ -4,20 +4,21 @@
 //                    ▲▼ sealed packets
 //                 gateway
 
-import { readdirSync, readFileSync, statSync } from "node:fs";
+import { readdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
 import { webcrypto } from "node:crypto";
-import { PNG } from "pngjs";
 import WebSocket from "ws";
 
 import { PhoneAgent } from "../agent/phone_agent";
 import type { AgentEvents, WasmModuleFactory } from "../agent/phone_agent";
 import { GatewayLink } from "../link/gateway_link";
-import { openRecording } from "../recording/euroc";
-import type { Recording } from "../recording/euroc";
+import { isCalibrated, openRecording, withCamera } from "../recording/euroc";
+import type { CalibratedRecording, Recording } from "../recording/euroc";
 import type { Files } from "../recording/files";
 import { argumentsOf, kHelp } from "./arguments";
 import type { Arguments } from "./arguments";
+import { cameraYamlOf } from "./calibrate";
 import { KeyframeLog, TumFiles } from "./outputs";
+import { lumaOf } from "./png";
 
 const kPoll_ms = 10;
 const kMaxLag_ms = 1000; // of an image, in real time, before it is left out
@@ -34,18 +35,26 @@ function filesOfFolder(folder: string): Files {
   return { names, read: async (name) => readFileSync(`${folder}/${name}`) };
 }
 
-// Grey pixels of a grey or coloured PNG: its first channel, as of the recordings that there are.
-function lumaOf(file: Uint8Array): { luma: Uint8Array; width: number; height: number } {
-  const { data, width, height } = PNG.sync.read(Buffer.from(file));
-  const luma = new Uint8Array(width * height);
-  for (let i = 0; i < luma.length; ++i) luma[i] = data[4 * i];
-  return { luma, width, height };
+async function wasm(): Promise<[WasmModuleFactory, object]> {
+  const module: { default: WasmModuleFactory } = await import(new URL("./pangea_agent.mjs", import.meta.url).href);
+  return [module.default, {
+    wasmBinary: readFileSync(new URL("./pangea_agent.wasm", import.meta.url)),
+    getRandomValue: () => webcrypto.getRandomValues(new Uint32Array(1))[0],
+  }];
 }
 
-async function loadAgent(config: Arguments, recording: Recording): Promise<PhoneAgent> {
-  const module: { default: WasmModuleFactory } = await import(new URL("./pangea_agent.mjs", import.meta.url).href);
+async function openCalibrated(config: Arguments): Promise<CalibratedRecording> {
+  const recording = await openRecording(filesOfFolder(config.recording));
+  if (isCalibrated(recording)) return recording;
+  const cameraYaml = await cameraYamlOf(recording, ...(await wasm()));
+  if (config.outCamera) writeFileSync(config.outCamera, cameraYaml);
+  return withCamera(recording, cameraYaml, "the calibration");
+}
+
+async function loadAgent(config: Arguments, recording: CalibratedRecording): Promise<PhoneAgent> {
+  const [factory, options] = await wasm();
   return PhoneAgent.load(
-    module.default,
+    factory,
     {
       agent: config.agent,
       keyHex: config.keyHex,
@@ -54,10 +63,7 @@ async function loadAgent(config: Arguments, recording: Recording): Promise<Phone
       vioOptionsYaml: config.optionsYaml,
       openedUtime: now_us(),
     },
-    {
-      wasmBinary: readFileSync(new URL("./pangea_agent.wasm", import.meta.url)),
-      getRandomValue: () => webcrypto.getRandomValues(new Uint32Array(1))[0],
-    },
+    options,
   );
 }
 
@@ -165,7 +171,7 @@ async function main(): Promise<number> {
     return 0;
   }
   statSync(config.recording);
-  const recording = await openRecording(filesOfFolder(config.recording));
+  const recording = await openCalibrated(config);
   const session = new Session(await loadAgent(config, recording), config);
   await session.play(recording);
   return session.finish();

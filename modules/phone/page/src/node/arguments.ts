@@ -11,6 +11,7 @@ export interface Arguments {
   rate: number; // 0: as fast as possible
   outTum?: string;
   outKeyframes?: string;
+  outCamera?: string;
   optionsYaml: string;
   gateway?: string; // "wss://host:port"
   keyHex: string; // empty without a gateway
@@ -26,6 +27,7 @@ Plays a recording in EuRoC's format into the agent as phones run it.
   --options FILE        the odometry's options, as of pangea-vio
   --out-tum FILE        write the raw odometry, TUM; a second map goes to FILE.2
   --out-keyframes FILE  write the keyframes as an LCM log
+  --out-camera FILE     write the camera's sensor.yaml, when the recording has none: it is calibrated first
   --gateway URL         wss://HOST:PORT of pangea-gateway; needs --key
   --key FILE            the agent's key file (pangea-agent-handler keygen)
 Exit code: 0; 1 when something could not be done; 2 when the recording gave no pose.`;
@@ -49,7 +51,7 @@ export function argumentsOf(words: string[]): Arguments | undefined {
     args: words,
     options: {
       help: { type: "boolean", short: "h" }, recording: text, agent: text, start: text, duration: text, rate: text,
-      options: text, "out-tum": text, "out-keyframes": text, gateway: text, key: text,
+      options: text, "out-tum": text, "out-keyframes": text, "out-camera": text, gateway: text, key: text,
     },
   });
   if (values.help) return undefined;
@@ -64,6 +66,7 @@ export function argumentsOf(words: string[]): Arguments | undefined {
     rate: values.rate === "max" ? 0 : numberOf("rate", values.rate, 1, 0.01),
     outTum: values["out-tum"],
     outKeyframes: values["out-keyframes"],
+    outCamera: values["out-camera"],
     optionsYaml: values.options ? readFileSync(values.options, "utf8") : "",
     gateway: values.gateway,
     keyHex: values.key ? keyOf(values.key) : "",

@@ -1,5 +1,7 @@
-// A recording in EuRoC's format (docs/recordings.md): calibration, inertial samples, and which images there are.
+// A recording in EuRoC's format (docs/recordings.md): calibration if there is one, inertial samples, and which images there are.
 
+import { Matrix4 } from "three";
+import { kPhoneImu } from "../sensors/calibration";
 import { parseCamera, parseExtrinsics } from "../view/camera_model";
 import type { CameraModel } from "../view/camera_model";
 import type { Files } from "./files";
@@ -17,11 +19,22 @@ export interface RecordedImage {
 
 export interface Recording {
   files: Files;
-  camera: CameraModel;
-  cameraYaml: string;
   imuYaml: string;
   imu: ImuSample[];
   images: RecordedImage[];
+  // Without cam0/sensor.yaml there are none.
+  camera?: CameraModel;
+  cameraYaml?: string;
+}
+
+export type CalibratedRecording = Recording & Required<Pick<Recording, "camera" | "cameraYaml">>;
+
+export const isCalibrated = (recording: Recording): recording is CalibratedRecording => recording.camera !== undefined;
+
+// With the text of a cam0/sensor.yaml, which `file` stands for in messages.
+export function withCamera(recording: Recording, cameraYaml: string, file: string): CalibratedRecording {
+  const T_rig_body = parseExtrinsics(recording.imuYaml, "imu0/sensor.yaml");
+  return { ...recording, cameraYaml, camera: parseCamera(cameraYaml, file, T_rig_body) };
 }
 
 const text = async (files: Files, name: string) => new TextDecoder().decode(await files.read(name));
@@ -70,11 +83,9 @@ function parseImu(csv: string, file: string): ImuSample[] {
 export async function openRecording(files: Files): Promise<Recording> {
   const root = rootOf(files.names);
   const present = new Set(files.names);
-  for (const name of ["cam0/sensor.yaml", "imu0/sensor.yaml", "imu0/data.csv"]) {
-    if (!present.has(root + name)) throw new Error(`${root}${name} is missing`);
-  }
-  const cameraYaml = await text(files, `${root}cam0/sensor.yaml`);
-  const imuYaml = await text(files, `${root}imu0/sensor.yaml`);
+  if (!present.has(`${root}imu0/data.csv`)) throw new Error(`${root}imu0/data.csv is missing`);
+  const imuFile = `${root}imu0/sensor.yaml`;
+  const imuYaml = present.has(imuFile) ? await text(files, imuFile) : kPhoneImu;
   const imu = parseImu(await text(files, `${root}imu0/data.csv`), `${root}imu0/data.csv`);
   const images = growing(
     rows(await text(files, `${root}cam0/data.csv`), `${root}cam0/data.csv`, 2)
@@ -82,6 +93,11 @@ export async function openRecording(files: Files): Promise<Recording> {
       .filter(({ name }) => present.has(name)),
   );
   if (images.length === 0) throw new Error(`${root}cam0/data: none of the images of data.csv is there`);
-  const T_rig_body = parseExtrinsics(imuYaml, `${root}imu0/sensor.yaml`);
-  return { files, camera: parseCamera(cameraYaml, `${root}cam0/sensor.yaml`, T_rig_body), cameraYaml, imuYaml, imu, images };
+  const recording = { files, imuYaml, imu, images };
+  const cameraFile = `${root}cam0/sensor.yaml`;
+  if (present.has(cameraFile)) return withCamera(recording, await text(files, cameraFile), cameraFile);
+  if (!parseExtrinsics(imuYaml, imuFile).equals(new Matrix4())) {
+    throw new Error(`${imuFile}: field 'T_BS' must be the identity where ${cameraFile} is missing: the camera is calibrated to the IMU`);
+  }
+  return recording;
 }

@@ -21,6 +21,15 @@ export interface PlayerSink {
 export class Player {
   private stopped = false;
 
+  // The image of that index; nothing where the browser cannot read it.
+  static async load({ files, images }: Recording, index: number): Promise<RecordedPicture | undefined> {
+    const { utime, name } = images[index];
+    const encoded = await files.read(name);
+    const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" } as const;
+    const picture = await createImageBitmap(new Blob([encoded as Uint8Array<ArrayBuffer>]), options).catch(() => undefined);
+    return picture && { utime, picture, ...lumaOfPicture(picture, picture.width, picture.height) };
+  }
+
   constructor(
     private readonly recording: Recording,
     private readonly sink: PlayerSink,
@@ -37,8 +46,8 @@ export class Player {
     const began_ms = performance.now();
     let next = 0;
     for (let i = 0; i < images.length && !this.stopped; ++i) {
-      const { utime, name } = images[i];
-      const image = await this.load(name, utime);
+      const { utime } = images[i];
+      const image = await Player.load(this.recording, i);
       if (this.realTime) await until(began_ms + (utime - images[0].utime) / 1000);
       const from = next;
       while (next < imu.length && imu[next].utime <= utime + kAhead_us) ++next;
@@ -46,14 +55,6 @@ export class Player {
       if (image) await this.sink.addImage(image);
       onImage((i + 1) / images.length);
     }
-  }
-
-  // Nothing where the browser cannot read it.
-  private async load(name: string, utime: number): Promise<RecordedPicture | undefined> {
-    const encoded = await this.recording.files.read(name);
-    const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" } as const;
-    const picture = await createImageBitmap(new Blob([encoded as Uint8Array<ArrayBuffer>]), options).catch(() => undefined);
-    return picture && { utime, picture, ...lumaOfPicture(picture, picture.width, picture.height) };
   }
 }
 

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { openRecording } from "./euroc";
+import { isCalibrated, openRecording, withCamera } from "./euroc";
 import { filesOf, filesOfZip } from "./files";
 import { RecordingWriter } from "./writer";
 
@@ -31,7 +31,7 @@ test("reads a folder: microseconds, sorted", async () => {
   assert.deepEqual(images.map(({ utime }) => utime), [1700000000055000, 1700000000105000]);
   assert.equal(images[0].name, "walk/mav0/cam0/data/a.png");
   assert.deepEqual(imu[0], { utime: 1700000000050000, gyro: [1, 2, 3], accel: [4, 5, 6] });
-  assert.equal(camera.width, 640);
+  assert.equal(camera?.width, 640);
 });
 
 test("an image that is not there is left out; none at all is refused", async () => {
@@ -39,6 +39,16 @@ test("an image that is not there is left out; none at all is refused", async () 
   assert.equal(some.images.length, 1);
   const none = folder({ "walk/mav0/cam0/data/a.png": undefined, "walk/mav0/cam0/data/b.png": undefined });
   await assert.rejects(openRecording(none), /none of the images/);
+});
+
+test("without calibration it opens, to be calibrated to its IMU", async () => {
+  const recording = await openRecording(folder({ "walk/mav0/cam0/sensor.yaml": undefined, "walk/mav0/imu0/sensor.yaml": undefined }));
+  assert.equal(isCalibrated(recording), false);
+  assert.match(recording.imuYaml, /a phone's, as browsers deliver it/);
+  assert.equal(withCamera(recording, kCamera, "mine").camera.width, 640);
+  const shifted = kImu.replace("[1, 0, 0, 0,", "[1, 0, 0, 0.1,");
+  const strange = folder({ "walk/mav0/cam0/sensor.yaml": undefined, "walk/mav0/imu0/sensor.yaml": shifted });
+  await assert.rejects(openRecording(strange), /walk\/mav0\/imu0\/sensor.yaml: field 'T_BS' must be the identity/);
 });
 
 test("what is wrong is named with its file", async () => {

@@ -1,4 +1,4 @@
-// The calibration of this phone's camera: the one that is stored for it, else one that no phone is far from, with standard
+// The calibration of this phone's camera: the one that is stored for it, or one that no phone is far from, with standard
 // deviations that say so.
 
 import { cameraInBody } from "./axes";
@@ -15,11 +15,18 @@ const kFocal = 0.78;
 const kFocalSigma = 0.08;
 const kCentreSigma = 0.01;
 
-const keyOf = ({ label, width, height, angle_deg }: CameraKind) =>
-  `pangea.calibration.${label}.${width}x${height}.${angle_deg}`;
+const kPrefix = "pangea.calibration.";
+const keyOf = ({ label, width, height, angle_deg }: CameraKind) => `${kPrefix}${label}.${width}x${height}.${angle_deg}`;
 
 export const storedCalibration = (kind: CameraKind) => localStorage.getItem(keyOf(kind)) ?? undefined;
 export const storeCalibration = (kind: CameraKind, cameraYaml: string) => localStorage.setItem(keyOf(kind), cameraYaml);
+
+export const storedCalibrations = () => Object.keys(localStorage).filter((key) => key.startsWith(kPrefix)).length;
+
+// Of all cameras.
+export function forgetCalibrations() {
+  for (const key of Object.keys(localStorage)) if (key.startsWith(kPrefix)) localStorage.removeItem(key);
+}
 
 // The text of a cam0/sensor.yaml.
 export function roughCalibration({ width, height, angle_deg }: CameraKind): string {

@@ -1,12 +1,13 @@
 // The back camera: images as they come, stamped on the page's clock.
 
+import type { CameraKind } from "./calibration";
 import { ArrivalClock, utimeOf } from "./clock";
 import { lumaOfFrame } from "./luma";
 import type { Luma } from "./luma";
 
 export interface CameraImage extends Luma {
   utime: number; // us
-  picture: VideoFrame; // what to draw; whoever has the image closes it
+  picture: ImageBitmap; // what to draw; whoever has the image closes it
 }
 
 const kSettle_ms = 1500; // of focus and exposure, before they are locked
@@ -18,6 +19,7 @@ declare class MediaStreamTrackProcessor {
 }
 
 export class Camera {
+  onImage?: (image: CameraImage) => void; // without it images are dropped
   private stopped = false;
 
   private constructor(
@@ -26,7 +28,7 @@ export class Camera {
   ) {}
 
   // Throws what the browser says: no camera, no permission.
-  static async open(onImage: (image: CameraImage) => void): Promise<Camera> {
+  static async open(): Promise<Camera> {
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
       video: { facingMode: "environment", width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
@@ -37,13 +39,19 @@ export class Camera {
     await video.play();
     const camera = new Camera(stream, video);
     setTimeout(() => void camera.lock(), kSettle_ms);
-    if ("MediaStreamTrackProcessor" in window) void camera.readTrack(onImage);
-    else camera.readVideo(onImage);
+    if ("MediaStreamTrackProcessor" in window) void camera.readTrack();
+    else camera.readVideo();
     return camera;
   }
 
   get track(): MediaStreamTrack {
     return this.stream.getVideoTracks()[0];
+  }
+
+  // As it delivers images now.
+  get kind(): CameraKind {
+    const { videoWidth: width, videoHeight: height } = this.video;
+    return { label: this.track.label, width, height, angle_deg: screen.orientation?.angle ?? 0 };
   }
 
   stop() {
@@ -60,31 +68,38 @@ export class Camera {
     }
   }
 
-  private async readTrack(onImage: (image: CameraImage) => void) {
+  private async readTrack() {
     const clock = new ArrivalClock();
     const reader = new MediaStreamTrackProcessor({ track: this.track, maxBufferSize: 2 }).readable.getReader();
     while (!this.stopped) {
-      const { value: picture, done } = await reader.read();
+      const { value: frame, done } = await reader.read();
       if (done) return;
-      const utime = clock.map(picture.timestamp, utimeOf(performance.now()));
-      if (utime === undefined) picture.close();
-      else onImage({ utime, picture, ...(await lumaOfFrame(picture)) });
+      const utime = clock.map(frame.timestamp, utimeOf(performance.now()));
+      if (utime === undefined) frame.close();
+      else await this.give(utime, frame);
     }
   }
 
   // Safari and Firefox. captureTime is when the camera had it; without it there is the time of its presentation.
-  private readVideo(onImage: (image: CameraImage) => void) {
+  private readVideo() {
     let newest = 0;
     const next = async (now: number, { captureTime }: VideoFrameCallbackMetadata) => {
       if (this.stopped) return;
       const utime = utimeOf(captureTime ?? now);
       if (utime > newest) {
         newest = utime;
-        const picture = new VideoFrame(this.video);
-        onImage({ utime, picture, ...(await lumaOfFrame(picture)) });
+        await this.give(utime, new VideoFrame(this.video));
       }
       this.video.requestVideoFrameCallback(next);
     };
     this.video.requestVideoFrameCallback(next);
+  }
+
+  // The frame goes back to the camera at once: it has a few only, and gives no more while they are kept.
+  private async give(utime: number, frame: VideoFrame) {
+    const [luma, picture] = await Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
+    frame.close();
+    if (this.onImage) this.onImage({ utime, picture, ...luma });
+    else picture.close();
   }
 }

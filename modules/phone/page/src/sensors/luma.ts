@@ -33,6 +33,13 @@ export function lumaOfRgba(rgba: Uint8ClampedArray): Uint8Array {
   return luma;
 }
 
+// The image's rows without what pads them to `stride`.
+export function packRows(luma: Uint8Array, width: number, height: number, stride: number, into: Uint8Array) {
+  for (let row = 0; row < height; ++row) {
+    into.set(luma.subarray(row * stride, row * stride + width), row * width);
+  }
+}
+
 // Of every 16th pixel of every 16th row.
 export function brightnessOf({ luma, width, height, stride }: Luma): number {
   let sum = 0;

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { AgentPose } from "../agent/phone_agent";
-import { hintOf } from "./hints";
+import { calibrationHint, hintOf } from "./hints";
 import type { Situation } from "./hints";
 
 const pose: AgentPose = {
@@ -33,4 +33,16 @@ test("with whom the map is one", () => {
 
 test("a dark image that is tracked well is no trouble", () => {
   assert.doesNotMatch(says({ brightness: 10 }), /dark/);
+});
+
+test("while it calibrates: what is missing most, or why the last try was refused", () => {
+  const at = { progress: { share: 0.4, missing: "time" }, refused: "", brightness: 120, motionSilent: false } as const;
+  const text = (change: Partial<Parameters<typeof calibrationHint>[0]>) => calibrationHint({ ...at, ...change }).text;
+  assert.match(text({}), /^Getting to know this camera.*to and fro/);
+  assert.match(text({ progress: { share: 0.4, missing: "rotation about z" } }), /steering wheel/);
+  assert.match(text({ progress: { share: 0.4, missing: "points" } }), /more detail/);
+  assert.match(text({ progress: { share: 1, missing: "" } }), /^Calculating/);
+  assert.match(text({ progress: { share: 1, missing: "" }, refused: "rotate more" }), /^Not yet: rotate more\. Go on/);
+  assert.match(text({ brightness: 10 }), /Too dark/);
+  assert.match(text({ motionSilent: true }), /no motion/);
 });

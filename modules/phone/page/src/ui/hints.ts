@@ -1,6 +1,8 @@
 // The one line that tells the visitor what to do next.
 
 import type { AgentPose } from "../agent/phone_agent";
+import type { CalibrationProgress } from "../calibration/camera_calibration";
+import type { CalibrationWalk } from "../calibration/calibration_walk";
 import type { LinkState } from "../messages";
 
 export interface Situation {
@@ -16,14 +18,16 @@ export interface Hint {
   tone: "do" | "good" | "bad";
 }
 
+const kNoMotion = "The phone tells no motion. Allow it in the browser's settings.";
+const kTooDark = "Too dark: find more light.";
 const kDark = 25;
 const kFewFeatures = 25;
 
 export function hintOf({ pose, brightness, link, together, motionSilent }: Situation): Hint {
-  if (motionSilent) return { text: "The phone tells no motion. Allow it in the browser's settings.", tone: "bad" };
+  if (motionSilent) return { text: kNoMotion, tone: "bad" };
   if (!pose) return { text: "Starting…", tone: "do" };
   const tracking = pose.state === "tracking";
-  if (brightness < kDark && (!tracking || pose.numTracked < kFewFeatures)) return { text: "Too dark: find more light.", tone: "bad" };
+  if (brightness < kDark && (!tracking || pose.numTracked < kFewFeatures)) return { text: kTooDark, tone: "bad" };
   if (pose.state === "initialising") return starting(pose.reason);
   if (!tracking) return { text: "Lost. Look at something with detail, and move sideways, slowly.", tone: "bad" };
   if (pose.numTracked < kFewFeatures) return { text: "Little to see here: look at something with more detail.", tone: "do" };
@@ -34,6 +38,26 @@ export function hintOf({ pose, brightness, link, together, motionSilent }: Situa
   if (link === "open") return { text: "Walk where others have been, to join their map.", tone: "do" };
   return { text: "Tracking.", tone: "good" };
 }
+
+// While an unknown camera is calibrated. `missing` as of CalibrationProgress, about the camera's axes.
+export function calibrationHint(situation: Pick<CalibrationWalk, "progress" | "refused" | "brightness" | "motionSilent">): Hint {
+  const { progress: { share, missing }, refused, brightness, motionSilent } = situation;
+  if (motionSilent) return { text: kNoMotion, tone: "bad" };
+  if (brightness < kDark) return { text: kTooDark, tone: "bad" };
+  if (missing === "points") return { text: "Look at something with more detail, near and far.", tone: "bad" };
+  if (share >= 1 && refused === "") return { text: "Calculating…", tone: "good" };
+  const begin = refused === "" ? "Getting to know this camera." : `Not yet: ${refused}.`;
+  return { text: `${begin} ${kMoves[missing]}`, tone: "do" };
+}
+
+const kMoves: Record<CalibrationProgress["missing"], string> = {
+  points: "",
+  "": "Go on rotating the phone to and fro.",
+  time: "Rotate the phone to and fro, in all directions.",
+  "rotation about x": "Tilt the phone up and down, to and fro.",
+  "rotation about y": "Look left and right, to and fro.",
+  "rotation about z": "Roll the phone like a steering wheel, to and fro.",
+};
 
 function starting(reason: string): Hint {
   if (/too few features/.test(reason)) return { text: "Look at something with more detail.", tone: "do" };

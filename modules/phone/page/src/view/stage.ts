@@ -7,8 +7,6 @@ import { Fit } from "./fit";
 import { anchorsBefore, Overlay } from "./overlay";
 import type { DrawnAnchor } from "./overlay";
 
-type Picture = VideoFrame | ImageBitmap;
-
 const kMaxWaiting = 4; // pictures whose pose has not come
 
 export interface Drawn {
@@ -18,7 +16,7 @@ export interface Drawn {
 
 export class Stage {
   drawn?: Drawn;
-  private readonly waiting = new Map<number, Picture>();
+  private readonly waiting = new Map<number, ImageBitmap>();
   private readonly overlay: Overlay;
 
   constructor(
@@ -33,7 +31,7 @@ export class Stage {
   }
 
   // The agent has the image of `utime`.
-  keep(utime: number, picture: Picture) {
+  keep(utime: number, picture: ImageBitmap) {
     this.waiting.set(utime, picture);
     const [oldest] = this.waiting.keys();
     if (this.waiting.size > kMaxWaiting) this.forget(oldest);
@@ -41,16 +39,25 @@ export class Stage {
 
   // Shows the picture of the pose. Nothing when it is not there any more.
   show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[]) {
-    const picture = this.waiting.get(pose.utime);
-    if (!picture) return;
-    const fit = new Fit(camera, this.canvas);
-    const [left, top] = fit.toScreen([-0.5, -0.5]);
-    const { scale } = fit;
-    this.canvas.getContext("2d")!.drawImage(picture, left, top, scale * camera.width, scale * camera.height);
     const seen = pose.state === "tracking" ? anchorsBefore(camera, pose, anchors) : [];
+    if (!this.present(pose.utime)) return;
     this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf);
     this.drawn = { utime: pose.utime, anchors: seen.map(({ T_cam_anchor: _, ...drawn }) => drawn) };
-    for (const utime of [...this.waiting.keys()]) if (utime <= pose.utime) this.forget(utime);
+  }
+
+  // A picture whose pose nobody knows.
+  showAlone(utime: number) {
+    this.present(utime);
+  }
+
+  private present(utime: number): boolean {
+    const picture = this.waiting.get(utime);
+    if (!picture) return false;
+    const fit = new Fit(picture, this.canvas);
+    const [left, top] = fit.toScreen([-0.5, -0.5]);
+    this.canvas.getContext("2d")!.drawImage(picture, left, top, fit.scale * picture.width, fit.scale * picture.height);
+    for (const waiting of [...this.waiting.keys()]) if (waiting <= utime) this.forget(waiting);
+    return true;
   }
 
   // The pixel of the shown image at a place of the screen; nothing outside.

@@ -1,0 +1,46 @@
+#include "calibration/collector.h"
+
+#include <vector>
+
+#include "calibration/priors.h"
+
+namespace pangea::calibration {
+namespace {
+
+// As wide as a guessed lens and an unknown rotation ask for; outliers that stay are dealt with by
+// the robust loss.
+vio::TrackerOptions Forgiving() {
+  vio::TrackerOptions options;
+  options.two_view.inlier_px = 4;
+  options.two_view.rotation_sigma = 0.2;
+  return options;
+}
+
+Input Empty(int width, int height, const ImuNoise& noise,
+            std::optional<Eigen::Quaterniond> q_body_cam) {
+  Input input;
+  input.width = width;
+  input.height = height;
+  input.imu_noise = noise;
+  input.q_body_cam = q_body_cam;
+  return input;
+}
+
+}  // namespace
+
+Collector::Collector(int width, int height, const ImuNoise& noise,
+                     std::optional<Eigen::Quaterniond> q_body_cam)
+    : input_(Empty(width, height, noise, q_body_cam)),
+      tracker_(GuessedCamera(width, height), Forgiving()) {}
+
+void Collector::AddImage(int64_t utime, const cv::Mat& image) {
+  input_.frames.push_back(tracker_.Track(utime, image, Eigen::Quaterniond::Identity()));
+}
+
+void Collector::Forget(int64_t before_utime) {
+  const auto is_before = [before_utime](const auto& item) { return item.utime < before_utime; };
+  std::erase_if(input_.frames, is_before);
+  std::erase_if(input_.imu, is_before);
+}
+
+}  // namespace pangea::calibration
