@@ -61,6 +61,10 @@ std::vector<std::string> GatewayCommand(const ServerOptions& options) {
           options.link,      "--port",    std::to_string(*options.phone_port)};
 }
 
+bool IsServerProcess(const std::string& process) {
+  return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
+}
+
 // Whether one was given up: a server that lacks a process is none. It is one without the gateway.
 bool ReviveAll(KeptProcesses* kept) {
   bool given_up = false;
@@ -78,8 +82,7 @@ bool ReviveAll(KeptProcesses* kept) {
 void AddProcessOptions(const std::string& text, ServerOptions* options) {
   const size_t equals = text.find('=');
   const std::string process = text.substr(0, equals);
-  if (equals == std::string::npos ||
-      std::ranges::find(kServerProcesses, process) == std::end(kServerProcesses)) {
+  if (equals == std::string::npos || !IsServerProcess(process)) {
     throw std::runtime_error(fmt::format("--options {}: give PROCESS=FILE, PROCESS one of {}", text,
                                          fmt::join(kServerProcesses, ", ")));
   }
@@ -88,6 +91,14 @@ void AddProcessOptions(const std::string& text, ServerOptions* options) {
     throw std::runtime_error(fmt::format("--options {}: there is no file {}", text, file.string()));
   }
   options->options[process] = file;
+}
+
+void LeaveOut(const std::string& process, ServerOptions* options) {
+  if (!IsServerProcess(process)) {
+    throw std::runtime_error(
+        fmt::format("--without {}: give one of {}", process, fmt::join(kServerProcesses, ", ")));
+  }
+  options->without.insert(process);
 }
 
 void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
@@ -111,7 +122,9 @@ int Serve(const ServerOptions& options) {
     Say(fmt::format("started {}", fmt::join(argv, " ")));
   };
   for (const std::string process : kServerProcesses) {
-    start(process, Command(process, options));
+    if (!options.without.contains(process)) {
+      start(process, Command(process, options));
+    }
   }
   if (options.phone_port) {
     start(kGateway, GatewayCommand(options));
