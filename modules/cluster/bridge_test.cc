@@ -88,7 +88,7 @@ TEST_F(Bridge, TwoWorkersShareTheMatchesAndOneIsKilled) {
   TestWorker& first = AddWorker();
   TestWorker& second = AddWorker();
   AddKeyframes(30, 3);
-  ASSERT_TRUE(Until([&] { return first.num_verified() >= 12 && second.num_verified() >= 12; }));
+  ASSERT_TRUE(Until([&] { return first.num_verified() >= 13 && second.num_verified() >= 12; }));
   EXPECT_FALSE(server_->has_all());
   ASSERT_GT(first.num_waiting(), 0u) << "it has nothing to lose";
   first.Kill();
@@ -112,7 +112,19 @@ TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
   ASSERT_TRUE(Until([&] { return first.num_verified() >= 1; }));
   workers_.clear();
   AddWorker();
-  ASSERT_TRUE(Until([&] { return server_->has_all(); }, 0.8 * 1e-6 * SiteStreams::kAckWait_us));
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }, 0.8 * 1e-6 * kTestAckWait_us));
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, AWorkerAtWorkKeepsItsMatchesHoweverLongItTakes) {
+  TestWorker& slow = AddWorker();
+  slow.set_pauses(true);
+  AddKeyframes(4, 2);
+  ASSERT_TRUE(Until([&] { return slow.num_waiting() == 8; }));
+  TestWorker& second = AddWorker();
+  EXPECT_FALSE(Until([&] { return second.num_verified() > 0; }, 1.5 * 1e-6 * kTestAckWait_us));
+  slow.set_pauses(false);
+  EXPECT_TRUE(Until([&] { return server_->has_all(); }));
   ExpectEachResultOnce();
 }
 
@@ -156,7 +168,7 @@ TEST_F(Bridge, WhatTheJournalHasGoesIntoEmptyStreams) {
   workers_.clear();
   server_->RestartBridge("hall-2");
   server_->SayHave();
-  SiteStreams streams(nats_->url(), "hall-2");
+  SiteStreams streams(nats_->url(), "hall-2", kTestAckWait_us);
   EXPECT_TRUE(Until([&] { return CountOf(streams.Keyframes()) == 6; }));
   EXPECT_EQ(CountOf(streams.Results()), 12);
   ExpectEachResultOnce();
@@ -178,8 +190,8 @@ TEST_F(Bridge, VerifiersAreAnsweredForKeyframesAndNotForMatches) {
   ASSERT_TRUE(Until([&] { return worker.keyframes().size() == 6; }));
   EXPECT_TRUE(QueueIsEmpty()) << "matches without candidates are no work";
   worker.AskForKeyframes(2, 4);
-  EXPECT_TRUE(Until([&] { return worker.keyframes_again().size() == 3; }));
-  EXPECT_THAT(worker.keyframes_again(), ElementsAre(2, 3, 4));
+  EXPECT_TRUE(Until([&] { return worker.retransmitted().size() == 3; }));
+  EXPECT_THAT(worker.retransmitted(), ElementsAre(2, 3, 4));
 }
 
 TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
@@ -200,7 +212,7 @@ TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
 TEST_F(Bridge, SaysWhatIsWrongWithNats) {
   const auto why = [](const std::string& url, const std::string& site) -> std::string {
     try {
-      SiteStreams(url, site);
+      SiteStreams(url, site, kTestAckWait_us);
     } catch (const std::runtime_error& error) {
       return error.what();
     }

@@ -76,7 +76,7 @@ void NatsServer::Start() {
 TestServer::TestServer(const std::string& nats_url) : nats_url_(nats_url) { StartBridge(kSite); }
 
 void TestServer::StartBridge(const std::string& site) {
-  streams_ = std::make_unique<SiteStreams>(nats_url_, site);
+  streams_ = std::make_unique<SiteStreams>(nats_url_, site, kTestAckWait_us);
   bus_ = std::make_unique<LocalBus>();
   node_ = std::make_unique<Node>(*bus_, "agent_handler");
   node_->Subscribe<constraint_t>("CONSTRAINT", [this](const std::string&, const constraint_t& m) {
@@ -155,7 +155,9 @@ void TestServer::Round(int64_t now_utime) {
 }
 
 TestWorker::TestWorker(const std::string& nats_url)
-    : node_(bus_, "fusion"), streams_(nats_url, kSite), bridge_(bus_, streams_, kMaxMatches) {
+    : node_(bus_, "fusion"),
+      streams_(nats_url, kSite, kTestAckWait_us),
+      bridge_(bus_, streams_, kMaxMatches) {
   node_.Subscribe<keyframe_t>("KEYFRAME_1", [this](const std::string&, const keyframe_t& m) {
     keyframes_.insert(m.id.seq);
   });
@@ -173,7 +175,7 @@ TestWorker::TestWorker(const std::string& nats_url)
     if (DecodeMessage(again.data, &result) && !made_.contains(result.id)) {
       results_of_others_.insert(result.id);
     } else if (DecodeMessage(again.data, &keyframe)) {
-      keyframes_again_.push_back(keyframe.id.seq);
+      retransmitted_.push_back(keyframe.id.seq);
     }
   };
   node_.Subscribe<again_t>("AGAIN_fusion", take_again);
@@ -195,7 +197,7 @@ void TestWorker::TakeMatch(const PlaceMatch& match) {
 }
 
 void TestWorker::Verify() {
-  if (to_verify_.empty()) {
+  if (to_verify_.empty() || pauses_) {
     return;
   }
   const Constraint result = to_verify_.front();

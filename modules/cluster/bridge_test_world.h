@@ -25,6 +25,8 @@
 
 namespace pangea {
 
+inline constexpr int64_t kTestAckWait_us = 2'000'000;
+
 // Empty when it is not installed.
 std::string NatsServerProgram();
 
@@ -90,6 +92,7 @@ class TestWorker {
   void Round(int64_t now_utime);
   // As kill -9 does: nothing more is heard of it.
   void Kill() { killed_ = true; }
+  void set_pauses(bool pauses) { pauses_ = pauses; }
   // The next results do not reach the bridge.
   void LoseResults(int count) { to_lose_ = count; }
   void AskForKeyframes(int32_t from_seq, int32_t to_seq);
@@ -97,7 +100,7 @@ class TestWorker {
   int num_verified() const { return static_cast<int>(made_.size()); }
   size_t num_waiting() const { return to_verify_.size(); }
   const std::set<int32_t>& keyframes() const { return keyframes_; }
-  const std::vector<int32_t>& keyframes_again() const { return keyframes_again_; }
+  const std::vector<int32_t>& retransmitted() const { return retransmitted_; }
   const std::set<int64_t>& results_of_others() const { return results_of_others_; }
 
  private:
@@ -112,8 +115,9 @@ class TestWorker {
   std::deque<Constraint> to_verify_;
   std::map<int64_t, Constraint> made_;
   std::set<int32_t> keyframes_;
-  std::vector<int32_t> keyframes_again_;
+  std::vector<int32_t> retransmitted_;
   std::set<int64_t> results_of_others_;
+  bool pauses_ = false;
   int to_lose_ = 0;
   bool killed_ = false;
 };

@@ -42,7 +42,7 @@ CoreBridge::CoreBridge(Bus& bus, SiteStreams& streams)
 void CoreBridge::ToStore(SiteStreams::Entry entry) {
   if (to_store_.size() >= kMaxUnstored) {
     throw std::runtime_error(fmt::format(
-        "NATS does not answer, and {} messages wait for it: start NATS, then this bridge again; "
+        "NATS takes nothing, and {} messages wait for it: start NATS, then this bridge again; "
         "the journal has them",
         kMaxUnstored));
   }

@@ -37,8 +37,9 @@ class CoreBridge : public Process {
 
  private:
   static constexpr size_t kMaxUnstored = 5000;
-  // In one go, so that messages on the bus do not wait long.
-  static constexpr int kPiece = 50;
+  // In one go, so that messages on the bus do not wait long; more than a piece of the journal's
+  // file has.
+  static constexpr int kPiece = 500;
 
   void ToStore(SiteStreams::Entry entry);
   bool TakeMatch(const PlaceMatch& match);

@@ -37,14 +37,14 @@ std::string Tokens(const MapId& map) {
 
 }  // namespace
 
-SiteStreams::SiteStreams(const std::string& nats_url, const std::string& site)
+SiteStreams::SiteStreams(const std::string& nats_url, const std::string& site, int64_t ack_wait_us)
     : site_(CheckedSite(site)), nats_(nats_url, "pangea-bridge " + site) {
   for (const char* kind : {kKeyframe, kMatch, kResult}) {
     nats_.MakeStream(
         Stream(kind), Subject(kind, ">"),
         kind == kMatch ? NatsClient::Retention::kUntilAcknowledged : NatsClient::Retention::kKept);
   }
-  nats_.MakeQueue(Stream(kMatch), kWorkers, kAckWait_us);
+  nats_.MakeQueue(Stream(kMatch), kWorkers, ack_wait_us);
 }
 
 std::string SiteStreams::Stream(const std::string& kind) const {

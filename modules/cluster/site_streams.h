@@ -27,7 +27,8 @@ class SiteStreams {
   static constexpr int64_t kAckWait_us = 5'000'000;
 
   // Connects, and makes the streams that are not there. Throws std::runtime_error.
-  SiteStreams(const std::string& nats_url, const std::string& site);
+  SiteStreams(const std::string& nats_url, const std::string& site,
+              int64_t ack_wait_us = kAckWait_us);
 
   bool connected() const { return nats_.connected(); }
 
