@@ -18,7 +18,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 # Started by name: lcm-logger by every session, gnuplot by its report.
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "liblcm-bin, gnuplot-nox | gnuplot")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "python3")  # for the package pangea of Python
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "liblcm-java, openjdk-17-jre, libjchart2d-java")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "liblcm-java, openjdk-17-jre, libjchart2d-java, nats-server")
 set(scripts ${CMAKE_SOURCE_DIR}/packaging/debian)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm)
 

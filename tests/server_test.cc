@@ -88,6 +88,20 @@ TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
   EXPECT_THAT(outcome.output, HasSubstr("given up after 3 times"));
 }
 
+TEST(Server, StartsNotWhatOthersDo) {
+  const fs::path folder = FreshFolder("server_without");
+  fs::create_directories(folder / "keys");
+  const std::string command = ServerCommand(folder);
+  const Outcome outcome =
+      RunCommand("timeout -s INT 2 " + command + " --without fusion inter_map_ba");
+  EXPECT_THAT(outcome.output, HasSubstr("pangea-posegraph --bus"));
+  EXPECT_THAT(outcome.output, testing::Not(HasSubstr("pangea-fusion --bus")));
+  EXPECT_THAT(outcome.output, testing::Not(HasSubstr("pangea-inter-map-ba --bus")));
+  EXPECT_THAT(outcome.output, HasSubstr("ended\n"));
+  EXPECT_THAT(RunCommand(command + " --without fushion").output,
+              HasSubstr("--without fushion: give one of agent_handler, place_recognition"));
+}
+
 TEST(Server, RefusesOptionsOfNoProcessAndOptionsThatAreNotThere) {
   const fs::path folder = FreshFolder("server_options");
   Outcome outcome = RunCommand(ServerCommand(folder) + " --options fushion=/dev/null");

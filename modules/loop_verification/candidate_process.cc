@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "bus/record_status.h"
+#include "core/constraint_id.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -82,11 +83,7 @@ bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
     return false;
   }
   for (const PlaceCandidate& candidate : match.candidates) {
-    Constraint constraint;
-    constraint.from = candidate.match;
-    constraint.to = match.query;
-    constraint.kind = candidate.kind;
-    if (candidate.kind == kind_ && !verified_.contains(constraint.Id())) {
+    if (candidate.kind == kind_ && !verified_.contains(ConstraintId(match.query, candidate))) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }
@@ -135,7 +132,7 @@ bool CandidateProcess::VerifyNext() {
   const auto [query, candidate] = std::move(ready_.front());
   ready_.pop_front();
   // A verification result of a former run may come after its match.
-  if (!verified_.contains(RefusedConstraint(query, candidate, "").Id())) {
+  if (!verified_.contains(ConstraintId(query, candidate))) {
     const Constraint constraint = verifier_->Verify(query, candidate);
     verified_.insert(constraint.Id());
     node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));

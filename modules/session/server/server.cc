@@ -67,6 +67,10 @@ double SteadySeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+bool IsServerProcess(const std::string& process) {
+  return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
+}
+
 // Whether one was given up: a server that lacks a process is none. It is one without the gateway.
 bool ReviveAll(KeptProcesses* kept) {
   bool given_up = false;
@@ -84,8 +88,7 @@ bool ReviveAll(KeptProcesses* kept) {
 void AddProcessOptions(const std::string& text, ServerOptions* options) {
   const size_t equals = text.find('=');
   const std::string process = text.substr(0, equals);
-  if (equals == std::string::npos ||
-      std::ranges::find(kServerProcesses, process) == std::end(kServerProcesses)) {
+  if (equals == std::string::npos || !IsServerProcess(process)) {
     throw std::runtime_error(fmt::format("--options {}: give PROCESS=FILE, PROCESS one of {}", text,
                                          fmt::join(kServerProcesses, ", ")));
   }
@@ -94,6 +97,14 @@ void AddProcessOptions(const std::string& text, ServerOptions* options) {
     throw std::runtime_error(fmt::format("--options {}: there is no file {}", text, file.string()));
   }
   options->options[process] = file;
+}
+
+void LeaveOut(const std::string& process, ServerOptions* options) {
+  if (!IsServerProcess(process)) {
+    throw std::runtime_error(
+        fmt::format("--without {}: give one of {}", process, fmt::join(kServerProcesses, ", ")));
+  }
+  options->without.insert(process);
 }
 
 void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
@@ -118,6 +129,9 @@ int Serve(const ServerOptions& options) {
   };
   Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);
   for (const std::string process : kServerProcesses) {
+    if (options.without.contains(process)) {
+      continue;
+    }
     std::vector<std::string> argv = Command(process, options);
     const std::vector<std::string> checkpoint = checkpoints.ArgumentsOf(process);
     argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace pangea::session {
@@ -25,10 +26,13 @@ struct ServerOptions {
   std::optional<uint16_t> phone_port;
   std::filesystem::path site;
   std::map<std::string, std::filesystem::path> options;  // of each process, its file
+  std::set<std::string> without;  // processes that are not started: others do their part
 };
 
 // "fusion=FILE" into `options`. Throws std::runtime_error naming the mend.
 void AddProcessOptions(const std::string& text, ServerOptions* options);
+// Throws std::runtime_error when it is no process of the server's.
+void LeaveOut(const std::string& process, ServerOptions* options);
 // <process>.yaml of each process that has one there.
 void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
 

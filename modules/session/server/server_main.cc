@@ -20,6 +20,7 @@ struct Arguments {
   std::string site;
   std::string options_folder;
   std::vector<std::string> option_files;
+  std::vector<std::string> without;
 };
 
 void AddArguments(CLI::App& app, Arguments* arguments) {
@@ -47,6 +48,9 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
       ->excludes(site);
   app.add_option("--options", arguments->option_files,
                  "PROCESS=FILE.yaml, before what the folder has");
+  app.add_option("--without", arguments->without,
+                 "PROCESS that is not started, as others do its part: fusion and inter_map_ba "
+                 "where workers verify (pangea-bridge)");
   app.add_option("--http", options.http,
                  "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
   app.add_option("--phone", options.phone_port,
@@ -96,6 +100,9 @@ int Run(Arguments* arguments) {
   }
   for (const std::string& file : arguments->option_files) {
     AddProcessOptions(file, &arguments->options);
+  }
+  for (const std::string& process : arguments->without) {
+    LeaveOut(process, &arguments->options);
   }
   return Serve(arguments->options);
 }

@@ -1,0 +1,229 @@
+// Both roles of the bridge against a real nats-server.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "bus/wall_clock.h"
+#include "cluster/bridge_test_world.h"
+
+namespace pangea {
+namespace {
+
+using testing::Each;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Pair;
+using testing::SizeIs;
+
+int CountOf(SiteStreams::Reader reader) {
+  int count = 0;
+  for (; reader.Next(); ++count) {
+  }
+  return count;
+}
+
+class Bridge : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (NatsServerProgram().empty()) {
+      GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
+    }
+    nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_bridge");
+    server_ = std::make_unique<TestServer>(nats_->url());
+  }
+
+  TestWorker& AddWorker() {
+    workers_.push_back(std::make_unique<TestWorker>(nats_->url()));
+    return *workers_.back();
+  }
+  void AddKeyframes(int count, int candidates) {
+    for (int i = 0; i < count; ++i) {
+      server_->Add(candidates);
+    }
+    server_->SayHave();
+  }
+  // Rounds of 20 ms until it is so; false after `timeout_s`.
+  bool Until(const std::function<bool()>& holds, double timeout_s = 15) {
+    const int64_t end = WallUtime() + static_cast<int64_t>(1e6 * timeout_s);
+    while (!holds()) {
+      if (WallUtime() > end) {
+        return false;
+      }
+      Round();
+    }
+    return true;
+  }
+  void Round() {
+    const int64_t now = WallUtime() + ahead_us_;
+    server_->Round(now);
+    for (const auto& worker : workers_) {
+      worker->Round(now);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  bool QueueIsEmpty() {
+    const auto queue = server_->streams().LookAtQueue();
+    return queue && queue->waiting == 0 && queue->taken == 0;
+  }
+  void ExpectEachResultOnce() {
+    EXPECT_EQ(server_->published().size(), server_->candidates().size());
+    EXPECT_THAT(server_->published(), Each(Pair(testing::_, 1)));
+    for (const int64_t id : server_->candidates()) {
+      EXPECT_TRUE(server_->published().contains(id));
+    }
+  }
+
+  std::unique_ptr<NatsServer> nats_;
+  std::unique_ptr<TestServer> server_;
+  std::vector<std::unique_ptr<TestWorker>> workers_;
+  int64_t ahead_us_ = 0;  // of the bridges' clock
+};
+
+TEST_F(Bridge, TwoWorkersShareTheMatchesAndOneIsKilled) {
+  TestWorker& first = AddWorker();
+  TestWorker& second = AddWorker();
+  AddKeyframes(30, 3);
+  ASSERT_TRUE(Until([&] { return first.num_verified() >= 13 && second.num_verified() >= 12; }));
+  EXPECT_FALSE(server_->has_all());
+  ASSERT_GT(first.num_waiting(), 0u) << "it has nothing to lose";
+  first.Kill();
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }));
+  EXPECT_TRUE(Until([&] { return QueueIsEmpty(); }, 2));
+  ExpectEachResultOnce();
+  EXPECT_THAT(second.keyframes(), SizeIs(30));
+  EXPECT_GE(first.num_verified() + second.num_verified(), 90);
+  EXPECT_LE(first.num_verified() + second.num_verified(), 91)
+      << "what was stored is not made again";
+  EXPECT_GE(second.results_of_others().size(), 12u) << "it knows what the map has";
+}
+
+TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
+  AddKeyframes(4, 3);
+  ASSERT_TRUE(Until([&] {
+    const auto queue = server_->streams().LookAtQueue();
+    return queue && queue->waiting == 4;
+  }));
+  TestWorker& first = AddWorker();
+  ASSERT_TRUE(Until([&] { return first.num_verified() >= 1; }));
+  workers_.clear();
+  AddWorker();
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }, 0.8 * 1e-6 * kTestAckWait_us));
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, AWorkerAtWorkKeepsItsMatchesHoweverLongItTakes) {
+  TestWorker& slow = AddWorker();
+  slow.set_pauses(true);
+  AddKeyframes(4, 2);
+  ASSERT_TRUE(Until([&] { return slow.num_waiting() == 8; }));
+  TestWorker& second = AddWorker();
+  EXPECT_FALSE(Until([&] { return second.num_verified() > 0; }, 1.5 * 1e-6 * kTestAckWait_us));
+  slow.set_pauses(false);
+  EXPECT_TRUE(Until([&] { return server_->has_all(); }));
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, AResultThatIsLostOnTheWorkersBusIsAskedFor) {
+  TestWorker& worker = AddWorker();
+  worker.LoseResults(3);
+  AddKeyframes(5, 3);
+  ASSERT_TRUE(Until([&] { return worker.num_verified() == 15; }));
+  EXPECT_FALSE(server_->has_all());
+  ahead_us_ += 5'000'000;
+  EXPECT_TRUE(Until([&] { return server_->has_all(); }));
+  EXPECT_EQ(worker.num_verified(), 15);
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, ACoreThatStartsAgainPublishesAndQueuesNothingAnew) {
+  AddWorker();
+  AddKeyframes(8, 2);
+  ASSERT_TRUE(Until([&] { return server_->has_all() && QueueIsEmpty(); }));
+  workers_.clear();
+  server_->RestartBridge();
+  server_->SayHave();
+  for (int i = 0; i < 100; ++i) {
+    Round();
+    ahead_us_ += 100'000;
+  }
+  EXPECT_TRUE(QueueIsEmpty());
+  ExpectEachResultOnce();
+  AddKeyframes(1, 2);
+  AddWorker();
+  EXPECT_TRUE(Until([&] { return server_->has_all(); }));
+  ExpectEachResultOnce();
+  EXPECT_EQ(CountOf(server_->streams().Keyframes()), 9);
+}
+
+// The site was served without workers before, or NATS has lost its disk.
+TEST_F(Bridge, WhatTheJournalHasGoesIntoEmptyStreams) {
+  AddWorker();
+  AddKeyframes(6, 2);
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }));
+  workers_.clear();
+  server_->RestartBridge("hall-2");
+  server_->SayHave();
+  SiteStreams streams(nats_->url(), "hall-2", kTestAckWait_us);
+  EXPECT_TRUE(Until([&] { return CountOf(streams.Keyframes()) == 6; }));
+  EXPECT_EQ(CountOf(streams.Results()), 12);
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, AgentHandlerIsAnsweredOutOfTheStream) {
+  AddWorker();
+  AddKeyframes(3, 2);
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }));
+  server_->AskForResults(1);
+  EXPECT_TRUE(Until([&] { return server_->num_again() > 0; }));
+  Round();
+  EXPECT_EQ(server_->num_again(), 2);
+}
+
+TEST_F(Bridge, VerifiersAreAnsweredForKeyframesAndNotForMatches) {
+  TestWorker& worker = AddWorker();
+  AddKeyframes(6, 0);
+  ASSERT_TRUE(Until([&] { return worker.keyframes().size() == 6; }));
+  EXPECT_TRUE(QueueIsEmpty()) << "matches without candidates are no work";
+  worker.AskForKeyframes(2, 4);
+  EXPECT_TRUE(Until([&] { return worker.retransmitted().size() == 3; }));
+  EXPECT_THAT(worker.retransmitted(), ElementsAre(2, 3, 4));
+}
+
+TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
+  AddWorker();
+  AddKeyframes(10, 3);
+  ASSERT_TRUE(Until([&] { return server_->published().size() >= 5; }));
+  nats_->Stop();
+  AddKeyframes(10, 3);
+  for (int i = 0; i < 20; ++i) {
+    Round();
+  }
+  EXPECT_FALSE(server_->has_all());
+  nats_->Start();
+  EXPECT_TRUE(Until([&] { return server_->has_all(); }));
+  ExpectEachResultOnce();
+}
+
+TEST_F(Bridge, SaysWhatIsWrongWithNats) {
+  const auto why = [](const std::string& url, const std::string& site) -> std::string {
+    try {
+      SiteStreams(url, site, kTestAckWait_us);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(why("nats://127.0.0.1:1", "hall"),
+              HasSubstr("cannot reach NATS at nats://127.0.0.1:1"));
+  EXPECT_THAT(why("nats://127.0.0.1:1", "hall"), HasSubstr("nats-server -a 127.0.0.1 -js -sd"));
+  EXPECT_THAT(why(nats_->url(), "the hall"), HasSubstr("--site the hall: give a name of letters"));
+  EXPECT_THAT(why(nats_->url(), "hall"), IsEmpty());
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,231 @@
+#include "cluster/bridge_test_world.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <stdexcept>
+#include <thread>
+
+#include "bus/retransmission/missing.h"
+#include "core/constraint_id.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "messages/testing/test_keyframes.h"
+
+namespace pangea {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr char kSite[] = "hall";
+constexpr size_t kMaxMatches = 4;
+const MapId kMap{1, 1'700'000'000'000'000};
+
+int FreePort() {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  bind(fd, reinterpret_cast<sockaddr*>(&address), size);
+  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
+  close(fd);
+  return ntohs(address.sin_port);
+}
+
+// Some within the map, some with another.
+PlaceKind KindOf(int candidate) {
+  return candidate % 2 == 0 ? PlaceKind::kInter : PlaceKind::kIntra;
+}
+
+}  // namespace
+
+std::string NatsServerProgram() {
+  for (const char* path : {"/usr/sbin/nats-server", "/usr/bin/nats-server"}) {
+    if (access(path, X_OK) == 0) {
+      return path;
+    }
+  }
+  return "";
+}
+
+NatsServer::NatsServer(const std::filesystem::path& store)
+    : store_(store), port_(FreePort()), url_(fmt::format("nats://127.0.0.1:{}", port_)) {
+  std::filesystem::remove_all(store_);
+  Start();
+}
+
+void NatsServer::Start() {
+  program_ = std::make_unique<Program>(
+      std::vector<std::string>{NatsServerProgram(), "-a", "127.0.0.1", "-p", std::to_string(port_),
+                               "-js", "-sd", store_.string(), "-l", store_.string() + ".log"});
+  for (int i = 0; i < 100; ++i) {
+    try {
+      NatsClient(url_, "test");
+      return;
+    } catch (const std::runtime_error&) {
+      std::this_thread::sleep_for(50ms);
+    }
+  }
+  throw std::runtime_error("nats-server does not start; see " + store_.string() + ".log");
+}
+
+TestServer::TestServer(const std::string& nats_url) : nats_url_(nats_url) { StartBridge(kSite); }
+
+void TestServer::StartBridge(const std::string& site) {
+  streams_ = std::make_unique<SiteStreams>(nats_url_, site, kTestAckWait_us);
+  bus_ = std::make_unique<LocalBus>();
+  node_ = std::make_unique<Node>(*bus_, "agent_handler");
+  node_->Subscribe<constraint_t>("CONSTRAINT", [this](const std::string&, const constraint_t& m) {
+    ++published_[m.id];
+    TakeResult(m);
+  });
+  node_->Subscribe<again_t>("AGAIN_agent_handler", [this](const std::string&, const again_t& m) {
+    constraint_t result{};
+    num_again_ += DecodeMessage(m.data, &result) ? 1 : 0;
+  });
+  node_->Listen<resend_request_t>("RESEND_REQUEST",
+                                  std::bind_front(&TestServer::OnResendRequest, this));
+  bridge_ = std::make_unique<CoreBridge>(*bus_, *streams_);
+}
+
+void TestServer::RestartBridge(const std::string& site) {
+  bridge_.reset();
+  StartBridge(site);
+}
+
+void TestServer::TakeResult(const constraint_t& result) { journal_.emplace(result.id, result); }
+
+void TestServer::Add(int candidates) {
+  const auto seq = static_cast<int32_t>(keyframes_.size());
+  PlaceMatch match;
+  match.query = {kMap, seq};
+  for (int i = 0; i < candidates; ++i) {
+    match.candidates.push_back({{{2, kMap.opened_utime}, seq + i}, KindOf(i), 0.5f, {}});
+    candidates_.insert(ConstraintId(match.query, match.candidates.back()));
+  }
+  keyframes_.push_back(ToMessage(TestKeyframe(match.query)));
+  matches_.push_back(ToMessage(match));
+  node_->Publish("KEYFRAME_1", keyframes_.back());
+  node_->Publish("PLACE_MATCH", matches_.back());
+}
+
+void TestServer::SayHave() {
+  have_t have{};
+  have.num_maps = 1;
+  have.maps = {ToMessage(kMap)};
+  have.highest_seq = {static_cast<int32_t>(keyframes_.size()) - 1};
+  node_->Publish("HAVE", have);
+}
+
+void TestServer::AskForResults(int32_t seq) {
+  ResultNames names{kMap, {}};
+  for (const auto& [id, result] : journal_) {
+    if (result.to.seq == seq) {
+      names.results.emplace_back(seq, id);
+    }
+  }
+  RequestResults(*node_, names);
+}
+
+void TestServer::OnResendRequest(const ResendRequest& request) {
+  const auto at = [&](const auto& list, auto seq) { return list.at(static_cast<size_t>(seq)); };
+  for (int32_t seq = request.range.from_seq; seq <= request.range.to_seq; ++seq) {
+    if (request.channel == "PLACE_MATCH") {
+      Retransmit(*node_, request.requester, request.channel, at(matches_, seq));
+    } else if (request.channel == "KEYFRAME_1") {
+      Retransmit(*node_, request.requester, request.channel, at(keyframes_, seq));
+    }
+  }
+  for (const auto& [id, result] : journal_) {
+    if (request.channel == "CONSTRAINT") {
+      Retransmit(*node_, request.requester, request.channel, result);
+    }
+  }
+}
+
+void TestServer::Round(int64_t now_utime) {
+  bus_->Drain();
+  bridge_->BetweenMessages(now_utime);
+  bridge_->Tick(now_utime);
+  bus_->Drain();
+}
+
+TestWorker::TestWorker(const std::string& nats_url)
+    : node_(bus_, "fusion"),
+      streams_(nats_url, kSite, kTestAckWait_us),
+      bridge_(bus_, streams_, kMaxMatches) {
+  node_.Subscribe<keyframe_t>("KEYFRAME_1", [this](const std::string&, const keyframe_t& m) {
+    keyframes_.insert(m.id.seq);
+  });
+  node_.Listen<place_match_t>("PLACE_MATCH", std::bind_front(&TestWorker::TakeMatch, this));
+  node_.Listen<verdict_request_t>("VERDICT_REQUEST", [this](const VerificationRequest& request) {
+    for (const auto& [seq, id] : request.names.results) {
+      if (made_.contains(id)) {
+        Retransmit(node_, request.requester, "CONSTRAINT", ToMessage(made_.at(id)));
+      }
+    }
+  });
+  const auto take_again = [this](const std::string&, const again_t& again) {
+    constraint_t result{};
+    keyframe_t keyframe{};
+    if (DecodeMessage(again.data, &result) && !made_.contains(result.id)) {
+      results_of_others_.insert(result.id);
+    } else if (DecodeMessage(again.data, &keyframe)) {
+      retransmitted_.push_back(keyframe.id.seq);
+    }
+  };
+  node_.Subscribe<again_t>("AGAIN_fusion", take_again);
+  node_.Subscribe<again_t>("AGAIN_inter_map_ba", take_again);
+}
+
+void TestWorker::TakeMatch(const PlaceMatch& match) {
+  if (!taken_.insert(match.query).second) {
+    return;
+  }
+  for (const PlaceCandidate& candidate : match.candidates) {
+    Constraint result;
+    result.from = candidate.match;
+    result.to = match.query;
+    result.kind = candidate.kind;
+    result.reason = "a test's";
+    to_verify_.push_back(result);
+  }
+}
+
+void TestWorker::Verify() {
+  if (to_verify_.empty() || pauses_) {
+    return;
+  }
+  const Constraint result = to_verify_.front();
+  to_verify_.pop_front();
+  if (results_of_others_.contains(result.Id())) {
+    return;
+  }
+  made_.emplace(result.Id(), result);
+  if (to_lose_ > 0) {
+    --to_lose_;
+  } else {
+    node_.Publish("CONSTRAINT", ToMessage(result));
+  }
+}
+
+void TestWorker::AskForKeyframes(int32_t from_seq, int32_t to_seq) {
+  RequestRetransmission(node_, "KEYFRAME_1", {kMap, from_seq, to_seq});
+  RequestRetransmission(node_, "PLACE_MATCH", {kMap, from_seq, to_seq});
+}
+
+void TestWorker::Round(int64_t now_utime) {
+  if (!killed_) {
+    Verify();
+    bus_.Drain();
+    bridge_.BetweenMessages(now_utime);
+    bridge_.Tick(now_utime);
+    bus_.Drain();
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,125 @@
+#pragma once
+
+// A real nats-server on a loopback port, and round it a server and workers of the site hall in one
+// thread: the
+// bridges are the real ones; agent_handler, place_recognition and the verifiers do as little as
+// their part of the bus asks.
+
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bus/bus.h"
+#include "cluster/core_bridge.h"
+#include "cluster/site_streams.h"
+#include "cluster/worker_bridge.h"
+#include "core/testing/program.h"
+#include "pangea/constraint_t.hpp"
+#include "pangea/place_match_t.hpp"
+
+namespace pangea {
+
+inline constexpr int64_t kTestAckWait_us = 2'000'000;
+
+// Empty when it is not installed.
+std::string NatsServerProgram();
+
+class NatsServer {
+ public:
+  explicit NatsServer(const std::filesystem::path& store);
+  const std::string& url() const { return url_; }
+  void Stop() { program_->End(SIGKILL); }
+  void Start();
+
+ private:
+  const std::filesystem::path store_;
+  const int port_;
+  const std::string url_;
+  std::unique_ptr<Program> program_;
+};
+
+// agent_handler and place_recognition: one agent's map, a match a keyframe.
+class TestServer {
+ public:
+  explicit TestServer(const std::string& nats_url);
+
+  // The next keyframe, and its match with this many candidates.
+  void Add(int candidates);
+  void SayHave();
+  // agent_handler asks for all results of this keyframe.
+  void AskForResults(int32_t seq);
+  // The bridge is killed, and begins anew with what the journal has.
+  void RestartBridge(const std::string& site = "hall");
+  void Round(int64_t now_utime);
+
+  const std::set<int64_t>& candidates() const { return candidates_; }
+  // How often each result was published.
+  const std::map<int64_t, int>& published() const { return published_; }
+  bool has_all() const { return journal_.size() == candidates_.size(); }
+  int num_again() const { return num_again_; }
+
+  SiteStreams& streams() { return *streams_; }
+
+ private:
+  void StartBridge(const std::string& site);
+  void OnResendRequest(const ResendRequest& request);
+  void TakeResult(const constraint_t& result);
+
+  const std::string nats_url_;
+  std::unique_ptr<SiteStreams> streams_;
+  std::unique_ptr<LocalBus> bus_;
+  std::unique_ptr<Node> node_;  // agent_handler's
+  std::unique_ptr<CoreBridge> bridge_;
+  std::vector<keyframe_t> keyframes_;
+  std::vector<place_match_t> matches_;
+  std::map<int64_t, constraint_t> journal_;
+  std::set<int64_t> candidates_;
+  std::map<int64_t, int> published_;
+  int num_again_ = 0;
+};
+
+// A verifier of one candidate a round beside a worker's bridge.
+class TestWorker {
+ public:
+  explicit TestWorker(const std::string& nats_url);
+
+  void Round(int64_t now_utime);
+  // As kill -9 does: nothing more is heard of it.
+  void Kill() { killed_ = true; }
+  void set_pauses(bool pauses) { pauses_ = pauses; }
+  // The next results do not reach the bridge.
+  void LoseResults(int count) { to_lose_ = count; }
+  void AskForKeyframes(int32_t from_seq, int32_t to_seq);
+
+  int num_verified() const { return static_cast<int>(made_.size()); }
+  size_t num_waiting() const { return to_verify_.size(); }
+  const std::set<int32_t>& keyframes() const { return keyframes_; }
+  const std::vector<int32_t>& retransmitted() const { return retransmitted_; }
+  const std::set<int64_t>& results_of_others() const { return results_of_others_; }
+
+ private:
+  void TakeMatch(const PlaceMatch& match);
+  void Verify();
+
+  LocalBus bus_;
+  Node node_;  // fusion's
+  SiteStreams streams_;
+  WorkerBridge bridge_;
+  std::set<KeyframeId> taken_;
+  std::deque<Constraint> to_verify_;
+  std::map<int64_t, Constraint> made_;
+  std::set<int32_t> keyframes_;
+  std::vector<int32_t> retransmitted_;
+  std::set<int64_t> results_of_others_;
+  bool pauses_ = false;
+  int to_lose_ = 0;
+  bool killed_ = false;
+};
+
+}  // namespace pangea

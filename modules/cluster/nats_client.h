@@ -1,0 +1,78 @@
+#pragma once
+
+// NATS with JetStream, as much of it as the bridges need, over libnats. Calls are synchronous and
+// for one thread; a call that NATS does not answer within kTimeout_ms, or while there is no
+// connection, says so and changes nothing that a repeat would not. The connection is made again by
+// itself.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bus/bus.h"
+
+namespace pangea {
+
+class NatsClient {
+ public:
+  static constexpr int64_t kTimeout_ms = 2000;
+
+  // Throws std::runtime_error with the URL and the mend when nobody answers there, or without
+  // JetStream.
+  NatsClient(const std::string& url, const std::string& name);
+  ~NatsClient();
+  NatsClient(const NatsClient&) = delete;
+  NatsClient& operator=(const NatsClient&) = delete;
+
+  bool connected() const;
+
+  // Streams in files; one that exists stays. Throw std::runtime_error.
+  enum class Retention : uint8_t { kKept, kUntilAcknowledged };
+  void MakeStream(const std::string& stream, const std::string& subjects, Retention retention);
+  // Whoever takes a message and says nothing of it for `ack_wait_us` has lost it to another.
+  void MakeQueue(const std::string& stream, const std::string& consumer, int64_t ack_wait_us);
+
+  // Stores a message whose subject has none yet.
+  enum class Stored : uint8_t { kNew, kWasThere, kTooLarge, kUnreachable };
+  Stored Store(const std::string& subject, Bytes data);
+
+  struct Message {
+    std::string subject;
+    uint64_t sequence = 0;  // in its stream
+    std::vector<uint8_t> data;
+  };
+  // The stream's message of this subject. Nothing: there is none, or NATS does not answer.
+  std::optional<Message> Find(const std::string& stream, const std::string& subject);
+  // Its first message from `sequence` on whose subject is among `subjects`.
+  std::optional<Message> Next(const std::string& stream, uint64_t sequence,
+                              const std::string& subjects);
+
+  struct Taken {
+    std::string claim;
+    std::vector<uint8_t> data;
+  };
+  std::optional<Taken> Take(const std::string& stream, const std::string& consumer);
+  // Done, and out of the queue. False when NATS does not answer.
+  bool Acknowledge(const std::string& claim);
+  void StillWorking(const std::string& claim);
+  void GiveBack(const std::string& claim);
+
+  struct Queue {
+    uint64_t waiting = 0;
+    int64_t taken = 0;  // and not acknowledged
+  };
+  std::optional<Queue> LookAt(const std::string& stream, const std::string& consumer);
+
+  // Best effort, to who listens now; one subject is listened to.
+  void Publish(const std::string& subject, Bytes data);
+  void Listen(const std::string& subject);
+  std::optional<std::vector<uint8_t>> NextHeard();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pangea

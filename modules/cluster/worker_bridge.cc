@@ -1,0 +1,251 @@
+#include "cluster/worker_bridge.h"
+
+#include <fmt/format.h>
+
+#include <functional>
+#include <utility>
+
+#include "bus/retransmission/missing.h"
+#include "core/constraint_id.h"
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "pangea/keyframe_t.hpp"
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond_us = 1'000'000;
+constexpr int64_t kRoundInterval_us = 20'000;
+constexpr char kJournalOwner[] = "agent_handler";
+
+// Who verifies candidates of this kind, and is to know the results on them.
+std::string VerifierOf(PlaceKind kind) {
+  return kind == PlaceKind::kIntra ? "inter_map_ba" : "fusion";
+}
+
+}  // namespace
+
+WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
+    : node_(bus, "bridge"),
+      as_handler_(bus, kJournalOwner),
+      streams_(streams),
+      max_matches_(max_matches),
+      keyframes_(streams.Keyframes()),
+      results_(streams.Results()) {
+  streams_.ListenToHave();
+  node_.Listen<constraint_t>(channels::kConstraint, std::bind_front(&WorkerBridge::OnResult, this));
+  node_.Subscribe<again_t>(
+      channels::Again(kJournalOwner),
+      [this](const std::string&, const again_t& again) { OnRetransmission(again); });
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&WorkerBridge::OnResendRequest, this));
+}
+
+WorkerBridge::~WorkerBridge() {
+  for (const std::string& claim : outstanding_.Claims()) {
+    streams_.GiveBack(claim);
+  }
+}
+
+void WorkerBridge::OnRetransmission(const again_t& again) {
+  TakeRetransmission<constraint_t>(node_, again, std::bind_front(&WorkerBridge::OnResult, this));
+}
+
+void WorkerBridge::OnResult(const Constraint& result) {
+  if (outstanding_.Lacks(result.Id())) {
+    to_store_.try_emplace(result.Id(), streams_.EntryOf(result));
+    StoreResults();
+  }
+}
+
+void WorkerBridge::StoreResults() {
+  while (!to_store_.empty()) {
+    const auto& [constraint_id, entry] = *to_store_.begin();
+    const SiteStreams::Stored stored = streams_.Store(entry);
+    if (stored == SiteStreams::Stored::kUnreachable) {
+      return;
+    }
+    if (stored == SiteStreams::Stored::kNew) {
+      ++num_results_;
+      node_.Count("results");
+    }
+    NoteStored(constraint_id);
+    to_store_.erase(to_store_.begin());
+  }
+}
+
+void WorkerBridge::NoteStored(int64_t constraint_id) {
+  if (auto claim = outstanding_.NoteStored(constraint_id)) {
+    done_.push_back(*std::move(claim));
+  }
+}
+
+void WorkerBridge::OnResendRequest(const ResendRequest& request) {
+  const bool is_keyframes = request.channel.starts_with(channels::kKeyframePrefix);
+  const bool is_results = request.channel == channels::kConstraint;
+  if ((!is_keyframes && !is_results) || requests_.size() >= kMaxRequests) {
+    return;
+  }
+  requests_.push_back({request.requester, request.range, std::nullopt});
+  if (is_results) {
+    requests_.back().results = streams_.ResultsOf(request.range.map);
+  }
+}
+
+bool WorkerBridge::AnswerKeyframe(Request* request) {
+  keyframe_t keyframe{};
+  const auto message = streams_.FindKeyframe({request->range.map, request->range.from_seq});
+  if (message && DecodeMessage(message->data, &keyframe)) {
+    Retransmit(node_, request->requester, channels::Keyframe(request->range.map.agent_id),
+               keyframe);
+  }
+  return ++request->range.from_seq <= request->range.to_seq;
+}
+
+bool WorkerBridge::AnswerResult(Request* request) {
+  constraint_t result{};
+  const auto message = request->results->Next();
+  if (message && DecodeMessage(message->data, &result) &&
+      result.to.seq >= request->range.from_seq && result.to.seq <= request->range.to_seq) {
+    Retransmit(node_, request->requester, std::string(channels::kConstraint), result);
+  }
+  return message.has_value();
+}
+
+void WorkerBridge::AnswerRequests() {
+  for (int i = 0; i < kKeyframes && !requests_.empty(); ++i) {
+    Request& request = requests_.front();
+    const bool more = request.results ? AnswerResult(&request) : AnswerKeyframe(&request);
+    if (!more) {
+      requests_.pop_front();
+    }
+  }
+}
+
+void WorkerBridge::PassKeyframes() {
+  for (int i = 0; i < kKeyframes; ++i) {
+    const auto message = keyframes_.Next();
+    if (!message) {
+      has_keyframes_ = has_keyframes_ || streams_.connected();
+      return;
+    }
+    keyframe_t keyframe{};
+    if (DecodeMessage(message->data, &keyframe)) {
+      node_.Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe);
+      node_.Count("keyframes");
+    } else {
+      node_.Refuse("keyframe in the stream does not decode");
+    }
+  }
+}
+
+// Only once the keyframes that it tells of were published: verifiers ask for all that they lack.
+void WorkerBridge::PassHave() {
+  while (const auto data = streams_.NextHave()) {
+    if (has_keyframes_) {
+      node_.bus().Publish(std::string(channels::kHave), *data);
+    }
+  }
+}
+
+void WorkerBridge::PassResults() {
+  for (int i = 0; i < kResults; ++i) {
+    const auto message = results_.Next();
+    if (!message) {
+      return;
+    }
+    constraint_t data{};
+    if (!DecodeMessage(message->data, &data)) {
+      node_.Refuse("result in the stream does not decode");
+      continue;
+    }
+    node_.Take(data, [&](const Constraint& result) {
+      NoteStored(result.Id());
+      Retransmit(node_, VerifierOf(result.kind), std::string(channels::kConstraint), data);
+    });
+  }
+}
+
+void WorkerBridge::TakeMatches(int64_t now_utime) {
+  while (outstanding_.size() < max_matches_) {
+    const auto taken = streams_.TakeMatch();
+    if (!taken) {
+      return;
+    }
+    place_match_t data{};
+    auto match = DecodeMessage(taken->data, &data) ? Parse(data) : Parsed<PlaceMatch>{};
+    if (match.value) {
+      TakeMatch(*std::move(match.value), taken->claim, now_utime);
+    } else {
+      node_.Refuse("match in the queue: " + match.refused);
+      done_.push_back(taken->claim);
+    }
+  }
+}
+
+// What a worker that died has stored is not made again.
+void WorkerBridge::TakeMatch(PlaceMatch match, const std::string& claim, int64_t now_utime) {
+  std::erase_if(match.candidates, [&](const PlaceCandidate& candidate) {
+    return streams_.FindResult(match.query, ConstraintId(match.query, candidate)).has_value();
+  });
+  if (match.candidates.empty()) {
+    return done_.push_back(claim);
+  }
+  node_.Publish(std::string(channels::kPlaceMatch), ToMessage(match));
+  node_.Count("matches");
+  outstanding_.Add(std::move(match), claim, now_utime);
+}
+
+void WorkerBridge::AskForOverdue(int64_t now_utime) {
+  for (const PlaceMatch& match : outstanding_.Overdue(now_utime)) {
+    ResultNames names{match.query.map, {}};
+    for (const PlaceCandidate& candidate : match.candidates) {
+      const int64_t constraint_id = ConstraintId(match.query, candidate);
+      names.results.emplace_back(match.query.seq, constraint_id);
+      // NATS did not answer when this was looked for: our verifiers know it as another's.
+      if (streams_.FindResult(match.query, constraint_id)) {
+        NoteStored(constraint_id);
+      }
+    }
+    RequestResults(as_handler_, names);
+    node_.Publish(std::string(channels::kPlaceMatch), ToMessage(match));
+    node_.Count("asked_again");
+  }
+}
+
+void WorkerBridge::BetweenMessages(int64_t now_utime) {
+  if (now_utime < next_round_utime_) {
+    return;
+  }
+  next_round_utime_ = now_utime + kRoundInterval_us;
+  PassKeyframes();
+  PassHave();
+  PassResults();
+  StoreResults();
+  std::erase_if(done_, [this](const std::string& claim) { return streams_.Acknowledge(claim); });
+  if (has_keyframes_) {
+    TakeMatches(now_utime);
+  }
+  AnswerRequests();
+}
+
+void WorkerBridge::Tick(int64_t now_utime) {
+  AskForOverdue(now_utime);
+  if (now_utime >= next_status_utime_) {
+    next_status_utime_ = now_utime + kSecond_us;
+    for (const std::string& claim : outstanding_.Claims()) {
+      streams_.StillWorking(claim);
+    }
+    PublishStatus(now_utime);
+  }
+}
+
+void WorkerBridge::PublishStatus(int64_t now_utime) {
+  node_.PublishStatus(
+      now_utime, static_cast<int64_t>(outstanding_.num_lacking() + done_.size()),
+      fmt::format("worker: {} of {} matches taken, {} results awaited, {} stored{}",
+                  outstanding_.size(), max_matches_, outstanding_.num_lacking(), num_results_,
+                  streams_.connected() ? "" : "; NATS DOES NOT ANSWER"));
+}
+
+}  // namespace pangea
