@@ -171,8 +171,10 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
       now_utime,
       counters.parked + static_cast<int64_t>(journal_.parked()) +
           (num_finished_ != num_arrived_ ? 1 : 0),
-      fmt::format("{} maps in {} groups, {} constraints in force, {} switched off", counters.maps,
-                  counters.groups, counters.in_force, counters.switched_off));
+      counters.maps == 0
+          ? "no keyframes yet"
+          : fmt::format("{} maps in {} groups, {} constraints in force, {} switched off",
+                        counters.maps, counters.groups, counters.in_force, counters.switched_off));
 }
 
 }  // namespace pangea

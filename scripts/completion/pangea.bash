@@ -38,6 +38,6 @@ _pangea() {
   fi
 }
 
-complete -o bashdefault -o default -F _pangea pangea-agent-handler pangea-anchors pangea-calibrate pangea-eval pangea-fusion pangea-gateway pangea-global-ba \
+complete -o bashdefault -o default -F _pangea pangea-agent-handler pangea-anchors pangea-bridge pangea-calibrate pangea-eval pangea-fusion pangea-gateway pangea-global-ba \
   pangea-inter-map-ba pangea-keyframe-player pangea-link-emulator pangea-log pangea-map-points pangea-place-recognition \
   pangea-posegraph pangea-server pangea-session pangea-sim pangea-site pangea-uplink pangea-viewer pangea-vio
