@@ -221,8 +221,8 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
 }
 
 bool Estimator::Impl::ContradictedWithin(int64_t after_utime, int64_t to_utime) const {
-  return std::ranges::any_of(
-      contradicted_utimes, [&](int64_t utime) { return utime > after_utime && utime <= to_utime; });
+  const auto first = contradicted_utimes.upper_bound(after_utime);
+  return first != contradicted_utimes.end() && *first <= to_utime;
 }
 
 // Optimises the window; the tracks that turned out to be outliers.
