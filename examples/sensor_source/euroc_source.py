@@ -13,8 +13,11 @@ import sys
 import time
 from pathlib import Path
 
-from pangea import camera_t, imu_t, pose_t
-from pangea.bus import DEFAULT_URL, Bus, image_chunks
+try:
+    from pangea import camera_t, imu_t, pose_t
+    from pangea.bus import DEFAULT_URL, Bus, image_chunks
+except ModuleNotFoundError:
+    sys.exit("euroc_source: no package pangea: set PYTHONPATH to build/release/python of Pangea's tree, or install Pangea")
 
 CAMERA_INTERVAL_S = 1.0
 STATES = {pose_t.STATE_INITIALISING: "initialising", pose_t.STATE_TRACKING: "tracking", pose_t.STATE_LOST: "lost"}

@@ -1,4 +1,5 @@
 #include "agent_handler/agent_handler_process.h"
+#include "bus/status_log.h"
 
 #include <fmt/format.h>
 
@@ -151,6 +152,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   agent.heard_us = now_us_;
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));
+    Log(node_.name(), fmt::format("agent {} has joined", agent_id));
   }
   if (opened.new_uplink) {
     agent.handler->OnNewUplink();
@@ -276,11 +278,13 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   node_.Set("keyframes_given_up", given_up);
   archive_.SetCounters();
   anchors_.SetCounters();
-  node_.PublishStatus(now_utime, pending,
-                      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}", connected,
-                                  archive_.num_keyframes(),
-                                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "",
-                                  archive_.Damage(), OtherSoftware(), OtherKeys()));
+  node_.PublishStatus(
+      now_utime, pending,
+      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}", connected,
+                  archive_.num_keyframes(),
+                  agents_.empty() ? "; the folder of keys is empty: nobody can join" : "",
+                  archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", archive_.Damage(),
+                  OtherSoftware(), OtherKeys()));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {

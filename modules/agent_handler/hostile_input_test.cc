@@ -191,11 +191,18 @@ TEST_F(LinkWorld, AnAgentIsShutOutThoughAnotherKeyIsBad) {
   PublishKeyframes(2);
   Run(3);
   ExpectDelivered(4);
+  std::string summary;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    summary = status.summary;
+  });
   std::filesystem::remove(KeyFile(1));
   Run(2);
   PublishKeyframes(2);
   Run(5);
   EXPECT_EQ(delivered.size(), 4u);
+  EXPECT_THAT(summary, testing::HasSubstr("the folder of keys is empty: nobody can join"));
 }
 
 TEST_F(LinkWorld, AnotherVersionIsSaid) {

@@ -30,8 +30,8 @@ int Keygen(const KeygenArguments& arguments) {
       arguments.file.empty() ? KeyFileName(arguments.agent_id) : arguments.file;
   MakeKeyFile(file, arguments.agent_id, AnchorRightOf(arguments.anchors).value());
   std::cout << fmt::format(
-      "{}: for agent {} (pangea-uplink --key); the server needs a copy in its folder of keys "
-      "(--keys)\n",
+      "{}: for agent {} (pangea-uplink --key); the server needs it, or a copy, in its folder "
+      "of keys (--keys, or a site's keys/)\n",
       file, arguments.agent_id);
   return 0;
 }

@@ -46,6 +46,8 @@ std::string Ranges(const std::set<int32_t>& seqs) {
   return text;
 }
 
+constexpr double kShortest_s = 0.1;  // that tells a rate; a burst does not
+
 std::string ChannelTable(const LogSummary& summary) {
   size_t width = 7;
   for (const auto& [channel, of] : summary.channels) {
@@ -55,12 +57,13 @@ std::string ChannelTable(const LogSummary& summary) {
                                  "events", "kB", "Hz", "from s", "to s");
   for (const auto& [channel, of] : summary.channels) {
     const double seconds = Seconds(of.last_utime - of.first_utime);
-    text += fmt::format(
-        "{:<{}} {:>8} {:>10.1f} {:>8} {:>9.2f} {:>9.2f}\n", channel, width, of.events,
-        1e-3 * static_cast<double>(of.bytes),
-        seconds > 0 ? fmt::format("{:.2f}", static_cast<double>(of.events - 1) / seconds) : "",
-        Seconds(of.first_utime - summary.first_utime),
-        Seconds(of.last_utime - summary.first_utime));
+    text += fmt::format("{:<{}} {:>8} {:>10.1f} {:>8} {:>9.2f} {:>9.2f}\n", channel, width,
+                        of.events, 1e-3 * static_cast<double>(of.bytes),
+                        seconds > kShortest_s
+                            ? fmt::format("{:.2f}", static_cast<double>(of.events - 1) / seconds)
+                            : "",
+                        Seconds(of.first_utime - summary.first_utime),
+                        Seconds(of.last_utime - summary.first_utime));
   }
   return text;
 }
