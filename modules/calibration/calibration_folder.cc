@@ -25,7 +25,7 @@ constexpr ImuNoise kPhoneNoise{.gyro_noise_density = 5e-4,
                                .rate_hz = 200};
 
 fs::path Mav0Of(const std::string& folder) {
-  const fs::path mav0 =
+  fs::path mav0 =
       fs::exists(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
   if (!fs::exists(mav0 / "cam0") || !fs::exists(mav0 / "imu0")) {
     throw std::runtime_error(fmt::format(

@@ -17,7 +17,7 @@ vio::TrackerOptions Forgiving() {
 }
 
 Input Empty(int width, int height, const ImuNoise& noise,
-            std::optional<Eigen::Quaterniond> q_body_cam) {
+            const std::optional<Eigen::Quaterniond>& q_body_cam) {
   Input input;
   input.width = width;
   input.height = height;
@@ -29,7 +29,7 @@ Input Empty(int width, int height, const ImuNoise& noise,
 }  // namespace
 
 Collector::Collector(int width, int height, const ImuNoise& noise,
-                     std::optional<Eigen::Quaterniond> q_body_cam)
+                     const std::optional<Eigen::Quaterniond>& q_body_cam)
     : input_(Empty(width, height, noise, q_body_cam)),
       tracker_(GuessedCamera(width, height), Forgiving()) {}
 

@@ -16,7 +16,7 @@ class Collector {
  public:
   // Of the image's size, in pixels. `q_body_cam` to some degrees, where it is known.
   Collector(int width, int height, const ImuNoise& noise,
-            std::optional<Eigen::Quaterniond> q_body_cam);
+            const std::optional<Eigen::Quaterniond>& q_body_cam);
 
   void AddImu(const ImuSample& sample) { input_.imu.push_back(sample); }
   // 8-bit grey.

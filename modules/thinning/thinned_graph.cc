@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <ranges>
 #include <utility>
 
 #include "thinning/thinning.h"
@@ -31,7 +30,9 @@ ThinnedMaps::Edge Join(const Keyframe& first, const ThinnedMaps::Edge& second) {
 }  // namespace
 
 void Thinning::JoinEdges(ThinnedMaps* thinned) const {
-  for (const auto& [id, map] : stored_) {
+  for (const auto& stored : stored_) {
+    const MapId& id = stored.first;
+    const auto& map = stored.second;
     for (auto it = map.keyframes.begin(); it != map.keyframes.end(); ++it) {
       const auto begins_at_one_that_goes = [&](const std::optional<OdometryEdge>& edge) {
         return edge && thinned->gone.contains({id, edge->from_seq});
@@ -171,7 +172,10 @@ std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
   }
   std::ranges::stable_sort(constraints, {}, &std::pair<double, Constraint>::first);
   std::vector<Constraint> sorted;
-  std::ranges::move(constraints | std::views::values, std::back_inserter(sorted));
+  sorted.reserve(constraints.size());
+  for (auto& [log_determinant, constraint] : constraints) {
+    sorted.push_back(std::move(constraint));
+  }
   return sorted;
 }
 

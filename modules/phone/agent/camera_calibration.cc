@@ -12,7 +12,7 @@
 namespace pangea::phone {
 
 CameraCalibration::CameraCalibration(int width, int height, const std::string& imu_yaml,
-                                     std::optional<Eigen::Quaterniond> q_body_cam)
+                                     const std::optional<Eigen::Quaterniond>& q_body_cam)
     : collector_(width, height, ParseEurocImuCalibration(imu_yaml, "imuYaml").noise, q_body_cam) {}
 
 void CameraCalibration::AddImage(int64_t utime, const cv::Mat& image) {

@@ -26,7 +26,7 @@ class CameraCalibration {
 
   // `imu_yaml`: of mav0/imu0/sensor.yaml; throws std::runtime_error naming the field.
   CameraCalibration(int width, int height, const std::string& imu_yaml,
-                    std::optional<Eigen::Quaterniond> q_body_cam);
+                    const std::optional<Eigen::Quaterniond>& q_body_cam);
 
   void AddImu(const ImuSample& sample) { collector_.AddImu(sample); }
   // 8-bit grey, of that size.
