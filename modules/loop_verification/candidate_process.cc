@@ -69,8 +69,7 @@ bool CandidateProcess::Restore(ByteReader* reader) {
 
 bool CandidateProcess::IsComplete(const PlaceMatch& match) const {
   return std::ranges::all_of(match.candidates, [&](const PlaceCandidate& candidate) {
-    return candidate.kind != kind_ ||
-           verified_.contains(RefusedConstraint(match.query, candidate, "").Id());
+    return candidate.kind != kind_ || verified_.contains(ConstraintId(match.query, candidate));
   });
 }
 

@@ -3,18 +3,16 @@
 #include <algorithm>
 
 #include "bus/retransmission/timeouts.h"
+#include "core/constraint_id.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {
 
 void DueResults::Promise(const PlaceMatch& match, int64_t now_utime) {
   for (const PlaceCandidate& candidate : match.candidates) {
-    Constraint promised;
-    promised.from = candidate.match;
-    promised.to = match.query;
-    promised.kind = candidate.kind;
-    if (!came_.contains(promised.Id()) && due_.size() < kMax) {
-      Watch(promised.Id(), match.query, now_utime);
+    const int64_t promised = ConstraintId(match.query, candidate);
+    if (!came_.contains(promised) && due_.size() < kMax) {
+      Watch(promised, match.query, now_utime);
     }
   }
 }

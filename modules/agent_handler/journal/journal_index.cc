@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/constraint_id.h"
+
 namespace pangea {
 
 const JournalIndex::MapIndex* JournalIndex::FindMap(const MapId& id) const {
@@ -44,12 +46,9 @@ void JournalIndex::Add(const PlaceMatch& match, const JournalPlace& place) {
   ++num_matches_;
   const auto results = map.results.find(match.query.seq);
   for (const PlaceCandidate& candidate : match.candidates) {
-    Constraint expected;
-    expected.from = candidate.match;
-    expected.to = match.query;
-    expected.kind = candidate.kind;
-    const bool known = results != map.results.end() && results->second.contains(expected.Id());
-    if (!known && map.missing_results[match.query.seq].insert(expected.Id()).second) {
+    const int64_t expected = ConstraintId(match.query, candidate);
+    const bool known = results != map.results.end() && results->second.contains(expected);
+    if (!known && map.missing_results[match.query.seq].insert(expected).second) {
       ++num_missing_results_;
     }
   }

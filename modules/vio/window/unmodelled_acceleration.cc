@@ -34,7 +34,8 @@ bool AllowForUnmodelledAcceleration(const ImuNoise& noise, WindowProblem* proble
     const auto r = ComputeInertialResidual(measured, AsTheImagesHaveIt(state.frames[to - 1]),
                                            AsTheImagesHaveIt(state.frames[to]))
                        .r;
-    const auto information = InertialInformation(factor.span.measured, noise);
+    const auto information =
+        factor.contradicted ? InertialInformation(factor.span.measured, noise) : factor.information;
     const bool contradicted = r.dot(information * r) > kContradiction;
     if (contradicted != factor.contradicted) {
       factor.contradicted = contradicted;
