@@ -165,7 +165,7 @@ class RestartCheckpoint : public testing::TestWithParam<Named> {
   have_t Have(size_t count) const {
     std::map<MapId, int32_t> highest;
     for (size_t i = 0; i < count; ++i) {
-      keyframe_t keyframe{};
+      KeyframeMessage keyframe{};
       if (DecodeMessage(events_[i].data, &keyframe)) {
         highest[*Parse(keyframe.id.map).value] = keyframe.id.seq;
       }

@@ -21,7 +21,7 @@ void WriteThinLog(const fs::path& path) {
   int64_t utime = 0;
   for (const session::LoggedKeyframe& logged : session::ReadKeyframeLog(
            fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm")) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     ASSERT_TRUE(DecodeMessage(logged.data, &message));
     const Keyframe keyframe = *Parse(message).value;
     const std::vector<uint8_t> bytes = EncodeMessage(

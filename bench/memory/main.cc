@@ -52,7 +52,7 @@ class Walk {
   Keyframe At(int n) const {
     const int visit = n / static_cast<int>(stored_.size());
     const session::LoggedKeyframe& logged = stored_[n % stored_.size()];
-    keyframe_t message;
+    KeyframeMessage message;
     DecodeMessage(logged.data, &message);
     Keyframe keyframe = *std::move(Parse(message).value);
     keyframe.id = logged.id;

@@ -25,7 +25,7 @@ Trajectory ReadTruth(const std::string& path) {
 }
 
 Keyframe Decode(const session::LoggedKeyframe& logged) {
-  keyframe_t message;
+  KeyframeMessage message;
   DecodeMessage(logged.data, &message);
   Parsed<Keyframe> parsed = Parse(message);
   if (!parsed.value) {

@@ -100,7 +100,7 @@ class Visits {
   }
 
   void AddKeyframe(int visit, const Event& event) {
-    auto message = Decoded<keyframe_t>(event);
+    auto message = Decoded<KeyframeMessage>(event);
     message.id = ToMessage(At(visit, *Parse(message.id).value));
     std::mt19937_64 rng(num_keyframes_++);
     for (int corner = 0; corner < message.num_corners; ++corner) {

@@ -14,15 +14,19 @@ def url(port):
     return f"udpm://239.255.76.67:{port}?ttl=0&recv_buf_size=4194304"
 
 
+def write_journal(options, site, keyframes):
+    """One of fewer keyframes, in whole visits, is the begin of it."""
+    subprocess.run([options.build.resolve() / "bin/pangea-restart-journal", options.log, "--out", site / "journal.lcm",
+                    "--keyframes", str(keyframes)], check=True)
+
+
 def make_site(options, keyframes):
     """A new site with a journal of so many keyframes."""
     site = options.work.resolve() / str(keyframes)
     shutil.rmtree(site, ignore_errors=True)
-    programs = options.build.resolve() / "bin"
-    subprocess.run([programs / "pangea-site", "create", site, "--bus", url(options.port), "--link", url(options.port + 1)],
-                   check=True, stdout=subprocess.DEVNULL)
-    subprocess.run([programs / "pangea-restart-journal", options.log, "--out", site / "journal.lcm",
-                    "--keyframes", str(keyframes)], check=True)
+    subprocess.run([options.build.resolve() / "bin/pangea-site", "create", site, "--bus", url(options.port),
+                    "--link", url(options.port + 1)], check=True, stdout=subprocess.DEVNULL)
+    write_journal(options, site, keyframes)
     return site
 
 
@@ -67,6 +71,9 @@ def measure(options, keyframes):
     """One of {keyframes, start, processes: {name: metrics}} for each start."""
     sys.path.insert(0, os.fspath(options.build.resolve() / "python"))
     site = make_site(options, keyframes)
-    for number in range(1, options.starts + 1):
+    for number in range(1, options.starts + 1 + (options.later > 0)):
+        if number > options.starts:
+            keyframes += options.later
+            write_journal(options, site, keyframes)
         yield {"keyframes": keyframes, "start": number, "journal_mb": 1e-6 * (site / "journal.lcm").stat().st_size,
                "processes": start(options, site)}

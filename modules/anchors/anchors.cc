@@ -67,18 +67,7 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
 
 void Anchors::Take(const MapState& state) {
   positions_.reset();
-  auto group = std::make_shared<Group>();
-  group->id = state.group;
-  group->revision = state.revision;
-  for (const KeyframePose& pose : state.keyframes) {
-    group->T_map_body[pose.id] = pose.T_map_body;
-  }
-  for (const MapId& map : state.maps) {
-    auto& known = groups_[map];
-    if (known == nullptr || known->revision < group->revision) {
-      known = group;
-    }
-  }
+  groups_.Take(state);
 }
 
 void Anchors::Take(const Correction& correction) {
@@ -100,13 +89,8 @@ std::vector<MapId> Anchors::AgentMaps() const {
   return maps;
 }
 
-const Anchors::Group* Anchors::GroupOf(const MapId& map) const {
-  const auto found = groups_.find(map);
-  return found == groups_.end() ? nullptr : found->second.get();
-}
-
 Rigid3 Anchors::T_map_odom(const MapId& map) const {
-  const Group* const group = GroupOf(map);
+  const GroupState* const group = groups_.Find(map);
   const auto track = tracks_.find(map);
   if (group == nullptr || track == tracks_.end()) {
     return {};
@@ -123,7 +107,7 @@ Rigid3 Anchors::T_map_odom(const MapId& map) const {
 
 // A keyframe that the group's state does not have yet lies on the odometry behind those it has.
 Rigid3 Anchors::T_map_body(const MapId& map, int32_t seq) const {
-  if (const Group* const group = GroupOf(map)) {
+  if (const GroupState* const group = groups_.Find(map)) {
     const auto found = group->T_map_body.find({map, seq});
     if (found != group->T_map_body.end()) {
       return found->second;
@@ -163,7 +147,7 @@ const std::map<AnchorId, Anchors::InGroup>& Anchors::Positions() const {
 }
 
 bool Anchors::SameGroup(const MapId& a, const MapId& b) const {
-  const Group *const group_a = GroupOf(a), *const group_b = GroupOf(b);
+  const GroupState *const group_a = groups_.Find(a), *const group_b = groups_.Find(b);
   return a == b || (group_a != nullptr && group_b != nullptr && group_a->id == group_b->id);
 }
 
@@ -260,7 +244,7 @@ std::optional<AnchorState> Anchors::InItsGroup(const AnchorId& id) const {
 }
 
 std::pair<MapId, int64_t> Anchors::GroupAndRevision(const MapId& map) const {
-  const Group* const group = GroupOf(map);
+  const GroupState* const group = groups_.Find(map);
   return group == nullptr ? std::pair(map, int64_t{0}) : std::pair(group->id, group->revision);
 }
 

@@ -13,7 +13,6 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,6 +23,7 @@
 #include "anchors/odometry_track.h"
 #include "anchors/placement.h"
 #include "core/anchor.h"
+#include "core/group_states.h"
 #include "core/server_messages.h"
 
 namespace pangea {
@@ -93,11 +93,6 @@ class Anchors {
   std::vector<std::string> TakeNotPlaced() { return std::exchange(not_placed_, {}); }
 
  private:
-  struct Group {
-    MapId id;
-    int64_t revision = 0;
-    std::map<KeyframeId, Rigid3> T_map_body;
-  };
   // Where something is in a group.
   struct InGroup {
     Rigid3 T_map_anchor;
@@ -105,7 +100,6 @@ class Anchors {
   };
 
   void PlaceOrWait(const AnchorId& id);
-  const Group* GroupOf(const MapId& map) const;
   // The newest odom frame; in a map that is in no group its own.
   Rigid3 T_map_odom(const MapId& map) const;
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
@@ -122,7 +116,7 @@ class Anchors {
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;
   std::map<MapId, std::set<AnchorId>> waiting_;  // for a keyframe of this map
-  std::map<MapId, std::shared_ptr<const Group>> groups_;
+  GroupStates groups_;
   std::map<MapId, Correction> corrections_;
   std::vector<std::string> not_placed_;
   // Since the last change; nothing: to be computed.

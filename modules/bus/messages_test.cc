@@ -83,48 +83,72 @@ TEST(Messages, KeyframeRoundTrip) {
   EXPECT_EQ(out.points[9].inverse_depth, in.points[9].inverse_depth);
 }
 
+// The shipped type where it is enough: what read it before still does.
+TEST(Messages, AKeyframeSaysHowSureItsScaleAndExtrinsicsAre) {
+  Keyframe in = RandomKeyframe(1);
+  const size_t shipped = EncodeMessage(ToMessage(in)).size();
+  keyframe_t plain{};
+  EXPECT_TRUE(DecodeMessage(EncodeMessage(ToMessage(in)), &plain));
+  EXPECT_EQ(plain.id.seq, in.id.seq);
+
+  in.scale_sigma = 0.07;
+  in.T_body_cam_covariance = 1e-6 * Matrix6d::Identity();
+  in.T_body_cam_covariance(1, 3) = in.T_body_cam_covariance(3, 1) = 5e-7;
+  const std::vector<uint8_t> bytes = EncodeMessage(ToMessage(in));
+  EXPECT_EQ(bytes.size(), shipped + 37 * sizeof(double));
+  EXPECT_FALSE(DecodeMessage(bytes, &plain));
+  const auto out = Parse(ThroughBytes(ToMessage(in)));
+  ASSERT_TRUE(out.value) << out.refused;
+  EXPECT_EQ(out.value->scale_sigma, 0.07);
+  EXPECT_EQ(out.value->T_body_cam_covariance, in.T_body_cam_covariance);
+  EXPECT_EQ(out.value->corners.size(), in.corners.size());
+}
+
 // What a keyframe costs on the wire with 600 corners, 120 tracked, 70 points.
 TEST(Messages, KeyframeFitsItsBudget) {
   EXPECT_LE(ToMessage(RandomKeyframe(2)).getEncodedSize(), 28'000);
 }
 
 TEST(Messages, BadKeyframesAreRefusedWithAReason) {
-  const keyframe_t good = ToMessage(RandomKeyframe(3));
+  const KeyframeMessage good = ToMessage(RandomKeyframe(3));
   const double nan = std::nan("");
-  const std::vector<std::function<void(keyframe_t*)>> damages = {
-      [](keyframe_t* m) { m->id.map.agent_id = 0; },
-      [](keyframe_t* m) { m->id.seq = -1; },
-      [](keyframe_t* m) { m->utime = -5; },
-      [&](keyframe_t* m) { m->camera.fx = nan; },
-      [](keyframe_t* m) { m->camera.model = 9; },
-      [](keyframe_t* m) { m->camera.cx = 1e300; },
-      [&](keyframe_t* m) { m->camera.distortion[2] = -1e10; },
-      [](keyframe_t* m) { m->camera.width = 1 << 20; },
-      [](keyframe_t* m) { m->camera.readout_s = std::numeric_limits<double>::infinity(); },
-      [&](keyframe_t* m) { m->v_odom_body.y = nan; },
-      [](keyframe_t* m) { m->preintegration.bias_jacobian[3] = 1e200; },
-      [](keyframe_t* m) { m->num_corners = 701; },
-      [](keyframe_t* m) { m->T_odom_body.rotation.w += 1; },
-      [&](keyframe_t* m) { m->T_odom_body.translation.x = nan; },
-      [](keyframe_t* m) { m->T_odom_body.translation.x = 1e9; },
-      [](keyframe_t* m) { m->edge_covariance[0] = -1; },
-      [](keyframe_t* m) { m->edge_covariance[1] += 1; },
-      [](keyframe_t* m) { m->edge_from_seq = m->id.seq; },
-      [&](keyframe_t* m) { m->preintegration.covariance[0] = nan; },
-      [](keyframe_t* m) { m->u_16th_px[5] = 32000; },
-      [](keyframe_t* m) { m->octave[5] = 100; },
-      [](keyframe_t* m) { m->tracked_corner[0] = 9999; },
-      [](keyframe_t* m) { m->point_corner[0] = -1; },
-      [](keyframe_t* m) { m->inverse_depth[0] = -0.1f; },
-      [&](keyframe_t* m) { m->inverse_depth_variance[0] = std::nanf(""); },
-      [](keyframe_t* m) {
+  const std::vector<std::function<void(KeyframeMessage*)>> damages = {
+      [](KeyframeMessage* m) { m->id.map.agent_id = 0; },
+      [](KeyframeMessage* m) { m->id.seq = -1; },
+      [](KeyframeMessage* m) { m->utime = -5; },
+      [&](KeyframeMessage* m) { m->camera.fx = nan; },
+      [](KeyframeMessage* m) { m->camera.model = 9; },
+      [](KeyframeMessage* m) { m->camera.cx = 1e300; },
+      [&](KeyframeMessage* m) { m->camera.distortion[2] = -1e10; },
+      [](KeyframeMessage* m) { m->camera.width = 1 << 20; },
+      [](KeyframeMessage* m) { m->camera.readout_s = std::numeric_limits<double>::infinity(); },
+      [&](KeyframeMessage* m) { m->v_odom_body.y = nan; },
+      [](KeyframeMessage* m) { m->preintegration.bias_jacobian[3] = 1e200; },
+      [](KeyframeMessage* m) { m->num_corners = 701; },
+      [](KeyframeMessage* m) { m->T_odom_body.rotation.w += 1; },
+      [&](KeyframeMessage* m) { m->T_odom_body.translation.x = nan; },
+      [](KeyframeMessage* m) { m->T_odom_body.translation.x = 1e9; },
+      [](KeyframeMessage* m) { m->edge_covariance[0] = -1; },
+      [](KeyframeMessage* m) { m->edge_covariance[1] += 1; },
+      [](KeyframeMessage* m) { m->edge_from_seq = m->id.seq; },
+      [&](KeyframeMessage* m) { m->preintegration.covariance[0] = nan; },
+      [](KeyframeMessage* m) { m->u_16th_px[5] = 32000; },
+      [](KeyframeMessage* m) { m->octave[5] = 100; },
+      [](KeyframeMessage* m) { m->tracked_corner[0] = 9999; },
+      [](KeyframeMessage* m) { m->point_corner[0] = -1; },
+      [](KeyframeMessage* m) { m->inverse_depth[0] = -0.1f; },
+      [&](KeyframeMessage* m) { m->inverse_depth_variance[0] = std::nanf(""); },
+      [](KeyframeMessage* m) {
         m->num_descriptor_bytes = static_cast<int16_t>(m->num_descriptor_bytes - 32);
       },
-      [](keyframe_t* m) { m->roll_pitch_covariance[0] = 0; },
+      [](KeyframeMessage* m) { m->roll_pitch_covariance[0] = 0; },
+      [&](KeyframeMessage* m) { m->scale_sigma = nan; },
+      [](KeyframeMessage* m) { m->scale_sigma = 1.5; },
+      [](KeyframeMessage* m) { m->T_body_cam_covariance[1] = 1e-6; },
   };
   ASSERT_TRUE(Parse(good).value) << Parse(good).refused;
   for (size_t i = 0; i < damages.size(); ++i) {
-    keyframe_t bad = good;
+    KeyframeMessage bad = good;
     damages[i](&bad);
     const auto parsed = Parse(bad);
     EXPECT_FALSE(parsed.value) << "damage " << i;

@@ -158,9 +158,9 @@ TestWorker::TestWorker(const std::string& nats_url)
     : node_(bus_, "fusion"),
       streams_(nats_url, kSite, kTestAckWait_us),
       bridge_(bus_, streams_, kMaxMatches) {
-  node_.Subscribe<keyframe_t>("KEYFRAME_1", [this](const std::string&, const keyframe_t& m) {
-    keyframes_.insert(m.id.seq);
-  });
+  node_.Subscribe<KeyframeMessage>(
+      "KEYFRAME_1",
+      [this](const std::string&, const KeyframeMessage& m) { keyframes_.insert(m.id.seq); });
   node_.Listen<place_match_t>("PLACE_MATCH", std::bind_front(&TestWorker::TakeMatch, this));
   node_.Listen<verdict_request_t>("VERDICT_REQUEST", [this](const VerificationRequest& request) {
     for (const auto& [seq, id] : request.names.results) {
@@ -171,7 +171,7 @@ TestWorker::TestWorker(const std::string& nats_url)
   });
   const auto take_again = [this](const std::string&, const again_t& again) {
     constraint_t result{};
-    keyframe_t keyframe{};
+    KeyframeMessage keyframe{};
     if (DecodeMessage(again.data, &result) && !made_.contains(result.id)) {
       results_of_others_.insert(result.id);
     } else if (DecodeMessage(again.data, &keyframe)) {

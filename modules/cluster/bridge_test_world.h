@@ -76,7 +76,7 @@ class TestServer {
   std::unique_ptr<LocalBus> bus_;
   std::unique_ptr<Node> node_;  // agent_handler's
   std::unique_ptr<CoreBridge> bridge_;
-  std::vector<keyframe_t> keyframes_;
+  std::vector<KeyframeMessage> keyframes_;
   std::vector<place_match_t> matches_;
   std::map<int64_t, constraint_t> journal_;
   std::set<int64_t> candidates_;

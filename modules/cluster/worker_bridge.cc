@@ -9,7 +9,6 @@
 #include "core/constraint_id.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "pangea/keyframe_t.hpp"
 
 namespace pangea {
 namespace {
@@ -93,7 +92,7 @@ void WorkerBridge::OnResendRequest(const ResendRequest& request) {
 }
 
 bool WorkerBridge::AnswerKeyframe(Request* request) {
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   const auto message = streams_.FindKeyframe({request->range.map, request->range.from_seq});
   if (message && DecodeMessage(message->data, &keyframe)) {
     Retransmit(node_, request->requester, channels::Keyframe(request->range.map.agent_id),
@@ -129,7 +128,7 @@ void WorkerBridge::PassKeyframes() {
       has_keyframes_ = has_keyframes_ || streams_.connected();
       return;
     }
-    keyframe_t keyframe{};
+    KeyframeMessage keyframe{};
     if (DecodeMessage(message->data, &keyframe)) {
       node_.Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe);
       node_.Count("keyframes");

@@ -17,6 +17,14 @@ namespace pangea {
 
 inline constexpr int kMaxCorners = 700;
 inline constexpr int32_t kNoLandmark = -1;
+inline constexpr double kMaxScaleSigma = 1;  // nothing is known
+// A map whose scale is known better is metric.
+inline constexpr double kMetricScaleSigma = 0.03;
+
+// 0 for a metric one.
+inline double UnknownScaleSigma(double scale_sigma) {
+  return scale_sigma > kMetricScaleSigma ? scale_sigma : 0;
+}
 
 struct Corner {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // raw (distorted); on the wire in 1/16 px
@@ -58,6 +66,9 @@ struct Keyframe {
   std::vector<Corner> corners;
   std::vector<MapPoint> points;
   int64_t group_revision = 0;  // newest correction the agent had applied
+  // What all keyframes of a map share, so that no covariance above has it:
+  double scale_sigma = 0;  // of all lengths, a share, at most kMaxScaleSigma; 0: not doubted
+  Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // left frame; zero: as good as exact
 
   Rigid3 T_odom_cam() const { return T_odom_body * camera.T_body_cam; }
 };

@@ -33,6 +33,8 @@ void VisitHead(KeyframeType& k, const Visit& visit) {
   visit(&k.accel_bias);
   visit(&k.roll_pitch_covariance);
   visit(&k.group_revision);
+  visit(&k.scale_sigma);
+  visit(&k.T_body_cam_covariance);
 }
 
 template <typename EdgeType, typename Visit>

@@ -27,6 +27,8 @@ Keyframe Full() {
   keyframe.gyro_bias = {0.01, 0.02, 0.03};
   keyframe.accel_bias = {0.3, 0.2, 0.1};
   keyframe.roll_pitch_covariance << 2e-4, 1e-5, 1e-5, 3e-4;
+  keyframe.scale_sigma = 0.07;
+  keyframe.T_body_cam_covariance(2, 4) = 1e-6;
   keyframe.edge = OdometryEdge{16, {YawRotation(0.01), {0.2, 0, 0}}, Matrix6d::Identity() * 0.7};
   keyframe.preintegration.emplace();
   keyframe.preintegration->duration_s = 0.25;

@@ -180,7 +180,7 @@ TEST_F(VerificationProcesses, AsksForAGapThatStays) {
 
   // The answer closes it.
   for (int k = 3; k < 5; ++k) {
-    const keyframe_t keyframe = ToMessage(agent_m_.keyframes[k]);
+    const KeyframeMessage keyframe = ToMessage(agent_m_.keyframes[k]);
     again_t again{};
     again.channel = "KEYFRAME_1";
     again.data = EncodeMessage(keyframe);

@@ -58,6 +58,21 @@ class BiasPriorFactor : public ceres::SizedCostFunction<6, 9> {
   Eigen::Matrix<double, 6, 1> inverse_sigma_;
 };
 
+// An odometry edge of a map that is not metric. Blocks: from's pose, to's pose, log scale kappa:
+// r = L^-1 [exp(-kappa) t_rel - t; Log(R_rel R^T)], covariance L L^T in from's body frame. In the
+// odometry's metres, unlike EdgeFactor: else a scale that only its prior holds would shrink until
+// the residuals are nothing.
+class UnscaledEdgeFactor : public ceres::SizedCostFunction<6, 7, 7, 1> {
+ public:
+  UnscaledEdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Rigid3 T_from_to_;
+  Matrix6d sqrt_info_;
+};
+
 // What is known of T_body_cam beforehand: r = (T (-) prior) / sigma. Block: T_body_cam.
 class CameraPriorFactor : public ceres::SizedCostFunction<6, 7> {
  public:

@@ -164,6 +164,39 @@ TEST(ImuFactorTest, IsChiSquaredAtTheTruth) {
   }
 }
 
+TEST(UnscaledEdgeFactor, DerivativesMatchDifferences) {
+  std::mt19937_64 rng(4);
+  std::normal_distribution<double> normal(0, 0.1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Rigid3 T_from = RandomPose(rng), T_from_to = RandomPose(rng);
+    const Rigid3 T_to = T_from * T_from_to.Plus(Vector6d::Constant(0.02));
+    Matrix6d root = Matrix6d::Identity();
+    root(1, 4) = 0.5;
+    root(3, 0) = -0.3;
+    const UnscaledEdgeFactor factor(T_from_to, 0.01 * root * root.transpose());
+    const double log_scale = normal(rng);
+    const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
+      double from[7], to[7];
+      PoseToBlock(T_from.Plus(offset.head<6>()), from);
+      PoseToBlock(T_to.Plus(offset.segment<6>(6)), to);
+      const double kappa = log_scale + offset[12];
+      const double* const blocks[] = {from, to, &kappa};
+      VectorXd r(6);
+      EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
+      return r;
+    };
+    Eigen::Matrix<double, 6, 7, Eigen::RowMajor> J_from, J_to;
+    Vector6d J_scale;
+    double* jacobians[] = {J_from.data(), J_to.data(), J_scale.data()};
+    evaluate(VectorXd::Zero(13), jacobians);
+    MatrixXd J(6, 13);
+    J << J_from.leftCols<6>(), J_to.leftCols<6>(), J_scale;
+    const MatrixXd numeric = NumericJacobian(
+        13, 1e-6, [&](const VectorXd& offset) -> VectorXd { return evaluate(offset, nullptr); });
+    EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-6 * numeric.cwiseAbs().maxCoeff());
+  }
+}
+
 TEST(BiasPriorFactor, IsOneAtOneSigmaAndItsDerivativeMatches) {
   const BiasPriorFactor factor(0.05, 0.15);
   const auto evaluate = [&](const VectorXd& motion, double** jacobians) {

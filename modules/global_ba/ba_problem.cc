@@ -18,6 +18,14 @@ ceres::LossFunction* Weight(double weight) {
   return new ceres::ScaledLoss(nullptr, weight, ceres::TAKE_OWNERSHIP);
 }
 
+ceres::CostFunction* MakeEdgeFactor(const BaKeyframe& keyframe) {
+  const BaEdge& edge = *keyframe.edge;
+  if (keyframe.unknown_scale > 0) {
+    return new UnscaledEdgeFactor(edge.T_previous_this, edge.covariance);
+  }
+  return new EdgeFactor(edge.T_previous_this, edge.covariance);
+}
+
 }  // namespace
 
 void DropLonelyLandmarks(BaWorld* world) {
@@ -111,16 +119,17 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
 }
 
 void BaProblem::Solver::AddEdges(const BaWorld& world, const BaOptions& ba) {
+  std::vector<double> sigmas(world.T_body_cam.size(), ba.edge_scale_sigma);
   for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
     const BaKeyframe& keyframe = world.keyframes[i];
     if (keyframe.previous >= 0 && keyframe.edge) {
-      problem.AddResidualBlock(
-          new EdgeFactor(keyframe.edge->T_previous_this, keyframe.edge->covariance),
-          Weight(ba.edge_weight), Pose(keyframe.previous), Pose(i), EdgeLogScale(keyframe.camera));
+      problem.AddResidualBlock(MakeEdgeFactor(keyframe), Weight(ba.edge_weight),
+                               Pose(keyframe.previous), Pose(i), EdgeLogScale(keyframe.camera));
     }
+    sigmas[keyframe.camera] = std::max(sigmas[keyframe.camera], keyframe.unknown_scale);
   }
   for (int i = 0; i < static_cast<int>(world.T_body_cam.size()); ++i) {
-    problem.AddResidualBlock(new ScalePriorFactor(ba.edge_scale_sigma), nullptr, EdgeLogScale(i));
+    problem.AddResidualBlock(new ScalePriorFactor(sigmas[i]), nullptr, EdgeLogScale(i));
     options.linear_solver_ordering->AddElementToGroup(EdgeLogScale(i), 1);
   }
 }

@@ -13,7 +13,8 @@
 // keyframes: without it the adjustment knows less of a map than its odometry did. How much of their
 // errors the two share is not known, so they are weighted as covariance intersection does (Julier
 // and Uhlmann, 1997), which holds whatever they share. The edges of a map have their scale's error
-// in common, as none of their covariances can say: it is one unknown a map (ScalePriorFactor).
+// in common, as none of their covariances can say: it is one unknown a map (ScalePriorFactor), with
+// the odometry's own sigma where a map is not metric.
 //
 // Landmarks are eliminated first (Schur), the rest is one sparse Cholesky. Two rounds: with
 // Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated.
@@ -46,6 +47,7 @@ struct BaKeyframe {
   int previous = -1;
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;
+  double unknown_scale = 0;  // sigma of its map's scale; 0 for a metric map
 };
 
 struct BaObservation {

@@ -68,6 +68,18 @@ TEST(BaProblem, EdgesThatAreAllTooLongLeaveItsScaleAlone) {
   }
 }
 
+// The same where the odometry says so itself, however far it is off.
+TEST(BaProblem, AMapThatIsNotMetricGetsItsScaleFromTheRest) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    BaTestWorld world = MakeBaTestWorld(
+        {.seed = seed, .edge_sigma_m = 0.001, .edge_scale_error = 0.15, .scale_error = 0.05});
+    for (BaKeyframe& keyframe : world.start.keyframes) {
+      keyframe.unknown_scale = 0.15;
+    }
+    EXPECT_NEAR(PathLength(Solved(world.start)) / PathLength(world.truth), 1, 4e-3);
+  }
+}
+
 // Coarse edges take half the weight of the IMU, no more.
 TEST(BaProblem, CoarseEdgesDoNoHarm) {
   const BaTestWorld without = MakeBaTestWorld({});

@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 1;
+constexpr uint32_t kCheckpointFormat = 2;
 constexpr int64_t kSecond = 1'000'000;
 // Longer than the pose graph waits before it solves all from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;

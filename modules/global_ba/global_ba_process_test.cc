@@ -138,7 +138,7 @@ TEST(GlobalBaProcess, AsksForWhatItLacks) {
   const size_t asked = server.requests.size();
   again_t again{};
   again.channel = "KEYFRAME_1";
-  const keyframe_t message = ToMessage(lost);
+  const KeyframeMessage message = ToMessage(lost);
   again.data = EncodeMessage(message);
   again.num_bytes = static_cast<int32_t>(again.data.size());
   PublishMessage(server.bus, "AGAIN_global_ba", again);

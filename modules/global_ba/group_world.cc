@@ -4,6 +4,8 @@
 #include <map>
 #include <memory>
 
+#include "core/median.h"
+
 namespace pangea {
 namespace {
 
@@ -17,6 +19,17 @@ BaKeyframe Start(const Keyframe& keyframe, const Rigid3& T_map_body) {
   return start;
 }
 
+// As the pose graph has it: what most keyframes of a map say.
+void SetUnknownScales(const std::vector<std::vector<double>>& sigmas_of_maps, BaWorld* world) {
+  std::vector<double> unknown;
+  for (const std::vector<double>& sigmas : sigmas_of_maps) {
+    unknown.push_back(UnknownScaleSigma(Median(sigmas)));
+  }
+  for (BaKeyframe& keyframe : world->keyframes) {
+    keyframe.unknown_scale = unknown[keyframe.camera];
+  }
+}
+
 }  // namespace
 
 BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& places,
@@ -26,6 +39,7 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
     poses[pose.id] = pose.T_map_body;
   }
   BaWorld world;
+  std::vector<std::vector<double>> scale_sigmas;  // by camera
   std::map<KeyframeId, int> index;
   for (const auto& [id, T_map_body] : poses) {
     const auto view = store->Find(id);
@@ -39,6 +53,8 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
     world.T_body_cam.resize(world.T_body_cam.size() + (same_map ? 0 : 1));
     world.T_body_cam.back() = keyframe.camera.T_body_cam;
     start.camera = static_cast<int>(world.T_body_cam.size()) - 1;
+    scale_sigmas.resize(world.T_body_cam.size());
+    scale_sigmas.back().push_back(keyframe.scale_sigma);
     if (keyframe.edge && keyframe.preintegration) {
       const auto previous = index.find({id.map, keyframe.edge->from_seq});
       if (previous != index.end()) {
@@ -50,6 +66,7 @@ BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& 
     index[id] = static_cast<int>(world.keyframes.size());
     world.keyframes.push_back(std::move(start));
   }
+  SetUnknownScales(scale_sigmas, &world);
   std::vector<MatchedKeyframes> matches;
   std::vector<bool> needed(world.keyframes.size(), false);
   for (const MatchedPlaces& place : places) {

@@ -141,7 +141,7 @@ Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* 
   bool from = false, to = false;
   const auto add = [&](const LogEvent& event) {
     auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
-                        ? ParseEvent<keyframe_t>(event)
+                        ? ParseEvent<KeyframeMessage>(event)
                         : std::nullopt;
     if (!keyframe) {
       return;

@@ -20,7 +20,7 @@ namespace {
 std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log, LogReadings* readings) {
   std::map<KeyframeId, OdometryEdge> edges;
   const auto add = [&edges](const LogEvent& event) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     if (event.channel.starts_with(channels::kKeyframePrefix) &&
         DecodeMessage(event.data, &message)) {
       if (const auto keyframe = Parse(message); keyframe.value && keyframe.value->edge) {

@@ -17,7 +17,7 @@ namespace {
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 void AddKeyframe(Bytes data, LogSummary* summary) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (DecodeMessage(data, &message)) {
     if (const auto id = Parse(message.id); id.value) {
       summary->keyframes[id.value->map].insert(id.value->seq);

@@ -18,6 +18,7 @@
 #include "log_tools/log_import.h"
 #include "log_tools/log_info.h"
 #include "log_tools/recording_arguments.h"
+#include "options/command_line.h"
 #include "report/session_record.h"
 
 namespace pangea::session {
@@ -236,13 +237,7 @@ int main(int argc, char** argv) {
       "read; above 100 for a wrong command line.");
   pangea::session::Arguments arguments;
   pangea::session::AddCommands(app, &arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-log: {}\n", error.what());
-    arguments.exit_code = 1;
-  }
-  return pangea::TellLosses("pangea-log", arguments.readings, arguments.exit_code);
+  const int failed = pangea::RunSubcommand(app, argc, argv);
+  return pangea::TellLosses("pangea-log", arguments.readings,
+                            failed != 0 ? failed : arguments.exit_code);
 }

@@ -3,13 +3,18 @@
 #include <cmath>
 #include <utility>
 
+#include "loop_verification/extrinsics_error.h"
+
 namespace pangea {
 namespace {
 
 void FillIn(const Verification& verification, Constraint* constraint) {
   if (const auto& ba = verification.ba) {
     constraint->T_from_to = ba->T_Km_Kc;
-    constraint->covariance = ba->covariance;
+    const auto& [m, c] = verification.windows;
+    constraint->covariance =
+        ba->covariance +
+        ExtrinsicsCovariance(m.newest_keyframe(), c.newest_keyframe(), ba->T_Km_Kc);
     constraint->num_inliers = ba->num_inlier_observations;
     constraint->inlier_ratio = verification.inlier_ratio();
     constraint->rms_px = ba->rms_px;

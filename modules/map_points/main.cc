@@ -1,21 +1,9 @@
-#include <memory>
-
 #include "bus/process_main.h"
 #include "map_points/map_points_process.h"
 
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_* --> MapPointsProcess --> LANDMARKS_k
 int main(int argc, char** argv) {
-  pangea::MapPointsOptions options;
-  pangea::ScratchFileOptions scratch;
-  pangea::CheckpointPlace checkpoint;
-  pangea::YamlOptions yaml;
-  options.Visit(yaml);
-  return pangea::ProcessMain(
-      argc, argv,
-      {"pangea-map-points", "Sends each agent the landmarks of the fused map that it may see next",
-       yaml, &scratch, &checkpoint},
-      [&](pangea::Bus& bus) {
-        return std::make_unique<pangea::MapPointsProcess>(
-            bus, options, std::make_shared<pangea::ScratchFile>(scratch), checkpoint);
-      });
+  return pangea::SubmapProcessMain<pangea::MapPointsProcess, pangea::MapPointsOptions>(
+      argc, argv, "pangea-map-points",
+      "Sends each agent the landmarks of the fused map that it may see next");
 }

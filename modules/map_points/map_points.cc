@@ -21,20 +21,7 @@ constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
 
 }  // namespace
 
-void MapPoints::Take(const MapState& state) {
-  auto group = std::make_shared<Group>();
-  group->id = state.group;
-  group->revision = state.revision;
-  for (const KeyframePose& pose : state.keyframes) {
-    group->poses[pose.id] = pose.T_map_body;
-  }
-  for (const MapId& map : state.maps) {
-    auto& known = groups_[map];
-    if (known == nullptr || known->revision < group->revision) {
-      known = group;
-    }
-  }
-}
+void MapPoints::Take(const MapState& state) { groups_.Take(state); }
 
 void MapPoints::TakeRefined(const MapState& refined) {
   for (const KeyframePose& pose : refined.keyframes) {
@@ -44,9 +31,10 @@ void MapPoints::TakeRefined(const MapState& refined) {
   }
 }
 
-std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent, const Group& group) {
-  auto newest = group.poses.upper_bound({agent.map, std::numeric_limits<int32_t>::max()});
-  if (newest == group.poses.begin() || (--newest)->first.map != agent.map) {
+std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent,
+                                                       const GroupState& group) {
+  auto newest = group.T_map_body.upper_bound({agent.map, std::numeric_limits<int32_t>::max()});
+  if (newest == group.T_map_body.begin() || (--newest)->first.map != agent.map) {
     return std::nullopt;
   }
   const auto view = store_.Find(newest->first);
@@ -85,14 +73,15 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
 }
 
 // Those that saw most of it first.
-std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent, const Group& group,
+std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
+                                                     const GroupState& group,
                                                      const Outlook& outlook) {
   const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
   for (const KeyframeId& id : refined_) {
-    const auto pose = group.poses.find(id);
+    const auto pose = group.T_map_body.find(id);
     const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - options_.own_recent;
-    if (pose == group.poses.end() || is_recent ||
+    if (pose == group.T_map_body.end() || is_recent ||
         (pose->second.t - outlook.T_map_cam.t).norm() > options_.max_distance_m) {
       continue;
     }
@@ -119,7 +108,7 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent, con
 // One message as it fills.
 class MapPoints::Selection {
  public:
-  Selection(const MapPointsOptions& options, const Group& group, const Outlook& outlook,
+  Selection(const MapPointsOptions& options, const GroupState& group, const Outlook& outlook,
             SubmapStore* store, SentPoints* sent_points)
       : options_(options),
         group_(group),
@@ -170,7 +159,7 @@ class MapPoints::Selection {
     if (in_cell >= kPerCell || taken_.contains(track)) {
       return std::nullopt;
     }
-    const auto point = PointOfTrack(group_.poses, view, corner, options_.track, store_);
+    const auto point = PointOfTrack(group_.T_map_body, view, corner, options_.track, store_);
     const auto sent = sent_points_->tracks.find(track);
     if (!point || (sent != sent_points_->tracks.end() &&
                    (sent->second.p_map - point->p_map).norm() < options_.moved_m)) {
@@ -192,7 +181,7 @@ class MapPoints::Selection {
   }
 
   const MapPointsOptions& options_;
-  const Group& group_;
+  const GroupState& group_;
   const Outlook& outlook_;
   SubmapStore* store_;
   SentPoints* sent_points_;
@@ -202,13 +191,13 @@ class MapPoints::Selection {
 };
 
 std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
-  const auto group = groups_.find(agent.map);
-  const auto outlook = group == groups_.end() ? std::nullopt : OutlookOf(agent, *group->second);
+  const GroupState* const group = groups_.Find(agent.map);
+  const auto outlook = group == nullptr ? std::nullopt : OutlookOf(agent, *group);
   if (!outlook) {
     return std::nullopt;
   }
-  const std::vector<Source> sources = SourcesFor(agent, *group->second, *outlook);
-  Selection selection(options_, *group->second, *outlook, &store_, &sent_points_[agent.map]);
+  const std::vector<Source> sources = SourcesFor(agent, *group, *outlook);
+  Selection selection(options_, *group, *outlook, &store_, &sent_points_[agent.map]);
   for (const Source& source : sources) {
     if (selection.IsFull() || selection.HasAllSources()) {
       break;
@@ -220,8 +209,8 @@ std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
     return std::nullopt;
   }
   message.map = agent.map;
-  message.group = group->second->id;
-  message.revision = group->second->revision;
+  message.group = group->id;
+  message.revision = group->revision;
   return message;
 }
 

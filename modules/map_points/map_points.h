@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/group_states.h"
 #include "core/map_landmarks.h"
 #include "core/server_messages.h"
 #include "core/submap_store.h"
@@ -98,11 +99,6 @@ class MapPoints {
  private:
   static constexpr SubmapStoreOptions kStore{.max_views = 512};
 
-  struct Group {
-    MapId id;
-    int64_t revision = 0;
-    MapPoses poses;
-  };
   // Where the agent will be.
   struct Outlook {
     CameraModel camera;
@@ -125,14 +121,14 @@ class MapPoints {
   };
   class Selection;
 
-  std::optional<Outlook> OutlookOf(const AgentPose& agent, const Group& group);
-  std::vector<Source> SourcesFor(const AgentPose& agent, const Group& group,
+  std::optional<Outlook> OutlookOf(const AgentPose& agent, const GroupState& group);
+  std::vector<Source> SourcesFor(const AgentPose& agent, const GroupState& group,
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
 
   MapPointsOptions options_;
   SubmapStore store_;
-  std::map<MapId, std::shared_ptr<const Group>> groups_;  // of each map
+  GroupStates groups_;
   std::set<KeyframeId> refined_;
   std::map<MapId, SentPoints> sent_points_;
 };

@@ -14,7 +14,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 1;
+constexpr uint32_t kCheckpointFormat = 2;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace

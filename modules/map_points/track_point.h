@@ -4,9 +4,9 @@
 // tracked it, where the group's state has them.
 
 #include <Eigen/Core>
-#include <map>
 #include <optional>
 
+#include "core/group_states.h"
 #include "core/keyframe.h"
 #include "core/submap_store.h"
 
@@ -30,9 +30,6 @@ struct TrackPoint {
   Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
-
-// T_map_body by keyframe.
-using MapPoses = std::map<KeyframeId, Rigid3>;
 
 // `corner` of `source` must be a landmark's. Nothing when the rays do not say where it is.
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,

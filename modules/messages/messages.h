@@ -10,10 +10,10 @@
 #include "core/keyframe.h"
 #include "core/map_landmarks.h"
 #include "core/server_messages.h"
+#include "messages/keyframe_message.h"
 #include "pangea/camera_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/options_t.hpp"
@@ -40,7 +40,7 @@ keyframe_id_t ToMessage(const KeyframeId& id);
 rigid3_t ToMessage(const Rigid3& T);
 vector3_t ToMessage(const Eigen::Vector3d& v);
 camera_t ToMessage(const CameraModel& camera);
-keyframe_t ToMessage(const Keyframe& keyframe);
+KeyframeMessage ToMessage(const Keyframe& keyframe);
 place_match_t ToMessage(const PlaceMatch& match);
 constraint_t ToMessage(const Constraint& constraint);
 correction_t ToMessage(const Correction& correction);
@@ -52,7 +52,7 @@ Parsed<MapId> Parse(const map_id_t& message);
 Parsed<KeyframeId> Parse(const keyframe_id_t& message);
 Parsed<Rigid3> Parse(const rigid3_t& message);
 Parsed<CameraModel> Parse(const camera_t& message);
-Parsed<Keyframe> Parse(const keyframe_t& message);
+Parsed<Keyframe> Parse(const KeyframeMessage& message);
 Parsed<PlaceMatch> Parse(const place_match_t& message);
 Parsed<Constraint> Parse(const constraint_t& message);
 Parsed<Correction> Parse(const correction_t& message);

@@ -16,6 +16,8 @@ constexpr double kPixelScale = 16.0;
 // Of position to accelerometer bias, half the duration squared, after an hour.
 constexpr double kMaxBiasJacobian = 1e7;
 
+using Vector36 = Eigen::Matrix<double, 36, 1>;
+
 preintegration_t ToMessage(const Preintegration& p) {
   preintegration_t m{};
   m.duration_s = p.duration_s;
@@ -147,10 +149,24 @@ std::string UnpackEdge(const keyframe_t& m, Keyframe* keyframe) {
   return "";
 }
 
+std::string UnpackCommonErrors(const KeyframeMessage& m, Keyframe* keyframe) {
+  if (!(m.scale_sigma >= 0 && m.scale_sigma <= kMaxScaleSigma)) {
+    return "scale's sigma out of range";
+  }
+  keyframe->scale_sigma = m.scale_sigma;
+  const Eigen::Map<const Vector36> covariance(m.T_body_cam_covariance);
+  if (covariance.isZero(0)) {
+    return "";
+  }
+  const auto positive = ToCovariance<6>(m.T_body_cam_covariance);
+  keyframe->T_body_cam_covariance = positive.value_or(Matrix6d::Zero());
+  return positive ? "" : "covariance of the extrinsics is invalid";
+}
+
 }  // namespace
 
-keyframe_t ToMessage(const Keyframe& keyframe) {
-  keyframe_t m{};
+KeyframeMessage ToMessage(const Keyframe& keyframe) {
+  KeyframeMessage m{};
   m.id = ToMessage(keyframe.id);
   m.utime = keyframe.utime;
   m.camera = ToMessage(keyframe.camera);
@@ -177,10 +193,12 @@ keyframe_t ToMessage(const Keyframe& keyframe) {
   }
   m.num_points = static_cast<int16_t>(keyframe.points.size());
   m.group_revision = keyframe.group_revision;
+  m.scale_sigma = keyframe.scale_sigma;
+  FromMatrix(keyframe.T_body_cam_covariance, m.T_body_cam_covariance);
   return m;
 }
 
-Parsed<Keyframe> Parse(const keyframe_t& m) {
+Parsed<Keyframe> Parse(const KeyframeMessage& m) {
   const auto id = Parse(m.id);
   const auto camera = Parse(m.camera);
   const auto T_odom_body = Parse(m.T_odom_body);
@@ -214,6 +232,9 @@ Parsed<Keyframe> Parse(const keyframe_t& m) {
     return Refused<Keyframe>("roll/pitch covariance is not positive definite");
   }
   keyframe.roll_pitch_covariance = *roll_pitch;
+  if (std::string reason = UnpackCommonErrors(m, &keyframe); !reason.empty()) {
+    return Refused<Keyframe>(std::move(reason));
+  }
   for (const auto& unpack : {UnpackEdge, UnpackCorners, UnpackPoints}) {
     if (std::string reason = unpack(m, &keyframe); !reason.empty()) {
       return Refused<Keyframe>(std::move(reason));

@@ -26,8 +26,8 @@ Payload Encode(const Message& message) {
   return bytes;
 }
 
-std::vector<keyframe_t> Round(test::TestWorld& world, const MapId& map, int count) {
-  std::vector<keyframe_t> keyframes;
+std::vector<KeyframeMessage> Round(test::TestWorld& world, const MapId& map, int count) {
+  std::vector<KeyframeMessage> keyframes;
   for (int seq = 0; seq < count; ++seq) {
     const double yaw = 2 * M_PI * seq / kRound;
     Keyframe keyframe = world.See({map, seq}, {2 * std::cos(yaw), 2 * std::sin(yaw), 1.5}, yaw);
@@ -53,7 +53,7 @@ struct Server {
       ASSERT_TRUE(DecodeMessage(data, &status));
     });
   }
-  void Send(const keyframe_t& keyframe) {
+  void Send(const KeyframeMessage& keyframe) {
     PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), keyframe);
     bus.Drain();
   }
@@ -108,7 +108,7 @@ TEST(PlaceRecognitionProcess, OneMatchPerKeyframeInOrderWhateverTheOrderAndRepea
   test::TestWorld world(1);
   const auto keyframes = Round(world, kMapA, 8);
   Server straight;
-  for (const keyframe_t& keyframe : keyframes) {
+  for (const KeyframeMessage& keyframe : keyframes) {
     straight.Send(keyframe);
   }
   Server shuffled;
@@ -232,11 +232,11 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   for (const Payload& match : before.matches) {
     after.Retransmit("PLACE_MATCH", match);
   }
-  for (const keyframe_t& keyframe : a) {
+  for (const KeyframeMessage& keyframe : a) {
     after.Retransmit("KEYFRAME_1", Encode(keyframe));
   }
   EXPECT_TRUE(after.matches.empty());  // a#3 waits for map B
-  for (const keyframe_t& keyframe : b) {
+  for (const KeyframeMessage& keyframe : b) {
     after.Retransmit("KEYFRAME_2", Encode(keyframe));
   }
   EXPECT_TRUE(after.matches.empty());  // the groups are still to come
@@ -263,7 +263,7 @@ TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
     for (const Payload& match : before.matches) {
       after.Retransmit("PLACE_MATCH", match);
     }
-    for (const keyframe_t& keyframe : keyframes) {
+    for (const KeyframeMessage& keyframe : keyframes) {
       after.Retransmit("KEYFRAME_1", Encode(keyframe));
     }
     EXPECT_TRUE(after.matches.empty());
@@ -288,7 +288,7 @@ TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
 TEST(PlaceRecognitionProcess, RetransmitsItsMatchesAsTheyWere) {
   test::TestWorld world(6);
   Server server;
-  for (const keyframe_t& keyframe : Round(world, kMapA, 3)) {
+  for (const KeyframeMessage& keyframe : Round(world, kMapA, 3)) {
     server.Send(keyframe);
   }
   std::vector<again_t> answers;
@@ -322,7 +322,7 @@ TEST(PlaceRecognitionProcess, LiveItHearsBeforeItRecognises) {
                                     [&](const std::string&, const place_match_t& match) {
                                       recognised.push_back(match.query.seq);
                                     });
-  for (const keyframe_t& keyframe : Round(world, kMapA, 4)) {
+  for (const KeyframeMessage& keyframe : Round(world, kMapA, 4)) {
     PublishMessage(bus, "KEYFRAME_1", keyframe);
   }
   while (bus.MoreWaits()) {

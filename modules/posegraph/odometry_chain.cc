@@ -36,6 +36,7 @@ bool OdometryChain::Add(const Keyframe& keyframe) {
   node.T_odom_body = keyframe.T_odom_body;
   node.roll_pitch_covariance = keyframe.roll_pitch_covariance;
   node.scene_odom = MiddleOfScene(keyframe);
+  node.scale_sigma = keyframe.scale_sigma;
   if (!nodes_.empty()) {
     const std::optional<int> from = keyframe.edge ? Find(keyframe.edge->from_seq) : std::nullopt;
     if (from) {
@@ -117,6 +118,14 @@ Matrix4d OdometryChain::DriftBetween(int i, int j, const Eigen::Vector3d& point_
 
 double OdometryChain::PathBetween(int i, int j) const {
   return std::abs(nodes_[i].path_m - nodes_[j].path_m);
+}
+
+double OdometryChain::UnknownScale() const {
+  std::vector<double> sigmas;
+  for (const Node& node : nodes_) {
+    sigmas.push_back(node.scale_sigma);
+  }
+  return sigmas.empty() ? 0 : UnknownScaleSigma(Median(std::move(sigmas)));
 }
 
 }  // namespace pangea

@@ -25,6 +25,7 @@ class OdometryChain {
     Rigid3 T_odom_body;
     Eigen::Matrix2d roll_pitch_covariance;
     Eigen::Vector3d scene_odom;  // the middle of what it sees
+    double scale_sigma = 0;      // Keyframe::scale_sigma
     int edge_from = -1;          // index of the node its odometry edge begins at; -1 for the first
     Relative4 edge;
     double path_m = 0;                      // travelled since the map's first keyframe
@@ -50,6 +51,8 @@ class OdometryChain {
   // to node i.
   Matrix4d DriftBetween(int i, int j, const Eigen::Vector3d& point_odom) const;
   double PathBetween(int i, int j) const;
+  // Sigma of the map's scale, by what most of its keyframes say; 0 for a metric map.
+  double UnknownScale() const;
 
  private:
   void JoinByEdge(const OdometryEdge& edge, int from, Node* node) const;
@@ -64,6 +67,7 @@ class OdometryChain {
     visit(&node.T_odom_body);
     visit(&node.roll_pitch_covariance);
     visit(&node.scene_odom);
+    visit(&node.scale_sigma);
     visit(&node.edge_from);
     visit(&node.edge.t);
     visit(&node.edge.yaw);

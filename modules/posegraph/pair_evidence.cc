@@ -30,6 +30,13 @@ bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l,
          view_k.dot(view_l) < std::cos(options.viewpoint_angle);
 }
 
+// Of a position `from_l` away from node l, in a map whose keyframes k and l may doubt its scale.
+Eigen::Matrix3d ScaleCovariance(const OdometryChain::Node& k, const OdometryChain::Node& l,
+                                const Eigen::Vector3d& from_l) {
+  const double sigma = UnknownScaleSigma(std::max(k.scale_sigma, l.scale_sigma));
+  return sigma * sigma * from_l * from_l.transpose();
+}
+
 }  // namespace
 
 Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point,
@@ -52,6 +59,9 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
   Innovation innovation;
   innovation.error << from_k + k.relative.t - p_a, WrapAngle(k.relative.yaw - l.relative.yaw);
   innovation.measurement = k.relative.covariance + CovarianceAt(l.relative.covariance, p_a - to_l);
+  innovation.measurement.topLeftCorner<3, 3>() +=
+      ScaleCovariance((*a_)[k.node_a], (*a_)[l.node_a], from_k - (*a_)[l.node_a].T_odom_body.t) +
+      ScaleCovariance((*b_)[k.node_b], (*b_)[l.node_b], p_a - to_l);
   innovation.odometry =
       BelievableDrift(*a_, k.node_a, l.node_a, p_a, drift) +
       RotateAxes(BelievableDrift(*b_, l.node_b, k.node_b, p_b, drift), l.relative.yaw);
@@ -93,6 +103,7 @@ void PairEvidence::Save(ByteWriter* writer) const {
     writer->Put(candidate.node_b);
     Put(candidate.relative, writer);
     writer->Put(candidate.num_inliers);
+    writer->Put(candidate.derived);
     Put(candidate.T_odom_a_odom_b, writer);
     for (const bool agrees : candidate.agrees) {
       writer->Put(agrees);
@@ -114,6 +125,7 @@ bool PairEvidence::Restore(ByteReader* reader) {
     reader->Get(&candidate.node_b);
     Get(reader, &candidate.relative);
     reader->Get(&candidate.num_inliers);
+    reader->Get(&candidate.derived);
     Get(reader, &candidate.T_odom_a_odom_b);
     for (size_t earlier = 0; earlier < i; ++earlier) {
       bool agrees = false;

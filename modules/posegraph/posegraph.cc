@@ -49,7 +49,7 @@ void PoseGraph::Take(const Keyframe& keyframe) {
   if (!map.chain.Add(keyframe)) {
     return;
   }
-  map.poses.push_back(map.T_map_odom * Pose4{keyframe.T_odom_body.t, 0});
+  map.poses.push_back(map.PoseOf(static_cast<int>(map.chain.size()) - 1));
   Group& group = GroupOf(number);
   group.unpublished = true;
   ++group.keyframes_unpublished;
@@ -199,6 +199,9 @@ void PoseGraph::SolveDue(bool from_the_beginning) {
 }
 
 PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
+  if (!from_the_beginning) {
+    JoinRestored();
+  }
   SolveDue(from_the_beginning);
   PoseGraphUpdate update;
   for (auto& [oldest, group] : groups_) {
@@ -331,7 +334,7 @@ void PoseGraph::Publish(Group* group, PoseGraphUpdate* update) {
     correction.seq = node.seq;
     correction.group = state.group;
     correction.revision = state.revision;
-    correction.T_map_odom = (told.at(number).Shift(newest) * map.T_map_odom).ToRigid3();
+    correction.T_map_odom = (told.at(number).Shift(newest) * map.RigidAt(newest)).ToRigid3();
     constexpr double kLeastVariance = 1e-12;
     correction.covariance = kLeastVariance * Matrix6d::Identity();
     correction.covariance.topLeftCorner<3, 3>() += map.covariance.topLeftCorner<3, 3>();
@@ -375,6 +378,8 @@ PoseGraph::Counters PoseGraph::counters() const {
   for (const MapChain& map : maps_) {
     counters.bridged += map.chain.num_bridged();
   }
+  counters.not_metric = std::ranges::count_if(
+      maps_, [](const MapChain& map) { return map.chain.UnknownScale() > 0; });
   counters.parked = static_cast<int64_t>(parked_.size());
   for (const auto& [oldest, group] : groups_) {
     counters.odometry_scale = std::max(counters.odometry_scale, std::sqrt(group.odometry_variance));

@@ -5,7 +5,8 @@
 //
 // In: keyframes of any maps, each map's in ascending seq, and verification results (constraints).
 // Out: after each solve the corrections (T_map_odom of each map) and the group's state. A node is
-// (x, y, z, yaw); roll and pitch are the odometry's. Maps are grouped by the constraints in force:
+// (x, y, z, yaw); roll and pitch are the odometry's. A map whose odometry does not know its scale
+// well has that as one more state. Maps are grouped by the constraints in force:
 // a pair is merged once several candidate alignments agree (pair_evidence.h), loops that contradict
 // the rest are switched off by graduated non-convexity (group_solver.h), and a merge they no longer
 // carry is undone. Map frame: the odom of the group's map that was seen first.
@@ -18,6 +19,7 @@
 // Deterministic: the same calls in the same order give the same bytes. When it solves depends on
 // counts of messages, and on when it is told to settle, alone. One thread.
 
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -83,6 +85,7 @@ class PoseGraph {
     int64_t bridged = 0;  // composite edges
     int64_t parked = 0;
     double odometry_scale = 1;  // largest of the groups, standard deviations
+    int64_t not_metric = 0;     // maps whose scale is a state of the solve
   };
 
   // Revisions count from `first_revision`.
@@ -130,9 +133,21 @@ class PoseGraph {
     OdometryChain chain;
     std::vector<Pose4> poses;  // of each node, in the map frame
     Pose4 T_map_odom;
+    double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)
     int newest_solved = -1;
     Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom
     bool corrected = false;                  // a correction was published
+
+    double scale() const { return std::exp(log_scale); }
+    // Where the newest solution has a node by odometry alone.
+    Pose4 PoseOf(int node) const {
+      return T_map_odom * Pose4{scale() * chain[node].T_odom_body.t, 0};
+    }
+    // The rigid transform that has the node, and what is near it, in its place.
+    Pose4 RigidAt(int node) const {
+      return {T_map_odom * Eigen::Vector3d((scale() - 1) * chain[node].T_odom_body.t),
+              T_map_odom.yaw};
+    }
   };
   struct Group {
     std::vector<int> maps;         // ascending: the first is the oldest
@@ -153,7 +168,8 @@ class PoseGraph {
     int number = 0;
     int first = 0;
     int last = 0;
-    int offset = 0;  // of its nodes in the solver, which counts from its own zero
+    int offset = 0;                    // of its nodes in the solver, which counts from its own zero
+    int scale = GroupSolver::kMetric;  // its state in the solver
   };
 
   int MapNumber(const MapId& map);
@@ -170,7 +186,20 @@ class PoseGraph {
   // Merges that their loops no longer carry; whether there were any.
   bool UndoMerges(const Group& group);
 
+  // After a restart, of groups that maps have joined since the checkpoint: its solution stays, the
+  // others are laid beside it; the next solve from the beginning is due (posegraph_join.cc).
+  void JoinRestored();
+  void Join(Group* group, const std::vector<int>& restored_group_of);
+  void SolveJoined(Group* group, const std::set<int>& fixed_maps);
+
   void Solve(Group* group, bool from_the_beginning);
+  struct Placed {
+    int map = 0;
+    Pose4 T_map_odom;
+  };
+  // Along the merges with most agreeing viewpoints: the next map of a group of which some are
+  // placed.
+  Placed PlaceNext(const std::set<int>& placed) const;
   void Place(const Group& group);
   void ResetLoops(const Group& group, const std::vector<Loop*>& loops);
   bool FitsOdometry(const Loop& loop) const;
@@ -178,7 +207,9 @@ class PoseGraph {
   std::vector<PairEvidence::Innovation> Innovations(const Group& group,
                                                     const std::vector<Loop*>& loops) const;
   std::vector<SolvedMap> SolvedMaps(const Group& group, const std::vector<Loop*>& loops) const;
-  void AddMaps(const Group& group, const std::vector<SolvedMap>& solved, GroupSolver* solver) const;
+  // Of a fixed map every node stays where it is, and its scale.
+  void AddMaps(const Group& group, const std::set<int>& fixed_maps, std::vector<SolvedMap>* solved,
+               GroupSolver* solver) const;
   void AddLoops(const std::vector<Loop*>& loops, const std::vector<SolvedMap>& solved,
                 GroupSolver* solver) const;
   void Apply(const GroupSolver& solver, const std::vector<SolvedMap>& solved);
@@ -203,6 +234,7 @@ class PoseGraph {
   std::set<Pair> undone_;        // merges that the robust solve does not carry, until new evidence
   std::map<int, Group> groups_;  // by their oldest map
   std::vector<int> group_of_;    // of each map
+  std::vector<int> restored_group_of_;  // until the first settling after a restart
   std::vector<Constraint> parked_;
   std::set<int64_t> seen_;               // accepted constraints
   std::vector<Refinement> refinements_;  // no two share a map

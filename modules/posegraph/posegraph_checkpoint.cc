@@ -25,6 +25,7 @@ void Put(const Loop& loop, ByteWriter* writer) {
   Put(loop.to, writer);
   Put(loop.relative, writer);
   writer->Put(loop.num_inliers);
+  writer->Put(loop.derived);
   writer->Put(loop.on);
 }
 
@@ -34,6 +35,7 @@ void Get(ByteReader* reader, Loop* loop) {
   Get(reader, &loop->to);
   Get(reader, &loop->relative);
   reader->Get(&loop->num_inliers);
+  reader->Get(&loop->derived);
   reader->Get(&loop->on);
 }
 
@@ -89,6 +91,7 @@ void PoseGraph::Save(ByteWriter* writer) {
     map.chain.Save(writer);
     PutAll(map.poses, writer);
     Put(map.T_map_odom, writer);
+    writer->Put(map.log_scale);
     writer->Put(map.newest_solved);
     writer->Put(map.covariance);
   }
@@ -126,6 +129,7 @@ bool PoseGraph::Restore(ByteReader* reader) {
   if (!graph.Read(reader)) {
     return false;
   }
+  graph.restored_group_of_ = graph.group_of_;
   *this = std::move(graph);
   return true;
 }
@@ -141,6 +145,7 @@ bool PoseGraph::Read(ByteReader* reader) {
     const bool is_chain = map.chain.Restore(reader);
     GetAll(reader, &map.poses);
     Get(reader, &map.T_map_odom);
+    reader->Get(&map.log_scale);
     reader->Get(&map.newest_solved);
     reader->Get(&map.covariance);
     sizes.push_back(map.chain.size());

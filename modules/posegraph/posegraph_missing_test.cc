@@ -21,7 +21,7 @@ TEST(PoseGraphMissing, AsksForGapsAndTakesTheAnswers) {
   EXPECT_EQ(server.requests[0].from_seq, 3);
   EXPECT_EQ(server.requests[0].to_seq, 5);
   for (const int seq : {3, 4, 5}) {
-    const keyframe_t message = ToMessage(keyframes[seq]);
+    const KeyframeMessage message = ToMessage(keyframes[seq]);
     again_t again{};
     again.channel = "KEYFRAME_1";
     again.data = EncodeMessage(message);

@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 1;
+constexpr uint32_t kCheckpointFormat = 2;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
@@ -160,6 +160,7 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   node_.Set("constraints_between_unmerged_maps", counters.unused);
   node_.Set("solves", counters.solves);
   node_.Set("edges_bridged", counters.bridged);
+  node_.Set("maps_not_metric", counters.not_metric);
   node_.Set("odometry_sigma_percent", std::llround(100 * counters.odometry_scale));
   node_.Set("results_due", static_cast<int64_t>(results_.size()));
   if (journal_.catching_up()) {

@@ -82,39 +82,40 @@ double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>&
   return std::exp(high);
 }
 
+PoseGraph::Placed PoseGraph::PlaceNext(const std::set<int>& placed) const {
+  const std::pair<const Pair, PairEvidence>* best = nullptr;
+  for (const auto& entry : pairs_) {
+    const auto& [pair, evidence] = entry;
+    const bool leads_on = placed.contains(pair.first) != placed.contains(pair.second) &&
+                          group_of_[pair.first] == group_of_[pair.second];
+    const bool merged = evidence.decision().merge && !undone_.contains(pair);
+    const auto rank = [this](const std::pair<const Pair, PairEvidence>& e) {
+      return std::tuple(-e.second.decision().viewpoints, maps_[e.first.first].id,
+                        maps_[e.first.second].id);
+    };
+    if (leads_on && merged && (best == nullptr || rank(entry) < rank(*best))) {
+      best = &entry;
+    }
+  }
+  const auto& [a, b] = best->first;
+  const Pose4 T_a_b = best->second.Alignment();
+  return placed.contains(a) ? Placed{b, maps_[a].T_map_odom * T_a_b}
+                            : Placed{a, maps_[b].T_map_odom * T_a_b.Inverse()};
+}
+
 void PoseGraph::Place(const Group& group) {
-  // Along the merges with most agreeing viewpoints, from the oldest map on.
   std::set<int> placed = {group.maps.front()};
   maps_[group.maps.front()].T_map_odom = {};
   while (placed.size() < group.maps.size()) {
-    const std::pair<const Pair, PairEvidence>* best = nullptr;
-    for (const auto& entry : pairs_) {
-      const auto& [pair, evidence] = entry;
-      const bool leads_on = placed.contains(pair.first) != placed.contains(pair.second) &&
-                            group_of_[pair.first] == group_of_[pair.second];
-      const bool merged = evidence.decision().merge && !undone_.contains(pair);
-      const auto rank = [this](const std::pair<const Pair, PairEvidence>& e) {
-        return std::tuple(-e.second.decision().viewpoints, maps_[e.first.first].id,
-                          maps_[e.first.second].id);
-      };
-      if (leads_on && merged && (best == nullptr || rank(entry) < rank(*best))) {
-        best = &entry;
-      }
-    }
-    const auto& [a, b] = best->first;
-    const Pose4 T_a_b = best->second.Alignment();
-    if (placed.contains(a)) {
-      maps_[b].T_map_odom = maps_[a].T_map_odom * T_a_b;
-      placed.insert(b);
-    } else {
-      maps_[a].T_map_odom = maps_[b].T_map_odom * T_a_b.Inverse();
-      placed.insert(a);
-    }
+    const Placed next = PlaceNext(placed);
+    maps_[next.map].T_map_odom = next.T_map_odom;
+    placed.insert(next.map);
   }
   for (const int number : group.maps) {
     MapChain& map = maps_[number];
+    map.log_scale = 0;
     for (size_t i = 0; i < map.chain.size(); ++i) {
-      map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
+      map.poses[i] = map.PoseOf(static_cast<int>(i));
     }
     map.newest_solved = -1;
     map.covariance.setZero();
@@ -156,9 +157,9 @@ void PoseGraph::Solve(Group* group, bool from_the_beginning) {
     return;
   }
 
-  const std::vector<SolvedMap> solved = SolvedMaps(*group, loops);
+  std::vector<SolvedMap> solved = SolvedMaps(*group, loops);
   GroupSolver solver(options_.solver);
-  AddMaps(*group, solved, &solver);
+  AddMaps(*group, {}, &solved, &solver);
   AddLoops(loops, solved, &solver);
   if (graduated) {
     solver.SolveGraduated();
@@ -198,19 +199,27 @@ std::vector<PoseGraph::SolvedMap> PoseGraph::SolvedMaps(const Group& group,
   return solved;
 }
 
-void PoseGraph::AddMaps(const Group& group, const std::vector<SolvedMap>& solved,
-                        GroupSolver* solver) const {
-  for (const SolvedMap& map : solved) {
+void PoseGraph::AddMaps(const Group& group, const std::set<int>& fixed_maps,
+                        std::vector<SolvedMap>* solved, GroupSolver* solver) const {
+  for (SolvedMap& map : *solved) {
+    const bool all_fixed = fixed_maps.contains(map.number);
+    const double scale_sigma = maps_[map.number].chain.UnknownScale();
+    if (scale_sigma > 0 && !all_fixed) {
+      map.scale = solver->AddScale(maps_[map.number].log_scale, scale_sigma);
+    }
     for (int i = map.first; i <= map.last; ++i) {
-      const bool fixed = map.number == group.maps.front() && i == map.first;
+      const bool fixed = all_fixed || (map.number == group.maps.front() && i == map.first);
       solver->AddNode(maps_[map.number].poses[i], fixed);
+    }
+    if (all_fixed) {
+      continue;
     }
     const OdometryChain& chain = maps_[map.number].chain;
     for (int i = map.first + 1; i <= map.last; ++i) {
       if (chain[i].edge_from >= map.first) {
         Relative4 edge = chain[i].edge;
         edge.covariance *= group.odometry_variance;
-        solver->AddOdometry(map.offset + chain[i].edge_from, map.offset + i, edge);
+        solver->AddOdometry(map.offset + chain[i].edge_from, map.offset + i, edge, map.scale);
       }
     }
   }
@@ -218,13 +227,16 @@ void PoseGraph::AddMaps(const Group& group, const std::vector<SolvedMap>& solved
 
 void PoseGraph::AddLoops(const std::vector<Loop*>& loops, const std::vector<SolvedMap>& solved,
                          GroupSolver* solver) const {
-  std::map<int, int> offset;
+  std::map<int, SolvedMap> by_number;
   for (const SolvedMap& map : solved) {
-    offset[map.number] = map.offset;
+    by_number[map.number] = map;
   }
   for (const Loop* loop : loops) {
-    solver->AddLoop(offset[loop->from.map] + loop->from.node, offset[loop->to.map] + loop->to.node,
-                    loop->relative, loop->on);
+    const SolvedMap& from = by_number.at(loop->from.map);
+    // Between maps, verification has weighed their scales.
+    solver->AddLoop(from.offset + loop->from.node,
+                    by_number.at(loop->to.map).offset + loop->to.node, loop->relative, loop->on,
+                    loop->intra() ? from.scale : GroupSolver::kMetric);
   }
 }
 
@@ -235,18 +247,19 @@ void PoseGraph::Apply(const GroupSolver& solver, const std::vector<SolvedMap>& s
   }
   const std::vector<Matrix4d> marginals = solver.Marginals(newest);
   for (size_t k = 0; k < solved.size(); ++k) {
-    const auto& [number, first, last, offset] = solved[k];
+    const auto& [number, first, last, offset, scale] = solved[k];
     MapChain& map = maps_[number];
+    map.log_scale = scale == GroupSolver::kMetric ? 0 : solver.log_scale(scale);
     for (int i = first; i <= last; ++i) {
       map.poses[i] = solver.pose(offset + i);
     }
     const Pose4& newest_pose = map.poses[last];
     const Eigen::Vector3d arm = YawRotation(newest_pose.yaw) * map.chain[last].T_odom_body.t;
-    map.T_map_odom = {newest_pose.p - arm, newest_pose.yaw};
+    map.T_map_odom = {newest_pose.p - map.scale() * arm, newest_pose.yaw};
     map.covariance = CovarianceAt(marginals[k], -arm);
     map.newest_solved = last;
     for (size_t i = last + 1; i < map.chain.size(); ++i) {
-      map.poses[i] = map.T_map_odom * Pose4{map.chain[i].T_odom_body.t, 0};
+      map.poses[i] = map.PoseOf(static_cast<int>(i));
     }
   }
 }

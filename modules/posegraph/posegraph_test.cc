@@ -6,86 +6,10 @@
 #include <algorithm>
 #include <random>
 
-#include "core/testing/synthetic_world.h"
+#include "posegraph/posegraph_test_world.h"
 
 namespace pangea {
 namespace {
-
-using Random = std::mt19937_64;
-
-SyntheticWorldOptions PosesOnly(int num_agents, int num_keyframes, uint64_t seed = 1) {
-  SyntheticWorldOptions options;
-  options.seed = seed;
-  options.num_agents = num_agents;
-  options.num_keyframes = num_keyframes;
-  options.with_corners = false;
-  return options;
-}
-
-// About `count` of the overlapping pairs, evenly; a share of them false.
-std::vector<Constraint> MakeConstraints(const SyntheticWorld& world, int count, double false_share,
-                                        uint64_t seed = 11) {
-  Random random(seed);
-  const std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
-  std::vector<Constraint> constraints;
-  const size_t stride = std::max<size_t>(1, pairs.size() / count);
-  for (size_t i = 0; i < pairs.size(); i += stride) {
-    const bool is_false = std::uniform_real_distribution<double>(0, 1)(random) < false_share;
-    constraints.push_back((is_false ? MakeFalseConstraint : MakeTrueConstraint)(
-        world, pairs[i].from, pairs[i].to, {}, random));
-  }
-  return constraints;
-}
-
-std::vector<Constraint> BetweenMaps(std::vector<Constraint> constraints) {
-  std::erase_if(constraints, [](const Constraint& one) { return one.kind != PlaceKind::kInter; });
-  return constraints;
-}
-
-void AddKeyframes(const SyntheticWorld& world, PoseGraph* graph) {
-  for (size_t k = 0; k < world.agents[0].keyframes.size(); ++k) {
-    for (const SyntheticAgent& agent : world.agents) {
-      graph->AddKeyframe(agent.keyframes[k]);
-    }
-  }
-}
-
-void AddConstraints(const std::vector<Constraint>& constraints, PoseGraph* graph) {
-  for (const Constraint& constraint : constraints) {
-    graph->AddConstraint(constraint);
-  }
-}
-
-PoseGraphUpdate Solve(const SyntheticWorld& world, const std::vector<Constraint>& constraints,
-                      PoseGraph* graph) {
-  AddKeyframes(world, graph);
-  AddConstraints(constraints, graph);
-  return graph->Finish();
-}
-
-// RMSE of positions after the best rotation about z and shift: the joint ATE of a group.
-double JointAte(const SyntheticWorld& world, const MapState& state) {
-  Eigen::Vector3d mean_map = Eigen::Vector3d::Zero(), mean_hall = Eigen::Vector3d::Zero();
-  const auto count = static_cast<double>(state.keyframes.size());
-  for (const KeyframePose& pose : state.keyframes) {
-    mean_map += pose.T_map_body.t / count;
-    mean_hall += world.T_hall_body(pose.id).t / count;
-  }
-  double cross = 0, dot = 0;
-  for (const KeyframePose& pose : state.keyframes) {
-    const Eigen::Vector3d a = pose.T_map_body.t - mean_map;
-    const Eigen::Vector3d b = world.T_hall_body(pose.id).t - mean_hall;
-    cross += a.x() * b.y() - a.y() * b.x();
-    dot += a.x() * b.x() + a.y() * b.y();
-  }
-  const Eigen::Quaterniond q = YawRotation(std::atan2(cross, dot));
-  double sum = 0;
-  for (const KeyframePose& pose : state.keyframes) {
-    sum += (q * (pose.T_map_body.t - mean_map) - (world.T_hall_body(pose.id).t - mean_hall))
-               .squaredNorm();
-  }
-  return std::sqrt(sum / count);
-}
 
 double OdometryAte(const SyntheticWorld& world, int agent) {
   MapState state;
@@ -246,6 +170,81 @@ TEST(PoseGraph, ADerivedConstraintMergesAloneUntilManyContradictIt) {
   EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
 }
 
+std::vector<uint8_t> Saved(PoseGraph* graph) {
+  ByteRecordWriter writer;
+  graph->Save(&writer);
+  return writer.Take();
+}
+
+TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  Constraint derived = Shifted(world, pairs[0], {});
+  derived.kind = PlaceKind::kDerived;
+  PoseGraph graph({});
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      graph.Take(keyframe);
+    }
+  }
+  graph.Take(derived);
+  const std::vector<uint8_t> bytes = Saved(&graph);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  EXPECT_EQ(restored.counters().groups, 1);
+  restored.AddConstraint(Shifted(world, pairs[pairs.size() / 2], {}));
+  restored.Finish();
+  EXPECT_EQ(restored.counters().groups, 1);
+  EXPECT_EQ(restored.counters().in_force, 2);
+}
+
+// What comes after the restart is laid beside the solution; a solve from the beginning comes later,
+// and is that of a graph which took all at once.
+TEST(PoseGraph, AMapThatCameAfterTheCheckpointJoinsItsSolution) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 100));
+  const MapId& late = world.agents[2].map;
+  const std::vector<Constraint> constraints = MakeConstraints(world, 120, 0.1);
+  PoseGraph before({}), all({});
+  const auto take = [&](PoseGraph* graph, bool of_late) {
+    for (const SyntheticAgent& agent : world.agents) {
+      for (const Keyframe& keyframe : agent.keyframes) {
+        if ((agent.map == late) == of_late) {
+          graph->Take(keyframe);
+        }
+      }
+    }
+    for (const Constraint& constraint : constraints) {
+      if ((constraint.from.map == late || constraint.to.map == late) == of_late) {
+        graph->Take(constraint);
+      }
+    }
+  };
+  take(&before, false);
+  take(&all, false);
+  take(&all, true);
+  const std::vector<uint8_t> bytes = Saved(&before);
+  const MapState solution = before.States().at(0);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  take(&restored, true);
+  const PoseGraphUpdate first = restored.Settle();
+  ASSERT_EQ(first.states.size(), 1u);
+  EXPECT_EQ(first.states[0].maps.size(), 3u);
+  EXPECT_EQ(first.corrections.size(), 3u);
+  for (size_t i = 0; i < solution.keyframes.size(); ++i) {
+    EXPECT_EQ(first.states[0].keyframes[i].T_map_body.t, solution.keyframes[i].T_map_body.t);
+  }
+  EXPECT_LT(JointAte(world, first.states[0]), 0.06);
+  restored.Finish();
+  all.Finish();
+  const MapState later = restored.States().at(0), once = all.States().at(0);
+  for (size_t i = 0; i < once.keyframes.size(); ++i) {
+    EXPECT_EQ(later.keyframes.at(i).T_map_body.t, once.keyframes[i].T_map_body.t);
+  }
+}
+
 TEST(PoseGraph, OptimisedRelativePosesAreAsGoodAsTheirCovariance) {
   double sum = 0;
   constexpr int kTrials = 20;
@@ -258,30 +257,8 @@ TEST(PoseGraph, OptimisedRelativePosesAreAsGoodAsTheirCovariance) {
     ASSERT_EQ(update.states.size(), 1u);
     const Correction& correction = update.corrections[1];
     ASSERT_EQ(correction.map, world.agents[1].map);
-    // The map frame is the odom of the first map, fixed at its first keyframe.
-    const Keyframe& first = world.agents[0].keyframes[0];
-    const Keyframe& newest = world.agents[1].keyframes[correction.seq];
-    const double yaw_map_hall =
-        YawOf(first.T_odom_body.q) - YawOf(world.agents[0].T_hall_body[0].q);
-    const double yaw_odom_hall =
-        YawOf(newest.T_odom_body.q) - YawOf(world.T_hall_body(newest.id).q);
-    const Eigen::Vector3d p_map_body =
-        first.T_odom_body.t + YawRotation(yaw_map_hall) * (world.T_hall_body(newest.id).t -
-                                                           world.agents[0].T_hall_body[0].t);
-    const Rigid3& T_map_odom = correction.T_map_odom;
-    // In the error's covariance the keyframe, not the origin of odom, is what is known best.
-    Vector4d error;
-    error << T_map_odom * newest.T_odom_body.t - p_map_body,
-        WrapAngle(YawOf(T_map_odom.q) - (yaw_map_hall - yaw_odom_hall));
-    Matrix4d at_origin;
-    constexpr int kBlock[4] = {0, 1, 2, 5};
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) {
-        at_origin(i, j) = correction.covariance(kBlock[i], kBlock[j]);
-      }
-    }
-    const Matrix4d covariance = CovarianceAt(at_origin, T_map_odom.q * newest.T_odom_body.t);
-    sum += error.dot(covariance.ldlt().solve(error));
+    const Vector4d error = ErrorOfNewest(world, correction);
+    sum += error.dot(CovarianceOfNewest(world, correction).ldlt().solve(error));
   }
   // Four degrees of freedom; the mean of 20 has a standard deviation of 0.63. Tilt errors wander
   // from edge to edge instead of being independent, hence the wider side below.

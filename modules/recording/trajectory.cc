@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 #include "files/csv.h"
@@ -56,20 +57,6 @@ bool ParsePose(const CsvRow& row, bool quaternion_w_first, Rigid3* pose, std::st
   return true;
 }
 
-Trajectory Finished(Trajectory trajectory, const std::string& path, const RowComplaints& complaints,
-                    size_t num_rows, const std::string& expected,
-                    std::vector<std::string>* warnings) {
-  complaints.ThrowIfTooMany(num_rows, expected);
-  if (trajectory.empty()) {
-    throw std::runtime_error(fmt::format("{}: holds no pose; expected rows: {}", path, expected));
-  }
-  for (const std::string& line : complaints.Lines()) {
-    warnings->push_back(line + "; row dropped");
-  }
-  Warn(SortByTime(&trajectory), path, warnings);
-  return trajectory;
-}
-
 }  // namespace
 
 int64_t UtimeFromNs(int64_t ns) { return ns / 1000 - (ns % 1000 < 0 ? 1 : 0); }
@@ -85,52 +72,74 @@ void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::
   }
 }
 
-Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings) {
-  const std::string expected = "seconds tx ty tz qx qy qz qw";
+namespace {
+
+// A row's stamp and pose. False, with a reason, when it is malformed.
+using RowParser = std::function<bool(const CsvRow& row, StampedPose* pose, std::string* why)>;
+
+Trajectory ReadRows(const std::string& path, const std::string& expected, const RowParser& parse,
+                    std::vector<std::string>* warnings) {
   const std::vector<CsvRow> rows = ReadCsv(path);
   Trajectory trajectory;
   RowComplaints complaints(path);
   for (const CsvRow& row : rows) {
     StampedPose pose;
-    double seconds = 0;
     std::string why;
     CheckFinite(path, row);
-    if (row.fields.size() != 8) {
-      complaints.Add(row.line, fmt::format("{} columns instead of 8", row.fields.size()));
-    } else if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > kMaxStamp_s) {
-      complaints.Add(row.line, fmt::format("'{}' is no stamp in seconds", row.fields[0]));
-    } else if (!ParsePose(row, false, &pose.T, &why)) {
-      complaints.Add(row.line, why);
-    } else {
-      pose.utime = std::llround(seconds * 1e6);
+    if (parse(row, &pose, &why)) {
       trajectory.push_back(pose);
+    } else {
+      complaints.Add(row.line, why);
     }
   }
-  return Finished(std::move(trajectory), path, complaints, rows.size(), expected, warnings);
+  complaints.ThrowIfTooMany(rows.size(), expected);
+  if (trajectory.empty()) {
+    throw std::runtime_error(fmt::format("{}: holds no pose; expected rows: {}", path, expected));
+  }
+  for (const std::string& line : complaints.Lines()) {
+    warnings->push_back(line + "; row dropped");
+  }
+  Warn(SortByTime(&trajectory), path, warnings);
+  return trajectory;
+}
+
+bool ParseTumRow(const CsvRow& row, StampedPose* pose, std::string* why) {
+  double seconds = 0;
+  if (row.fields.size() != 8) {
+    *why = fmt::format("{} columns instead of 8", row.fields.size());
+    return false;
+  }
+  if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > kMaxStamp_s) {
+    *why = fmt::format("'{}' is no stamp in seconds", row.fields[0]);
+    return false;
+  }
+  pose->utime = std::llround(seconds * 1e6);
+  return ParsePose(row, false, &pose->T, why);
+}
+
+bool ParseEurocRow(const CsvRow& row, StampedPose* pose, std::string* why) {
+  int64_t ns = 0;
+  if (row.fields.size() != 8 && row.fields.size() != 17) {
+    *why = fmt::format("{} columns instead of 8 or 17", row.fields.size());
+    return false;
+  }
+  if (!ParseNumber(row.fields[0], &ns)) {
+    *why = fmt::format("'{}' is no stamp in whole nanoseconds", row.fields[0]);
+    return false;
+  }
+  pose->utime = UtimeFromNs(ns);
+  return ParsePose(row, true, &pose->T, why);
+}
+
+}  // namespace
+
+Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings) {
+  return ReadRows(path, "seconds tx ty tz qx qy qz qw", ParseTumRow, warnings);
 }
 
 Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string>* warnings) {
-  const std::string expected = "nanoseconds, x, y, z, qw, qx, qy, qz (and 9 more, or none)";
-  const std::vector<CsvRow> rows = ReadCsv(path);
-  Trajectory trajectory;
-  RowComplaints complaints(path);
-  for (const CsvRow& row : rows) {
-    StampedPose pose;
-    int64_t ns = 0;
-    std::string why;
-    CheckFinite(path, row);
-    if (row.fields.size() != 8 && row.fields.size() != 17) {
-      complaints.Add(row.line, fmt::format("{} columns instead of 8 or 17", row.fields.size()));
-    } else if (!ParseNumber(row.fields[0], &ns)) {
-      complaints.Add(row.line, fmt::format("'{}' is no stamp in whole nanoseconds", row.fields[0]));
-    } else if (!ParsePose(row, true, &pose.T, &why)) {
-      complaints.Add(row.line, why);
-    } else {
-      pose.utime = UtimeFromNs(ns);
-      trajectory.push_back(pose);
-    }
-  }
-  return Finished(std::move(trajectory), path, complaints, rows.size(), expected, warnings);
+  return ReadRows(path, "nanoseconds, x, y, z, qw, qx, qy, qz (and 9 more, or none)", ParseEurocRow,
+                  warnings);
 }
 
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings) {

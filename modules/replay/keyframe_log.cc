@@ -64,7 +64,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
     LoggedKeyframe keyframe;
     keyframe.channel = event.channel;
     keyframe.data.assign(event.data.begin(), event.data.end());
-    keyframe_t message;
+    KeyframeMessage message;
     const bool decoded = DecodeMessage(event.data, &message);
     const auto id = decoded ? Parse(message.id) : Parsed<KeyframeId>{};
     if (!id.value) {

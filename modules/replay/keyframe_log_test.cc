@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "log_file/log_writer.h"
-#include "pangea/keyframe_t.hpp"
+#include "messages/keyframe_message.h"
 
 namespace pangea::session {
 namespace {
@@ -20,7 +20,7 @@ std::filesystem::path WriteLog(const std::string& name, int32_t agent,
   std::filesystem::remove(path);
   LogFileWriter file(path.string());
   for (const auto& [seq, utime] : keyframes) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     message.id.map.agent_id = agent;
     message.id.map.opened_utime = 100;
     message.id.seq = seq;

@@ -9,7 +9,6 @@
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "pangea/keyframe_t.hpp"
 
 namespace pangea::session {
 
@@ -20,7 +19,7 @@ LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readi
   std::optional<KeyframeId> newest;
   const auto take = [&](const LogEvent& event) {
     if (event.channel.starts_with(channels::kKeyframePrefix)) {
-      keyframe_t message{};
+      KeyframeMessage message{};
       const auto id = DecodeMessage(event.data, &message) ? Parse(message.id).value : std::nullopt;
       if (id && !newest) {
         edits[*id] = std::move(before_any);

@@ -138,7 +138,7 @@ void Finish(const Frames& frames, PoseTrack* track) {
 }
 
 bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (!DecodeMessage(data, &message)) {
     return false;
   }

@@ -1,10 +1,6 @@
 // pangea-session: scripted multi-agent sessions, their deterministic replay, and reports.
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
-#include <iostream>
-
+#include "options/command_line.h"
 #include "session/commands.h"
 
 int main(int argc, char** argv) {
@@ -22,13 +18,7 @@ int main(int argc, char** argv) {
   pangea::session::AddReplayCommand(app, &result);
   pangea::session::AddReportCommand(app, &result);
   pangea::session::AddCompareCommand(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-session: {}\n", error.what());
-    result.exit_code = 1;
-  }
-  return pangea::TellLosses("pangea-session", result.readings, result.exit_code);
+  const int failed = pangea::RunSubcommand(app, argc, argv);
+  return pangea::TellLosses("pangea-session", result.readings,
+                            failed != 0 ? failed : result.exit_code);
 }

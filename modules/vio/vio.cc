@@ -154,6 +154,9 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
   TakeOutReadout({finished.omega_body, finished.T_odom_body.q.conjugate() * finished.v_odom_body},
                  keyframe);
   keyframe.group_revision = group_revision_;
+  keyframe.scale_sigma =
+      std::min(finished.scale_sigma.value_or(scale_sigma_.value_or(0)), kMaxScaleSigma);
+  keyframe.T_body_cam_covariance = finished.T_body_cam_covariance;
   return keyframe;
 }
 

@@ -9,7 +9,6 @@
 
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "recording/tum.h"
 
@@ -25,8 +24,7 @@ constexpr char kContradicted[] =
 
 // In words, when the motion has not told the scale; else nothing.
 std::string UnknownScale(const std::optional<double>& sigma) {
-  constexpr double kUnknown = 0.03;
-  return sigma && *sigma > kUnknown
+  return sigma && *sigma > kMetricScaleSigma
              ? fmt::format(
                    "the scale is known to {:.0f} % at best: it takes acceleration, not even "
                    "motion or turning",

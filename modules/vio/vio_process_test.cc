@@ -11,7 +11,7 @@
 
 #include "files/text_file.h"
 #include "messages/channels.h"
-#include "pangea/keyframe_t.hpp"
+#include "messages/keyframe_message.h"
 #include "recording/trajectory.h"
 #include "vio/command_line.h"
 #include "vio/front_end/test_images.h"
@@ -155,7 +155,7 @@ TEST_F(VioProcessTest, LandmarksDoNotReachTheOdometry) {
     Play(process, 0, 6);
     bus.Drain();
     ASSERT_FALSE(run.empty());
-    keyframe_t last{};
+    KeyframeMessage last{};
     ASSERT_TRUE(DecodeMessage(run.back(), &last));
     const Keyframe keyframe = *Parse(last).value;
     Correction correction;
@@ -220,7 +220,7 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
   EXPECT_TRUE(process.outlet().uplink_ever_seen());
   ASSERT_EQ(again_.size(), 2u);
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   ASSERT_TRUE(DecodeMessage(again_[0].data, &keyframe));
   EXPECT_EQ(keyframe.id.seq, 2);
 }

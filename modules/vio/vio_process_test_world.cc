@@ -55,7 +55,7 @@ VioProcessTest::VioProcessTest() : world_(1) {
   options_.agent_id = 7;
   options_.map_utime = kMapUtime;
   bus_.Subscribe("KEYFRAME_7", [this](const std::string&, Bytes data) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     ASSERT_TRUE(DecodeMessage(data, &message));
     const auto keyframe = Parse(message);
     ASSERT_TRUE(keyframe.value) << keyframe.refused;

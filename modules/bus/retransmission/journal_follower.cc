@@ -21,8 +21,8 @@ JournalFollower::JournalFollower(Node& node, const Follows& follows, Handlers ha
       handlers_(std::move(handlers)),
       checkpoint_(std::move(checkpoint)),
       records_(std::move(records)) {
-  node_.Listen<keyframe_t>(channels::kAllKeyframes,
-                           std::bind_front(&JournalFollower::OnKeyframe, this));
+  node_.Listen<KeyframeMessage>(channels::kAllKeyframes,
+                                std::bind_front(&JournalFollower::OnKeyframe, this));
   if (follows_.matches == Which::kAll) {
     node_.Listen<place_match_t>(channels::kPlaceMatch,
                                 std::bind_front(&JournalFollower::OnMatch, this));
@@ -153,7 +153,7 @@ void JournalFollower::TakeNewMap(const MapId& map, int32_t highest_seq) {
 }
 
 void JournalFollower::OnRetransmission(const again_t& again) {
-  const bool known = TakeRetransmission<keyframe_t>(
+  const bool known = TakeRetransmission<KeyframeMessage>(
                          node_, again, std::bind_front(&JournalFollower::OnKeyframe, this)) ||
                      (follows_.matches != Which::kNone &&
                       TakeRetransmission<place_match_t>(
@@ -254,7 +254,7 @@ bool JournalFollower::TakeOfFile(const std::string& channel, Bytes data, int64_t
   bool taken = true;
   if (channel.starts_with(channels::kKeyframePrefix)) {
     event_ = offset;
-    TakeBytes<keyframe_t>(data, [&](Keyframe keyframe) {
+    TakeBytes<KeyframeMessage>(data, [&](Keyframe keyframe) {
       taken = !checkpoint_.place.writes || MayBeKept(keyframe);
       if (taken) {
         NoteMapOfFile(keyframe.id.map);

@@ -42,7 +42,7 @@ struct Follower {
                          std::to_string(request.to_seq));
     });
   }
-  static keyframe_t Message(int32_t seq, int32_t from_seq) {
+  static KeyframeMessage Message(int32_t seq, int32_t from_seq) {
     Keyframe keyframe;
     keyframe.id = {kMap, seq};
     keyframe.camera.width = keyframe.camera.height = 100;

@@ -56,7 +56,7 @@ bool JournalRecords::Read(int64_t offset, std::span<uint8_t> record) {
   if (offset < kJournal) {
     return others_ != nullptr && others_->Read(offset, record);
   }
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (DecodeMessage(ReadEventData(fd_, offset - kJournal), &message)) {
     if (const auto keyframe = Parse(message); keyframe.value) {
       const std::vector<uint8_t> made = encoder_(*keyframe.value);

@@ -17,12 +17,13 @@
 
 namespace pangea {
 
-// "udpm://GROUP:PORT?ttl=N&recv_buf_size=N", each with LCM's default.
+// "udpm://GROUP:PORT?ttl=N&recv_buf_size=N", each with LCM's default but the last: the kernel's
+// 200 kB, which LCM leaves as they are, lose bursts of keyframes.
 struct UdpmAddress {
   in_addr group{};
   uint16_t port = 7667;
   int ttl = 0;
-  int recv_buf_size = 0;  // bytes; 0: the kernel's default
+  int recv_buf_size = 4 << 20;  // bytes; 0: the kernel's default
 };
 
 // Throws std::runtime_error naming the URL and what is wrong with it.

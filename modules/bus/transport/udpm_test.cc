@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <thread>
@@ -10,6 +12,7 @@
 #include "bus/node.h"
 #include "bus/transport/test_datagrams.h"
 #include "bus/transport/udpm_receiver.h"
+#include "bus/transport/udpm_socket.h"
 
 namespace pangea {
 namespace {
@@ -203,8 +206,25 @@ TEST(UdpmUrl, IsReadAsLcmDoes) {
   EXPECT_EQ(ntohl(defaults.group.s_addr), 0xefff4c43);
   EXPECT_EQ(defaults.port, 7667);
   EXPECT_EQ(defaults.ttl, 0);
+  EXPECT_EQ(defaults.recv_buf_size, 4194304);
   EXPECT_EQ(ParseUdpmUrl("udpm://239.1.2.3").port, 7667);
   EXPECT_EQ(ParseUdpmUrl("udpm://239.1.2.3:1?recv_buf_size=1,ttl=10").ttl, 10);
+}
+
+int ReceiveBufferOf(const std::string& url) {
+  const int socket = OpenUdpmSocket(ParseUdpmUrl(url), LcmBus::Fragments::kJoined);
+  int bytes = 0;
+  socklen_t size = sizeof bytes;
+  EXPECT_EQ(getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &bytes, &size), 0);
+  close(socket);
+  return bytes;
+}
+
+// A user who leaves it out of the URL must not lose bursts.
+TEST(UdpmUrl, WithoutABufferSizeTheSocketHasAsMuchAsInTheDefaultUrl) {
+  const std::string url = "udpm://239.255.76.67:20011?ttl=0";
+  EXPECT_EQ(ReceiveBufferOf(url), ReceiveBufferOf(url + "&recv_buf_size=4194304"));
+  EXPECT_GT(ReceiveBufferOf(url), ReceiveBufferOf(url + "&recv_buf_size=100000"));
 }
 
 TEST(UdpmUrl, WhatMakesNoSenseIsAnErrorThatNamesIt) {

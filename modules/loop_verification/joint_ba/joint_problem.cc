@@ -201,13 +201,21 @@ std::vector<double*> JointProblem::FrameBlocks() {
   return blocks;
 }
 
+// Windows of one map have its unknown scale in common.
+double JointProblem::ScaleSigma(int side) const {
+  const Keyframe& newest = windows_[side]->newest_keyframe();
+  const bool of_one_map = newest.id.map == windows_[1 - side]->newest_keyframe().id.map;
+  return of_one_map ? options_.scale_sigma
+                    : std::max(options_.scale_sigma, UnknownScaleSigma(newest.scale_sigma));
+}
+
 void JointProblem::AddPosesAndEdges() {
   for (const int side : {kSideM, kSideC}) {
     for (int f = 0; f <= windows_[side]->newest(); ++f) {
       problem_->AddParameterBlock(Pose(side, f), 7, new RigidManifold);
     }
     problem_->AddParameterBlock(Scale(side), 1);
-    problem_->AddResidualBlock(new ScalePriorFactor(options_.scale_sigma), nullptr, Scale(side));
+    problem_->AddResidualBlock(new ScalePriorFactor(ScaleSigma(side)), nullptr, Scale(side));
     for (int f = 1; f <= windows_[side]->newest(); ++f) {
       const OdometryEdge& edge = *windows_[side]->keyframe(f).edge;
       problem_->AddResidualBlock(new EdgeFactor(edge.T_from_this, Floored(edge.covariance)),

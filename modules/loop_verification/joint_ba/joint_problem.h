@@ -79,6 +79,7 @@ class JointProblem {
                                  const std::vector<bool>& use) const;
   // Everything but the points and the fixed newest keyframe of m; the newest of c first.
   std::vector<double*> FrameBlocks();
+  double ScaleSigma(int side) const;
   void AddPosesAndEdges();
   void AddMatch(const PointMatch& match, double share, ceres::LossFunction* loss,
                 std::set<PointKey>* added);

@@ -53,9 +53,9 @@ Relative4 MakeRelative4(const Rigid3& T_from_to, const Matrix6d& covariance,
   return relative;
 }
 
-Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured) {
+Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured, double scale) {
   Vector4d residual;
-  residual << YawRotation(-from.yaw) * (to.p - from.p) - measured.t,
+  residual << YawRotation(-from.yaw) * (to.p - from.p) / scale - measured.t,
       WrapAngle(to.yaw - from.yaw - measured.yaw);
   return residual;
 }

@@ -51,8 +51,10 @@ Relative4 MakeRelative4(const Rigid3& T_from_to, const Matrix6d& covariance,
                         const Eigen::Matrix2d& roll_pitch_covariance_from,
                         const Eigen::Quaterniond& q_odom_to);
 
-// predicted - measured for two keyframe poses, in from's odom axes.
-Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured);
+// predicted - measured for two keyframe poses, in from's odom axes, and in the measurement's
+// metres: these are `scale` of the map's. So both sides shrink together, and a scale that nothing
+// tells is not drawn to where residuals are small.
+Vector4d Residual(const Pose4& from, const Pose4& to, const Relative4& measured, double scale = 1);
 
 // L^T of information = L L^T: |L^T r|^2 = r^T information r (a plain L only does for a diagonal
 // one). Variances below 1e-10 and above 1e6 are beyond what a solve can use and are bounded.

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
+#include "core/testing/numeric_jacobian.h"
 #include "posegraph/solver/pose_cost.h"
 
 namespace pangea {
@@ -66,6 +67,40 @@ TEST(RelativePoseCost, JacobiansAgreeWithDifferences) {
         EXPECT_LT((J[block].col(i) - numeric).norm(), 1e-6 * (1 + numeric.norm())) << trial;
       }
     }
+  }
+}
+
+TEST(ScaledPoseCost, JacobiansAgreeWithDifferences) {
+  Random random(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    Relative4 measured{NormalVector(random, 3), Normal(random, 1), {}};
+    measured.covariance = RandomCovariance<4>(random, 0.3);
+    const double weight = 0.7;
+    const ScaledPoseCost cost(measured, Whitening(measured.covariance), &weight);
+    const Pose4 from = RandomPose(random), to = RandomPose(random);
+    const double log_scale = Normal(random, 0.3);
+    using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+    RowMajor J[2];
+    Vector4d J_scale;
+    const auto evaluate = [&](const Eigen::VectorXd& offset, double** jacobians) {
+      Vector4d x[2];
+      x[0] << from.p, from.yaw;
+      x[1] << to.p, to.yaw;
+      x[0] += offset.head<4>();
+      x[1] += offset.segment<4>(4);
+      const double kappa = log_scale + offset[8];
+      const double* parameters[3] = {x[0].data(), x[1].data(), &kappa};
+      Eigen::VectorXd r(4);
+      EXPECT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
+      return r;
+    };
+    double* jacobians[3] = {J[0].data(), J[1].data(), J_scale.data()};
+    evaluate(Eigen::VectorXd::Zero(9), jacobians);
+    Eigen::Matrix<double, 4, 9> analytic;
+    analytic << J[0], J[1], J_scale;
+    const Eigen::MatrixXd numeric = NumericJacobian(
+        9, 1e-6, [&](const Eigen::VectorXd& offset) { return evaluate(offset, nullptr); });
+    EXPECT_LT((analytic - numeric).norm(), 1e-6 * (1 + numeric.norm())) << trial;
   }
 }
 

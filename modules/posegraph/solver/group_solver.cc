@@ -68,21 +68,32 @@ int GroupSolver::AddNode(const Pose4& pose, bool fixed) {
   return static_cast<int>(nodes_.size()) - 1;
 }
 
-void GroupSolver::AddEdge(int from, int to, const Relative4& relative, const Matrix4d& whitening,
-                          const double* sqrt_weight) {
-  problem_->AddResidualBlock(new RelativePoseCost(relative, whitening, sqrt_weight), nullptr,
-                             nodes_[from].data(), nodes_[to].data());
+int GroupSolver::AddScale(double log_scale, double sigma) {
+  scales_.push_back(log_scale);
+  problem_->AddResidualBlock(new ScalePriorCost(sigma), nullptr, &scales_.back());
+  return static_cast<int>(scales_.size()) - 1;
 }
 
-void GroupSolver::AddOdometry(int from, int to, const Relative4& relative) {
-  AddEdge(from, to, relative, Whitening(relative.covariance), &kOne);
+void GroupSolver::AddEdge(int from, int to, int scale, const Relative4& relative,
+                          const Matrix4d& whitening, const double* sqrt_weight) {
+  if (scale == kMetric) {
+    problem_->AddResidualBlock(new RelativePoseCost(relative, whitening, sqrt_weight), nullptr,
+                               nodes_[from].data(), nodes_[to].data());
+  } else {
+    problem_->AddResidualBlock(new ScaledPoseCost(relative, whitening, sqrt_weight), nullptr,
+                               nodes_[from].data(), nodes_[to].data(), &scales_[scale]);
+  }
 }
 
-int GroupSolver::AddLoop(int from, int to, const Relative4& relative, bool on) {
-  loops_.push_back({from, to, relative, Whitening(relative.covariance)});
+void GroupSolver::AddOdometry(int from, int to, const Relative4& relative, int scale) {
+  AddEdge(from, to, scale, relative, Whitening(relative.covariance), &kOne);
+}
+
+int GroupSolver::AddLoop(int from, int to, const Relative4& relative, bool on, int scale) {
+  loops_.push_back({from, to, scale, relative, Whitening(relative.covariance)});
   Loop& loop = loops_.back();
   SetWeight(&loop, on ? 1 : 0);
-  AddEdge(from, to, relative, loop.whitening, &loop.sqrt_weight);
+  AddEdge(from, to, scale, relative, loop.whitening, &loop.sqrt_weight);
   return static_cast<int>(loops_.size()) - 1;
 }
 
@@ -96,7 +107,9 @@ void GroupSolver::SetWeight(Loop* loop, double weight) {
 }
 
 double GroupSolver::SquaredResidual(const Loop& loop) const {
-  return (loop.whitening * Residual(pose(loop.from), pose(loop.to), loop.relative)).squaredNorm();
+  const double scale = loop.scale == kMetric ? 1 : std::exp(scales_[loop.scale]);
+  return (loop.whitening * Residual(pose(loop.from), pose(loop.to), loop.relative, scale))
+      .squaredNorm();
 }
 
 void GroupSolver::Minimise(int max_iterations) {
@@ -179,6 +192,9 @@ std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) cons
   std::vector<Matrix4d> marginals(nodes.size(), Matrix4d::Zero());
   if (blocks.empty()) {
     return marginals;
+  }
+  for (const double& scale : scales_) {
+    blocks.push_back(const_cast<double*>(&scale));
   }
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = blocks;

@@ -10,7 +10,7 @@
 #include "bus/process.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
-#include "pangea/keyframe_t.hpp"
+#include "messages/keyframe_message.h"
 #include "pangea/pose_t.hpp"
 #include "recording/euroc.h"
 
@@ -77,7 +77,7 @@ void AnchorApp::OnPose(int32_t agent, Bytes data) {
 }
 
 void AnchorApp::OnKeyframe(int32_t agent, Bytes data) {
-  keyframe_t message;
+  KeyframeMessage message;
   if (!DecodeMessage(data, &message)) {
     return;
   }

@@ -9,7 +9,6 @@
 #include "bus/process.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 
 namespace pangea::session {
@@ -136,7 +135,7 @@ void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
 
 // Stored keyframes come without poses between them.
 void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
-  keyframe_t message;
+  KeyframeMessage message;
   if (with_odometry_.contains(agent_id) || !DecodeMessage(data, &message)) {
     return;
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "vio/window/landmark_factor.h"
@@ -57,6 +58,13 @@ class ScaleError {
   Eigen::RowVectorXd sum_;
   int count_ = 0;
 };
+
+// The window has rotation first, messages translation.
+Matrix6d ExtrinsicsCovariance(const MatrixXd& P) {
+  const std::array<int, 6> order = {3, 4, 5, 0, 1, 2};
+  const Matrix6d covariance = P.block<6, 6>(kExtrinsics, kExtrinsics)(order, order);
+  return 0.5 * (covariance + covariance.transpose());
+}
 
 std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const MatrixXd& P,
                                      const TrackHistory& history, int frame, ScaleError* scale) {
@@ -144,6 +152,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
     }
   }
   keyframe.scale_sigma = scale.Sigma(P);
+  keyframe.T_body_cam_covariance = ExtrinsicsCovariance(P);
   return keyframe;
 }
 
