@@ -12,7 +12,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from ablation_lib.recording import numbers  # noqa: E402
-from generalization_lib import paths, pictures  # noqa: E402
+from generalization_lib import paths, people, pictures  # noqa: E402
 from generalization_lib.plan import PAIRS, WORLDS, Plan  # noqa: E402
 from generalization_lib.spoil import NS, PHONE, SPOILERS, Recording  # noqa: E402
 from generalization_lib.tables import Tables  # noqa: E402
@@ -106,6 +106,25 @@ class SpoilTest(unittest.TestCase):
         self.assertNotIn("0.png", steps.painted)
         self.assertEqual(steps.painted["60.png"](bytes([100, 250])), bytes([40, 100]))
         self.assertEqual(steps.painted["120.png"](bytes([100, 250])), bytes([180, 255]))
+
+    def test_people_walk_past_the_true_camera(self):
+        # The camera looks along x; it stands at the origin and then is 1 m further on.
+        yaml = "T_BS:\n  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\nresolution: [640, 480]\n" \
+               "intrinsics: [400, 400, 320, 240]\ndistortion_coefficients: [0, 0, 0, 0]\n"
+        (self.mav0 / "cam0/sensor.yaml").write_text(yaml)
+        truth = self.mav0 / "state_groundtruth_estimate0"
+        truth.mkdir()
+        (truth / "data.csv").write_text("".join(f"{NS + NS // 20 * i},{int(i >= 230)},0,0,1,0,0,0\n" for i in range(400)))
+        view = people.View(Recording(self.mav0))
+        one = people.Passage(9, 12, [people.Person(3.0, 0.0, [[7] * people.COLUMNS] * people.ROWS)])
+        x0, x1, y0, y1 = next(view.rectangles(one, 10.5))[0]
+        for value, expected in ((x0 + x1, 640), (x1 - x0, 400 * people.WIDTH_M / 3), (y1, 240 + 400 * people.EYES_M / 3),
+                                (y1 - y0, 400 * people.HEIGHT_M / 3)):
+            self.assertAlmostEqual(value, expected, places=3)
+        x2, x3, *_ = next(view.rectangles(one, 11.75))[0]  # 1.5 m to the right, and nearer by 1 m
+        self.assertAlmostEqual(x2 + x3, 640 + 2 * 400 * 1.5 / 2, places=3)
+        pixels = people.painted(bytes(640 * 480), view.camera, [((-10.0, 2.0, 470.0, 900.0), one.people[0].clothes)])
+        self.assertEqual([i for i, grey in enumerate(pixels) if grey], [640 * y + x for y in range(470, 480) for x in (0, 1)])
 
     def test_images_that_stay_are_links(self):
         folder = self.mav0.parent / "images"

@@ -11,6 +11,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from ablation_lib.recording import direction, numbers, put, rotated  # noqa: E402
 from generalization_lib import pictures  # noqa: E402
+from generalization_lib.people import crowd, people  # noqa: E402
 
 NS = 1_000_000_000
 # A phone's IMU: white noise and walks several times EuRoC's, 100 Hz (densities of the order of the BMI160's).
@@ -22,6 +23,7 @@ class Recording:
     """Rows of the two tables, as text, the two sensor.yaml, and images to be painted over: file -> what its pixels become."""
 
     def __init__(self, mav0):
+        self.mav0 = mav0
         self.painted = {}
         self.images = self._rows(mav0 / "cam0/data.csv")
         self.imu = self._rows(mav0 / "imu0/data.csv")
@@ -198,6 +200,11 @@ def covered(recording):
     cover(recording, (10, 11), (25, 27))
 
 
+def hand(recording):
+    """A hand over the lens, for 3 s and for 4.5 s."""
+    cover(recording, (10, 13), (25, 29.5))
+
+
 def pocket(recording):
     """Nothing to be seen for 8 s."""
     cover(recording, (15, 23))
@@ -235,7 +242,8 @@ def browser_stamps(recording):
 
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
                                     jitter, accel_bias, phone_imu, noise_10_times, noise_a_tenth, third_of_imu, large_accel_bias,
-                                    accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, pocket, exposure_steps)}
+                                    accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, hand, pocket,
+                                    exposure_steps, people, crowd)}
 
 
 def main():

@@ -4,16 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
 #include "vio/imu/stationary_detector.h"
 #include "vio/initialization/initialiser.h"
 #include "vio/keyframes/frame_choice.h"
-#include "vio/keyframes/keyframe_finisher.h"
+#include "vio/keyframes/keyframe_publisher.h"
 #include "vio/keyframes/track_history.h"
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmark_check.h"
 #include "vio/window/landmark_store.h"
 #include "vio/window/stamp_jitter.h"
 #include "vio/window/unmodelled_acceleration.h"
@@ -39,38 +38,8 @@ constexpr double kMaxAccelBias = 4;  // m/s^2
 constexpr int kMaxIterations = 4;
 // A start has no solution of the image before: where it knows little, four end half way.
 constexpr int kStartIterations = 20;
-// A landmark is an outlier when its newest ray is this far off, or all of them together.
-constexpr double kMaxRayError = 5.0;     // sigmas
-constexpr double kMaxLandmarkRms = 2.0;  // sigmas of a ray's coordinate
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
-
-// 95 % quantile of chi-square (Wilson & Hilferty, 1931).
-double ChiSquare95(int degrees_of_freedom) {
-  const double k = degrees_of_freedom;
-  const double c = 1 - 2 / (9 * k) + 1.6449 * std::sqrt(2 / (9 * k));
-  return k * c * c * c;
-}
-
-struct LandmarkError {
-  double sum = 0;    // of squares, sigmas
-  double worst = 0;  // ray, sigmas
-};
-LandmarkError ErrorOf(const WindowState& state, const Landmark& landmark) {
-  LandmarkError error;
-  const Eigen::Vector3d p_odom = InOdom(state, landmark.point);
-  for (const FrameRay& ray : landmark.rays) {
-    const double e = RayError(state, p_odom, ray);
-    error.sum += e * e;
-    error.worst = std::max(error.worst, e);
-  }
-  return error;
-}
-
-bool IsSeenIn(int frame, const Landmark& landmark) {
-  return std::any_of(landmark.rays.begin(), landmark.rays.end(),
-                     [frame](const FrameRay& ray) { return ray.frame == frame; });
-}
 
 }  // namespace
 
@@ -96,20 +65,14 @@ struct Estimator::Impl {
   void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
   std::optional<std::string> AddToWindow(const TrackedFrame& frame);
   void DropNonKeyframe();
-  bool ContradictedWithin(int64_t after_utime, int64_t to_utime) const;
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
   void FoldLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
-  FinishedKeyframe Publish(int index, const MatrixXd& P);
   std::optional<std::string> Implausible() const;
   int64_t ImuTime(int64_t frame_utime) const {
     return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
-  }
-  // When its image was taken, by the IMU's clock.
-  int64_t TakenAt(const WindowFrame& frame) const {
-    return ImuTime(frame.utime) + std::llround(1e6 * frame.stamp_error_s);
   }
   WindowFrame& Newest() { return problem.state.frames.back(); }
   const WindowFrame& LastWindowKeyframe() const {
@@ -130,10 +93,8 @@ struct Estimator::Impl {
   StationaryDetector stationary_detector;
   StampJitter stamp_jitter;
   FrameChoice choice;
-  std::optional<FinishedKeyframe> previous;         // the last published keyframe
-  Matrix6d previous_covariance = Matrix6d::Zero();  // of its pose, when it was published
-  int64_t last_tracked = 0;                         // utime of the newest image that is one
-  std::set<int64_t> contradicted_utimes;            // ends of such IMU factors since then
+  KeyframePublisher publisher;
+  int64_t last_tracked = 0;  // utime of the newest image that is one
   bool lost = false;
 };
 
@@ -220,11 +181,6 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
   return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 
-bool Estimator::Impl::ContradictedWithin(int64_t after_utime, int64_t to_utime) const {
-  const auto first = contradicted_utimes.upper_bound(after_utime);
-  return first != contradicted_utimes.end() && *first <= to_utime;
-}
-
 // Optimises the window; the tracks that turned out to be outliers.
 std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   problem.landmarks = landmarks.Gather(problem.state, history);
@@ -232,22 +188,15 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   if (AllowForUnmodelledAcceleration(noise, &problem)) {
     Optimise(problem, max_iterations);
   }
-  for (int to = 1; to <= problem.state.Newest(); ++to) {
-    if (problem.imu_factors[to] && problem.imu_factors[to]->contradicted) {
-      contradicted_utimes.insert(problem.state.frames[to].utime);
-    }
-  }
+  publisher.NoteContradicted(problem);
   std::vector<int32_t> outliers;
   const int newest = problem.state.Newest();
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
-    const bool is_seen = IsSeenIn(newest, landmark);
-    const auto [sum, worst] = ErrorOf(problem.state, landmark);
-    const double rms = std::sqrt(sum / (2.0 * static_cast<double>(landmark.rays.size())));
-    if (rms < kMaxLandmarkRms && worst < kMaxRayError) {
+    if (!IsOutlier(problem.state, landmark)) {
       return false;
     }
     history.RemoveLandmark(landmark.id);
-    if (is_seen) {
+    if (IsSeenIn(newest, landmark)) {
       outliers.push_back(landmark.id);
     }
     return true;
@@ -255,34 +204,6 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   landmarks.Keep(problem);
   last_tracked = Newest().is_tracked ? Newest().utime : last_tracked;
   return outliers;
-}
-
-FinishedKeyframe Estimator::Impl::Publish(int index, const MatrixXd& P) {
-  WindowState& state = problem.state;
-  FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
-  const int at = state.Offset(index);
-  const auto from = previous ? state.Find(previous->utime) : std::nullopt;
-  if (from) {
-    const int at_from = state.Offset(*from);
-    keyframe.edge = FinishedKeyframe::Edge{previous->T_odom_body.Inverse() * keyframe.T_odom_body,
-                                           RelativeCovariance(state, P, *from, index)};
-    keyframe.edge->covariance +=
-        CorrectionCovariance(previous_covariance - P.block<6, 6>(at_from, at_from),
-                             previous->T_odom_body, keyframe.T_odom_body);
-    ScaledPreintegration span =
-        imu_samples.Integrate(TakenAt(state.frames[*from]), TakenAt(state.frames[index]),
-                              state.imu_intrinsics, previous->gyro_bias, previous->accel_bias);
-    if (span.measured.duration_s > 0 && !ContradictedWithin(previous->utime, keyframe.utime)) {
-      span.measured.covariance.diagonal().array() += 1e-14;
-      keyframe.preintegration = span.measured;
-    }
-  }
-  state.frames[index].is_published = true;
-  contradicted_utimes.erase(contradicted_utimes.begin(),
-                            contradicted_utimes.upper_bound(keyframe.utime));
-  previous = keyframe;
-  previous_covariance = P.block<6, 6>(at, at);
-  return keyframe;
 }
 
 // Publishes the keyframes up to frame `newest` that have not been.
@@ -294,7 +215,7 @@ void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* fin
       if (P.size() == 0) {
         P = WindowCovariance(problem);
       }
-      finished->push_back(Publish(i, P));
+      finished->push_back(publisher.Publish(problem.state, P, history, imu_samples, i));
     }
   }
 }
@@ -312,7 +233,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
       break;
     }
     PublishUpTo(oldest, finished);
-    const int64_t published = previous ? previous->utime : 0;
+    const int64_t published = publisher.last_utime().value_or(0);
     Marginalisation what;
     what.keep_pose = state.frames[oldest].utime == published;
     what.drop_kept_pose = state.frames.front().utime != published;
@@ -322,7 +243,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   }
   landmarks.Forget(history);
   const int64_t needed = std::min(state.frames.front().imu_utime,
-                                  previous ? ImuTime(previous->utime) : Newest().imu_utime);
+                                  ImuTime(publisher.last_utime().value_or(Newest().utime)));
   imu_samples.Forget(needed);
 }
 
@@ -334,8 +255,7 @@ void Estimator::Impl::FoldLandmarks(int frame) {
       return false;
     }
     landmarks.StartAnew(landmark.id, Newest().utime);
-    return ErrorOf(problem.state, landmark).sum >
-           ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
+    return !FitsAsWhole(problem.state, landmark);
   });
 }
 

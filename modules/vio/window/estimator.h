@@ -91,6 +91,7 @@ struct FinishedKeyframe {
   // The same span; none where the images contradict it (unmodelled_acceleration.h).
   std::optional<Preintegration> preintegration;
   std::vector<LandmarkDepth> landmarks;
+  Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // (translation, rotation) in the left frame
   // Of the scale of what it sees, as a share; none with too few depths to tell.
   std::optional<double> scale_sigma;
 };

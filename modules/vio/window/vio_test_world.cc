@@ -55,7 +55,7 @@ ImuIntrinsics RandomImuIntrinsics(const ImuNoise& noise, uint64_t seed) {
 }  // namespace
 
 VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
-    : options_(options), rng_(options.seed) {
+    : options_(options), rng_(options.seed), crowd_rng_(options.seed) {
   camera_ = PinholeTestCamera(640, 480, 400);
   camera_.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng_, 0.05)),
                         RandomVector(rng_, 0.05)};
@@ -138,12 +138,58 @@ std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& 
   return pixel && camera_.Contains(*pixel, 5) ? pixel : std::nullopt;
 }
 
+// To the right of where the camera looks as it sets off.
+Vector3d VioTestWorld::CrowdMoved(double t) const {
+  const Eigen::Quaterniond q = PoseAt(options_.crowd_moves_s).q * true_T_body_cam_.q;
+  Vector3d right = q * Vector3d::UnitX();
+  right.z() = 0;
+  const double moving_s = std::max(0.0, t - options_.crowd_moves_s);
+  const double soft_s = options_.crowd_sets_off ? options_.crowd_mps : 0;  // 1 m/s^2
+  const double distance = moving_s < soft_s ? 0.5 * moving_s * moving_s
+                                            : options_.crowd_mps * moving_s - 0.5 * soft_s * soft_s;
+  return distance * right.normalized();
+}
+
+void VioTestWorld::ObserveCrowd(double t, const Rigid3& T_odom_cam) {
+  const bool is_there = t >= options_.crowd_comes_s && t < options_.crowd_end_s;
+  const auto wanted = static_cast<size_t>(
+      is_there ? std::lround(options_.crowd_share * static_cast<double>(kTracks)) : 0);
+  const Vector3d moved = CrowdMoved(t);
+  std::erase_if(tracks_, [&](const auto& item) {
+    return item.second.in_crowd && (wanted == 0 || !Seen(item.second.point + moved, T_odom_cam));
+  });
+  const auto in_crowd = [](const auto& item) { return item.second.in_crowd; };
+  auto count = static_cast<size_t>(std::count_if(tracks_.begin(), tracks_.end(), in_crowd));
+  if (count == 0 && wanted > 0) {  // it hides what is behind
+    std::bernoulli_distribution hidden(options_.crowd_share);
+    std::erase_if(tracks_, [&](const auto&) { return hidden(crowd_rng_); });
+  }
+  std::uniform_real_distribution<double> x(5, camera_.width - 6), y(5, camera_.height - 6);
+  std::uniform_real_distribution<double> depth(2, 4);
+  for (; count < wanted; ++count) {
+    const Vector2d pixel(x(crowd_rng_), y(crowd_rng_));
+    const Vector2d ray = *true_intrinsics_.Unproject(pixel);
+    Track track;
+    track.point = T_odom_cam * (depth(crowd_rng_) * ray.homogeneous()) - moved;
+    track.in_crowd = true;
+    tracks_[next_id_] = track;
+    all_tracks_[next_id_] = track;
+    ++next_id_;
+  }
+}
+
 TrackedFrame VioTestWorld::Observe(int64_t utime) {
-  const Rigid3 T_odom_cam = PoseAt(Seconds(utime) + true_time_offset_s_) * true_T_body_cam_;
+  const double t = Seconds(utime) + true_time_offset_s_;
+  const Rigid3 T_odom_cam = PoseAt(t) * true_T_body_cam_;
   std::uniform_real_distribution<double> uniform;
   std::erase_if(tracks_, [&](const auto& item) {
-    return !Seen(item.second.point, T_odom_cam) || uniform(rng_) < kLossPerFrame;
+    return !item.second.in_crowd &&
+           (!Seen(item.second.point, T_odom_cam) || uniform(rng_) < kLossPerFrame);
   });
+  if (options_.crowd_share > 0) {
+    ObserveCrowd(t, T_odom_cam);
+  }
+  const Vector3d moved = CrowdMoved(t);
   for (int tries = 0; tracks_.size() < kTracks && tries < 5000; ++tries) {
     const Vector3d& point = points_[rng_() % points_.size()];
     const bool taken = std::any_of(tracks_.begin(), tracks_.end(),
@@ -159,8 +205,8 @@ TrackedFrame VioTestWorld::Observe(int64_t utime) {
   }
   TrackedFrame frame{utime, {}};
   for (auto& [id, track] : tracks_) {
-    Vector2d pixel =
-        *Seen(track.point, T_odom_cam) + RandomVector(rng_, options_.pixel_noise).head<2>();
+    const Vector3d point = track.in_crowd ? Vector3d(track.point + moved) : track.point;
+    Vector2d pixel = *Seen(point, T_odom_cam) + RandomVector(rng_, options_.pixel_noise).head<2>();
     if (track.slides) {
       track.slid += track.velocity;
       pixel += track.slid;
@@ -205,7 +251,7 @@ ImuState VioTestWorld::TruthAt(int64_t frame_utime) const {
 
 std::optional<double> VioTestWorld::TrueDepth(int32_t landmark_id, int64_t frame_utime) const {
   const Track& track = all_tracks_.at(landmark_id);
-  if (track.slides) {
+  if (track.slides || track.in_crowd) {
     return std::nullopt;
   }
   return ((TruthAt(frame_utime).T_odom_body * true_T_body_cam_).Inverse() * track.point).z();

@@ -51,6 +51,12 @@ struct VioTestWorldOptions {
   // The body stands still in between, seconds.
   double stationary_begin_s = -10, stationary_end_s = -10;
   double stamp_jitter_s = 0;  // of the images' stamps
+  // A crowd or a bus, 2 to 4 m away, has this share of the tracks. It comes, sets off with 1 m/s^2
+  // or is at its speed at once, and is gone at the end.
+  double crowd_share = 0;
+  double crowd_mps = 1;
+  double crowd_comes_s = 0, crowd_moves_s = 0, crowd_end_s = 0;
+  bool crowd_sets_off = true;
   // Errors of the calibration the estimator is given.
   double extrinsics_rotation_sigma = 0;  // rad
   double extrinsics_position_sigma = 0;  // m
@@ -79,12 +85,13 @@ class VioTestWorld {
   double true_time_offset_s() const { return true_time_offset_s_; }
   // The body when an image of the past was taken.
   ImuState TruthAt(int64_t frame_utime) const;
-  // Along the camera's z axis; nothing for a track that slid off.
+  // Along the camera's z axis; nothing for a track that slid off or moves.
   std::optional<double> TrueDepth(int32_t landmark_id, int64_t frame_utime) const;
 
  private:
   struct Track {
-    Eigen::Vector3d point;
+    Eigen::Vector3d point;  // of the crowd: before it moved
+    bool in_crowd = false;
     bool slides = false;
     Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  // pixels per image
     Eigen::Vector2d slid = Eigen::Vector2d::Zero();
@@ -93,10 +100,14 @@ class VioTestWorld {
   Eigen::Vector3d VelocityAt(double t) const;
   ImuSample SampleAt(int64_t utime);
   std::optional<Eigen::Vector2d> Seen(const Eigen::Vector3d& point, const Rigid3& T_odom_cam) const;
+  Eigen::Vector3d CrowdMoved(double t) const;
+  // Its tracks come, go on and end.
+  void ObserveCrowd(double t, const Rigid3& T_odom_cam);
   TrackedFrame Observe(int64_t utime);
 
   VioTestWorldOptions options_;
   std::mt19937_64 rng_;
+  std::mt19937_64 crowd_rng_;  // of its own: the world stays as it is
   CameraModel camera_;
   CameraModel true_intrinsics_;
   Rigid3 true_T_body_cam_;
