@@ -145,6 +145,10 @@ void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments) {
   app.add_option("--key", arguments->key, "... and its key (PEM)");
   app.add_option("--page", arguments->page,
                  "folder of the built page (default: the installed one)");
+  app.add_option("--recordings-gb", arguments->recordings_gb,
+                 "so much of the recordings that pages upload is kept; 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
   app.require_subcommand(0, 1);
   AddSubcommands(app);
 }

@@ -34,13 +34,13 @@ std::string PagePolicy(const std::string& host) {
       host);
 }
 
-// "/link?agent=7" is 7.
-std::optional<int32_t> AgentOfLink(std::string_view target) {
-  constexpr std::string_view kLink = "/link?agent=";
-  if (!target.starts_with(kLink)) {
+// "/link?agent=7" is 7, for "/link".
+std::optional<int32_t> AgentOf(std::string_view target, std::string_view path) {
+  constexpr std::string_view kAgent = "?agent=";
+  if (!target.starts_with(path) || !target.substr(path.size()).starts_with(kAgent)) {
     return std::nullopt;
   }
-  const std::string_view digits = target.substr(kLink.size());
+  const std::string_view digits = target.substr(path.size() + kAgent.size());
   int32_t agent_id = 0;
   const char* const last = digits.data() + digits.size();
   const auto [end, error] = std::from_chars(digits.data(), last, agent_id);
@@ -49,20 +49,41 @@ std::optional<int32_t> AgentOfLink(std::string_view target) {
              : std::nullopt;
 }
 
-}  // namespace
-
-void Gateway::SetAgents(std::map<int32_t, Agent> agents) {
-  for (auto connected = connected_.begin(); connected != connected_.end();) {
-    LinkSocket* const socket = connected->second;
-    const auto before = agents_.find(socket->agent_id());
-    const auto after = agents.find(socket->agent_id());
-    if (after != agents.end() && after->second.key == before->second.key) {
-      ++connected;
+// Cuts off whose key is another one in `after`, or not there any more.
+template <typename Socket>
+void EndOthers(const std::map<int32_t, Gateway::Agent>& before,
+               const std::map<int32_t, Gateway::Agent>& after,
+               std::map<int32_t, Socket*>* sockets) {
+  for (auto it = sockets->begin(); it != sockets->end();) {
+    Socket* const socket = it->second;
+    const auto agent = after.find(it->first);
+    if (agent != after.end() && agent->second.key == before.at(it->first).key) {
+      ++it;
     } else {
-      connected = connected_.erase(connected);
+      it = sockets->erase(it);
       socket->End(kNotKnown);
     }
   }
+}
+
+// Takes the place of the agent's former socket, or a free one.
+template <typename Socket>
+bool TakePlace(Socket* socket, size_t max_at_once, std::map<int32_t, Socket*>* sockets) {
+  if (const auto former = sockets->find(socket->agent_id()); former != sockets->end()) {
+    former->second->End(kReplaced);
+  } else if (sockets->size() >= max_at_once) {
+    socket->End(kTooMany);
+    return false;
+  }
+  (*sockets)[socket->agent_id()] = socket;
+  return true;
+}
+
+}  // namespace
+
+void Gateway::SetAgents(std::map<int32_t, Agent> agents) {
+  EndOthers(agents_, agents, &connected_);
+  EndOthers(agents_, agents, &uploads_);
   agents_ = std::move(agents);
 }
 
@@ -132,44 +153,49 @@ WebAnswer Gateway::File(const WebRequest& request) const {
 }
 
 std::unique_ptr<web::WebPeer> Gateway::Open(const WebRequest& request) {
-  const auto agent_id = AgentOfLink(request.target);
-  if (!agent_id) {
+  std::unique_ptr<AgentSocket> socket;
+  if (const auto agent_id = AgentOf(request.target, "/link")) {
+    socket = std::make_unique<LinkSocket>(*this, *agent_id);
+  } else if (const auto uploader = AgentOf(request.target, "/recording")) {
+    socket = std::make_unique<RecordingSocket>(*this, *uploader);
+  } else {
     return nullptr;
   }
   if (unproven_.size() >= kMaxUnproven) {
     unproven_.front()->End(kTooMany);
     unproven_.pop_front();
   }
-  auto socket = std::make_unique<LinkSocket>(*this, *agent_id);
   unproven_.push_back(socket.get());
   return socket;
 }
 
-bool Gateway::OnProof(LinkSocket* socket, Bytes proof) {
+bool Gateway::OnProof(AgentSocket* socket, Bytes proof) {
   unproven_.remove(socket);
   const int32_t agent_id = socket->agent_id();
   const auto agent = agents_.find(agent_id);
   // The same work for an agent that nobody knows.
   const SecretKey key = agent == agents_.end() ? SecretKey::Random() : agent->second.key;
   const auto expected = GatewayProof(key, agent_id, socket->nonce());
-  if (proof.size() != expected.size() ||
-      sodium_memcmp(proof.data(), expected.data(), expected.size()) != 0) {
-    socket->End(kNotKnown);
-    return false;
+  if (proof.size() == expected.size() &&
+      sodium_memcmp(proof.data(), expected.data(), expected.size()) == 0) {
+    return true;
   }
-  if (const auto former = connected_.find(agent_id); former != connected_.end()) {
-    former->second->End(kReplaced);
-  } else if (connected_.size() >= kMaxAgentsAtOnce) {
-    socket->End(kTooMany);
-    return false;
-  }
-  connected_[agent_id] = socket;
-  return true;
+  socket->End(kNotKnown);
+  return false;
 }
 
-void Gateway::OnGone(LinkSocket* socket) {
+bool Gateway::OnLink(LinkSocket* socket) {
+  return TakePlace(socket, kMaxAgentsAtOnce, &connected_);
+}
+
+bool Gateway::OnUpload(RecordingSocket* socket) {
+  return TakePlace(socket, kMaxUploads, &uploads_);
+}
+
+void Gateway::OnGone(AgentSocket* socket) {
   unproven_.remove(socket);
   std::erase_if(connected_, [&](const auto& item) { return item.second == socket; });
+  std::erase_if(uploads_, [&](const auto& item) { return item.second == socket; });
 }
 
 }  // namespace pangea

@@ -9,9 +9,10 @@
 //   GET  /v1/info            {"site", "version", "agents": [{"agent", "name", "connected"}]}
 //   POST /v1/join            {"code", "name"}: {"agent", "key", "site"}, or {"error"}
 //   WS   /link?agent=K       link_socket.h
+//   WS   /recording?agent=K  recording_socket.h
 //
-// Bounded: kMaxAgentsAtOnce have proven their key; of those that have not, the oldest gives way to
-// the one after kMaxUnproven.
+// Bounded: kMaxAgentsAtOnce have proven their key, kMaxUploads of them upload; of those that have
+// not, the oldest gives way to the one after kMaxUnproven.
 
 #include <functional>
 #include <list>
@@ -22,6 +23,7 @@
 #include "gateway/attempt_limit.h"
 #include "gateway/join_request.h"
 #include "gateway/link_socket.h"
+#include "gateway/recording_socket.h"
 #include "web/page_files.h"
 
 namespace pangea {
@@ -35,12 +37,13 @@ struct JoinResult {
   std::string key_hex;
 };
 
-class Gateway : public web::WebSite, public LinkSocketOwner {
+class Gateway : public web::WebSite, public LinkSocketOwner, public RecordingSocketOwner {
  public:
   static constexpr size_t kMaxAgentsAtOnce = 100;
   static constexpr size_t kMaxUnproven = kMaxAgentsAtOnce;  // all come back at once
-  // Both, and as many that are being told to go.
-  static constexpr int kMaxPeers = 2 * (kMaxAgentsAtOnce + kMaxUnproven);
+  static constexpr size_t kMaxUploads = 4;
+  // All, and as many that are being told to go.
+  static constexpr int kMaxPeers = 2 * (kMaxAgentsAtOnce + kMaxUnproven + kMaxUploads);
 
   struct Public {
     std::string site;  // its name
@@ -59,7 +62,9 @@ class Gateway : public web::WebSite, public LinkSocketOwner {
     std::function<void()> dropped;
   };
 
-  Gateway(Public what, Events events) : public_(std::move(what)), events_(std::move(events)) {}
+  // `recordings` outlives it.
+  Gateway(Public what, Events events, RecordingStore& recordings)
+      : public_(std::move(what)), events_(std::move(events)), recordings_(recordings) {}
 
   // Often; a clock that never steps.
   void SetNow(int64_t now_us) { now_us_ = now_us; }
@@ -77,19 +82,24 @@ class Gateway : public web::WebSite, public LinkSocketOwner {
   web::WebAnswer Info() const;
   web::WebAnswer File(const web::WebRequest& request) const;
 
-  bool OnProof(LinkSocket* socket, Bytes proof) override;
+  bool OnProof(AgentSocket* socket, Bytes proof) override;
+  bool OnLink(LinkSocket* socket) override;
+  bool OnUpload(RecordingSocket* socket) override;
   void OnPacketUp(int32_t agent_id, Bytes packet) override { events_.packet_up(agent_id, packet); }
   void OnRefused(const std::string& why) override { events_.refused(why); }
   void OnDropped() override { events_.dropped(); }
-  void OnGone(LinkSocket* socket) override;
+  void OnGone(AgentSocket* socket) override;
+  RecordingStore& recordings() override { return recordings_; }
   int64_t now_us() const override { return now_us_; }
 
   const Public public_;
   const Events events_;
+  RecordingStore& recordings_;
   int64_t now_us_ = 0;
   std::map<int32_t, Agent> agents_;
   std::map<int32_t, LinkSocket*> connected_;
-  std::list<LinkSocket*> unproven_;  // oldest first
+  std::map<int32_t, RecordingSocket*> uploads_;
+  std::list<AgentSocket*> unproven_;  // oldest first
   AttemptLimit wrong_codes_;
 };
 

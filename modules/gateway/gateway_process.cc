@@ -45,7 +45,8 @@ GatewayProcess::GatewayProcess(Bus& link_bus, Bus& server_bus, const site::Site&
       node_(server_bus, "gateway"),
       admission_(site),
       key_folder_(site.keys()),
-      gateway_(PublicOf(site, options), Events()),
+      recordings_(site.recordings(), options.max_recordings),
+      gateway_(PublicOf(site, options), Events(), recordings_),
       server_(WithIdentity(options), gateway_),
       address_(AddressOf(options, server_.port())) {
   node_.Watch(link_bus);
@@ -123,9 +124,11 @@ void GatewayProcess::Tick(int64_t now_utime) {
 
 void GatewayProcess::PublishStatus(int64_t now_utime) {
   node_.Set("connected", gateway_.num_connected());
-  node_.PublishStatus(now_utime, 0,
-                      fmt::format("{}: {} of {} agents connected", address_.url,
-                                  gateway_.num_connected(), agents_.size()));
+  // The viewer shows address and fingerprint as they are here.
+  node_.PublishStatus(
+      now_utime, 0,
+      fmt::format("{} (certificate's SHA-256 {}): {} of {} agents connected", address_.url,
+                  address_.fingerprint, gateway_.num_connected(), agents_.size()));
 }
 
 }  // namespace pangea

@@ -13,6 +13,7 @@
 #include "gateway/admission.h"
 #include "gateway/gateway.h"
 #include "gateway/identity.h"
+#include "gateway/recording_folder.h"
 #include "link/agent_key.h"
 #include "web/web_server.h"
 
@@ -20,11 +21,13 @@ namespace pangea {
 
 class GatewayProcess {
  public:
+  static constexpr int64_t kDefaultMaxRecordings = 20'000'000'000;
   struct Options {
     web::WebOptions web;  // without `tls`, which is the identity's
     web::Page page;
     GatewayIdentity identity;
-    std::string url_host;  // by which phones reach it
+    std::string url_host;                            // by which phones reach it
+    int64_t max_recordings = kDefaultMaxRecordings;  // bytes, all that are kept together
   };
 
   // Throws std::runtime_error: it cannot listen there, the site's folder cannot be used.
@@ -50,6 +53,7 @@ class GatewayProcess {
   Admission admission_;
   KeyFolder key_folder_;
   std::map<int32_t, Gateway::Agent> agents_;
+  RecordingFolder recordings_;
   Gateway gateway_;
   web::WebServer server_;
   GatewayAddress address_;

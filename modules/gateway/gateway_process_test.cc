@@ -9,6 +9,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "bus/process.h"
+#include "files/text_file.h"
 #include "gateway/test_client.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
@@ -200,6 +201,28 @@ TEST_F(GatewayProcessTest, ARevokedAgentIsCutOffWithinASecond) {
   Skip(kSecond);
   anna.Received();
   EXPECT_EQ(anna.close_code(), 4401);
+}
+
+TEST_F(GatewayProcessTest, ARecordingIsKeptUnderTheSite) {
+  TestAgent anna(process_->port(), 5, NewKey(5), identity_.authority_pem, "/recording");
+  for (int i = 0; i < 10 && !anna.proven(); ++i) {
+    Serve(2);
+    anna.Received();
+  }
+  const std::string zip = "PK\x03\x04" + std::string(99'996, 'z');
+  anna.Send(std::vector<uint8_t>{0xa0, 0x86, 1, 0, 0, 0, 0, 0});  // 100,000
+  for (size_t sent = 0; sent < zip.size(); sent += 50'000) {
+    const std::string part = zip.substr(sent, 50'000);
+    anna.Send(std::vector<uint8_t>(part.begin(), part.end()));
+  }
+  for (int i = 0; i < 20 && anna.close_code() == 0; ++i) {
+    Serve(2);
+    anna.Received();
+  }
+  EXPECT_EQ(anna.close_code(), RecordingSocket::kKept);
+  EXPECT_THAT(anna.close_reason(), HasSubstr("_agent_5.zip"));
+  EXPECT_EQ(ReadTextFile(site_.recordings() / anna.close_reason()), zip);
+  EXPECT_EQ(fs::status(site_.recordings()).permissions(), fs::perms::owner_all);
 }
 
 // While strangers do what they like, an agent's packets go on.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "link/agent_key.h"
 #include "link/link_session.h"
@@ -22,6 +23,18 @@ using testing::Pair;
 using testing::SizeIs;
 using web::WebAnswer;
 
+class NoStore : public RecordingStore {
+ public:
+  std::string Begin(int32_t agent_id, int64_t) override {
+    begun.insert(agent_id);
+    return "";
+  }
+  std::string Write(int32_t, Bytes) override { return ""; }
+  Kept Finish(int32_t) override { return {"a.zip", ""}; }
+  void Abort(int32_t agent_id) override { begun.erase(agent_id); }
+  std::set<int32_t> begun;
+};
+
 class GatewayTest : public testing::Test {
  protected:
   GatewayTest()
@@ -34,7 +47,8 @@ class GatewayTest : public testing::Test {
              [this](int32_t agent_id, Bytes packet) {
                up_.emplace_back(agent_id, std::string(packet.begin(), packet.end()));
              },
-             [this](const std::string& why) { refused_.push_back(why); }, [this] { ++dropped_; }}) {
+             [this](const std::string& why) { refused_.push_back(why); }, [this] { ++dropped_; }},
+            store_) {
     gateway_.SetNow(now_us_);
     gateway_.SetAgents(Agents({7, 8}));
   }
@@ -76,8 +90,8 @@ class GatewayTest : public testing::Test {
     return {proof.begin(), proof.end()};
   }
   // One that has proven its key.
-  std::unique_ptr<web::WebPeer> Connect(int32_t agent_id) {
-    auto socket = Open("/link?agent=" + std::to_string(agent_id));
+  std::unique_ptr<web::WebPeer> Connect(int32_t agent_id, const std::string& path = "/link") {
+    auto socket = Open(path + "?agent=" + std::to_string(agent_id));
     EXPECT_TRUE(socket->Receive(ProofFor(KeyOf(agent_id), agent_id, socket.get())));
     return socket;
   }
@@ -94,6 +108,7 @@ class GatewayTest : public testing::Test {
   std::vector<std::pair<int32_t, std::string>> up_;
   std::vector<std::string> refused_;
   int dropped_ = 0;
+  NoStore store_;
   Gateway gateway_;
 };
 
@@ -211,7 +226,7 @@ TEST_F(GatewayTest, WhoSaysNothingIsToldToGo) {
   const auto silent = Open("/link?agent=7");
   const auto anna = Connect(7);
   EXPECT_EQ(TextOf(silent->Next()).size(), 32U);
-  gateway_.SetNow(now_us_ + LinkSocket::kProofTime_us + 1);
+  gateway_.SetNow(now_us_ + AgentSocket::kProofTime_us + 1);
   EXPECT_EQ(silent->Next(), std::nullopt);
   EXPECT_EQ(silent->Ending().value().code, 4408);
   EXPECT_EQ(anna->Next(), std::nullopt);
@@ -304,6 +319,31 @@ TEST_F(GatewayTest, SoManyAgentsAtOnce) {
   const auto again = Connect(ids[0]);
   agents[1].reset();
   EXPECT_EQ(Connect(ids.back())->Ending(), std::nullopt);
+}
+
+TEST_F(GatewayTest, UploadsAreOfAgentsAndFew) {
+  gateway_.SetAgents(Agents({1, 2, 3, 4, 5}));
+  const auto stranger = Open("/recording?agent=1");
+  EXPECT_FALSE(stranger->Receive(ProofFor(KeyOf(2), 1, stranger.get())));
+  EXPECT_EQ(stranger->Ending().value().code, 4401);
+
+  const std::string size = "\x64" + std::string(7, '\0');
+  std::map<int32_t, std::unique_ptr<web::WebPeer>> uploads;
+  for (int32_t id = 1; id <= static_cast<int32_t>(Gateway::kMaxUploads); ++id) {
+    uploads[id] = Connect(id, "/recording");
+    EXPECT_TRUE(uploads[id]->Receive(size));
+  }
+  EXPECT_EQ(gateway_.num_connected(), 0) << "its link is another socket";
+  const auto late = Open("/recording?agent=5");
+  EXPECT_FALSE(late->Receive(ProofFor(KeyOf(5), 5, late.get())));
+  EXPECT_EQ(late->Ending().value().code, 4429);
+
+  const auto again = Connect(1, "/recording");
+  EXPECT_EQ(uploads[1]->Ending().value().code, 4409);
+  uploads[2].reset();
+  gateway_.SetAgents(Agents({4}));
+  EXPECT_EQ(uploads[3]->Ending().value().code, 4401);
+  EXPECT_EQ(store_.begun, std::set<int32_t>{4});
 }
 
 }  // namespace

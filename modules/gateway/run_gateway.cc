@@ -10,7 +10,6 @@
 #include "bus/process.h"
 #include "bus/status_log.h"
 #include "files/text_file.h"
-#include "gateway/gateway_process.h"
 #include "gateway/machine_names.h"
 
 namespace pangea {
@@ -92,7 +91,8 @@ void RunGateway(const GatewayArguments& arguments) {
   LcmBus server_bus(buses.bus);
   MakeGatewayFolders(site);
   GatewayProcess::Options options{arguments.web, PageOf(arguments.page),
-                                  IdentityOf(arguments, site, names), UrlHost(arguments, names)};
+                                  IdentityOf(arguments, site, names), UrlHost(arguments, names),
+                                  static_cast<int64_t>(1e9 * arguments.recordings_gb)};
   options.web.names = names.hosts;
   GatewayProcess process(link_bus, server_bus, site, options);
   StartLog("pangea-gateway",

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "web/web_server.h"
+#include "gateway/gateway_process.h"
 
 namespace pangea {
 
@@ -16,6 +16,7 @@ struct GatewayArguments {
   std::string certificate, key;  // files; empty: the gateway's own authority
   std::string page;              // folder; empty: the installed one
   std::vector<std::string> hosts;
+  double recordings_gb = 1e-9 * static_cast<double>(GatewayProcess::kDefaultMaxRecordings);
 };
 
 // Serves until a signal. Throws std::runtime_error when it cannot begin.

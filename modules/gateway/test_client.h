@@ -1,6 +1,6 @@
 #pragma once
 
-// For tests: an agent's end of a link socket, over TLS.
+// For tests: an agent's end of its sockets, over TLS.
 
 #include <fmt/format.h>
 
@@ -16,9 +16,9 @@ namespace pangea {
 class TestAgent {
  public:
   TestAgent(uint16_t port, int32_t agent_id, const SecretKey& key,
-            const std::string& authority_pem = "")
+            const std::string& authority_pem = "", const std::string& path = "/link")
       : client_(port, authority_pem), agent_id_(agent_id), key_(key) {
-    client_.Send(web::UpgradeRequest(fmt::format("/link?agent={}", agent_id), ""));
+    client_.Send(web::UpgradeRequest(fmt::format("{}?agent={}", path, agent_id), ""));
   }
 
   void Send(Bytes packet) {
@@ -34,6 +34,7 @@ class TestAgent {
       if (frame.opcode == web::Frame::kClose) {
         close_code_ =
             static_cast<uint8_t>(frame.payload[0]) << 8 | static_cast<uint8_t>(frame.payload[1]);
+        close_reason_ = frame.payload.substr(2);
       } else if (!proven_) {
         Prove(frame.payload);
       } else if (frame.opcode == web::Frame::kBinary) {
@@ -44,6 +45,7 @@ class TestAgent {
   }
   bool proven() const { return proven_; }
   int close_code() const { return close_code_; }  // 0: open
+  const std::string& close_reason() const { return close_reason_; }
 
  private:
   void TakeAnswer() {
@@ -69,6 +71,7 @@ class TestAgent {
   bool upgraded_ = false;
   bool proven_ = false;
   int close_code_ = 0;
+  std::string close_reason_;
 };
 
 }  // namespace pangea

@@ -13,7 +13,6 @@
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/image_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "viewer/log_show.h"
@@ -104,7 +103,7 @@ TEST_F(LogShowTest, OfManySolvesTheLastAndTheFusionsAreKept) {
 // Of an agent's images in a log, those of keyframes; the others would fill the memory.
 TEST(LogShow, KeepsTheImagesOfKeyframes) {
   const std::string path = testing::TempDir() + "viewer_images.lcm";
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   ReadLog(kLog, [&keyframe](const LogEvent& event) {
     if (event.channel == "KEYFRAME_1" && keyframe.utime == 0) {
       EXPECT_TRUE(DecodeMessage(event.data, &keyframe));

@@ -1,5 +1,6 @@
-// What strangers say to the gateway: the first byte chooses a request to join or a socket; then a
-// body, or a target's end and what is said on its socket.
+// What strangers say to the gateway: the first byte chooses a request to join, a target, an upload
+// or a socket; then a body, a target, messages of an upload (a byte of length each), or a target's
+// end and what is said on its socket.
 
 #include <nlohmann/json.hpp>
 
@@ -12,17 +13,42 @@ namespace {
 
 constexpr int32_t kAgent = 7;
 
+// Keeps nothing, and knows what it was promised.
+class CountingStore : public RecordingStore {
+ public:
+  std::string Begin(int32_t agent_id, int64_t bytes) override {
+    Require(agent_id == kAgent && bytes > 0 && bytes <= RecordingSocket::kMaxRecording,
+            "an upload is an agent's, and bounded");
+    left_ = bytes;
+    return "";
+  }
+  std::string Write(int32_t, Bytes data) override {
+    left_ -= static_cast<int64_t>(data.size());
+    Require(left_ >= 0, "no upload is larger than it was said to be");
+    return "";
+  }
+  Kept Finish(int32_t) override {
+    Require(left_ == 0, "what is kept is whole");
+    return {"a.zip", ""};
+  }
+  void Abort(int32_t) override { left_ = 0; }
+
+ private:
+  int64_t left_ = 0;
+};
+
 class Strangers {
  public:
   Strangers()
       : gateway_({"hall", "pangea", {}, ""},
-                 {[this](const JoinRequest& request) { return Join(request); },
+                 {[](const JoinRequest& request) { return Join(request); },
                   [](int32_t agent_id, Bytes packet) {
                     Require(agent_id == kAgent, "packets are of the agent that proved its key");
                     Require(!packet.empty(), "no packet is empty");
                   },
                   [](const std::string& why) { Require(!why.empty(), "a refusal has a reason"); },
-                  [] {}}) {
+                  [] {}},
+                 store_) {
     gateway_.SetNow(1'000'000);
     gateway_.SetAgents({{kAgent, {key_, "Anna"}}});
   }
@@ -48,19 +74,36 @@ class Strangers {
     Require(socket->Ending().has_value() && !socket->Next(), "the conversation is over");
   }
 
-  // Of an agent that has proven its key.
   void Send(const std::string& said) {
-    const auto socket =
-        gateway_.Open({"GET", "/link?agent=" + std::to_string(kAgent), "localhost", "", ""});
+    const auto socket = Proven("/link");
+    Require(socket->Receive(said) == !said.empty(), "the gateway opens no packet");
+  }
+
+  void Upload(std::string_view said) {
+    const auto socket = Proven("/recording");
+    bool goes_on = true;
+    while (goes_on && !said.empty()) {
+      const size_t length = std::min<size_t>(static_cast<uint8_t>(said[0]), said.size() - 1);
+      goes_on = socket->Receive(said.substr(1, length));
+      socket->Next();
+      said.remove_prefix(1 + length);
+    }
+    Require(goes_on || socket->Ending().has_value(), "an end has a reason");
+  }
+
+ private:
+  // Of an agent that has proven its key.
+  std::unique_ptr<web::WebPeer> Proven(const std::string& path) {
+    auto socket =
+        gateway_.Open({"GET", path + "?agent=" + std::to_string(kAgent), "localhost", "", ""});
     GatewayNonce nonce{};
     const std::vector<uint8_t> sent = socket->Next().value();
     std::copy(sent.begin(), sent.end(), nonce.begin());
     const auto proof = GatewayProof(key_, kAgent, nonce);
     Require(socket->Receive(std::string(proof.begin(), proof.end())), "a proof is taken");
-    Require(socket->Receive(said) == !said.empty(), "the gateway opens no packet");
+    return socket;
   }
 
- private:
   static JoinResult Join(const JoinRequest& request) {
     Require(PlainJoinCode(request.code) == request.code && request.code.size() == kCodeLetters,
             "a code is plain");
@@ -69,6 +112,7 @@ class Strangers {
   }
 
   const SecretKey key_ = SecretKey::Random();
+  CountingStore store_;
   Gateway gateway_;
 };
 
@@ -86,6 +130,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     strangers.Ask({"POST", "/v1/join", "localhost", "", text});
   } else if (data[0] == 't') {
     strangers.Ask({"GET", text, "localhost", "", ""});
+  } else if (data[0] == 'r') {
+    strangers.Upload(text);
   } else {
     const size_t line = std::min(text.find('\n'), text.size());
     const std::string said = text.substr(std::min(line + 1, text.size()));

@@ -1,13 +1,15 @@
-// keyframe_t, from bytes to the domain type.
+// A keyframe, from bytes to the domain type.
 
 #include "fuzz.h"
 #include "messages/messages.h"
+#include "pangea/keyframe_2_t.hpp"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
   std::vector<uint8_t> bytes(data, data + size);
-  fuzz::SetFingerprint(keyframe_t::getHash(), &bytes);
-  keyframe_t message{};
+  const bool second = size > 0 && data[size - 1] % 2 == 1;
+  fuzz::SetFingerprint(second ? keyframe_2_t::getHash() : keyframe_t::getHash(), &bytes);
+  KeyframeMessage message{};
   if (!DecodeMessage(bytes, &message)) {
     return 0;
   }

@@ -14,7 +14,7 @@ constexpr int32_t kAgent = 1;
 constexpr int64_t kMaxBytes = 1 << 20;
 
 bool IsKeyframe(const std::vector<uint8_t>& data, const KeyframeId& id) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   return DecodeMessage(data, &message) && Parse(message.id).value == id;
 }
 

@@ -8,12 +8,12 @@
 
 #include "fuzz.h"
 #include "link/wire.h"
+#include "messages/keyframe_message.h"
 #include "pangea/again_t.hpp"
 #include "pangea/anchor_edit_t.hpp"
 #include "pangea/anchor_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/landmarks_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -53,7 +53,7 @@ inline const std::vector<Channel>& UplinkChannels() {
   static const std::vector<Channel> channels = {
       {"LINK_DOWN_1", {}},
       {"ACK", {}},
-      ChannelOf<keyframe_t>("KEYFRAME_1"),
+      ChannelOf<KeyframeMessage>("KEYFRAME_1"),
       ChannelOf<pose_t>("POSE_1"),
       ChannelOf<again_t>("AGAIN_uplink_1"),
       ChannelOf<landmarks_t>("LANDMARKS"),

@@ -49,7 +49,7 @@ struct Captured {
 };
 
 Payload Small(const Payload& keyframe_bytes, size_t corners) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   Require(DecodeMessage(keyframe_bytes, &message), "the log's keyframes decode");
   Keyframe keyframe = *Parse(message).value;
   keyframe.corners.resize(std::min(keyframe.corners.size(), corners));
@@ -124,7 +124,7 @@ Payload Results(const MapId& map) {
 }
 
 MapId MapOf(const Payload& keyframe_bytes) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   DecodeMessage(keyframe_bytes, &message);
   return Parse(message.id).value->map;
 }
@@ -151,7 +151,7 @@ void Datagrams(const Corpus& corpus) {
 // In the order of fuzz_messages.cc.
 void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
   const Payload& first = First(events, "KEYFRAME_1");
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   DecodeMessage(first, &keyframe);
   const MapId map = MapOf(first);
   LinkAck ack{1, 9, 100'000, {{map, 3}}, {{{map, 4}, {7}}}, {}};
@@ -226,7 +226,7 @@ void Link(const std::vector<Captured>& events, const Corpus& corpus) {
   handler.OnNewUplink();
   for (int seq = 0; seq < 2; ++seq) {
     const Payload& bytes = First(events, "KEYFRAME_1", seq);
-    keyframe_t message{};
+    KeyframeMessage message{};
     DecodeMessage(bytes, &message);
     to(UplinkChannels(), "KEYFRAME_1", bytes, &to_uplink);
     uplink.AddKeyframe(*Parse(message.id).value, Compress(bytes), now_us);
@@ -390,7 +390,7 @@ void Sensors(const Corpus& corpus) {
 
 // A keyframe, and an anchor on a pixel of it and one in its frame.
 void Anchors(const Payload& keyframe_bytes, const Corpus& corpus) {
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   Require(DecodeMessage(keyframe_bytes, &keyframe), "the log's keyframes decode");
   Payload sequence;
   AppendStep(Find(ServerChannels(), "KEYFRAME_1"), keyframe_bytes, &sequence);

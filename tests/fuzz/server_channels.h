@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "fuzz.h"
+#include "messages/keyframe_message.h"
 #include "pangea/again_t.hpp"
 #include "pangea/anchor_edit_t.hpp"
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/have_t.hpp"
-#include "pangea/keyframe_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -21,8 +21,8 @@ namespace pangea::fuzz {
 
 inline const std::vector<Channel>& ServerChannels() {
   static const std::vector<Channel> channels = {
-      ChannelOf<keyframe_t>("KEYFRAME_1"),
-      ChannelOf<keyframe_t>("KEYFRAME_2"),
+      ChannelOf<KeyframeMessage>("KEYFRAME_1"),
+      ChannelOf<KeyframeMessage>("KEYFRAME_2"),
       ChannelOf<place_match_t>("PLACE_MATCH"),
       ChannelOf<constraint_t>("CONSTRAINT"),
       ChannelOf<map_state_t>("MAP_STATE"),

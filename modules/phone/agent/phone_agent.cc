@@ -9,7 +9,7 @@
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
-#include "pangea/keyframe_t.hpp"
+#include "messages/keyframe_message.h"
 #include "pangea/pose_t.hpp"
 
 namespace pangea::phone {
@@ -26,7 +26,7 @@ vio::VioProcessOptions ProcessOptions(const AgentConfig& config) {
 }
 
 std::optional<KeyframeId> IdOf(Bytes keyframe) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   return DecodeMessage(keyframe, &message) ? Parse(message.id).value : std::nullopt;
 }
 

@@ -25,7 +25,7 @@ def run(*command, expect=0):
 def seqs(programs, log):
     """Of the keyframes in a log, as our own decoder reads them."""
     lines = run(programs / "pangea-log", "list", "--json", "--channels", "KEYFRAME_1", log).splitlines()
-    return [json.loads(line)["message"]["id"]["seq"] for line in lines]
+    return [json.loads(line)["message"]["keyframe"]["id"]["seq"] for line in lines]
 
 
 def ate_m(programs, tum, recording):

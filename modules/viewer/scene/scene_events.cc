@@ -140,7 +140,7 @@ Outcome Parsable(Bytes data) {
 
 Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
   if (channels::AgentOf(channel, channels::kKeyframePrefix) > 0) {
-    return Decoded<keyframe_t>(data, [](const keyframe_t& message) -> Outcome {
+    return Decoded<KeyframeMessage>(data, [](const KeyframeMessage& message) -> Outcome {
       const Parsed<Keyframe> keyframe = pangea::Parse(message);
       return keyframe.value ? Outcome{Shown(*keyframe.value), ""}
                             : Outcome{std::nullopt, keyframe.refused};

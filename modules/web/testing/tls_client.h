@@ -11,6 +11,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -38,6 +39,8 @@ class TlsClient {
     if (!authority_pem.empty()) {
       X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(ssl_.get()), "127.0.0.1");
     }
+    std::signal(SIGPIPE,
+                SIG_IGN);  // OpenSSL writes to a server that was killed without MSG_NOSIGNAL
     SSL_set_fd(ssl_.get(), fd_);
     SSL_set_connect_state(ssl_.get());
     Pump();

@@ -1,7 +1,7 @@
 import "./style.css";
 import { agentColour, colours } from "../../../web/page/palette";
 import type { AgentPose } from "./agent/phone_agent";
-import { byId } from "./dom";
+import { askDialog, byId } from "./dom";
 import { codeIn, forgetMembership, join, storedMembership } from "./link/join";
 import type { Membership } from "./messages";
 import { People } from "./people";
@@ -10,7 +10,7 @@ import { isCalibrated, openRecording, withCamera } from "./recording/euroc";
 import type { CalibratedRecording, Recording } from "./recording/euroc";
 import { filesOf, filesOfDrop, filesOfZip } from "./recording/files";
 import type { Files } from "./recording/files";
-import { download } from "./recording/recorder";
+import { saveRecording } from "./recording/save";
 import { forgetCalibrations, roughCalibration, storeCalibration, storedCalibration, storedCalibrations } from "./sensors/calibration";
 import type { CameraKind } from "./sensors/calibration";
 import { Camera } from "./sensors/camera";
@@ -208,14 +208,6 @@ function notice(text: string) {
 
 // --- anchors
 
-async function askDialog(id: string): Promise<string> {
-  const dialog = byId<HTMLDialogElement>(id);
-  dialog.returnValue = "cancel";
-  dialog.showModal();
-  await new Promise((done) => dialog.addEventListener("close", done, { once: true }));
-  return dialog.returnValue;
-}
-
 async function onTap(x: number, y: number) {
   if (!walk || !stage.drawn) return;
   const { utime, anchors } = stage.drawn;
@@ -266,7 +258,7 @@ byId("record").onclick = async () => {
   byId("record").classList.toggle("recording", !recorder);
   if (!recorder) return;
   walk.recorder = undefined;
-  download(await recorder.finish(), `${recorder.name}.zip`);
+  await saveRecording(await recorder.finish(), recorder.name, membership, notice);
 };
 for (const what of ["folder", "zip"]) byId(`open_${what}`).onclick = () => byId(what).click();
 byId<HTMLInputElement>("folder").onchange = ({ target }) => {

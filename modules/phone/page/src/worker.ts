@@ -3,7 +3,7 @@
 import { PhoneAgent } from "./agent/phone_agent";
 import type { AgentEvents, AnchorEdit, WasmModuleFactory } from "./agent/phone_agent";
 import { SpoolStore } from "./agent/spool_store";
-import { GatewayLink } from "./link/gateway_link";
+import { GatewayLink, gatewayOrigin } from "./link/gateway_link";
 import { kImuStride } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
 
@@ -41,8 +41,7 @@ class AgentHost {
   private async connect(agent: number, key: string) {
     this.spool = await SpoolStore.open(`pangea.spool.${agent}`);
     this.agent.restoreSpool(await this.spool.entries());
-    const origin = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
-    this.link = new GatewayLink(origin, agent, key, (packet) => this.agent.onLinkDown(packet));
+    this.link = new GatewayLink(gatewayOrigin(), agent, key, (packet) => this.agent.onLinkDown(packet));
   }
 
   on(message: Exclude<ToWorker, OpenAgent>) {

@@ -38,7 +38,7 @@ function keyframesOf(server, map) {
   const [agent, opened_utime] = map.split("/").map(Number);
   const list = execFileSync(`${options.bin}/pangea-log`,
     ["list", "--json", "--channels", `KEYFRAME_${agent}`, `${server.site}/journal.lcm`], { encoding: "utf8", maxBuffer: 1e9 });
-  const ids = list.split("\n").filter(Boolean).map((line) => JSON.parse(line).message.id).filter((id) => id.map.opened_utime === opened_utime);
+  const ids = list.split("\n").filter(Boolean).map((line) => JSON.parse(line).message.keyframe.id).filter((id) => id.map.opened_utime === opened_utime);
   const seqs = new Set(ids.map(({ seq }) => seq));
   return { ids: [...seqs].map((seq) => `${map}#${seq}`), isWhole: [...seqs].every((seq) => seq < seqs.size) };
 }

@@ -6,11 +6,29 @@ import { readFile } from "node:fs/promises";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { unzipSync, zipSync } from "fflate";
+import { WebSocketServer } from "ws";
 import { becomes, check, launch, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
 const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }] };
+
+// Refuses the first upload, keeps the second.
+const uploads = [];
+function takeUploads(socket) {
+  const messages = [];
+  if (uploads.push(messages) === 1) return socket.close(4413, "the server has no room for more recordings");
+  socket.on("message", (message) => {
+    messages.push(message);
+    const [, size, ...parts] = messages;
+    if (!size) return;
+    const taken = parts.reduce((sum, { length }) => sum + length, 0);
+    if (BigInt(taken) === size.readBigUInt64LE()) return socket.close(4200, "walk.zip");
+    const said = Buffer.alloc(8);
+    said.writeBigUInt64LE(BigInt(taken));
+    socket.send(said);
+  });
+}
 
 // The page, and as much of the gateway as it asks.
 async function serve() {
@@ -24,6 +42,10 @@ async function serve() {
     const file = path === "/pangea_agent.mjs" ? kFake : join(options.page, path === "/" ? "index.html" : path);
     answer.setHeader("Content-Type", kTypes[extname(file)] ?? "application/octet-stream");
     answer.end(await readFile(file).catch(() => ((answer.statusCode = 404), "")));
+  });
+  new WebSocketServer({ server }).on("connection", (socket, { url }) => {
+    socket.send(Buffer.alloc(32));
+    if (url.startsWith("/recording")) takeUploads(socket);
   });
   await new Promise((done) => server.listen(0, "127.0.0.1", done));
   return `http://localhost:${server.address().port}/`;
@@ -138,6 +160,29 @@ async function testRecording(page) {
   return zip;
 }
 
+// Of a member, who may choose.
+async function testUpload(browser, url) {
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] });
+  await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
+  await page.reload();
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await page.locator("#skip").click();
+  await becomes(page, "a member starts", () => pangea.walk?.vio?.counters.images > 2);
+  await page.locator("#record").click();
+  await becomes(page, "images are recorded", () => pangea.walk.recorder?.numImages > 5);
+  await page.locator("#record").click();
+  await page.locator("#save_dialog [value=server]").click();
+  await becomes(page, "a refused upload says why, and the page asks anew", () =>
+    document.getElementById("save_dialog").open && /not uploaded: the server has no room/.test(document.getElementById("save_text").textContent));
+  await screenshot(page, "save");
+  await page.locator("#save_dialog [value=server]").click();
+  await becomes(page, "the second is kept", () => /keeps it as walk\.zip/.test(document.getElementById("notice").textContent));
+  const files = Object.keys(unzipSync(Buffer.concat(uploads[1].slice(2))));
+  check("whole", files.filter((name) => name.endsWith(".jpg")).length > 5 && files.some((name) => name.endsWith("imu0/data.csv")), `${files.length} files`);
+  await page.close();
+}
+
 async function testPlaying(browser, url, zip) {
   const page = await openPage(browser, `${url}#rate=max`, { colorScheme: "dark" });
   await screenshot(page, "welcome_dark");
@@ -163,6 +208,7 @@ await run(async () => {
   const url = await serve();
   const browser = await launch(["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]);
   const zip = await testLive(browser, url);
+  await testUpload(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);
   await testRefusals(browser, url);

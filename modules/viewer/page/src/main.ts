@@ -5,6 +5,7 @@ import { Model } from "./model";
 import {
   byId, clock, drawAgents, drawHealth, drawLegend, drawMarks, fusionText, tipOf,
 } from "./panels";
+import { drawPhones } from "./phones";
 import { onThemeChange } from "../../../web/page/palette";
 import type { Update } from "./protocol";
 import { Stage } from "./stage";
@@ -66,6 +67,7 @@ function drawPanels() {
   drawAgents(model);
   anchorTools.draw();
   drawHealth(model);
+  drawPhones(model);
   drawLegend(stage.gridCell_m, stage.ellipseScale, model.leftOut);
 }
 

@@ -2,6 +2,8 @@
 // Writes screenshots to --out; `scripts/viewer --screenshots` puts them into docs/.
 
 import { execFileSync } from "node:child_process";
+import { readFileSync, rmSync } from "node:fs";
+import jsQR from "jsqr";
 import { becomes, check, launch, openPage, options, run, start, startViewer } from "./harness.mjs";
 
 const screenshot = (page, name) => page.screenshot({ path: `${options.out}/viewer_${name}.png` });
@@ -165,7 +167,28 @@ async function testLive(browser) {
   await becomes(page, "live: every keyframe arrives", () => pangea.model.numKeyframes === 63);
   check("live: one group", (await page.evaluate(numGroups)) === 1);
   check("live: no time slider", await page.locator("#player").isHidden());
+  await testPhones(page, bus);
   await testLiveAnchors(page);
+}
+
+// Of a gateway, where phones join; as a camera reads it.
+async function testPhones(page, bus) {
+  check("phones: without a gateway there is nothing to join", await page.locator("#phones").isHidden());
+  const site = `${options.out}/site_of_phones`;
+  rmSync(site, { recursive: true, force: true });
+  start(`${options.bin}/pangea-gateway`, "--site", site, "--bus", bus, "--link", bus.replace("76.67", "76.68"), "--listen", "127.0.0.1", "--port", "0");
+  await becomes(page, "phones: a gateway has a button", () => !document.getElementById("phones").hidden);
+  await page.locator("#phones").click();
+  const { url, fingerprint } = JSON.parse(readFileSync(`${site}/gateway/address.json`, "utf8"));
+  const [data, width] = await page.evaluate(() => {
+    const canvas = document.getElementById("phones_code");
+    return [[...canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data], canvas.width];
+  });
+  const read = jsQR(Uint8ClampedArray.from(data), width, width)?.data;
+  check("phones: its QR code is the address", read === url, read);
+  check("phones: with the certificate's fingerprint", (await page.locator("#phones_fingerprint").textContent()) === fingerprint);
+  await screenshot(page, "phones");
+  await page.keyboard.press("Escape");
 }
 
 // Pixels of map points that nothing lies over, far from each other.

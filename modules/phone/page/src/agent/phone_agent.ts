@@ -84,7 +84,7 @@ export interface AgentEvents {
   anchors?: ShownAnchor[];
   /** Keyframes to keep until they are acknowledged, in this order. */
   spool: SpoolChange[];
-  /** Finished keyframes, encoded keyframe_t, for --out-keyframes and tests. */
+  /** Finished keyframes, encoded keyframe_2_t, for --out-keyframes and tests. */
   keyframes: Uint8Array[];
 }
 

@@ -11,6 +11,9 @@ const kMaxWaiting_bytes = 256_000; // in the socket: what is beyond is dropped, 
 // Why the gateway closes for good, by its close codes: the key is unknown or revoked; another page of this agent came.
 const kFinal = new Map<number, LinkState>([[4401, "refused"], [4409, "replaced"]]);
 
+// Of the gateway that served this page.
+export const gatewayOrigin = () => `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
+
 export function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16));
 }

@@ -5,7 +5,7 @@ import { closeSync, openSync, writeSync } from "node:fs";
 import type { AgentPose } from "../agent/phone_agent";
 
 const kLogMagic = 0xeda1da01;
-const kUtimeOffset = 24; // in keyframe_t: behind its fingerprint and its id
+const kUtimeOffset = 24; // in keyframe_t and keyframe_2_t: behind its fingerprint and its id
 
 export class TumFiles {
   private file?: number;

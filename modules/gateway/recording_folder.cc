@@ -1,0 +1,126 @@
+#include "gateway/recording_folder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <exception>
+#include <utility>
+
+#include "files/whole_file.h"
+#include "site/site.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr mode_t kSecret = 0600;  // images of people
+constexpr const char* kPart = ".part";
+constexpr const char* kCannotWrite = "the server cannot write it: tell whoever runs it";
+
+bool WriteAll(int fd, Bytes data) {
+  while (!data.empty()) {
+    const ssize_t written = write(fd, data.data(), data.size());
+    if (written <= 0) {
+      return false;
+    }
+    data = data.subspan(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+}  // namespace
+
+RecordingFolder::RecordingFolder(fs::path folder, int64_t max_bytes)
+    : folder_(std::move(folder)), max_bytes_(max_bytes) {
+  fs::create_directories(folder_);
+  fs::permissions(folder_, fs::perms::owner_all);
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    if (entry.path().extension() == kPart) {
+      fs::remove(entry.path());
+    }
+  }
+}
+
+RecordingFolder::~RecordingFolder() {
+  while (!uploads_.empty()) {
+    Abort(uploads_.begin()->first);
+  }
+}
+
+fs::path RecordingFolder::PartOf(int32_t agent_id) const {
+  return folder_ / fmt::format("agent_{}{}", agent_id, kPart);
+}
+
+fs::path RecordingFolder::NewName(int32_t agent_id) const {
+  const std::string name = fmt::format("{}_agent_{}", site::TimeForFileName(), agent_id);
+  fs::path file = folder_ / (name + ".zip");
+  for (int n = 2; fs::exists(file); ++n) {
+    file = folder_ / fmt::format("{}_{}.zip", name, n);
+  }
+  return file;
+}
+
+// Also for what is under way and not yet written.
+bool RecordingFolder::HasRoomFor(int64_t bytes) const {
+  int64_t under_way = bytes;
+  for (const auto& [agent_id, upload] : uploads_) {
+    under_way += upload.bytes;
+  }
+  int64_t kept = 0;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    if (entry.path().extension() != kPart) {
+      kept += static_cast<int64_t>(entry.file_size());
+    }
+  }
+  return kept + under_way <= max_bytes_ &&
+         static_cast<int64_t>(fs::space(folder_).available) - under_way >= kLeftOnDisk;
+}
+
+std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
+  Abort(agent_id);
+  try {
+    if (!HasRoomFor(bytes)) {
+      return "the server has no room for more recordings";
+    }
+  } catch (const std::exception&) {
+    return kCannotWrite;
+  }
+  const int fd = open(PartOf(agent_id).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kSecret);
+  if (fd < 0) {
+    return kCannotWrite;
+  }
+  uploads_[agent_id] = {fd, bytes};
+  return "";
+}
+
+std::string RecordingFolder::Write(int32_t agent_id, Bytes data) {
+  return WriteAll(uploads_.at(agent_id).fd, data) ? "" : kCannotWrite;
+}
+
+RecordingStore::Kept RecordingFolder::Finish(int32_t agent_id) {
+  const auto upload = uploads_.extract(agent_id);
+  close(upload.mapped().fd);
+  try {
+    SyncToDisk(PartOf(agent_id));
+    const fs::path file = NewName(agent_id);
+    fs::rename(PartOf(agent_id), file);
+    SyncToDisk(folder_);
+    return {file.filename().string(), ""};
+  } catch (const std::exception&) {
+    std::error_code ignored;
+    fs::remove(PartOf(agent_id), ignored);
+    return {"", kCannotWrite};
+  }
+}
+
+void RecordingFolder::Abort(int32_t agent_id) {
+  if (const auto upload = uploads_.extract(agent_id); !upload.empty()) {
+    close(upload.mapped().fd);
+    std::error_code ignored;
+    fs::remove(PartOf(agent_id), ignored);
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,78 @@
+#pragma once
+
+// A recording that a page uploads over a WebSocket. After the proof, all integers little-endian:
+//
+//   up    uint64 size of the zip; then its bytes, in messages of at most kMaxMessage
+//   down  uint64 bytes that are taken so far: at first 0. No more than kWindow may be sent beyond
+//         them. Closed with kKept and the file's name when all are kept, else with the reason.
+//
+// Bounded: kMaxRecording bytes, kRate_bytes_per_s (what is taken is told no faster), kStalled_us
+// without a byte.
+
+#include <string>
+
+#include "gateway/agent_socket.h"
+#include "link/pacer.h"
+
+namespace pangea {
+
+// Where recordings are kept; one at a time of an agent. Errors are texts for the visitor; empty:
+// there is none.
+class RecordingStore {
+ public:
+  struct Kept {
+    std::string file;  // its name
+    std::string error;
+  };
+  virtual ~RecordingStore() = default;
+  virtual std::string Begin(int32_t agent_id, int64_t bytes) = 0;
+  virtual std::string Write(int32_t agent_id, Bytes data) = 0;
+  virtual Kept Finish(int32_t agent_id) = 0;
+  // Forgets what is not finished, if anything.
+  virtual void Abort(int32_t agent_id) = 0;
+};
+
+class RecordingSocket;
+
+class RecordingSocketOwner : public AgentSocketOwner {
+ public:
+  // Whether the agent's upload is this one from now on; else it has been ended.
+  virtual bool OnUpload(RecordingSocket* socket) = 0;
+  virtual RecordingStore& recordings() = 0;
+};
+
+class RecordingSocket : public AgentSocket {
+ public:
+  static constexpr int64_t kMaxRecording = 2'000'000'000;  // bytes: 10 minutes of images as JPEG
+  static constexpr size_t kMaxMessage = 64'000;
+  static constexpr int64_t kWindow = 1'000'000;
+  static constexpr double kRate_bytes_per_s = 8e6;
+  static constexpr int64_t kStalled_us = 30'000'000;
+  static constexpr uint16_t kKept = 4200, kMalformed = 4400, kNotTaken = 4413;
+
+  RecordingSocket(RecordingSocketOwner& owner, int32_t agent_id)
+      : AgentSocket(owner, agent_id), owner_(owner) {}
+  ~RecordingSocket() override;
+
+  void End(const web::WebEnding& ending) override;
+  size_t max_message_bytes() const override { return kMaxMessage; }
+
+ private:
+  bool Begin() override;
+  std::optional<std::vector<uint8_t>> NextMessage() override;
+  bool ReceiveMessage(Bytes message) override;
+  bool TakeSize(Bytes message);
+  bool TakeBytes(Bytes message);
+  bool Refuse(uint16_t code, const std::string& why);
+  void Abort();
+
+  RecordingSocketOwner& owner_;
+  int64_t size_ = 0;        // 0: not yet told
+  int64_t received_ = 0;    // bytes
+  int64_t told_ = -1;       // that are taken
+  bool is_stored_ = false;  // the store has something of it
+  int64_t last_us_ = 0;     // when something came
+  Pacer rate_{kRate_bytes_per_s, static_cast<double>(kWindow)};
+};
+
+}  // namespace pangea

@@ -1,0 +1,79 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { proofOf } from "./gateway_link";
+import { uploadRecording } from "./upload";
+
+const kMembership = { agent: 7, key: "ab".repeat(32), site: "hall", name: "Anna" };
+
+// A socket whose other side is the test.
+class FakeSocket {
+  static readonly OPEN = 1;
+  static last: FakeSocket;
+  readyState = FakeSocket.OPEN;
+  sent: Uint8Array[] = [];
+  onmessage: ((event: { data: ArrayBuffer }) => void) | null = null;
+  onclose: ((event: { code: number; reason: string }) => void) | null = null;
+  constructor(readonly url: string) {
+    FakeSocket.last = this;
+  }
+  send(message: Uint8Array | ArrayBuffer) {
+    this.sent.push(new Uint8Array(message));
+  }
+  close() {}
+  says(message: Uint8Array<ArrayBuffer>) {
+    this.onmessage?.({ data: message.buffer });
+  }
+  takes(bytes: number) {
+    this.says(new Uint8Array(new BigUint64Array([BigInt(bytes)]).buffer));
+  }
+  ends(code: number, reason: string) {
+    this.readyState = 3;
+    this.onclose?.({ code, reason });
+  }
+}
+
+const settled = () => new Promise((done) => setTimeout(done, 20));
+
+async function withSocket(run: () => Promise<void>) {
+  const realSocket = globalThis.WebSocket;
+  globalThis.WebSocket = FakeSocket as unknown as typeof WebSocket;
+  await run().finally(() => (globalThis.WebSocket = realSocket));
+}
+
+test("a recording goes up no faster than the server takes it", () => withSocket(async () => {
+  const content = new Uint8Array(1_500_000).map((_, i) => i % 251);
+  const shares: number[] = [];
+  const kept = uploadRecording("wss://server", kMembership, new Blob([content]), (share) => shares.push(share));
+  const socket = FakeSocket.last;
+  assert.equal(socket.url, "wss://server/recording?agent=7");
+  const nonce = new Uint8Array(32).fill(5);
+  socket.says(nonce);
+  await settled();
+  const [proof, size] = socket.sent.splice(0);
+  assert.deepEqual(proof, await proofOf(kMembership.key, 7, nonce));
+  assert.equal(new DataView(size.buffer).getBigUint64(0, true), 1_500_000n);
+
+  const sentBytes = () => socket.sent.reduce((sum, { length }) => sum + length, 0);
+  socket.takes(0);
+  await settled();
+  assert.equal(sentBytes(), 1_000_000);
+  socket.takes(300_000);
+  await settled();
+  assert.equal(sentBytes(), 1_300_000);
+  socket.takes(1_000_000);
+  await settled();
+  assert.deepEqual(Buffer.concat(socket.sent), Buffer.from(content));
+  assert.ok(socket.sent.every(({ length }) => length <= 64_000));
+  assert.deepEqual(shares, [0, 0.2, 2 / 3]);
+  socket.ends(4200, "walk.zip");
+  assert.equal(await kept, "walk.zip");
+}));
+
+test("what the server says against it is the visitor's to read", () => withSocket(async () => {
+  const refused = uploadRecording("wss://server", kMembership, new Blob(["zip"]), () => {});
+  FakeSocket.last.ends(4413, "the server has no room for more recordings");
+  await assert.rejects(refused, /no room/);
+  const lost = uploadRecording("wss://server", kMembership, new Blob(["zip"]), () => {});
+  FakeSocket.last.ends(1006, "");
+  await assert.rejects(lost, /connection was lost/);
+}));

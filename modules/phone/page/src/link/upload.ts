@@ -1,0 +1,64 @@
+// Uploads a recording to the gateway: the proof as on the link, then size and bytes, as far ahead of what the server has taken as it
+// allows (modules/gateway/recording_socket.h).
+
+import type { Membership } from "../messages";
+import { proofOf } from "./gateway_link";
+
+const kMessage_bytes = 60_000;
+const kWindow_bytes = 1_000_000;
+const kKept = 4200; // close code; the reason is the file's name
+
+class Upload {
+  private proven = false;
+  private sent = 0;
+  private taken = 0;
+  private sending = false;
+
+  constructor(
+    private readonly socket: WebSocket,
+    private readonly membership: Membership,
+    private readonly zip: Blob,
+    private readonly onProgress: (share: number) => void,
+  ) {}
+
+  async take(message: ArrayBuffer) {
+    if (!this.proven) return this.prove(new Uint8Array(message));
+    this.taken = Number(new DataView(message).getBigUint64(0, true));
+    this.onProgress(this.taken / this.zip.size);
+    await this.sendMore();
+  }
+
+  private async prove(nonce: Uint8Array) {
+    this.proven = true;
+    const proof = await proofOf(this.membership.key, this.membership.agent, nonce);
+    const size = new DataView(new ArrayBuffer(8));
+    size.setBigUint64(0, BigInt(this.zip.size), true);
+    this.socket.send(proof);
+    this.socket.send(size.buffer);
+  }
+
+  private async sendMore() {
+    if (this.sending) return;
+    this.sending = true;
+    while (this.socket.readyState === WebSocket.OPEN) {
+      const end = Math.min(this.sent + kMessage_bytes, this.taken + kWindow_bytes, this.zip.size);
+      if (end === this.sent) break;
+      this.socket.send(await this.zip.slice(this.sent, end).arrayBuffer());
+      this.sent = end;
+    }
+    this.sending = false;
+  }
+}
+
+// The file's name at the server. Throws the reason for which it is not kept there, for the visitor.
+export function uploadRecording(origin: string, membership: Membership, zip: Blob, onProgress: (share: number) => void): Promise<string> {
+  return new Promise((done, failed) => {
+    const socket = new WebSocket(`${origin}/recording?agent=${membership.agent}`);
+    socket.binaryType = "arraybuffer";
+    const upload = new Upload(socket, membership, zip, onProgress);
+    socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
+      upload.take(data).catch((error) => (socket.close(), failed(error)));
+    };
+    socket.onclose = ({ code, reason }) => (code === kKept ? done(reason) : failed(new Error(reason || "the connection was lost")));
+  });
+}

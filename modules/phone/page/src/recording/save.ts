@@ -1,0 +1,21 @@
+// Where a finished recording goes: to the server, or into the phone's downloads.
+
+import { askDialog, byId } from "../dom";
+import { gatewayOrigin } from "../link/gateway_link";
+import { uploadRecording } from "../link/upload";
+import type { Membership } from "../messages";
+import { download } from "./recorder";
+
+// Asks a member; it is not lost when the server does not take it.
+export async function saveRecording(zip: Blob, name: string, membership: Membership | undefined, notice: (text: string) => void) {
+  byId("save_text").textContent = `A recording of ${(zip.size / 1e6).toFixed(1)} MB, with camera images.`;
+  while (membership && (await askDialog("save_dialog")) === "server") {
+    try {
+      const file = await uploadRecording(gatewayOrigin(), membership, zip, (share) => notice(`Uploading: ${Math.floor(100 * share)} %`));
+      return notice(`The server keeps it as ${file}.`);
+    } catch (error) {
+      byId("save_text").textContent = `It was not uploaded: ${(error as Error).message}.`;
+    }
+  }
+  download(zip, `${name}.zip`);
+}

@@ -1,0 +1,38 @@
+// Where phones join this server: the gateway's address as a QR code, and its certificate's fingerprint to compare.
+
+import { encode } from "uqr";
+import type { Model } from "./model";
+import { byId } from "./panels";
+
+// The begin of STATUS_gateway's summary (modules/gateway/gateway_process.cc).
+const kAddress = /^(https:\S+\/) \(certificate's SHA-256 ([0-9A-F:]+)\)/;
+const kQuiet = 4; // modules around the code
+const kModule_px = 6;
+
+let shown = ""; // the address
+
+function drawCode(text: string) {
+  const { size, data } = encode(text, { border: kQuiet });
+  const canvas = byId<HTMLCanvasElement>("phones_code");
+  canvas.width = canvas.height = kModule_px * size;
+  const context = canvas.getContext("2d")!;
+  context.fillStyle = "white";
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.fillStyle = "black";
+  data.forEach((row, y) => row.forEach((dark, x) => {
+    if (dark) context.fillRect(kModule_px * x, kModule_px * y, kModule_px, kModule_px);
+  }));
+}
+
+// A gateway that runs has a button.
+export function drawPhones(model: Model) {
+  const [, url, fingerprint] = kAddress.exec(model.processes.get("gateway")?.summary ?? "") ?? [];
+  byId("phones").hidden = url === undefined;
+  if (url === undefined || url === shown) return;
+  shown = url;
+  drawCode(url);
+  byId("phones_url").textContent = url;
+  byId("phones_fingerprint").textContent = fingerprint;
+}
+
+byId("phones").onclick = () => byId<HTMLDialogElement>("phones_dialog").showModal();
