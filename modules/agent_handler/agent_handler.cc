@@ -20,7 +20,7 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity*
   if (!bytes) {
     return "keyframe does not decompress";
   }
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (!DecodeMessage(*bytes, &message)) {
     return "keyframe_t does not decode";
   }

@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
+#include <utility>
 
 #include "agent_handler/link_test_world.h"
 #include "link/agent_key.h"
+#include "log_file/log_writer.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
@@ -135,6 +138,33 @@ TEST_F(LinkWorld, WhatNobodyHasIsGivenUpAndSaid) {
   ASSERT_EQ(gaps.size(), 1u);
   EXPECT_EQ(gaps[0].from_seq, 0);
   EXPECT_EQ(gaps[0].to_seq, 4);
+}
+
+// More of them than a message takes.
+TEST_F(LinkWorld, EveryGapOfAThinnedJournalIsSaid) {
+  KillHandler();
+  constexpr int kMaps = 30, kGaps = 50;
+  {
+    LogFileWriter journal(journal_path);
+    for (int map = 0; map < kMaps; ++map) {
+      for (int32_t seq = 0; seq <= 2 * kGaps; seq += 2) {
+        journal.Write(0, "KEYFRAME_1", EncodeTestKeyframe({{1, 1000 + map}, seq}));
+      }
+    }
+  }
+  std::set<std::pair<int64_t, int32_t>> gaps;
+  server_bus.Subscribe("HAVE", [&](const std::string&, Bytes data) {
+    have_t have{};
+    ASSERT_TRUE(DecodeMessage(data, &have));
+    EXPECT_LE(have.num_gaps, 1000);
+    for (const seq_gap_t& gap : have.gaps) {
+      EXPECT_EQ(gap.from_seq, gap.to_seq);
+      gaps.emplace(gap.map.opened_utime, gap.from_seq);
+    }
+  });
+  StartHandler();
+  Run(3);
+  EXPECT_EQ(gaps.size(), size_t{kMaps * kGaps});
 }
 
 TEST_F(LinkWorld, CorrectionsReachTheAgentAndPosesTheServer) {
@@ -368,7 +398,7 @@ TEST_F(LinkWorld, UnderABudgetKeyframesAreThinnedAndAllArrive) {
   ASSERT_EQ(delivered.size(), 80u);
   size_t bytes = 0, with_corners = 0;
   for (int seq = 0; seq < 80; ++seq) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     ASSERT_TRUE(DecodeMessage(delivered[static_cast<size_t>(seq)], &message));
     const auto keyframe = Parse(message);
     ASSERT_TRUE(keyframe.value) << keyframe.refused;

@@ -52,7 +52,7 @@ TEST_F(AgentHandlerTest, AcknowledgesOnlyWhatIsOnTheDisk) {
 }
 
 TEST_F(AgentHandlerTest, RefusesWhatDoesNotParse) {
-  keyframe_t absurd = ToMessage(TestKeyframe({kMap, 0}));
+  KeyframeMessage absurd = ToMessage(TestKeyframe({kMap, 0}));
   absurd.T_odom_body.translation.x = 1e12;
   EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(EncodeMessage(absurd)))), "");
   EXPECT_NE(handler.OnPacket(WholeKeyframe(0, Compress(std::vector<uint8_t>{1, 2, 3}))), "");
@@ -101,11 +101,11 @@ TEST_F(AgentHandlerTest, OldMapsAreSentInAnswerToAHello) {
 
 // An agent that is not ours may send what our uplink would refuse.
 TEST_F(AgentHandlerTest, RefusesWhatCannotBeOfItsMap) {
-  const auto send = [&](const keyframe_t& message) {
+  const auto send = [&](const KeyframeMessage& message) {
     return handler.OnPacket(WholeKeyframe(message.id.seq, Compress(EncodeMessage(message))));
   };
   EXPECT_EQ(send(ToMessage(TestKeyframe({kMap, 0}))), "");
-  keyframe_t other = ToMessage(TestKeyframe({kMap, 1}));
+  KeyframeMessage other = ToMessage(TestKeyframe({kMap, 1}));
   other.camera.fy += 100;
   EXPECT_EQ(send(other), "keyframe with another camera than its map's");
   other = ToMessage(TestKeyframe({kMap, 1}));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <random>
 #include <set>
@@ -146,7 +147,7 @@ TEST_F(AnchorLink, AnEditIsJournalledAndTheStateComesBack) {
   EXPECT_EQ(handler_counters.at("anchors_sent"), 1);
 }
 
-// Apps repeat what they have not seen come back: an uplink that is killed forgets what it held.
+// Apps repeat what they have not seen come back: without a spool a killed uplink forgets it.
 TEST_F(AnchorLink, ATapCarriesThePoseOfItsImage) {
   Run(2);
   for (int i = 0; i < 5; ++i) {
@@ -205,6 +206,88 @@ TEST_F(AnchorLink, EditsAreJournalledOnceEachThoughBothEndsAreKilled) {
   }
   EXPECT_EQ(newest, wanted);
   EXPECT_EQ(uplink_counters.at("anchor_edits_waiting"), 0);
+}
+
+// Made, moved, renamed, deleted, each said once; a file that the killed process was writing lies
+// beside the others.
+TEST_F(AnchorLink, AKilledUplinkWithASpoolLosesNoEdit) {
+  KillUplink();
+  spools_edits = true;
+  StartUplink();
+  MakeLinkBad();
+  std::mt19937_64 rng(11);
+  std::map<AnchorId, AnchorEdit> wanted;
+  for (int i = 0; i < 120; ++i) {
+    const AnchorId id{1, static_cast<int64_t>(rng() % 40)};
+    AnchorEdit edit = TestEdit(id, i + 1, 1);
+    if (wanted[id].deleted) {
+      continue;
+    }
+    edit.deleted = i > 60 && rng() % 4 == 0;
+    if (rng() % 3 == 0 && wanted[id].revision > 1) {
+      edit.placement = AnchorEdit::Placement::kSame;
+      edit.name = "pot";
+    }
+    wanted[id] = edit;
+    Request(edit);
+    Run(0.01 * static_cast<double>(rng() % 8));
+    if (i % 4 == 0) {
+      KillUplink();
+      std::ofstream(folder / "anchor_1_5.lcm.new") << "torn";
+      StartUplink();
+    }
+    if (i % 25 == 0) {
+      KillHandler();
+      Run(0.1);
+      StartHandler();
+    }
+  }
+  Run(60);
+  ExpectOnceEach(journalled.size());
+  std::map<AnchorId, AnchorEdit> newest;
+  for (const auto& [seq, edit] : journalled) {
+    if (newest[edit.anchor].revision <= edit.revision) {
+      newest[edit.anchor] = edit;
+    }
+  }
+  ASSERT_EQ(newest.size(), wanted.size());
+  for (const auto& [id, edit] : wanted) {
+    EXPECT_EQ(newest[id].revision, edit.revision);
+    EXPECT_EQ(newest[id].deleted, edit.deleted);
+    EXPECT_EQ(newest[id].name, edit.name);
+  }
+  EXPECT_EQ(uplink_counters.at("anchor_edits_waiting"), 0);
+  const size_t before = journalled.size();
+  KillUplink();
+  uplink_counters.clear();
+  StartUplink();
+  Run(5);
+  EXPECT_EQ(journalled.size(), before) << "what was answered is not sent again";
+  EXPECT_FALSE(uplink_counters.contains("anchor_edits"));
+}
+
+// Before a keyframe has said where that was: then as it was known live.
+TEST_F(AnchorLink, AKilledUplinkWithASpoolKeepsATap) {
+  KillUplink();
+  spools_edits = true;
+  StartUplink();
+  for (int i = 0; i < 5; ++i) {
+    PublishPose(1'000'000 + 50'000 * i, {0.1 * i, 0, 0});
+  }
+  Run(0.1);
+  AnchorEdit edit = TestEdit({1, 5}, 1, 1);
+  edit.map = kMap;
+  edit.placement = AnchorEdit::Placement::kPixel;
+  edit.utime = 1'125'000;
+  Request(edit);
+  Run(0.1);
+  KillUplink();
+  EXPECT_TRUE(journalled.empty());
+  StartUplink();
+  Run(2);
+  ASSERT_EQ(journalled.size(), 1u);
+  ASSERT_TRUE(journalled[0].T_odom_body);
+  EXPECT_NEAR(journalled[0].T_odom_body->t.x(), 0.25, 1e-9);
 }
 
 // None that the uplink took is lost when only the server dies, however often.

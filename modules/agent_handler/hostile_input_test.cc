@@ -38,19 +38,19 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
   listen(server_bus);
   PublishKeyframes(2);
   Run(2);
-  const auto publish = [&](int32_t seq, const std::function<void(keyframe_t*)>& damage) {
-    keyframe_t message = ToMessage(TestKeyframe({kMap, seq}));
+  const auto publish = [&](int32_t seq, const std::function<void(KeyframeMessage*)>& damage) {
+    KeyframeMessage message = ToMessage(TestKeyframe({kMap, seq}));
     damage(&message);
     PublishMessage(agent_bus, "KEYFRAME_1", message);
   };
-  publish(2, [](keyframe_t* m) { m->v_odom_body.x = std::nan(""); });
-  publish(2, [](keyframe_t* m) {
+  publish(2, [](KeyframeMessage* m) { m->v_odom_body.x = std::nan(""); });
+  publish(2, [](KeyframeMessage* m) {
     m->T_odom_body.translation.z = std::numeric_limits<double>::infinity();
   });
-  publish(2, [](keyframe_t* m) { m->camera.height = 1 << 30; });
-  publish(2, [](keyframe_t* m) { m->camera.fx += 100; });
-  publish(2, [](keyframe_t* m) { m->utime = 1; });
-  publish(1, [](keyframe_t* m) { m->v_odom_body.x += 1; });
+  publish(2, [](KeyframeMessage* m) { m->camera.height = 1 << 30; });
+  publish(2, [](KeyframeMessage* m) { m->camera.fx += 100; });
+  publish(2, [](KeyframeMessage* m) { m->utime = 1; });
+  publish(1, [](KeyframeMessage* m) { m->v_odom_body.x += 1; });
   PublishMessage(server_bus, "RESEND_REQUEST", resend_request_t{});
   Constraint result;
   result.from = {kMap, 0};
@@ -91,7 +91,7 @@ TEST_F(LinkWorld, AMapGoesOnFromItsJournalledKeyframes) {
     }
   });
   Run(2);
-  keyframe_t early = ToMessage(TestKeyframe({kMap, 3}));
+  KeyframeMessage early = ToMessage(TestKeyframe({kMap, 3}));
   early.utime = 1;
   PublishMessage(agent_bus, "KEYFRAME_1", early);
   Run(3);

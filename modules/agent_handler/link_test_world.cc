@@ -91,8 +91,12 @@ void LinkWorld::SetAnchorRight(const std::string& word) const {
 void LinkWorld::StartUplink() {
   uplink_agent_side = std::make_unique<SwitchedBus>(agent_bus);
   uplink_link_side = std::make_unique<SwitchedBus>(link_bus);
+  if (spools_edits) {
+    edit_spools.push_back(std::make_unique<EditSpool>(folder, 1));
+  }
   uplink = std::make_unique<UplinkProcess>(*uplink_agent_side, *uplink_link_side, 1,
-                                           ReadKeyFileOf(KeyFile(1), 1), options);
+                                           ReadKeyFileOf(KeyFile(1), 1), options, nullptr,
+                                           spools_edits ? edit_spools.back().get() : nullptr);
 }
 
 void LinkWorld::KillUplink() {

@@ -81,6 +81,8 @@ class LinkWorld : public testing::Test {
   std::vector<std::unique_ptr<UplinkProcess>> dead_uplinks;
   std::unique_ptr<SwitchedBus> uplink_agent_side, uplink_link_side;
   std::unique_ptr<SwitchedBus> handler_link_side, handler_server_side;
+  bool spools_edits = false;
+  std::vector<std::unique_ptr<EditSpool>> edit_spools;  // of each uplink its own
   std::unique_ptr<UplinkProcess> uplink;
   std::unique_ptr<AgentHandlerProcess> handler;
   std::vector<std::vector<uint8_t>> delivered;

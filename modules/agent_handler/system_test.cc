@@ -162,7 +162,7 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
       ++next[channel];
       return true;
     }
-    keyframe_t keyframe{};
+    KeyframeMessage keyframe{};
     EXPECT_TRUE(DecodeMessage(data, &keyframe));
     EXPECT_EQ(keyframe.id.seq, next[channel]++) << channel;
     return true;

@@ -157,9 +157,11 @@ void AddReading(CLI::App& app, const Shared& arguments, LogReadings* readings) {
       arguments);
   info->callback([arguments] { std::cout << ToText(ReadInfo(ReadSite(arguments->site))); });
 
-  CLI::App* out = AddSiteCommand(
-      app, "export", "Trajectories (*.tum) and map points (map.ply), by a replay of the journal",
-      arguments);
+  CLI::App* out = AddSiteCommand(app, "export",
+                                 "Trajectories (*.tum), map points (map.ply) and anchors "
+                                 "(anchors.json, map.gltf), by a replay of "
+                                 "the journal",
+                                 arguments);
   out->add_option("--out", arguments->out, "New folder for them")->required();
   out->callback([arguments, readings] {
     for (const std::string& file :

@@ -17,7 +17,7 @@ auto ParseEvent(Bytes data) -> decltype(Parse(Message{}).value) {
 }
 
 std::string KeyframeName(Bytes data) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (!DecodeMessage(data, &message)) {
     return "";
   }

@@ -1,10 +1,6 @@
 // pangea-site: the maps of a server, each in a folder of its own.
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
-#include <iostream>
-
+#include "options/command_line.h"
 #include "site/commands.h"
 
 int main(int argc, char** argv) {
@@ -16,14 +12,6 @@ int main(int argc, char** argv) {
       "is damaged): then all is of what could be read; above 100 for a wrong command line.");
   pangea::LogReadings readings;
   pangea::site::AddCommands(app, &readings);
-  int exit_code = 0;
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-site: {}\n", error.what());
-    exit_code = 1;
-  }
+  const int exit_code = pangea::RunSubcommand(app, argc, argv);
   return pangea::TellLosses("pangea-site", readings, exit_code);
 }

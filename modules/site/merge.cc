@@ -31,7 +31,7 @@ bool IsKeyframe(const LogEvent& event) {
 }
 
 std::optional<KeyframeId> KeyframeOf(const LogEvent& event) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   return DecodeMessage(event.data, &message) ? Parse(message.id).value : std::nullopt;
 }
 

@@ -87,7 +87,7 @@ TEST_F(MergeTest, KeepsResultsBetweenTheSecondsMaps) {
 
 TEST_F(MergeTest, KeepsWhatAThinningDerivedWithinAMap) {
   std::vector<StoredEvent> walk = WalksOf({2});
-  keyframe_t keyframe{};
+  KeyframeMessage keyframe{};
   ASSERT_TRUE(DecodeMessage(walk.front().data, &keyframe));
   Constraint derived;
   derived.from = *Parse(keyframe.id).value;

@@ -29,8 +29,8 @@ constexpr size_t kMaxName = 100;
 // What stands in a site: only this may be in a folder that becomes one.
 bool IsOurs(const std::string& name) {
   return std::ranges::find(kFolders, name) != std::end(kFolders) || name == "lock" ||
-         name == "gateway" || name == "site.yaml" || name == "site.yaml.new" ||
-         name.starts_with("journal.lcm");
+         name == "gateway" || name == "recordings" || name == "site.yaml" ||
+         name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
 void CheckDescription(const fs::path& file, const SiteDescription& description) {

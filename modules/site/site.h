@@ -9,6 +9,7 @@
 //   logs/         what the server's processes print
 //   checkpoint/   what they made of the journal; without it they read all of that again
 //   gateway/      what pangea-gateway keeps (admission.h, identity.h there); mode 0700
+//   recordings/   what pages of phones have uploaded; mode 0700
 //   lock          held by the server, and by what changes the site
 
 #include <cstdint>
@@ -47,6 +48,7 @@ struct Site {
   std::filesystem::path logs() const { return folder / "logs"; }
   std::filesystem::path checkpoints() const { return folder / "checkpoint"; }
   std::filesystem::path gateway() const { return folder / "gateway"; }
+  std::filesystem::path recordings() const { return folder / "recordings"; }
 };
 
 // What a site is called that nobody gave a name.

@@ -6,6 +6,9 @@
 #include <stdexcept>
 
 #include "files/progress.h"
+#include "files/text_file.h"
+#include "log_tools/anchors_gltf.h"
+#include "log_tools/log_anchors.h"
 #include "log_tools/log_export.h"
 #include "replay/replay.h"
 #include "server_options/server_options.h"
@@ -34,6 +37,13 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
   std::vector<std::string> files = session::ExportTum(replayed, out);
   files.push_back(out / "map.ply");
   session::ExportPly(replayed, files.back());
+  const session::LoggedAnchors anchors = session::ReadAnchors(replayed);
+  if (!anchors.anchors.empty()) {
+    files.push_back(out / "anchors.json");
+    WriteTextFile(files.back(), session::ToJson(anchors));
+    files.push_back(out / "map.gltf");
+    session::ExportGltf(replayed, anchors, files.back());
+  }
   fs::remove(replayed);
   return files;
 }

@@ -55,7 +55,7 @@ class Counter {
 
  private:
   void TakeKeyframe(Bytes data) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     if (DecodeMessage(data, &message)) {
       if (const auto id = Parse(message.id).value) {
         info_->keyframes[id->map].insert(id->seq);

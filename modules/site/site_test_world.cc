@@ -78,10 +78,25 @@ std::optional<StoredEvent> OfVisit(const StoredEvent& event, int visit) {
       rename(&constraint->to);
     });
   } else {
-    again = Renamed<keyframe_t>(event, [&](Keyframe* keyframe) { rename(&keyframe->id); });
+    again = Renamed<KeyframeMessage>(event, [&](Keyframe* keyframe) { rename(&keyframe->id); });
   }
   again.utime += visit * kDay_us;
   return says_something ? std::optional(again) : std::nullopt;
+}
+
+AnchorEdit Kettle(const AnchorId& anchor, int64_t seq) {
+  AnchorEdit edit;
+  edit.anchor = anchor;
+  edit.agent_id = anchor.agent_id;
+  edit.right = AnchorRight::kEditOwn;
+  edit.seq = seq;
+  edit.name = "kettle";
+  return edit;
+}
+
+StoredEvent EventOf(const AnchorEdit& edit) {
+  return {1'800'000'000'000'000, std::string(channels::kAnchorEdit),
+          EncodeMessage(ToMessage(edit))};
 }
 
 }  // namespace
@@ -125,16 +140,20 @@ ThinJournal AfterTheLast(const std::vector<StoredEvent>& events) {
 }
 
 StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted) {
-  AnchorEdit edit;
-  edit.anchor = anchor;
+  AnchorEdit edit = Kettle(anchor, seq);
   edit.revision = revision;
-  edit.agent_id = anchor.agent_id;
-  edit.right = AnchorRight::kEditOwn;
-  edit.seq = seq;
   edit.deleted = deleted;
-  edit.name = "kettle";
-  return {1'800'000'000'000'000, std::string(channels::kAnchorEdit),
-          EncodeMessage(ToMessage(edit))};
+  return EventOf(edit);
+}
+
+StoredEvent PlacementEvent(const AnchorId& anchor, int64_t seq, const KeyframeId& keyframe,
+                           const Eigen::Vector3d& p_body_anchor) {
+  AnchorEdit edit = Kettle(anchor, seq);
+  edit.placement = AnchorEdit::Placement::kKeyframe;
+  edit.map = keyframe.map;
+  edit.keyframe_seq = keyframe.seq;
+  edit.T_ref_anchor.t = p_body_anchor;
+  return EventOf(edit);
 }
 
 StoredEvent OptionsEvent(const std::string& process, const std::string& yaml) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/anchor.h"
+#include "core/keyframe.h"
 #include "site/compact.h"
 #include "site/journal_writer.h"
 #include "site/site.h"
@@ -34,6 +35,9 @@ std::vector<StoredEvent> WalksAgainAndAgain();
 // A thinning an hour after these.
 ThinJournal AfterTheLast(const std::vector<StoredEvent>& events);
 StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted = false);
+// Makes it, beside that keyframe; `p_body_anchor`: metres.
+StoredEvent PlacementEvent(const AnchorId& anchor, int64_t seq, const KeyframeId& keyframe,
+                           const Eigen::Vector3d& p_body_anchor);
 StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
 
 Site MakeSite(const std::filesystem::path& folder, const std::vector<StoredEvent>& events);

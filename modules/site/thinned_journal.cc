@@ -40,7 +40,7 @@ void Take(const LogEvent& event, Thinning* thinning) {
     }
   };
   if (IsKeyframe(event)) {
-    if (const auto keyframe = ParseEvent<keyframe_t>(event)) {
+    if (const auto keyframe = ParseEvent<KeyframeMessage>(event)) {
       thinning->Take(*keyframe, event.utime);
     }
   } else if (event.channel == channels::kConstraint) {
@@ -77,7 +77,7 @@ void ThinnedJournal::Rewrite(const LogEvent& event, const Write& write) {
 }
 
 void ThinnedJournal::RewriteKeyframe(const LogEvent& event, const Write& write) const {
-  auto keyframe = ParseEvent<keyframe_t>(event);
+  auto keyframe = ParseEvent<KeyframeMessage>(event);
   const auto edge = keyframe ? thinned_.edges.find(keyframe->id) : thinned_.edges.end();
   if (edge != thinned_.edges.end()) {
     keyframe->edge = edge->second.edge;

@@ -20,7 +20,7 @@ using testing::HasSubstr;
 std::map<MapId, std::set<int32_t>> KeyframesOf(const std::vector<StoredEvent>& events) {
   std::map<MapId, std::set<int32_t>> keyframes;
   for (const StoredEvent& event : events) {
-    keyframe_t message{};
+    KeyframeMessage message{};
     if (event.channel.starts_with(channels::kKeyframePrefix) &&
         DecodeMessage(event.data, &message)) {
       const KeyframeId id = *Parse(message.id).value;

@@ -25,6 +25,8 @@ class EditQueue {
   Taken Add(AnchorEdit edit);
   // This edit of the anchor, or a newer one.
   bool Has(const AnchorId& anchor, int64_t revision) const;
+  // The one that waits of this anchor; there must be one.
+  const AnchorEdit& Waiting(const AnchorId& anchor) const { return edits_.at(anchor); }
   // Whether it was waiting for it.
   bool OnAnswer(const AnchorEditAnswer& answer);
   void OnNewSession() { queue_.SendAllAgain(); }

@@ -23,8 +23,9 @@ int main(int argc, char** argv) {
   app.add_option("--key", key, "the agent's key file (pangea-agent-handler keygen)");
   app.add_option("--bus", bus, "LCM URL of the agent's bus")->capture_default_str();
   app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
-  app.add_option("--spool", spool_folder,
-                 "folder for unacknowledged keyframes (default: none, they are kept in memory)");
+  app.add_option(
+      "--spool", spool_folder,
+      "folder for what the server has yet to acknowledge (default: none, it is kept in memory)");
   std::optional<double> bandwidth_kb_per_s, budget_kb_per_s;
   app.add_option("--bandwidth", bandwidth_kb_per_s,
                  "kB/s of keyframes at most, repeats included; over --options");
@@ -50,14 +51,16 @@ int main(int argc, char** argv) {
       throw std::runtime_error("give --agent ID and --key FILE");
     }
     std::optional<pangea::Spool> spool;
+    std::optional<pangea::EditSpool> edit_spool;
     if (!spool_folder.empty()) {
       spool.emplace(spool_folder, agent_id, options.spool_disk_bytes);
+      edit_spool.emplace(spool_folder, agent_id);
     }
     pangea::LcmBus agent_bus(bus);
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::UplinkProcess process(agent_bus, link_bus, agent_id,
                                   pangea::ReadKeyFileOf(key, agent_id), options,
-                                  spool ? &*spool : nullptr);
+                                  spool ? &*spool : nullptr, edit_spool ? &*edit_spool : nullptr);
     pangea::StartLog("pangea-uplink",
                      fmt::format("agent {}, bus {}, link {}, key {}, {}, {}", agent_id, bus, link,
                                  key, spool_folder.empty() ? "no spool" : "spool " + spool_folder,

@@ -18,7 +18,6 @@
 #include "log_file/log_event.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
-#include "pangea/keyframe_t.hpp"
 
 namespace pangea {
 namespace {
@@ -26,21 +25,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kPrefix[] = "keyframes_";
-// keyframe_t begins with its fingerprint and its id (agent, map, seq).
+// A keyframe begins with its fingerprint and its id (agent, map, seq).
 constexpr size_t kIdBytes = 4 + 8 + 4;
 using Begin8 = std::array<uint8_t, 8>;
 
 // The id in a keyframe's first bytes, without decoding the rest.
 std::optional<KeyframeId> IdOf(Bytes begin) {
-  static const std::vector<uint8_t> fingerprint = [] {
-    const keyframe_t empty{};
-    std::vector<uint8_t> bytes = EncodeMessage(empty);
-    bytes.resize(sizeof(Begin8));
-    return bytes;
-  }();
   keyframe_id_t id{};
-  if (begin.size() < sizeof(Begin8) + kIdBytes ||
-      !std::equal(fingerprint.begin(), fingerprint.end(), begin.begin()) ||
+  if (begin.size() < sizeof(Begin8) + kIdBytes || !KeyframeMessage::BeginsOne(begin.data()) ||
       id._decodeNoHash(begin.data(), sizeof(Begin8), kIdBytes) < 0) {
     return std::nullopt;
   }
@@ -202,7 +194,7 @@ std::vector<uint8_t> Spool::Read(const KeyframeId& id) {
   }
   const Place place = found->second;
   std::vector<uint8_t> data = ReadData(place);
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (DecodeMessage(data, &message) && Parse(message).value.has_value()) {
     return data;
   }

@@ -13,8 +13,14 @@ constexpr int64_t kMaxHeld_us = 10'000'000;
 
 }  // namespace
 
-UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s)
-    : node_(node), agent_id_(agent_id), edits_(edit_bytes_per_s) {
+UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s,
+                             EditSpool* spool)
+    : node_(node), agent_id_(agent_id), spool_(spool), edits_(edit_bytes_per_s) {
+  if (spool_ != nullptr) {
+    for (AnchorEdit& edit : spool_->TakeLeft()) {
+      Queue(std::move(edit));
+    }
+  }
   node_.Listen<anchor_edit_t>(channels::AnchorRequest(agent_id),
                               [this](AnchorEdit edit) { OnRequest(std::move(edit)); });
 }
@@ -49,11 +55,21 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   Release(edit.anchor);  // the queue makes one edit of the two
   if (by_pose && !edit.T_odom_body && held_.size() < EditQueue::kMaxEdits &&
       !edits_.Has(edit.anchor, edit.revision)) {
-    const AnchorId id = edit.anchor;
-    held_[id] = {std::move(edit), now_us_ + kMaxHeld_us};
-    return ReleaseSettled();
+    return Hold(std::move(edit));
   }
   Queue(std::move(edit));
+}
+
+// Killed meanwhile, it goes with the pose that is known by now.
+void UplinkAnchors::Hold(AnchorEdit edit) {
+  if (spool_ != nullptr) {
+    AnchorEdit by_now = edit;
+    by_now.T_odom_body = poses_.At(edit.utime, edit.map);
+    spool_->Put(by_now);
+  }
+  const AnchorId id = edit.anchor;
+  held_[id] = {std::move(edit), now_us_ + kMaxHeld_us};
+  ReleaseSettled();
 }
 
 void UplinkAnchors::Release(const AnchorId& id) {
@@ -77,12 +93,20 @@ void UplinkAnchors::ReleaseSettled() {
 }
 
 void UplinkAnchors::Queue(AnchorEdit edit) {
+  const AnchorId id = edit.anchor;
+  const int64_t revision = edit.revision;
   switch (edits_.Add(std::move(edit))) {
     case EditQueue::Taken::kNew:
+      if (spool_ != nullptr) {
+        spool_->Put(edits_.Waiting(id));  // with the place of the one that it replaced
+      }
       return node_.Count("anchor_edits");
     case EditQueue::Taken::kOutdated:
       return node_.Count("anchor_edits_repeated");
     case EditQueue::Taken::kFull:
+      if (spool_ != nullptr) {
+        spool_->Remove(id, revision);
+      }
       node_.NoteDropped();
       return node_.Refuse("too many edits of anchors wait for the server");
   }
@@ -135,6 +159,9 @@ void UplinkAnchors::OnEditAnswers(Bytes body) {
   for (const AnchorEditAnswer& answer : *answers.value) {
     if (!edits_.OnAnswer(answer)) {
       continue;  // a repeat
+    }
+    if (spool_ != nullptr) {
+      spool_->Remove(answer.anchor, answer.revision);
     }
     node_.Count(answer.journalled ? "anchor_edits_journalled" : "anchor_edits_refused");
     if (!answer.journalled) {

@@ -13,6 +13,7 @@
 #include "link/link_session.h"
 #include "uplink/agent_anchors.h"
 #include "uplink/edit_queue.h"
+#include "uplink/edit_spool.h"
 #include "uplink/pose_history.h"
 #include "uplink/shown_anchors.h"
 
@@ -23,8 +24,8 @@ class UplinkAnchors {
   // Seals and sends a packet; its bytes on the wire.
   using Send = std::function<int64_t(LinkKind kind, std::vector<uint8_t> body)>;
 
-  // `edit_bytes_per_s`: for edits on their way up, at most.
-  UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s);
+  // `edit_bytes_per_s`: for edits on their way up, at most. `spool`: may be null.
+  UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s, EditSpool* spool = nullptr);
 
   static bool IsOfAnchors(LinkKind kind) {
     return kind == LinkKind::kAnchor || kind == LinkKind::kAnchorEditAnswers;
@@ -41,6 +42,13 @@ class UplinkAnchors {
   // Publish wants to be called every few milliseconds.
   bool moving() const { return shown_.moving(); }
   size_t edits_waiting() const { return edits_.waiting() + held_.size(); }
+  void SyncSpool() {
+    if (spool_ != nullptr) {
+      spool_->Sync();
+    }
+  }
+  // An edit that would not survive this process.
+  bool spool_refuses() const { return spool_ != nullptr && spool_->refuses(); }
 
  private:
   // One that says "where I was then", until the keyframe after it says better where that was.
@@ -50,6 +58,7 @@ class UplinkAnchors {
   };
 
   void OnRequest(AnchorEdit edit);
+  void Hold(AnchorEdit edit);
   void Queue(AnchorEdit edit);
   void Release(const AnchorId& id);
   void ReleaseSettled();
@@ -59,6 +68,7 @@ class UplinkAnchors {
 
   Node& node_;
   const int32_t agent_id_;
+  EditSpool* const spool_;
   int64_t now_us_ = 0;
   std::map<AnchorId, Held> held_;  // at most kMaxEdits
   EditQueue edits_;

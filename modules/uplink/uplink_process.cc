@@ -43,14 +43,14 @@ const char* KindForPeople(LinkKind kind) {
 }  // namespace
 
 UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
-                             const UplinkOptions& options, Spool* spool)
+                             const UplinkOptions& options, Spool* spool, EditSpool* edit_spool)
     : agent_id_(agent_id),
       link_bus_(link_bus),
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
       spool_(spool),
       uplink_(options, [this](const KeyframeId& id) { return Load(id); }),
-      anchors_(node_, agent_id, AnchorBytesPerSecond(options)) {
+      anchors_(node_, agent_id, AnchorBytesPerSecond(options), edit_spool) {
   node_.Watch(link_bus);
   if (options.budget_kb_per_s > 0) {
     ladder_.emplace(1000 * options.budget_kb_per_s);
@@ -80,7 +80,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
 }
 
 void UplinkProcess::OnKeyframe(Bytes data) {
-  keyframe_t message{};
+  KeyframeMessage message{};
   if (data.size() > static_cast<size_t>(kMaxKeyframeBytes) || !DecodeMessage(data, &message)) {
     return node_.Refuse("keyframe_t does not decode, or is too large");
   }
@@ -311,6 +311,7 @@ void UplinkProcess::Tick(int64_t now_utime) {
     node_.Set("spool_damaged", spool_->num_damaged());
     node_.Set("spool_damaged_bytes", spool_->damaged_bytes());
   }
+  anchors_.SyncSpool();
   node_.PublishStatus(
       now_utime, spooled + edits_waiting,
       fmt::format("{}, {} keyframes acknowledged, {} in the spool{}{}", StateForPeople(),
@@ -334,7 +335,8 @@ std::string UplinkProcess::SpoolForPeople() const {
   if (spool_ == nullptr) {
     return "";
   }
-  return std::string(spool_->refuses() ? "; THE SPOOL'S DISK REFUSES WRITES" : "") +
+  const bool refuses = spool_->refuses() || anchors_.spool_refuses();
+  return std::string(refuses ? "; THE SPOOL'S DISK REFUSES WRITES" : "") +
          (spool_->num_damaged() > 0 ? "; THE SPOOL WAS DAMAGED, those files stay" : "");
 }
 

@@ -22,7 +22,8 @@ namespace pangea {
 class UplinkProcess : public PolledProcess {
  public:
   UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
-                const UplinkOptions& options, Spool* spool = nullptr);
+                const UplinkOptions& options, Spool* spool = nullptr,
+                EditSpool* edit_spool = nullptr);
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;

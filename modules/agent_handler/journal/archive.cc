@@ -13,6 +13,7 @@
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
+#include "pangea/keyframe_2_t.hpp"
 
 namespace pangea {
 namespace {
@@ -152,19 +153,19 @@ void Archive::NoteJournalled(const KeyframeId& id) {
 std::optional<Keyframe> Archive::Newest(const MapId& map) const {
   const auto places = index_.Find(JournalChannel::kKeyframe, {map, have_.at(map)});
   return places.empty() ? std::nullopt
-                        : DecodeAndParse<keyframe_t>(journal_->Read(places.front())).value;
+                        : DecodeAndParse<KeyframeMessage>(journal_->Read(places.front())).value;
 }
 
 bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
   if (channel.starts_with(channels::kKeyframePrefix)) {
-    if (const auto keyframe = DecodeAndParse<keyframe_t>(data); keyframe.value) {
+    if (const auto keyframe = DecodeAndParse<KeyframeMessage>(data); keyframe.value) {
       const KeyframeId& id = keyframe.value->id;
       index_.AddKeyframe(id, place);
       NoteJournalled(id);
       return true;
     }
     node_.Count("journal_events_unreadable");
-    return !IsDamaged<keyframe_t>(data);
+    return !IsDamaged<keyframe_t>(data) && !IsDamaged<keyframe_2_t>(data);
   }
   if (channel == channels::kPlaceMatch) {
     return LoadAnswer<place_match_t>(data, place);
@@ -319,9 +320,13 @@ void Archive::PublishHave() {
   do {
     have_t message{};
     for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
+      const std::vector<SeqGap> lost = Lost(*it);
+      if (!message.gaps.empty() && message.gaps.size() + lost.size() > kMaxHaveGaps) {
+        break;  // into the next: a thinned journal has many
+      }
       message.maps.push_back(ToMessage(*it));
       message.highest_seq.push_back(have_.at(*it));
-      for (const SeqGap& gap : Lost(*it)) {
+      for (const SeqGap& gap : lost) {
         if (message.gaps.size() < kMaxHaveGaps) {
           message.gaps.push_back(ToMessage(gap));
         }

@@ -1,0 +1,44 @@
+#include "site/site_export.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "messages/messages.h"
+#include "site/site_test_world.h"
+
+namespace pangea::site {
+namespace {
+
+TEST(SiteExport, HasTheAnchorsAmongThePoints) {
+  std::vector<StoredEvent> events = WalksOf({1});
+  keyframe_t first{};
+  ASSERT_TRUE(DecodeMessage(events.front().data, &first));
+  const KeyframeId keyframe{*Parse(first.id.map).value, 10};
+  events.push_back(PlacementEvent({1, 5}, 0, keyframe, {2, 0, 0}));
+  const std::filesystem::path folder = FreshFolder("export");
+  const Site site = MakeSite(folder / "hall", events);
+  LogReadings readings;
+  EXPECT_EQ(
+      ExportSite(site, folder / "out", &readings),
+      (std::vector<std::string>{folder / "out" / "agent_1.tum", folder / "out" / "map.ply",
+                                folder / "out" / "anchors.json", folder / "out" / "map.gltf"}));
+  std::ifstream anchors(folder / "out" / "anchors.json");
+  const auto json = nlohmann::json::parse(anchors);
+  ASSERT_EQ(json["anchors"].size(), 1u);
+  EXPECT_EQ(json["anchors"][0]["name"], "kettle");
+  EXPECT_EQ(json["anchors"][0]["state"], "placed");
+  std::ifstream map(folder / "out" / "map.gltf");
+  const auto gltf = nlohmann::json::parse(map);
+  std::vector<std::string> names;
+  for (const auto& node : gltf["nodes"]) {
+    names.push_back(node.value("name", ""));
+  }
+  EXPECT_NE(std::find(names.begin(), names.end(), "kettle"), names.end());
+  EXPECT_FALSE(gltf["meshes"].empty()) << "the points";
+}
+
+}  // namespace
+}  // namespace pangea::site

@@ -1,0 +1,135 @@
+#include "uplink/edit_spool.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <system_error>
+#include <utility>
+
+#include "log_file/checked_scan.h"
+#include "log_file/checksums.h"
+#include "log_file/damaged_copy.h"
+#include "log_file/log_event.h"
+#include "messages/anchor_messages.h"
+#include "messages/channels.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kPrefix[] = "anchor_";
+constexpr char kSuffix[] = ".lcm";
+
+}  // namespace
+
+EditSpool::EditSpool(fs::path folder, int32_t agent_id)
+    : folder_(std::move(folder)), channel_(channels::AnchorRequest(agent_id)) {}
+
+fs::path EditSpool::File(const AnchorId& anchor) const {
+  return folder_ /
+         fmt::format("{}{}_{}{}", kPrefix, anchor.agent_id, anchor.created_utime, kSuffix);
+}
+
+std::vector<AnchorEdit> EditSpool::TakeLeft() {
+  std::map<AnchorId, AnchorEdit> left;
+  std::vector<fs::path> damaged;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder_, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) {
+      continue;
+    }
+    if (auto edit = Read(entry.path())) {
+      revisions_[edit->anchor] = edit->revision;
+      left[edit->anchor] = *std::move(edit);
+    } else {
+      damaged.push_back(entry.path());
+    }
+  }
+  for (const fs::path& file : damaged) {
+    const std::string kept = DamagedName(file.string());
+    fs::rename(file, kept, error);
+    std::cerr << fmt::format("'{}' IS DAMAGED: an edit of an anchor is lost; kept as '{}'\n",
+                             file.string(), kept);
+  }
+  std::vector<AnchorEdit> edits;
+  for (auto& [anchor, edit] : left) {
+    edits.push_back(std::move(edit));
+  }
+  return edits;
+}
+
+std::optional<AnchorEdit> EditSpool::Read(const fs::path& file) const {
+  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) {
+    return std::nullopt;
+  }
+  CheckedScan scan(fd);
+  const CheckedScan::Piece* const piece = scan.Next();
+  std::optional<AnchorEdit> edit;
+  anchor_edit_t message{};
+  if (piece != nullptr && piece->kind == LogPiece::Kind::kEvent && piece->channel == channel_ &&
+      DecodeMessage(piece->data, &message)) {
+    edit = Parse(message).value;
+  }
+  close(fd);
+  return edit;
+}
+
+void EditSpool::Put(const AnchorEdit& edit) {
+  refuses_ = !Write(edit);
+  if (!refuses_) {
+    revisions_[edit.anchor] = edit.revision;
+    unsynced_.insert(edit.anchor);
+  }
+}
+
+bool EditSpool::Write(const AnchorEdit& edit) const {
+  std::vector<uint8_t> bytes;
+  const std::vector<uint8_t> message = EncodeMessage(ToMessage(edit));
+  AppendLogEvent(0, edit.anchor.created_utime, channel_, message, &bytes);
+  AppendChecksumsEvent({0, {EventChecksum(bytes)}}, edit.anchor.created_utime, &bytes);
+  const fs::path file = File(edit.anchor);
+  const std::string made = file.string() + ".new";
+  const int fd = open(made.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) {
+    return false;
+  }
+  const bool written = WriteFully(fd, 0, bytes.data(), bytes.size());
+  const bool closed = close(fd) == 0;
+  std::error_code error;
+  if (written && closed) {
+    fs::rename(made, file, error);
+    return !error;
+  }
+  fs::remove(made, error);
+  return false;
+}
+
+void EditSpool::Remove(const AnchorId& anchor, int64_t revision) {
+  const auto kept = revisions_.find(anchor);
+  if (kept != revisions_.end() && kept->second <= revision) {
+    std::error_code error;
+    fs::remove(File(anchor), error);
+    revisions_.erase(kept);
+    unsynced_.erase(anchor);
+  }
+}
+
+void EditSpool::Sync() {
+  for (const AnchorId& anchor : unsynced_) {
+    if (const int fd = open(File(anchor).c_str(), O_RDONLY | O_CLOEXEC); fd >= 0) {
+      fdatasync(fd);
+      close(fd);
+    }
+  }
+  if (!unsynced_.empty()) {
+    SyncFolder(folder_);
+  }
+  unsynced_.clear();
+}
+
+}  // namespace pangea
