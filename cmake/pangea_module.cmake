@@ -118,12 +118,13 @@ endfunction()
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one GoogleTest binary.
+# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one
+# GoogleTest binary. SEPARATE: its sources use the same names, so that each is compiled by itself.
 function(pangea_test name)
   if(EMSCRIPTEN)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "SEPARATE" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -134,6 +135,9 @@ function(pangea_test name)
     math(EXPR ARG_TIMEOUT "10 * ${ARG_TIMEOUT}")
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_SEPARATE)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+  endif()
   # A test spends its time in the libraries; its own code is compiled a third faster so.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   pangea_include_root(root)

@@ -152,7 +152,8 @@ class ThinnedSite : public testing::Test {
     EXPECT_THAT(statuses["posegraph"].summary,
                 testing::StartsWith(fmt::format("{} maps in 1 groups", NumMaps())));
     ASSERT_TRUE(heard);
-    EXPECT_LT((heard->T_odom_anchor.t - p_odom_anchor).norm(), 0.03)
+    // What the odometry has drifted since is in it.
+    EXPECT_LT((heard->T_odom_anchor.t - p_odom_anchor).norm(), 0.1)
         << heard->T_odom_anchor.t.transpose() << " for " << p_odom_anchor.transpose();
     player.Stop(5);
     uplink.Stop(5);

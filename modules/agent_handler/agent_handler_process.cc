@@ -1,5 +1,4 @@
 #include "agent_handler/agent_handler_process.h"
-#include "bus/status_log.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "bus/status_log.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"

@@ -16,7 +16,6 @@
 namespace pangea::calibration {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
 constexpr double kFieldsOfView[] = {52 * kDegree, 65 * kDegree, 80 * kDegree};
 constexpr double kOtherRotation = 0.5;  // rad
 constexpr CameraModel::Kind kLenses[] = {CameraModel::Kind::kRadtan,

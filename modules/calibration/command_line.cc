@@ -8,6 +8,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "calibration/calibration_folder.h"
+#include "calibration/parameters.h"
 #include "calibration/recording_tracks.h"
 #include "calibration/summary.h"
 #include "files/text_file.h"
@@ -16,7 +17,6 @@ namespace pangea::calibration {
 namespace {
 
 constexpr int kRefused = 2;  // exit code
-constexpr double kDegree = M_PI / 180;
 
 struct Arguments {
   std::string recording, out;

@@ -5,10 +5,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 
 #include "core/camera_model.h"
 
 namespace pangea::calibration {
+
+inline constexpr double kDegree = M_PI / 180;  // radians
 
 // Rows of the tangent. kRotation: R_body_cam' = Exp(d) R_body_cam, radians, body axes.
 enum Row : int {

@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kOffsetStep_s = 0.015;
 constexpr size_t kMaxPairs = 50;
-constexpr int kMaxPoints = 25;       // of each
-constexpr double kGridSigma_px = 3;  // what the grid leaves
+constexpr int kMaxPointsOfPair = 25;  // of each
+constexpr double kGridSigma_px = 3;   // what the grid leaves
 
 double Motion(const FramePair& pair) {
   double squared = 0;
@@ -33,7 +33,7 @@ std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs) {
                    [](const FramePair& a, const FramePair& b) { return Motion(a) > Motion(b); });
   most.resize(std::min(most.size(), kMaxPairs));
   for (FramePair& pair : most) {
-    Thin(kMaxPoints, &pair);
+    Thin(kMaxPointsOfPair, &pair);
   }
   return most;
 }

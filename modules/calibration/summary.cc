@@ -6,12 +6,12 @@
 #include <cmath>
 #include <vector>
 
+#include "calibration/parameters.h"
 #include "calibration/priors.h"
 
 namespace pangea::calibration {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
 constexpr double kRough_px = 1.0;
 constexpr double kTold = 0.7;  // of the prior's sigma: above, the data did not tell
 constexpr char kAxisNames[] = {'x', 'y', 'z'};

@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kSecond_us = 1'000'000;
+constexpr int64_t kCoreSecond_us = 1'000'000;
 constexpr int64_t kPollInterval_us = 20'000;
 constexpr char kJournalOwner[] = "agent_handler";
 constexpr size_t kMaxAsked = 5000;
@@ -137,7 +137,7 @@ void CoreBridge::BetweenMessages(int64_t now_utime) {
 void CoreBridge::Tick(int64_t now_utime) {
   journal_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond_us;
+    next_status_utime_ = now_utime + kCoreSecond_us;
     PublishStatus(now_utime);
   }
 }

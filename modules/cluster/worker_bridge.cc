@@ -13,9 +13,9 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kSecond_us = 1'000'000;
+constexpr int64_t kWorkerSecond_us = 1'000'000;
 constexpr int64_t kRoundInterval_us = 20'000;
-constexpr char kJournalOwner[] = "agent_handler";
+constexpr char kHandler[] = "agent_handler";
 
 // Who verifies candidates of this kind, and is to know the results on them.
 std::string VerifierOf(PlaceKind kind) {
@@ -26,7 +26,7 @@ std::string VerifierOf(PlaceKind kind) {
 
 WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
     : node_(bus, "bridge"),
-      as_handler_(bus, kJournalOwner),
+      as_handler_(bus, kHandler),
       streams_(streams),
       max_matches_(max_matches),
       keyframes_(streams.Keyframes()),
@@ -34,7 +34,7 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
   streams_.ListenToHave();
   node_.Listen<constraint_t>(channels::kConstraint, std::bind_front(&WorkerBridge::OnResult, this));
   node_.Subscribe<again_t>(
-      channels::Again(kJournalOwner),
+      channels::Again(kHandler),
       [this](const std::string&, const again_t& again) { OnRetransmission(again); });
   node_.Listen<resend_request_t>(channels::kResendRequest,
                                  std::bind_front(&WorkerBridge::OnResendRequest, this));
@@ -231,7 +231,7 @@ void WorkerBridge::BetweenMessages(int64_t now_utime) {
 void WorkerBridge::Tick(int64_t now_utime) {
   AskForOverdue(now_utime);
   if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond_us;
+    next_status_utime_ = now_utime + kWorkerSecond_us;
     for (const std::string& claim : outstanding_.Claims()) {
       streams_.StillWorking(claim);
     }

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace pangea {
@@ -15,6 +16,11 @@ inline uint64_t GetBigEndian(const uint8_t* in, size_t num_bytes) {
     value = value << 8 | in[i];
   }
   return value;
+}
+
+// Of the four bytes from there on.
+inline uint32_t WordAt(std::span<const uint8_t> bytes, size_t at) {
+  return static_cast<uint32_t>(GetBigEndian(bytes.data() + at, sizeof(uint32_t)));
 }
 
 inline void PutBigEndian(uint64_t value, size_t num_bytes, std::vector<uint8_t>* out) {

@@ -1,6 +1,12 @@
 #include "core/keyframe.h"
 
+#include "core/median.h"
+
 namespace pangea {
+
+double UnknownScaleSigma(const std::vector<double>& scale_sigmas) {
+  return scale_sigmas.empty() ? 0 : UnknownScaleSigma(Median(scale_sigmas));
+}
 
 std::optional<Eigen::Vector3d> PointInCamera(const Keyframe& keyframe, const MapPoint& point) {
   const auto ray = keyframe.camera.Unproject(keyframe.corners[point.corner].pixel.cast<double>());

@@ -26,6 +26,9 @@ inline double UnknownScaleSigma(double scale_sigma) {
   return scale_sigma > kMetricScaleSigma ? scale_sigma : 0;
 }
 
+// Of a map, by what its keyframes say: the first ones know least. 0 for no keyframes, too.
+double UnknownScaleSigma(const std::vector<double>& scale_sigmas);
+
 struct Corner {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // raw (distorted); on the wire in 1/16 px
   int8_t octave = 0;                                // pyramid level

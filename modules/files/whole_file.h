@@ -14,6 +14,8 @@ namespace pangea {
 // std::runtime_error.
 void SyncToDisk(const std::filesystem::path& path);
 
+inline constexpr mode_t kOwnerOnly = 0600;  // of keys, invites, images of people
+
 // A new file with this mode. False, and nothing is changed, if there is one of that name. Throws
 // std::runtime_error when it cannot be written.
 bool WriteNewFile(const std::filesystem::path& file, std::string_view text, mode_t mode);

@@ -17,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr mode_t kSecret = 0600;
 constexpr int32_t kMaxAgentId = 65535;
 
 // 128 bits of it.
@@ -108,7 +107,7 @@ std::string Admission::Make(const Invite& invite) {
   std::string code = NewJoinCode();
   const json written = {
       {"name", invite.name}, {"anchors", WordOf(invite.anchors)}, {"expires_s", invite.expires_s}};
-  WriteNewFile(InviteFile(PlainJoinCode(code)), written.dump() + "\n", kSecret);
+  WriteNewFile(InviteFile(PlainJoinCode(code)), written.dump() + "\n", kOwnerOnly);
   return code;
 }
 
@@ -138,7 +137,7 @@ int32_t Admission::MakeAgent(const std::string& name, AnchorRight anchors, int64
   for (; agent_id <= kMaxAgentId; ++agent_id) {
     const json written = {{"agent", agent_id}, {"name", name}, {"joined_s", now_s}};
     if (!Exists(KeyFile(agent_id)) &&
-        WriteNewFile(AgentFile(agent_id), written.dump() + "\n", kSecret)) {
+        WriteNewFile(AgentFile(agent_id), written.dump() + "\n", kOwnerOnly)) {
       MakeKeyFile(KeyFile(agent_id), agent_id, anchors);
       return agent_id;
     }

@@ -9,7 +9,7 @@
 //   GET  /v1/info            {"site", "version", "agents": [{"agent", "name", "connected"}]}
 //   POST /v1/join            {"code", "name"}: {"agent", "key", "site"}, or {"error"}
 //   WS   /link?agent=K       link_socket.h
-//   WS   /recording?agent=K  recording_socket.h
+//   WS   /recording?agent=K  recording/recording_socket.h
 //
 // Bounded: kMaxAgentsAtOnce have proven their key, kMaxUploads of them upload; of those that have
 // not, the oldest gives way to the one after kMaxUnproven.
@@ -23,7 +23,7 @@
 #include "gateway/attempt_limit.h"
 #include "gateway/join_request.h"
 #include "gateway/link_socket.h"
-#include "gateway/recording_socket.h"
+#include "gateway/recording/recording_socket.h"
 #include "web/page_files.h"
 
 namespace pangea {

@@ -13,7 +13,7 @@
 #include "gateway/admission.h"
 #include "gateway/gateway.h"
 #include "gateway/identity.h"
-#include "gateway/recording_folder.h"
+#include "gateway/recording/recording_folder.h"
 #include "link/agent_key.h"
 #include "web/web_server.h"
 

@@ -20,45 +20,45 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 
 constexpr int64_t kDay_s = 86'400;
-constexpr int64_t kNow_s = 1'700'000'000;
+constexpr int64_t kIssued_s = 1'700'000'000;
 const MachineNames kNames{{"localhost", "robot.local"}, {"127.0.0.1", "192.168.1.7", "fd00::7"}};
 
 TEST(Certificates, TheAuthorityVouchesForTheServer) {
-  const Identity authority = MakeAuthority("Pangea hall", {}, kNow_s);
-  const MadeCertificate made = MakeServerCertificate(authority, kNames, kNow_s);
+  const Identity authority = MakeAuthority("Pangea hall", {}, kIssued_s);
+  const MadeCertificate made = MakeServerCertificate(authority, kNames, kIssued_s);
   EXPECT_THAT(made.left_out, IsEmpty());
-  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kNow_s, 30));
-  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kNow_s, kServerDays - 1));
-  EXPECT_FALSE(IsGoodFor(made.identity, authority, kNames, kNow_s, kServerDays));
+  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kIssued_s, 30));
+  EXPECT_TRUE(IsGoodFor(made.identity, authority, kNames, kIssued_s, kServerDays - 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, kNames, kIssued_s, kServerDays));
   EXPECT_LT(kServerDays + 1, 398) << "more than browsers take";
   EXPECT_FALSE(
-      IsGoodFor(made.identity, MakeAuthority("Pangea hall", {}, kNow_s), kNames, kNow_s, 1));
-  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{}, {"192.168.1.8"}}, kNow_s, 1));
-  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{"other.local"}, {}}, kNow_s, 1));
-  EXPECT_FALSE(IsGoodFor({"nonsense", "nonsense"}, authority, kNames, kNow_s, 1));
+      IsGoodFor(made.identity, MakeAuthority("Pangea hall", {}, kIssued_s), kNames, kIssued_s, 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{}, {"192.168.1.8"}}, kIssued_s, 1));
+  EXPECT_FALSE(IsGoodFor(made.identity, authority, {{"other.local"}, {}}, kIssued_s, 1));
+  EXPECT_FALSE(IsGoodFor({"nonsense", "nonsense"}, authority, kNames, kIssued_s, 1));
 }
 
 // A phone that trusts it does not trust it for a bank.
 TEST(Certificates, TheAuthorityVouchesForPrivateNetworksOnly) {
   const Identity authority =
-      MakeAuthority("Pangea hall", {{"robot", "hall.example.org"}, {"8.8.8.7"}}, kNow_s);
+      MakeAuthority("Pangea hall", {{"robot", "hall.example.org"}, {"8.8.8.7"}}, kIssued_s);
   const MachineNames names{
       {"robot", "hall.example.org", "a.lan", "bank.example.org", "example.org", "robot.evil"},
       {"10.1.2.3", "8.8.8.7", "8.8.8.8", "2001:db8::1", "fe80::1"}};
-  const MadeCertificate made = MakeServerCertificate(authority, names, kNow_s);
+  const MadeCertificate made = MakeServerCertificate(authority, names, kIssued_s);
   EXPECT_THAT(made.left_out, UnorderedElementsAre("bank.example.org", "example.org", "robot.evil",
                                                   "8.8.8.8", "2001:db8::1"));
   EXPECT_TRUE(IsGoodFor(
       made.identity, authority,
-      {{"robot", "hall.example.org", "a.lan"}, {"10.1.2.3", "8.8.8.7", "fe80::1"}}, kNow_s, 1));
+      {{"robot", "hall.example.org", "a.lan"}, {"10.1.2.3", "8.8.8.7", "fe80::1"}}, kIssued_s, 1));
 }
 
 TEST(Certificates, HaveFingerprintsAndAFormForPhones) {
-  const Identity authority = MakeAuthority("Pangea hall", {}, kNow_s);
+  const Identity authority = MakeAuthority("Pangea hall", {}, kIssued_s);
   const std::string fingerprint = Fingerprint(authority.certificate_chain_pem);
   EXPECT_EQ(fingerprint.size(), 32U * 3 - 1);
   EXPECT_NE(fingerprint,
-            Fingerprint(MakeAuthority("Pangea hall", {}, kNow_s).certificate_chain_pem));
+            Fingerprint(MakeAuthority("Pangea hall", {}, kIssued_s).certificate_chain_pem));
   EXPECT_EQ(ToDer(authority.certificate_chain_pem).substr(0, 2), "\x30\x82") << "an ASN.1 sequence";
   EXPECT_THROW(Fingerprint("nonsense"), std::runtime_error);
 }
@@ -70,7 +70,7 @@ class IdentityTest : public testing::Test {
     site_ = site::OpenSite(folder_);
     MakeGatewayFolders(site_);
   }
-  GatewayIdentity Open(int64_t now_s = kNow_s, const MachineNames& names = kNames) {
+  GatewayIdentity Open(int64_t now_s = kIssued_s, const MachineNames& names = kNames) {
     return OpenIdentity(site_, names, now_s);
   }
 
@@ -80,7 +80,7 @@ class IdentityTest : public testing::Test {
 
 TEST_F(IdentityTest, IsKeptAndItsKeysAreSecret) {
   const GatewayIdentity first = Open();
-  const GatewayIdentity second = Open(kNow_s + kDay_s);
+  const GatewayIdentity second = Open(kIssued_s + kDay_s);
   EXPECT_EQ(first.server.certificate_chain_pem, second.server.certificate_chain_pem);
   EXPECT_EQ(first.authority_pem, second.authority_pem);
   for (const char* key : {"ca.key", "server.key"}) {
@@ -92,15 +92,15 @@ TEST_F(IdentityTest, IsKeptAndItsKeysAreSecret) {
 
 TEST_F(IdentityTest, IsRenewedBeforeItRunsOutAndForNewAddresses) {
   const GatewayIdentity first = Open();
-  const GatewayIdentity late = Open(kNow_s + (kServerDays - 29) * kDay_s);
+  const GatewayIdentity late = Open(kIssued_s + (kServerDays - 29) * kDay_s);
   EXPECT_NE(first.server.certificate_chain_pem, late.server.certificate_chain_pem);
   EXPECT_EQ(first.authority_pem, late.authority_pem) << "phones need not trust another";
   MachineNames moved = kNames;
   moved.addresses.emplace_back("192.168.2.7");
-  const GatewayIdentity elsewhere = Open(kNow_s + (kServerDays - 29) * kDay_s, moved);
+  const GatewayIdentity elsewhere = Open(kIssued_s + (kServerDays - 29) * kDay_s, moved);
   EXPECT_NE(late.server.certificate_chain_pem, elsewhere.server.certificate_chain_pem);
   moved.addresses.emplace_back("8.8.8.8");
-  const GatewayIdentity partly = Open(kNow_s + (kServerDays - 29) * kDay_s, moved);
+  const GatewayIdentity partly = Open(kIssued_s + (kServerDays - 29) * kDay_s, moved);
   EXPECT_EQ(elsewhere.server.certificate_chain_pem, partly.server.certificate_chain_pem);
   EXPECT_THAT(partly.left_out, Contains("8.8.8.8"));
 }

@@ -75,11 +75,11 @@ bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals
   return true;
 }
 
-ImuFactorTest::ImuFactorTest(const Preintegration& measured, const ImuNoise& noise)
+PreintegrationFactor::PreintegrationFactor(const Preintegration& measured, const ImuNoise& noise)
     : measured_(measured), sqrt_info_(InertialInformation(measured, noise).llt().matrixU()) {}
 
-bool ImuFactorTest::Evaluate(double const* const* parameters, double* residuals,
-                             double** jacobians) const {
+bool PreintegrationFactor::Evaluate(double const* const* parameters, double* residuals,
+                                    double** jacobians) const {
   const ImuState from = StateFromBlocks(parameters[0], parameters[1]);
   const ImuState to = StateFromBlocks(parameters[2], parameters[3]);
   const InertialResidual residual = ComputeInertialResidual(measured_, from, to);
@@ -117,44 +117,6 @@ bool BiasPriorFactor::Evaluate(double const* const* parameters, double* residual
     Eigen::Map<RowMajor<6, 9>> J = AsMatrix<6, 9>(jacobians[0]);
     J.setZero();
     J.rightCols<6>() = inverse_sigma_.asDiagonal();
-  }
-  return true;
-}
-
-UnscaledEdgeFactor::UnscaledEdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance)
-    : T_from_to_(T_from_to) {
-  const Eigen::LLT<Matrix6d> llt(covariance);
-  sqrt_info_ = llt.matrixL().solve(Matrix6d::Identity());
-}
-
-bool UnscaledEdgeFactor::Evaluate(double const* const* parameters, double* residuals,
-                                  double** jacobians) const {
-  const Rigid3 T_from = PoseFromBlock(parameters[0]);
-  const Rigid3 T_to = PoseFromBlock(parameters[1]);
-  const double inverse_scale = std::exp(-parameters[2][0]);
-  const Eigen::Matrix3d R_from_map = T_from.R().transpose();
-  const Eigen::Vector3d step = inverse_scale * (R_from_map * (T_to.t - T_from.t));
-  const Eigen::Vector3d r_theta = LogSo3(T_from.q.conjugate() * T_to.q * T_from_to_.q.conjugate());
-  Vector6d r;
-  r << step - T_from_to_.t, r_theta;
-  Eigen::Map<Vector6d>(residuals, 6) = sqrt_info_ * r;
-  if (jacobians == nullptr) {
-    return true;
-  }
-  // As in EdgeFactor.
-  Matrix6d J = Matrix6d::Zero();
-  J.topLeftCorner<3, 3>() = inverse_scale * R_from_map;
-  J.bottomRightCorner<3, 3>() = RightJacobianInverse(-r_theta) * R_from_map;
-  if (jacobians[1] != nullptr) {
-    AsMatrix<6, 7>(jacobians[1]) << sqrt_info_ * J, Vector6d::Zero();
-  }
-  if (jacobians[0] != nullptr) {
-    J = -J;
-    J.topRightCorner<3, 3>() = inverse_scale * R_from_map * Hat(T_to.t - T_from.t);
-    AsMatrix<6, 7>(jacobians[0]) << sqrt_info_ * J, Vector6d::Zero();
-  }
-  if (jacobians[2] != nullptr) {
-    Eigen::Map<Vector6d>(jacobians[2], 6) = -sqrt_info_.leftCols<3>() * step;
   }
   return true;
 }

@@ -36,9 +36,9 @@ class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
 // The preintegrated motion between two keyframes, and biases that wander
 // (core/imu/imu_factor.h). Blocks: pose and motion of the first, pose and motion of the
 // second.
-class ImuFactorTest : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
+class PreintegrationFactor : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
-  ImuFactorTest(const Preintegration& measured, const ImuNoise& noise);
+  PreintegrationFactor(const Preintegration& measured, const ImuNoise& noise);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
@@ -56,21 +56,6 @@ class BiasPriorFactor : public ceres::SizedCostFunction<6, 9> {
 
  private:
   Eigen::Matrix<double, 6, 1> inverse_sigma_;
-};
-
-// An odometry edge of a map that is not metric. Blocks: from's pose, to's pose, log scale kappa:
-// r = L^-1 [exp(-kappa) t_rel - t; Log(R_rel R^T)], covariance L L^T in from's body frame. In the
-// odometry's metres, unlike EdgeFactor: else a scale that only its prior holds would shrink until
-// the residuals are nothing.
-class UnscaledEdgeFactor : public ceres::SizedCostFunction<6, 7, 7, 1> {
- public:
-  UnscaledEdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance);
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override;
-
- private:
-  Rigid3 T_from_to_;
-  Matrix6d sqrt_info_;
 };
 
 // What is known of T_body_cam beforehand: r = (T (-) prior) / sigma. Block: T_body_cam.

@@ -106,12 +106,12 @@ TEST(CameraPriorFactor, DerivativesMatchDifferences) {
   EXPECT_LT((J.leftCols<6>() - numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
-TEST(ImuFactorTest, DerivativesMatchDifferencesInEveryBlock) {
+TEST(PreintegrationFactor, DerivativesMatchDifferencesInEveryBlock) {
   const BaTestWorld world = MakeBaTestWorld({.agents = 1, .keyframes = 8, .landmarks = 1});
   for (size_t i = 1; i < world.start.keyframes.size(); ++i) {
     const BaKeyframe& to = world.start.keyframes[i];
     const Blocks first(world.start.keyframes[i - 1].imu), second(to.imu);
-    const ImuFactorTest factor(*to.preintegration, ImuNoise{});
+    const PreintegrationFactor factor(*to.preintegration, ImuNoise{});
     double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
     const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
       first.Write(offset.head<15>(), pose_a, motion_a);
@@ -139,7 +139,7 @@ TEST(ImuFactorTest, DerivativesMatchDifferencesInEveryBlock) {
 
 // Noisy samples, wandering biases: at the truth the whitened residual is what it claims, 15 degrees
 // of freedom a span. In long spans most of it is what the biases wander within them.
-TEST(ImuFactorTest, IsChiSquaredAtTheTruth) {
+TEST(PreintegrationFactor, IsChiSquaredAtTheTruth) {
   for (const double step_s : {0.5, 2.0}) {
     double sum = 0, degrees = 0;
     for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -154,46 +154,13 @@ TEST(ImuFactorTest, IsChiSquaredAtTheTruth) {
         Blocks(to.imu).Write(VectorXd::Zero(15), pose_b, motion_b);
         const double* const blocks[] = {pose_a, motion_a, pose_b, motion_b};
         VectorXd r(15);
-        EXPECT_TRUE(
-            ImuFactorTest(*to.preintegration, ImuNoise{}).Evaluate(blocks, r.data(), nullptr));
+        EXPECT_TRUE(PreintegrationFactor(*to.preintegration, ImuNoise{})
+                        .Evaluate(blocks, r.data(), nullptr));
         sum += r.squaredNorm();
         degrees += 15;
       }
     }
     EXPECT_NEAR(sum / degrees, 1, 0.1) << step_s;  // the floors of integration take a little
-  }
-}
-
-TEST(UnscaledEdgeFactor, DerivativesMatchDifferences) {
-  std::mt19937_64 rng(4);
-  std::normal_distribution<double> normal(0, 0.1);
-  for (int trial = 0; trial < 20; ++trial) {
-    const Rigid3 T_from = RandomPose(rng), T_from_to = RandomPose(rng);
-    const Rigid3 T_to = T_from * T_from_to.Plus(Vector6d::Constant(0.02));
-    Matrix6d root = Matrix6d::Identity();
-    root(1, 4) = 0.5;
-    root(3, 0) = -0.3;
-    const UnscaledEdgeFactor factor(T_from_to, 0.01 * root * root.transpose());
-    const double log_scale = normal(rng);
-    const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
-      double from[7], to[7];
-      PoseToBlock(T_from.Plus(offset.head<6>()), from);
-      PoseToBlock(T_to.Plus(offset.segment<6>(6)), to);
-      const double kappa = log_scale + offset[12];
-      const double* const blocks[] = {from, to, &kappa};
-      VectorXd r(6);
-      EXPECT_TRUE(factor.Evaluate(blocks, r.data(), jacobians));
-      return r;
-    };
-    Eigen::Matrix<double, 6, 7, Eigen::RowMajor> J_from, J_to;
-    Vector6d J_scale;
-    double* jacobians[] = {J_from.data(), J_to.data(), J_scale.data()};
-    evaluate(VectorXd::Zero(13), jacobians);
-    MatrixXd J(6, 13);
-    J << J_from.leftCols<6>(), J_to.leftCols<6>(), J_scale;
-    const MatrixXd numeric = NumericJacobian(
-        13, 1e-6, [&](const VectorXd& offset) -> VectorXd { return evaluate(offset, nullptr); });
-    EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-6 * numeric.cwiseAbs().maxCoeff());
   }
 }
 

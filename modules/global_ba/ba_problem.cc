@@ -20,10 +20,9 @@ ceres::LossFunction* Weight(double weight) {
 
 ceres::CostFunction* MakeEdgeFactor(const BaKeyframe& keyframe) {
   const BaEdge& edge = *keyframe.edge;
-  if (keyframe.unknown_scale > 0) {
-    return new UnscaledEdgeFactor(edge.T_previous_this, edge.covariance);
-  }
-  return new EdgeFactor(edge.T_previous_this, edge.covariance);
+  return new EdgeFactor(
+      edge.T_previous_this, edge.covariance,
+      keyframe.unknown_scale > 0 ? EdgeFactor::Metres::kOdometry : EdgeFactor::Metres::kWorld);
 }
 
 }  // namespace
@@ -107,7 +106,7 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
     options.linear_solver_ordering->AddElementToGroup(Pose(i), 1);
     options.linear_solver_ordering->AddElementToGroup(Motion(i), 1);
     if (keyframe.previous >= 0 && keyframe.preintegration) {
-      problem.AddResidualBlock(new ImuFactorTest(*keyframe.preintegration, ba.imu),
+      problem.AddResidualBlock(new PreintegrationFactor(*keyframe.preintegration, ba.imu),
                                Weight(keyframe.edge ? 1 - ba.edge_weight : 1),
                                Pose(keyframe.previous), Motion(keyframe.previous), Pose(i),
                                Motion(i));

@@ -4,8 +4,6 @@
 #include <map>
 #include <memory>
 
-#include "core/median.h"
-
 namespace pangea {
 namespace {
 
@@ -19,11 +17,10 @@ BaKeyframe Start(const Keyframe& keyframe, const Rigid3& T_map_body) {
   return start;
 }
 
-// As the pose graph has it: what most keyframes of a map say.
 void SetUnknownScales(const std::vector<std::vector<double>>& sigmas_of_maps, BaWorld* world) {
   std::vector<double> unknown;
   for (const std::vector<double>& sigmas : sigmas_of_maps) {
-    unknown.push_back(UnknownScaleSigma(Median(sigmas)));
+    unknown.push_back(UnknownScaleSigma(sigmas));
   }
   for (BaKeyframe& keyframe : world->keyframes) {
     keyframe.unknown_scale = unknown[keyframe.camera];

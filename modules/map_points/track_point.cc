@@ -12,7 +12,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kMinDepth = 0.3;  // m
+constexpr double kMinTrackDepth = 0.3;  // m
 constexpr int kIterations = 3;
 constexpr double kMaxChi2 = 3;  // a degree of freedom
 
@@ -86,7 +86,7 @@ std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView
     cost = 0;
     for (const Ray& ray : rays) {
       const Vector3d y = ray.T_map_cam.Inverse() * p;
-      if (!(y.z() > kMinDepth)) {
+      if (!(y.z() > kMinTrackDepth)) {
         return std::nullopt;
       }
       Eigen::Matrix<double, 2, 3> J;

@@ -125,7 +125,7 @@ double OdometryChain::UnknownScale() const {
   for (const Node& node : nodes_) {
     sigmas.push_back(node.scale_sigma);
   }
-  return sigmas.empty() ? 0 : UnknownScaleSigma(Median(std::move(sigmas)));
+  return UnknownScaleSigma(sigmas);
 }
 
 }  // namespace pangea

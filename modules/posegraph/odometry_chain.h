@@ -51,8 +51,7 @@ class OdometryChain {
   // to node i.
   Matrix4d DriftBetween(int i, int j, const Eigen::Vector3d& point_odom) const;
   double PathBetween(int i, int j) const;
-  // Sigma of the map's scale, by what most of its keyframes say; 0 for a metric map.
-  double UnknownScale() const;
+  double UnknownScale() const;  // sigma of the map's scale; 0 for a metric map
 
  private:
   void JoinByEdge(const OdometryEdge& edge, int from, Node* node) const;

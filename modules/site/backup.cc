@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kArchiveEnd = ".tar.zst";
 constexpr const char* kTop = "site/";  // the folder in the archive
-constexpr int64_t kPart = 1 << 20;
+constexpr int64_t kCopiedPart = 1 << 20;
 constexpr int64_t kMegabyte = 1'000'000;
 
 // A file of the copy, and how much of it.
@@ -86,7 +86,7 @@ uint32_t CopyFile(const Source& source, const Target& target) {
   boost::crc_32_type crc;
   std::vector<uint8_t> part;
   for (int64_t at = 0; at < source.bytes; at += std::ssize(part)) {
-    part.resize(static_cast<size_t>(std::min(kPart, source.bytes - at)));
+    part.resize(static_cast<size_t>(std::min(kCopiedPart, source.bytes - at)));
     if (!ReadFully(fd, at, part.data(), part.size())) {
       throw std::runtime_error(fmt::format("{}: cannot be read to its end", source.path.string()));
     }

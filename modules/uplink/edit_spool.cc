@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kPrefix[] = "anchor_";
-constexpr char kSuffix[] = ".lcm";
+constexpr char kEditPrefix[] = "anchor_";
+constexpr char kEditSuffix[] = ".lcm";
 
 }  // namespace
 
@@ -30,7 +30,7 @@ EditSpool::EditSpool(fs::path folder, int32_t agent_id)
 
 fs::path EditSpool::File(const AnchorId& anchor) const {
   return folder_ /
-         fmt::format("{}{}_{}{}", kPrefix, anchor.agent_id, anchor.created_utime, kSuffix);
+         fmt::format("{}{}_{}{}", kEditPrefix, anchor.agent_id, anchor.created_utime, kEditSuffix);
 }
 
 std::vector<AnchorEdit> EditSpool::TakeLeft() {
@@ -39,7 +39,7 @@ std::vector<AnchorEdit> EditSpool::TakeLeft() {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) {
+    if (!name.starts_with(kEditPrefix) || !name.ends_with(kEditSuffix)) {
       continue;
     }
     if (auto edit = Read(entry.path())) {

@@ -32,10 +32,6 @@ constexpr size_t kReadBytes = 1 << 16;
 // A relay whose host has vanished, or that takes nothing for so long, is left.
 constexpr unsigned kUnansweredTimeout_ms = 10'000;
 
-uint32_t WordAt(Bytes bytes, size_t at) {
-  return static_cast<uint32_t>(GetBigEndian(bytes.data() + at, sizeof(uint32_t)));
-}
-
 sockaddr_in Resolve(const std::string& url) {
   const std::string rest = url.substr(std::strlen("tcpq://"));
   const size_t colon = rest.find(':');

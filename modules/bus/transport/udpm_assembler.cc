@@ -17,10 +17,6 @@ constexpr size_t kPartialOverhead = 256;
 static_assert(UdpmAssembler::kMaxMessage + 65'535 * kPieceOverhead + kPartialOverhead <=
               UdpmAssembler::kMaxPartialBytes);
 
-uint32_t WordAt(Bytes bytes, size_t at) {
-  return static_cast<uint32_t>(GetBigEndian(bytes.data() + at, 4));
-}
-
 uint16_t HalfAt(Bytes bytes, size_t at) {
   return static_cast<uint16_t>(GetBigEndian(bytes.data() + at, 2));
 }

@@ -114,21 +114,26 @@ bool PointPriorFactor::Evaluate(double const* const* parameters, double* residua
   return true;
 }
 
-EdgeFactor::EdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance)
-    : T_from_to_(T_from_to) {
+EdgeFactor::EdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance, Metres metres)
+    : T_from_to_(T_from_to), metres_(metres) {
   const Eigen::LLT<Matrix6d> llt(covariance);
   sqrt_info_ = llt.matrixL().solve(Matrix6d::Identity());
 }
 
 bool EdgeFactor::Evaluate(double const* const* parameters, double* residuals,
                           double** jacobians) const {
+  const bool in_world = metres_ == Metres::kWorld;
   const Rigid3 T_from = PoseFromBlock(parameters[0]);
   const Rigid3 T_to = PoseFromBlock(parameters[1]);
-  const Eigen::Vector3d scaled_t = std::exp(parameters[2][0]) * T_from_to_.t;
+  const double kappa = parameters[2][0];
+  const double world_scale = in_world ? 1 : std::exp(-kappa);
+  const double odometry_scale = in_world ? std::exp(kappa) : 1;
   const Eigen::Matrix3d R_from_w = T_from.R().transpose();
+  const Eigen::Vector3d t_world = world_scale * (R_from_w * (T_to.t - T_from.t));
+  const Eigen::Vector3d t_odometry = odometry_scale * T_from_to_.t;
   const Eigen::Vector3d r_theta = LogSo3(T_from.q.conjugate() * T_to.q * T_from_to_.q.conjugate());
   Vector6d r;
-  r << R_from_w * (T_to.t - T_from.t) - scaled_t, r_theta;
+  r << t_world - t_odometry, r_theta;
   Eigen::Map<Vector6d>(residuals, 6) = sqrt_info_ * r;
   if (jacobians == nullptr) {
     return true;
@@ -136,7 +141,7 @@ bool EdgeFactor::Evaluate(double const* const* parameters, double* residuals,
   // Log(Exp(a) Exp(r)) ~ r + Jl^-1(r) a, and Jl^-1(r) = Jr^-1(-r).
   const Eigen::Matrix3d Jl_inv_R = RightJacobianInverse(-r_theta) * R_from_w;
   Matrix6d J = Matrix6d::Zero();
-  J.topLeftCorner<3, 3>() = R_from_w;
+  J.topLeftCorner<3, 3>() = world_scale * R_from_w;
   J.bottomRightCorner<3, 3>() = Jl_inv_R;
   if (jacobians[1] != nullptr) {
     Jacobian67 J_to(jacobians[1]);
@@ -145,13 +150,14 @@ bool EdgeFactor::Evaluate(double const* const* parameters, double* residuals,
   }
   if (jacobians[0] != nullptr) {
     J = -J;
-    J.topRightCorner<3, 3>() = R_from_w * Hat(T_to.t - T_from.t);
+    J.topRightCorner<3, 3>() = world_scale * R_from_w * Hat(T_to.t - T_from.t);
     Jacobian67 J_from(jacobians[0]);
     J_from.leftCols<6>() = sqrt_info_ * J;
     J_from.col(6).setZero();
   }
   if (jacobians[2] != nullptr) {
-    Eigen::Map<Vector6d>(jacobians[2], 6) = -sqrt_info_.leftCols<3>() * scaled_t;
+    Eigen::Map<Vector6d>(jacobians[2], 6) =
+        -sqrt_info_.leftCols<3>() * (in_world ? t_odometry : t_world);
   }
   return true;
 }

@@ -64,17 +64,24 @@ class PointPriorFactor : public ceres::SizedCostFunction<3, 3, 1> {
   double sigma_;
 };
 
-// An odometry edge. Blocks: from's T_w_body (7), to's T_w_body (7), log scale kappa (1).
-// r = L^-1 [t_rel - exp(kappa) t; Log(R_rel R^T)], covariance L L^T in from's body frame.
+// An odometry edge. Blocks: from's T_w_body (7), to's T_w_body (7), log scale kappa (1). Covariance
+// L L^T in from's body frame;
+//   kWorld:    r = L^-1 [t_rel - exp(kappa) t; Log(R_rel R^T)]
+//   kOdometry: r = L^-1 [exp(-kappa) t_rel - t; Log(R_rel R^T)]
+// In the world's metres a scale that only its prior holds would shrink until the residuals are
+// nothing.
 class EdgeFactor : public ceres::SizedCostFunction<6, 7, 7, 1> {
  public:
-  EdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance);
+  enum class Metres { kWorld, kOdometry };
+
+  EdgeFactor(const Rigid3& T_from_to, const Matrix6d& covariance, Metres metres = Metres::kWorld);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   Rigid3 T_from_to_;
   Matrix6d sqrt_info_;
+  Metres metres_;
 };
 
 // r = kappa / sigma.

@@ -144,8 +144,10 @@ TEST(BaFactors, EdgeJacobianWithACorrelatedCovariance) {
   for (int run = 0; run < 100; ++run) {
     const Rigid3 T_from = RandomPose(random, 2, 5), T_from_to = RandomPose(random, 0.5, 1);
     const Rigid3 T_to = T_from * T_from_to * RandomPose(random, 0.1, 0.1);
-    ExpectJacobian(EdgeFactor(T_from_to, RandomCovariance(random)),
-                   {ToBlock(T_from), ToBlock(T_to), {Uniform(random, -0.05, 0.05)}});
+    for (const auto metres : {EdgeFactor::Metres::kWorld, EdgeFactor::Metres::kOdometry}) {
+      ExpectJacobian(EdgeFactor(T_from_to, RandomCovariance(random), metres),
+                     {ToBlock(T_from), ToBlock(T_to), {Uniform(random, -0.3, 0.3)}});
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 #include "posegraph/solver/group_solver.h"
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
@@ -70,7 +71,9 @@ int GroupSolver::AddNode(const Pose4& pose, bool fixed) {
 
 int GroupSolver::AddScale(double log_scale, double sigma) {
   scales_.push_back(log_scale);
-  problem_->AddResidualBlock(new ScalePriorCost(sigma), nullptr, &scales_.back());
+  problem_->AddResidualBlock(
+      new ceres::NormalPrior(ceres::Matrix::Constant(1, 1, 1 / sigma), ceres::Vector::Zero(1)),
+      nullptr, &scales_.back());
   return static_cast<int>(scales_.size()) - 1;
 }
 

@@ -13,20 +13,24 @@
 
 namespace pangea {
 
+struct WeightedEdge {
+  Relative4 measured;
+  Matrix4d whitening;
+  const double* sqrt_weight;
+};
+
 // Parameters: (x, y, z, yaw) of both keyframes. `sqrt_weight` multiplies the residual; it is read
 // at each evaluation and outlives the cost.
 class RelativePoseCost : public ceres::SizedCostFunction<4, 4, 4> {
  public:
   RelativePoseCost(const Relative4& measured, const Matrix4d& whitening, const double* sqrt_weight)
-      : measured_(measured), whitening_(whitening), sqrt_weight_(sqrt_weight) {}
+      : edge_{measured, whitening, sqrt_weight} {}
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
-  Relative4 measured_;
-  Matrix4d whitening_;
-  const double* sqrt_weight_;
+  WeightedEdge edge_;
 };
 
 // The same where the measurement's metres are exp(kappa) of the map's:
@@ -35,27 +39,13 @@ class RelativePoseCost : public ceres::SizedCostFunction<4, 4, 4> {
 class ScaledPoseCost : public ceres::SizedCostFunction<4, 4, 4, 1> {
  public:
   ScaledPoseCost(const Relative4& measured, const Matrix4d& whitening, const double* sqrt_weight)
-      : measured_(measured), whitening_(whitening), sqrt_weight_(sqrt_weight) {}
+      : edge_{measured, whitening, sqrt_weight} {}
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
-  Relative4 measured_;
-  Matrix4d whitening_;
-  const double* sqrt_weight_;
-};
-
-// r = kappa / sigma.
-class ScalePriorCost : public ceres::SizedCostFunction<1, 1> {
- public:
-  explicit ScalePriorCost(double sigma) : sigma_(sigma) {}
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override;
-
- private:
-  double sigma_;
+  WeightedEdge edge_;
 };
 
 }  // namespace pangea

@@ -15,7 +15,7 @@ using testing::IsEmpty;
 constexpr int64_t kSecond = 1'000'000;
 constexpr int64_t kImage = 500 * kSecond;  // the image that shows it
 constexpr int64_t kNow = 1'700'000'000 * kSecond;
-const MapId kMap{2, 77};
+const MapId kPlacedMap{2, 77};
 const MapId kLater{2, 88};
 
 PlannedAnchor Kettle() { return {{2, 12, "kettle", {376, 240}, "{}"}, kImage}; }
@@ -24,7 +24,7 @@ PlannedAnchor Kettle() { return {{2, 12, "kettle", {376, 240}, "{}"}, kImage}; }
 AnchorPlacer TrackedFrom(int64_t from) {
   AnchorPlacer placer({Kettle()});
   for (int64_t utime = from; utime <= kImage + kSecond; utime += kSecond / 20) {
-    placer.OnPose(2, utime, kMap, kNow + utime - kImage);
+    placer.OnPose(2, utime, kPlacedMap, kNow + utime - kImage);
   }
   return placer;
 }
@@ -41,7 +41,7 @@ TEST(AnchorPlacer, RequestsTheAnchorAtTheImageThatShowsIt) {
   EXPECT_EQ(edit.name, "kettle");
   EXPECT_EQ(edit.payload, "{}");
   EXPECT_EQ(edit.placement, AnchorEdit::Placement::kPixel);
-  EXPECT_EQ(edit.map, kMap);
+  EXPECT_EQ(edit.map, kPlacedMap);
   EXPECT_EQ(edit.utime, kImage);
   EXPECT_EQ(edit.pixel, Eigen::Vector2d(376, 240));
   EXPECT_FALSE(edit.deleted);
@@ -49,10 +49,10 @@ TEST(AnchorPlacer, RequestsTheAnchorAtTheImageThatShowsIt) {
 
 TEST(AnchorPlacer, NothingIsRequestedBeforeTheImage) {
   AnchorPlacer placer({Kettle()});
-  placer.OnPose(2, kImage - kSecond / 20, kMap, kNow);
+  placer.OnPose(2, kImage - kSecond / 20, kPlacedMap, kNow);
   placer.OnPose(1, kImage + kSecond, MapId{1, 5}, kNow);  // another agent
   EXPECT_THAT(placer.TakeDue(kNow), IsEmpty());
-  placer.OnPose(2, kImage, kMap, kNow);
+  placer.OnPose(2, kImage, kPlacedMap, kNow);
   EXPECT_EQ(placer.TakeDue(kNow).size(), 1u);
 }
 
@@ -78,17 +78,17 @@ TEST(AnchorPlacer, WithoutTrackingTheFirstImageThatIsTrackedIsTaken) {
   const int64_t late = kImage + kSecond / 2;
   EXPECT_EQ(TrackedFrom(late).TakeDue(kNow + kSecond).at(0).utime, late);
   AnchorPlacer placer({Kettle()});
-  placer.OnPose(2, kImage - kSecond, kMap, kNow);
+  placer.OnPose(2, kImage - kSecond, kPlacedMap, kNow);
   placer.OnPose(2, kImage - 1, std::nullopt, kNow);
   placer.OnPose(2, kImage, std::nullopt, kNow);
   EXPECT_THAT(placer.TakeDue(kNow), IsEmpty());
-  placer.OnPose(2, late, kMap, kNow);
+  placer.OnPose(2, late, kPlacedMap, kNow);
   EXPECT_EQ(placer.TakeDue(kNow).at(0).utime, late) << "tracking was lost between";
 }
 
 TEST(AnchorPlacer, AMapOpenedAfterTheImageHasNoneOfIt) {
   AnchorPlacer placer({Kettle()});
-  placer.OnPose(2, kImage - kSecond, kMap, kNow);
+  placer.OnPose(2, kImage - kSecond, kPlacedMap, kNow);
   placer.OnPose(2, kImage + 7, kLater, kNow);
   const AnchorEdit edit = placer.TakeDue(kNow).at(0);
   EXPECT_EQ(edit.map, kLater);
@@ -97,8 +97,8 @@ TEST(AnchorPlacer, AMapOpenedAfterTheImageHasNoneOfIt) {
 
 TEST(AnchorPlacer, StoredKeyframesAroundTheImageAreEnough) {
   AnchorPlacer placer({Kettle()});
-  placer.OnPose(2, kImage - kSecond / 5, kMap, kNow);
-  placer.OnPose(2, kImage + kSecond / 5, kMap, kNow);
+  placer.OnPose(2, kImage - kSecond / 5, kPlacedMap, kNow);
+  placer.OnPose(2, kImage + kSecond / 5, kPlacedMap, kNow);
   EXPECT_EQ(placer.TakeDue(kNow).at(0).utime, kImage);
 }
 
@@ -106,7 +106,7 @@ TEST(AnchorPlacer, NoTwoAnchorsShareAnId) {
   PlannedAnchor second = Kettle();
   second.script.name = "pot";
   AnchorPlacer placer({Kettle(), second});
-  placer.OnPose(2, kImage, kMap, kNow);
+  placer.OnPose(2, kImage, kPlacedMap, kNow);
   const auto due = placer.TakeDue(kNow);
   ASSERT_EQ(due.size(), 2u);
   EXPECT_NE(due[0].anchor, due[1].anchor);
@@ -114,7 +114,7 @@ TEST(AnchorPlacer, NoTwoAnchorsShareAnId) {
 
 TEST(AnchorPlacer, SaysWhatWasNeverRequested) {
   AnchorPlacer placer({Kettle()});
-  placer.OnPose(2, kImage - kSecond, kMap, kNow);
+  placer.OnPose(2, kImage - kSecond, kPlacedMap, kNow);
   EXPECT_THAT(placer.NotPlaced(),
               ElementsAre("agent 2: anchor kettle was never placed: the odometry did not track at "
                           "12 s or later"));

@@ -19,9 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kStopGrace_s = 5;
+constexpr double kServerStopGrace_s = 5;
 constexpr const char* kGateway = "gateway";
-constexpr std::chrono::milliseconds kLookInterval{100};
+constexpr std::chrono::milliseconds kServerLookInterval{100};
 
 void Say(const std::string& line) {
   fmt::print("{}\n", line);
@@ -144,11 +144,11 @@ int Serve(const ServerOptions& options) {
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
   bool given_up = false;
   while (!StopRequested() && !given_up) {
-    std::this_thread::sleep_for(kLookInterval);
+    std::this_thread::sleep_for(kServerLookInterval);
     given_up = ReviveAll(&kept);
     checkpoints.Tick(SteadySeconds());
   }
-  kept.StopAll(kStopGrace_s);
+  kept.StopAll(kServerStopGrace_s);
   Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
   checkpoints.Finish();
   Say("ended");

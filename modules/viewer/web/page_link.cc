@@ -10,7 +10,7 @@ namespace {
 
 // Of records in one update: what a phone takes in within a frame or two.
 constexpr size_t kBudget = 300'000;
-constexpr uint64_t kMaxAgent = 100'000;
+constexpr uint64_t kMaxWatchedAgent = 100'000;
 
 }  // namespace
 
@@ -34,7 +34,8 @@ bool PageLink::Receive(std::string_view text) {
   const auto& value = said.begin().value();
   if (key == "taken" && value.is_number_unsigned()) {
     under_way_ = false;
-  } else if (key == "watch" && value.is_number_unsigned() && value.get<uint64_t>() < kMaxAgent) {
+  } else if (key == "watch" && value.is_number_unsigned() &&
+             value.get<uint64_t>() < kMaxWatchedAgent) {
     seen_.watched = value.get<int32_t>();
     seen_.view = 0;
   } else if (key == "play" && value.is_boolean()) {

@@ -22,7 +22,7 @@ constexpr double kMaxDistance = 200;  // m, of a point: beyond it the start's ba
 // A point straight ahead may be anywhere along its ray, and one such leaves all unknowns without a
 // covariance. So each is held to the closed-form solution, by this many times its distance.
 constexpr double kPointPrior = 10;
-constexpr double kMinDepth = 0.1;  // m, of a point before a camera that saw it
+constexpr double kMinRefinedDepth = 0.1;  // m, of a point before a camera that saw it
 // The closed form is too small where noise is large beside the motion's changes, and scale is a
 // long flat valley: fewer iterations end half way up it, where the covariance is smaller.
 constexpr int kMaxIterations = 100;
@@ -66,7 +66,7 @@ int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_firs
       }
       ++rays;
       const Vector3d p_odom = q_odom_first * found->second;
-      if (!((T_cam_odom * p_odom).z() > kMinDepth)) {
+      if (!((T_cam_odom * p_odom).z() > kMinRefinedDepth)) {
         continue;
       }
       StartPoint& point = points[id];

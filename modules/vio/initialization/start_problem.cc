@@ -24,7 +24,7 @@ constexpr double kGyroBiasSigma = 0.02;   // rad/s, about the epipolar solution
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
 constexpr double kHeld = 1e-8;            // rad^2, m^2: the first frame's yaw and position
 constexpr double kHuber = 2.0;            // sigmas
-constexpr double kMinDepth = 0.05;        // m
+constexpr double kMinStartDepth = 0.05;   // m
 // A step that promises less than this of the cost (a half is one sigma of one direction) is the
 // last.
 constexpr double kEnough = 1e-3;
@@ -52,8 +52,8 @@ Vector3d InCamera(const StartProblem& problem, int frame, const Vector3d& p_odom
 
 double RayErrorOf(const StartProblem& problem, const StartRay& seen, const Vector3d& p_odom) {
   const Vector3d y = InCamera(problem, seen.frame, p_odom);
-  return y.z() > kMinDepth ? (y.head<2>() / y.z() - seen.ray).norm() / problem.ray_sigma
-                           : std::numeric_limits<double>::infinity();
+  return y.z() > kMinStartDepth ? (y.head<2>() / y.z() - seen.ray).norm() / problem.ray_sigma
+                                : std::numeric_limits<double>::infinity();
 }
 
 double PointCost(const StartProblem& problem, const StartPoint& point, const Vector3d& p_odom) {

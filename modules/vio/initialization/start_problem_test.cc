@@ -21,7 +21,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr int kFrames = 6, kPoints = 12;
+constexpr int kStartFrames = 6, kPoints = 12;
 
 // No residual at all: rays without noise, and IMU factors that say what the states do.
 StartProblem ExactProblem() {
@@ -30,7 +30,7 @@ StartProblem ExactProblem() {
   problem.T_body_cam = kT_body_cam;
   problem.ray_sigma = kRaySigma;
   problem.expected_gyro_bias = kGyroBias;
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kStartFrames; ++i) {
     ImuState state;
     state.T_odom_body = Lively(1 + 0.1 * i);
     state.v_odom_body = VelocityAt(Lively, 1 + 0.1 * i);
@@ -38,7 +38,7 @@ StartProblem ExactProblem() {
     problem.states.push_back(state);
   }
   const StartWorld world = Record(Lively, 0, 0);
-  for (int i = 0; i + 1 < kFrames; ++i) {
+  for (int i = 0; i + 1 < kStartFrames; ++i) {
     Preintegrator integrator(ImuNoise{}, kGyroBias, Vector3d::Zero());
     integrator.Add(world.frames[i + 1].imu);
     Preintegration measured = integrator.result();
@@ -58,7 +58,7 @@ StartProblem ExactProblem() {
     StartPoint point;
     point.p_odom = point.expected = Vector3d(5, 0, 0) + RandomVector(rng, 1);
     point.expected_sigma = 20;
-    for (int i = k % 3; i < kFrames; ++i) {
+    for (int i = k % 3; i < kStartFrames; ++i) {
       const Vector3d y = (problem.states[i].T_odom_body * kT_body_cam).Inverse() * point.p_odom;
       point.rays.push_back({i, y.head<2>() / y.z()});
     }

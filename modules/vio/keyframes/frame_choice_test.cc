@@ -9,8 +9,8 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kTracks = 20;
-constexpr int64_t kFirst_us = 1'000'000;
+constexpr int kFrameTracks = 20;
+constexpr int64_t kFirstFrame_us = 1'000'000;
 
 // A window of a first frame, which is a keyframe, and a second one.
 struct Pair {
@@ -22,7 +22,7 @@ struct Pair {
   // Every landmark is seen at its place plus `shift_px`; the first `tracks` of them.
   WindowFrame& Add(double at_s, double shift_px, int tracks) {
     WindowFrame frame;
-    frame.utime = kFirst_us + std::llround(1e6 * at_s);
+    frame.utime = kFirstFrame_us + std::llround(1e6 * at_s);
     state.frames.push_back(frame);
     TrackedFrame tracked{frame.utime, {}};
     for (int i = 0; i < tracks; ++i) {
@@ -34,10 +34,10 @@ struct Pair {
     return state.frames.back();
   }
   Pair() {
-    Add(0, 0, kTracks);
+    Add(0, 0, kFrameTracks);
     choice.Choose(history, &state);
   }
-  const WindowFrame& Second(double at_s, double shift_px, int tracks = kTracks) {
+  const WindowFrame& Second(double at_s, double shift_px, int tracks = kFrameTracks) {
     Add(at_s, shift_px, tracks);
     choice.Choose(history, &state);
     return state.frames.back();
@@ -69,7 +69,7 @@ TEST(FrameChoice, AKeyframeWantsMoreAndATimeApart) {
 
 TEST(FrameChoice, RotationIsTakenOut) {
   Pair pair;
-  WindowFrame& frame = pair.Add(0.3, 30, kTracks);
+  WindowFrame& frame = pair.Add(0.3, 30, kFrameTracks);
   // The camera looks along the body's z axis here: about its y axis the rays near the middle shift
   // alike.
   frame.imu.T_odom_body.q = ExpSo3({0, -30 * pair.camera.PixelAngle(), 0});
@@ -87,8 +87,8 @@ TEST(FrameChoice, StandingStillIsHeldByTheFrameItBeganWith) {
     EXPECT_FALSE(pair.state.frames[1].is_keyframe);
     return pair.state.frames[1].is_window_keyframe;
   };
-  EXPECT_TRUE(is_window_keyframe(false, kTracks));
-  EXPECT_FALSE(is_window_keyframe(true, kTracks));
+  EXPECT_TRUE(is_window_keyframe(false, kFrameTracks));
+  EXPECT_FALSE(is_window_keyframe(true, kFrameTracks));
   EXPECT_FALSE(is_window_keyframe(true, 10));
   EXPECT_TRUE(is_window_keyframe(true, 9)) << "handed on before its tracks run out";
 }

@@ -22,7 +22,7 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
       history.AddFrame({1, {{5, pixel.cast<float>(), camera.Unproject(pixel).value()}}}, camera,
                        1e-3);
       const FrameRay& seen = history.Frame(1).at(5);
-      const MatrixXd numeric = NumericJacobian(3, 1e-6, [&](const Vector3d& intrinsics) {
+      const MatrixXd numeric = pangea::NumericJacobian(3, 1e-6, [&](const Vector3d& intrinsics) {
         WindowState changed;
         changed.intrinsics = intrinsics;
         return changed.Calibrated(camera).Unproject(pixel).value();

@@ -10,7 +10,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kMinDepth = 0.2;  // m
+constexpr double kMinSearchDepth = 0.2;  // m
 constexpr double kBorder_px = 5;
 // Keyframes of the map in one alignment: each costs four unknowns.
 constexpr size_t kMaxSources = 32;
@@ -106,7 +106,7 @@ std::vector<MapLocalization::Match> MapLocalization::FindIn(const CameraModel& c
   std::map<int, std::pair<int, LandmarkKey>> nearest;  // of each corner: (distance, landmark)
   for (const auto& [key, known] : known_) {
     const Vector3d p_cam = T_cam_map * known.p_map;
-    const auto pixel = p_cam.z() > kMinDepth ? camera.Project(p_cam) : std::nullopt;
+    const auto pixel = p_cam.z() > kMinSearchDepth ? camera.Project(p_cam) : std::nullopt;
     const auto match =
         pixel && camera.Contains(*pixel, kBorder_px)
             ? grid.Nearest(*pixel, options_.search_radius_px, known.descriptor, options_.matching)

@@ -7,12 +7,12 @@
 namespace pangea::vio {
 namespace {
 
-const MapId kMap{1, 100};
+const MapId kShownMap{1, 100};
 const MapId kOther{2, 50};
 
 Correction MakeCorrection(int64_t revision, const MapId& group, const Rigid3& T_map_odom) {
   Correction correction;
-  correction.map = kMap;
+  correction.map = kShownMap;
   correction.group = group;
   correction.revision = revision;
   correction.T_map_odom = T_map_odom;
@@ -23,16 +23,16 @@ const Rigid3 kFar{YawRotation(0.7), {40, -20, 1}};
 
 TEST(ShownPose, IsTheOdometryWithoutACorrection) {
   ShownPose shown;
-  shown.Reset(kMap);
+  shown.Reset(kShownMap);
   EXPECT_LT(shown.Show(0, kFar).Minus(kFar).norm(), 1e-12);
 }
 
 TEST(ShownPose, BlendsACorrectionAtABoundedRateAndArrives) {
   ShownPose shown;
-  shown.Reset(kMap);
+  shown.Reset(kShownMap);
   Rigid3 last = shown.Show(0, kFar);
   const Rigid3 drift{YawRotation(0.05), {0.4, -0.3, 0.1}};
-  ASSERT_TRUE(shown.Correct(MakeCorrection(3, kMap, drift)));
+  ASSERT_TRUE(shown.Correct(MakeCorrection(3, kShownMap, drift)));
   EXPECT_EQ(shown.revision(), 3);
   for (int i = 1; i <= 200; ++i) {
     const Rigid3 now = shown.Show(i * 50'000, kFar);
@@ -47,12 +47,12 @@ TEST(ShownPose, BlendsACorrectionAtABoundedRateAndArrives) {
 // step, metres, that is not the odometry's own, as a person who carries the phone sees it.
 double LargestJump(const Rigid3& T_map_odom, Rigid3* last_error) {
   ShownPose shown;
-  shown.Reset(kMap);
+  shown.Reset(kShownMap);
   const auto odometry = [](int image) {
     return Rigid3{YawRotation(0.02 * image), {640 + 0.06 * image, 480, 1}};
   };
   Rigid3 last = shown.Show(0, odometry(0));
-  EXPECT_TRUE(shown.Correct(MakeCorrection(1, kMap, T_map_odom)));
+  EXPECT_TRUE(shown.Correct(MakeCorrection(1, kShownMap, T_map_odom)));
   double largest = 0;
   for (int image = 1; image <= 400; ++image) {
     const Rigid3 now = shown.Show(image * 50'000, odometry(image));
@@ -83,7 +83,7 @@ TEST(ShownPose, ARotationAboutTheBodyDoesNotMoveIt) {
 
 TEST(ShownPose, ANewFrameHoldsAtOnce) {
   ShownPose shown;
-  shown.Reset(kMap);
+  shown.Reset(kShownMap);
   shown.Show(0, kFar);
   const Rigid3 fused{YawRotation(2.0), {100, 0, 0}};
   ASSERT_TRUE(shown.Correct(MakeCorrection(1, kOther, fused)));
@@ -92,7 +92,7 @@ TEST(ShownPose, ANewFrameHoldsAtOnce) {
 
 TEST(ShownPose, TheHighestRevisionWinsAndOtherMapsAreNotOurs) {
   ShownPose shown;
-  shown.Reset(kMap);
+  shown.Reset(kShownMap);
   const Rigid3 newer{YawRotation(0.0), {1, 0, 0}};
   EXPECT_TRUE(shown.Correct(MakeCorrection(5, kOther, newer)));
   EXPECT_FALSE(shown.Correct(MakeCorrection(4, kOther, kFar)));

@@ -14,7 +14,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int64_t kImuStep_us = 5'000;
+constexpr int64_t kImuPeriod_us = 5'000;
 constexpr double kDifference_s = 1e-4;  // for derivatives of the path
 constexpr size_t kTracks = 100;
 constexpr double kLossPerFrame = 0.02;
@@ -116,7 +116,7 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
   const Vector3d omega = LogSo3(before.q.conjugate() * after.q) / (2 * kDifference_s);
   const Vector3d accel = (after.t - 2 * now.t + before.t) / (kDifference_s * kDifference_s);
   const ImuNoise& noise = options_.imu_noise;
-  const double dt = Seconds(kImuStep_us);
+  const double dt = Seconds(kImuPeriod_us);
   gyro_bias_ += RandomVector(rng_, noise.gyro_random_walk * std::sqrt(dt));
   accel_bias_ += RandomVector(rng_, noise.accel_random_walk * std::sqrt(dt));
   biases_[utime] = {gyro_bias_, accel_bias_};
@@ -224,7 +224,7 @@ VioTestWorld::Input VioTestWorld::Next() {
       next_frame_utime_ + std::llround(1e6 * RandomVector(rng, options_.stamp_jitter_s).x());
   do {
     input.imu.push_back(SampleAt(next_imu_utime_));
-    next_imu_utime_ += kImuStep_us;
+    next_imu_utime_ += kImuPeriod_us;
   } while (input.imu.back().utime < stamp);
   input.frame = Observe(next_frame_utime_);
   input.frame.utime = stamp;

@@ -1,5 +1,5 @@
 // Uploads a recording to the gateway: the proof as on the link, then size and bytes, as far ahead of what the server has taken as it
-// allows (modules/gateway/recording_socket.h).
+// allows (modules/gateway/recording/recording_socket.h).
 
 import type { Membership } from "../messages";
 import { proofOf } from "./gateway_link";

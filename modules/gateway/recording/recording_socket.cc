@@ -1,4 +1,4 @@
-#include "gateway/recording_socket.h"
+#include "gateway/recording/recording_socket.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "gateway/recording_folder.h"
+#include "gateway/recording/recording_folder.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t kSecret = 0600;  // images of people
 constexpr const char* kPart = ".part";
 constexpr const char* kCannotWrite = "the server cannot write it: tell whoever runs it";
 
@@ -87,7 +86,8 @@ std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
   } catch (const std::exception&) {
     return kCannotWrite;
   }
-  const int fd = open(PartOf(agent_id).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kSecret);
+  const int fd =
+      open(PartOf(agent_id).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kOwnerOnly);
   if (fd < 0) {
     return kCannotWrite;
   }

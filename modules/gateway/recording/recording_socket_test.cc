@@ -1,4 +1,4 @@
-#include "gateway/recording_socket.h"
+#include "gateway/recording/recording_socket.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

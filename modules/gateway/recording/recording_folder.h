@@ -9,7 +9,7 @@
 #include <map>
 #include <string>
 
-#include "gateway/recording_socket.h"
+#include "gateway/recording/recording_socket.h"
 
 namespace pangea {
 

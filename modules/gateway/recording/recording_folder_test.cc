@@ -1,4 +1,4 @@
-#include "gateway/recording_folder.h"
+#include "gateway/recording/recording_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
