@@ -22,7 +22,7 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity*
   }
   KeyframeMessage message{};
   if (!DecodeMessage(*bytes, &message)) {
-    return "keyframe_t does not decode";
+    return "keyframe does not decode";
   }
   const auto keyframe = Parse(message);
   if (!keyframe.value) {

@@ -82,7 +82,7 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
 void UplinkProcess::OnKeyframe(Bytes data) {
   KeyframeMessage message{};
   if (data.size() > static_cast<size_t>(kMaxKeyframeBytes) || !DecodeMessage(data, &message)) {
-    return node_.Refuse("keyframe_t does not decode, or is too large");
+    return node_.Refuse("keyframe does not decode, or is too large");
   }
   const auto keyframe = Parse(message);
   if (!keyframe.value) {

@@ -14,25 +14,19 @@
 #include "agent_handler/journal/journal.h"
 #include "bus/transport/test_datagrams.h"
 #include "core/big_endian.h"
+#include "corpus.h"
+#include "files/text_file.h"
 #include "fuzz.h"
-#include "global_ba/global_ba.h"
-#include "link/agent_key.h"
 #include "link/compression.h"
 #include "link_channels.h"
 #include "log_file/log_reader.h"
-#include "loop_verification/drift_gate.h"
-#include "loop_verification/steps/steps.h"
-#include "map_points/map_points.h"
 #include "messages/anchor_messages.h"
 #include "messages/messages.h"
-#include "options/yaml_options.h"
 #include "pangea_schemas.h"
-#include "posegraph/posegraph.h"
 #include "sensor_channels.h"
 #include "server_channels.h"
 #include "uplink/spool.h"
 #include "uplink/uplink.h"
-#include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {
 namespace {
@@ -91,21 +85,6 @@ const Payload& First(const std::vector<Captured>& events, const std::string& cha
   }
   throw std::runtime_error("the log has too little on " + channel);
 }
-
-class Corpus {
- public:
-  explicit Corpus(fs::path folder) : folder_(std::move(folder)) {}
-  void Add(const std::string& target, const std::string& name, Bytes bytes) const {
-    fs::create_directories(folder_ / target);
-    WriteFile(folder_ / target / ("seed_" + name), bytes);
-  }
-  void AddText(const std::string& target, const std::string& name, const std::string& text) const {
-    Add(target, name, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
-  }
-
- private:
-  fs::path folder_;
-};
 
 Payload Landmarks(const MapId& map) {
   MapLandmarks landmarks{map, map, 3, {{{map, 1}, {0, 0, 1}}}, {}};
@@ -243,11 +222,6 @@ void Link(const std::vector<Captured>& events, const Corpus& corpus) {
   corpus.Add("uplink", "link", to_uplink);
 }
 
-std::string TextOf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
 void Journals(const std::vector<Captured>& events, const Corpus& corpus) {
   const fs::path file = ScratchFolder() / "made.lcm";
   fs::remove(file);
@@ -260,7 +234,7 @@ void Journals(const std::vector<Captured>& events, const Corpus& corpus) {
     journal.Append(2, "PLACE_MATCH", First(events, "PLACE_MATCH"));
     journal.Append(3, "CONSTRAINT", First(events, "CONSTRAINT"));
   }
-  const std::string text = TextOf(file);
+  const std::string text = ReadTextFile(file);
   corpus.AddText("journal", "whole", text);
   corpus.AddText("journal", "torn", text.substr(0, text.size() - 100));
 }
@@ -274,82 +248,9 @@ void Spools(const std::vector<Captured>& events, const Corpus& corpus) {
       spool.Add({MapOf(bytes), seq}, bytes, seq);
     }
   }
-  const std::string text = TextOf(fs::directory_iterator(folder)->path());
+  const std::string text = ReadTextFile(fs::directory_iterator(folder)->path());
   corpus.AddText("spool", "whole", text);
   corpus.AddText("spool", "torn", text.substr(0, text.size() - 100));
-}
-
-template <typename Options>
-std::string Printed() {
-  Options options;
-  YamlOptions yaml;
-  options.Visit(yaml);
-  return yaml.Print();
-}
-
-std::string KeyText() {
-  const fs::path file = ScratchFolder() / "agent_1.key";
-  fs::remove(file);
-  MakeKeyFile(file, 1);
-  return TextOf(file);
-}
-
-// In the order of fuzz_options.cc.
-void OptionFiles(const Corpus& corpus) {
-  const std::string session =
-      "agents:\n  - {id: 1, keyframes: a.lcm, delay: 1.5, duration: 60, link: {loss: 0.1, "
-      "delay_ms: 50, partitions: [{at: 3, seconds: 4}], seed: 7}}\n"
-      "  - {id: 2, recording: MH_01, start: 3}\n";
-  const std::vector<std::pair<std::string, std::string>> seeds = {
-      {"session", session},
-      {"vio", Printed<vio::VioFileOptions>()},
-      {"loop_verification", Printed<LoopVerificationOptions>()},
-      {"posegraph", Printed<PoseGraphOptions>()},
-      {"global_ba", Printed<GlobalBaOptions>()},
-      {"map_points", Printed<MapPointsOptions>()},
-      {"key", KeyText()},
-  };
-  for (size_t i = 0; i < seeds.size(); ++i) {
-    corpus.AddText("options", seeds[i].first,
-                   std::string(1, static_cast<char>('F' + static_cast<int>(i))) + seeds[i].second);
-  }
-}
-
-void AnchorApiRequests(const Corpus& corpus) {
-  corpus.AddText("anchor_api", "group",
-                 R"(POST /v1/anchors
-{"name": "kettle", "payload": "{}", "pose": {"group": "1/1000", "position": [1, 2, 0.5],
- "orientation": [1, 0, 0, 0]}})");
-  corpus.AddText("anchor_api", "keyframe",
-                 R"(POST /v1/anchors
-{"pose": {"keyframe": {"map": "2/1001", "seq": 1}, "position": [1, 0, 0]}})");
-  corpus.AddText("anchor_api", "pixel",
-                 R"(POST /v1/anchors
-{"pose": {"agent": 1, "utime": 1000000, "pixel": [376.5, 240]}})");
-  corpus.AddText("anchor_api", "change",
-                 "PUT /v1/anchors/1%2F17\n{\"name\": \"pot\", \"revision\": 1}");
-  corpus.AddText("anchor_api", "delete", "DELETE /v1/anchors/1/17\n");
-  corpus.AddText("anchor_api", "list", "GET /v1/anchors?group=1%2F1000\n");
-  corpus.AddText("anchor_api", "agent", "GET /v1/agents/2/anchors\n");
-}
-
-void Recording(const Corpus& corpus) {
-  const std::string extrinsics =
-      "T_BS:\n  rows: 4\n  cols: 4\n  data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n";
-  corpus.AddText(
-      "recording", "whole",
-      extrinsics +
-          "resolution: [32, 24]\nintrinsics: [30, 31, 16, 12]\ndistortion_model: radtan\n"
-          "distortion_coefficients: [0.1, 0.01, 0, 0]\nreadout_s: 0.02\n\f" +
-          extrinsics +
-          "rate_hz: 200\ngyroscope_noise_density: 1e-4\ngyroscope_random_walk: 2e-5\n"
-          "accelerometer_noise_density: 3e-3\naccelerometer_random_walk: 4e-3\n\f"
-          "#timestamp [ns],filename\n1000000000,1000000000.png\n\f"
-          "#timestamp [ns],w,w,w,a,a,a\n999000000,0.1,0.2,0.3,0,0,9.81\n"
-          "1004000000,0.1,0.2,0.3,0,0,9.81\n1010000000,0.1,0.2,0.3,0,0,9.81\n\f"
-          "#t\n1000000000,1,2,3,1,0,0,0\n2000000000,1,2,4,1,0,0,0\n\f" +
-          extrinsics);
-  corpus.AddText("recording", "tum", "\f\f\f\f1.5 1 2 3 0 0 0 1\n2.5 1 2 4 0 0 0 1\n");
 }
 
 // A camera of 32 x 24 pixels, still, then moving.
@@ -437,9 +338,7 @@ int Make(const std::string& log, const Corpus& corpus) {
   Link(events, corpus);
   Journals(events, corpus);
   Spools(events, corpus);
-  OptionFiles(corpus);
-  AnchorApiRequests(corpus);
-  Recording(corpus);
+  AddTexts(corpus);
   Sensors(corpus);
   Server(events, corpus);
   return 0;
