@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <stdexcept>
 
 #include "core/median.h"
@@ -18,6 +19,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::optional<std::string> Mav0In(const fs::path& folder) {
+  std::error_code error;
+  for (const fs::path& candidate : {folder / "mav0", folder}) {
+    if (fs::is_directory(candidate / "cam0", error) ||
+        fs::is_directory(candidate / "imu0", error)) {
+      return candidate.string();
+    }
+  }
+  return std::nullopt;
+}
+
+// What else it may be that somebody took for a recording.
+std::string Hint(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) {
+    return path.extension() == ".bag" || path.extension() == ".db3"
+               ? "a ROS bag: write its topics into such a folder first"
+               : "a file: unpack it, and give the folder that holds mav0";
+  }
+  for (const fs::directory_entry& inner : fs::directory_iterator(path, error)) {
+    if (inner.is_directory(error) && Mav0In(inner.path())) {
+      return fmt::format("but {} is one", inner.path().string());
+    }
+  }
+  return fs::is_empty(path, error) ? "the folder is empty" : "it must hold mav0/cam0 and mav0/imu0";
+}
+
 std::string FindMav0(const std::string& folder) {
   std::error_code error;
   if (!fs::exists(folder, error)) {
@@ -25,14 +53,36 @@ std::string FindMav0(const std::string& folder) {
         fmt::format("{}: there is no such recording folder{}", folder,
                     error ? fmt::format(": {}", error.message()) : std::string()));
   }
-  for (const fs::path& candidate : {fs::path(folder) / "mav0", fs::path(folder)}) {
-    if (fs::is_directory(candidate / "cam0", error) ||
-        fs::is_directory(candidate / "imu0", error)) {
-      return candidate.string();
+  if (const auto mav0 = Mav0In(folder)) {
+    return *mav0;
+  }
+  throw std::runtime_error(
+      fmt::format("{}: not a recording in EuRoC's format; {}", folder, Hint(folder)));
+}
+
+// Files that the table of stamps does not name are as good as lost.
+void NameImagesWithoutStamp(const std::string& mav0, const std::vector<CsvRow>& rows,
+                            std::vector<std::string>* warnings) {
+  std::set<std::string> named;
+  for (const CsvRow& row : rows) {
+    named.insert(row.fields.back());
+  }
+  size_t unnamed = 0;
+  std::string first;
+  std::error_code error;
+  for (const fs::directory_entry& file : fs::directory_iterator(mav0 + "/cam0/data", error)) {
+    const std::string name = file.path().filename();
+    if (!named.contains(name)) {
+      ++unnamed;
+      first = first.empty() ? name : std::min(first, name);
     }
   }
-  throw std::runtime_error(fmt::format(
-      "{}: not a recording in EuRoC's format; it must hold mav0/cam0 and mav0/imu0", folder));
+  if (unnamed > 0) {
+    warnings->push_back(
+        fmt::format("{0}/cam0/data: {1} files have no row in {0}/cam0/data.csv, {2} the first; not "
+                    "played",
+                    mav0, unnamed, first));
+  }
 }
 
 // A row the file was cut off in: its last number may be cut too.
@@ -139,12 +189,14 @@ EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folde
 }
 
 void EurocRecording::ReadCamera() {
-  camera_ = ReadEurocCamera(mav0_ + "/cam0/sensor.yaml");
-  calibration_sigmas_ = ReadEurocCalibrationSigmas(mav0_ + "/cam0/sensor.yaml");
+  const std::string file = EurocCalibrationFile(mav0_, "cam0");
+  camera_ = ReadEurocCamera(file);
+  calibration_sigmas_ = ReadEurocCalibrationSigmas(file);
 }
 
 Rigid3 EurocRecording::ReadImuCalibration() {
-  const EurocImuCalibration calibration = ReadEurocImuCalibration(mav0_ + "/imu0/sensor.yaml");
+  const EurocImuCalibration calibration =
+      ReadEurocImuCalibration(EurocCalibrationFile(mav0_, "imu0"));
   imu_noise_ = calibration.noise;
   return calibration.T_s_body;
 }
@@ -173,9 +225,12 @@ void EurocRecording::ReadImages() {
   malformed.ThrowIfTooMany(rows.size(), "nanoseconds, file name");
   Append(malformed, &warnings_);
   Append(missing, &warnings_);
+  NameImagesWithoutStamp(mav0_, rows, &warnings_);
   if (images_.empty()) {
     throw std::runtime_error(
-        fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
+        rows.empty()
+            ? fmt::format("{}: holds no row; expected: nanoseconds, file name", csv)
+            : fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
   }
   DropFarStamps(&images_, csv, &warnings_);
   Warn(SortByTime(&images_), csv, &warnings_);
@@ -220,7 +275,9 @@ void EurocRecording::DropImagesOutsideImu() {
                 [&](const EurocImage& image) { return image.utime < begin || image.utime > end; });
   if (images_.empty()) {
     throw std::runtime_error(fmt::format(
-        "{}: no image lies within the IMU's time; are imu0 and cam0 of one recording?", mav0_));
+        "{}: no image lies within the IMU's time; are imu0 and cam0 of one recording, and both "
+        "stamped in nanoseconds?",
+        mav0_));
   }
   if (images_.size() < before) {
     warnings_.push_back(
@@ -244,10 +301,12 @@ void EurocRecording::CheckImages() const {
     of_another_size += !image.size.empty() && image.size != expected ? 1 : 0;
     last = fmt::format("{}: {}", images_[i].path, image.why);
   }
-  throw std::runtime_error(
-      fmt::format("{}/cam0/data: none of the images can be used; the calibration must be of these "
-                  "(cam0/sensor.yaml, field 'resolution'); the last one tried: {}",
-                  mav0_, last));
+  throw std::runtime_error(fmt::format(
+      "{}/cam0/data: none of the images can be used{}; the last one tried: {}", mav0_,
+      of_another_size > 0 ? "; the calibration must be of these (cam0/sensor.yaml, field "
+                            "'resolution')"
+                          : "",
+      last));
 }
 
 cv::Mat EurocRecording::LoadImage(size_t index, std::string* why) const {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 #include <vector>
 
@@ -54,26 +55,63 @@ std::vector<double> Numbers(const YAML::Node& root, const std::string& file, con
   return values;
 }
 
-Rigid3 Extrinsics(const YAML::Node& root, const std::string& file) {
-  const YAML::Node node = root["T_BS"];
-  if (!node || !node.IsMap()) {
-    Throw(file, "field 'T_BS' (a 4x4 matrix with rows, cols and data) is missing");
+// Kalibr's files hold several sensors, each below its name; EuRoC's are of one.
+YAML::Node SensorIn(const YAML::Node& root, const char* sensor) {
+  const YAML::Node node = root[sensor];
+  return node && node.IsMap() ? node : root;
+}
+
+// Row by row: of EuRoC's `data`, or of Kalibr's list of rows.
+std::vector<double> Matrix4(const YAML::Node& root, const std::string& file,
+                            const std::string& key) {
+  const YAML::Node node = root[key];
+  if (node && node.IsMap()) {
+    return Numbers(node, file, "data", 16);
   }
-  const std::vector<double> m = Numbers(node, file, "data", 16);
+  if (!node || !node.IsSequence() || node.size() != 4) {
+    Throw(file, fmt::format("field '{}' must be a 4x4 matrix", key));
+  }
+  std::vector<double> values;
+  for (const YAML::Node& row : node) {
+    for (const YAML::Node& item : row) {
+      values.push_back(Number(item, file, key));
+    }
+  }
+  if (values.size() != 16) {
+    Throw(file, fmt::format("field '{}' must be a 4x4 matrix", key));
+  }
+  return values;
+}
+
+Rigid3 Transform(const YAML::Node& root, const std::string& file, const std::string& key) {
+  const std::vector<double> m = Matrix4(root, file, key);
   Eigen::Matrix3d R;
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
   const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (error > 1e-3 || R.determinant() < 0) {
-    Throw(file, fmt::format("the rotation in 'T_BS' is not one (|R R' - I| = {:.2g}, det {:.2g})",
-                            error, R.determinant()));
+    Throw(file, fmt::format("the rotation in '{}' is not one (|R R' - I| = {:.2g}, det {:.2g})",
+                            key, error, R.determinant()));
   }
   const Eigen::Vector3d t(m[3], m[7], m[11]);
   if (t.norm() > CameraModel::kMaxLever_m) {
-    Throw(file, fmt::format("the translation in 'T_BS' is {:.3g} m long; at most {} are plausible: "
+    Throw(file, fmt::format("the translation in '{}' is {:.3g} m long; at most {} are plausible: "
                             "is it in metres?",
-                            t.norm(), CameraModel::kMaxLever_m));
+                            key, t.norm(), CameraModel::kMaxLever_m));
   }
   return {Eigen::Quaterniond(R).normalized(), t};
+}
+
+// EuRoC's T_BS of a camera, or Kalibr's T_cam_imu, which is its inverse.
+Rigid3 CameraExtrinsics(const YAML::Node& root, const std::string& file) {
+  if (root["T_BS"]) {
+    return Transform(root, file, "T_BS");
+  }
+  if (root["T_cam_imu"]) {
+    return Transform(root, file, "T_cam_imu").Inverse();
+  }
+  Throw(file,
+        "field 'T_BS' (body from camera, a 4x4 matrix with rows, cols and data) is missing, "
+        "and Kalibr's 'T_cam_imu' too: a calibration of the camera alone is not enough");
 }
 
 CameraModel::Kind Distortion(const YAML::Node& root, const std::string& file) {
@@ -88,6 +126,23 @@ CameraModel::Kind Distortion(const YAML::Node& root, const std::string& file) {
   Throw(file, fmt::format("'distortion_model: {}' is not known; known: radial-tangential (radtan), "
                           "equidistant",
                           name));
+}
+
+// Four: k1, k2, p1, p2, or the four of the equidistant model. A fifth, k3, must be 0.
+std::vector<double> Coefficients(const YAML::Node& root, const std::string& file) {
+  const std::string key = root["distortion_coeffs"] ? "distortion_coeffs"  // Kalibr's name
+                                                    : "distortion_coefficients";
+  if (root[key] && root[key].size() == 5) {
+    std::vector<double> values = Numbers(root, file, key, 5);
+    if (values.back() != 0) {
+      Throw(file, fmt::format("field '{}' has a fifth number, k3 = {}; the lens model has four: "
+                              "calibrate with k3 held at 0, or as equidistant",
+                              key, values.back()));
+    }
+    values.pop_back();
+    return values;
+  }
+  return Numbers(root, file, key, 4);
 }
 
 double OptionalNumber(const YAML::Node& root, const std::string& file, const std::string& key,
@@ -120,15 +175,35 @@ double TimeOffset(const YAML::Node& root, const std::string& file, double readou
 
 }  // namespace
 
+std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor) {
+  const bool is_camera = sensor == "cam0";
+  std::string euroc = fmt::format("{}/{}/sensor.yaml", mav0, sensor);
+  std::error_code error;
+  if (std::filesystem::symlink_status(euroc, error).type() !=
+      std::filesystem::file_type::not_found) {
+    return euroc;
+  }
+  std::string tum_vi =
+      fmt::format("{}/../dso/{}", mav0, is_camera ? "camchain.yaml" : "imu_config.yaml");
+  if (Exists(tum_vi)) {
+    return tum_vi;
+  }
+  Throw(euroc, fmt::format("there is no such file. Kalibr's {} serves under that name, and "
+                           "pangea-calibrate makes one from the recording",
+                           is_camera ? "camchain.yaml" : "imu.yaml"));
+}
+
 CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
   return ParseEurocCamera(ReadTextFile(sensor_yaml), sensor_yaml);
 }
 
 CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml) {
-  const YAML::Node root = Load(text, sensor_yaml);
+  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "cam0");
   const YAML::Node model = root["camera_model"];
   if (model && (!model.IsScalar() || model.Scalar() != "pinhole")) {
-    Throw(sensor_yaml, "'camera_model' must be pinhole");
+    Throw(sensor_yaml,
+          "'camera_model' must be pinhole; for a wide lens with 'distortion_model: "
+          "equidistant'");
   }
   CameraModel camera;
   camera.kind = Distortion(root, sensor_yaml);
@@ -145,9 +220,9 @@ CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_
   camera.fy = k[1];
   camera.cx = k[2];
   camera.cy = k[3];
-  const std::vector<double> d = Numbers(root, sensor_yaml, "distortion_coefficients", 4);
+  const std::vector<double> d = Coefficients(root, sensor_yaml);
   camera.distortion << d[0], d[1], d[2], d[3];
-  camera.T_body_cam = Extrinsics(root, sensor_yaml);
+  camera.T_body_cam = CameraExtrinsics(root, sensor_yaml);
   camera.readout_s = OptionalNumber(root, sensor_yaml, "readout_s", 0);
   camera.time_offset_s = TimeOffset(root, sensor_yaml, camera.readout_s);
   if (const auto invalid = camera.Invalid()) {
@@ -162,7 +237,7 @@ std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& s
 
 std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
                                                              const std::string& sensor_yaml) {
-  const YAML::Node root = Load(text, sensor_yaml);
+  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "cam0");
   // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0).
   const auto read = [&](const char* key, size_t size, size_t first, size_t count, double unit,
                         double* sigma) {
@@ -195,16 +270,19 @@ EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
 
 EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
                                              const std::string& sensor_yaml) {
-  const YAML::Node root = Load(text, sensor_yaml);
+  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "imu0");
   EurocImuCalibration calibration;
-  calibration.T_s_body = Extrinsics(root, sensor_yaml);
+  const bool is_kalibr = !root["rate_hz"] && root["update_rate"];  // whose first IMU is the body
+  if (!is_kalibr) {
+    calibration.T_s_body = Transform(root, sensor_yaml, "T_BS");
+  }
   ImuNoise& noise = calibration.noise;
   const std::pair<const char*, double*> fields[] = {
       {"gyroscope_noise_density", &noise.gyro_noise_density},
       {"gyroscope_random_walk", &noise.gyro_random_walk},
       {"accelerometer_noise_density", &noise.accel_noise_density},
       {"accelerometer_random_walk", &noise.accel_random_walk},
-      {"rate_hz", &noise.rate_hz}};
+      {is_kalibr ? "update_rate" : "rate_hz", &noise.rate_hz}};
   for (const auto& [key, value] : fields) {
     const YAML::Node node = root[key];
     if (!node) {
@@ -231,7 +309,7 @@ Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
     return {};
   }
   const YAML::Node root = Load(ReadTextFile(sensor_yaml), sensor_yaml);
-  return root["T_BS"] ? Extrinsics(root, sensor_yaml) : Rigid3();
+  return root["T_BS"] ? Transform(root, sensor_yaml, "T_BS") : Rigid3();
 }
 
 }  // namespace pangea

@@ -1,6 +1,7 @@
 #pragma once
 
-// EuRoC's sensor.yaml files.
+// EuRoC's sensor.yaml files, or Kalibr's camchain and IMU files in their place (of which cam0 and
+// imu0 count).
 
 #include <optional>
 #include <string>
@@ -16,6 +17,9 @@ struct EurocImuCalibration {
   Rigid3 T_s_body;  // EuRoC's T_BS of the IMU: rig frame from IMU
 };
 
+// Where the calibration of "cam0" or "imu0" is: sensor.yaml, or as TUM-VI has it, beside mav0 in
+// dso/. Throws std::runtime_error when there is neither.
+std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor);
 // T_body_cam of the result is the file's T_BS: rig frame from camera.
 // All throw std::runtime_error naming file and field.
 CameraModel ReadEurocCamera(const std::string& sensor_yaml);

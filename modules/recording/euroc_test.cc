@@ -176,9 +176,35 @@ TEST_F(EurocTest, MissingPartsAreNamed) {
   fs::remove(root_ + "/mav0/imu0/data.csv");
   EXPECT_THAT(Complaint(), HasSubstr("imu0/data.csv: cannot be opened: No such file"));
   fs::remove(root_ + "/mav0/cam0/sensor.yaml");
-  EXPECT_THAT(Complaint(), HasSubstr("cam0/sensor.yaml: cannot be opened"));
+  EXPECT_THAT(Complaint(), HasSubstr("cam0/sensor.yaml: there is no such file"));
   fs::remove_all(root_ + "/mav0");
+  EXPECT_THAT(Complaint(), HasSubstr("the folder is empty"));
+  std::ofstream(root_ + "/notes.txt") << "notes";
   EXPECT_THAT(Complaint(), HasSubstr("must hold mav0/cam0 and mav0/imu0"));
+}
+
+TEST_F(EurocTest, WhatElseSomebodyMayGiveIsNamed) {
+  const std::string outer = root_ + "_outer";
+  fs::remove_all(outer);
+  fs::create_directories(outer);
+  fs::rename(root_, outer + "/MH_01");
+  root_ = outer;
+  EXPECT_THAT(Complaint(), HasSubstr("but " + outer + "/MH_01 is one"));
+  for (const auto& [name, says] : {std::pair("MH_01.zip", "a file: unpack it"),
+                                   std::pair("MH_01.bag", "a ROS bag: write its topics")}) {
+    root_ = fmt::format("{}/{}", outer, name);
+    std::ofstream(root_) << "PK";
+    EXPECT_THAT(Complaint(), HasSubstr(says));
+  }
+}
+
+TEST_F(EurocTest, ImagesWithoutAStampAreCounted) {
+  Write("cam0/data.csv", ImageRow(0) + ImageRow(1) + ImageRow(3));
+  const EurocRecording recording(root_);
+  EXPECT_EQ(recording.images().size(), 3U);
+  EXPECT_THAT(recording.warnings(),
+              Contains(HasSubstr("7 files have no row in " + root_ + "/mav0/cam0/data.csv, " +
+                                 fs::path(ImagePath(2)).filename().string() + " the first")));
 }
 
 TEST_F(EurocTest, CalibrationMistakesNameTheField) {

@@ -1,0 +1,97 @@
+#include "recording/euroc_calibration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+// Kalibr's layouts (its wiki, "YAML formats"). The camera looks along the body's x axis, 0.1 m
+// before it.
+const std::string kLens =
+    "  camera_model: pinhole\n  intrinsics: [190.9, 190.8, 254.9, 256.8]\n"
+    "  distortion_model: equidistant\n  distortion_coeffs: [0.003, 0.0007, -0.002, 0.0002]\n"
+    "  resolution: [512, 512]\n  rostopic: /cam0/image_raw\n";
+const std::string kCamchain = "cam0:\n" + kLens +
+                              "  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.0]\n  - [0.0, 0.0, -1.0, 0.0]\n"
+                              "  - [1.0, 0.0, 0.0, -0.1]\n  - [0.0, 0.0, 0.0, 1.0]\n"
+                              "  timeshift_cam_imu: 0.002\ncam1:\n  camera_model: pinhole\n";
+const std::string kNoise =
+    "accelerometer_noise_density: 0.0028\naccelerometer_random_walk: 0.00086\n"
+    "gyroscope_noise_density: 0.00016\ngyroscope_random_walk: 2.2e-05\n"
+    "rostopic: /imu0\nupdate_rate: 199.0\n";
+
+template <typename Parse>
+std::string Complaint(const Parse& parse) {
+  try {
+    parse();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(EurocCalibration, KalibrsCamchainIsUnderstood) {
+  const CameraModel camera = ParseEurocCamera(kCamchain, "camchain.yaml");
+  EXPECT_EQ(camera.kind, CameraModel::Kind::kEquidistant);
+  EXPECT_EQ(camera.width, 512);
+  EXPECT_EQ(camera.cx, 254.9);
+  EXPECT_EQ(camera.distortion[2], -0.002);
+  EXPECT_EQ(camera.time_offset_s, 0.002);
+  // T_cam_imu takes points of the body to the camera; ours is the other way round.
+  EXPECT_LT((camera.T_body_cam.t - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((camera.T_body_cam.q * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
+            1e-12);
+  EXPECT_FALSE(ParseEurocCalibrationSigmas(kCamchain, "camchain.yaml"));
+}
+
+TEST(EurocCalibration, KalibrsImuFileIsUnderstood) {
+  for (const std::string& text :
+       {kNoise,
+        std::string("imu0:\n  T_i_b:\n  - [1, 0, 0, 0]\n  accelerometer_noise_density: 0.0028\n"
+                    "  accelerometer_random_walk: 0.00086\n  gyroscope_noise_density: 0.00016\n"
+                    "  gyroscope_random_walk: 2.2e-05\n  update_rate: 199.0\n")}) {
+    const EurocImuCalibration imu = ParseEurocImuCalibration(text, "imu.yaml");
+    EXPECT_EQ(imu.noise.accel_noise_density, 0.0028);
+    EXPECT_EQ(imu.noise.gyro_random_walk, 2.2e-05);
+    EXPECT_EQ(imu.noise.rate_hz, 199);
+    EXPECT_EQ(imu.T_s_body.t, Eigen::Vector3d(0, 0, 0));
+  }
+}
+
+TEST(EurocCalibration, WhatALensModelLacksIsSaid) {
+  const auto parse = [](std::string text, const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+    return Complaint([&] { ParseEurocCamera(text, "camchain.yaml"); });
+  };
+  EXPECT_EQ(parse(kCamchain, "0.0002]", "0.0002, 0.0]"), "");
+  EXPECT_THAT(parse(kCamchain, "0.0002]", "0.0002, 0.1]"), HasSubstr("a fifth number, k3 = 0.1"));
+  EXPECT_THAT(parse(kCamchain, "camera_model: pinhole", "camera_model: omni"),
+              HasSubstr("'camera_model' must be pinhole; for a wide lens"));
+  EXPECT_THAT(parse(kCamchain, "T_cam_imu", "T_cn_cnm1"), HasSubstr("field 'T_BS'"));
+  EXPECT_THAT(parse(kCamchain, "-0.1]\n", "-0.1, 1.0]\n"),
+              HasSubstr("field 'T_cam_imu' must be a 4x4 matrix"));
+}
+
+TEST(EurocCalibration, IsFoundBesideTheFolderAsInTumVi) {
+  const std::string root = ::testing::TempDir() + "pangea_tum_vi";
+  fs::remove_all(root);
+  fs::create_directories(root + "/mav0/cam0");
+  EXPECT_THAT(Complaint([&] { EurocCalibrationFile(root + "/mav0", "cam0"); }),
+              HasSubstr("mav0/cam0/sensor.yaml: there is no such file. Kalibr's camchain.yaml"));
+  fs::create_directories(root + "/dso");
+  std::ofstream(root + "/dso/camchain.yaml") << kCamchain;
+  EXPECT_EQ(ReadEurocCamera(EurocCalibrationFile(root + "/mav0", "cam0")).width, 512);
+  std::ofstream(root + "/mav0/cam0/sensor.yaml") << "a: 1\n";  // comes first
+  EXPECT_EQ(EurocCalibrationFile(root + "/mav0", "cam0"), root + "/mav0/cam0/sensor.yaml");
+}
+
+}  // namespace
+}  // namespace pangea
