@@ -125,9 +125,7 @@ void AddCutOptions(CLI::App& command, Arguments* arguments) {
       ->capture_default_str();
 }
 
-}  // namespace
-
-void AddCommands(CLI::App& app, Arguments* arguments) {
+void AddInfo(CLI::App& app, Arguments* arguments) {
   AddCommand(app, "info", "Channels, keyframes and verification results in a log", arguments, 1)
       ->callback([arguments] {
         const std::string& log = arguments->logs.front();
@@ -135,6 +133,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
         arguments->readings[log] = summary.reading;
         std::cout << ToText(summary, log);
       });
+}
+
+void AddList(CLI::App& app, Arguments* arguments) {
   CLI::App* list = AddCommand(app, "list", "The messages of a log, one a line", arguments, 1);
   AddCutOptions(*list, arguments);
   list->add_flag("--fields", arguments->fields, "Every field, of arrays the first eight items");
@@ -146,6 +147,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                                    : ListAs::kLines,
                std::cout, &arguments->readings);
   });
+}
+
+void AddAnchors(CLI::App& app, Arguments* arguments) {
   CLI::App* anchors = AddCommand(
       app, "anchors", "The anchors as the log ends: where they are, who made them", arguments, 1);
   anchors
@@ -153,6 +157,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                    "FILE.json: every field; FILE.gltf: with the map points, glTF 2.0, y up")
       ->check(IsJsonOrGltf);
   anchors->callback([arguments] { ListAnchors(*arguments); });
+}
+
+void AddDiff(CLI::App& app, Arguments* arguments) {
   CLI::App* diff =
       AddCommand(app, "diff",
                  "Where two runs part: the first message of each channel that differs, "
@@ -165,6 +172,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
     std::cout << ToText(differences);
     arguments->exit_code = differences.First() == nullptr ? 0 : 2;
   });
+}
+
+void AddCut(CLI::App& app, Arguments* arguments) {
   CLI::App* cut =
       AddCommand(app, "cut",
                  "A part of a log: a time, some channels; of a damaged log all that can be "
@@ -178,6 +188,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
     KeepRecordings({log}, arguments->out);
     std::cout << fmt::format("{}: {} events\n", arguments->out, events);
   });
+}
+
+void AddCat(CLI::App& app, Arguments* arguments) {
   CLI::App* cat = AddCommand(app, "cat", "Several logs in one, by time of capture", arguments, -1);
   cat->alias("merge");
   cat->add_option("--out", arguments->out, "The new log")->required();
@@ -186,11 +199,17 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
     KeepRecordings({arguments->logs.begin(), arguments->logs.end()}, arguments->out);
     std::cout << fmt::format("{}: {} events\n", arguments->out, events);
   });
+}
+
+void AddExport(CLI::App& app, Arguments* arguments) {
   CLI::App* out = AddCommand(app, "export", "What a server bus' log amounts to", arguments, 1);
   out->add_option("--tum", arguments->tum, "Folder for the agents' trajectories, TUM format");
   out->add_option("--g2o", arguments->g2o, "File for the pose graph, g2o format");
   out->add_option("--ply", arguments->ply, "File for the largest group's map points");
   out->callback([arguments] { Export(*arguments); });
+}
+
+void AddImport(CLI::App& app, Arguments* arguments) {
   CLI::App* back = AddCommand(app, "import",
                               "A pose graph that was exported and solved elsewhere, back into the "
                               "log: its poses, not its edges, are the newest state of each group",
@@ -207,6 +226,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
         "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own\n",
         arguments->out, placed, arguments->g2o);
   });
+}
+
+void AddExplain(CLI::App& app, Arguments* arguments) {
   CLI::App* explain = AddCommand(
       app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
       arguments, 1);
@@ -216,6 +238,9 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
                       "ID=FOLDER: an agent's recording, for its images (default: as the session "
                       "remembers it beside its log)");
   explain->callback([arguments] { ExplainResult(*arguments); });
+}
+
+void AddCost(CLI::App& app, Arguments* arguments) {
   CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
   cost->callback([arguments] {
@@ -223,6 +248,15 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
                              graph.vertices.size(), graph.edges.size(), Cost(graph));
   });
+}
+
+}  // namespace
+
+void AddCommands(CLI::App& app, Arguments* arguments) {
+  for (const auto add : {AddInfo, AddList, AddAnchors, AddDiff, AddCut, AddCat, AddExport,
+                         AddImport, AddExplain, AddCost}) {
+    add(app, arguments);
+  }
 }
 
 }  // namespace pangea::session

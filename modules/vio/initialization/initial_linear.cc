@@ -158,8 +158,7 @@ FoundBias FindBias(const std::vector<RotationPair>& pairs, const Vector3d& start
 
 // min y' A y - 2 b' y with |y.tail(3)| = kGravity: the head is eliminated, the rest is a secular
 // equation in one unknown.
-std::optional<Eigen::Matrix<double, 6, 1>> SolveWithGravityNorm(
-    const Eigen::Matrix<double, 6, 6>& A, const Eigen::Matrix<double, 6, 1>& b) {
+std::optional<Vector6d> SolveWithGravityNorm(const Matrix6d& A, const Vector6d& b) {
   const Matrix3d A_vv_inv = A.topLeftCorner<3, 3>().inverse();
   const Matrix3d M = A.bottomRightCorner<3, 3>() -
                      A.bottomLeftCorner<3, 3>() * A_vv_inv * A.topRightCorner<3, 3>();
@@ -182,11 +181,82 @@ std::optional<Eigen::Matrix<double, 6, 1>> SolveWithGravityNorm(
     (length(mid) > kGravity ? low : high) = mid;
   }
   const double mu = 0.5 * (low + high);
-  Eigen::Matrix<double, 6, 1> y;
+  Vector6d y;
   y.tail<3>() = eigen.eigenvectors() * (e.array() / (w.array() + mu)).matrix();
   y.head<3>() = A_vv_inv * (b.head<3>() - A.topRightCorner<3, 3>() * y.tail<3>());
   return y;
 }
+
+// Of each frame, from the first one.
+std::vector<Preintegration> FromFirst(std::span<const StartFrame> frames, const ImuNoise& noise,
+                                      const Vector3d& gyro_bias) {
+  std::vector<Preintegration> from_first;
+  Preintegrator integrator(noise, gyro_bias, Vector3d::Zero());
+  for (const StartFrame& frame : frames) {
+    integrator.Add(frame.imu);
+    from_first.push_back(integrator.result());
+  }
+  return from_first;
+}
+
+// By landmark: frame, and bearing in the first body frame's orientation.
+using Sighting = std::pair<size_t, Vector3d>;
+using Sightings = std::map<int32_t, std::vector<Sighting>>;
+
+Sightings SeenOften(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                    const std::vector<Preintegration>& from_first) {
+  Sightings seen;
+  for (size_t k = 0; k < frames.size(); ++k) {
+    for (const auto& [id, ray] : frames[k].rays) {
+      seen[id].emplace_back(k, from_first[k].delta_q * (T_body_cam.q * Bearing(ray)));
+    }
+  }
+  std::erase_if(seen, [](const auto& item) { return item.second.size() < 4; });
+  return seen;
+}
+
+// The normal equations of one point X and y = (v0, g): across (X - v0 t - g t^2/2 - c) = 0 at each
+// sighting, where `across` takes what is perpendicular to the bearing and c is the known part of
+// the camera's place. All in the first body frame.
+class PointEquations {
+ public:
+  PointEquations(const std::vector<Sighting>& sightings,
+                 const std::vector<Preintegration>& from_first, const Rigid3& T_body_cam,
+                 double weight) {
+    for (const auto& [k, bearing] : sightings) {
+      const double t = from_first[k].duration_s;
+      const Matrix3d W = weight * (Matrix3d::Identity() - bearing * bearing.transpose());
+      const Vector3d c = from_first[k].delta_p + from_first[k].delta_q * T_body_cam.t;
+      Eigen::Matrix<double, 3, 6> T;
+      T << t * Matrix3d::Identity(), 0.5 * t * t * Matrix3d::Identity();
+      A_xx_ += W;
+      A_xy_ -= W * T;
+      b_x_ += W * c;
+      A_yy_ += T.transpose() * W * T;
+      b_y_ -= T.transpose() * W * c;
+    }
+  }
+
+  // What they say of y once X is eliminated; false when they do not determine X.
+  bool AddReduced(Matrix6d* A, Vector6d* b) const {
+    const Matrix3d A_xx_inv = A_xx_.inverse();
+    if (!A_xx_inv.allFinite()) {
+      return false;
+    }
+    *A += A_yy_ - A_xy_.transpose() * A_xx_inv * A_xy_;
+    *b += b_y_ - A_xy_.transpose() * A_xx_inv * b_x_;
+    return true;
+  }
+
+  Vector3d Solve(const Vector6d& y) const { return A_xx_.inverse() * (b_x_ - A_xy_ * y); }
+
+ private:
+  Matrix3d A_xx_ = Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 6> A_xy_ = Eigen::Matrix<double, 3, 6>::Zero();
+  Vector3d b_x_ = Vector3d::Zero();
+  Matrix6d A_yy_ = Matrix6d::Zero();
+  Vector6d b_y_ = Vector6d::Zero();
+};
 
 }  // namespace
 
@@ -235,61 +305,24 @@ std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const 
 
 std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                        const ImuNoise& noise, const Vector3d& gyro_bias) {
-  LinearStart out;
-  std::vector<Preintegration> from_first;
-  Preintegrator integrator(noise, gyro_bias, Vector3d::Zero());
-  for (const StartFrame& frame : frames) {
-    integrator.Add(frame.imu);
-    from_first.push_back(integrator.result());
-  }
-  // Observations by landmark: frame and bearing in the first body frame's orientation.
-  std::map<int32_t, std::vector<std::pair<size_t, Vector3d>>> seen;
-  for (size_t k = 0; k < frames.size(); ++k) {
-    for (const auto& [id, ray] : frames[k].rays) {
-      seen[id].emplace_back(k, from_first[k].delta_q * (T_body_cam.q * Bearing(ray)));
-    }
-  }
-  std::erase_if(seen, [](const auto& item) { return item.second.size() < 4; });
+  const std::vector<Preintegration> from_first = FromFirst(frames, noise, gyro_bias);
+  const Sightings seen = SeenOften(frames, T_body_cam, from_first);
   if (seen.size() < kMinShared) {
     return std::nullopt;
   }
-  // across (X - v0 t - g t^2/2 - c_k) = 0 with c_k the known part of the camera's place; weighted
-  // by 1/depth.
+  LinearStart out;
   std::map<int32_t, double> depth;
-  Eigen::Matrix<double, 6, 1> y;
+  Vector6d y;
   for (int round = 0; round < 3; ++round) {
-    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-    struct Point {
-      Matrix3d A_xx = Matrix3d::Zero();
-      Eigen::Matrix<double, 3, 6> A_xy = Eigen::Matrix<double, 3, 6>::Zero();
-      Vector3d b_x = Vector3d::Zero();
-    };
-    std::map<int32_t, Point> points;
-    for (const auto& [id, observations] : seen) {
-      Point point;
+    Matrix6d A = Matrix6d::Zero();
+    Vector6d b = Vector6d::Zero();
+    std::map<int32_t, PointEquations> points;
+    for (const auto& [id, sightings] : seen) {
       const double weight = depth.contains(id) ? 1.0 / (depth[id] * depth[id]) : 1.0;
-      Eigen::Matrix<double, 6, 6> A_yy = Eigen::Matrix<double, 6, 6>::Zero();
-      Eigen::Matrix<double, 6, 1> b_y = Eigen::Matrix<double, 6, 1>::Zero();
-      for (const auto& [k, bearing] : observations) {
-        const double t = from_first[k].duration_s;
-        const Matrix3d W = weight * (Matrix3d::Identity() - bearing * bearing.transpose());
-        const Vector3d c = from_first[k].delta_p + from_first[k].delta_q * T_body_cam.t;
-        Eigen::Matrix<double, 3, 6> T;
-        T << t * Matrix3d::Identity(), 0.5 * t * t * Matrix3d::Identity();
-        point.A_xx += W;
-        point.A_xy -= W * T;
-        point.b_x += W * c;
-        A_yy += T.transpose() * W * T;
-        b_y -= T.transpose() * W * c;
+      const PointEquations point(sightings, from_first, T_body_cam, weight);
+      if (point.AddReduced(&A, &b)) {
+        points.emplace(id, point);
       }
-      const Matrix3d A_xx_inv = point.A_xx.inverse();
-      if (!A_xx_inv.allFinite()) {
-        continue;
-      }
-      A += A_yy - point.A_xy.transpose() * A_xx_inv * point.A_xy;
-      b += b_y - point.A_xy.transpose() * A_xx_inv * point.b_x;
-      points[id] = point;
     }
     const auto solved = SolveWithGravityNorm(A, b);
     if (!solved) {
@@ -298,9 +331,8 @@ std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const
     y = *solved;
     out.p_first.clear();
     for (const auto& [id, point] : points) {
-      const Vector3d X = point.A_xx.inverse() * (point.b_x - point.A_xy * y);
-      out.p_first[id] = X;
-      depth[id] = std::clamp(X.norm(), 0.3, 50.0);
+      out.p_first[id] = point.Solve(y);
+      depth[id] = std::clamp(out.p_first[id].norm(), 0.3, 50.0);
     }
   }
   out.v0 = y.head<3>();
