@@ -69,12 +69,10 @@ double ParseRate(const std::string& rate) {
   return value;
 }
 
-// Says so where no pose came of it all. To be stopped before there is one is no failure.
+// Says what came of it all. To be stopped before there is a pose is no failure.
 int Outcome(const VioProcess& process) {
   const std::optional<std::string> why = process.NoPoseYet();
-  if (why) {
-    std::cerr << fmt::format("pangea-vio: no pose: {}\n", *why);
-  }
+  std::cerr << fmt::format("pangea-vio: {}\n", why ? "no pose: " + *why : process.Totals());
   return why && !StopRequested() ? kNoPose : 0;
 }
 

@@ -93,7 +93,7 @@ void VioProcess::Handle(const VioOutput& output) {
   }
   const bool tracking = output.state == EstimatorState::kTracking;
   ++num_images_;
-  has_tracked_ = has_tracked_ || tracking;
+  num_poses_ += tracking ? 1 : 0;
   why_not_tracking_ = output.reason;
   node_.Count("frames");
   node_.Set("maps", vio_->maps_opened());
@@ -171,6 +171,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
 }
 
 void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
+  ++num_keyframes_;
   std::vector<uint8_t> bytes = EncodeMessage(pangea::ToMessage(keyframe));
   if (keyframe_log_) {
     keyframe_log_->Write(keyframe.utime, channels::Keyframe(options_.agent_id), bytes);
@@ -192,8 +193,14 @@ void VioProcess::WriteTum(const VioOutput& output) {
   tum_ << ToTum({{output.utime, output.T_odom_body}}) << std::flush;
 }
 
+std::string VioProcess::Totals() const {
+  return fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} map{}",
+                     options_.agent_id, num_poses_, num_images_, num_keyframes_,
+                     vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
+}
+
 std::optional<std::string> VioProcess::NoPoseYet() const {
-  if (has_tracked_) {
+  if (num_poses_ > 0) {
     return std::nullopt;
   }
   return num_images_ == 0 ? "no image came to the odometry"

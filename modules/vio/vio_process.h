@@ -69,6 +69,8 @@ class VioProcess : public Process {
   void StartAnew();
   // No more images: finishes the keyframes in the window.
   void Flush();
+  // What came of all images so far.
+  std::string Totals() const;
   // Why no image has given a pose so far; nothing once one has.
   std::optional<std::string> NoPoseYet() const;
   // Everything is said: the last status, with the counter finished = 1.
@@ -107,11 +109,12 @@ class VioProcess : public Process {
   std::string doubt_;             // while tracking
   std::string why_not_tracking_;  // at the newest image
   int64_t num_images_ = 0;
+  int64_t num_poses_ = 0;
+  int64_t num_keyframes_ = 0;
   int64_t lag_us_ = 0;
   int64_t num_dropped_ = 0;  // for the lag
   int64_t num_dropped_told_ = 0;
   int64_t next_lag_told_utime_ = 0;
-  bool has_tracked_ = false;
   std::ofstream tum_;
   std::optional<MapId> tum_map_;
   int tum_files_ = 0;

@@ -1,6 +1,7 @@
 #include "vio/vio_process.h"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -260,6 +261,10 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
   bus_.Drain();
   EXPECT_EQ(keyframes_.front().id.map, (MapId{7, kMapUtime}));
   EXPECT_EQ(keyframes_.back().id.map, (MapId{7, kMapUtime + 1}));
+  EXPECT_THAT(process.Totals(),
+              ::testing::MatchesRegex(fmt::format(
+                  "agent 7: [0-9]+ of [0-9]+ images have a pose; {} keyframes in 2 maps",
+                  keyframes_.size())));
   int32_t expected = 0;
   for (const Keyframe& keyframe : keyframes_) {
     if (keyframe.id.map.opened_utime == kMapUtime + 1) {
@@ -284,6 +289,21 @@ TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
   EXPECT_EQ(process.NoPoseYet(),
             "the odometry did not start in 30 images; at the last: the accelerometer shows 0.00 "
             "m/s^2 on average, where gravity is 9.8");
+}
+
+TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  const cv::Mat image = RandomTexture(752, 480, 11);
+  for (int64_t utime = 0; utime < 2'000'000; utime += kImageStep_us) {
+    std::vector<ImuSample> imu;
+    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+      imu.push_back({next_imu_, Eigen::Vector3d(0, 20, 0), Eigen::Vector3d(0, 0, 9.8)});
+    }
+    process.AddTracks(world_.Frame(utime), image, imu);
+  }
+  EXPECT_THAT(*process.NoPoseYet(),
+              ::testing::HasSubstr("20.0 rad/s on average: is it in degrees"));
 }
 
 // As somebody sees it who plays a recording of a dead sensor.

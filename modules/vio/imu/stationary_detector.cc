@@ -1,7 +1,5 @@
 #include "vio/imu/stationary_detector.h"
 
-#include <vector>
-
 #include "vio/imu/imu_noise.h"
 
 namespace pangea::vio {
@@ -10,20 +8,18 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSpan_s = 0.5;
-constexpr double kStillSigmas = 2.2;    // of the median shift: noise alone gives 1.7
-constexpr double kMaxGyro = 0.05;       // rad/s, mean rate less bias
-constexpr double kMaxAccelSigma = 0.3;  // m/s^2, standard deviation
+constexpr double kStillSigmas = 2.2;  // of the median shift: noise alone gives 1.7
 constexpr size_t kSamples = 50;
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
-bool IsQuiet(const std::vector<ImuSample>& samples, const Vector3d& gyro_bias) {
-  const SampleMoments moments = MomentsOf(samples);
-  return (moments.gyro_mean - gyro_bias).norm() < kMaxGyro &&
-         moments.accel_variance < kMaxAccelSigma * kMaxAccelSigma;
-}
-
 }  // namespace
+
+bool StationaryDetector::IsQuiet(const ImuBuffer& imu, const Vector3d& gyro_bias) const {
+  const SampleMoments moments = MomentsOf(imu.Latest(kSamples));
+  return (moments.gyro_mean - gyro_bias).norm() < options_.gyro_rate &&
+         moments.accel_variance < options_.accel_sigma * options_.accel_sigma;
+}
 
 bool StationaryDetector::AddFrame(const TrackedFrame& frame, std::optional<double> shift_sigmas,
                                   const ImuBuffer& imu, const Vector3d& gyro_bias) {
@@ -38,7 +34,7 @@ bool StationaryDetector::AddFrame(const TrackedFrame& frame, std::optional<doubl
                                 ? *shift_sigmas < kStillSigmas
                                 : Seconds(frame.utime - first) >= kSpan_s &&
                                       recent_.MedianShiftSigmas(first, frame.utime) < kStillSigmas;
-  return images_stand && IsQuiet(imu.Latest(kSamples), gyro_bias);
+  return images_stand && IsQuiet(imu, gyro_bias);
 }
 
 }  // namespace pangea::vio

@@ -11,6 +11,7 @@
 #include "core/camera_model.h"
 #include "vio/front_end/tracks.h"
 #include "vio/imu/imu_buffer.h"
+#include "vio/imu/stationary_options.h"
 #include "vio/keyframes/track_history.h"
 
 namespace pangea::vio {
@@ -18,8 +19,8 @@ namespace pangea::vio {
 class StationaryDetector {
  public:
   // `ray_sigma`: of an observation with sigma_px 1.
-  StationaryDetector(const CameraModel& camera, double ray_sigma)
-      : camera_(camera), ray_sigma_(ray_sigma) {}
+  StationaryDetector(const CameraModel& camera, double ray_sigma, const StationaryOptions& options)
+      : camera_(camera), ray_sigma_(ray_sigma), options_(options) {}
 
   // Frames in time order; whether the body is stationary at this one. `shift_sigmas`: how far the
   // image has moved since a frame of the present stand, if there is one
@@ -28,8 +29,11 @@ class StationaryDetector {
                 const Eigen::Vector3d& gyro_bias);
 
  private:
+  bool IsQuiet(const ImuBuffer& imu, const Eigen::Vector3d& gyro_bias) const;
+
   CameraModel camera_;
   double ray_sigma_;
+  StationaryOptions options_;
   TrackHistory recent_;
   std::deque<int64_t> recent_utimes_;
 };

@@ -28,6 +28,7 @@ struct Ride {
   Vector3d seen_omega = Vector3d::Zero();  // what the gyro reads besides
   Vector3d gyro_bias = Vector3d::Zero();   // what the estimator takes it to be
   double accel_sigma = 0.03;               // m/s^2, each axis
+  StationaryOptions options = {};
 };
 
 struct Said {
@@ -66,7 +67,7 @@ Said Watch(const Ride& ride, std::optional<double> shift_sigmas = std::nullopt) 
   for (int i = 0; i < ride.landmarks; ++i) {
     points.emplace_back(4 + uniform(rng), 2 * uniform(rng), 1.5 * uniform(rng));
   }
-  StationaryDetector detector(camera, ride.pixel_noise * camera.PixelAngle());
+  StationaryDetector detector(camera, ride.pixel_noise * camera.PixelAngle(), ride.options);
   ImuBuffer imu(ImuNoise{});
   Said said;
   int samples = 0;
@@ -126,6 +127,7 @@ TEST(StationaryDetector, TheImuMustBeQuietToo) {
   EXPECT_EQ(rotating.stationary, 0);
   const Said shaken = Watch({.accel_sigma = 0.25});
   EXPECT_EQ(shaken.stationary, 0);
+  EXPECT_EQ(Watch({.accel_sigma = 0.25, .options = {.accel_sigma = 0.6}}).stationary, kAll);
 }
 
 TEST(StationaryDetector, AKnownGyroBiasIsNoRotation) {

@@ -27,20 +27,26 @@ constexpr size_t kMinTracks = 20;
 // gravity. Far less is a dead sensor or one in units of g, far more one in other units.
 constexpr double kMinMeanAccel = 4;   // m/s^2
 constexpr double kMaxMeanAccel = 25;  // m/s^2
+// Nobody rotates a camera like this for a second; a sensor that counts degrees shows it soon.
+constexpr double kMaxMeanGyro = 12;  // rad/s
 
 // Stationary: the image stands, the accelerometer and the gyro are quiet.
 constexpr double kStationarySpan_s = 1.0;
 constexpr double kStationarySigmas =
     2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
-constexpr double kStationaryAccel = 0.25;  // m/s^2, standard deviation
-constexpr double kStationaryGyro = 0.03;   // rad/s
+// All of the second is looked at, so less is allowed than later: shares of the options.
+constexpr double kStationaryAccel = 5.0 / 6;  // standard deviation, of accel_sigma
+constexpr double kStationaryGyro = 0.6;       // standard deviation, of gyro_rate
+// A stationary start has had less bias than a moving one allows for, or it would not be upright.
+constexpr double kStationaryBias = 0.1 / 0.15;  // of accel_bias_sigma
 
 // A moving start must be at least this certain and explain this much.
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
 constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMaxRmsSigmas = 1.8;
-constexpr double kMaxAccelBias = 0.8;  // m/s^2
+constexpr double kUsualBias = 0.15;
+constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
 
 double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
   std::vector<double> displacement;
@@ -62,18 +68,19 @@ double SpanSeconds(int64_t from_utime, int64_t to_utime) {
   return 1e-6 * static_cast<double>(to_utime - from_utime);
 }
 
-double MeanMagnitude(const std::vector<ImuSample>& samples) {
+double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::*of) {
   double sum = 0;
   for (const ImuSample& sample : samples) {
-    sum += sample.accel.norm();
+    sum += (sample.*of).norm();
   }
   return sum / static_cast<double>(samples.size());
 }
 
 }  // namespace
 
-Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma)
-    : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma) {}
+Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
+                         const StationaryOptions& stationary)
+    : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma), stationary_(stationary) {}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   samples_.insert(samples_.end(), imu.begin(), imu.end());
@@ -100,11 +107,16 @@ InitialResult Initialiser::Try() {
   if (span < kMinSpan_s) {
     return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
   }
-  const double accel = MeanMagnitude(samples_);
+  const double accel = MeanMagnitude(samples_, &ImuSample::accel);
   if (!(accel > kMinMeanAccel && accel < kMaxMeanAccel)) {
     return {std::nullopt,
             fmt::format("the accelerometer shows {:.2f} m/s^2 on average, where gravity is {:.1f}",
                         accel, kGravity)};
+  }
+  const double gyro = MeanMagnitude(samples_, &ImuSample::gyro);
+  if (gyro > kMaxMeanGyro) {
+    return {std::nullopt,
+            fmt::format("the gyroscope shows {:.1f} rad/s on average: is it in degrees?", gyro)};
   }
   if (auto stationary = TryStationary()) {
     return {stationary, ""};
@@ -124,8 +136,10 @@ std::optional<InitialState> Initialiser::TryStationary() const {
     return std::nullopt;
   }
   const SampleMoments moments = MomentsOf(samples);
-  if (moments.accel_variance > kStationaryAccel * kStationaryAccel ||
-      moments.gyro_variance > kStationaryGyro * kStationaryGyro) {
+  const double max_accel = kStationaryAccel * stationary_.accel_sigma;
+  const double max_gyro = kStationaryGyro * stationary_.gyro_rate;
+  if (moments.accel_variance > max_accel * max_accel ||
+      moments.gyro_variance > max_gyro * max_gyro) {
     return std::nullopt;
   }
   InitialState state;
@@ -137,10 +151,9 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
   // the bias.
   Eigen::Matrix<double, 15, 1> sigma;
-  constexpr double kAccelBiasSigma = 0.1;
-  sigma << Vector3d(kAccelBiasSigma / kGravity, kAccelBiasSigma / kGravity, 1e-4),
-      Vector3d::Constant(1e-4), Vector3d::Constant(0.01), Vector3d::Constant(0.002),
-      Vector3d::Constant(kAccelBiasSigma);
+  const double bias_sigma = kStationaryBias * kUsualBias;
+  sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
+      Vector3d::Constant(0.01), Vector3d::Constant(0.002), Vector3d::Constant(bias_sigma);
   state.covariance = sigma.cwiseAbs2().asDiagonal();
   return state;
 }
@@ -208,7 +221,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
                     refined->velocity_sigma, refined->tilt_sigma * 57.3)};
   }
-  if (refined->states.back().accel_bias.norm() > kMaxAccelBias) {
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * kUsualBias) {
     return {std::nullopt, "the start needs an implausible accelerometer bias"};
   }
   InitialState state;

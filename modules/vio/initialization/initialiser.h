@@ -18,6 +18,7 @@
 #include "core/camera_model.h"
 #include "core/imu/imu.h"
 #include "vio/front_end/tracks.h"
+#include "vio/imu/stationary_options.h"
 #include "vio/initialization/initial_solution.h"
 #include "vio/window/window_state.h"
 
@@ -45,7 +46,8 @@ struct InitialResult {
 
 class Initialiser {
  public:
-  Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma);
+  Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
+              const StationaryOptions& stationary);
 
   // Frames in time order, with the samples since the previous frame (the last one at or after the
   // frame).
@@ -61,6 +63,7 @@ class Initialiser {
   CameraModel camera_;
   ImuNoise noise_;
   double pixel_sigma_;
+  StationaryOptions stationary_;
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
   double time_offset_change_s_ = 0;

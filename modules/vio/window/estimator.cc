@@ -49,9 +49,9 @@ struct Estimator::Impl {
         camera(c),
         noise(WithUsualWalks(n)),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
-        initialiser(c, noise, o.pixel_sigma),
+        initialiser(c, noise, o.pixel_sigma, o.stationary),
         imu_samples(noise),
-        stationary_detector(c, ray_sigma),
+        stationary_detector(c, ray_sigma, o.stationary),
         choice(o, c) {
     problem.state.T_body_cam = c.T_body_cam;
     problem.state.time_offset_s = c.time_offset_s;

@@ -22,6 +22,7 @@
 #include "core/keyframe.h"
 #include "core/rigid3.h"
 #include "vio/front_end/tracks.h"
+#include "vio/imu/stationary_options.h"
 #include "vio/window/window_poses.h"
 
 namespace pangea::vio {
@@ -41,6 +42,7 @@ struct EstimatorOptions {
   double keyframe_interval_s = 5;
   double keyframe_min_interval_s = 0.2;
   CalibrationSigmas calibration;
+  StationaryOptions stationary;
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -60,6 +62,7 @@ struct EstimatorOptions {
                 "between keyframes, at least");
     archive.Section("calibration", &calibration,
                     "how well the given one is known, where the recording does not say");
+    archive.Section("stationary", &stationary, "what the IMU may show when the body stands still");
   }
 };
 
