@@ -53,8 +53,12 @@ public class SpyPicture {
   static Map<String, String> typesByChannel(JTable table) throws Exception {
     Map<String, String> types = new TreeMap<>();
     SwingUtilities.invokeAndWait(() -> {
-      for (int row = 0; row < table.getRowCount(); ++row) {
-        types.put(table.getValueAt(row, 0).toString().trim(), String.valueOf(table.getValueAt(row, 1)).trim());
+      try {
+        for (int row = 0; row < table.getRowCount(); ++row) {
+          types.put(table.getValueAt(row, 0).toString().trim(), String.valueOf(table.getValueAt(row, 1)).trim());
+        }
+      } catch (IndexOutOfBoundsException growing) {
+        types.clear();  // lcm-spy adds rows in a thread that is not Swing's: looked at once more
       }
     });
     return types;
@@ -95,7 +99,17 @@ public class SpyPicture {
     return wrong;
   }
 
-  public static void main(String[] arguments) throws Exception {
+  // The windows' threads would keep a failed program alive.
+  public static void main(String[] arguments) {
+    try {
+      look(arguments);
+    } catch (Exception error) {
+      error.printStackTrace();
+      System.exit(1);
+    }
+  }
+
+  static void look(String[] arguments) throws Exception {
     new Thread(() -> {
       try {
         Class.forName("lcm.spy.Spy").getMethod("main", String[].class)
