@@ -25,5 +25,21 @@ TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
   EXPECT_LT(keyframe.T_odom_body.q.angularDistance(moved.q), 1e-9);
 }
 
+// The window has the rotation first, a keyframe the translation.
+TEST(FinishKeyframe, TellsTheExtrinsicsCovarianceTranslationFirst) {
+  const WindowState state = TestWindow({}).state;
+  const int size = state.size();
+  MatrixXd P = 1e-6 * MatrixXd::Identity(size, size);
+  constexpr int kRotationX = kExtrinsics, kTranslationY = kExtrinsics + 4;
+  P(kRotationX, kRotationX) = 2e-6;
+  P(kTranslationY, kTranslationY) = 5e-6;
+  P(kRotationX, kTranslationY) = P(kTranslationY, kRotationX) = 3e-7;
+  Matrix6d expected = 1e-6 * Matrix6d::Identity();
+  expected(3, 3) = 2e-6;
+  expected(1, 1) = 5e-6;
+  expected(1, 3) = expected(3, 1) = 3e-7;
+  EXPECT_EQ(FinishKeyframe(state, P, TrackHistory{}, 2).T_body_cam_covariance, expected);
+}
+
 }  // namespace
 }  // namespace pangea::vio
