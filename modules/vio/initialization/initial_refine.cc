@@ -103,11 +103,13 @@ void SumUpRays(const StartProblem& problem, int rays, RefinedStart* out) {
 
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Vector3d& gyro_bias,
-                                   const LinearStart& start, double ray_sigma) {
+                                   const LinearStart& start, double ray_sigma,
+                                   double accel_bias_sigma) {
   StartProblem problem;
   problem.T_body_cam = T_body_cam;
   problem.ray_sigma = ray_sigma;
   problem.expected_gyro_bias = gyro_bias;
+  problem.accel_bias_sigma = accel_bias_sigma;
   const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
   AddStates(q_odom_first, start, &problem);
   AddImuFactors(frames, noise, &problem);

@@ -57,6 +57,7 @@ struct RefinedStart {
 inline constexpr double kMinInlierShare = 0.8;
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
-                                   const LinearStart& start, double ray_sigma);
+                                   const LinearStart& start, double ray_sigma,
+                                   double accel_bias_sigma);
 
 }  // namespace pangea::vio

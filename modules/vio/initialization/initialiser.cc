@@ -27,8 +27,8 @@ constexpr size_t kMinTracks = 20;
 // gravity. Far less is a dead sensor or one in units of g, far more one in other units.
 constexpr double kMinMeanAccel = 4;   // m/s^2
 constexpr double kMaxMeanAccel = 25;  // m/s^2
-// Nobody rotates a camera like this for a second; a sensor that counts degrees shows it soon.
-constexpr double kMaxMeanGyro = 12;  // rad/s
+// A rotation each second, at which no image is sharp; a sensor in degrees shows more.
+constexpr double kMaxMeanGyro = 6;  // rad/s
 
 // Stationary: the image stands, the accelerometer and the gyro are quiet.
 constexpr double kStationarySpan_s = 1.0;
@@ -45,7 +45,6 @@ constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
 constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMaxRmsSigmas = 1.8;
-constexpr double kUsualBias = 0.15;
 constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
 
 double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
@@ -79,8 +78,12 @@ double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::
 }  // namespace
 
 Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
-                         const StationaryOptions& stationary)
-    : camera_(camera), noise_(noise), pixel_sigma_(pixel_sigma), stationary_(stationary) {}
+                         double accel_bias_sigma, const StationaryOptions& stationary)
+    : camera_(camera),
+      noise_(noise),
+      pixel_sigma_(pixel_sigma),
+      accel_bias_sigma_(accel_bias_sigma),
+      stationary_(stationary) {}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   samples_.insert(samples_.end(), imu.begin(), imu.end());
@@ -151,7 +154,7 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
   // the bias.
   Eigen::Matrix<double, 15, 1> sigma;
-  const double bias_sigma = kStationaryBias * kUsualBias;
+  const double bias_sigma = kStationaryBias * accel_bias_sigma_;
   sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
       Vector3d::Constant(0.01), Vector3d::Constant(0.002), Vector3d::Constant(bias_sigma);
   state.covariance = sigma.cwiseAbs2().asDiagonal();
@@ -201,7 +204,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   }
   const ImuNoise noise = MeasuredNoise(noise_, samples_);
   const auto refined = Refine(frames, camera_.T_body_cam, noise, *gyro_bias, *linear,
-                              pixel_sigma_ * camera_.PixelAngle());
+                              pixel_sigma_ * camera_.PixelAngle(), accel_bias_sigma_);
   if (!refined) {
     return {std::nullopt, "the start-up bundle adjustment did not converge"};
   }
@@ -221,7 +224,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
                     refined->velocity_sigma, refined->tilt_sigma * 57.3)};
   }
-  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * kUsualBias) {
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * accel_bias_sigma_) {
     return {std::nullopt, "the start needs an implausible accelerometer bias"};
   }
   InitialState state;

@@ -46,8 +46,9 @@ struct InitialResult {
 
 class Initialiser {
  public:
+  // `accel_bias_sigma`: m/s^2, before anything is known of it.
   Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
-              const StationaryOptions& stationary);
+              double accel_bias_sigma, const StationaryOptions& stationary);
 
   // Frames in time order, with the samples since the previous frame (the last one at or after the
   // frame).
@@ -63,6 +64,7 @@ class Initialiser {
   CameraModel camera_;
   ImuNoise noise_;
   double pixel_sigma_;
+  double accel_bias_sigma_;
   StationaryOptions stationary_;
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest

@@ -20,11 +20,10 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Equations = StartProblem::Equations;
 
-constexpr double kGyroBiasSigma = 0.02;   // rad/s, about the epipolar solution
-constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
-constexpr double kHeld = 1e-8;            // rad^2, m^2: the first frame's yaw and position
-constexpr double kHuber = 2.0;            // sigmas
-constexpr double kMinStartDepth = 0.05;   // m
+constexpr double kGyroBiasSigma = 0.02;  // rad/s, about the epipolar solution
+constexpr double kHeld = 1e-8;           // rad^2, m^2: the first frame's yaw and position
+constexpr double kHuber = 2.0;           // sigmas
+constexpr double kMinStartDepth = 0.05;  // m
 // A step that promises less than this of the cost (a half is one sigma of one direction) is the
 // last.
 constexpr double kEnough = 1e-3;
@@ -178,7 +177,7 @@ void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
 double StartProblem::Cost() const {
   double cost = 0.5 * (states[0].gyro_bias - expected_gyro_bias).squaredNorm() /
                     (kGyroBiasSigma * kGyroBiasSigma) +
-                0.5 * states[0].accel_bias.squaredNorm() / (kAccelBiasSigma * kAccelBiasSigma);
+                0.5 * states[0].accel_bias.squaredNorm() / (accel_bias_sigma * accel_bias_sigma);
   for (size_t i = 0; i < imu_factors.size(); ++i) {
     const Eigen::Matrix<double, 9, 1> r =
         ComputeInertialResidual(imu_factors[i].measured, states[i], states[i + 1]).r.head<9>();
@@ -200,9 +199,9 @@ Equations StartProblem::Linearise(double damping) const {
   out.H.setZero(size(), size());
   out.g.setZero(size());
   out.H.diagonal().head<3>().setConstant(1 / (kGyroBiasSigma * kGyroBiasSigma));
-  out.H.diagonal().segment<3>(3).setConstant(1 / (kAccelBiasSigma * kAccelBiasSigma));
+  out.H.diagonal().segment<3>(3).setConstant(1 / (accel_bias_sigma * accel_bias_sigma));
   out.g.head<3>() = (states[0].gyro_bias - expected_gyro_bias) / (kGyroBiasSigma * kGyroBiasSigma);
-  out.g.segment<3>(3) = states[0].accel_bias / (kAccelBiasSigma * kAccelBiasSigma);
+  out.g.segment<3>(3) = states[0].accel_bias / (accel_bias_sigma * accel_bias_sigma);
   out.H.diagonal().segment<4>(PoseColumn(0) + 2).setConstant(1 / kHeld);
   for (int i = 0; i < static_cast<int>(imu_factors.size()); ++i) {
     AddImuFactor(*this, i, &out);

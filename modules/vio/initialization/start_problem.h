@@ -46,6 +46,7 @@ class StartProblem {
   std::vector<StartImuFactor> imu_factors;  // imu_factors[i]: from frame i to frame i + 1
   std::vector<StartPoint> points;
   Eigen::Vector3d expected_gyro_bias = Eigen::Vector3d::Zero();
+  double accel_bias_sigma = 0.15;  // m/s^2, about zero
 
   // Columns of the error: (gyro bias, accel bias), then each frame's (dtheta, xi_p), then each
   // frame's xi_v.

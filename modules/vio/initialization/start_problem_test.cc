@@ -152,6 +152,8 @@ TEST(StartProblem, CovarianceIsThatOfTheNewestFrame) {
 }
 
 // What the closed form mostly gets wrong.
+constexpr double kAccelBiasSigma = 0.15;
+
 LinearStart Scaled(const LinearStart& start, double scale) {
   LinearStart scaled = start;
   scaled.v0 *= scale;
@@ -173,7 +175,7 @@ TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
   ASSERT_TRUE(start);
   const auto refine = [&](double scale) {
     return Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, Scaled(*start, scale),
-                  kRaySigma);
+                  kRaySigma, kAccelBiasSigma);
   };
   const auto from_whole = refine(1), from_third = refine(0.33);
   ASSERT_TRUE(from_whole && from_third);
@@ -191,10 +193,29 @@ TEST(Refine, DoesNotTryWithPointsBehindTheCamera) {
   for (auto& [id, p] : start->p_first) {
     p *= id % 3 == 0 ? -1 : 1;
   }
-  const auto refined = Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start, kRaySigma);
+  const auto refined =
+      Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start, kRaySigma, kAccelBiasSigma);
   ASSERT_TRUE(refined);
   EXPECT_NEAR(refined->inlier_share, 2.0 / 3, 0.02);
   EXPECT_TRUE(refined->states.empty());
+}
+
+TEST(Refine, ALargeAccelerometerBiasIsFoundWhereItIsExpected) {
+  const Vector3d bias(0.6, -0.5, 0.4);
+  StartWorld world = Record(Lively, 0, kRaySigma);
+  for (StartFrame& frame : world.frames) {
+    for (ImuSample& sample : frame.imu) {
+      sample.accel += bias;
+    }
+  }
+  const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  const auto error = [&](double accel_bias_sigma) {
+    const auto refined = Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start, kRaySigma,
+                                accel_bias_sigma);
+    return refined ? (refined->states.back().accel_bias - bias).norm() : 1e9;
+  };
+  EXPECT_LT(error(1), 0.5 * error(kAccelBiasSigma));
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ struct Estimator::Impl {
         camera(c),
         noise(WithUsualWalks(n)),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
-        initialiser(c, noise, o.pixel_sigma, o.stationary),
+        initialiser(c, noise, o.pixel_sigma, o.accel_bias_sigma, o.stationary),
         imu_samples(noise),
         stationary_detector(c, ray_sigma, o.stationary),
         choice(o, c) {
@@ -110,10 +110,10 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      problem.prior =
-          initial.stationary
-              ? StartPrior(problem.state, initial.covariance, options.calibration, noise)
-              : MovingStartPrior(problem.state, options.calibration, noise);
+      problem.prior = initial.stationary ? StartPrior(problem.state, initial.covariance,
+                                                      options.calibration, noise)
+                                         : MovingStartPrior(problem.state, options.calibration,
+                                                            noise, options.accel_bias_sigma);
     } else {
       Append(tracked.utime, from.imu, MakeImuFactor(Newest(), ImuTime(tracked.utime)));
     }

@@ -41,6 +41,7 @@ struct EstimatorOptions {
   double keyframe_track_share = 0.5;
   double keyframe_interval_s = 5;
   double keyframe_min_interval_s = 0.2;
+  double accel_bias_sigma = 0.15;  // m/s^2, when it is switched on
   CalibrationSigmas calibration;
   StationaryOptions stationary;
 
@@ -60,6 +61,8 @@ struct EstimatorOptions {
                 "between keyframes, at most");
     archive.Add("keyframe_min_interval_s", &keyframe_min_interval_s, {0, 1000}, "s",
                 "between keyframes, at least");
+    archive.Add("accel_bias_sigma", &accel_bias_sigma, {0.001, 5}, "m/s^2",
+                "of the accelerometer's bias when it is switched on; a cheap one may have more");
     archive.Section("calibration", &calibration,
                     "how well the given one is known, where the recording does not say");
     archive.Section("stationary", &stationary, "what the IMU may show when the body stands still");

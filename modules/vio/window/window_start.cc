@@ -11,11 +11,10 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
 
-// Of a moving start: next to nothing on tilt and velocity, and what a consumer's IMU may have.
-constexpr double kTiltSigma = 0.5;        // rad
-constexpr double kVelocitySigma = 5;      // m/s
-constexpr double kGyroBiasSigma = 0.05;   // rad/s, about what was found
-constexpr double kAccelBiasSigma = 0.15;  // m/s^2, about zero
+// Of a moving start: next to nothing on tilt and velocity.
+constexpr double kTiltSigma = 0.5;       // rad
+constexpr double kVelocitySigma = 5;     // m/s
+constexpr double kGyroBiasSigma = 0.05;  // rad/s, about what was found
 
 // Each sensor has gains and axes of its own, the gyro's are the body's.
 Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> ImuIntrinsicsCovariance(
@@ -70,11 +69,11 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
 }
 
 WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
-                             const ImuNoise& noise) {
+                             const ImuNoise& noise, double accel_bias_sigma) {
   Eigen::Matrix<double, 15, 1> sigma;
   sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
       Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
-      Vector3d::Constant(kAccelBiasSigma);
+      Vector3d::Constant(accel_bias_sigma);
   WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), given, noise);
   prior.at.frames[0].imu.accel_bias.setZero();
   return prior;

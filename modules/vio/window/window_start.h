@@ -13,7 +13,7 @@ namespace pangea::vio {
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
 WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
-                             const ImuNoise& noise);
+                             const ImuNoise& noise, double accel_bias_sigma);
 
 // `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
 // the left, all differences plain (InitialState).
