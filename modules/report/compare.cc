@@ -39,7 +39,7 @@ json ReadJson(const fs::path& file) {
   }
 }
 
-std::string Text(const json& value, const char* format = "{:.3f}") {
+std::string Text(const json& value, const char* format) {
   return value.is_number() ? fmt::format(fmt::runtime(format), value.get<double>()) : "-";
 }
 
@@ -64,8 +64,8 @@ void AddRow(const fs::path& run, const fs::path& file, const json& report, Table
   const json& truth = report.at("constraints_truth");
   table->Add({run.string(), Text(constraints.at("accepted"), "{:.0f}"),
               Text(constraints.at("refused"), "{:.0f}"), Wrong(truth), Nees(truth),
-              Text(report.at("ate_joint_m")), fmt::format("{}", report.at("groups").size()),
-              WallTime(file.parent_path())});
+              Text(report.at("ate_joint_m"), "{:.4f}"),
+              fmt::format("{}", report.at("groups").size()), WallTime(file.parent_path())});
 }
 
 // As the report has them among its notes.

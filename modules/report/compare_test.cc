@@ -45,7 +45,7 @@ TEST_F(Compare, OneRowEachAndTheOptionsBelow) {
   EXPECT_THAT(text, testing::ContainsRegex(
                         "plain +\\| +55 +\\| +10 +\\| - +\\| - +\\| - +\\| +1 +\\| - +\\|"));
   EXPECT_THAT(text, testing::ContainsRegex(
-                        "report.json +\\| +40 +\\| +10 +\\| 1 of 40 +\\| +1.25 +\\| +0.052 +\\| "
+                        "report.json +\\| +40 +\\| +10 +\\| 1 of 40 +\\| +1.25 +\\| +0.0519 +\\| "
                         "+2 +\\| +12.3 +\\|"));
   EXPECT_THAT(text, HasSubstr("option fusion.alignment.min_inliers 30 (default 16)\n"));
 }

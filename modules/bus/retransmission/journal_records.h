@@ -38,9 +38,6 @@ class JournalRecords : public RecordStore {
   bool Read(int64_t offset, std::span<uint8_t> record) override;
   std::string problem() const override;
 
-  // Whether a record lies in the journal.
-  static bool IsInJournal(const Record& record) { return record.offset() >= kJournal; }
-
  private:
   // An offset from here on is one in the journal.
   static constexpr int64_t kJournal = int64_t{1} << 62;
