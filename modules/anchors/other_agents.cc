@@ -39,9 +39,8 @@ void OtherAgents::Take(const MapId& map, const Rigid3& T_odom_body, int64_t now_
 }
 
 std::vector<Others> OtherAgents::ForEach(const Anchors& anchors, int64_t now_utime) {
-  std::erase_if(agents_, [now_utime](const auto& item) {
-    return now_utime - item.second.utime > kFresh_us;
-  });
+  std::erase_if(
+      agents_, [now_utime](const auto& item) { return now_utime - item.second.utime > kFresh_us; });
   std::map<MapId, std::vector<InGroup>> groups;
   for (const auto& [agent_id, heard] : agents_) {
     const auto T_body_cam = anchors.T_body_cam(heard.map);

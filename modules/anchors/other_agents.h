@@ -3,8 +3,8 @@
 // Where agents are now, for the others of their group.
 //
 // In: the newest pose of each agent, as it was heard. Out: for each agent that tracks, the cameras
-// of the others of its group in its own odom frame. What was heard kFresh_us ago counts no more: who
-// is lost or away is not shown where it was. Bounded: kMaxAgents; of one agent the nearest
+// of the others of its group in its own odom frame. What was heard kFresh_us ago counts no more:
+// who is lost or away is not shown where it was. Bounded: kMaxAgents; of one agent the nearest
 // kMaxOthers.
 
 #include <cstdint>
