@@ -20,6 +20,7 @@
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/options_t.hpp"
+#include "pangea/others_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -47,6 +48,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(landmarks_t::getHash()), 0xc37fda84c71fcf58u);
   EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
   EXPECT_EQ(static_cast<uint64_t>(options_t::getHash()), 0x68b9878722173cbcu);
+  EXPECT_EQ(static_cast<uint64_t>(others_t::getHash()), 0xb9186610703fc487u);
   EXPECT_EQ(static_cast<uint64_t>(place_match_t::getHash()), 0x5be9f82364c3b435u);
   EXPECT_EQ(static_cast<uint64_t>(pose_t::getHash()), 0xe48404a0f50b25c7u);
   EXPECT_EQ(static_cast<uint64_t>(resend_request_t::getHash()), 0x3f967c69b75046f2u);

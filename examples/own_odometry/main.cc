@@ -6,11 +6,9 @@
 #include <iostream>
 #include <optional>
 
-#include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/keyframe_outlet.h"
 #include "bus/retransmission/playback_pace.h"
-#include "keyframe_maker.h"
+#include "external_odometry/external_odometry_process.h"
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -25,32 +23,8 @@ struct Arguments {
   std::string recording, poses, bus, out_keyframes;
 };
 
-// Keyframes on the agent's bus, where an uplink takes them to the server.
-class Agent : public Process {
- public:
-  Agent(Bus& bus, int32_t agent_id)
-      : node_(bus, fmt::format("own_odometry_{}", agent_id)),
-        outlet_(node_, agent_id, /*kept=*/200, WallUtime()) {}
-
-  void Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
-    outlet_.Publish(id, std::move(bytes));
-  }
-  void Tick(int64_t now_utime) override {
-    outlet_.Tick(now_utime);
-    if (now_utime >= next_status_utime_) {
-      next_status_utime_ = now_utime + 1'000'000;
-      node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "poses of another odometry");
-    }
-  }
-  const KeyframeOutlet& outlet() const { return outlet_; }
-
- private:
-  Node node_;
-  KeyframeOutlet outlet_;
-  int64_t next_status_utime_ = 0;
-};
-
-// As fast as the server keeps up; a live odometry calls Add from its camera's callback instead.
+// As fast as the server keeps up; a live odometry calls AddImage from its camera's callback
+// instead.
 void Play(const Arguments& arguments) {
   const EurocRecording recording(arguments.recording);
   std::vector<std::string> warnings;
@@ -58,16 +32,18 @@ void Play(const Arguments& arguments) {
   for (const std::string& warning : warnings) {
     std::cerr << fmt::format("warning: {}\n", warning);
   }
-  KeyframeMaker maker({arguments.agent_id, WallUtime()}, recording.camera(), {});
+  LocalBus nobody;
   std::optional<LcmBus> bus;
-  std::optional<Agent> agent;
-  std::optional<PlaybackPace> pace;
-  std::optional<LogFileWriter> log;  // for `keyframes:` in a session file, and for a replay
   if (!arguments.bus.empty()) {
     bus.emplace(arguments.bus);
-    agent.emplace(*bus, arguments.agent_id);
-    pace.emplace(&*bus, *agent, agent->outlet());
   }
+  ExternalOdometryProcess process(bus ? static_cast<Bus&>(*bus) : nobody, arguments.agent_id,
+                                  recording.camera(), WallUtime, WallUtime());
+  std::optional<PlaybackPace> pace;
+  if (bus) {
+    pace.emplace(&*bus, process, process.outlet());
+  }
+  std::optional<LogFileWriter> log;  // for `keyframes:` in a session file, and for a replay
   if (!arguments.out_keyframes.empty()) {
     log.emplace(arguments.out_keyframes);
   }
@@ -82,17 +58,17 @@ void Play(const Arguments& arguments) {
       std::cerr << (why.empty() ? "" : fmt::format("warning: {}\n", why));
       continue;
     }
-    if (const auto keyframe = maker.Add(utime, image, *T_odom_body)) {
+    if (const auto keyframe = process.AddImage(utime, image, T_odom_body)) {
       ++keyframes;
-      std::vector<uint8_t> bytes = EncodeMessage(ToMessage(*keyframe));
       if (log) {
-        log->Write(utime, channels::Keyframe(arguments.agent_id), bytes);
+        log->Write(utime, channels::Keyframe(arguments.agent_id),
+                   EncodeMessage(ToMessage(*keyframe)));
       }
-      if (agent) {
-        agent->Publish(keyframe->id, std::move(bytes));
+      if (pace) {
         pace->WaitForAcknowledgements();
       }
     }
+    nobody.Drain();
   }
   if (pace) {
     pace->WaitAtTheEnd();

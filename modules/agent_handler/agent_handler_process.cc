@@ -48,6 +48,8 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
                              std::bind_front(&AgentHandlerProcess::OnCorrection, this));
   node_.Listen<landmarks_t>(channels::kAllLandmarks,
                             std::bind_front(&AgentHandlerProcess::OnLandmarks, this));
+  node_.Listen<others_t>(channels::kAllOthers,
+                         std::bind_front(&AgentHandlerProcess::OnOthers, this));
 }
 
 void AgentHandlerProcess::OnCorrection(const Correction& correction) {
@@ -66,16 +68,23 @@ void AgentHandlerProcess::OnCorrection(const Correction& correction) {
   }
 }
 
-// Best effort: an agent that is away misses them.
 void AgentHandlerProcess::OnLandmarks(const MapLandmarks& landmarks, const landmarks_t& message) {
   if (message.getEncodedSize() > kMaxLandmarksBytes) {
     return node_.Refuse("landmarks: too large");
   }
-  const int32_t agent_id = landmarks.map.agent_id;
+  SendBestEffort(landmarks.map.agent_id, LinkKind::kLandmarks, EncodeMessage(message));
+}
+
+void AgentHandlerProcess::OnOthers(const Others& others, const others_t& message) {
+  SendBestEffort(others.map.agent_id, LinkKind::kOthers, EncodeMessage(message));
+}
+
+// An agent that is away misses it.
+void AgentHandlerProcess::SendBestEffort(int32_t agent_id, LinkKind kind,
+                                         std::vector<uint8_t> body) {
   const auto agent = agents_.find(agent_id);
   if (agent != agents_.end() && agent->second.session.HasUplink()) {
-    SendDown(agent_id, &agent->second,
-             agent->second.session.Seal(LinkKind::kLandmarks, EncodeMessage(message)));
+    SendDown(agent_id, &agent->second, agent->second.session.Seal(kind, std::move(body)));
   }
 }
 

@@ -2,8 +2,8 @@
 
 // The agent_handler between the link bus and the server bus.
 //   link bus:   LINK_UP_* in; LINK_DOWN_k out
-//   server bus: POSE_k, STATUS_agent_handler and what archive.h says out; CORRECTION_k, LANDMARKS_k
-//               and what archive.h and anchor_relay.h say in
+//   server bus: POSE_k, STATUS_agent_handler and what archive.h says out; CORRECTION_k,
+//               LANDMARKS_k, OTHERS_k and what archive.h and anchor_relay.h say in
 // Keyframes are acknowledged and published once the journal's disk has them. What does not open
 // under the key of the agent it claims to be from is dropped and counted; it costs one attempt to
 // open it, and leaves nothing behind.
@@ -58,6 +58,8 @@ class AgentHandlerProcess : public PolledProcess {
   AgentHandler MakeHandler(int32_t agent_id) const;
   void OnCorrection(const Correction& correction);
   void OnLandmarks(const MapLandmarks& landmarks, const landmarks_t& message);
+  void OnOthers(const Others& others, const others_t& message);
+  void SendBestEffort(int32_t agent_id, LinkKind kind, std::vector<uint8_t> body);
   void JournalReady(Agent* agent);
   void SendAcks();
   void SendAnchors();

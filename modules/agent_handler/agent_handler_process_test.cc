@@ -201,34 +201,6 @@ TEST_F(LinkWorld, CorrectionsReachTheAgentAndPosesTheServer) {
   EXPECT_LE(poses, 51);
 }
 
-TEST_F(LinkWorld, LandmarksReachTheirAgentAlone) {
-  std::vector<landmarks_t> told;
-  agent_bus.Subscribe("LANDMARKS_1", [&](const std::string&, Bytes data) {
-    ASSERT_TRUE(DecodeMessage(data, &told.emplace_back()));
-  });
-  PublishKeyframes(1);
-  Run(3);
-  MapLandmarks landmarks{kMap, {2, 500}, 3, {{{{2, 500}, 8}, {1, 0, 0}}}, {}};
-  for (int i = 0; i < 18; ++i) {
-    landmarks.landmarks.push_back({0, i, {5, 0.1 * i, 1}, 0.05, 0.01, {}});
-  }
-  PublishMessage(server_bus, "LANDMARKS_1", ToMessage(landmarks));
-  Run(1);
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].num_landmarks, 18);
-  // Another agent's, one that is not sound, and one that no frame would hold.
-  landmarks.map = {9, 1000};
-  PublishMessage(server_bus, "LANDMARKS_9", ToMessage(landmarks));
-  landmarks.map = kMap;
-  landmarks_t hostile = ToMessage(landmarks);
-  hostile.landmarks[3].sigma_along_m = -1;
-  PublishMessage(server_bus, "LANDMARKS_1", hostile);
-  landmarks.landmarks.resize(60, landmarks.landmarks.front());
-  PublishMessage(server_bus, "LANDMARKS_1", ToMessage(landmarks));
-  Run(1);
-  EXPECT_EQ(told.size(), 1u);
-}
-
 // The handler may hear of a map before the map's agent says hello: after a restart, it does.
 TEST_F(LinkWorld, ACorrectionWaitsForItsAgentsHello) {
   PublishKeyframes(1);

@@ -105,6 +105,13 @@ Rigid3 Anchors::T_map_odom(const MapId& map) const {
   return {};
 }
 
+std::optional<Rigid3> Anchors::T_body_cam(const MapId& map) const {
+  const auto track = tracks_.find(map);
+  return track == tracks_.end()
+             ? std::nullopt
+             : std::optional(track->second.keyframes().rbegin()->second.camera->T_body_cam);
+}
+
 // A keyframe that the group's state does not have yet lies on the odometry behind those it has.
 Rigid3 Anchors::T_map_body(const MapId& map, int32_t seq) const {
   if (const GroupState* const group = groups_.Find(map)) {

@@ -75,6 +75,10 @@ class Anchors {
   std::optional<AnchorState> InItsGroup(const AnchorId& id) const;
   // The group that a map belongs to, and its revision; the map itself and 0 while it is alone.
   std::pair<MapId, int64_t> GroupAndRevision(const MapId& map) const;
+  // The newest odom frame in the group's frame; of a map that is in no group the identity.
+  Rigid3 T_map_odom(const MapId& map) const;
+  // Of a map's newest keyframe; nothing for a map without keyframes.
+  std::optional<Rigid3> T_body_cam(const MapId& map) const;
   // Of a group's keyframes the nearest to a point in its frame (metres); nothing for what is not,
   // or no longer, the id of a group that has keyframes.
   struct NearKeyframe {
@@ -100,8 +104,6 @@ class Anchors {
   };
 
   void PlaceOrWait(const AnchorId& id);
-  // The newest odom frame; in a map that is in no group its own.
-  Rigid3 T_map_odom(const MapId& map) const;
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
   InGroup Position(const AnchorPlacement& placement) const;
   // Of each placed anchor.

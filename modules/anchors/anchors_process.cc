@@ -17,6 +17,7 @@ namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr int64_t kPublishInterval_us = 250'000;
+constexpr int64_t kOthersInterval_us = 200'000;
 constexpr int32_t kMaxAsked = 50;
 // The newest edit has been heard then, and with it a gap before it: it comes every second.
 constexpr int64_t kNewestEditRepeated_us = 2 * kSecond_us;
@@ -38,6 +39,20 @@ AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options)
                             std::bind_front(&AnchorsProcess::OnMapState, this));
   node_.Listen<correction_t>(channels::kAllCorrections,
                              [this](const Correction& correction) { anchors_.Take(correction); });
+  node_.Subscribe<pose_t>(std::string(channels::kAllPoses),
+                          [this](const std::string&, const pose_t& message) { OnPose(message); });
+}
+
+void AnchorsProcess::OnPose(const pose_t& message) {
+  const auto map = Parse(message.map);
+  const auto T_odom_body = Parse(message.T_odom_body);
+  if (message.state != pose_t::STATE_TRACKING) {
+    return;
+  }
+  if (!map.value || !T_odom_body.value) {
+    return node_.Refuse("pose: invalid map or pose");
+  }
+  other_agents_.Take(*map.value, *T_odom_body.value, now_utime_);
 }
 
 void AnchorsProcess::OnMapState(MapState state, const map_state_t& message) {
@@ -105,6 +120,16 @@ void AnchorsProcess::PublishDue(int64_t now_utime) {
   }
 }
 
+void AnchorsProcess::PublishOthers(int64_t now_utime) {
+  if (now_utime < next_others_utime_) {
+    return;
+  }
+  next_others_utime_ = now_utime + kOthersInterval_us;
+  for (const Others& others : other_agents_.ForEach(anchors_, now_utime)) {
+    node_.Publish(channels::Others(others.map.agent_id), ToMessage(others));
+  }
+}
+
 void AnchorsProcess::Finish() {
   for (const AnchorState& state : anchors_.All()) {
     node_.Publish(std::string(channels::kAnchor), ToMessage(state));
@@ -117,6 +142,7 @@ void AnchorsProcess::Tick(int64_t now_utime) {
   journal_.Tick(now_utime);
   RequestMissingEdits(now_utime);
   PublishDue(now_utime);
+  PublishOthers(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond_us;
     PublishStatus(now_utime);

@@ -1,6 +1,7 @@
 #pragma once
 
-// KEYFRAME_*, MAP_STATE, CORRECTION_*, ANCHOR_EDIT, HAVE in; ANCHOR_k, ANCHOR, STATUS_anchors out.
+// KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT, HAVE in; ANCHOR_k, ANCHOR, OTHERS_k,
+// STATUS_anchors out.
 //
 // Edits are taken in the journal's order: what is missing is asked for at ticks (RESEND_REQUEST,
 // answers on AGAIN_anchors), and agent_handler repeats the newest, so that a lost tail shows. What
@@ -15,6 +16,7 @@
 
 #include "anchors/anchor_updates.h"
 #include "anchors/anchors.h"
+#include "anchors/other_agents.h"
 #include "bus/node.h"
 #include "bus/process.h"
 #include "bus/retransmission/in_order.h"
@@ -22,6 +24,7 @@
 #include "messages/state_chunks.h"
 #include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
+#include "pangea/pose_t.hpp"
 
 namespace pangea {
 
@@ -46,8 +49,10 @@ class AnchorsProcess : public Process {
  private:
   void OnMapState(MapState state, const map_state_t& message);
   void OnEdit(AnchorEdit edit);
+  void OnPose(const pose_t& message);
   void RequestMissingEdits(int64_t now_utime);
   void PublishDue(int64_t now_utime);
+  void PublishOthers(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   const AnchorsOptions options_;
@@ -59,11 +64,13 @@ class AnchorsProcess : public Process {
   InOrder<AnchorEdit> edits_;  // one stream
   AnchorUpdates for_watchers_;
   std::map<MapId, AnchorUpdates> for_agents_;  // the newest map of each
+  OtherAgents other_agents_;
   bool have_received_ = false;
   int64_t have_utime_ = 0;  // of the first tick after the first HAVE
   int64_t now_utime_ = 0;
   int64_t next_request_utime_ = 0;
   int64_t next_publish_utime_ = 0;
+  int64_t next_others_utime_ = 0;
   int64_t next_status_utime_ = 0;
 };
 

@@ -26,6 +26,9 @@ class AnchorsProcessTest : public testing::Test {
     bus_.Subscribe("ANCHOR_2", [this](const std::string&, Bytes data) {
       DecodeMessage(data, &for_agent_2_.emplace_back());
     });
+    bus_.Subscribe("OTHERS_2", [this](const std::string&, Bytes data) {
+      DecodeMessage(data, &others_of_2_.emplace_back());
+    });
     bus_.Subscribe("ANCHOR", [this](const std::string&, Bytes data) {
       DecodeMessage(data, &for_watchers_.emplace_back());
     });
@@ -70,6 +73,16 @@ class AnchorsProcessTest : public testing::Test {
     }
     bus_.Drain();
   }
+  void SendPoses() {
+    for (const SyntheticAgent& agent : world_.agents) {
+      pose_t pose{};
+      pose.state = pose_t::STATE_TRACKING;
+      pose.map = ToMessage(agent.map);
+      pose.T_odom_body = ToMessage(agent.keyframes.back().T_odom_body);
+      PublishMessage(bus_, channels::Pose(agent.map.agent_id), pose);
+    }
+    bus_.Drain();
+  }
   void Send(const anchor_edit_t& edit) {
     PublishMessage(bus_, "ANCHOR_EDIT", edit);
     bus_.Drain();
@@ -85,6 +98,7 @@ class AnchorsProcessTest : public testing::Test {
   AnchorsProcess process_;
   SyntheticWorld world_;
   std::vector<anchor_t> for_agent_2_, for_watchers_;
+  std::vector<others_t> others_of_2_;
   std::vector<resend_request_t> requests_;
   status_t status_{};
   int64_t now_utime_ = 1'700'000'000'000'000;
@@ -101,6 +115,22 @@ TEST_F(AnchorsProcessTest, AnAnchorReachesTheOtherAgentAndWatchers) {
   EXPECT_TRUE(Parse(for_agent_2_[0]).value) << Parse(for_agent_2_[0]).refused;
   ASSERT_EQ(for_watchers_.size(), 1u);
   EXPECT_EQ(for_watchers_[0].map.agent_id, 1);
+}
+
+TEST_F(AnchorsProcessTest, AnAgentHearsOfTheOthersFiveTimesASecond) {
+  SendMap();
+  for (int i = 0; i < 20; ++i) {
+    SendPoses();
+    Tick(1);
+  }
+  EXPECT_GE(others_of_2_.size(), 9u);
+  EXPECT_LE(others_of_2_.size(), 11u);
+  ASSERT_EQ(others_of_2_.back().num_others, 1);
+  EXPECT_EQ(others_of_2_.back().others[0].agent_id, 1);
+  EXPECT_EQ(others_of_2_.back().map.agent_id, 2);
+  const size_t told = others_of_2_.size();
+  Tick(40);
+  EXPECT_LE(others_of_2_.size(), told + 11);  // until the poses are two seconds old
 }
 
 TEST_F(AnchorsProcessTest, WhatDoesNotChangeIsSaidAgainEveryTenSeconds) {

@@ -7,7 +7,8 @@
 #include "anchors/api/anchors_server.h"
 #include "bus/process_main.h"
 
-// KEYFRAME_*, MAP_STATE, CORRECTION_*, ANCHOR_EDIT --> AnchorsProcess --> ANCHOR_k, ANCHOR
+// KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT --> AnchorsProcess --> ANCHOR_k, ANCHOR,
+//                                                                                 OTHERS_k
 //                                     HTTP <--> AnchorApi --> ANCHOR_REQUEST_0
 int main(int argc, char** argv) {
   pangea::AnchorsOptions options;

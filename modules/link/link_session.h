@@ -33,6 +33,7 @@ enum class LinkKind : uint8_t {
   kLandmarks = 18,
   kAnchor = 19,
   kAnchorEditAnswers = 20,
+  kOthers = 21,
 };
 
 struct LinkPacket {

@@ -13,6 +13,7 @@
 //          count, and of each keyframe in the cache: index of its map, seq, bits of its pieces;
 //          count, and of each correction: an encoded correction_t
 //   landmarks: an encoded landmarks_t; best effort
+//   others: an encoded others_t; best effort, the newest counts
 // Anchors (anchor_wire.h), each sent again until the other side says that it has it:
 //   anchor edit (up):          an encoded anchor_edit_t
 //   anchor edit answers (down): count, and of each: agent_id and created_utime of the anchor,
@@ -53,8 +54,9 @@ inline constexpr int kMaxLinkMaps = 20;
 inline constexpr size_t kMaxSoftwareName = 40;
 inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
-// An encoded landmarks_t: fits one Ethernet frame.
+// An encoded landmarks_t or others_t: fits one Ethernet frame.
 inline constexpr int kMaxLandmarksBytes = 1300;
+inline constexpr int kMaxOthersBytes = 1300;
 
 // UDP, IP and LCM's small-message header (8 bytes, the channel, 0): a packet's bytes on the wire.
 // What is larger than an Ethernet frame is cut by IP, each part with a header of its own.

@@ -30,6 +30,7 @@ inline constexpr std::string_view kDamaged = "DAMAGED";
 inline constexpr std::string_view kAllKeyframes = "KEYFRAME_[0-9]+";
 inline constexpr std::string_view kAllCorrections = "CORRECTION_[0-9]+";
 inline constexpr std::string_view kAllLandmarks = "LANDMARKS_[0-9]+";
+inline constexpr std::string_view kAllOthers = "OTHERS_[0-9]+";
 inline constexpr std::string_view kAllAnchors = "ANCHOR_[0-9]+";
 inline constexpr std::string_view kAllPoses = "POSE_[0-9]+";
 inline constexpr std::string_view kAllImages = "IMAGE_[0-9]+";
@@ -46,6 +47,7 @@ inline constexpr std::string_view kPosePrefix = "POSE_";
 inline constexpr std::string_view kKeyframePrefix = "KEYFRAME_";
 inline constexpr std::string_view kCorrectionPrefix = "CORRECTION_";
 inline constexpr std::string_view kLandmarksPrefix = "LANDMARKS_";
+inline constexpr std::string_view kOthersPrefix = "OTHERS_";
 inline constexpr std::string_view kAnchorPrefix = "ANCHOR_";
 inline constexpr std::string_view kAnchorRequestPrefix = "ANCHOR_REQUEST_";
 inline constexpr std::string_view kShownAnchorsPrefix = "SHOWN_ANCHORS_";
@@ -66,6 +68,7 @@ inline std::string Pose(int32_t agent_id) { return OfAgent(kPosePrefix, agent_id
 inline std::string Keyframe(int32_t agent_id) { return OfAgent(kKeyframePrefix, agent_id); }
 inline std::string Correction(int32_t agent_id) { return OfAgent(kCorrectionPrefix, agent_id); }
 inline std::string Landmarks(int32_t agent_id) { return OfAgent(kLandmarksPrefix, agent_id); }
+inline std::string Others(int32_t agent_id) { return OfAgent(kOthersPrefix, agent_id); }
 inline std::string Anchor(int32_t agent_id) { return OfAgent(kAnchorPrefix, agent_id); }
 // 0: a tool on the server's bus.
 inline std::string AnchorRequest(int32_t agent_id) {

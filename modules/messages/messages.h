@@ -9,6 +9,7 @@
 
 #include "core/keyframe.h"
 #include "core/map_landmarks.h"
+#include "core/others.h"
 #include "core/server_messages.h"
 #include "messages/keyframe_message.h"
 #include "pangea/camera_t.hpp"
@@ -17,6 +18,7 @@
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
 #include "pangea/options_t.hpp"
+#include "pangea/others_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/rigid3_t.hpp"
 
@@ -45,6 +47,7 @@ place_match_t ToMessage(const PlaceMatch& match);
 constraint_t ToMessage(const Constraint& constraint);
 correction_t ToMessage(const Correction& correction);
 landmarks_t ToMessage(const MapLandmarks& landmarks);
+others_t ToMessage(const Others& others);
 // At most 500 keyframes a chunk.
 std::vector<map_state_t> ToMessages(const MapState& state);
 
@@ -57,6 +60,7 @@ Parsed<PlaceMatch> Parse(const place_match_t& message);
 Parsed<Constraint> Parse(const constraint_t& message);
 Parsed<Correction> Parse(const correction_t& message);
 Parsed<MapLandmarks> Parse(const landmarks_t& message);
+Parsed<Others> Parse(const others_t& message);
 Parsed<ProcessOptions> Parse(const options_t& message);
 // One chunk as a MapState of its own.
 Parsed<MapState> Parse(const map_state_t& message);

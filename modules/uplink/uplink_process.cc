@@ -10,6 +10,7 @@
 #include "messages/channels.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
+#include "pangea/others_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "uplink/thin.h"
@@ -166,12 +167,16 @@ void UplinkProcess::OnLinkDown(Bytes data) {
   if (opened.new_session) {
     uplink_.OnNewSession();
     anchors_.OnNewSession();
+    last_others_ = 0;
   }
   if (!opened.packet) {
     return;
   }
   if (opened.packet->kind == LinkKind::kLandmarks) {
     return OnLandmarks(opened.packet->body);
+  }
+  if (opened.packet->kind == LinkKind::kOthers) {
+    return OnOthers(*opened.packet);
   }
   if (UplinkAnchors::IsOfAnchors(opened.packet->kind)) {
     return anchors_.OnPacket(*opened.packet, now_us_);
@@ -197,6 +202,21 @@ void UplinkProcess::OnLandmarks(Bytes body) {
   }
   node_.Publish(channels::Landmarks(agent_id_), message);
   node_.Count("landmark_messages");
+}
+
+void UplinkProcess::OnOthers(const LinkPacket& packet) {
+  others_t message{};
+  if (packet.body.size() > size_t{kMaxOthersBytes} || !DecodeMessage(packet.body, &message)) {
+    return node_.Refuse("others_t does not decode, or is too large");
+  }
+  const auto others = Parse(message);
+  if (!others.value || others.value->map.agent_id != agent_id_) {
+    return node_.Refuse(others.value ? "others: for another agent" : others.refused);
+  }
+  if (packet.number > last_others_) {  // it was not overtaken
+    last_others_ = packet.number;
+    node_.Publish(channels::Others(agent_id_), message);
+  }
 }
 
 int64_t UplinkProcess::Send(const LinkPacket& packet) {

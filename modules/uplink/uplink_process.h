@@ -1,8 +1,8 @@
 #pragma once
 
 // The uplink between its agent's bus and the link bus.
-//   agent bus: KEYFRAME_k, AGAIN_uplink_k, POSE_k in; HAVE, CORRECTION_k, RESEND_REQUEST,
-//              STATUS_uplink_k out; and what uplink_anchors.h says
+//   agent bus: KEYFRAME_k, AGAIN_uplink_k, POSE_k in; HAVE, CORRECTION_k, LANDMARKS_k, OTHERS_k,
+//              RESEND_REQUEST, STATUS_uplink_k out; and what uplink_anchors.h says
 //   link bus:  LINK_DOWN_k in, LINK_UP_k out
 
 #include <optional>
@@ -35,6 +35,7 @@ class UplinkProcess : public PolledProcess {
   // The keyframe's bytes as they are sent: all of them, or what the budget leaves.
   std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
   void OnLandmarks(Bytes body);
+  void OnOthers(const LinkPacket& packet);
   // The bytes on the wire.
   int64_t Send(const LinkPacket& packet);
   std::vector<uint8_t> Load(const KeyframeId& id);
@@ -61,6 +62,7 @@ class UplinkProcess : public PolledProcess {
   int64_t now_us_ = 0;
   int64_t now_utime_ = 0;
   int64_t next_have_us_ = 0;
+  int64_t last_others_ = 0;  // number of the newest packet of this session
   int64_t next_status_utime_ = 0;
   std::map<MapId, int32_t> last_have_;
 };

@@ -119,6 +119,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       ParseBytes<anchor_t>,
       ParseBytes<shown_anchors_t>,
       ParseAnchorBodies,
+      ParseBytes<others_t>,
   };
   if (size > 0) {
     targets[data[0] % std::size(targets)]({data + 1, data + size});

@@ -14,8 +14,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       bus.Publish("LINK_DOWN_1", opened.welcome);
     }
   });
-  for (const LinkKind kind :
-       {LinkKind::kAck, LinkKind::kLandmarks, LinkKind::kAnchor, LinkKind::kAnchorEditAnswers}) {
+  for (const LinkKind kind : {LinkKind::kAck, LinkKind::kLandmarks, LinkKind::kOthers,
+                              LinkKind::kAnchor, LinkKind::kAnchorEditAnswers}) {
     bus.Subscribe(fuzz::ChannelOfKind(kind), [&bus, &server, kind](const std::string&, Bytes body) {
       if (server.HasUplink()) {
         bus.Publish("LINK_DOWN_1", server.Seal(kind, {body.begin(), body.end()}));

@@ -15,6 +15,7 @@
 #include "pangea/constraint_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/landmarks_t.hpp"
+#include "pangea/others_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "pangea/pose_t.hpp"
 #include "pangea/resend_request_t.hpp"
@@ -60,6 +61,7 @@ inline const std::vector<Channel>& UplinkChannels() {
       {"ANCHOR_DOWN", {}},
       {"ANCHOR_EDIT_ANSWERS", {}},
       ChannelOf<anchor_edit_t>("ANCHOR_REQUEST_1"),
+      ChannelOf<others_t>("OTHERS"),
   };
   return channels;
 }
@@ -76,6 +78,8 @@ inline std::string ChannelOfKind(LinkKind kind) {
       return "POSE";
     case LinkKind::kLandmarks:
       return "LANDMARKS";
+    case LinkKind::kOthers:
+      return "OTHERS";
     case LinkKind::kAnchorEdit:
       return "ANCHOR_EDIT_UP";
     case LinkKind::kAnchorsReceived:

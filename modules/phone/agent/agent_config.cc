@@ -59,6 +59,7 @@ AgentConfig ReadAgentConfig(const AgentTexts& texts) {
   vio::VioFileOptions vio_options;
   ReadOptions(texts.vio_options_yaml, "vioOptionsYaml", &vio_options);
   config.vio = vio_options.vio;
+  config.device_poses = texts.device_poses;
   config.imu_noise = vio_options.live_imu;
   ReadOptions(texts.uplink_options_yaml, "uplinkOptionsYaml", &config.uplink);
   if (const auto invalid = config.uplink.Invalid()) {

@@ -23,6 +23,7 @@ struct AgentConfig {
   std::optional<CalibrationSigmas> sigmas;  // of the camera; else as `vio` says
   ImuNoise imu_noise;
   vio::VioOptions vio;
+  bool device_poses = false;  // images come with poses of the device's own odometry
   UplinkOptions uplink;
 };
 
@@ -35,6 +36,7 @@ struct AgentTexts {
   std::string imu_yaml;     // of mav0/imu0/sensor.yaml; empty: live_imu of the options
   std::string vio_options_yaml;
   std::string uplink_options_yaml;
+  bool device_poses = false;
 };
 
 // Throws std::runtime_error that names the field and the mend.

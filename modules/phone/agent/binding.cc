@@ -44,6 +44,11 @@ std::vector<double> Numbers(const val& object, const char* field, size_t count) 
   return numbers;
 }
 
+Rigid3 ToRigid3(const std::vector<double>& T) {
+  return {Eigen::Quaterniond(T.at(6), T.at(3), T.at(4), T.at(5)).normalized(),
+          {T.at(0), T.at(1), T.at(2)}};
+}
+
 std::string Text(const val& object, const char* field) {
   const val value = object[field];
   return value.isString() ? value.as<std::string>() : "";
@@ -95,6 +100,13 @@ val ToObject(const DrawnAnchor& anchor) {
   return object;
 }
 
+val ToObject(const OtherAgent& other) {
+  val object = val::object();
+  object.set("agent", other.agent_id);
+  object.set("T_odom_cam", ToArray(other.T_odom_cam));
+  return object;
+}
+
 val ToObject(const SpoolChange& change) {
   val object = val::object();
   object.set("op", std::string(change.bytes.empty() ? "delete" : "put"));
@@ -125,6 +137,13 @@ val ToObject(const PhoneEvents& events) {
   if (events.anchors) {
     object.set("anchors", ToArrayOf(*events.anchors, [](const auto& a) { return ToObject(a); }));
   }
+  if (events.others) {
+    val others = val::object();
+    others.set("map", ToString(events.others->map));
+    others.set("others",
+               ToArrayOf(events.others->others, [](const auto& o) { return ToObject(o); }));
+    object.set("others", others);
+  }
   if (events.vio_status || events.uplink_status) {
     val status = val::object();
     if (events.vio_status) {
@@ -153,6 +172,14 @@ class Agent {
   void AddImage(double utime, int width, int height) {
     agent_.AddImage(static_cast<int64_t>(utime), cv::Mat(height, width, CV_8U, image_.data()));
   }
+  // `T_odom_body` is null while the device's odometry is lost.
+  void AddPosedImage(double utime, int width, int height, const val& T_odom_body) {
+    std::optional<Rigid3> T;
+    if (T_odom_body.isArray()) {
+      T = ToRigid3(emscripten::convertJSArrayToNumberVector<double>(T_odom_body));
+    }
+    agent_.AddImage(static_cast<int64_t>(utime), cv::Mat(height, width, CV_8U, image_.data()), T);
+  }
   void OnLinkDown(const val& packet) { agent_.OnLinkDown(ToBytes(packet)); }
   void Restore(const std::string& id, const val& bytes) { agent_.Restore(id, ToBytes(bytes)); }
   std::string PlaceAnchor(const val& edit) {
@@ -165,9 +192,7 @@ class Agent {
         const std::vector<double> pixel = Numbers(edit, "pixel", 2);
         anchor.pixel = Eigen::Vector2d(pixel[0], pixel[1]);
       } else {
-        const std::vector<double> T = Numbers(edit, "T_body_anchor", 7);
-        anchor.T_body_anchor = {Eigen::Quaterniond(T[6], T[3], T[4], T[5]).normalized(),
-                                {T[0], T[1], T[2]}};
+        anchor.T_body_anchor = ToRigid3(Numbers(edit, "T_body_anchor", 7));
       }
       return ToString(agent_.PlaceAnchor(anchor));
     } catch (const std::exception& error) {
@@ -202,6 +227,7 @@ val CreateAgent(const val& config) {
     texts.imu_yaml = Text(config, "imuYaml");
     texts.vio_options_yaml = Text(config, "vioOptionsYaml");
     texts.uplink_options_yaml = Text(config, "uplinkOptionsYaml");
+    texts.device_poses = config["devicePoses"].isTrue();
     result.set("agent", val(std::make_shared<Agent>(ReadAgentConfig(texts))));
   } catch (const std::exception& error) {
     result.set("error", std::string(error.what()));
@@ -270,6 +296,7 @@ EMSCRIPTEN_BINDINGS(pangea_phone_agent) {
       .function("imageBuffer", &Agent::ImageBuffer)
       .function("addImu", &Agent::AddImu)
       .function("addImage", &Agent::AddImage)
+      .function("addPosedImage", &Agent::AddPosedImage)
       .function("onLinkDown", &Agent::OnLinkDown)
       .function("restore", &Agent::Restore)
       .function("placeAnchor", &Agent::PlaceAnchor)

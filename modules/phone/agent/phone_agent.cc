@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "messages/anchor_messages.h"
-#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/keyframe_message.h"
 #include "pangea/pose_t.hpp"
@@ -16,14 +15,6 @@ namespace pangea::phone {
 namespace {
 
 constexpr int64_t kTickInterval_us = 100'000;
-
-vio::VioProcessOptions ProcessOptions(const AgentConfig& config) {
-  vio::VioProcessOptions options;
-  options.agent_id = config.agent_id;
-  options.vio = config.vio;
-  options.map_utime = config.opened_utime;
-  return options;
-}
 
 std::optional<KeyframeId> IdOf(Bytes keyframe) {
   KeyframeMessage message{};
@@ -36,13 +27,11 @@ PhoneAgent::PhoneAgent(const AgentConfig& config)
     : agent_id_(config.agent_id),
       image_size_(config.camera.width, config.camera.height),
       node_(agent_bus_, fmt::format("phone_{}", config.agent_id)),
-      vio_(agent_bus_, ProcessOptions(config), config.opened_utime),
-      sensors_(vio_),
+      odometry_(MakeOdometry(agent_bus_, config)),
       now_us_(config.opened_utime) {
   if (config.key) {
     uplink_.emplace(agent_bus_, link_bus_, agent_id_, *config.key, config.uplink);
   }
-  vio_.Open(config.camera, config.imu_noise, config.sigmas);
   Listen();
 }
 
@@ -67,19 +56,22 @@ void PhoneAgent::Listen() {
   node_.Listen<shown_anchors_t>(
       channels::ShownAnchors(agent_id_),
       [this](const ShownAnchors& shown) { events_.anchors = anchors_.Draw(shown); });
+  node_.Listen<others_t>(channels::Others(agent_id_),
+                         [this](const Others& others) { events_.others = others; });
   node_.Subscribe<status_t>(
-      channels::Status(vio_.node().name()),
+      channels::Status(odometry_->node().name()),
       [this](const std::string&, const status_t& status) { events_.vio_status = status; });
   node_.Subscribe<status_t>(
       channels::Status(fmt::format("uplink_{}", agent_id_)),
       [this](const std::string&, const status_t& status) { events_.uplink_status = status; });
 }
 
-void PhoneAgent::AddImage(int64_t utime, const cv::Mat& image) {
+void PhoneAgent::AddImage(int64_t utime, const cv::Mat& image,
+                          const std::optional<Rigid3>& T_odom_body) {
   if (image.type() != CV_8U || image.size() != image_size_) {
-    vio_.node().Refuse("image: its size is not the calibration's");
-  } else if (sensors_.TakeImageStamp(utime)) {
-    sensors_.AddImage(utime, image.clone());
+    odometry_->node().Refuse("image: its size is not the calibration's");
+  } else {
+    odometry_->AddImage(utime, image, T_odom_body);
   }
   agent_bus_.Drain();
 }
@@ -189,7 +181,7 @@ void PhoneAgent::Poll(int64_t now_us) {
   }
   if (now_us >= next_tick_us_) {
     next_tick_us_ = now_us + kTickInterval_us;
-    vio_.Tick(now_us);
+    odometry_->Tick(now_us);
     if (uplink_) {
       uplink_->Tick(now_us);
     }
@@ -199,12 +191,12 @@ void PhoneAgent::Poll(int64_t now_us) {
 }
 
 void PhoneAgent::StartAnew() {
-  sensors_.StartAnew();
+  odometry_->StartAnew();
   agent_bus_.Drain();
 }
 
 void PhoneAgent::Flush() {
-  vio_.Flush();
+  odometry_->Flush();
   agent_bus_.Drain();
 }
 

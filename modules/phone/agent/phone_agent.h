@@ -21,12 +21,13 @@
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "core/anchor.h"
+#include "core/others.h"
 #include "core/server_messages.h"
+#include "messages/catch_up_messages.h"
 #include "phone/agent/agent_config.h"
 #include "phone/agent/drawn_anchors.h"
+#include "phone/agent/odometry.h"
 #include "uplink/uplink_process.h"
-#include "vio/live/sensor_input.h"
-#include "vio/vio_process.h"
 
 namespace pangea::phone {
 
@@ -51,12 +52,13 @@ struct SpoolChange {
   std::vector<uint8_t> bytes;  // empty: delete
 };
 
-// What has come out; as pose, statuses and anchors the newest alone.
+// What has come out; as pose, statuses, anchors and others the newest alone.
 struct PhoneEvents {
   std::vector<std::vector<uint8_t>> link_up;  // sealed packets, in their order
   std::optional<PhonePose> pose;
-  std::optional<status_t> vio_status, uplink_status;
+  std::optional<status_t> vio_status, uplink_status;  // vio: of either odometry
   std::optional<std::vector<DrawnAnchor>> anchors;
+  std::optional<Others> others;
   std::vector<SpoolChange> spool;
   std::vector<std::vector<uint8_t>> keyframes;  // encoded keyframe_t, as they are finished
 };
@@ -74,9 +76,10 @@ class PhoneAgent {
  public:
   explicit PhoneAgent(const AgentConfig& config);
 
-  void AddImu(const ImuSample& sample) { sensors_.AddImu(sample); }
-  // 8-bit grey, of the calibration's size; copied.
-  void AddImage(int64_t utime, const cv::Mat& image);
+  void AddImu(const ImuSample& sample) { odometry_->AddImu(sample); }
+  // 8-bit grey, of the calibration's size; copied. `T_odom_body`: as of Odometry.
+  void AddImage(int64_t utime, const cv::Mat& image,
+                const std::optional<Rigid3>& T_odom_body = std::nullopt);
   void OnLinkDown(Bytes packet);
   // A keyframe that an earlier run has put in its spool; before the first image, in their order.
   // One that is damaged is deleted.
@@ -105,8 +108,7 @@ class PhoneAgent {
   LocalBus agent_bus_;
   LocalBus link_bus_;
   Node node_;
-  vio::VioProcess vio_;
-  vio::SensorInput sensors_;
+  const std::unique_ptr<Odometry> odometry_;
   std::optional<UplinkProcess> uplink_;  // none without a key
   DrawnAnchors anchors_;
   std::optional<Correction> correction_;  // the newest one of the newest map

@@ -82,6 +82,7 @@ class PhoneAgentTest : public testing::Test {
       spool_.insert(spool_.end(), events.spool.begin(), events.spool.end());
       keyframes_ += events.keyframes.size();
       anchors_ = events.anchors ? events.anchors : anchors_;
+      others_ = events.others ? events.others : others_;
       uplink_status_ = events.uplink_status ? events.uplink_status : uplink_status_;
       vio_status_ = events.vio_status ? events.vio_status : vio_status_;
       pose_ = events.pose ? events.pose : pose_;
@@ -102,6 +103,7 @@ class PhoneAgentTest : public testing::Test {
   std::vector<std::vector<uint8_t>> delivered_;
   std::vector<SpoolChange> spool_;
   std::optional<std::vector<DrawnAnchor>> anchors_;
+  std::optional<Others> others_;
   std::optional<status_t> uplink_status_, vio_status_;
   std::optional<PhonePose> pose_;
   size_t keyframes_ = 0;
@@ -171,6 +173,17 @@ TEST_F(PhoneAgentTest, AnchorsOfTheServerAreDrawnAndRemoved) {
   EXPECT_EQ(CounterOf(*uplink_status_, "anchor_edits"), 1);
 }
 
+TEST_F(PhoneAgentTest, ItHearsWhereTheOthersAre) {
+  agent_.Restore("a", EncodeTestKeyframe({kOldMap, 0}));
+  Run(2);
+  PublishMessage(server_bus_, "OTHERS_7", ToMessage(Others{kOldMap, {{3, {}}, {4, {}}}}));
+  Run(0.5);
+  ASSERT_TRUE(others_);
+  EXPECT_EQ(others_->map, kOldMap);
+  ASSERT_EQ(others_->others.size(), 2u);
+  EXPECT_EQ(others_->others[1].agent_id, 4);
+}
+
 TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
   const MapId map{7, kStart_us};
   const auto pose_at = [this](int64_t utime) {
@@ -204,6 +217,31 @@ TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
     ASSERT_TRUE(pose->in_group) << utime;
     EXPECT_EQ(pose->in_group->group, kOldMap);
   }
+}
+
+TEST(PhoneAgentWithDevicePoses, GivesPosesAndKeyframes) {
+  AgentTexts texts = Texts();
+  texts.device_poses = true;
+  PhoneAgent agent(ReadAgentConfig(texts));
+  auto add = [&agent, utime = int64_t{0}](const std::optional<Rigid3>& T) mutable {
+    agent.AddImage(utime += 100'000, cv::Mat(48, 64, CV_8U, cv::Scalar(0)), T);
+    agent.Poll(kStart_us + utime);
+    return agent.Take();
+  };
+  size_t keyframes = 0;
+  for (int i = 0; i < 20; ++i) {
+    const PhoneEvents events = add(Rigid3{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 1.5}});
+    ASSERT_TRUE(events.pose);
+    EXPECT_EQ(events.pose->state, pose_t::STATE_TRACKING);
+    EXPECT_EQ(events.pose->map, (MapId{7, kStart_us}));
+    EXPECT_NEAR(events.pose->T_odom_body.t.x(), 0.1 * i, 1e-9);
+    keyframes += events.keyframes.size();
+    EXPECT_EQ(events.spool.size(), events.keyframes.size());
+  }
+  EXPECT_GE(keyframes, 5u);
+  EXPECT_EQ(add(std::nullopt).pose->state, pose_t::STATE_LOST);
+  agent.StartAnew();
+  EXPECT_EQ(add(Rigid3{}).pose->map, (MapId{7, kStart_us + 1}));
 }
 
 TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCounted) {

@@ -1,5 +1,6 @@
 // The page's side of the worker: sensors go in, what the agent says comes out.
 
+import type { Pose7 } from "./agent/phone_agent";
 import type { CameraImage } from "./sensors/camera";
 import { packImu } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
@@ -7,7 +8,7 @@ import type { ImuSample } from "./recording/euroc";
 
 const kLongestClose_ms = 3000; // of an agent that answers no more
 
-type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride">;
+type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride"> & { T_odom_body?: Pose7 | null };
 
 export class AgentClient {
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
@@ -26,8 +27,8 @@ export class AgentClient {
   }
 
   // The image's luma is the worker's afterwards.
-  addImage({ utime, luma, width, height, stride }: Image) {
-    this.say({ kind: "image", utime, luma, width, height, stride }, [luma.buffer]);
+  addImage({ utime, luma, width, height, stride, T_odom_body }: Image) {
+    this.say({ kind: "image", utime, luma, width, height, stride, T_odom_body }, [luma.buffer]);
   }
 
   say(message: ToWorker, transfer: Transferable[] = []) {

@@ -23,6 +23,7 @@ import { parseCamera } from "./view/camera_model";
 import { Stage } from "./view/stage";
 import { Walk } from "./walk";
 import type { WalkEvents } from "./walk";
+import { XrOdometry } from "./xr/xr_odometry";
 
 const kNotice_ms = 6000;
 const kTapRadius = 36; // CSS pixels around an anchor
@@ -32,7 +33,7 @@ const options = new URLSearchParams(location.hash.slice(1));
 const people = new People();
 const colourOf = (owner: number) => (owner > 0 ? agentColour(owner) : colours().anchor);
 const picture = byId<HTMLCanvasElement>("picture");
-const stage = new Stage(picture, byId<HTMLCanvasElement>("overlay"), byId("labels"), colourOf);
+const stage = new Stage(picture, byId<HTMLCanvasElement>("overlay"), byId("labels"), (agent) => people.nameOf(agent), colourOf);
 const smallMap = new SmallMap(byId<HTMLCanvasElement>("map"));
 let membership: Membership | undefined = storedMembership();
 let walk: Walk | undefined;
@@ -54,6 +55,7 @@ async function ensureMembership() {
 
 async function startLive() {
   endCalibration(undefined);
+  if (!xrFails && (await hasXr) && (await startXr())) return;
   await askForMotion(); // first: iOS asks within the tap only
   await ensureMembership();
   await walk?.close();
@@ -66,6 +68,38 @@ async function startLive() {
   if (!cameraYaml) return;
   walk = Walk.live(sensor, cameraYaml, membership, stage, events);
   enter();
+}
+
+// The device's own odometry, where there is one.
+const hasXr = options.get("odometry") === "own" ? Promise.resolve(false) : XrOdometry.isSupported();
+let xr: XrOdometry | undefined;
+let xrFails = false;
+
+// False: ours takes its place, for instance where a browser gives no images.
+async function startXr(): Promise<boolean> {
+  try {
+    xr = await XrOdometry.open(stage.overlay.renderer, document.body);
+  } catch (error) {
+    console.info(`WebXR: ${error}`);
+    return false;
+  }
+  const device = xr;
+  device.onEnd = () => {
+    if (!device.hasCamera) xrFails = true;
+    if (xr !== device) return;
+    leave();
+    if (xrFails) notice("AR gives no camera images here. Start again: the page tracks by itself then.");
+  };
+  await ensureMembership();
+  await navigator.wakeLock?.request("screen").catch(() => {});
+  isLive = true;
+  device.onCamera = async (cameraYaml) => {
+    await walk?.close();
+    if (xr !== device) return;
+    walk = Walk.xr(device, cameraYaml, membership, stage, events);
+    enter();
+  };
+  return true;
 }
 
 async function startRecorded(files: Files) {
@@ -129,14 +163,19 @@ function attempt(what: Promise<void>) {
 function enter() {
   imagesBefore = rate_hz = 0;
   byId("welcome").hidden = true;
+  document.documentElement.classList.toggle("xr", xr !== undefined);
   byId("hint").hidden = byId("bar").hidden = false;
-  byId("record").hidden = !isLive || !walk;
+  byId("record").hidden = !isLive || !walk || xr !== undefined; // an image without motion is no recording
 }
 
 function leave() {
   endCalibration(undefined);
   walk?.stop();
+  const device = xr;
+  xr = undefined;
+  device?.stop();
   byId("welcome").hidden = false;
+  document.documentElement.classList.remove("xr");
   byId("hint").hidden = byId("bar").hidden = true;
   stage.clear();
   showWelcome();
@@ -157,14 +196,16 @@ function showWelcome() {
 // --- what is shown
 
 function onPose(pose: AgentPose) {
-  smallMap.draw(pose, walk!.camera.T_body_cam, walk!.anchors, colourOf, membership?.agent ?? 1);
+  const others = walk!.others.in(pose.map, performance.now());
+  smallMap.draw(pose, walk!.camera.T_body_cam, walk!.anchors, others, colourOf, membership?.agent ?? 1);
 }
 
-// Whose maps are one with this one, as far as the agent is told.
+// Whose maps are one with this one, as far as the agent is told: those who are there now first.
 function together(): string[] {
   const { pose, anchors } = walk!;
+  const present = pose ? walk!.others.in(pose.map, performance.now()).map(({ agent }) => agent) : [];
   const owner = pose?.fused && pose.group ? [Number(pose.group.split("/")[0])] : [];
-  const others = new Set([...owner, ...anchors.map((anchor) => anchor.owner)]);
+  const others = new Set([...present, ...owner, ...anchors.map((anchor) => anchor.owner)]);
   others.delete(0);
   others.delete(membership?.agent ?? 0);
   return [...others].map((agent) => people.nameOf(agent));
@@ -300,7 +341,7 @@ document.addEventListener("visibilitychange", () => {
 });
 // Images stand otherwise in the device from now on: another camera, for the odometry.
 screen.orientation?.addEventListener("change", () => {
-  if (!isLive || byId("bar").hidden) return;
+  if (!isLive || xr || byId("bar").hidden) return;
   attempt(startLive());
 });
 

@@ -1,6 +1,6 @@
 // What the page and the worker that holds the agent say to each other. Times are microseconds.
 
-import type { AgentPose, AnchorEdit, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { AgentPose, AnchorEdit, Others, Pose7, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
 import type { ImuSample } from "./recording/euroc";
 
 // Who this phone is at the server; from joining.
@@ -17,12 +17,13 @@ export interface OpenAgent {
   cameraYaml: string;
   imuYaml?: string;
   vioOptionsYaml?: string;
+  devicePoses?: boolean; // images have poses, in place of our odometry
 }
 
 export type ToWorker =
   | OpenAgent
   | { kind: "imu"; samples: Float64Array } // kImuStride values each: utime, gyro xyz, accel xyz
-  | { kind: "image"; utime: number; luma: Uint8Array; width: number; height: number; stride: number }
+  | { kind: "image"; utime: number; luma: Uint8Array; width: number; height: number; stride: number; T_odom_body?: Pose7 | null }
   | { kind: "place"; edit: AnchorEdit }
   | { kind: "remove"; id: string }
   | { kind: "end_map" } // the keyframes of the window are finished; what comes next is a new map
@@ -45,6 +46,7 @@ export type FromWorker =
   | { kind: "taken"; utime: number } // the agent is done with the image
   | { kind: "pose"; pose: AgentPose }
   | { kind: "anchors"; anchors: ShownAnchor[] }
+  | { kind: "others"; told: Others }
   | { kind: "status"; vio?: ProcessStatus; uplink?: ProcessStatus; link?: LinkState }
   | { kind: "placed"; id: string }
   | { kind: "refused"; text: string } // an anchor

@@ -10,11 +10,13 @@ import { Recorder } from "./recording/recorder";
 import { kPhoneImu } from "./sensors/calibration";
 import type { Camera, CameraImage } from "./sensors/camera";
 import { brightnessOf } from "./sensors/luma";
+import { OtherPeople } from "./other_people";
 import { Motion } from "./sensors/motion";
 import { NewestFrame } from "./sensors/newest_frame";
 import { parseCamera } from "./view/camera_model";
 import type { CameraModel } from "./view/camera_model";
 import type { Stage } from "./view/stage";
+import type { XrFrame, XrImage, XrOdometry } from "./xr/xr_odometry";
 
 export interface WalkEvents {
   onPose(pose: AgentPose): void;
@@ -25,6 +27,7 @@ export interface WalkEvents {
 export class Walk {
   pose?: AgentPose;
   anchors: ShownAnchor[] = [];
+  readonly others = new OtherPeople();
   link?: LinkState;
   vio?: ProcessStatus;
   uplink?: ProcessStatus;
@@ -38,13 +41,13 @@ export class Walk {
 
   private constructor(
     readonly camera: CameraModel,
-    private readonly yaml: { camera: string; imu: string },
+    private readonly yaml: { camera: string; imu?: string }, // no IMU: images have the device's poses
     readonly membership: Membership | undefined,
     private readonly stage: Stage,
     private readonly events: WalkEvents,
   ) {
     this.link = membership && "connecting";
-    const open = { kind: "open", membership, cameraYaml: yaml.camera, imuYaml: yaml.imu } as const;
+    const open = { kind: "open", membership, cameraYaml: yaml.camera, imuYaml: yaml.imu, devicePoses: !yaml.imu } as const;
     this.client = new AgentClient(open, (message) => this.take(message));
   }
 
@@ -58,6 +61,17 @@ export class Walk {
       camera.stop();
       motion.stop();
     };
+    return walk;
+  }
+
+  // With the device's own odometry, whose session goes on when it stops.
+  static xr(device: XrOdometry, cameraYaml: string, membership: Membership | undefined, stage: Stage, events: WalkEvents): Walk {
+    const walk = new Walk(parseCamera(cameraYaml, "the device's camera"), { camera: cameraYaml }, membership, stage, events);
+    const images = new NewestFrame<XrImage>((image) => walk.giveToAgent(image), () => {});
+    walk.taken = () => images.done();
+    device.onImage = (image) => images.add(image);
+    device.onFrame = (frame) => walk.showThrough(frame);
+    walk.stopSensors = () => (device.onImage = device.onFrame = undefined);
     return walk;
   }
 
@@ -107,7 +121,7 @@ export class Walk {
   }
 
   startRecording() {
-    this.recorder = new Recorder(`walk_${new Date().toISOString().replace(/[:.]/g, "-")}`, this.yaml.camera, this.yaml.imu);
+    this.recorder = new Recorder(`walk_${new Date().toISOString().replace(/[:.]/g, "-")}`, this.yaml.camera, this.yaml.imu ?? kPhoneImu);
   }
 
   // Keyframes that the server has not acknowledged.
@@ -131,10 +145,18 @@ export class Walk {
     this.client.addImu([sample]);
   }
 
-  private giveToAgent(image: CameraImage | RecordedPicture) {
-    this.brightness = brightnessOf(image);
-    this.stage.keep(image.utime, image.picture);
+  private giveToAgent(image: CameraImage | RecordedPicture | XrImage) {
+    const isLost = "T_odom_body" in image && image.T_odom_body === null;
+    if (!isLost) this.brightness = brightnessOf(image);
+    if ("picture" in image) this.stage.keep(image.utime, image.picture);
     this.client.addImage(image);
+  }
+
+  // What lies over a camera image that the device shows itself: by the pose of this frame, taps by the agent's newest image.
+  private showThrough({ T_odom_body, target }: XrFrame) {
+    if (!this.pose) return;
+    const pose: AgentPose = { ...this.pose, T_odom_body };
+    this.stage.showThrough(this.camera, pose, this.anchors, this.others.in(pose.map, performance.now()), target);
   }
 
   private take(message: FromWorker) {
@@ -148,11 +170,13 @@ export class Walk {
         return this.frames.done();
       case "pose":
         this.pose = message.pose;
-        this.stage.show(this.camera, message.pose, this.anchors);
+        this.stage.show(this.camera, message.pose, this.anchors, this.others.in(message.pose.map, performance.now()));
         return this.events.onPose(message.pose);
       case "anchors":
         this.anchors = message.anchors;
         return;
+      case "others":
+        return this.others.take(message.told, performance.now());
       case "status":
         return this.takeStatus(message);
       case "refused":

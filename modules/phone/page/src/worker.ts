@@ -20,9 +20,12 @@ class AgentHost {
   private stored = Promise.resolve(); // what was given to the spool so far
   private polling?: ReturnType<typeof setInterval>;
 
-  private constructor(private readonly agent: PhoneAgent) {}
+  private constructor(
+    private readonly agent: PhoneAgent,
+    private readonly devicePoses: boolean,
+  ) {}
 
-  static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml }: OpenAgent): Promise<AgentHost> {
+  static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml, devicePoses }: OpenAgent): Promise<AgentHost> {
     const module: { default: WasmModuleFactory } = await import(/* @vite-ignore */ kModule);
     const agent = await PhoneAgent.load(module.default, {
       agent: membership?.agent ?? kAlone,
@@ -30,9 +33,10 @@ class AgentHost {
       cameraYaml,
       imuYaml,
       vioOptionsYaml,
+      devicePoses,
       openedUtime: now_us(),
     });
-    const host = new AgentHost(agent);
+    const host = new AgentHost(agent, devicePoses ?? false);
     if (membership) await host.connect(membership.agent, membership.key);
     host.polling = setInterval(() => host.take(agent.poll(now_us())), kPoll_ms);
     return host;
@@ -77,8 +81,10 @@ class AgentHost {
     }
   }
 
-  private addImage({ utime, luma, width, height, stride }: Extract<ToWorker, { kind: "image" }>) {
-    this.take(this.agent.addImage(utime, luma, width, height, stride));
+  private addImage({ utime, luma, width, height, stride, T_odom_body }: Extract<ToWorker, { kind: "image" }>) {
+    this.take(this.devicePoses
+      ? this.agent.addPosedImage(utime, luma, width, height, stride, T_odom_body ?? null)
+      : this.agent.addImage(utime, luma, width, height, stride));
     say({ kind: "taken", utime });
   }
 
@@ -97,6 +103,7 @@ class AgentHost {
     }
     if (events.pose) say({ kind: "pose", pose: events.pose });
     if (events.anchors) say({ kind: "anchors", anchors: events.anchors });
+    if (events.others) say({ kind: "others", told: events.others });
     if (events.status) say({ kind: "status", ...events.status, link: this.link?.state });
   }
 }

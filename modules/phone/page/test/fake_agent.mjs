@@ -1,7 +1,8 @@
 // In place of pangea_agent.mjs, for the page's own test: an agent that walks along odom's x at the height of 1.5 m, a centimetre
-// an image, and is told of an anchor that somebody else has placed. What it was given is in its status. And a calibration that is none.
+// an image, and is told of an anchor that somebody else has placed, and of where somebody else is. What it was given is in its status. And a calibration that is none.
 
 const kAnchor = [0, 3, 1.5]; // straight ahead at the start
+const kOther = [1, 4, 1.5]; // its camera looks along odom's -y
 const kMap = "1/1700000000000000";
 const half = Math.SQRT1_2;
 
@@ -27,6 +28,13 @@ class FakeAgent {
       T_odom_body: [0.01 * this.numImages, 0, 1.5, half, 0, 0, half], // upright, the camera to odom's y
     };
   }
+  addPosedImage(utime, width, height, T_odom_body) {
+    ++this.numImages;
+    const { image } = this;
+    const mean = (from, step) => Array.from({ length: 16 }, (_, i) => image[from + i * step]).reduce((a, b) => a + b) / 16;
+    this.edges = { top: mean(100, 1), bottom: mean((height - 1) * width + 100, 1), left: mean(100 * width, width), right: mean(101 * width - 1, width) };
+    this.pose = { utime, state: T_odom_body ? "tracking" : "lost", reason: "", map: kMap, fused: false, numTracked: 120, T_odom_body: T_odom_body ?? [0, 0, 0, 0, 0, 0, 1] };
+  }
   onLinkDown() {}
   restore() {}
   placeAnchor(edit) {
@@ -43,12 +51,13 @@ class FakeAgent {
     const { pose } = this;
     this.pose = undefined;
     const counters = { images: this.numImages, imu: this.numImu, maps: this.numMaps };
-    const told = { imu: this.imu, edits: this.edits, cameraYaml: this.config.cameraYaml, range: rangeOf(this.image) };
+    const told = { imu: this.imu, edits: this.edits, cameraYaml: this.config.cameraYaml, edges: this.edges, range: rangeOf(this.image) };
     return {
       linkUp: [], spool: [], keyframes: [], pose,
       anchors: pose && [{
         id: "2/1", name: "kettle", payload: "", owner: 2, sigma_m: 0.01, revision: 1, T_odom_anchor: [...kAnchor, 0, 0, 0, 1],
       }],
+      others: pose && { map: kMap, others: [{ agent: 3, T_odom_cam: [...kOther, 0, half, half, 0] }] },
       status: pose && { vio: { text: JSON.stringify(told), counters } },
     };
   }

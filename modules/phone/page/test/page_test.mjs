@@ -6,12 +6,14 @@ import { readFile } from "node:fs/promises";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { unzipSync, zipSync } from "fflate";
+import { PNG } from "pngjs";
 import { WebSocketServer } from "ws";
 import { becomes, check, launch, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
+import { installFakeXr, projectionOf } from "./fake_xr.mjs";
 
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
-const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }] };
+const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }, { agent: 3, name: "Ben", connected: true }] };
 
 // Refuses the first upload, keeps the second.
 const uploads = [];
@@ -129,8 +131,8 @@ async function testUncalibrated(browser, url, zip) {
 
 async function testAnchor(page) {
   await becomes(page, "somebody else's anchor is named", () =>
-    /^kettle · 3\.\d m$/.test(document.querySelector("#labels span")?.textContent));
-  await becomes(page, "the hint says who", () => document.getElementById("hint").textContent.startsWith("In one map with Anna"));
+    [...document.querySelectorAll("#labels span")].some(({ textContent }) => /^kettle · 3\.\d m$/.test(textContent)));
+  await becomes(page, "the hint says who", () => document.getElementById("hint").textContent.startsWith("In one map with Ben and Anna"));
   const [drawn, expected] = await page.evaluate(() => {
     const { walk, stage } = pangea;
     const { utime, anchors } = stage.drawn;
@@ -139,6 +141,7 @@ async function testAnchor(page) {
   });
   const error = Math.hypot(drawn[0] - expected[0], drawn[1] - expected[1]);
   check("it is where it belongs in the image", error < 2, `${error.toFixed(2)} px`);
+  await testOther(page);
   await page.mouse.click(90, 300);
   await page.locator("#anchor_name").fill("tap");
   await screenshot(page, "place");
@@ -148,6 +151,27 @@ async function testAnchor(page) {
   // 360 x 720 shows the middle of 640 x 480, 1.5 times as large.
   const [u, v] = [(90 + 300) / 1.5 - 0.5, 300 / 1.5 - 0.5];
   check("at the pixel that was tapped", edit.name === "tap" && Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
+}
+
+// Somebody else's camera: at (1, 4, 1.5) in odom, the agent walks along x.
+async function testOther(page) {
+  await becomes(page, "somebody else is named", () =>
+    /^Ben · \d\.\d m$/.test(document.querySelector("#labels .person")?.textContent));
+  const [drawn, expected] = await page.evaluate(() => {
+    const { walk, stage } = pangea;
+    const [fx, , cx, cy] = walk.camera.intrinsics;
+    return [stage.drawn.others[0].pixel, [cx + (fx * (1 - walk.pose.T_odom_body[0])) / 4, cy]];
+  });
+  const error = Math.hypot(drawn[0] - expected[0], drawn[1] - expected[1]);
+  check("and where it belongs in the image", error < 2, `${error.toFixed(2)} px`);
+  const { colour, x, y } = await page.evaluate((pixel) => {
+    const [x, y] = pangea.stage.screenOf(pangea.walk.camera, pixel);
+    return { colour: getComputedStyle(document.querySelector("#labels .person")).borderLeftColor, x, y };
+  }, drawn);
+  const { data } = PNG.sync.read(await page.screenshot({ clip: { x: x - 40, y: y - 40, width: 80, height: 45 } }));
+  const [r, g, b] = colour.match(/\d+/g).map(Number);
+  const edges = [...Array(data.length / 4).keys()].filter((i) => Math.hypot(data[4 * i] - r, data[4 * i + 1] - g, data[4 * i + 2] - b) < 40);
+  check("as a frustum", edges.length > 50, `${edges.length} pixels of ${colour}`);
 }
 
 async function testRecording(page) {
@@ -196,6 +220,48 @@ async function testPlaying(browser, url, zip) {
   await page.close();
 }
 
+// A device with an odometry of its own looks along odom's y from 1.5 m, at an image that is dark below and darker on the right.
+async function testXr(browser, url) {
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
+  await page.evaluate((projection) => {
+    const picture = new OffscreenCanvas(1440, 1920);
+    const context = picture.getContext("2d");
+    for (const [grey, x, y] of [[200, 0, 0], [150, 720, 0], [100, 0, 960], [50, 720, 960]]) {
+      context.fillStyle = `rgb(${grey} ${grey} ${grey})`;
+      context.fillRect(x, y, 720, 960);
+    }
+    const lens = { picture, width: 1440, height: 1920, projection };
+    const half = Math.SQRT1_2;
+    window.xrSource = () => ({ ...lens, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
+  }, projectionOf({ width: 1440, height: 1920, focal: 1500 }));
+  await page.locator("#start").click();
+  await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5);
+  const { cameraYaml, edges } = await told(page);
+  check("its camera too, smaller", /resolution: \[480, 640\]/.test(cameraYaml) && /intrinsics: \[500\.000, 500\.000, 239\.500, 319\.500\]/.test(cameraYaml));
+  const expected = { top: 200, bottom: 100, left: 200, right: 150 };
+  check("the image is upright and exact", Object.entries(expected).every(([side, grey]) => Math.abs(edges[side] - grey) <= 1), JSON.stringify(edges));
+  const [T, pixel, other] = await page.evaluate(() => [pangea.walk.pose.T_odom_body, pangea.stage.drawn.anchors[0].pixel, pangea.stage.drawn.others[0].pixel]);
+  check("with its pose, z up", Math.hypot(T[0], T[1], T[2] - 1.5) < 1e-6, String(T));
+  check("an anchor and somebody else are where they belong", Math.hypot(pixel[0] - 239.5, pixel[1] - 319.5) < 0.1 && Math.hypot(other[0] - 364.5, other[1] - 319.5) < 0.1, `${pixel}, ${other}`);
+  check("nothing is recorded without motion", !(await page.locator("#record").isVisible()));
+  await screenshot(page, "webxr");
+  await page.evaluate(() => (window.xrLost = true));
+  await becomes(page, "the hint says when the device is lost", () => /^Lost/.test(document.getElementById("hint").textContent));
+  await page.evaluate(() => (window.xrLost = false));
+  await becomes(page, "and goes on when it is not", () => pangea.walk.pose.state === "tracking");
+  await page.locator("#stop").click();
+  check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
+  await page.close();
+}
+
+async function testXrRefused(browser, url) {
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33, refusedFeature: "camera-access" }));
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await becomes(page, "WebXR without camera images: the page's own odometry", () => Boolean(pangea.calibration));
+  await page.close();
+}
+
 async function testRefusals(browser, url) {
   const page = await openPage(browser, `${url}#join=ABCD-EFGH`);
   check("the code of the link is there", (await page.locator("#code").inputValue()) === "ABCD-EFGH");
@@ -211,6 +277,8 @@ await run(async () => {
   await testUpload(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);
+  await testXr(browser, url);
+  await testXrRefused(browser, url);
   await testRefusals(browser, url);
   await browser.close();
 });

@@ -1,6 +1,6 @@
 // Where a rendered recording's things really are: exact poses of the body, and exact tracks of the scene's points.
 
-import { readFileSync } from "node:fs";
+import { readdirSync, readFileSync } from "node:fs";
 import { Matrix3, Matrix4, Quaternion, Vector3 } from "three";
 import { parseCamera, project } from "../src/view/camera_model";
 
@@ -16,6 +16,16 @@ export class Truth {
       return { utime: utimeOf(stamp), p: new Vector3(x, y, z), q: new Quaternion(qx, qy, qz, qw) };
     });
     this.recording = recording;
+  }
+
+  // The stamps of the images.
+  images() {
+    return readdirSync(`${this.recording}/mav0/cam0/data`).filter((name) => name.endsWith(".png")).sort().map((name) => utimeOf(name.slice(0, -4)));
+  }
+
+  // Where the lens has a point of the camera frame.
+  project(p_cam) {
+    return project(this.camera, p_cam);
   }
 
   // T_world_cam at a time, between the two poses around it.

@@ -1,11 +1,12 @@
 // Two pages that play rendered phones, by invite, over TLS, at a real server with its gateway, beside an agent that is a program:
-// they fuse; page 1 places an anchor on something of the scene; page 2 shows it where that is in its own images. Page 2 has to
-// calibrate its camera first.
+// they fuse; page 1 places an anchor on something of the scene; page 2 shows it where that is in its own images, and each page shows
+// the other. Page 2 has to calibrate its camera first.
 
 import { cpSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
+import { checkOther, noteOthers } from "./others_truth.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
 
@@ -26,6 +27,7 @@ async function joined(browser, server, name, folder) {
   await page.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 300_000 });
   check(`${name} has joined, and the link is open`, true);
   await noteDrawn(page);
+  await noteOthers(page);
   return page;
 }
 
@@ -48,5 +50,9 @@ await run(async () => {
   await Promise.all([atEnd(anna), atEnd(ben)]);
   await checkFused([anna, ben]);
   await checkShown(ben, second, target);
+  const agentOf = (page) => page.evaluate(() => pangea.walk.membership.agent);
+  const both = [{ page: anna, truth: first, agent: await agentOf(anna) }, { page: ben, truth: second, agent: await agentOf(ben) }];
+  await checkOther(both[0], both[1]);
+  await checkOther(both[1], both[0]);
   await browser.close();
 });

@@ -46,7 +46,8 @@ export const launch = (more = []) =>
 
 const consoleErrors = [];
 
-export async function openPage(browser, url, context = {}) {
+// `prepare`: done with the page before it is loaded.
+export async function openPage(browser, url, context = {}, prepare = async () => {}) {
   const page = await (
     await browser.newContext({ viewport: { width: 1280, height: 800 }, ...context })
   ).newPage();
@@ -54,6 +55,7 @@ export async function openPage(browser, url, context = {}) {
     if (["error", "warning"].includes(message.type())) consoleErrors.push(message.text());
   });
   page.on("pageerror", (error) => consoleErrors.push(String(error)));
+  await prepare(page);
   await page.goto(url);
   return page;
 }

@@ -22,6 +22,8 @@ export interface AgentConfig {
   /** What `pangea-vio --options` and `pangea-uplink --options` take. */
   vioOptionsYaml?: string;
   uplinkOptionsYaml?: string;
+  /** Images come with poses of the device's own odometry (addPosedImage), in place of ours. */
+  devicePoses?: boolean;
   /** Wall clock, µs since 1970: names the map, so no two runs of an agent may have the same. */
   openedUtime: number;
 }
@@ -39,7 +41,7 @@ export interface AgentPose {
   T_map_body?: Pose7;
   /** The map whose odom frame is the map frame: the oldest of those that are fused. */
   group?: string;
-  /** The server has fused this map into an older one. Of the oldest map of a group an agent is not told that others joined it. */
+  /** The server has fused this map into an older one. Of the oldest map of a group an agent is not told that others joined it; `others` says so. */
   fused: boolean;
   /** Features tracked in this image. */
   numTracked: number;
@@ -65,6 +67,18 @@ export interface ShownAnchor {
   revision: number;
 }
 
+export interface OtherAgent {
+  agent: number;
+  /** Its camera, in the odom frame of `Others.map`. */
+  T_odom_cam: Pose7;
+}
+
+/** All other agents of the group that track now, at most 16. */
+export interface Others {
+  map: string;
+  others: OtherAgent[];
+}
+
 export interface SpoolChange {
   op: 'put' | 'delete';
   id: string;
@@ -82,6 +96,8 @@ export interface AgentEvents {
   status?: { vio?: ProcessStatus; uplink?: ProcessStatus };
   /** All that are shown; absent when nothing changed. Twenty times a second while one moves, else once a second. */
   anchors?: ShownAnchor[];
+  /** Five times a second while there are any; absent in between. Who is not among them for two seconds is away. */
+  others?: Others;
   /** Keyframes to keep until they are acknowledged, in this order. */
   spool: SpoolChange[];
   /** Finished keyframes, encoded keyframe_2_t, for --out-keyframes and tests. */
@@ -106,6 +122,7 @@ interface NativeAgent {
   imageBuffer(bytes: number): Uint8Array;
   addImu(utime: number, gx: number, gy: number, gz: number, ax: number, ay: number, az: number): void;
   addImage(utime: number, width: number, height: number): void;
+  addPosedImage(utime: number, width: number, height: number, T_odom_body: Pose7 | null): void;
   onLinkDown(packet: Uint8Array): void;
   restore(id: string, bytes: Uint8Array): void;
   placeAnchor(edit: AnchorEdit): string;
@@ -163,6 +180,13 @@ export class PhoneAgent {
     const buffer = this.native.imageBuffer(width * height);
     packRows(luma, width, height, stride, buffer);
     this.native.addImage(utime, width, height);
+    return this.native.take();
+  }
+
+  /** With `devicePoses`: with the pose that the device has for it, z up; without one it is lost. */
+  addPosedImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number, T_odom_body: Pose7 | null): AgentEvents {
+    packRows(luma, width, height, stride, this.native.imageBuffer(width * height));
+    this.native.addPosedImage(utime, width, height, T_odom_body);
     return this.native.take();
   }
 

@@ -1,12 +1,14 @@
-// The way that was walked, from above, with the anchors: in the odom frame, so that nothing jumps.
+// The way that was walked, from above, with the anchors and the others: in the odom frame, so that nothing jumps.
 
 import { Matrix4, Vector3 } from "three";
-import type { AgentPose, ShownAnchor } from "../agent/phone_agent";
+import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
 import { matrixOf } from "../view/poses";
 
 const kStep_m = 0.1; // of the way, between points that are kept
 const kMaxPoints = 3000;
 const kSmallest_m = 4; // across
+const kSelf = 22; // size, pixels of the canvas
+const kOther = 16;
 
 export class SmallMap {
   private way: { x: number; y: number }[] = [];
@@ -15,9 +17,12 @@ export class SmallMap {
   constructor(private readonly canvas: HTMLCanvasElement) {}
 
   // `T_body_cam` tells where the camera looks.
-  draw(pose: AgentPose, T_body_cam: Matrix4, anchors: ShownAnchor[], colourOf: (owner: number) => string, self: number) {
+  draw(
+    pose: AgentPose, T_body_cam: Matrix4, anchors: ShownAnchor[], others: OtherAgent[], colourOf: (owner: number) => string, self: number,
+  ) {
     this.add(pose);
-    const points = [...this.way, ...anchors.map(({ T_odom_anchor: [x, y] }) => ({ x, y }))];
+    const things = [...anchors.map(({ T_odom_anchor }) => T_odom_anchor), ...others.map(({ T_odom_cam }) => T_odom_cam)];
+    const points = [...this.way, ...things.map(([x, y]) => ({ x, y }))];
     const place = this.placing(points);
     const context = this.canvas.getContext("2d")!;
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
@@ -27,7 +32,11 @@ export class SmallMap {
     context.beginPath();
     for (const p of this.way) context.lineTo(...place(p));
     context.stroke();
-    this.drawSelf(context, pose, T_body_cam, place);
+    drawCamera(context, matrixOf(pose.T_odom_body).multiply(T_body_cam), place, kSelf);
+    for (const { agent, T_odom_cam } of others) {
+      context.fillStyle = colourOf(agent);
+      drawCamera(context, matrixOf(T_odom_cam), place, kOther);
+    }
     for (const { owner, T_odom_anchor: [x, y] } of anchors) {
       const [u, v] = place({ x, y });
       context.fillStyle = colourOf(owner);
@@ -54,18 +63,18 @@ export class SmallMap {
       this.canvas.height / 2 - scale * (y - (south + north) / 2),
     ];
   }
+}
 
-  private drawSelf(
-    context: CanvasRenderingContext2D, pose: AgentPose, T_body_cam: Matrix4,
-    place: (p: { x: number; y: number }) => [number, number],
-  ) {
-    const T_odom_cam = matrixOf(pose.T_odom_body).multiply(T_body_cam);
-    const ahead = new Vector3(0, 0, 1).transformDirection(T_odom_cam);
-    const heading = Math.atan2(-ahead.y, ahead.x);
-    const [u, v] = place({ x: pose.T_odom_body[0], y: pose.T_odom_body[1] });
-    context.beginPath();
-    context.moveTo(u, v);
-    context.arc(u, v, 22, heading - 0.45, heading + 0.45);
-    context.fill();
-  }
+// Where somebody is, and looks.
+function drawCamera(
+  context: CanvasRenderingContext2D, T_odom_cam: Matrix4, place: (p: { x: number; y: number }) => [number, number], radius: number,
+) {
+  const { x, y } = new Vector3().setFromMatrixPosition(T_odom_cam);
+  const ahead = new Vector3(0, 0, 1).transformDirection(T_odom_cam);
+  const heading = Math.atan2(-ahead.y, ahead.x);
+  const [u, v] = place({ x, y });
+  context.beginPath();
+  context.moveTo(u, v);
+  context.arc(u, v, radius, heading - 0.45, heading + 0.45);
+  context.fill();
 }

@@ -1,46 +1,59 @@
-// Anchors over the camera image. Every corner goes through the camera's own lens model, so that what is drawn lies where the
-// image has it; three.js draws what comes out in pixels of the screen, nearer things in front.
+// Anchors and other people's cameras over the camera image. Every corner goes through the camera's own lens model, so that what is
+// drawn lies where the image has it; three.js draws what comes out in pixels of the screen, nearer things in front.
 
 import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Matrix4, Mesh, MeshBasicMaterial, OrthographicCamera, Scene, Vector3,
   WebGLRenderer,
 } from "three";
-import type { AgentPose, ShownAnchor } from "../agent/phone_agent";
+import type { WebGLRenderTarget } from "three";
+import type { AgentPose, Pose7 } from "../agent/phone_agent";
 import { kAnchorFaces } from "./anchor_shape";
 import { project } from "./camera_model";
 import type { CameraModel } from "./camera_model";
 import type { Fit, Size } from "./fit";
+import { kFrustumEdges } from "./frustum";
 import { matrixOf } from "./poses";
 
 const kFar_m = 200;
-const kMaxAnchors = 200; // the nearest
+const kMaxThings = 200; // the nearest
+const kEdge_px = 3;
+const kVertices = Math.max(3 * kAnchorFaces.length, 6 * kFrustumEdges.length);
 
-export interface DrawnAnchor {
-  id: string;
+export interface Thing {
+  name: string;
+  owner: number;
+  T_odom_thing: Pose7;
+  id?: string; // of an anchor; without it, it is a person's camera
+}
+
+export interface DrawnThing {
+  id?: string;
   name: string;
   owner: number;
   pixel: [number, number]; // of the image
   distance_m: number;
 }
 
-interface Seen extends DrawnAnchor {
-  T_cam_anchor: Matrix4;
+interface Seen extends DrawnThing {
+  T_cam_thing: Matrix4;
 }
 
-// Anchors whose foot is before the camera, nearest first; off the image too.
-export function anchorsBefore(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[]): Seen[] {
+// Things whose origin is before the camera, nearest first; off the image too.
+export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing[]): Seen[] {
   const T_cam_odom = matrixOf(pose.T_odom_body).multiply(camera.T_body_cam).invert();
-  const seen = anchors.flatMap(({ id, name, owner, T_odom_anchor }) => {
-    const T_cam_anchor = T_cam_odom.clone().multiply(matrixOf(T_odom_anchor));
-    const p_cam = new Vector3().setFromMatrixPosition(T_cam_anchor);
+  const seen = things.flatMap(({ T_odom_thing, ...thing }) => {
+    const T_cam_thing = T_cam_odom.clone().multiply(matrixOf(T_odom_thing));
+    const p_cam = new Vector3().setFromMatrixPosition(T_cam_thing);
     const pixel = project(camera, p_cam);
-    return pixel ? [{ id, name, owner, pixel, distance_m: p_cam.length(), T_cam_anchor }] : [];
+    return pixel ? [{ ...thing, pixel, distance_m: p_cam.length(), T_cam_thing }] : [];
   });
-  return seen.sort((a, b) => a.distance_m - b.distance_m).slice(0, kMaxAnchors);
+  return seen.sort((a, b) => a.distance_m - b.distance_m).slice(0, kMaxThings);
 }
+
+type Point = [number, number, number]; // pixels of the screen, and depth
 
 export class Overlay {
-  private readonly renderer: WebGLRenderer;
+  readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera = new OrthographicCamera();
   private readonly geometry = new BufferGeometry();
@@ -66,15 +79,26 @@ export class Overlay {
     this.camera.updateProjectionMatrix();
   }
 
-  draw(camera: CameraModel, fit: Fit, seen: Seen[], colourOf: (owner: number) => string) {
+  // Into the canvas, or into `target`, which is empty before.
+  draw(camera: CameraModel, fit: Fit, seen: Seen[], colourOf: (owner: number) => string, target?: WebGLRenderTarget) {
     if (seen.length === 0) return this.clear();
     this.isClear = false;
     let n = 0;
-    for (const { T_cam_anchor, owner } of seen) n = this.addAnchor(camera, fit, T_cam_anchor, new Color(colourOf(owner)), n);
+    for (const thing of seen) {
+      const toScreen = (corner: Vector3): Point | undefined => {
+        const p_cam = corner.clone().applyMatrix4(thing.T_cam_thing);
+        const pixel = project(camera, p_cam);
+        return pixel && [...fit.toScreen(pixel), -p_cam.z];
+      };
+      const colour = new Color(colourOf(thing.owner));
+      n = thing.id === undefined ? this.addFrustum(toScreen, colour, n) : this.addAnchor(toScreen, colour, n);
+    }
     this.geometry.setDrawRange(0, n);
     this.positions.needsUpdate = this.colours.needsUpdate = true;
+    this.renderer.setRenderTarget(target ?? null);
     this.renderer.render(this.scene, this.camera);
-    this.label(seen, fit);
+    this.renderer.setRenderTarget(null);
+    this.label(seen, fit, colourOf);
   }
 
   clear() {
@@ -85,23 +109,34 @@ export class Overlay {
     for (const label of this.labels) label.hidden = true;
   }
 
-  private addAnchor(camera: CameraModel, fit: Fit, T_cam_anchor: Matrix4, colour: Color, n: number): number {
+  private addAnchor(toScreen: (corner: Vector3) => Point | undefined, colour: Color, n: number): number {
     for (const { corners, brightness } of kAnchorFaces) {
-      const points = corners.map((corner) => {
-        const p_cam = corner.clone().applyMatrix4(T_cam_anchor);
-        const pixel = project(camera, p_cam);
-        return pixel && [...fit.toScreen(pixel), -p_cam.z];
-      });
+      const points = corners.map(toScreen);
       if (!points.every((point) => point !== undefined)) continue; // partly behind the camera
-      for (const [x, y, z] of points) {
-        this.positions.setXYZ(n, x, y, z);
-        this.colours.setXYZ(n++, brightness * colour.r, brightness * colour.g, brightness * colour.b);
-      }
+      for (const point of points) this.addVertex(n++, point, colour, brightness);
     }
     return n;
   }
 
-  private label(seen: DrawnAnchor[], fit: Fit) {
+  // Lines as thin rectangles: those of a graphics card are one pixel wide.
+  private addFrustum(toScreen: (corner: Vector3) => Point | undefined, colour: Color, n: number): number {
+    for (const edge of kFrustumEdges) {
+      const [a, b] = edge.map(toScreen);
+      if (!a || !b) continue;
+      const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+      const [x, y] = [(-kEdge_px * (b[1] - a[1])) / length / 2, (kEdge_px * (b[0] - a[0])) / length / 2];
+      const at = ([u, v, depth]: Point, side: number): Point => [u + side * x, v + side * y, depth];
+      for (const point of [at(a, 1), at(b, 1), at(b, -1), at(b, -1), at(a, -1), at(a, 1)]) this.addVertex(n++, point, colour, 1);
+    }
+    return n;
+  }
+
+  private addVertex(n: number, point: Point, colour: Color, brightness: number) {
+    this.positions.setXYZ(n, ...point);
+    this.colours.setXYZ(n, brightness * colour.r, brightness * colour.g, brightness * colour.b);
+  }
+
+  private label(seen: DrawnThing[], fit: Fit, colourOf: (owner: number) => string) {
     while (this.labels.length < seen.length) {
       const label = document.createElement("span");
       this.labels.push(label);
@@ -110,15 +145,17 @@ export class Overlay {
     this.labels.forEach((label, i) => {
       label.hidden = i >= seen.length;
       if (label.hidden) return;
-      const { name, pixel, distance_m } = seen[i];
+      const { id, name, owner, pixel, distance_m } = seen[i];
       const [x, y] = fit.toScreen(pixel);
       label.textContent = `${name} · ${distance_m.toFixed(1)} m`;
+      label.className = id === undefined ? "person" : "";
+      label.style.setProperty("--owner", colourOf(owner));
       label.style.transform = `translate(-50%, 6px) translate(${x}px, ${y}px)`;
     });
   }
 
   private attribute(name: string): BufferAttribute {
-    const attribute = new BufferAttribute(new Float32Array(kMaxAnchors * kAnchorFaces.length * 9), 3);
+    const attribute = new BufferAttribute(new Float32Array(kMaxThings * kVertices * 3), 3);
     attribute.setUsage(DynamicDrawUsage);
     this.geometry.setAttribute(name, attribute);
     return attribute;

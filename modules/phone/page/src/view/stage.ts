@@ -1,28 +1,31 @@
 // The camera image over the whole screen, with what belongs onto it. An image is shown when its pose is known, so that anchors
 // stand still in it: a tenth of a second late at most, and nobody looks past the phone to notice.
 
-import type { AgentPose, ShownAnchor } from "../agent/phone_agent";
+import type { WebGLRenderTarget } from "three";
+import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
 import type { CameraModel } from "./camera_model";
 import { Fit } from "./fit";
-import { anchorsBefore, Overlay } from "./overlay";
-import type { DrawnAnchor } from "./overlay";
+import { Overlay, thingsBefore } from "./overlay";
+import type { DrawnThing } from "./overlay";
 
 const kMaxWaiting = 4; // pictures whose pose has not come
 
 export interface Drawn {
   utime: number; // of the image that is shown
-  anchors: DrawnAnchor[];
+  anchors: (DrawnThing & { id: string })[];
+  others: DrawnThing[]; // people
 }
 
 export class Stage {
   drawn?: Drawn;
   private readonly waiting = new Map<number, ImageBitmap>();
-  private readonly overlay: Overlay;
+  readonly overlay: Overlay;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
     overlayCanvas: HTMLCanvasElement,
     labels: HTMLElement,
+    private readonly nameOf: (agent: number) => string,
     private readonly colourOf: (owner: number) => string,
   ) {
     this.overlay = new Overlay(overlayCanvas, labels);
@@ -38,11 +41,28 @@ export class Stage {
   }
 
   // Shows the picture of the pose. Nothing when it is not there any more.
-  show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[]) {
-    const seen = pose.state === "tracking" ? anchorsBefore(camera, pose, anchors) : [];
-    if (!this.present(pose.utime)) return;
-    this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf);
-    this.drawn = { utime: pose.utime, anchors: seen.map(({ T_cam_anchor: _, ...drawn }) => drawn) };
+  show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[]) {
+    if (this.present(pose.utime)) this.draw(camera, pose, anchors, others);
+  }
+
+  // The device shows its camera's image by itself; what lies over it goes into `target`.
+  showThrough(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target: WebGLRenderTarget) {
+    this.draw(camera, pose, anchors, others, target);
+  }
+
+  private draw(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target?: WebGLRenderTarget) {
+    const things = [
+      ...anchors.map(({ id, name, owner, T_odom_anchor }) => ({ id, name, owner, T_odom_thing: T_odom_anchor })),
+      ...others.map(({ agent, T_odom_cam }) => ({ name: this.nameOf(agent), owner: agent, T_odom_thing: T_odom_cam })),
+    ];
+    const seen = pose.state === "tracking" ? thingsBefore(camera, pose, things) : [];
+    this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf, target);
+    const drawn = seen.map(({ T_cam_thing: _, ...thing }) => thing);
+    this.drawn = {
+      utime: pose.utime,
+      anchors: drawn.flatMap((thing) => (thing.id === undefined ? [] : [{ ...thing, id: thing.id }])),
+      others: drawn.filter(({ id }) => id === undefined),
+    };
   }
 
   // A picture whose pose nobody knows.

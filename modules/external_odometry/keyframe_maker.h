@@ -17,7 +17,7 @@
 #include "vio/front_end/describer.h"
 #include "vio/front_end/tracker.h"
 
-namespace pangea::example {
+namespace pangea {
 
 struct KeyframeMakerOptions {
   // A keyframe after so much motion, or so long.
@@ -40,6 +40,8 @@ class KeyframeMaker {
   // `T_odom_body`: body is the IMU (or any frame that `camera.T_body_cam` refers to); odom's z
   // points up. In time order. A keyframe when it is time for one.
   std::optional<Keyframe> Add(int64_t utime, const cv::Mat& image, const Rigid3& T_odom_body);
+  // Features in the newest image.
+  int num_tracked() const { return static_cast<int>(observations_.size()); }
 
  private:
   struct Observation {
@@ -64,4 +66,4 @@ class KeyframeMaker {
   std::map<int32_t, std::deque<Observation>> observations_;  // by landmark
 };
 
-}  // namespace pangea::example
+}  // namespace pangea

@@ -1,8 +1,8 @@
-#include "keyframe_maker.h"
+#include "external_odometry/keyframe_maker.h"
 
 #include <cmath>
 
-namespace pangea::example {
+namespace pangea {
 namespace {
 
 constexpr size_t kMaxObservations = 60;
@@ -138,4 +138,4 @@ std::optional<MapPoint> KeyframeMaker::Triangulate(int corner, const Corner& of,
                   static_cast<float>(deviation * deviation)};
 }
 
-}  // namespace pangea::example
+}  // namespace pangea
