@@ -290,8 +290,9 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
       now_utime, pending,
       fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}{}", connected,
                   archive_.num_keyframes(),
-                  archive_.MayAnswer() ? "" : "; NO AGENT IS ANSWERED: no bridge to NATS says that "
-                                              "the journal is replicated",
+                  archive_.MayAnswer() ? ""
+                                       : "; NO AGENT IS ANSWERED: no bridge to NATS says that "
+                                         "the journal is replicated",
                   agents_.empty() ? "; the folder of keys is empty: nobody can join" : "",
                   archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", archive_.Damage(),
                   OtherSoftware(), OtherKeys()));

@@ -144,7 +144,8 @@ void TestServer::Add(int candidates) {
   }
   keyframes_.push_back(ToMessage(TestKeyframe(match.query)));
   matches_.push_back(ToMessage(match));
-  journal_file_->Append(1'700'000'000'000'000 + seq, "KEYFRAME_1", EncodeMessage(keyframes_.back()));
+  journal_file_->Append(1'700'000'000'000'000 + seq, "KEYFRAME_1",
+                        EncodeMessage(keyframes_.back()));
   SayJournalFile();
   node_->Publish("KEYFRAME_1", keyframes_.back());
   node_->Publish("PLACE_MATCH", matches_.back());
@@ -192,9 +193,7 @@ void TestServer::Round(int64_t now_utime) {
 }
 
 TestWorker::TestWorker(const NatsAccess& access)
-    : node_(bus_, "fusion"),
-      streams_(access, kSite),
-      bridge_(bus_, streams_, kMaxMatches) {
+    : node_(bus_, "fusion"), streams_(access, kSite), bridge_(bus_, streams_, kMaxMatches) {
   node_.Subscribe<KeyframeMessage>(
       "KEYFRAME_1",
       [this](const std::string&, const KeyframeMessage& m) { keyframes_.insert(m.id.seq); });

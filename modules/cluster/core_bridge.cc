@@ -52,7 +52,7 @@ void CoreBridge::OnJournalFile(const JournalFile& file) {
 void CoreBridge::ShipJournal() {
   shipper_.Ship();
   const auto shipped = shipper_.shipped();
-  if (!shipped || shipped->path.empty() || !lease_.fresh(now_utime_)) {
+  if (!shipped || !lease_.fresh(now_utime_)) {
     return;
   }
   if (shipped->state.num_bytes != told_bytes_ || now_utime_ >= next_told_utime_) {

@@ -35,7 +35,8 @@ std::optional<bool> JournalCopy::HasNext(const SiteStreams::JournalEvent& event)
       return false;
     }
     const bool of_file = IsOfFile(*piece);
-    if (!of_file && (piece->channel != event.channel || !std::ranges::equal(piece->data, event.data))) {
+    if (!of_file &&
+        (piece->channel != event.channel || !std::ranges::equal(piece->data, event.data))) {
       return false;
     }
     at_.file = {piece->end(), piece->offset, EventChecksum(piece->whole)};

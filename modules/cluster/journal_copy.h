@@ -3,8 +3,8 @@
 // A standby's journal: a file that follows the site's stream. What it has already is compared with
 // the stream, event by event; where it has another event (this host was the core, and wrote what it
 // told nobody was kept), its end is cut off, kept beside it (log_file/damaged_copy.h), and the
-// stream's events take its place. A file that goes on where the stream ends stays as it is. One that
-// differs from its first event on is another site's and is refused. One thread.
+// stream's events take its place. A file that goes on where the stream ends stays as it is. One
+// that differs from its first event on is another site's and is refused. One thread.
 
 #include <cstdint>
 #include <filesystem>

@@ -113,8 +113,8 @@ bool JournalShipper::ShipEvent(const LogPiece& event) {
       return false;
     }
     if (next && (next->channel != event.channel || !std::ranges::equal(next->data, event.data))) {
-      throw std::runtime_error(fmt::format("{}: its event at {} is not the one in NATS",
-                                           shipped_.path, event.offset));
+      throw std::runtime_error(
+          fmt::format("{}: its event at {} is not the one in NATS", shipped_.path, event.offset));
     }
     if (next) {
       ++sequence_;
@@ -151,6 +151,9 @@ void JournalShipper::PassTerms() {
 }
 
 void JournalShipper::Ship() {
+  if (shipped_.path.empty()) {
+    return;  // nobody has said which
+  }
   JournalState& at = shipped_.state;
   if (at.num_bytes >= wanted_bytes_) {
     return PassTerms();

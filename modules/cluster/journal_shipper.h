@@ -2,9 +2,9 @@
 
 // A core's journal into the site's stream, event by event in the file's order, each stored only if
 // the stream's newest is the one stored before it. A core begins by storing its term there
-// (site_lease.h): from then on whoever had the lease before can store nothing, whatever it believes.
-// So the stream has one writer at a time, and is what the site has: the file is a copy of it, and
-// may be ahead of it by what nobody was told is kept.
+// (site_lease.h): from then on whoever had the lease before can store nothing, whatever it
+// believes. So the stream has one writer at a time, and is what the site has: the file is a copy of
+// it, and may be ahead of it by what nobody was told is kept.
 //
 // Events of the file's own (CHECKSUMS, DAMAGED) do not go. One thread.
 
@@ -58,7 +58,7 @@ class JournalShipper {
   // So much of the file is in the stream; nothing: it is not known whether the file has all that
   // was there before the term.
   std::optional<JournalFile> shipped() const {
-    return sequence_ >= begin_ ? std::optional(shipped_) : std::nullopt;
+    return sequence_ >= begin_ && !shipped_.path.empty() ? std::optional(shipped_) : std::nullopt;
   }
   int64_t bytes_to_ship() const { return wanted_bytes_ - shipped_.state.num_bytes; }
   int64_t num_too_large() const { return num_too_large_; }

@@ -26,16 +26,19 @@ int main(int argc, char** argv) {
   app.add_option("--nats", arguments.nats.url,
                  "URL of nats-server, with JetStream; of a cluster several, with commas between")
       ->capture_default_str();
-  app.add_option("--ca", arguments.nats.ca, "of tls://: certificate of the authority of nats-server");
+  app.add_option("--ca", arguments.nats.ca,
+                 "of tls://: certificate of the authority of nats-server");
   app.add_option("--credentials", arguments.nats.credentials,
                  "file with user and password (pangea-nats-config), mode 0600");
-  app.add_option("--replicas", arguments.replicas,
-                 "core, standby: nodes of NATS that have each message (default: as the streams are)")
+  app.add_option(
+         "--replicas", arguments.replicas,
+         "core, standby: nodes of NATS that have each message (default: as the streams are)")
       ->check(CLI::Range(1, 5));
   app.add_option("--matches", arguments.max_matches, "a worker's matches at a time")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--journal", arguments.journal, "standby: LCM log that follows the site's journal");
+  app.add_option("--journal", arguments.journal,
+                 "standby: LCM log that follows the site's journal");
   app.add_option("--holder", arguments.holder,
                  "core, standby: name under which this host has the site (default: drawn)");
   CLI11_PARSE(app, argc, argv);

@@ -10,8 +10,9 @@
 namespace pangea {
 
 struct NatsAccess {
-  std::string url = "nats://127.0.0.1:4222";  // several, of one cluster of NATS: with commas between
-  std::filesystem::path ca;           // whose certificate the server's has to be signed by; for tls://
+  std::string url =
+      "nats://127.0.0.1:4222";  // several, of one cluster of NATS: with commas between
+  std::filesystem::path ca;     // whose certificate the server's has to be signed by; for tls://
   std::filesystem::path credentials;  // "user: NAME" and "password: WORD"; mode 0600; empty: nobody
 
   std::vector<std::string> Urls() const;

@@ -59,20 +59,25 @@ std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
   switch (status) {
     case NATS_CONNECTION_AUTH_FAILED:
       return access.credentials.empty()
-                 ? fmt::format("NATS at {} wants a user and a password: give --credentials FILE", url)
-                 : fmt::format("NATS at {} refuses the user of {}: another password, or none of its "
-                               "users",
-                               url, access.credentials.string());
+                 ? fmt::format("NATS at {} wants a user and a password: give --credentials FILE",
+                               url)
+                 : fmt::format(
+                       "NATS at {} refuses the user of {}: another password, or none of its "
+                       "users",
+                       url, access.credentials.string());
     case NATS_SECURE_CONNECTION_WANTED:
-      return fmt::format("NATS at {} has no TLS, and gets no password: see pangea-nats-config", url);
+      return fmt::format("NATS at {} has no TLS, and gets no password: see pangea-nats-config",
+                         url);
     case NATS_SSL_ERROR:
-      return fmt::format("NATS at {}: its certificate is not of the authority in {}, or for "
-                         "another host: {}",
-                         url, access.ca.string(), nats_GetLastError(nullptr));
+      return fmt::format(
+          "NATS at {}: its certificate is not of the authority in {}, or for "
+          "another host: {}",
+          url, access.ca.string(), nats_GetLastError(nullptr));
     default:
-      return fmt::format("cannot reach NATS at {}: {}; give --nats with its URL, or start it: "
-                         "nats-server -a 127.0.0.1 -js -sd FOLDER",
-                         url, natsStatus_GetText(status));
+      return fmt::format(
+          "cannot reach NATS at {}: {}; give --nats with its URL, or start it: "
+          "nats-server -a 127.0.0.1 -js -sd FOLDER",
+          url, natsStatus_GetText(status));
   }
 }
 
@@ -252,8 +257,7 @@ NatsClient::StoreAnswer NatsClient::Store(const std::string& subject, Bytes data
   options.MaxWait = kTimeout_ms;
   jsErrCode error{};
   jsPubAck* got = nullptr;
-  const natsStatus status =
-      js_PublishMsg(&got, impl_->context.get(), made, &options, &error);
+  const natsStatus status = js_PublishMsg(&got, impl_->context.get(), made, &options, &error);
   const Owned<jsPubAck> answer(got);
   if (status == NATS_OK) {
     return {Stored::kNew, answer->Sequence};

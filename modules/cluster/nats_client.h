@@ -29,8 +29,8 @@ class NatsClient {
 
   bool connected() const;
 
-  // Streams in files; one that exists stays, with as many replicas as wanted. A cluster of NATS that
-  // has just been started is waited for. Throw std::runtime_error.
+  // Streams in files; one that exists stays, with as many replicas as wanted. A cluster of NATS
+  // that has just been started is waited for. Throw std::runtime_error.
   enum class Retention : uint8_t { kKept, kUntilAcknowledged, kNewestOfSubject };
   // `replicas` 0: as it is, or 1.
   void MakeStream(const std::string& stream, const std::string& subjects, Retention retention,
@@ -49,8 +49,7 @@ class NatsClient {
     uint64_t sequence = 0;  // of a new one, in its stream
   };
   // `utime`: goes with it; 0: none.
-  StoreAnswer Store(const std::string& subject, Bytes data, const If& condition,
-                    int64_t utime = 0);
+  StoreAnswer Store(const std::string& subject, Bytes data, const If& condition, int64_t utime = 0);
 
   struct Message {
     std::string subject;
@@ -64,8 +63,8 @@ class NatsClient {
   std::optional<Message> Next(const std::string& stream, uint64_t sequence,
                               const std::string& subjects);
 
-  // The sequence of its newest message, 0 before the first, from who decides on what is stored next.
-  // Nothing: there is no such stream, or nobody decides now.
+  // The sequence of its newest message, 0 before the first, from who decides on what is stored
+  // next. Nothing: there is no such stream, or nobody decides now.
   std::optional<uint64_t> LastSequence(const std::string& stream);
 
   struct Taken {

@@ -51,8 +51,8 @@ int RunStandby(const BridgeArguments& arguments, SiteStreams& streams) {
   }
   streams.Make(arguments.replicas);
   Standby standby(arguments.journal, streams, arguments.holder);
-  const bool is_core = Wait([&] { return standby.Step(WallUtime()); },
-                            [&] { return standby.Said(); });
+  const bool is_core =
+      Wait([&] { return standby.Step(WallUtime()); }, [&] { return standby.Said(); });
   Log(kProgram, standby.Said());
   return is_core ? 0 : 1;
 }

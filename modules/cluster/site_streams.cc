@@ -103,7 +103,8 @@ SiteStreams::StoreAnswer SiteStreams::StoreEvent(const std::string& channel, int
 
 SiteStreams::StoreAnswer SiteStreams::StoreTerm(uint64_t term, uint64_t behind) {
   const std::string text = std::to_string(term);
-  return nats_.Store(Subject(kJournal, kTerm), {reinterpret_cast<const uint8_t*>(text.data()), text.size()},
+  return nats_.Store(Subject(kJournal, kTerm),
+                     {reinterpret_cast<const uint8_t*>(text.data()), text.size()},
                      {NatsClient::If::What::kNewestOfStream, behind});
 }
 
@@ -113,9 +114,10 @@ std::optional<SiteStreams::JournalEvent> SiteStreams::EventAt(uint64_t sequence)
     return std::nullopt;
   }
   if (message->sequence != sequence) {
-    throw std::runtime_error(fmt::format("stream {}: message {} is not there any more: delete the "
-                                         "stream, and the journal fills it anew",
-                                         Stream(kJournal), sequence));
+    throw std::runtime_error(
+        fmt::format("stream {}: message {} is not there any more: delete the "
+                    "stream, and the journal fills it anew",
+                    Stream(kJournal), sequence));
   }
   const size_t begin = Subject(kJournal, "").size();
   JournalEvent event;
@@ -135,7 +137,8 @@ std::optional<std::string> SiteStreams::FindLease() {
 }
 
 SiteStreams::StoreAnswer SiteStreams::StoreLease(const std::string& record, uint64_t behind) {
-  return nats_.Store(LeaseSubject(), {reinterpret_cast<const uint8_t*>(record.data()), record.size()},
+  return nats_.Store(LeaseSubject(),
+                     {reinterpret_cast<const uint8_t*>(record.data()), record.size()},
                      {NatsClient::If::What::kNewestOfStream, behind});
 }
 

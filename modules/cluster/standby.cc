@@ -26,11 +26,12 @@ bool Standby::Step(int64_t now_utime) {
 }
 
 std::string Standby::Said() const {
-  return fmt::format("{}: {} bytes are as in NATS{}",
-                     begin_ > 0 ? std::string("has the site")
-                                : fmt::format("stands by, {} has the site", lease_.seen_holder()),
-                     copy_.cursor().file.num_bytes,
-                     copy_.cut().empty() ? "" : "; what nobody was told is kept was cut off: " + copy_.cut());
+  return fmt::format(
+      "{}: {} bytes are as in NATS{}",
+      begin_ > 0 ? std::string("has the site")
+                 : fmt::format("stands by, {} has the site", lease_.seen_holder()),
+      copy_.cursor().file.num_bytes,
+      copy_.cut().empty() ? "" : "; what nobody was told is kept was cut off: " + copy_.cut());
 }
 
 }  // namespace pangea

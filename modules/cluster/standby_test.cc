@@ -14,6 +14,7 @@
 #include "cluster/standby.h"
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
+#include "messages/catch_up_messages.h"
 
 namespace pangea {
 namespace {
@@ -92,6 +93,42 @@ TEST_F(StandbyTest, TakesOverWhenTheCoreIsSilentWithAllThatWasReplicated) {
   const JournalCursor cursor = JournalCursor::Read(copy_, *streams_);
   EXPECT_EQ(cursor.file.num_bytes, static_cast<int64_t>(fs::file_size(copy_)));
   EXPECT_EQ(cursor.sequence, streams_->JournalEnd());
+}
+
+TEST_F(StandbyTest, ABridgeOnTheCopyGoesOnWhereTheFormerCoreEnded) {
+  AddKeyframes(3);
+  std::optional<Standby> standby(std::in_place, copy_, *streams_, "second");
+  ASSERT_TRUE(TakesOverWithin(*standby, 5'000'000));
+  standby.reset();
+  SiteLease lease(*streams_, "second");
+  ASSERT_TRUE(lease.TryTake(now_));
+  LocalBus bus;
+  Node node(bus, "agent_handler");
+  int64_t replicated_bytes = -1;
+  node.Listen<journal_file_t>("JOURNAL_REPLICATED", [&](const JournalFile& file) {
+    replicated_bytes = file.state.num_bytes;
+  });
+  CoreBridge bridge(bus, *streams_, lease);
+  const auto end = streams_->JournalEnd();
+  const auto round = [&] {
+    bridge.BetweenMessages(now_);
+    bridge.Tick(now_);
+    bus.Drain();
+  };
+  round();
+  EXPECT_EQ(replicated_bytes, -1) << "it has not been told which journal";
+  Journal journal(copy_, [](const std::string&, Bytes, const JournalPlace&) { return true; });
+  node.Publish("JOURNAL_FILE", ToMessage(JournalFile{copy_, journal.state()}));
+  bus.Drain();
+  round();
+  EXPECT_EQ(replicated_bytes, journal.size());
+  EXPECT_EQ(streams_->JournalEnd(), end) << "nothing is stored twice";
+  journal.Append(1, "OPTIONS_fusion", std::vector<uint8_t>{1});
+  journal.Sync();
+  node.Publish("JOURNAL_FILE", ToMessage(JournalFile{copy_, journal.state()}));
+  bus.Drain();
+  EXPECT_EQ(replicated_bytes, journal.size());
+  EXPECT_EQ(streams_->JournalEnd(), *end + 1);
 }
 
 // Fencing: its lease was taken while it slept, and it does not know.

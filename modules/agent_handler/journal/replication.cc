@@ -26,8 +26,8 @@ bool Replication::Works(int64_t now_us) const {
 
 bool Replication::Awaits(int32_t agent_id) const {
   return std::ranges::any_of(groups_, [&](const Group& group) {
-    return std::ranges::any_of(
-        group.keyframes, [&](const KeyframeId& id) { return id.map.agent_id == agent_id; });
+    return std::ranges::any_of(group.keyframes,
+                               [&](const KeyframeId& id) { return id.map.agent_id == agent_id; });
   });
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
-// What of the journal is kept, and may be acknowledged: what the disk has, or, for a site of several
-// hosts, what the bridge beside us says that other hosts have too (JOURNAL_REPLICATED, cluster.md).
-// Then nobody is answered before all that a start found is there, nor while the bridge is silent:
-// another host may be the core by then. Time goes in (microseconds).
+// What of the journal is kept, and may be acknowledged: what the disk has, or, for a site of
+// several hosts, what the bridge beside us says that other hosts have too (JOURNAL_REPLICATED,
+// cluster.md). Then nobody is answered before all that a start found is there, nor while the bridge
+// is silent: another host may be the core by then. Time goes in (microseconds).
 
 #include <cstdint>
 #include <deque>

@@ -41,9 +41,8 @@ std::string DrawHolder() {
 std::vector<std::string> BridgeCommand(BridgeRole role, const ClusterOptions& options,
                                        const std::string& bus,
                                        const std::filesystem::path& journal) {
-  std::vector<std::string> argv{ProgramOf("bridge"), "--role",   NameOf(role),
-                                "--site",            options.site, "--nats",
-                                options.nats};
+  std::vector<std::string> argv{ProgramOf("bridge"), "--role", NameOf(role), "--site",
+                                options.site,        "--nats", options.nats};
   const auto add = [&argv](const char* option, const std::string& value) {
     if (!value.empty()) {
       argv.insert(argv.end(), {option, value});

@@ -55,9 +55,15 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
 }
 
 std::vector<std::string> GatewayCommand(const ServerOptions& options) {
-  return {ProgramOf(kGateway), "--site",    options.site.string(),
-          "--bus",           options.bus, "--link",
-          options.link,      "--port",    std::to_string(*options.phone_port)};
+  return {ProgramOf(kGateway),
+          "--site",
+          options.site.string(),
+          "--bus",
+          options.bus,
+          "--link",
+          options.link,
+          "--port",
+          std::to_string(*options.phone_port)};
 }
 
 bool IsVerifier(const std::string& process) {
