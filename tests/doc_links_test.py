@@ -57,7 +57,7 @@ class DocLinks(unittest.TestCase):
 
     def test_programs_named(self):
         cmake = " ".join(path.read_text() for path in ROOT.glob("*/*/CMakeLists.txt"))
-        known = set(re.findall(r"(?:pangea_program|add_executable)\((pangea-[\w-]+)", cmake)) | {"pangea-spy"}
+        known = set(re.findall(r"(?:pangea_program|add_executable)\((pangea-[\w-]+)", cmake)) | {"pangea-nats-config", "pangea-spy"}
         for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
             for name in re.findall(r"bin/(pangea-[\w-]+)", page.read_text()):
                 self.assertIn(name, known, page.name)

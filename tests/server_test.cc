@@ -88,18 +88,13 @@ TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
   EXPECT_THAT(outcome.output, HasSubstr("given up after 3 times"));
 }
 
-TEST(Server, StartsNotWhatOthersDo) {
-  const fs::path folder = FreshFolder("server_without");
+TEST(Server, OfSeveralHostsSaysWhatItLacks) {
+  const fs::path folder = FreshFolder("server_hosts");
   fs::create_directories(folder / "keys");
-  const std::string command = ServerCommand(folder);
-  const Outcome outcome =
-      RunCommand("timeout -s INT 2 " + command + " --without fusion inter_map_ba");
-  EXPECT_THAT(outcome.output, HasSubstr("pangea-posegraph --bus"));
-  EXPECT_THAT(outcome.output, testing::Not(HasSubstr("pangea-fusion --bus")));
-  EXPECT_THAT(outcome.output, testing::Not(HasSubstr("pangea-inter-map-ba --bus")));
-  EXPECT_THAT(outcome.output, HasSubstr("ended\n"));
-  EXPECT_THAT(RunCommand(command + " --without fushion").output,
-              HasSubstr("--without fushion: give one of agent_handler, place_recognition"));
+  EXPECT_THAT(RunCommand("pangea-server --worker hall").output,
+              HasSubstr("--worker: give --nats with the URL of the site's NATS"));
+  EXPECT_THAT(RunCommand(ServerCommand(folder) + " --nats nats://127.0.0.1:1").output,
+              HasSubstr("--nats: give --site FOLDER, whose name the site has there"));
 }
 
 TEST(Server, RefusesOptionsOfNoProcessAndOptionsThatAreNotThere) {

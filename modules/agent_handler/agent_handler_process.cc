@@ -138,6 +138,9 @@ int64_t AgentHandlerProcess::SendDown(int32_t agent_id, Agent* agent, Bytes pack
 }
 
 void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
+  if (!archive_.MayAnswer()) {
+    return node_.Count("packets_not_taken");
+  }
   const auto found = agents_.find(channels::AgentOf(channel, channels::kLinkUpPrefix));
   if (found == agents_.end()) {
     return node_.Refuse("packet of an agent whose key is not in the folder of keys");
@@ -159,6 +162,9 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   }
   ++agent.packets;
   agent.heard_us = now_us_;
+  if (!agent.handler && !archive_.MayJoin(agent_id)) {
+    return;  // it would be told that all of the journal is kept
+  }
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));
     Log(node_.name(), fmt::format("agent {} has joined", agent_id));
@@ -222,8 +228,10 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
     }
   }
   anchors_.OnJournalled(archive_.TakeJournalledEdits());
-  SendAcks();
-  SendAnchors();
+  if (archive_.MayAnswer()) {
+    SendAcks();
+    SendAnchors();
+  }
   archive_.AnswerResendRequests();
   const bool busy =
       archive_.busy() || std::any_of(agents_.begin(), agents_.end(), [](const auto& item) {
@@ -289,8 +297,11 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   anchors_.SetCounters();
   node_.PublishStatus(
       now_utime, pending,
-      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}", connected,
+      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}{}", connected,
                   archive_.num_keyframes(),
+                  archive_.MayAnswer() ? ""
+                                       : "; NO AGENT IS ANSWERED: no bridge to NATS says that "
+                                         "the journal is replicated",
                   agents_.empty() ? "; the folder of keys is empty: nobody can join" : "",
                   archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", archive_.Damage(),
                   OtherSoftware(), OtherKeys()));

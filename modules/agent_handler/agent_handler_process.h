@@ -4,7 +4,8 @@
 //   link bus:   LINK_UP_* in; LINK_DOWN_k out
 //   server bus: POSE_k, STATUS_agent_handler and what archive.h says out; CORRECTION_k,
 //               LANDMARKS_k, OTHERS_k and what archive.h and anchor_relay.h say in
-// Keyframes are acknowledged and published once the journal's disk has them. What does not open
+// Keyframes are published once the journal's disk has them, and acknowledged once they are kept
+// (journal/replication.h). What does not open
 // under the key of the agent it claims to be from is dropped and counted; it costs one attempt to
 // open it, and leaves nothing behind.
 

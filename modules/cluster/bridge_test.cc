@@ -34,11 +34,11 @@ class Bridge : public testing::Test {
       GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
     }
     nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_bridge");
-    server_ = std::make_unique<TestServer>(nats_->url());
+    server_ = std::make_unique<TestServer>(nats_->access());
   }
 
   TestWorker& AddWorker() {
-    workers_.push_back(std::make_unique<TestWorker>(nats_->url()));
+    workers_.push_back(std::make_unique<TestWorker>(nats_->access()));
     return *workers_.back();
   }
   void AddKeyframes(int count, int candidates) {
@@ -168,7 +168,7 @@ TEST_F(Bridge, WhatTheJournalHasGoesIntoEmptyStreams) {
   workers_.clear();
   server_->RestartBridge("hall-2");
   server_->SayHave();
-  SiteStreams streams(nats_->url(), "hall-2", kTestAckWait_us);
+  SiteStreams streams(nats_->access(), "hall-2");
   EXPECT_TRUE(Until([&] { return CountOf(streams.Keyframes()) == 6; }));
   EXPECT_EQ(CountOf(streams.Results()), 12);
   ExpectEachResultOnce();
@@ -210,19 +210,20 @@ TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
 }
 
 TEST_F(Bridge, SaysWhatIsWrongWithNats) {
-  const auto why = [](const std::string& url, const std::string& site) -> std::string {
+  const auto why = [](const NatsAccess& access, const std::string& site) -> std::string {
     try {
-      SiteStreams(url, site, kTestAckWait_us);
+      SiteStreams(access, site).Make();
     } catch (const std::runtime_error& error) {
       return error.what();
     }
     return "";
   };
-  EXPECT_THAT(why("nats://127.0.0.1:1", "hall"),
-              HasSubstr("cannot reach NATS at nats://127.0.0.1:1"));
-  EXPECT_THAT(why("nats://127.0.0.1:1", "hall"), HasSubstr("nats-server -a 127.0.0.1 -js -sd"));
-  EXPECT_THAT(why(nats_->url(), "the hall"), HasSubstr("--site the hall: give a name of letters"));
-  EXPECT_THAT(why(nats_->url(), "hall"), IsEmpty());
+  const NatsAccess nobody{"nats://127.0.0.1:1", {}, {}};
+  EXPECT_THAT(why(nobody, "hall"), HasSubstr("cannot reach NATS at nats://127.0.0.1:1"));
+  EXPECT_THAT(why(nobody, "hall"), HasSubstr("nats-server -a 127.0.0.1 -js -sd"));
+  EXPECT_THAT(why(nats_->access(), "the hall"),
+              HasSubstr("--site the hall: give a name of letters"));
+  EXPECT_THAT(why(nats_->access(), "hall"), IsEmpty());
 }
 
 }  // namespace

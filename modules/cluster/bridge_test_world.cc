@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,7 +11,9 @@
 #include <thread>
 
 #include "bus/retransmission/missing.h"
+#include "bus/wall_clock.h"
 #include "core/constraint_id.h"
+#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "messages/testing/test_keyframes.h"
@@ -24,6 +27,21 @@ constexpr char kSite[] = "hall";
 constexpr size_t kMaxMatches = 4;
 const MapId kMap{1, 1'700'000'000'000'000};
 
+std::string FreshJournal(const std::string& name) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
+  for (const char* suffix : {"", ".stream"}) {
+    std::filesystem::remove(path.string() + suffix);
+  }
+  return path.string();
+}
+
+// Some within the map, some with another.
+PlaceKind KindOf(int candidate) {
+  return candidate % 2 == 0 ? PlaceKind::kInter : PlaceKind::kIntra;
+}
+
+}  // namespace
+
 int FreePort() {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
@@ -36,13 +54,6 @@ int FreePort() {
   return ntohs(address.sin_port);
 }
 
-// Some within the map, some with another.
-PlaceKind KindOf(int candidate) {
-  return candidate % 2 == 0 ? PlaceKind::kInter : PlaceKind::kIntra;
-}
-
-}  // namespace
-
 std::string NatsServerProgram() {
   for (const char* path : {"/usr/sbin/nats-server", "/usr/bin/nats-server"}) {
     if (access(path, X_OK) == 0) {
@@ -53,7 +64,7 @@ std::string NatsServerProgram() {
 }
 
 NatsServer::NatsServer(const std::filesystem::path& store)
-    : store_(store), port_(FreePort()), url_(fmt::format("nats://127.0.0.1:{}", port_)) {
+    : store_(store), port_(FreePort()), access_{fmt::format("nats://127.0.0.1:{}", port_), {}, {}} {
   std::filesystem::remove_all(store_);
   Start();
 }
@@ -64,7 +75,7 @@ void NatsServer::Start() {
                                "-js", "-sd", store_.string(), "-l", store_.string() + ".log"});
   for (int i = 0; i < 100; ++i) {
     try {
-      NatsClient(url_, "test");
+      NatsClient(access_, "test");
       return;
     } catch (const std::runtime_error&) {
       std::this_thread::sleep_for(50ms);
@@ -73,10 +84,20 @@ void NatsServer::Start() {
   throw std::runtime_error("nats-server does not start; see " + store_.string() + ".log");
 }
 
-TestServer::TestServer(const std::string& nats_url) : nats_url_(nats_url) { StartBridge(kSite); }
+TestServer::TestServer(const NatsAccess& access)
+    : access_(access), journal_path_(FreshJournal("cluster_bridge.lcm")) {
+  journal_file_ = std::make_unique<Journal>(
+      journal_path_, [](const std::string&, Bytes, const JournalPlace&) { return true; });
+  StartBridge(kSite);
+}
 
 void TestServer::StartBridge(const std::string& site) {
-  streams_ = std::make_unique<SiteStreams>(nats_url_, site, kTestAckWait_us);
+  streams_ = std::make_unique<SiteStreams>(access_, site);
+  streams_->Make(0, kTestAckWait_us);
+  lease_ = std::make_unique<SiteLease>(*streams_, "first");
+  if (!lease_->TryTake(WallUtime())) {
+    throw std::runtime_error(lease_->seen_holder() + " has the site");
+  }
   bus_ = std::make_unique<LocalBus>();
   node_ = std::make_unique<Node>(*bus_, "agent_handler");
   node_->Subscribe<constraint_t>("CONSTRAINT", [this](const std::string&, const constraint_t& m) {
@@ -89,7 +110,12 @@ void TestServer::StartBridge(const std::string& site) {
   });
   node_->Listen<resend_request_t>("RESEND_REQUEST",
                                   std::bind_front(&TestServer::OnResendRequest, this));
-  bridge_ = std::make_unique<CoreBridge>(*bus_, *streams_);
+  node_->Listen<journal_file_t>("JOURNAL_REPLICATED", [this](const JournalFile& file) {
+    EXPECT_EQ(file.path, journal_path_);
+    replicated_bytes_ = file.state.num_bytes;
+  });
+  bridge_ = std::make_unique<CoreBridge>(*bus_, *streams_, *lease_);
+  SayJournalFile();
 }
 
 void TestServer::RestartBridge(const std::string& site) {
@@ -97,7 +123,16 @@ void TestServer::RestartBridge(const std::string& site) {
   StartBridge(site);
 }
 
-void TestServer::TakeResult(const constraint_t& result) { journal_.emplace(result.id, result); }
+void TestServer::TakeResult(const constraint_t& result) {
+  if (journal_.emplace(result.id, result).second) {
+    journal_file_->Append(1, "CONSTRAINT", EncodeMessage(result));
+  }
+}
+
+void TestServer::SayJournalFile() {
+  journal_file_->Sync();
+  node_->Publish("JOURNAL_FILE", ToMessage(JournalFile{journal_path_, journal_file_->state()}));
+}
 
 void TestServer::Add(int candidates) {
   const auto seq = static_cast<int32_t>(keyframes_.size());
@@ -109,6 +144,9 @@ void TestServer::Add(int candidates) {
   }
   keyframes_.push_back(ToMessage(TestKeyframe(match.query)));
   matches_.push_back(ToMessage(match));
+  journal_file_->Append(1'700'000'000'000'000 + seq, "KEYFRAME_1",
+                        EncodeMessage(keyframes_.back()));
+  SayJournalFile();
   node_->Publish("KEYFRAME_1", keyframes_.back());
   node_->Publish("PLACE_MATCH", matches_.back());
 }
@@ -154,10 +192,8 @@ void TestServer::Round(int64_t now_utime) {
   bus_->Drain();
 }
 
-TestWorker::TestWorker(const std::string& nats_url)
-    : node_(bus_, "fusion"),
-      streams_(nats_url, kSite, kTestAckWait_us),
-      bridge_(bus_, streams_, kMaxMatches) {
+TestWorker::TestWorker(const NatsAccess& access)
+    : node_(bus_, "fusion"), streams_(access, kSite), bridge_(bus_, streams_, kMaxMatches) {
   node_.Subscribe<KeyframeMessage>(
       "KEYFRAME_1",
       [this](const std::string&, const KeyframeMessage& m) { keyframes_.insert(m.id.seq); });

@@ -1,9 +1,8 @@
 #pragma once
 
 // A real nats-server on a loopback port, and round it a server and workers of the site hall in one
-// thread: the
-// bridges are the real ones; agent_handler, place_recognition and the verifiers do as little as
-// their part of the bus asks.
+// thread: the bridges are the real ones; agent_handler, place_recognition and the verifiers do as
+// little as their part of the bus asks.
 
 #include <chrono>
 #include <deque>
@@ -15,8 +14,10 @@
 #include <string>
 #include <vector>
 
+#include "agent_handler/journal/journal.h"
 #include "bus/bus.h"
 #include "cluster/core_bridge.h"
+#include "cluster/site_lease.h"
 #include "cluster/site_streams.h"
 #include "cluster/worker_bridge.h"
 #include "core/testing/program.h"
@@ -30,24 +31,27 @@ inline constexpr int64_t kTestAckWait_us = 2'000'000;
 // Empty when it is not installed.
 std::string NatsServerProgram();
 
+int FreePort();
+
 class NatsServer {
  public:
+  // Without TLS and users, as whoever knows the port.
   explicit NatsServer(const std::filesystem::path& store);
-  const std::string& url() const { return url_; }
+  const NatsAccess& access() const { return access_; }
   void Stop() { program_->End(SIGKILL); }
   void Start();
 
  private:
   const std::filesystem::path store_;
   const int port_;
-  const std::string url_;
+  const NatsAccess access_;
   std::unique_ptr<Program> program_;
 };
 
 // agent_handler and place_recognition: one agent's map, a match a keyframe.
 class TestServer {
  public:
-  explicit TestServer(const std::string& nats_url);
+  explicit TestServer(const NatsAccess& access);
 
   // The next keyframe, and its match with this many candidates.
   void Add(int candidates);
@@ -56,8 +60,14 @@ class TestServer {
   void AskForResults(int32_t seq);
   // The bridge is killed, and begins anew with what the journal has.
   void RestartBridge(const std::string& site = "hall");
+  // Throws Deposed once another has the site.
   void Round(int64_t now_utime);
+  // Of the bus alone: what a bridge does that has not looked at its lease yet.
+  void Drain() { bus_->Drain(); }
 
+  const std::string& journal_path() const { return journal_path_; }
+  // All that the journal has may be acknowledged.
+  bool all_replicated() const { return replicated_bytes_ == journal_file_->size(); }
   const std::set<int64_t>& candidates() const { return candidates_; }
   // How often each result was published.
   const std::map<int64_t, int>& published() const { return published_; }
@@ -70,11 +80,16 @@ class TestServer {
   void StartBridge(const std::string& site);
   void OnResendRequest(const ResendRequest& request);
   void TakeResult(const constraint_t& result);
+  void SayJournalFile();
 
-  const std::string nats_url_;
+  const NatsAccess access_;
+  const std::string journal_path_;
+  std::unique_ptr<Journal> journal_file_;
+  int64_t replicated_bytes_ = -1;
   std::unique_ptr<SiteStreams> streams_;
   std::unique_ptr<LocalBus> bus_;
   std::unique_ptr<Node> node_;  // agent_handler's
+  std::unique_ptr<SiteLease> lease_;
   std::unique_ptr<CoreBridge> bridge_;
   std::vector<KeyframeMessage> keyframes_;
   std::vector<place_match_t> matches_;
@@ -87,7 +102,7 @@ class TestServer {
 // A verifier of one candidate a round beside a worker's bridge.
 class TestWorker {
  public:
-  explicit TestWorker(const std::string& nats_url);
+  explicit TestWorker(const NatsAccess& access);
 
   void Round(int64_t now_utime);
   // As kill -9 does: nothing more is heard of it.

@@ -22,21 +22,44 @@ constexpr size_t kMaxAsked = 5000;
 
 }  // namespace
 
-CoreBridge::CoreBridge(Bus& bus, SiteStreams& streams)
+CoreBridge::CoreBridge(Bus& bus, SiteStreams& streams, SiteLease& lease)
     : node_(bus, "bridge"),
       streams_(streams),
-      journal_(
-          node_,
-          {.matches = JournalFollower::Which::kAll,
-           .results = JournalFollower::Which::kOfFormerRuns},
-          {.keyframe = [this](const Keyframe& keyframe) { ToStore(streams_.EntryOf(keyframe)); },
-           .match = std::bind_front(&CoreBridge::TakeMatch, this),
-           .result = std::bind_front(&CoreBridge::OnFormerResult, this)}),
+      lease_(lease),
+      shipper_(streams, lease.term(), StoreTerm(streams, lease.term())),
+      journal_(node_,
+               {.matches = JournalFollower::Which::kAll,
+                .results = JournalFollower::Which::kOfFormerRuns},
+               {.keyframe = [](const Keyframe&) {},
+                .match = std::bind_front(&CoreBridge::TakeMatch, this),
+                .result = std::bind_front(&CoreBridge::OnFormerResult, this)}),
       results_(streams.Results()) {
+  streams_.ListenToOptions();
+  node_.Listen<journal_file_t>(channels::kJournalFile,
+                               std::bind_front(&CoreBridge::OnJournalFile, this));
   node_.SubscribeBytes(std::string(channels::kHave),
                        [this](const std::string&, Bytes data) { streams_.PublishHave(data); });
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&CoreBridge::OnVerificationRequest, this));
+}
+
+// At once: agents wait for the acknowledgement.
+void CoreBridge::OnJournalFile(const JournalFile& file) {
+  shipper_.OnJournalFile(file);
+  ShipJournal();
+}
+
+void CoreBridge::ShipJournal() {
+  shipper_.Ship();
+  const auto shipped = shipper_.shipped();
+  if (!shipped || !lease_.fresh(now_utime_)) {
+    return;
+  }
+  if (shipped->state.num_bytes != told_bytes_ || now_utime_ >= next_told_utime_) {
+    told_bytes_ = shipped->state.num_bytes;
+    next_told_utime_ = now_utime_ + kToldInterval_us;
+    node_.Publish(std::string(channels::kJournalReplicated), ToMessage(*shipped));
+  }
 }
 
 void CoreBridge::ToStore(SiteStreams::Entry entry) {
@@ -113,6 +136,15 @@ void CoreBridge::PublishResults() {
   }
 }
 
+void CoreBridge::PublishOptions() {
+  while (const auto data = streams_.NextOptions()) {
+    options_t options{};
+    if (DecodeMessage(*data, &options)) {
+      node_.Publish(channels::Options(options.process), options);
+    }
+  }
+}
+
 void CoreBridge::AnswerRequests() {
   for (int i = 0; i < kPiece && !asked_.empty(); ++i, asked_.pop_front()) {
     const auto& [query, constraint_id] = asked_.front();
@@ -126,15 +158,21 @@ void CoreBridge::AnswerRequests() {
 }
 
 void CoreBridge::BetweenMessages(int64_t now_utime) {
+  now_utime_ = now_utime;
+  ShipJournal();
   StoreAll();
   if (now_utime >= next_poll_utime_) {
     PublishResults();
+    PublishOptions();
     AnswerRequests();
     next_poll_utime_ = now_utime + kPollInterval_us;
   }
 }
 
 void CoreBridge::Tick(int64_t now_utime) {
+  if (!lease_.Renew(now_utime)) {
+    throw Deposed(fmt::format("another core has the site: {}", lease_.seen_holder()));
+  }
   journal_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kCoreSecond_us;
@@ -144,6 +182,8 @@ void CoreBridge::Tick(int64_t now_utime) {
 
 void CoreBridge::PublishStatus(int64_t now_utime) {
   const auto to_store = static_cast<int64_t>(to_store_.size());
+  node_.Set("bytes_to_replicate", shipper_.bytes_to_ship());
+  node_.Set("events_too_large", shipper_.num_too_large());
   const auto queue = streams_.LookAtQueue();
   if (!queue) {
     return node_.PublishStatus(now_utime, to_store + 1,

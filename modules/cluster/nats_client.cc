@@ -3,14 +3,23 @@
 #include <fmt/format.h>
 #include <nats/nats.h>
 
+#include <chrono>
+#include <cstdlib>
+#include <functional>
 #include <stdexcept>
 
 namespace pangea {
 namespace {
 
 constexpr int64_t kReconnectWait_ms = 500;
+constexpr int64_t kPing_ms = 2000;  // a host that is gone says nothing
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxTaken = 100'000;  // NATS' own default would stop a large cluster
+constexpr char kUtimeHeader[] = "Pangea-Utime";
+constexpr char kExpectedOfStream[] = "Nats-Expected-Last-Sequence";
+constexpr char kExpectedOfSubject[] = "Nats-Expected-Last-Subject-Sequence";
+// A cluster of NATS that was just started chooses who decides.
+constexpr std::chrono::seconds kLongestChoice{20};
 
 struct Deleter {
   void operator()(natsConnection* connection) const { natsConnection_Destroy(connection); }
@@ -19,6 +28,8 @@ struct Deleter {
   void operator()(natsMsg* message) const { natsMsg_Destroy(message); }
   void operator()(jsCtx* context) const { jsCtx_Destroy(context); }
   void operator()(jsConsumerInfo* info) const { jsConsumerInfo_Destroy(info); }
+  void operator()(jsStreamInfo* info) const { jsStreamInfo_Destroy(info); }
+  void operator()(jsPubAck* answer) const { jsPubAck_Destroy(answer); }
 };
 template <typename T>
 using Owned = std::unique_ptr<T, Deleter>;
@@ -32,6 +43,48 @@ std::vector<uint8_t> DataOf(const natsMsg* message) {
 bool IsStatus(natsMsg* message) {
   const char* status = nullptr;
   return natsMsgHeader_Get(message, "Status", &status) == NATS_OK;
+}
+
+int64_t UtimeOf(natsMsg* message) {
+  const char* utime = nullptr;
+  return natsMsgHeader_Get(message, kUtimeHeader, &utime) == NATS_OK ? std::atoll(utime) : 0;
+}
+
+std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
+  const std::string& url = access.url;
+  // libnats tries TLS by itself then, and trusts nobody.
+  if (!access.tls() && (status == NATS_SSL_ERROR || status == NATS_SECURE_CONNECTION_REQUIRED)) {
+    return fmt::format("NATS at {} takes TLS only: give --nats tls://HOST:4222 and --ca FILE", url);
+  }
+  switch (status) {
+    case NATS_CONNECTION_AUTH_FAILED:
+      return access.credentials.empty()
+                 ? fmt::format("NATS at {} wants a user and a password: give --credentials FILE",
+                               url)
+                 : fmt::format(
+                       "NATS at {} refuses the user of {}: another password, or none of its "
+                       "users",
+                       url, access.credentials.string());
+    case NATS_SECURE_CONNECTION_WANTED:
+      return fmt::format("NATS at {} has no TLS, and gets no password: see pangea-nats-config",
+                         url);
+    case NATS_SSL_ERROR:
+      return fmt::format(
+          "NATS at {}: its certificate is not of the authority in {}, or for "
+          "another host: {}",
+          url, access.ca.string(), nats_GetLastError(nullptr));
+    default:
+      return fmt::format(
+          "cannot reach NATS at {}: {}; give --nats with its URL, or start it: "
+          "nats-server -a 127.0.0.1 -js -sd FOLDER",
+          url, natsStatus_GetText(status));
+  }
+}
+
+// Who decides is being chosen, or no node of those that are needed is there yet.
+bool MayChange(natsStatus status, jsErrCode error) {
+  return status == NATS_TIMEOUT || error == JSClusterNotAvailErr || error == JSClusterNoPeersErr ||
+         error == JSInsufficientResourcesErr;
 }
 
 }  // namespace
@@ -54,6 +107,51 @@ struct NatsClient::Impl {
     }
   }
 
+  void Make(const std::string& what, const std::function<natsStatus(jsErrCode*)>& make) const {
+    const auto end = std::chrono::steady_clock::now() + kLongestChoice;
+    jsErrCode error{};
+    natsStatus status = make(&error);
+    while (MayChange(status, error) && std::chrono::steady_clock::now() < end) {
+      nats_Sleep(kReconnectWait_ms);
+      error = {};
+      status = make(&error);
+    }
+    Check(status, error, what);
+  }
+
+  // The options of a connection.
+  void SetOptions(const NatsAccess& access, const std::string& name) {
+    natsOptions* made = nullptr;
+    natsOptions_Create(&made);
+    options.reset(made);
+    natsOptions_SetName(made, name.c_str());
+    natsOptions_SetTimeout(made, kTimeout_ms);
+    natsOptions_SetMaxReconnect(made, -1);
+    natsOptions_SetReconnectWait(made, kReconnectWait_ms);
+    natsOptions_SetPingInterval(made, kPing_ms);
+    const std::vector<std::string> urls = access.Urls();
+    std::vector<const char*> servers;
+    for (const std::string& one : urls) {
+      servers.push_back(one.c_str());
+    }
+    if (natsOptions_SetServers(made, servers.data(), static_cast<int>(servers.size())) != NATS_OK) {
+      throw std::runtime_error(fmt::format("--nats {}: is no URL as tls://HOST:4222", access.url));
+    }
+    if (access.tls()) {
+      natsOptions_SetSecure(made, true);
+      if (natsOptions_LoadCATrustedCertificates(made, access.ca.c_str()) != NATS_OK) {
+        throw std::runtime_error(
+            fmt::format("--ca {}: cannot be read as certificates", access.ca.string()));
+      }
+    }
+    if (!access.credentials.empty()) {
+      const NatsCredentials credentials = ReadCredentials(access.credentials);
+      natsOptions_SetUserInfo(made, credentials.user.c_str(), credentials.password.c_str());
+      // Nobody else may read its answers.
+      natsOptions_SetCustomInboxPrefix(made, ("_INBOX." + credentials.user).c_str());
+    }
+  }
+
   std::optional<Message> Get(const std::string& stream, jsDirectGetMsgOptions* which) const {
     if (natsConnection_Status(connection.get()) != NATS_CONN_STATUS_CONNECTED) {
       return std::nullopt;
@@ -64,7 +162,7 @@ struct NatsClient::Impl {
     if (status != NATS_OK) {
       return std::nullopt;
     }
-    return Message{natsMsg_GetSubject(got), natsMsg_GetSequence(got), DataOf(got)};
+    return Message{natsMsg_GetSubject(got), natsMsg_GetSequence(got), UtimeOf(got), DataOf(got)};
   }
 
   void Say(const std::string& claim, const char* what) const {
@@ -72,27 +170,16 @@ struct NatsClient::Impl {
   }
 };
 
-NatsClient::NatsClient(const std::string& url, const std::string& name)
+NatsClient::NatsClient(const NatsAccess& access, const std::string& name)
     : impl_(std::make_unique<Impl>()) {
-  impl_->url = url;
-  natsOptions* options = nullptr;
-  natsOptions_Create(&options);
-  impl_->options.reset(options);
-  natsOptions_SetName(options, name.c_str());
-  natsOptions_SetTimeout(options, kTimeout_ms);
-  natsOptions_SetMaxReconnect(options, -1);
-  natsOptions_SetReconnectWait(options, kReconnectWait_ms);
+  access.Check();
+  impl_->url = access.url;
+  impl_->SetOptions(access, name);
   natsConnection* connection = nullptr;
-  natsStatus status = natsOptions_SetURL(options, url.c_str());
-  if (status == NATS_OK) {
-    status = natsConnection_Connect(&connection, options);
-  }
+  natsStatus status = natsConnection_Connect(&connection, impl_->options.get());
   impl_->connection.reset(connection);
   if (status != NATS_OK) {
-    throw std::runtime_error(
-        fmt::format("cannot reach NATS at {}: {}; give --nats nats://HOST:4222, or start it: "
-                    "nats-server -a 127.0.0.1 -js -sd FOLDER",
-                    url, natsStatus_GetText(status)));
+    throw std::runtime_error(WhyNotConnected(status, access));
   }
   jsOptions wait{};
   jsOptions_Init(&wait);
@@ -110,8 +197,11 @@ bool NatsClient::connected() const {
 }
 
 void NatsClient::MakeStream(const std::string& stream, const std::string& subjects,
-                            Retention retention) {
+                            Retention retention, int replicas) {
   const char* const names[] = {subjects.c_str()};
+  jsStreamInfo* got = nullptr;
+  js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), nullptr, nullptr);
+  const Owned<jsStreamInfo> info(got);
   jsStreamConfig config{};
   jsStreamConfig_Init(&config);
   config.Name = stream.c_str();
@@ -120,9 +210,17 @@ void NatsClient::MakeStream(const std::string& stream, const std::string& subjec
   config.AllowDirect = true;
   config.Retention =
       retention == Retention::kUntilAcknowledged ? js_WorkQueuePolicy : js_LimitsPolicy;
-  jsErrCode error{};
-  const natsStatus status = js_AddStream(nullptr, impl_->context.get(), &config, nullptr, &error);
-  impl_->Check(status, error, "stream " + stream);
+  if (retention == Retention::kNewestOfSubject) {
+    config.MaxMsgsPerSubject = 1;
+  }
+  const int64_t had = info ? info->Config->Replicas : 1;
+  config.Replicas = replicas > 0 ? replicas : had;
+  impl_->Make(fmt::format("stream {} with {} replicas", stream, config.Replicas),
+              [&](jsErrCode* error) {
+                return info && had != config.Replicas
+                           ? js_UpdateStream(nullptr, impl_->context.get(), &config, nullptr, error)
+                           : js_AddStream(nullptr, impl_->context.get(), &config, nullptr, error);
+              });
 }
 
 void NatsClient::MakeQueue(const std::string& stream, const std::string& consumer,
@@ -133,30 +231,52 @@ void NatsClient::MakeQueue(const std::string& stream, const std::string& consume
   config.AckPolicy = js_AckExplicit;
   config.AckWait = kNanosecondsPerMicrosecond * ack_wait_us;
   config.MaxAckPending = kMaxTaken;
-  jsErrCode error{};
-  const natsStatus status =
-      js_AddConsumer(nullptr, impl_->context.get(), stream.c_str(), &config, nullptr, &error);
-  impl_->Check(status, error, fmt::format("queue {} of stream {}", consumer, stream));
+  impl_->Make(fmt::format("queue {} of stream {}", consumer, stream), [&](jsErrCode* error) {
+    return js_AddConsumer(nullptr, impl_->context.get(), stream.c_str(), &config, nullptr, error);
+  });
 }
 
-NatsClient::Stored NatsClient::Store(const std::string& subject, Bytes data) {
+NatsClient::StoreAnswer NatsClient::Store(const std::string& subject, Bytes data,
+                                          const If& condition, int64_t utime) {
   if (!connected()) {
-    return Stored::kUnreachable;
+    return {};
   }
+  natsMsg* made = nullptr;
+  natsMsg_Create(&made, subject.c_str(), nullptr, reinterpret_cast<const char*>(data.data()),
+                 static_cast<int>(data.size()));
+  const Owned<natsMsg> message(made);
+  if (utime != 0) {
+    natsMsgHeader_Set(made, kUtimeHeader, std::to_string(utime).c_str());
+  }
+  // libnats' own options say nothing of a stream that is to be empty.
+  const bool of_stream = condition.what == If::What::kNewestOfStream;
+  natsMsgHeader_Set(made, of_stream ? kExpectedOfStream : kExpectedOfSubject,
+                    std::to_string(condition.sequence).c_str());
   jsPubOptions options{};
   jsPubOptions_Init(&options);
-  options.ExpectNoMessage = true;
   options.MaxWait = kTimeout_ms;
   jsErrCode error{};
-  const natsStatus status = js_Publish(nullptr, impl_->context.get(), subject.c_str(), data.data(),
-                                       static_cast<int>(data.size()), &options, &error);
+  jsPubAck* got = nullptr;
+  const natsStatus status = js_PublishMsg(&got, impl_->context.get(), made, &options, &error);
+  const Owned<jsPubAck> answer(got);
   if (status == NATS_OK) {
-    return Stored::kNew;
+    return {Stored::kNew, answer->Sequence};
   }
   if (status == NATS_MAX_PAYLOAD) {
-    return Stored::kTooLarge;
+    return {Stored::kTooLarge};
   }
-  return error == JSStreamWrongLastSequenceErr ? Stored::kWasThere : Stored::kUnreachable;
+  return {error == JSStreamWrongLastSequenceErr ? Stored::kOtherwise : Stored::kUnreachable};
+}
+
+std::optional<uint64_t> NatsClient::LastSequence(const std::string& stream) {
+  if (!connected()) {
+    return std::nullopt;
+  }
+  jsStreamInfo* got = nullptr;
+  const natsStatus status =
+      js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), nullptr, nullptr);
+  const Owned<jsStreamInfo> info(got);
+  return status == NATS_OK ? std::optional(info->State.LastSeq) : std::nullopt;
 }
 
 std::optional<NatsClient::Message> NatsClient::Find(const std::string& stream,

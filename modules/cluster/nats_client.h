@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bus/bus.h"
+#include "cluster/nats_access.h"
 
 namespace pangea {
 
@@ -19,28 +20,41 @@ class NatsClient {
  public:
   static constexpr int64_t kTimeout_ms = 2000;
 
-  // Throws std::runtime_error with the URL and the mend when nobody answers there, or without
-  // JetStream.
-  NatsClient(const std::string& url, const std::string& name);
+  // Throws std::runtime_error with the URL and the mend when nobody answers there, we are refused,
+  // or without JetStream.
+  NatsClient(const NatsAccess& access, const std::string& name);
   ~NatsClient();
   NatsClient(const NatsClient&) = delete;
   NatsClient& operator=(const NatsClient&) = delete;
 
   bool connected() const;
 
-  // Streams in files; one that exists stays. Throw std::runtime_error.
-  enum class Retention : uint8_t { kKept, kUntilAcknowledged };
-  void MakeStream(const std::string& stream, const std::string& subjects, Retention retention);
+  // Streams in files; one that exists stays, with as many replicas as wanted. A cluster of NATS
+  // that has just been started is waited for. Throw std::runtime_error.
+  enum class Retention : uint8_t { kKept, kUntilAcknowledged, kNewestOfSubject };
+  // `replicas` 0: as it is, or 1.
+  void MakeStream(const std::string& stream, const std::string& subjects, Retention retention,
+                  int replicas);
   // Whoever takes a message and says nothing of it for `ack_wait_us` has lost it to another.
   void MakeQueue(const std::string& stream, const std::string& consumer, int64_t ack_wait_us);
 
-  // Stores a message whose subject has none yet.
-  enum class Stored : uint8_t { kNew, kWasThere, kTooLarge, kUnreachable };
-  Stored Store(const std::string& subject, Bytes data);
+  // Stores a message if that is still so; else it is kOtherwise.
+  struct If {
+    enum class What : uint8_t { kNewestOfSubject, kNewestOfStream } what = What::kNewestOfSubject;
+    uint64_t sequence = 0;  // of the newest one; 0: there is none
+  };
+  enum class Stored : uint8_t { kNew, kOtherwise, kTooLarge, kUnreachable };
+  struct StoreAnswer {
+    Stored stored = Stored::kUnreachable;
+    uint64_t sequence = 0;  // of a new one, in its stream
+  };
+  // `utime`: goes with it; 0: none.
+  StoreAnswer Store(const std::string& subject, Bytes data, const If& condition, int64_t utime = 0);
 
   struct Message {
     std::string subject;
     uint64_t sequence = 0;  // in its stream
+    int64_t utime = 0;      // as it was stored with
     std::vector<uint8_t> data;
   };
   // The stream's message of this subject. Nothing: there is none, or NATS does not answer.
@@ -48,6 +62,10 @@ class NatsClient {
   // Its first message from `sequence` on whose subject is among `subjects`.
   std::optional<Message> Next(const std::string& stream, uint64_t sequence,
                               const std::string& subjects);
+
+  // The sequence of its newest message, 0 before the first, from who decides on what is stored
+  // next. Nothing: there is no such stream, or nobody decides now.
+  std::optional<uint64_t> LastSequence(const std::string& stream);
 
   struct Taken {
     std::string claim;

@@ -7,14 +7,17 @@
 #include <stdexcept>
 #include <utility>
 
+#include "messages/channels.h"
 #include "messages/messages.h"
 
 namespace pangea {
 namespace {
 
-constexpr char kKeyframe[] = "keyframe";
+constexpr char kJournal[] = "journal";
 constexpr char kMatch[] = "match";
 constexpr char kResult[] = "result";
+constexpr char kLease[] = "lease";
+constexpr char kTerm[] = "term";  // in place of a channel; those have capitals
 constexpr char kWorkers[] = "workers";
 constexpr size_t kMaxSiteName = 40;
 
@@ -31,19 +34,35 @@ std::string CheckedSite(const std::string& site) {
   return site;
 }
 
+// Behind "journal.": its channel, and what makes the subject the keyframe's.
+std::string KeyframeTokens(const KeyframeId& id) {
+  return fmt::format("{}.{}.{}", channels::Keyframe(id.map.agent_id), id.map.opened_utime, id.seq);
+}
+
+std::string TokensOf(const std::string& channel, Bytes data) {
+  KeyframeMessage keyframe{};
+  if (!channel.starts_with(channels::kKeyframePrefix) || !DecodeMessage(data, &keyframe)) {
+    return channel;
+  }
+  const auto parsed = Parse(keyframe);
+  return parsed.value ? KeyframeTokens(parsed.value->id) : channel;
+}
+
 std::string Tokens(const MapId& map) {
   return fmt::format("{}.{}", map.agent_id, map.opened_utime);
 }
 
 }  // namespace
 
-SiteStreams::SiteStreams(const std::string& nats_url, const std::string& site, int64_t ack_wait_us)
-    : site_(CheckedSite(site)), nats_(nats_url, "pangea-bridge " + site) {
-  for (const char* kind : {kKeyframe, kMatch, kResult}) {
-    nats_.MakeStream(
-        Stream(kind), Subject(kind, ">"),
-        kind == kMatch ? NatsClient::Retention::kUntilAcknowledged : NatsClient::Retention::kKept);
-  }
+SiteStreams::SiteStreams(const NatsAccess& access, const std::string& site)
+    : site_(CheckedSite(site)), nats_(access, "pangea-bridge " + site) {}
+
+void SiteStreams::Make(int replicas, int64_t ack_wait_us) {
+  using Retention = NatsClient::Retention;
+  nats_.MakeStream(Stream(kJournal), Subject(kJournal, ">"), Retention::kKept, replicas);
+  nats_.MakeStream(Stream(kResult), Subject(kResult, ">"), Retention::kKept, replicas);
+  nats_.MakeStream(Stream(kLease), LeaseSubject(), Retention::kNewestOfSubject, replicas);
+  nats_.MakeStream(Stream(kMatch), Subject(kMatch, ">"), Retention::kUntilAcknowledged, replicas);
   nats_.MakeQueue(Stream(kMatch), kWorkers, ack_wait_us);
 }
 
@@ -61,8 +80,10 @@ std::string SiteStreams::Subject(const std::string& kind, const KeyframeId& id) 
 
 std::string SiteStreams::HaveSubject() const { return fmt::format("pangea.{}.have", site_); }
 
-SiteStreams::Entry SiteStreams::EntryOf(const Keyframe& keyframe) const {
-  return {Subject(kKeyframe, keyframe.id), EncodeMessage(ToMessage(keyframe))};
+std::string SiteStreams::LeaseSubject() const { return fmt::format("pangea.{}.lease", site_); }
+
+std::string SiteStreams::OptionsSubject(const std::string& process) const {
+  return fmt::format("pangea.{}.options.{}", site_, process);
 }
 
 SiteStreams::Entry SiteStreams::EntryOf(const PlaceMatch& match) const {
@@ -74,8 +95,55 @@ SiteStreams::Entry SiteStreams::EntryOf(const Constraint& result) const {
           EncodeMessage(ToMessage(result))};
 }
 
+SiteStreams::StoreAnswer SiteStreams::StoreEvent(const std::string& channel, int64_t utime,
+                                                 Bytes data, uint64_t behind) {
+  return nats_.Store(Subject(kJournal, TokensOf(channel, data)), data,
+                     {NatsClient::If::What::kNewestOfStream, behind}, utime);
+}
+
+SiteStreams::StoreAnswer SiteStreams::StoreTerm(uint64_t term, uint64_t behind) {
+  const std::string text = std::to_string(term);
+  return nats_.Store(Subject(kJournal, kTerm),
+                     {reinterpret_cast<const uint8_t*>(text.data()), text.size()},
+                     {NatsClient::If::What::kNewestOfStream, behind});
+}
+
+std::optional<SiteStreams::JournalEvent> SiteStreams::EventAt(uint64_t sequence) {
+  auto message = nats_.Next(Stream(kJournal), sequence, Subject(kJournal, ">"));
+  if (!message) {
+    return std::nullopt;
+  }
+  if (message->sequence != sequence) {
+    throw std::runtime_error(
+        fmt::format("stream {}: message {} is not there any more: delete the "
+                    "stream, and the journal fills it anew",
+                    Stream(kJournal), sequence));
+  }
+  const size_t begin = Subject(kJournal, "").size();
+  JournalEvent event;
+  event.channel = message->subject.substr(begin, message->subject.find('.', begin) - begin);
+  if (event.channel == kTerm) {
+    event.term = std::stoull(std::string(message->data.begin(), message->data.end()));
+  }
+  event.utime = message->utime;
+  event.data = std::move(message->data);
+  return event;
+}
+
+std::optional<std::string> SiteStreams::FindLease() {
+  const auto message = nats_.Find(Stream(kLease), LeaseSubject());
+  return message ? std::optional(std::string(message->data.begin(), message->data.end()))
+                 : std::nullopt;
+}
+
+SiteStreams::StoreAnswer SiteStreams::StoreLease(const std::string& record, uint64_t behind) {
+  return nats_.Store(LeaseSubject(),
+                     {reinterpret_cast<const uint8_t*>(record.data()), record.size()},
+                     {NatsClient::If::What::kNewestOfStream, behind});
+}
+
 std::optional<SiteStreams::Message> SiteStreams::FindKeyframe(const KeyframeId& id) {
-  return nats_.Find(Stream(kKeyframe), Subject(kKeyframe, id));
+  return nats_.Find(Stream(kJournal), Subject(kJournal, KeyframeTokens(id)));
 }
 
 std::optional<SiteStreams::Message> SiteStreams::FindResult(const KeyframeId& query,
@@ -92,7 +160,7 @@ std::optional<SiteStreams::Message> SiteStreams::Reader::Next() {
 }
 
 SiteStreams::Reader SiteStreams::Keyframes() {
-  return {nats_, Stream(kKeyframe), Subject(kKeyframe, ">")};
+  return {nats_, Stream(kJournal), Subject(kJournal, "*.*.*")};
 }
 
 SiteStreams::Reader SiteStreams::Results() {
@@ -114,5 +182,11 @@ std::optional<SiteStreams::Queue> SiteStreams::LookAtQueue() {
 void SiteStreams::PublishHave(Bytes data) { nats_.Publish(HaveSubject(), data); }
 
 void SiteStreams::ListenToHave() { nats_.Listen(HaveSubject()); }
+
+void SiteStreams::PublishOptions(const std::string& process, Bytes data) {
+  nats_.Publish(OptionsSubject(process), data);
+}
+
+void SiteStreams::ListenToOptions() { nats_.Listen(OptionsSubject("*")); }
 
 }  // namespace pangea

@@ -1,13 +1,19 @@
 #pragma once
 
-// A site's streams in NATS: keyframes, place matches that wait for a worker, verification results.
-//   stream pangea-<site>-keyframe, subject pangea.<site>.keyframe.<agent>.<opened_utime>.<seq>
-//   stream pangea-<site>-match,    subject pangea.<site>.match.<agent>.<opened_utime>.<seq>
-//   stream pangea-<site>-result,   subject pangea.<site>.result.<agent>.<opened_utime>.<seq>.<id>
+// A site's streams in NATS: its journal, place matches that wait for a worker, results of workers,
+// and who its core is.
+//   stream pangea-<site>-journal, subject pangea.<site>.journal.<channel>, of keyframes
+//                                         pangea.<site>.journal.<channel>.<opened_utime>.<seq>
+//   stream pangea-<site>-match,   subject pangea.<site>.match.<agent>.<opened_utime>.<seq>
+//   stream pangea-<site>-result,  subject pangea.<site>.result.<agent>.<opened_utime>.<seq>.<id>
+//   stream pangea-<site>-lease,   subject pangea.<site>.lease: the newest record counts
 //   subject pangea.<site>.have: the newest HAVE, to who listens
-// The map and seq of matches and results are the query's; <id> is the constraint's. The bytes are
-// LCM's. A subject has one message: what is stored again is not stored twice, however much later.
-// A match goes when it is acknowledged. One thread.
+//   subject pangea.<site>.options.<process>: OPTIONS_<process> of workers
+// The journal has all events of the site's journal, in its order: it is written by one core at a
+// time (journal_shipper.h). The map and seq of matches and results are the query's; <id> is the
+// constraint's. The bytes are LCM's. A subject of matches and results has one message: what is
+// stored again is not stored twice, however much later. A match goes when it is acknowledged. One
+// thread.
 
 #include <cstdint>
 #include <optional>
@@ -26,21 +32,43 @@ class SiteStreams {
   // A worker that is silent for so long has lost its matches to others.
   static constexpr int64_t kAckWait_us = 5'000'000;
 
-  // Connects, and makes the streams that are not there. Throws std::runtime_error.
-  SiteStreams(const std::string& nats_url, const std::string& site,
-              int64_t ack_wait_us = kAckWait_us);
+  // Connects. Throws std::runtime_error.
+  SiteStreams(const NatsAccess& access, const std::string& site);
 
   bool connected() const { return nats_.connected(); }
+  // Those that are not there; a core's to do. `replicas` 0: as they are, or 1. Throws
+  // std::runtime_error.
+  void Make(int replicas = 0, int64_t ack_wait_us = kAckWait_us);
+  // Whether a core has.
+  bool AreThere() { return nats_.LastSequence(Stream("result")).has_value(); }
 
   struct Entry {
     std::string subject;
     std::vector<uint8_t> data;
   };
-  Entry EntryOf(const Keyframe& keyframe) const;
   Entry EntryOf(const PlaceMatch& match) const;
   Entry EntryOf(const Constraint& result) const;
   using Stored = NatsClient::Stored;
-  Stored Store(const Entry& entry) { return nats_.Store(entry.subject, entry.data); }
+  Stored Store(const Entry& entry) { return nats_.Store(entry.subject, entry.data, {}).stored; }
+
+  // The site's journal. An event is stored behind the one with this sequence, if that is the
+  // newest; a term (site_lease.h) is told in it as an event of its own.
+  using StoreAnswer = NatsClient::StoreAnswer;
+  StoreAnswer StoreEvent(const std::string& channel, int64_t utime, Bytes data, uint64_t behind);
+  StoreAnswer StoreTerm(uint64_t term, uint64_t behind);
+  struct JournalEvent {
+    uint64_t term = 0;  // of a core that began here; then nothing else is in it
+    std::string channel;
+    int64_t utime = 0;
+    std::vector<uint8_t> data;
+  };
+  std::optional<JournalEvent> EventAt(uint64_t sequence);
+  std::optional<uint64_t> JournalEnd() { return nats_.LastSequence(Stream("journal")); }
+
+  // Who the core is: the newest record, and the sequence that the next one is put behind.
+  std::optional<uint64_t> LeaseSequence() { return nats_.LastSequence(Stream("lease")); }
+  std::optional<std::string> FindLease();
+  StoreAnswer StoreLease(const std::string& record, uint64_t behind);
 
   // Nothing: it is not there, or NATS does not answer.
   using Message = NatsClient::Message;
@@ -78,12 +106,17 @@ class SiteStreams {
   void PublishHave(Bytes data);
   void ListenToHave();
   std::optional<std::vector<uint8_t>> NextHave() { return nats_.NextHeard(); }
+  void PublishOptions(const std::string& process, Bytes data);
+  void ListenToOptions();
+  std::optional<std::vector<uint8_t>> NextOptions() { return nats_.NextHeard(); }
 
  private:
   std::string Stream(const std::string& kind) const;
   std::string Subject(const std::string& kind, const std::string& rest) const;
   std::string Subject(const std::string& kind, const KeyframeId& id) const;
   std::string HaveSubject() const;
+  std::string LeaseSubject() const;
+  std::string OptionsSubject(const std::string& process) const;
 
   const std::string site_;
   NatsClient nats_;

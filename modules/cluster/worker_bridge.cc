@@ -32,6 +32,11 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
       keyframes_(streams.Keyframes()),
       results_(streams.Results()) {
   streams_.ListenToHave();
+  // For the site's journal: a replay verifies with the same.
+  node_.Subscribe<options_t>(std::string(channels::kAllOptions),
+                             [this](const std::string&, const options_t& options) {
+                               streams_.PublishOptions(options.process, EncodeMessage(options));
+                             });
   node_.Listen<constraint_t>(channels::kConstraint, std::bind_front(&WorkerBridge::OnResult, this));
   node_.Subscribe<again_t>(
       channels::Again(kHandler),

@@ -6,7 +6,7 @@
 // stores the results, and acknowledges a match once all its results are stored. Results of other
 // workers are passed on to the verifiers as those of former runs are, so that they know what the
 // map has.
-//   bus: CONSTRAINT, RESEND_REQUEST, AGAIN_agent_handler in;
+//   bus: CONSTRAINT, OPTIONS_*, RESEND_REQUEST, AGAIN_agent_handler in;
 //        KEYFRAME_*, PLACE_MATCH, HAVE, VERDICT_REQUEST, AGAIN_<process>, STATUS_bridge out
 //
 // A result that got lost on the bus is asked for, and its match published again: a verifier takes

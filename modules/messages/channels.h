@@ -16,6 +16,7 @@ inline constexpr std::string_view kMapState = "MAP_STATE";
 inline constexpr std::string_view kRefinement = "REFINEMENT";
 inline constexpr std::string_view kHave = "HAVE";
 inline constexpr std::string_view kJournalFile = "JOURNAL_FILE";
+inline constexpr std::string_view kJournalReplicated = "JOURNAL_REPLICATED";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 inline constexpr std::string_view kVerificationRequest = "VERDICT_REQUEST";
 // From the journal; what apps and tools ask for is kAnchorRequestPrefix.

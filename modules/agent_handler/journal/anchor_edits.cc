@@ -41,13 +41,13 @@ bool AnchorEdits::Load(Bytes data, const JournalPlace& place) {
     newest_.assign(data.begin(), data.end());
   }
   Index(*edit.value, place);
-  synced_seq_ = next_seq_;
+  kept_seq_ = next_seq_;
   return true;
 }
 
 AnchorEdits::Taken AnchorEdits::Take(AnchorEdit edit, int64_t utime, Journal* journal) {
   if (const auto known = seq_of_.find(KeyOf(edit)); known != seq_of_.end()) {
-    return known->second < synced_seq_ ? Taken::kJournalled : Taken::kQueued;
+    return known->second < kept_seq_ ? Taken::kJournalled : Taken::kQueued;
   }
   if (next_seq_ >= kMaxEdits) {
     return Taken::kFull;
@@ -62,14 +62,14 @@ AnchorEdits::Taken AnchorEdits::Take(AnchorEdit edit, int64_t utime, Journal* jo
   return Taken::kQueued;
 }
 
-void AnchorEdits::OnSynced() {
-  for (Queued& queued : queued_) {
+void AnchorEdits::OnKept(int64_t num_edits) {
+  for (; !queued_.empty() && queued_.front().edit.seq < num_edits; queued_.pop_front()) {
+    Queued& queued = queued_.front();
     node_.bus().Publish(std::string(channels::kAnchorEdit), queued.bytes);
     newest_ = std::move(queued.bytes);
     journalled_.push_back(std::move(queued.edit));
   }
-  queued_.clear();
-  synced_seq_ = next_seq_;
+  kept_seq_ = std::max(kept_seq_, num_edits);
 }
 
 void AnchorEdits::PublishNewest() {
@@ -85,7 +85,7 @@ std::string AnchorEdits::OnResendRequest(const resend_request_t& message) {
   }
   const Request request{
       parsed.value->requester, parsed.value->range.from_seq,
-      static_cast<int32_t>(std::min<int64_t>(parsed.value->range.to_seq, synced_seq_ - 1))};
+      static_cast<int32_t>(std::min<int64_t>(parsed.value->range.to_seq, kept_seq_ - 1))};
   const bool covered = std::ranges::any_of(requests_, [&](const Request& r) {
     return r.requester == request.requester && r.next_seq <= request.next_seq &&
            request.to_seq <= r.to_seq;

@@ -31,16 +31,16 @@ class AnchorEdits {
   bool Load(Bytes data, const JournalPlace& place);
 
   enum class Taken {
-    kQueued,      // OnSynced says when the disk has it
-    kJournalled,  // a repeat of what the disk has
+    kQueued,      // OnKept says when it is kept
+    kJournalled,  // a repeat of what is kept
     kBusy,        // the disk is behind: it has to come again
     kFull,        // there are kMaxEdits
   };
   // Numbers it and appends it, unless it is a repeat. `utime`: wall clock.
   Taken Take(AnchorEdit edit, int64_t utime, Journal* journal);
-  // The journal has been synced: what is on the disk since is published.
-  void OnSynced();
-  // What OnSynced found, each once.
+  // The first so many edits are kept (replication.h): those that were not before are published.
+  void OnKept(int64_t num_edits);
+  // What OnKept found, each once.
   std::vector<AnchorEdit> TakeJournalled() { return std::exchange(journalled_, {}); }
   // The newest one once more: a follower sees by its seq how many there are.
   void PublishNewest();
@@ -75,7 +75,7 @@ class AnchorEdits {
   std::map<Key, int32_t> seq_of_;     // also of those that are queued
   std::vector<JournalPlace> places_;  // by seq; of no size where damage has cost the edit
   int64_t next_seq_ = 0;
-  int64_t synced_seq_ = 0;  // those below are on the disk
+  int64_t kept_seq_ = 0;  // those below are kept
   std::vector<uint8_t> newest_;
   std::deque<Queued> queued_;
   std::vector<AnchorEdit> journalled_;

@@ -10,6 +10,7 @@
 
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
+#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
@@ -70,6 +71,7 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
         return LoadEvent(channel, data, place);
       });
+  replication_.emplace(options.replicated, journal_->size());
   const JournalMend& mend = journal_->mend();
   node_.Set("journal_bytes_torn", mend.torn_bytes);
   node_.Set("journal_bytes_damaged", mend.damaged_bytes);
@@ -91,6 +93,9 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
       [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&Archive::OnVerificationRequest, this));
+  node_.Listen<journal_file_t>(channels::kJournalReplicated, [this](const JournalFile& file) {
+    replication_->OnReplicated(file.state.num_bytes, now_us_);
+  });
   node_.Subscribe<again_t>(
       channels::Again(node_.name()),
       [this](const std::string&, const again_t& message) { OnRetransmission(message); });
@@ -226,26 +231,37 @@ void Archive::Append(const KeyframeId& id, std::vector<uint8_t> bytes) {
   unsynced_.push_back({id, std::move(bytes), place});
 }
 
-std::vector<KeyframeId> Archive::Sync() {
-  std::vector<KeyframeId> synced;
+void Archive::WriteDue() {
   if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < options_.sync_interval_us) {
-    return synced;
+    return;
   }
   oldest_unsynced_us_ = now_us_;
   disk_refuses_ = !journal_->Sync();
   if (disk_refuses_) {
-    node_.Count("journal_writes_failed");
-    return synced;
+    return node_.Count("journal_writes_failed");
   }
+  Replication::Group group{journal_->size(), {}, anchor_edits_.num_edits()};
   for (const Unsynced& keyframe : unsynced_) {
     index_.AddKeyframe(keyframe.id, keyframe.place);
     NoteJournalled(keyframe.id);
-    synced.push_back(keyframe.id);
+    group.keyframes.push_back(keyframe.id);
     node_.bus().Publish(channels::Keyframe(keyframe.id.map.agent_id), keyframe.bytes);
   }
   unsynced_.clear();
-  anchor_edits_.OnSynced();
-  return synced;
+  replication_->Add(std::move(group));
+  if (replication_->wanted()) {
+    PublishJournalFile();
+  }
+}
+
+std::vector<KeyframeId> Archive::Sync() {
+  WriteDue();
+  std::vector<KeyframeId> kept;
+  for (const Replication::Group& group : replication_->TakeKept()) {
+    kept.insert(kept.end(), group.keyframes.begin(), group.keyframes.end());
+    anchor_edits_.OnKept(group.num_edits);
+  }
+  return kept;
 }
 
 template <typename Message>
@@ -312,10 +328,14 @@ std::string Archive::Damage() const {
                            mend.damaged_bytes);
 }
 
-void Archive::PublishHave() {
+void Archive::PublishJournalFile() {
   node_.Publish(std::string(channels::kJournalFile),
                 ToMessage(JournalFile{std::filesystem::absolute(journal_->path()).string(),
                                       journal_->state()}));
+}
+
+void Archive::PublishHave() {
+  PublishJournalFile();
   auto it = by_age_.begin();
   do {
     have_t message{};

@@ -4,9 +4,9 @@
 // results and edits of anchors, each journalled once, told about (HAVE) and sent again to whoever
 // lacks them.
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
-//               VERDICT_REQUEST out, and what anchor_edits.h says;
+//               JOURNAL_FILE, VERDICT_REQUEST out, and what anchor_edits.h says;
 //               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name>,
-//               OPTIONS_* in
+//               OPTIONS_*, JOURNAL_REPLICATED in
 // The options of each process are journalled when a start of it brings others than those before.
 
 #include <cstdint>
@@ -20,6 +20,7 @@
 #include "agent_handler/journal/anchor_edits.h"
 #include "agent_handler/journal/journal.h"
 #include "agent_handler/journal/outstanding_results.h"
+#include "agent_handler/journal/replication.h"
 #include "agent_handler/journal/resend_queue.h"
 #include "bus/node.h"
 #include "link/pacer.h"
@@ -33,6 +34,8 @@ struct ArchiveOptions {
   // What arrives within this time shares one write to the disk.
   int64_t sync_interval_us = 20'000;
   double resend_kb_per_s = 6000;
+  // What other hosts do not have too is not acknowledged (replication.h).
+  bool replicated = false;
 };
 
 class Archive {
@@ -49,9 +52,9 @@ class Archive {
   bool Full() const { return journal_->Full(); }
   void Append(const KeyframeId& id, std::vector<uint8_t> bytes);
   AnchorEdits::Taken Append(AnchorEdit edit);
-  // Writes what is due; the keyframes that the disk has since, published.
+  // Writes what is due. The keyframes that are kept since, published when the disk had them.
   std::vector<KeyframeId> Sync();
-  // The edits that the disk has since.
+  // The edits that are kept since.
   std::vector<AnchorEdit> TakeJournalledEdits() { return anchor_edits_.TakeJournalled(); }
   void AnswerResendRequests();
   void PublishHave();
@@ -72,6 +75,9 @@ class Archive {
     return journal_->HasUnsynced() || resend_queue_.waiting() + anchor_edits_.waiting() > 0;
   }
   bool disk_refuses() const { return disk_refuses_; }
+  // Whether agents may be answered, and this one's session may begin.
+  bool MayAnswer() const { return replication_->Works(now_us_); }
+  bool MayJoin(int32_t agent_id) const { return !replication_->Awaits(agent_id); }
   int64_t num_keyframes() const { return index_.num_keyframes(); }
 
  private:
@@ -86,6 +92,8 @@ class Archive {
   void OnVerificationRequest(const VerificationRequest& request);
   void OnRetransmission(const again_t& message);
   void OnOptions(const std::string& channel, Bytes data);
+  void WriteDue();
+  void PublishJournalFile();
   void NoteJournalled(const KeyframeId& id);
   std::vector<SeqGap> Lost(const MapId& map) const;
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
@@ -102,6 +110,7 @@ class Archive {
   JournalIndex index_;
   AnchorEdits anchor_edits_;
   std::unique_ptr<Journal> journal_;
+  std::optional<Replication> replication_;
   std::deque<Unsynced> unsynced_;
   int64_t oldest_unsynced_us_ = 0;
   int64_t asks_for_gaps_until_utime_ = 0;

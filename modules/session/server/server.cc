@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "bus/process.h"
@@ -21,6 +23,9 @@ namespace fs = std::filesystem;
 
 constexpr double kServerStopGrace_s = 5;
 constexpr const char* kGateway = "gateway";
+constexpr const char* kBridge = "bridge";
+// What workers run, and a server of several hosts does not.
+constexpr const char* kVerifiers[] = {"fusion", "inter_map_ba"};
 constexpr std::chrono::milliseconds kServerLookInterval{100};
 
 void Say(const std::string& line) {
@@ -28,23 +33,15 @@ void Say(const std::string& line) {
   std::fflush(stdout);
 }
 
-std::string Program(const std::string& process) {
-  std::string name = "pangea-" + process;
-  std::ranges::replace(name, '_', '-');
-  const fs::path path = ProgramDirectory() / name;
-  if (!fs::exists(path)) {
-    throw std::runtime_error(
-        fmt::format("{} is missing: it belongs beside pangea-server", path.string()));
-  }
-  return path.string();
-}
-
 std::vector<std::string> Command(const std::string& process, const ServerOptions& options) {
-  std::vector<std::string> argv{Program(process)};
+  std::vector<std::string> argv{ProgramOf(process)};
   if (process == "agent_handler") {
     argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
                              options.journal.string(), "--keys", options.keys.string(),
                              "--checkpoints", options.checkpoints.string()});
+    if (!options.cluster.nats.empty()) {
+      argv.push_back("--replicated");
+    }
   } else {
     argv.insert(argv.end(), {"--bus", options.bus});
   }
@@ -58,13 +55,19 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
 }
 
 std::vector<std::string> GatewayCommand(const ServerOptions& options) {
-  return {Program(kGateway), "--site",    options.site.string(),
-          "--bus",           options.bus, "--link",
-          options.link,      "--port",    std::to_string(*options.phone_port)};
+  return {ProgramOf(kGateway),
+          "--site",
+          options.site.string(),
+          "--bus",
+          options.bus,
+          "--link",
+          options.link,
+          "--port",
+          std::to_string(*options.phone_port)};
 }
 
-double SteadySeconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+bool IsVerifier(const std::string& process) {
+  return std::ranges::find(kVerifiers, process) != std::end(kVerifiers);
 }
 
 bool IsServerProcess(const std::string& process) {
@@ -83,7 +86,39 @@ bool ReviveAll(KeptProcesses* kept) {
   return given_up;
 }
 
+// Until a signal comes or one is given up; then all have ended. Whether one was given up.
+bool KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
+  bool given_up = false;
+  while (!StopRequested() && !given_up) {
+    std::this_thread::sleep_for(kServerLookInterval);
+    given_up = ReviveAll(kept);
+    meanwhile();
+  }
+  kept->StopAll(kServerStopGrace_s);
+  return given_up;
+}
+
+void Start(KeptProcesses* kept, const std::string& process, const std::vector<std::string>& argv) {
+  kept->Start(process, argv);
+  Say(fmt::format("started {}", fmt::join(argv, " ")));
+}
+
 }  // namespace
+
+std::string ProgramOf(const std::string& process) {
+  std::string name = "pangea-" + process;
+  std::ranges::replace(name, '_', '-');
+  const fs::path path = ProgramDirectory() / name;
+  if (!fs::exists(path)) {
+    throw std::runtime_error(
+        fmt::format("{} is missing: it belongs beside pangea-server", path.string()));
+  }
+  return path.string();
+}
+
+double SteadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 void AddProcessOptions(const std::string& text, ServerOptions* options) {
   const size_t equals = text.find('=');
@@ -97,14 +132,6 @@ void AddProcessOptions(const std::string& text, ServerOptions* options) {
     throw std::runtime_error(fmt::format("--options {}: there is no file {}", text, file.string()));
   }
   options->options[process] = file;
-}
-
-void LeaveOut(const std::string& process, ServerOptions* options) {
-  if (!IsServerProcess(process)) {
-    throw std::runtime_error(
-        fmt::format("--without {}: give one of {}", process, fmt::join(kServerProcesses, ", ")));
-  }
-  options->without.insert(process);
 }
 
 void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
@@ -122,36 +149,53 @@ void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
 int Serve(const ServerOptions& options) {
   InstallSignalHandlers();
   fs::create_directories(options.logs);
-  KeptProcesses kept(options.logs);
-  const auto start = [&kept](const std::string& process, const std::vector<std::string>& argv) {
-    kept.Start(process, argv);
-    Say(fmt::format("started {}", fmt::join(argv, " ")));
-  };
+  const bool is_core = !options.cluster.nats.empty();
   Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);
+  std::vector<std::pair<std::string, std::vector<std::string>>> commands;
   for (const std::string process : kServerProcesses) {
-    if (options.without.contains(process)) {
+    if (is_core && IsVerifier(process)) {
       continue;
     }
     std::vector<std::string> argv = Command(process, options);
     const std::vector<std::string> checkpoint = checkpoints.ArgumentsOf(process);
     argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());
-    start(process, argv);
     checkpoints.Add(process, argv);
+    commands.emplace_back(process, std::move(argv));
+  }
+  KeptProcesses kept(options.logs);
+  if (is_core) {
+    Say(fmt::format("stands by until this host has the site; see {}/bridge.txt",
+                    options.logs.string()));
+    if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
+      return 0;
+    }
+    // The first to start is the last to end: then another host may have the site.
+    Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
+  }
+  for (const auto& [process, argv] : commands) {
+    Start(&kept, process, argv);
   }
   if (options.phone_port) {
-    start(kGateway, GatewayCommand(options));
+    Start(&kept, kGateway, GatewayCommand(options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
-  bool given_up = false;
-  while (!StopRequested() && !given_up) {
-    std::this_thread::sleep_for(kServerLookInterval);
-    given_up = ReviveAll(&kept);
-    checkpoints.Tick(SteadySeconds());
-  }
-  kept.StopAll(kServerStopGrace_s);
+  const bool given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
   Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
   checkpoints.Finish();
   Say("ended");
+  return given_up ? 1 : 0;
+}
+
+int ServeAsWorker(const ServerOptions& options) {
+  InstallSignalHandlers();
+  fs::create_directories(options.logs);
+  KeptProcesses kept(options.logs);
+  Start(&kept, kBridge, BridgeCommand(BridgeRole::kWorker, options.cluster, options.bus));
+  for (const char* verifier : kVerifiers) {
+    Start(&kept, verifier, Command(verifier, options));
+  }
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  const bool given_up = KeepAlive(&kept, [] {});
   return given_up ? 1 : 0;
 }
 

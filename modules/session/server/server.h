@@ -2,14 +2,15 @@
 
 // The server of a site by one command: the eight server processes and, if wanted, the gateway, each
 // started again when it ends, until Ctrl-C or SIGTERM ends them in order (what they say goes to
-// files).
+// files). On several hosts: six of them and a bridge, once this host has the site; and a worker.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
+
+#include "session/server/bridges.h"
 
 namespace pangea::session {
 
@@ -26,18 +27,22 @@ struct ServerOptions {
   std::optional<uint16_t> phone_port;
   std::filesystem::path site;
   std::map<std::string, std::filesystem::path> options;  // of each process, its file
-  std::set<std::string> without;  // processes that are not started: others do their part
+  ClusterOptions cluster;
 };
 
 // "fusion=FILE" into `options`. Throws std::runtime_error naming the mend.
 void AddProcessOptions(const std::string& text, ServerOptions* options);
-// Throws std::runtime_error when it is no process of the server's.
-void LeaveOut(const std::string& process, ServerOptions* options);
 // <process>.yaml of each process that has one there.
 void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
+
+// The path of a server process' program, which belongs beside this one; throws std::runtime_error.
+std::string ProgramOf(const std::string& process);
+double SteadySeconds();
 
 // Returns the exit code: 0 after a signal, 1 when a process was given up (kept_processes.h). Tells
 // on stdout what it starts. Throws std::runtime_error when it cannot begin.
 int Serve(const ServerOptions& options);
+// The verifiers and a bridge for another host's server: bus, logs, options, cluster. The same.
+int ServeAsWorker(const ServerOptions& options);
 
 }  // namespace pangea::session

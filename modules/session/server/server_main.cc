@@ -15,12 +15,15 @@
 namespace pangea::session {
 namespace {
 
+// Another than a server's, and with what a worker's verifiers say to each other on this host alone.
+constexpr char kWorkerBusUrl[] = "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
+
 struct Arguments {
   ServerOptions options;
   std::string site;
+  std::string worker;
   std::string options_folder;
   std::vector<std::string> option_files;
-  std::vector<std::string> without;
 };
 
 void AddArguments(CLI::App& app, Arguments* arguments) {
@@ -48,9 +51,21 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
       ->excludes(site);
   app.add_option("--options", arguments->option_files,
                  "PROCESS=FILE.yaml, before what the folder has");
-  app.add_option("--without", arguments->without,
-                 "PROCESS that is not started, as others do its part: fusion and inter_map_ba "
-                 "where workers verify (pangea-bridge)");
+  app.add_option("--nats", options.cluster.nats,
+                 "several hosts, by NATS at this URL (docs/cluster.md): serves once this host has "
+                 "the site; workers verify");
+  app.add_option("--ca", options.cluster.ca, "of --nats tls://: certificate of its authority");
+  app.add_option("--credentials", options.cluster.credentials,
+                 "of --nats: file with user and password, mode 0600");
+  app.add_option("--replicas", options.cluster.replicas,
+                 "nodes of NATS that have each message (default: as the streams are)")
+      ->check(CLI::Range(1, 5));
+  app.add_option("--worker", arguments->worker,
+                 "a worker alone: verifies for the server of the site of this name")
+      ->excludes(site);
+  app.add_option("--matches", options.cluster.max_matches, "a worker's matches at a time")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   app.add_option("--http", options.http,
                  "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
   app.add_option("--phone", options.phone_port,
@@ -87,24 +102,48 @@ void UseDefaults(ServerOptions* options) {
   }
 }
 
-int Run(Arguments* arguments) {
-  std::optional<site::SiteLock> lock;
-  if (!arguments->site.empty()) {
-    const site::Site site = site::OpenSite(arguments->site);
-    lock.emplace(site);
-    UseSite(site, arguments);
-  }
-  UseDefaults(&arguments->options);
+void UseProcessOptions(Arguments* arguments) {
   if (!arguments->options_folder.empty()) {
     AddOptionsFolder(arguments->options_folder, &arguments->options);
   }
   for (const std::string& file : arguments->option_files) {
     AddProcessOptions(file, &arguments->options);
   }
-  for (const std::string& process : arguments->without) {
-    LeaveOut(process, &arguments->options);
+}
+
+int RunWorker(Arguments* arguments) {
+  ServerOptions& options = arguments->options;
+  if (options.cluster.nats.empty()) {
+    throw std::runtime_error("--worker: give --nats with the URL of the site's NATS");
   }
-  return Serve(arguments->options);
+  options.cluster.site = arguments->worker;
+  options.bus = options.bus.empty() ? kWorkerBusUrl : options.bus;
+  options.logs = options.logs.empty() ? "worker.logs" : options.logs;
+  UseProcessOptions(arguments);
+  return ServeAsWorker(options);
+}
+
+int Run(Arguments* arguments) {
+  if (!arguments->worker.empty()) {
+    return RunWorker(arguments);
+  }
+  std::optional<site::SiteLock> lock;
+  ServerOptions& options = arguments->options;
+  if (!arguments->site.empty()) {
+    const site::Site site = site::OpenSite(arguments->site);
+    lock.emplace(site);
+    UseSite(site, arguments);
+    options.cluster.site = site.description.name;
+  }
+  UseDefaults(&options);
+  UseProcessOptions(arguments);
+  if (!options.cluster.nats.empty()) {
+    if (options.cluster.site.empty()) {
+      throw std::runtime_error("--nats: give --site FOLDER, whose name the site has there");
+    }
+    options.cluster.holder = DrawHolder();
+  }
+  return Serve(options);
 }
 
 }  // namespace

@@ -1,0 +1,129 @@
+// What packaging/pangea-nats-config makes, with a real nats-server: TLS, users, and what each may.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "cluster/bridge_test_world.h"
+#include "files/text_file.h"
+#include "files/whole_file.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class Access : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (NatsServerProgram().empty()) {
+      GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
+    }
+    fs::remove_all(folder_);
+    const std::string host = fmt::format("127.0.0.1:{}", port_);
+    ASSERT_EQ(std::system(fmt::format("{}/packaging/pangea-nats-config --sites hall --hosts {} "
+                                      "--out {} > /dev/null",
+                                      PANGEA_SOURCE_DIR, host, folder_.string())
+                              .c_str()),
+              0);
+    const fs::path place = folder_ / fmt::format("127.0.0.1_{}", port_);
+    server_ = std::make_unique<Program>(std::vector<std::string>{
+        NatsServerProgram(), "-c", place / "nats.conf", "-l", folder_ / "log"});
+    for (int i = 0; i < 100 && !Why(As("core")).empty(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  NatsAccess As(const std::string& role) const {
+    return {fmt::format("tls://127.0.0.1:{}", port_), folder_ / "ca.pem",
+            folder_ / (role + "-hall.credentials")};
+  }
+  // Why not; empty: connected.
+  static std::string Why(const NatsAccess& access) {
+    try {
+      SiteStreams(access, "hall");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / "cluster_access";
+  const int port_ = FreePort();
+  std::unique_ptr<Program> server_;
+};
+
+TEST_F(Access, CoreAndWorkerComeInAndNobodyElse) {
+  EXPECT_THAT(Why(As("core")), IsEmpty());
+  EXPECT_THAT(Why(As("worker")), IsEmpty());
+  NatsAccess plain = As("worker");
+  plain.url = fmt::format("nats://127.0.0.1:{}", port_);
+  EXPECT_THAT(Why(plain), HasSubstr("would show the password to the network"));
+  plain.credentials.clear();
+  EXPECT_THAT(Why(plain), HasSubstr("takes TLS only: give --nats tls://"));
+  NatsAccess nobody = As("worker");
+  nobody.credentials.clear();
+  EXPECT_THAT(Why(nobody), HasSubstr("wants a user and a password: give --credentials"));
+  NatsAccess without_authority = As("worker");
+  without_authority.ca.clear();
+  EXPECT_THAT(Why(without_authority), HasSubstr("and with it --ca FILE"));
+}
+
+TEST_F(Access, AWrongPasswordIsRefused) {
+  NatsAccess access = As("worker");
+  access.credentials = folder_ / "wrong.credentials";
+  WriteNewFile(access.credentials, "user: worker-hall\npassword: 1234\n", kOwnerOnly);
+  EXPECT_THAT(Why(access), HasSubstr("refuses the user of " + access.credentials.string()));
+}
+
+TEST_F(Access, CredentialsThatOthersCanReadAreNotUsed) {
+  fs::permissions(As("worker").credentials, fs::perms::group_read, fs::perm_options::add);
+  EXPECT_THAT(Why(As("worker")), HasSubstr("others can read the password: chmod 600"));
+}
+
+TEST_F(Access, AServerOfAnotherAuthorityIsNotTrusted) {
+  const fs::path other = folder_ / "other";
+  ASSERT_EQ(std::system(fmt::format("{}/packaging/pangea-nats-config --sites hall --hosts "
+                                    "127.0.0.1 --out {} > /dev/null",
+                                    PANGEA_SOURCE_DIR, other.string())
+                            .c_str()),
+            0);
+  NatsAccess access = As("worker");
+  access.ca = other / "ca.pem";
+  EXPECT_THAT(Why(access), HasSubstr("certificate is not of the authority in"));
+}
+
+TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
+  SiteStreams core(As("core"), "hall");
+  core.Make();
+  const std::vector<uint8_t> data{1, 2, 3};
+  ASSERT_EQ(core.StoreEvent("OPTIONS_fusion", 7, data, 0).stored, SiteStreams::Stored::kNew);
+  SiteStreams worker(As("worker"), "hall");
+  EXPECT_TRUE(worker.AreThere());
+  Constraint result;
+  result.from = {{1, 5}, 3};
+  result.to = {{2, 6}, 4};
+  EXPECT_EQ(worker.Store(worker.EntryOf(result)), SiteStreams::Stored::kNew);
+  EXPECT_TRUE(worker.FindResult(result.to, result.Id()).has_value());
+  EXPECT_TRUE(worker.EventAt(1).has_value()) << "it reads the journal";
+  EXPECT_EQ(worker.StoreEvent("KEYFRAME_1", 7, data, 1).stored, SiteStreams::Stored::kUnreachable);
+  PlaceMatch match;
+  match.query = result.to;
+  EXPECT_EQ(worker.Store(worker.EntryOf(match)), SiteStreams::Stored::kUnreachable);
+  EXPECT_EQ(worker.StoreLease("worker", 0).stored, SiteStreams::Stored::kUnreachable);
+  EXPECT_EQ(core.JournalEnd(), 1u);
+  EXPECT_EQ(core.LeaseSequence(), 0u);
+  EXPECT_EQ(core.Store(core.EntryOf(match)), SiteStreams::Stored::kNew);
+  const auto taken = worker.TakeMatch();
+  ASSERT_TRUE(taken.has_value());
+  EXPECT_TRUE(worker.Acknowledge(taken->claim));
+}
+
+}  // namespace
+}  // namespace pangea

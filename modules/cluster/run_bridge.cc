@@ -1,0 +1,103 @@
+#include "cluster/run_bridge.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <functional>
+#include <random>
+#include <stdexcept>
+#include <thread>
+
+#include "bus/process.h"
+#include "bus/retransmission/journal_first.h"
+#include "bus/status_log.h"
+#include "cluster/core_bridge.h"
+#include "cluster/standby.h"
+#include "cluster/worker_bridge.h"
+
+namespace pangea {
+namespace {
+
+constexpr char kProgram[] = "pangea-bridge";
+constexpr std::chrono::milliseconds kStep{100};
+
+std::string DrawnHolder() {
+  std::array<char, 64> host{};
+  gethostname(host.data(), host.size() - 1);
+  return fmt::format("{}:{:08x}", host.data(), std::random_device{}());
+}
+
+// Until it holds or a signal comes; whether it holds. What is said changes is logged.
+bool Wait(const std::function<bool()>& holds, const std::function<std::string()>& said) {
+  InstallSignalHandlers();
+  StateChanges changes;
+  while (!StopRequested()) {
+    if (holds()) {
+      return true;
+    }
+    if (const auto line = changes.Take(WallUtime(), said())) {
+      Log(kProgram, *line);
+    }
+    std::this_thread::sleep_for(kStep);
+  }
+  return false;
+}
+
+int RunStandby(const BridgeArguments& arguments, SiteStreams& streams) {
+  if (arguments.journal.empty()) {
+    throw std::runtime_error("give --journal FILE, which follows the site's");
+  }
+  streams.Make(arguments.replicas);
+  Standby standby(arguments.journal, streams, arguments.holder);
+  const bool is_core =
+      Wait([&] { return standby.Step(WallUtime()); }, [&] { return standby.Said(); });
+  Log(kProgram, standby.Said());
+  return is_core ? 0 : 1;
+}
+
+int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) {
+  streams.Make(arguments.replicas);
+  SiteLease lease(streams, arguments.holder);
+  const auto said = [&] { return fmt::format("{} has the site", lease.seen_holder()); };
+  if (!lease.TryTake(WallUtime()) && !waits) {
+    throw std::runtime_error(said());
+  }
+  if (lease.term() == 0 && !Wait([&] { return lease.TryTake(WallUtime()); }, said)) {
+    return 0;
+  }
+  LcmBus bus(arguments.bus);
+  JournalFirstBus journal_first(bus, WallUtime());
+  CoreBridge core(journal_first, streams, lease);
+  const int code = RunProcess(bus, core, &journal_first);
+  lease.GiveBack();
+  return code;
+}
+
+int RunWorker(const BridgeArguments& arguments, SiteStreams& streams) {
+  if (!Wait([&] { return streams.AreThere(); },
+            [] { return std::string("waits for the site's server"); })) {
+    return 0;
+  }
+  LcmBus bus(arguments.bus);
+  WorkerBridge worker(bus, streams, arguments.max_matches);
+  return RunProcess(bus, worker);
+}
+
+}  // namespace
+
+int RunBridge(BridgeArguments arguments) {
+  SiteStreams streams(arguments.nats, arguments.site);
+  StartLog(kProgram, fmt::format("{} of site {}, bus {}, NATS {}", arguments.role, arguments.site,
+                                 arguments.bus, arguments.nats.url));
+  const bool drawn = arguments.holder.empty();
+  arguments.holder = drawn ? DrawnHolder() : arguments.holder;
+  if (arguments.role == "standby") {
+    return RunStandby(arguments, streams);
+  }
+  return arguments.role == "core" ? RunCore(arguments, streams, drawn)
+                                  : RunWorker(arguments, streams);
+}
+
+}  // namespace pangea

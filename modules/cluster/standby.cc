@@ -1,0 +1,37 @@
+#include "cluster/standby.h"
+
+#include <fmt/format.h>
+
+namespace pangea {
+
+Standby::Standby(const std::filesystem::path& journal, SiteStreams& streams,
+                 const std::string& holder)
+    : journal_(journal), streams_(streams), lease_(streams, holder), copy_(journal, streams) {}
+
+// Before the term is stored the former core may still write.
+bool Standby::Step(int64_t now_utime) {
+  const bool more = copy_.Follow();
+  if (begin_ == 0 && !more && lease_.TryTake(now_utime)) {
+    begin_ = StoreTerm(streams_, lease_.term());
+    copy_.Follow();
+  }
+  if (begin_ > 0 && !lease_.Renew(now_utime)) {
+    begin_ = 0;
+  }
+  if (begin_ == 0 || copy_.cursor().sequence < begin_) {
+    return false;
+  }
+  copy_.cursor().Write(journal_);
+  return true;
+}
+
+std::string Standby::Said() const {
+  return fmt::format(
+      "{}: {} bytes are as in NATS{}",
+      begin_ > 0 ? std::string("has the site")
+                 : fmt::format("stands by, {} has the site", lease_.seen_holder()),
+      copy_.cursor().file.num_bytes,
+      copy_.cut().empty() ? "" : "; what nobody was told is kept was cut off: " + copy_.cut());
+}
+
+}  // namespace pangea
