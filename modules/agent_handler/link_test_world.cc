@@ -112,7 +112,7 @@ void LinkWorld::StartHandler() {
   handler_server_side = std::make_unique<SwitchedBus>(server_bus);
   handler =
       std::make_unique<AgentHandlerProcess>(*handler_link_side, *handler_server_side, journal_path,
-                                            folder / "keys", kWall + now, AgentHandlerOptions{});
+                                            folder / "keys", kWall + now, handler_options);
 }
 
 void LinkWorld::KillHandler() {

@@ -75,6 +75,7 @@ class LinkWorld : public testing::Test {
   LocalBus agent_bus, server_bus;
   LossyBus link_bus;
   UplinkOptions options;
+  AgentHandlerOptions handler_options;
   std::filesystem::path folder;  // journal and keys
   std::string journal_path;
   std::vector<std::unique_ptr<SwitchedBus>> dead_buses;
