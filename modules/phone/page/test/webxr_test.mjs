@@ -141,6 +141,7 @@ await run(async () => {
   await ben.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
   const { images, sent } = await anna.evaluate(() => ({ images: pangea.walk.numImages, sent: pangea.walk.uplink.counters }));
   check("its images became keyframes", sent.keyframes_acked > 20, `${images} images, ${sent.keyframes_acked} keyframes acknowledged`);
+  await anna.waitForFunction(() => pangea.walk.pose.group, undefined, { timeout: 60_000 }).catch(() => {});
   await checkFused([anna, ben]);
   await checkShown(ben, second, target);
   await browser.close();
