@@ -29,13 +29,15 @@ ExternalOdometryProcess::ExternalOdometryProcess(Bus& bus, int32_t agent_id,
   });
 }
 
-// As an even motion would have it, within what a body can be accelerated.
+// As an even motion would have it, within what a body can be accelerated. Images that are left out
+// are no loss: the odometry has seen them.
 bool ExternalOdometryProcess::GoesOn(const Step& now) const {
   const double dt = 1e-6 * static_cast<double>(now.utime - last_->utime);
   const Eigen::Vector3d off = now.T_odom_body.t - last_->T_odom_body.t - last_->v_odom_body * dt;
   const double angle = LogSo3(last_->T_odom_body.q.conjugate() * now.T_odom_body.q).norm();
-  return now.utime - last_->utime <= kMaxGap_us &&
-         off.norm() <= kMaxStep_m + kMaxAcceleration * dt * dt && angle <= kMaxRotation * dt;
+  const bool long_lost = lost_ && now.utime - last_->utime > kMaxLost_us;
+  return !long_lost && off.norm() <= kMaxStep_m + kMaxAcceleration * dt * dt &&
+         angle <= kMaxRotation * dt;
 }
 
 std::optional<Keyframe> ExternalOdometryProcess::AddImage(
@@ -43,6 +45,7 @@ std::optional<Keyframe> ExternalOdometryProcess::AddImage(
   node_.Count("frames");
   Step now{utime, T_odom_body.value_or(Rigid3{}), Eigen::Vector3d::Zero()};
   if (!T_odom_body) {
+    lost_ = true;
     Publish(now, /*tracking=*/false);
     return std::nullopt;
   }
@@ -60,6 +63,7 @@ std::optional<Keyframe> ExternalOdometryProcess::AddImage(
                       (1e-6 * static_cast<double>(now.utime - last_->utime));
   }
   last_ = now;
+  lost_ = false;
   std::optional<Keyframe> keyframe = maker_->Add(utime, image, *T_odom_body);
   Publish(now, /*tracking=*/true);
   if (keyframe) {

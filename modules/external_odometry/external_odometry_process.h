@@ -23,8 +23,8 @@ namespace pangea {
 class ExternalOdometryProcess : public Process {
  public:
   static constexpr size_t kKeptKeyframes = 200;
-  // Without a pose for longer, what comes is a new map.
-  static constexpr int64_t kMaxGap_us = 500'000;
+  // Lost for longer, what comes is a new map.
+  static constexpr int64_t kMaxLost_us = 500'000;
   // What a hand, or a drone, does not do: away from an even motion by more than this, and this over
   // the square of the time; or a rotation that is faster.
   static constexpr double kMaxStep_m = 0.1;
@@ -65,6 +65,7 @@ class ExternalOdometryProcess : public Process {
   MapId map_;
   std::optional<KeyframeMaker> maker_;  // of this map; none: the next pose opens one
   std::optional<Step> last_;            // of this map
+  bool lost_ = false;                   // since then
   int64_t next_status_utime_ = 0;
 };
 

@@ -101,6 +101,14 @@ TEST_F(ExternalOdometryTest, ShortlyLostGoesOnLongLostDoesNot) {
   EXPECT_EQ(Maps(), 2);
 }
 
+TEST_F(ExternalOdometryTest, ImagesThatAreLeftOutAreNoLoss) {
+  Walk(20);
+  x_m_ += 1.4;
+  Add(Rigid3{Eigen::Quaterniond::Identity(), {x_m_, 0, 1.5}}, 1'400'000);
+  Walk(20);
+  EXPECT_EQ(Maps(), 1);
+}
+
 TEST_F(ExternalOdometryTest, WhatItShowsFollowsTheCorrection) {
   Walk(20);
   Correction correction;

@@ -99,6 +99,7 @@ async function startXr(): Promise<boolean> {
     walk = Walk.xr(device, cameraYaml, membership, stage, events);
     enter();
   };
+  device.start();
   return true;
 }
 

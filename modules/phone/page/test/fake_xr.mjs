@@ -83,13 +83,13 @@ export function installFakeXr({ refusedFeature, frame_ms }) {
     constructor(_session, gl) {
       [this.gl, this.texture] = [gl, gl.createTexture()];
     }
-    // The first row of the texture is the lowest of the image.
+    // The first row of the texture is the lowest of the image. Of a canvas: WebGL does not flip an ImageBitmap.
     getCameraImage({ frame }) {
       if (!frame.active) throw new DOMException("the frame is over", "InvalidStateError");
       const { gl } = this;
       gl.bindTexture(gl.TEXTURE_2D, this.texture);
       gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, true);
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, frame.seen.picture);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, behind);
       gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
       return this.texture;
     }

@@ -18,16 +18,19 @@ export const noteOthers = (page) => page.evaluate(() => {
   }, 200);
 });
 
-// `a` and `b`: {page, truth, agent}. Both at once: b as a shows it, where b's own image was at that time.
+// `a` and `b`: {page, truth, agent, camera, timeOf}; `timeOf` gives the truth's time of an image, without it the image's. Both at once: b as a shows it, where b's own image was at that time.
 export async function checkOther(a, b) {
+  const cameraAt = ({ truth, timeOf = (utime) => utime }, utime) => timeOf(utime) && truth.cameraAt(timeOf(utime));
   const [ofA, ofB] = await Promise.all([a, b].map(({ page }) => page.evaluate(() => notedOthers)));
   const errors = [];
   for (const { wall, utime, T_odom_body, others } of ofA) {
     const shown = others.find(({ agent }) => agent === b.agent);
     const its = ofB.findLast((note) => note.wall <= wall);
     if (!shown || !its || wall - its.wall > 500) continue;
-    const inOdom = matrixOf(T_odom_body).multiply(a.truth.camera.T_body_cam).invert().multiply(matrixOf(shown.T_odom_cam));
-    const inHall = a.truth.cameraAt(utime).invert().multiply(b.truth.cameraAt(its.utime));
+    const inOdom = matrixOf(T_odom_body).multiply(a.camera ?? a.truth.camera.T_body_cam).invert().multiply(matrixOf(shown.T_odom_cam));
+    const [from, to] = [cameraAt(a, utime), cameraAt(b, its.utime)];
+    if (!from || !to) continue;
+    const inHall = from.invert().multiply(to);
     errors.push(new Vector3().setFromMatrixPosition(inOdom).distanceTo(new Vector3().setFromMatrixPosition(inHall)));
   }
   errors.sort((x, y) => x - y);

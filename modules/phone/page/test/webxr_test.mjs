@@ -1,10 +1,11 @@
 // A page whose device has an odometry of its own, by a fake of WebXR that plays a rendered recording's images with their exact poses;
-// beside it a page that plays another recording as always, at a real server: they fuse, and the second shows the anchor of the first.
+// beside it a page that plays another recording as always, at a real server: they fuse, the second shows the anchor of the first, and each shows the other.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 import { checkFused, checkShown, chooseTarget, noteDrawn, photograph } from "./anchor_truth.mjs";
 import { installFakeXr, projectionOf } from "./fake_xr.mjs";
+import { checkOther, noteOthers } from "./others_truth.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
 
@@ -78,18 +79,16 @@ async function playAsXr(page, folder, truth) {
       }
       window.xrLoaded = true;
     })();
+    // True to time: what is late is left out; where none is ready, time stands still.
     let due_ms = Infinity;
     let shown;
     window.xrSource = (time) => {
       if (ready.length > 10 && due_ms === Infinity) due_ms = time;
-      if (time >= due_ms && ready.length > 0) {
-        shown = ready.shift();
-        due_ms += frame_ms;
-      } else if (ready.length === 0 && window.xrLoaded) {
-        window.xrEnded = true;
-      } else {
-        return undefined;
-      }
+      if (ready.length === 0 && window.xrLoaded) window.xrEnded = true;
+      else if (ready.length === 0) due_ms = time;
+      if (time < due_ms && !window.xrEnded) return undefined;
+      for (; time >= due_ms && ready.length > 0; due_ms += frame_ms) shown = ready.shift();
+      if (!shown) return undefined;
       window.xrIndex.set(Math.round(1000 * (performance.timeOrigin + time)), shown.utime);
       return shown;
     };
@@ -128,12 +127,14 @@ await run(async () => {
   await anna.locator("#start").click();
   await anna.waitForFunction(() => pangea.walk?.link === "open" && pangea.walk.pose?.state === "tracking", undefined, { timeout: 120_000 });
   check("the device's odometry has joined, and the link is open", true);
+  await noteOthers(anna);
   const placing = place(anna, first, target);
   const ben = await openPage(browser, server.invite("Ben"), { viewport: { width: 960, height: 720 } });
   await ben.locator("#name").fill("Ben");
   await ben.locator("#folder").setInputFiles(recording(2));
   await ben.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 300_000 });
   await noteDrawn(ben);
+  await noteOthers(ben);
   void photograph(ben, `${options.out}/phone_webxr_2.png`);
   check("it places an anchor", await placing, `${target.distance.toFixed(1)} m away`);
   await anna.waitForFunction(() => window.xrEnded, undefined, { timeout: 300_000 });
@@ -141,7 +142,17 @@ await run(async () => {
   await ben.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
   const { images, sent } = await anna.evaluate(() => ({ images: pangea.walk.numImages, sent: pangea.walk.uplink.counters }));
   check("its images became keyframes", sent.keyframes_acked > 20, `${images} images, ${sent.keyframes_acked} keyframes acknowledged`);
+  await anna.waitForFunction(() => pangea.walk.pose.group, undefined, { timeout: 60_000 }).catch(() => {});
   await checkFused([anna, ben]);
   await checkShown(ben, second, target);
+  const index = new Map(await anna.evaluate(() => [...xrIndex]));
+  const agentOf = (page) => page.evaluate(() => pangea.walk.membership.agent);
+  const device = {
+    page: anna, truth: first, agent: await agentOf(anna), camera: new Matrix4().makeRotationX(Math.PI),
+    timeOf: (utime) => index.get(utime) && index.get(utime) + first.readout_us / 2,
+  };
+  const other = { page: ben, truth: second, agent: await agentOf(ben) };
+  await checkOther(device, other);
+  await checkOther(other, device);
   await browser.close();
 });

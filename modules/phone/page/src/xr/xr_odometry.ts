@@ -72,7 +72,11 @@ export class XrOdometry {
     this.target.texture.colorSpace = renderer.outputColorSpace;
     Object.assign(this.target, { isXRRenderTarget: true }); // three.js: its colours are the screen's
     session.addEventListener("end", () => this.end());
-    session.requestAnimationFrame(this.onAnimationFrame);
+  }
+
+  // Once who listens is there.
+  start() {
+    this.session.requestAnimationFrame(this.onAnimationFrame);
     setTimeout(() => !this.size && this.stop(), kNoCamera_ms);
   }
 
