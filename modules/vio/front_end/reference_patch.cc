@@ -2,8 +2,11 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace pangea::vio {
 namespace {
@@ -24,6 +27,23 @@ constexpr float kMinContrast = 2.0F;
 constexpr float kStiffness = 0.02F;
 constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
 
+// Of eight pixels and their right neighbours, blended by `share` of the neighbour.
+std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
+                                          const float* share) {
+  const cv::v_uint16x8 pairs = cv::v_reinterpret_as_u16(cv::v_lut_pairs(grey, offset));
+  const cv::v_int16x8 left = cv::v_reinterpret_as_s16(pairs & cv::v_setall_u16(0xff));
+  const cv::v_int16x8 change = cv::v_reinterpret_as_s16(pairs >> 8) - left;
+  std::array<cv::v_int32x4, 2> left_of, change_of;
+  cv::v_expand(left, left_of[0], left_of[1]);
+  cv::v_expand(change, change_of[0], change_of[1]);
+  std::array<cv::v_float32x4, 2> blended;
+  for (int half = 0; half < 2; ++half) {
+    blended[half] = cv::v_cvt_f32(left_of[half]) +
+                    cv::v_load(share + 4 * half) * cv::v_cvt_f32(change_of[half]);
+  }
+  return blended;
+}
+
 }  // namespace
 
 bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
@@ -35,35 +55,31 @@ bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
         at.y() + reach_y < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // Row by row in steps that the compiler makes vector instructions of, but for the four reads.
-  const int step = static_cast<int>(image.step);
-  std::array<int, kSize> offset;
-  std::array<float, kSize> fx, fy;
-  std::array<std::array<uchar, kSize>, 4> grey;  // above left, above right, below left, below right
+  // Row by row, eight pixels at a time; the last of a row is read again for those beyond it.
+  constexpr int kPadded = (kSize + 7) / 8 * 8;
+  const auto step = static_cast<int>(image.step);
+  std::array<int, kPadded> offset;
+  std::array<float, kPadded> fx, fy, grey;
   for (int v = 0; v < kSize; ++v) {
     const Eigen::Vector2f p0 = at + a * Eigen::Vector2f(-kHalf, static_cast<float>(v) - kHalf);
-    for (int u = 0; u < kSize; ++u) {
-      const float px = p0.x() + static_cast<float>(u) * a(0, 0);
-      const float py = p0.y() + static_cast<float>(u) * a(1, 0);
+    for (int u = 0; u < kPadded; ++u) {
+      const auto along = static_cast<float>(std::min(u, kSize - 1));
+      const float px = p0.x() + along * a(0, 0);
+      const float py = p0.y() + along * a(1, 0);
       const int x = static_cast<int>(px), y = static_cast<int>(py);
       fx[u] = px - static_cast<float>(x);
       fy[u] = py - static_cast<float>(y);
       offset[u] = y * step + x;
     }
-    for (int u = 0; u < kSize; ++u) {
-      const uchar* above = image.data + offset[u];
-      const uchar* below = above + step;
-      grey[0][u] = above[0];
-      grey[1][u] = above[1];
-      grey[2][u] = below[0];
-      grey[3][u] = below[1];
+    for (int u = 0; u < kPadded; u += 8) {
+      const auto top = BlendPairs(image.data, &offset[u], &fx[u]);
+      const auto bottom = BlendPairs(image.data + step, &offset[u], &fx[u]);
+      for (int half = 0; half < 2; ++half) {
+        const cv::v_float32x4 f = cv::v_load(&fy[u + 4 * half]);
+        cv::v_store(&grey[u + 4 * half], top[half] + f * (bottom[half] - top[half]));
+      }
     }
-    float* row = values->data() + v * kSize;
-    for (int u = 0; u < kSize; ++u) {
-      const float top = grey[0][u] + fx[u] * static_cast<float>(grey[1][u] - grey[0][u]);
-      const float bottom = grey[2][u] + fx[u] * static_cast<float>(grey[3][u] - grey[2][u]);
-      row[u] = top + fy[u] * (bottom - top);
-    }
+    std::memcpy(values->data() + v * kSize, grey.data(), kSize * sizeof(float));
   }
   return true;
 }
