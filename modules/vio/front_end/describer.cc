@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace pangea::vio {
 namespace {
@@ -68,7 +69,7 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
 
 void Describer::BuildPyramid(const cv::Mat& image) {
   pyramid_.resize(scales_.size());
-  fast_.resize(scales_.size());
+  strong_.resize(scales_.size());
   for (size_t octave = 0; octave < scales_.size(); ++octave) {
     if (octave == 0) {
       pyramid_[0] = image;
@@ -77,34 +78,52 @@ void Describer::BuildPyramid(const cv::Mat& image) {
                           static_cast<int>(std::lround(image.rows / scales_[octave])));
       cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
     }
-    cv::FAST(pyramid_[octave], fast_[octave], options_.fast_threshold_low, true);
+    cv::FAST(pyramid_[octave], strong_[octave], options_.fast_threshold, true);
   }
+}
+
+// Corners in a part of an octave by the low threshold. FAST looks 3 px around a pixel, and its
+// neighbours' responses count.
+std::vector<cv::KeyPoint> Describer::WeakCorners(int octave, const cv::Rect& part) const {
+  constexpr int kReach = 4;
+  const cv::Mat& level = pyramid_[octave];
+  const cv::Rect around = cv::Rect(part.x - kReach, part.y - kReach, part.width + 2 * kReach,
+                                   part.height + 2 * kReach) &
+                          cv::Rect({0, 0}, level.size());
+  std::vector<cv::KeyPoint> found;
+  cv::FAST(level(around), found, options_.fast_threshold_low, true);
+  for (cv::KeyPoint& corner : found) {
+    corner.pt += cv::Point2f(around.tl());
+  }
+  std::erase_if(found,
+                [&](const cv::KeyPoint& corner) { return !part.contains(cv::Point(corner.pt)); });
+  return found;
 }
 
 std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted) const {
   const cv::Mat& level = pyramid_[octave];
+  const cv::Rect inside(kBorder, kBorder, level.cols - 2 * kBorder, level.rows - 2 * kBorder);
   const int cell_px = options_.cell_px;
   const int columns = (level.cols + cell_px - 1) / cell_px;
-  const std::vector<cv::KeyPoint>& found = fast_[octave];
+  const int rows = (level.rows + cell_px - 1) / cell_px;
+  std::vector<cv::KeyPoint> corners = strong_[octave];
   // A cell with strong corners keeps only those.
-  std::vector<bool> has_strong;
-  const auto cell_of = [&](const cv::KeyPoint& corner) {
-    return static_cast<size_t>(corner.pt.y) / cell_px * columns +
-           static_cast<size_t>(corner.pt.x) / cell_px;
-  };
-  has_strong.resize(static_cast<size_t>(columns) * (level.rows / cell_px + 1), false);
-  for (const cv::KeyPoint& corner : found) {
-    if (corner.response >= static_cast<float>(options_.fast_threshold)) {
-      has_strong[cell_of(corner)] = true;
+  std::vector<bool> has_strong(static_cast<size_t>(columns) * rows, false);
+  for (const cv::KeyPoint& corner : corners) {
+    has_strong[static_cast<size_t>(corner.pt.y) / cell_px * columns +
+               static_cast<size_t>(corner.pt.x) / cell_px] = true;
+  }
+  for (int cell = 0; cell < columns * rows; ++cell) {
+    const cv::Rect part =
+        cv::Rect(cell % columns * cell_px, cell / columns * cell_px, cell_px, cell_px) & inside;
+    if (!has_strong[cell] && !part.empty()) {
+      const std::vector<cv::KeyPoint> weak = WeakCorners(octave, part);
+      corners.insert(corners.end(), weak.begin(), weak.end());
     }
   }
   std::vector<Candidate> candidates;
-  for (const cv::KeyPoint& corner : found) {
-    const bool inside = corner.pt.x >= kBorder && corner.pt.y >= kBorder &&
-                        corner.pt.x < static_cast<float>(level.cols - kBorder) &&
-                        corner.pt.y < static_cast<float>(level.rows - kBorder);
-    if (inside && (corner.response >= static_cast<float>(options_.fast_threshold) ||
-                   !has_strong[cell_of(corner)])) {
+  for (const cv::KeyPoint& corner : corners) {
+    if (inside.contains(cv::Point(corner.pt))) {
       Candidate candidate;
       candidate.level_pixel = corner.pt;
       candidate.octave = octave;
@@ -112,15 +131,20 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
       candidates.push_back(candidate);
     }
   }
+  // Row by row, as equal ones are chosen in this order.
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::pair(a.level_pixel.y, a.level_pixel.x) <
+           std::pair(b.level_pixel.y, b.level_pixel.x);
+  });
   return SpreadOver(candidates, cell_px, columns, static_cast<size_t>(wanted));
 }
 
-float Describer::CornerStrength(int octave, const cv::Point2f& level_pixel, cv::Point2f* at) const {
-  const std::vector<cv::KeyPoint>& found = fast_[octave];  // row by row
-  auto corner = std::lower_bound(found.begin(), found.end(), level_pixel.y - kSnapRadius,
+float Describer::StrongestNear(const std::vector<cv::KeyPoint>& corners,
+                               const cv::Point2f& level_pixel, cv::Point2f* at) {
+  auto corner = std::lower_bound(corners.begin(), corners.end(), level_pixel.y - kSnapRadius,
                                  [](const cv::KeyPoint& one, float y) { return one.pt.y < y; });
   float best = 0;
-  for (; corner != found.end() && corner->pt.y <= level_pixel.y + kSnapRadius; ++corner) {
+  for (; corner != corners.end() && corner->pt.y <= level_pixel.y + kSnapRadius; ++corner) {
     if (corner->response > best && cv::norm(corner->pt - level_pixel) <= kSnapRadius) {
       best = corner->response;
       *at = corner->pt;
@@ -129,32 +153,45 @@ float Describer::CornerStrength(int octave, const cv::Point2f& level_pixel, cv::
   return best;
 }
 
+// On the octave where it is the strongest corner; nothing too close to the rim.
+std::optional<Describer::Candidate> Describer::Place(const Eigen::Vector2f& pixel,
+                                                     bool weak_too) const {
+  std::optional<Candidate> best;
+  for (int octave = 0; octave < static_cast<int>(scales_.size()); ++octave) {
+    const cv::Point2f level_pixel = ToLevel(octave, pixel);
+    const cv::Mat& level = pyramid_[octave];
+    if (level_pixel.x < kBorder || level_pixel.y < kBorder ||
+        level_pixel.x >= static_cast<float>(level.cols - kBorder) ||
+        level_pixel.y >= static_cast<float>(level.rows - kBorder)) {
+      break;  // coarser levels only come closer to the rim
+    }
+    cv::Point2f at = level_pixel;
+    constexpr int kReach = static_cast<int>(kSnapRadius);
+    const cv::Rect near(static_cast<int>(level_pixel.x) - kReach,
+                        static_cast<int>(level_pixel.y) - kReach, 2 * kReach + 2, 2 * kReach + 2);
+    const float strength = weak_too ? StrongestNear(WeakCorners(octave, near), level_pixel, &at)
+                                    : StrongestNear(strong_[octave], level_pixel, &at);
+    if (!best || strength > best->response) {
+      best.emplace();
+      best->octave = octave;
+      best->level_pixel = at;
+      best->response = strength;
+      best->pixel = pixel;
+    }
+  }
+  return best;
+}
+
 std::vector<Describer::Candidate> Describer::PlaceLandmarks(const TrackedFrame& frame) const {
   std::vector<Candidate> candidates;
   for (const Observation& observation : frame.observations) {
-    Candidate best;
-    bool placed = false;
-    for (size_t octave = 0; octave < scales_.size(); ++octave) {
-      const cv::Point2f level_pixel = ToLevel(static_cast<int>(octave), observation.pixel);
-      const cv::Mat& level = pyramid_[octave];
-      if (level_pixel.x < kBorder || level_pixel.y < kBorder ||
-          level_pixel.x >= static_cast<float>(level.cols - kBorder) ||
-          level_pixel.y >= static_cast<float>(level.rows - kBorder)) {
-        break;  // coarser levels only come closer to the rim
-      }
-      cv::Point2f at = level_pixel;
-      const float strength = CornerStrength(static_cast<int>(octave), level_pixel, &at);
-      if (!placed || strength > best.response) {
-        best.octave = static_cast<int>(octave);
-        best.level_pixel = at;
-        best.response = strength;
-        placed = true;
-      }
+    auto placed = Place(observation.pixel, false);
+    if (placed && placed->response == 0) {
+      placed = Place(observation.pixel, true);
     }
     if (placed) {
-      best.landmark_id = observation.landmark_id;
-      best.pixel = observation.pixel;
-      candidates.push_back(best);
+      placed->landmark_id = observation.landmark_id;
+      candidates.push_back(*placed);
     }
   }
   return candidates;

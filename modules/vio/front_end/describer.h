@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/camera_model.h"
@@ -58,7 +59,10 @@ class Describer {
   void BuildPyramid(const cv::Mat& image);
   std::vector<Candidate> FindCorners(int octave, int wanted) const;
   std::vector<Candidate> PlaceLandmarks(const TrackedFrame& frame) const;
-  float CornerStrength(int octave, const cv::Point2f& level_pixel, cv::Point2f* at) const;
+  std::vector<cv::KeyPoint> WeakCorners(int octave, const cv::Rect& part) const;
+  static float StrongestNear(const std::vector<cv::KeyPoint>& corners,
+                             const cv::Point2f& level_pixel, cv::Point2f* at);
+  std::optional<Candidate> Place(const Eigen::Vector2f& pixel, bool weak_too) const;
   cv::Point2f ToLevel(int octave, const Eigen::Vector2f& pixel) const;
   Eigen::Vector2f ToImage(int octave, const cv::Point2f& level_pixel) const;
   float Angle(int octave, const cv::Point2f& level_pixel) const;
@@ -68,7 +72,7 @@ class Describer {
   DescriberOptions options_;
   std::vector<double> scales_;  // nominal, of each octave
   std::vector<cv::Mat> pyramid_;
-  std::vector<std::vector<cv::KeyPoint>> fast_;  // all corners of each octave, row by row
+  std::vector<std::vector<cv::KeyPoint>> strong_;  // corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;
 };
 

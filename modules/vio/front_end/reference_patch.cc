@@ -2,14 +2,17 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace pangea::vio {
 namespace {
 
 constexpr int kIterations = 10;
-constexpr float kConverged_px = 0.01F;
+constexpr float kConverged_px = 0.02F;
 // Correction of what image-to-image tracking says, beyond which it is another place.
 constexpr float kMaxCorrection_px = 2.0F;
 // Correlation of the patch with what is found.
@@ -24,10 +27,29 @@ constexpr float kMinContrast = 2.0F;
 constexpr float kStiffness = 0.02F;
 constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
 
+// Of eight pixels and their right neighbours, blended by `share` of the neighbour.
+std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
+                                          const float* share) {
+  const cv::v_uint16x8 pairs = cv::v_reinterpret_as_u16(cv::v_lut_pairs(grey, offset));
+  const cv::v_int16x8 left = cv::v_reinterpret_as_s16(pairs & cv::v_setall_u16(0xff));
+  const cv::v_int16x8 change = cv::v_reinterpret_as_s16(pairs >> 8) - left;
+  std::array<cv::v_int32x4, 2> left_of, change_of;
+  cv::v_expand(left, left_of[0], left_of[1]);
+  cv::v_expand(change, change_of[0], change_of[1]);
+  std::array<cv::v_float32x4, 2> blended;
+  for (int half = 0; half < 2; ++half) {
+    blended[half] = cv::v_cvt_f32(left_of[half]) +
+                    cv::v_load(share + 4 * half) * cv::v_cvt_f32(change_of[half]);
+  }
+  return blended;
+}
+
 }  // namespace
 
+template <int kSide>
 bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
-                            const Eigen::Matrix2f& a, Values* values) {
+                            const Eigen::Matrix2f& a, float* values) {
+  constexpr float kHalf = (kSide - 1) / 2.0F;
   const float reach_x = kHalf * (std::abs(a(0, 0)) + std::abs(a(0, 1)));
   const float reach_y = kHalf * (std::abs(a(1, 0)) + std::abs(a(1, 1)));
   if (!(at.x() - reach_x >= 0 && at.y() - reach_y >= 0 &&
@@ -35,35 +57,31 @@ bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
         at.y() + reach_y < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // Row by row in steps that the compiler makes vector instructions of, but for the four reads.
-  const int step = static_cast<int>(image.step);
-  std::array<int, kSize> offset;
-  std::array<float, kSize> fx, fy;
-  std::array<std::array<uchar, kSize>, 4> grey;  // above left, above right, below left, below right
-  for (int v = 0; v < kSize; ++v) {
+  // Row by row, eight pixels at a time; the last of a row is read again for those beyond it.
+  constexpr int kPadded = (kSide + 7) / 8 * 8;
+  const auto step = static_cast<int>(image.step);
+  std::array<int, kPadded> offset;
+  std::array<float, kPadded> fx, fy, grey;
+  for (int v = 0; v < kSide; ++v) {
     const Eigen::Vector2f p0 = at + a * Eigen::Vector2f(-kHalf, static_cast<float>(v) - kHalf);
-    for (int u = 0; u < kSize; ++u) {
-      const float px = p0.x() + static_cast<float>(u) * a(0, 0);
-      const float py = p0.y() + static_cast<float>(u) * a(1, 0);
+    for (int u = 0; u < kPadded; ++u) {
+      const auto along = static_cast<float>(std::min(u, kSide - 1));
+      const float px = p0.x() + along * a(0, 0);
+      const float py = p0.y() + along * a(1, 0);
       const int x = static_cast<int>(px), y = static_cast<int>(py);
       fx[u] = px - static_cast<float>(x);
       fy[u] = py - static_cast<float>(y);
       offset[u] = y * step + x;
     }
-    for (int u = 0; u < kSize; ++u) {
-      const uchar* above = image.data + offset[u];
-      const uchar* below = above + step;
-      grey[0][u] = above[0];
-      grey[1][u] = above[1];
-      grey[2][u] = below[0];
-      grey[3][u] = below[1];
+    for (int u = 0; u < kPadded; u += 8) {
+      const auto top = BlendPairs(image.data, &offset[u], &fx[u]);
+      const auto bottom = BlendPairs(image.data + step, &offset[u], &fx[u]);
+      for (int half = 0; half < 2; ++half) {
+        const cv::v_float32x4 f = cv::v_load(&fy[u + 4 * half]);
+        cv::v_store(&grey[u + 4 * half], top[half] + f * (bottom[half] - top[half]));
+      }
     }
-    float* row = values->data() + v * kSize;
-    for (int u = 0; u < kSize; ++u) {
-      const float top = grey[0][u] + fx[u] * static_cast<float>(grey[1][u] - grey[0][u]);
-      const float bottom = grey[2][u] + fx[u] * static_cast<float>(grey[3][u] - grey[2][u]);
-      row[u] = top + fy[u] * (bottom - top);
-    }
+    std::memcpy(values + v * kSide, grey.data(), kSide * sizeof(float));
   }
   return true;
 }
@@ -81,26 +99,30 @@ float ReferencePatch::Normalise(Values* values) {
 std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
                                                    const Eigen::Vector2f& pixel) {
   ReferencePatch patch;
-  const Eigen::Matrix2f a = Eigen::Matrix2f::Identity();
-  const Eigen::Vector2f dx = Eigen::Vector2f::UnitX();
-  const Eigen::Vector2f dy = Eigen::Vector2f::UnitY();
-  Values left, right, up, down;
-  if (!Sample(image, pixel, a, &patch.look_) || !Sample(image, pixel - dx, a, &left) ||
-      !Sample(image, pixel + dx, a, &right) || !Sample(image, pixel - dy, a, &up) ||
-      !Sample(image, pixel + dy, a, &down)) {
+  // A pixel more on each side, for its derivatives.
+  constexpr int kSide = kSize + 2;
+  using Square = Eigen::Array<float, kSide, kSide, Eigen::RowMajor>;
+  Square values;
+  if (!Sample<kSide>(image, pixel, Eigen::Matrix2f::Identity(), values.data())) {
     return std::nullopt;
   }
+  using Inner = Eigen::Array<float, kSize, kSize, Eigen::RowMajor>;
+  const auto moved = [&values](int x, int y) -> Inner {
+    return values.block<kSize, kSize>(1 + y, 1 + x);
+  };
+  patch.look_ = moved(0, 0).reshaped<Eigen::RowMajor>();
   const float length = Normalise(&patch.look_);
   if (length == 0) {
     return std::nullopt;
   }
-  const Values gx = (right - left) / (2 * length);
-  const Values gy = (down - up) / (2 * length);
+  const Inner gx = (moved(1, 0) - moved(-1, 0)) / (2 * length);
+  const Inner gy = (moved(0, 1) - moved(0, -1)) / (2 * length);
   for (int i = 0; i < kCount; ++i) {
     const int row = i / kSize;
     const float u = static_cast<float>(i - row * kSize) - kHalf;
     const float v = static_cast<float>(row) - kHalf;
-    patch.jacobian_.row(i) << gx[i], gy[i], gx[i] * u, gy[i] * u, gx[i] * v, gy[i] * v;
+    const float x = gx.data()[i], y = gy.data()[i];
+    patch.jacobian_.row(i) << x, y, x * u, y * u, x * v, y * v;
   }
   // Normalising makes the look blind to brightness and contrast: so is its derivative.
   for (int column = 0; column < 6; ++column) {
@@ -121,7 +143,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
   Eigen::Vector2f at = guess;
   Values values;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!Sample(image, at, a, &values) || Normalise(&values) == 0) {
+    if (!Sample<kSize>(image, at, a, values.data()) || Normalise(&values) == 0) {
       return std::nullopt;
     }
     const Eigen::Matrix<float, 6, 1> step = gain_ * (jacobian_.transpose() * (values - look_));

@@ -238,11 +238,14 @@ bool StartProblem::Optimise(int max_iterations) {
   const auto linearise = [](const StartProblem& problem, double damping) {
     return problem.Linearise(damping);
   };
+  const auto solve = [](const StartProblem&, const Equations& equations) -> VectorXd {
+    return SolveScaled(equations.H, equations.g);
+  };
   const auto retract = [](const Equations& equations, const VectorXd& step, StartProblem* problem) {
     problem->Retract(equations, step);
   };
   const auto cost = [](const StartProblem& problem) { return problem.Cost(); };
-  return LevenbergMarquardt(options, linearise, retract, cost, this).converged;
+  return LevenbergMarquardt(options, linearise, solve, retract, cost, this).converged;
 }
 
 std::optional<Matrix6d> StartProblem::NewestCovariance() const {

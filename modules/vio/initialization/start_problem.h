@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/imu/preintegration.h"
@@ -75,6 +76,9 @@ class StartProblem {
   };
   // `damping`: Levenberg-Marquardt's, a share of the diagonal.
   Equations Linearise(double damping) const;
+  // All of it may move (levenberg_marquardt.h).
+  StartProblem Estimate() const { return *this; }
+  void SetEstimate(StartProblem estimate) { *this = std::move(estimate); }
   // Moves the frames by `step`, the points with them, and lets those settle.
   void Retract(const Equations& equations, const Eigen::VectorXd& step);
   // False when no step makes it better, though one was promised.

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "vio/window/landmark_factor.h"
 #include "vio/window/point_geometry.h"
+#include "vio/window/window_solver.h"
 
 namespace pangea::vio {
 namespace {
@@ -18,15 +20,23 @@ using Eigen::Vector3d;
 // A depth is worth sending when it is known to this share of itself.
 constexpr double kMaxRelativeSigma = 0.3;
 constexpr size_t kMinRays = 4;
-constexpr double kMaxRms = 2.0;  // sigmas
+constexpr double kMaxRms = 2.0;          // sigmas
+constexpr size_t kMinDepthsOfScale = 8;  // what fewer have in common is not the scale's error
 
 // Nothing is better known than this, whatever the window's rays say.
 constexpr double kMinRelativeSigma = 0.005;
 
+struct SeenPoint {
+  int32_t landmark_id = 0;
+  Triangulated at;
+  std::vector<FrameRay> rays;
+};
+
 // What the window's error does to the inverse depth.
-Eigen::RowVectorXd DepthJacobian(const WindowState& state, const Triangulated& point,
-                                 const std::vector<FrameRay>& rays) {
-  const NormalEquations::Elimination elimination = EliminateLandmark(state, {0, point.point, rays});
+Eigen::RowVectorXd DepthJacobian(const WindowState& state, const SeenPoint& seen) {
+  const std::vector<FrameRay>& rays = seen.rays;
+  const NormalEquations::Elimination elimination =
+      EliminateLandmark(state, {seen.landmark_id, seen.at.point, rays});
   const Eigen::RowVectorXd gain = elimination.gain.row(2);
   Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
   J.head<kCalibrationSize>() = gain.head<kCalibrationSize>();
@@ -40,25 +50,6 @@ Eigen::RowVectorXd DepthJacobian(const WindowState& state, const Triangulated& p
   return J;
 }
 
-// What is common to the relative errors of many depths is the scale's.
-class ScaleError {
- public:
-  void Add(const Eigen::RowVectorXd& J_inverse_depth, double inverse_depth) {
-    sum_ = count_ == 0 ? Eigen::RowVectorXd(J_inverse_depth / inverse_depth)
-                       : Eigen::RowVectorXd(sum_ + J_inverse_depth / inverse_depth);
-    ++count_;
-  }
-  std::optional<double> Sigma(const MatrixXd& P) const {
-    constexpr int kMinDepths = 8;  // fewer are not what is common
-    return count_ < kMinDepths ? std::nullopt
-                               : std::optional(std::sqrt(sum_.dot(sum_ * P)) / count_);
-  }
-
- private:
-  Eigen::RowVectorXd sum_;
-  int count_ = 0;
-};
-
 // The window has rotation first, messages translation.
 Matrix6d ExtrinsicsCovariance(const MatrixXd& P) {
   const std::array<int, 6> order = {3, 4, 5, 0, 1, 2};
@@ -66,28 +57,51 @@ Matrix6d ExtrinsicsCovariance(const MatrixXd& P) {
   return 0.5 * (covariance + covariance.transpose());
 }
 
-std::optional<LandmarkDepth> DepthOf(int32_t id, const WindowState& state, const MatrixXd& P,
-                                     const TrackHistory& history, int frame, ScaleError* scale) {
-  const std::vector<FrameRay> rays = history.RaysOf(id, state, 0);
-  const auto own = std::find_if(rays.begin(), rays.end(),
-                                [frame](const FrameRay& ray) { return ray.frame == frame; });
-  if (rays.size() < kMinRays || own == rays.end()) {
-    return std::nullopt;
+// The landmarks of one frame as its camera sees them.
+std::vector<SeenPoint> PointsSeen(const WindowState& state, const TrackHistory& history,
+                                  int frame) {
+  std::vector<SeenPoint> points;
+  for (TrackHistory::Track& track : history.Tracks(state)) {
+    const std::vector<FrameRay>& rays = track.rays;
+    const auto own = std::find_if(rays.begin(), rays.end(),
+                                  [frame](const FrameRay& ray) { return ray.frame == frame; });
+    if (rays.size() < kMinRays || own == rays.end()) {
+      continue;
+    }
+    const auto point = Triangulate(state, rays, static_cast<size_t>(own - rays.begin()));
+    if (point && point->rms <= kMaxRms && point->point.ray_rho.z() > 0) {
+      points.push_back({track.landmark_id, *point, std::move(track.rays)});
+    }
   }
-  const auto point = Triangulate(state, rays, static_cast<size_t>(own - rays.begin()));
-  if (!point || point->rms > kMaxRms) {
-    return std::nullopt;
+  return points;
+}
+
+// The depths worth sending, and what the errors common to them say of the scale.
+void AddDepths(const WindowState& state, const MatrixXd& P, const std::vector<SeenPoint>& points,
+               FinishedKeyframe* keyframe) {
+  const std::vector<int> rows = RowsOfPoses(state);
+  MatrixXd J(points.size(), rows.size());
+  for (size_t k = 0; k < points.size(); ++k) {
+    J.row(static_cast<Eigen::Index>(k)) = DepthJacobian(state, points[k])(rows);
   }
-  const double rho = point->point.ray_rho.z();
-  const double floor = kMinRelativeSigma * rho;
+  const MatrixXd P_rows = P(rows, rows);
   // Variance: that of the rays, and what the errors of calibration and frames do to it.
-  const Eigen::RowVectorXd J = DepthJacobian(state, *point, rays);
-  const double variance = std::max(point->covariance(2, 2) + J.dot(J * P), floor * floor);
-  if (!(rho > 0) || !(std::sqrt(variance) < kMaxRelativeSigma * rho)) {
-    return std::nullopt;
+  const Eigen::VectorXd of_window = (J * P_rows).cwiseProduct(J).rowwise().sum();
+  Eigen::RowVectorXd scale = Eigen::RowVectorXd::Zero(J.cols());
+  for (size_t k = 0; k < points.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    const double rho = points[k].at.point.ray_rho.z();
+    const double floor = kMinRelativeSigma * rho;
+    const double variance = std::max(points[k].at.covariance(2, 2) + of_window[row], floor * floor);
+    if (std::sqrt(variance) < kMaxRelativeSigma * rho) {
+      scale += J.row(row) / rho;
+      keyframe->landmarks.push_back({points[k].landmark_id, rho, variance});
+    }
   }
-  scale->Add(J, rho);
-  return LandmarkDepth{id, rho, variance};
+  if (keyframe->landmarks.size() >= kMinDepthsOfScale) {
+    keyframe->scale_sigma =
+        std::sqrt(scale.dot(scale * P_rows)) / static_cast<double>(keyframe->landmarks.size());
+  }
 }
 
 }  // namespace
@@ -145,13 +159,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   const int at = state.Offset(index);
   keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
   keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
-  ScaleError scale;
-  for (const auto& [id, ray] : history.Frame(frame.utime)) {
-    if (const auto depth = DepthOf(id, state, P, history, index, &scale)) {
-      keyframe.landmarks.push_back(*depth);
-    }
-  }
-  keyframe.scale_sigma = scale.Sigma(P);
+  AddDepths(state, P, PointsSeen(state, history, index), &keyframe);
   keyframe.T_body_cam_covariance = ExtrinsicsCovariance(P);
   return keyframe;
 }

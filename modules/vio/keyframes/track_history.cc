@@ -1,8 +1,9 @@
 #include "vio/keyframes/track_history.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include "core/median.h"
@@ -26,87 +27,113 @@ Eigen::Matrix<double, 2, 3> ByIntrinsics(const Observation& observation,
   return -J_pixel.leftCols<2>().inverse() * further;
 }
 
+using SeenLandmarks = TrackHistory::SeenLandmarks;
+
+bool HasSmallerId(const SeenLandmarks::value_type& a, const SeenLandmarks::value_type& b) {
+  return a.first < b.first;
+}
+
+SeenLandmarks::const_iterator Find(const SeenLandmarks& seen, int32_t landmark_id) {
+  const auto at = std::lower_bound(seen.begin(), seen.end(), landmark_id,
+                                   [](const auto& one, int32_t id) { return one.first < id; });
+  return at != seen.end() && at->first == landmark_id ? at : seen.end();
+}
+
+// Calls use(ray in a, ray in b) for the landmarks that both saw.
+template <typename Use>
+void ForShared(const SeenLandmarks& a, const SeenLandmarks& b, const Use& use) {
+  auto in_b = b.begin();
+  for (const auto& [id, ray] : a) {
+    while (in_b != b.end() && in_b->first < id) {
+      ++in_b;
+    }
+    if (in_b != b.end() && in_b->first == id) {
+      use(ray, in_b->second);
+    }
+  }
+}
+
 }  // namespace
 
 void TrackHistory::AddFrame(const TrackedFrame& frame, const CameraModel& camera,
                             double ray_sigma) {
-  auto& seen = frames_[frame.utime];
+  SeenLandmarks& seen = frames_[frame.utime];
   const double row_s = camera.height > 1 ? camera.readout_s / (camera.height - 1) : 0;
+  seen.reserve(frame.observations.size());
   for (const Observation& observation : frame.observations) {
-    seen[observation.landmark_id] = {-1, observation.ray, ray_sigma * observation.sigma_px,
-                                     row_s * static_cast<double>(observation.pixel.y()),
-                                     ByIntrinsics(observation, camera)};
+    seen.push_back(
+        {observation.landmark_id,
+         {-1, observation.ray, ray_sigma * observation.sigma_px,
+          row_s * static_cast<double>(observation.pixel.y()), ByIntrinsics(observation, camera)}});
   }
+  std::sort(seen.begin(), seen.end(), HasSmallerId);
 }
 
 void TrackHistory::RemoveLandmark(int32_t landmark_id) {
   for (auto& [utime, seen] : frames_) {
-    seen.erase(landmark_id);
-  }
-}
-
-std::vector<int32_t> TrackHistory::Landmarks() const {
-  std::set<int32_t> ids;
-  for (const auto& [utime, seen] : frames_) {
-    for (const auto& [id, ray] : seen) {
-      ids.insert(id);
+    const auto at = Find(seen, landmark_id);
+    if (at != seen.end()) {
+      seen.erase(at);
     }
   }
-  return {ids.begin(), ids.end()};
 }
 
-std::vector<FrameRay> TrackHistory::RaysOf(int32_t landmark_id, const WindowState& state,
-                                           int64_t from_utime) const {
-  std::vector<FrameRay> rays;
+std::vector<TrackHistory::Track> TrackHistory::Tracks(const WindowState& state) const {
+  struct Seen {
+    int32_t landmark_id;
+    int frame;
+    const FrameRay* ray;
+  };
+  std::vector<Seen> all;
   for (int i = 0; i <= state.Newest(); ++i) {
     const WindowFrame& in_window = state.frames[i];
-    const auto frame = frames_.find(in_window.utime);
-    if (in_window.pose_only || !in_window.is_tracked || in_window.utime < from_utime ||
-        frame == frames_.end()) {
-      continue;
-    }
-    const auto seen = frame->second.find(landmark_id);
-    if (seen != frame->second.end()) {
-      rays.push_back(seen->second);
-      rays.back().frame = i;
+    if (!in_window.pose_only && in_window.is_tracked) {
+      for (const auto& [id, ray] : Frame(in_window.utime)) {
+        all.push_back({id, i, &ray});
+      }
     }
   }
-  return rays;
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Seen& a, const Seen& b) { return a.landmark_id < b.landmark_id; });
+  std::vector<Track> tracks;
+  for (const Seen& seen : all) {
+    if (tracks.empty() || tracks.back().landmark_id != seen.landmark_id) {
+      tracks.push_back({seen.landmark_id, {}});
+    }
+    std::vector<FrameRay>& rays = tracks.back().rays;
+    rays.push_back(*seen.ray);
+    rays.back().frame = seen.frame;
+  }
+  return tracks;
 }
 
-bool TrackHistory::Sees(int64_t utime, int32_t landmark_id) const {
-  const auto frame = frames_.find(utime);
-  return frame != frames_.end() && frame->second.contains(landmark_id);
-}
-
-const std::map<int32_t, FrameRay>& TrackHistory::Frame(int64_t utime) const {
-  static const std::map<int32_t, FrameRay> kNothing;
+const SeenLandmarks& TrackHistory::Frame(int64_t utime) const {
+  static const SeenLandmarks kNothing;
   const auto frame = frames_.find(utime);
   return frame == frames_.end() ? kNothing : frame->second;
 }
 
+bool TrackHistory::Sees(int32_t landmark_id) const {
+  return std::any_of(frames_.begin(), frames_.end(), [landmark_id](const auto& frame) {
+    return Find(frame.second, landmark_id) != frame.second.end();
+  });
+}
+
 size_t TrackHistory::Shared(int64_t a_utime, int64_t b_utime) const {
-  const auto& seen = Frame(b_utime);
   size_t shared = 0;
-  for (const auto& [id, ray] : Frame(a_utime)) {
-    shared += seen.contains(id) ? 1 : 0;
-  }
+  ForShared(Frame(a_utime), Frame(b_utime), [&](const FrameRay&, const FrameRay&) { ++shared; });
   return shared;
 }
 
 TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_utime,
                                                const Eigen::Quaterniond& q_to_from) const {
   std::vector<double> shifts;
-  const auto& to = Frame(to_utime);
-  for (const auto& [id, ray] : Frame(from_utime)) {
-    const auto other = to.find(id);
-    if (other != to.end()) {
-      const Eigen::Vector3d rotated = q_to_from * Eigen::Vector3d(ray.ray.x(), ray.ray.y(), 1);
-      if (rotated.z() > 0.1) {
-        shifts.push_back((rotated.head<2>() / rotated.z() - other->second.ray).norm());
-      }
+  ForShared(Frame(from_utime), Frame(to_utime), [&](const FrameRay& from, const FrameRay& to) {
+    const Eigen::Vector3d rotated = q_to_from * from.ray.homogeneous();
+    if (rotated.z() > 0.1) {
+      shifts.push_back((rotated.hnormalized() - to.ray).norm());
     }
-  }
+  });
   if (shifts.empty()) {
     return {};
   }
@@ -115,13 +142,9 @@ TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_ut
 
 double TrackHistory::MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const {
   std::vector<double> shifts;
-  const auto& to = Frame(to_utime);
-  for (const auto& [id, ray] : Frame(from_utime)) {
-    const auto other = to.find(id);
-    if (other != to.end()) {
-      shifts.push_back((ray.ray - other->second.ray).norm() / ray.sigma);
-    }
-  }
+  ForShared(Frame(from_utime), Frame(to_utime), [&](const FrameRay& from, const FrameRay& to) {
+    shifts.push_back((from.ray - to.ray).norm() / from.sigma);
+  });
   if (shifts.size() < kMinShared) {
     return std::numeric_limits<double>::infinity();
   }

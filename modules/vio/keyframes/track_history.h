@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "core/camera_model.h"
@@ -21,15 +22,18 @@ class TrackHistory {
   void RemoveFrame(int64_t utime) { frames_.erase(utime); }
   void RemoveLandmark(int32_t landmark_id);
 
-  // All of one landmark's rays in the window's full frames from `from_utime` on that are tracked,
-  // oldest first.
-  std::vector<FrameRay> RaysOf(int32_t landmark_id, const WindowState& state,
-                               int64_t from_utime) const;
-  bool Sees(int64_t utime, int32_t landmark_id) const;
-  const std::map<int32_t, FrameRay>& Frame(int64_t utime) const;  // FrameRay::frame is not set
-  size_t Shared(int64_t a_utime, int64_t b_utime) const;          // landmarks that both frames saw
-  // Every landmark some frame saw, in order.
-  std::vector<int32_t> Landmarks() const;
+  // Every landmark's rays in the window's full frames that are tracked, oldest first; landmarks in
+  // order of their ids.
+  struct Track {
+    int32_t landmark_id = 0;
+    std::vector<FrameRay> rays;
+  };
+  std::vector<Track> Tracks(const WindowState& state) const;
+  // What one frame saw, in the same order; FrameRay::frame is not set.
+  using SeenLandmarks = std::vector<std::pair<int32_t, FrameRay>>;
+  const SeenLandmarks& Frame(int64_t utime) const;
+  bool Sees(int32_t landmark_id) const;                   // whether any frame did
+  size_t Shared(int64_t a_utime, int64_t b_utime) const;  // landmarks that both frames saw
 
   // Median shift between two frames' shared landmarks, rotation taken out, in rays; and how many
   // they share.
@@ -45,7 +49,7 @@ class TrackHistory {
   double MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const;
 
  private:
-  std::map<int64_t, std::map<int32_t, FrameRay>> frames_;
+  std::map<int64_t, SeenLandmarks> frames_;
 };
 
 }  // namespace pangea::vio

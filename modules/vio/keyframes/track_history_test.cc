@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <utility>
+#include <vector>
+
 #include "core/testing/numeric_jacobian.h"
 #include "core/testing/test_cameras.h"
 
@@ -21,7 +25,7 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
       TrackHistory history;
       history.AddFrame({1, {{5, pixel.cast<float>(), camera.Unproject(pixel).value()}}}, camera,
                        1e-3);
-      const FrameRay& seen = history.Frame(1).at(5);
+      const FrameRay& seen = history.Frame(1).at(0).second;
       const MatrixXd numeric = pangea::NumericJacobian(3, 1e-6, [&](const Vector3d& intrinsics) {
         WindowState changed;
         changed.intrinsics = intrinsics;
@@ -35,6 +39,41 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
       EXPECT_LT((seen.RayBy(state) - exact).norm() * camera.fx, 0.1);
     }
   }
+}
+
+TEST(TrackHistory, TracksAreWhatFullTrackedFramesSaw) {
+  const CameraModel camera = EurocTestCamera();
+  TrackHistory history;
+  WindowState state;
+  for (const auto& [utime, ids] : std::map<int64_t, std::vector<int32_t>>{
+           {1, {2}}, {2, {7, 2}}, {3, {2, 5}}, {4, {5, 7, 2}}}) {
+    TrackedFrame frame{utime, {}};
+    for (const int32_t id : ids) {
+      frame.observations.push_back({id, {100, 100}, Vector2d(1e-3 * id, 1e-3 * utime)});
+    }
+    history.AddFrame(frame, camera, 1e-3);
+    state.frames.emplace_back().utime = utime;
+  }
+  state.frames[0].pose_only = true;
+  state.frames[2].is_tracked = false;
+  const std::vector<TrackHistory::Track> tracks = history.Tracks(state);
+  const std::vector<std::pair<int32_t, std::vector<int>>> kExpected = {
+      {2, {1, 3}}, {5, {3}}, {7, {1, 3}}};
+  ASSERT_EQ(tracks.size(), kExpected.size());
+  for (size_t k = 0; k < tracks.size(); ++k) {
+    const auto& [id, frames] = kExpected[k];
+    EXPECT_EQ(tracks[k].landmark_id, id);
+    ASSERT_EQ(tracks[k].rays.size(), frames.size());
+    for (size_t j = 0; j < frames.size(); ++j) {
+      EXPECT_EQ(tracks[k].rays[j].frame, frames[j]);
+      EXPECT_EQ(tracks[k].rays[j].ray, Vector2d(1e-3 * id, 1e-3 * (frames[j] + 1)));
+    }
+  }
+  EXPECT_EQ(history.Shared(2, 4), 2u);
+  history.RemoveLandmark(7);
+  EXPECT_FALSE(history.Sees(7));
+  EXPECT_TRUE(history.Sees(5));
+  EXPECT_EQ(history.Shared(2, 4), 1u);
 }
 
 }  // namespace

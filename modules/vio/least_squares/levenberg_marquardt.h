@@ -27,12 +27,15 @@ struct LevenbergMarquardtResult {
 
 // Minimises the cost of `problem` in place.
 //   linearise(problem, damping): equations with members cost, H, g
+//   solve(problem, equations): x of H x = g
 //   retract(equations, step, &problem)
 //   cost(problem)
-template <typename Problem, typename Linearise, typename Retract, typename Cost>
+// What a step moves: problem.Estimate(), problem.SetEstimate().
+template <typename Problem, typename Linearise, typename Solve, typename Retract, typename Cost>
 LevenbergMarquardtResult LevenbergMarquardt(const LevenbergMarquardtOptions& options,
-                                            const Linearise& linearise, const Retract& retract,
-                                            const Cost& cost_of, Problem* problem) {
+                                            const Linearise& linearise, const Solve& solve,
+                                            const Retract& retract, const Cost& cost_of,
+                                            Problem* problem) {
   LevenbergMarquardtResult result;
   double damping = 0;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
@@ -42,20 +45,20 @@ LevenbergMarquardtResult LevenbergMarquardt(const LevenbergMarquardtOptions& opt
       auto equations = linearise(*problem, damping);
       result.cost = equations.cost;
       equations.H.diagonal() *= 1 + damping;
-      const Eigen::VectorXd step = -SolveScaled(equations.H, equations.g);
+      const Eigen::VectorXd step = -solve(*problem, equations);
       // A damped step promises little because it is short.
       is_last = damping == 0 && -0.5 * equations.g.dot(step) < options.enough;
-      Problem moved = *problem;
+      auto before = problem->Estimate();
       if (step.allFinite()) {
-        retract(equations, step, &moved);
-        const double cost = cost_of(moved);
+        retract(equations, step, problem);
+        const double cost = cost_of(*problem);
         better = cost <= result.cost + options.tolerance * (1 + std::abs(result.cost));
         result.cost = better ? cost : result.cost;
       }
       if (better) {
-        *problem = std::move(moved);
         damping = damping < 1e-5 ? 0 : 0.1 * damping;
       } else {
+        problem->SetEstimate(std::move(before));
         damping = damping == 0 ? 1e-4 : 10 * damping;
       }
     }

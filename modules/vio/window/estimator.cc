@@ -17,6 +17,7 @@
 #include "vio/window/stamp_jitter.h"
 #include "vio/window/unmodelled_acceleration.h"
 #include "vio/window/window_problem.h"
+#include "vio/window/window_solver.h"
 #include "vio/window/window_start.h"
 
 namespace pangea::vio {
@@ -208,13 +209,20 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
 
 // Publishes the keyframes up to frame `newest` that have not been.
 void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished) {
-  MatrixXd P;
+  std::vector<int> due;
+  std::vector<int> rows = RowsOfPoses(problem.state);  // of the covariance that they need
   for (int i = 0; i <= newest; ++i) {
     const WindowFrame& frame = problem.state.frames[i];
     if (frame.is_keyframe && !frame.is_published) {
-      if (P.size() == 0) {
-        P = WindowCovariance(problem);
+      due.push_back(i);
+      for (int k = kPoseSize; k < kFrameSize; ++k) {
+        rows.push_back(problem.state.Offset(i) + k);
       }
+    }
+  }
+  if (!due.empty()) {
+    const MatrixXd P = WindowCovariance(problem, rows);
+    for (const int i : due) {
       finished->push_back(publisher.Publish(problem.state, P, history, imu_samples, i));
     }
   }
@@ -362,7 +370,7 @@ WindowPoses Estimator::Poses() const {
       rows.push_back(state.Offset(i) + row);
     }
   }
-  poses.covariance = WindowCovariance(impl_->problem)(rows, rows);
+  poses.covariance = WindowCovariance(impl_->problem, rows)(rows, rows);
   return poses;
 }
 

@@ -1,7 +1,6 @@
 #include "vio/window/landmark_store.h"
 
-#include <algorithm>
-#include <set>
+#include <utility>
 
 namespace pangea::vio {
 namespace {
@@ -14,11 +13,16 @@ constexpr double kMaxTriangulationRms = 3.0;  // sigmas
 std::vector<Landmark> LandmarkStore::Gather(const WindowState& state,
                                             const TrackHistory& history) const {
   std::vector<Landmark> landmarks;
-  for (const int32_t id : history.Landmarks()) {
-    const auto from = from_utime_.find(id);
+  for (TrackHistory::Track& track : history.Tracks(state)) {
+    const int32_t id = track.landmark_id;
     Landmark landmark;
     landmark.id = id;
-    landmark.rays = history.RaysOf(id, state, from == from_utime_.end() ? 0 : from->second + 1);
+    landmark.rays = std::move(track.rays);
+    if (const auto from = from_utime_.find(id); from != from_utime_.end()) {
+      std::erase_if(landmark.rays, [&](const FrameRay& ray) {
+        return state.frames[ray.frame].utime <= from->second;
+      });
+    }
     if (landmark.rays.size() < kMinRays) {
       continue;
     }
@@ -47,10 +51,7 @@ void LandmarkStore::Keep(const WindowProblem& problem) {
 }
 
 void LandmarkStore::Forget(const TrackHistory& history) {
-  const std::vector<int32_t> ids = history.Landmarks();
-  std::erase_if(from_utime_, [&](const auto& item) {
-    return !std::binary_search(ids.begin(), ids.end(), item.first);
-  });
+  std::erase_if(from_utime_, [&](const auto& item) { return !history.Sees(item.first); });
 }
 
 }  // namespace pangea::vio

@@ -33,34 +33,44 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
 
 }  // namespace
 
+// Columns: frame i; pose and velocity of frame j; IMU intrinsics. The biases' own rows, whose
+// information is diagonal, are added apart.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
+  constexpr int kMotion = 9;  // rows; and columns of j
+  constexpr int kColumns = kFrameSize + kMotion + kImuIntrinsicsSize;
   const ImuState& from = state.frames[to - 1].imu;
   const InertialResidual residual =
       ComputeInertialResidual(At(factor.span, state.imu_intrinsics), from, state.frames[to].imu);
-  Eigen::Matrix<double, 15, 30> J;
-  J << residual.J_from, residual.J_to;
-  const Eigen::Matrix<double, 30, 15> JtL = J.transpose() * factor.information;
-  const Eigen::Matrix<double, 30, 30> A = JtL * J;
-  const Eigen::Matrix<double, 30, 1> b = JtL * residual.r;
-  const Eigen::Matrix<double, 15, kImuIntrinsicsSize> J_imu_intrinsics = ImuIntrinsicsJacobian(
-      factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>());
-  const Eigen::Matrix<double, kImuIntrinsicsSize, 15> JtL_imu_intrinsics =
-      J_imu_intrinsics.transpose() * factor.information;
-  const Eigen::Matrix<double, 30, kImuIntrinsicsSize> cross = JtL * J_imu_intrinsics;
-  out->H.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) +=
-      JtL_imu_intrinsics * J_imu_intrinsics;
-  const int at[] = {state.Offset(to - 1), state.Offset(to)};
-  for (int i = 0; i < 2; ++i) {
-    out->g.segment<kFrameSize>(at[i]) += b.segment<kFrameSize>(kFrameSize * i);
-    const auto cross_i = cross.middleRows<kFrameSize>(kFrameSize * i);
-    out->H.block<kFrameSize, kImuIntrinsicsSize>(at[i], kImuIntrinsics) += cross_i;
-    out->H.block<kImuIntrinsicsSize, kFrameSize>(kImuIntrinsics, at[i]) += cross_i.transpose();
-    for (int j = 0; j < 2; ++j) {
-      out->H.block<kFrameSize, kFrameSize>(at[i], at[j]) +=
-          A.block<kFrameSize, kFrameSize>(kFrameSize * i, kFrameSize * j);
+  Eigen::Matrix<double, kMotion, kColumns> J;
+  J << residual.J_from.topRows<kMotion>(), residual.J_to.topLeftCorner<kMotion, kMotion>(),
+      ImuIntrinsicsJacobian(factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>())
+          .topRows<kMotion>();
+  const Eigen::Matrix<double, kColumns, kMotion> JtL =
+      J.transpose() * factor.information.topLeftCorner<kMotion, kMotion>();
+  const Eigen::Matrix<double, kColumns, kColumns> A = JtL * J;
+  const Eigen::Matrix<double, kColumns, 1> b = JtL * residual.r.head<kMotion>();
+  struct Part {
+    int at, begin, size;
+  };
+  const Part parts[] = {{state.Offset(to - 1), 0, kFrameSize},
+                        {state.Offset(to), kFrameSize, kMotion},
+                        {kImuIntrinsics, kFrameSize + kMotion, kImuIntrinsicsSize}};
+  for (const Part& row : parts) {
+    out->g.segment(row.at, row.size) += b.segment(row.begin, row.size);
+    for (const Part& column : parts) {
+      out->H.block(row.at, column.at, row.size, column.size) +=
+          A.block(row.begin, column.begin, row.size, column.size);
     }
   }
-  out->g.segment<kImuIntrinsicsSize>(kImuIntrinsics) += JtL_imu_intrinsics * residual.r;
+  const Vector6d walk = factor.information.diagonal().tail<6>();
+  const Vector6d pull = walk.cwiseProduct(residual.r.tail<6>());
+  const int at_i = state.Offset(to - 1) + kGyroBias, at_j = state.Offset(to) + kGyroBias;
+  out->H.diagonal().segment<6>(at_i) += walk;
+  out->H.diagonal().segment<6>(at_j) += walk;
+  out->H.block<6, 6>(at_i, at_j).diagonal() -= walk;
+  out->H.block<6, 6>(at_j, at_i).diagonal() -= walk;
+  out->g.segment<6>(at_i) -= pull;
+  out->g.segment<6>(at_j) += pull;
   out->cost += 0.5 * residual.r.dot(factor.information * residual.r);
 }
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "vio/least_squares/levenberg_marquardt.h"
 #include "vio/window/landmark_factor.h"
 #include "vio/window/window_factors.h"
+#include "vio/window/window_solver.h"
 
 namespace pangea::vio {
 namespace {
@@ -86,6 +88,22 @@ void EraseFrame(WindowProblem& problem, int index) {
 
 }  // namespace
 
+WindowEstimate WindowProblem::Estimate() const {
+  WindowEstimate estimate{state, {}};
+  estimate.ray_rhos.reserve(landmarks.size());
+  for (const Landmark& landmark : landmarks) {
+    estimate.ray_rhos.push_back(landmark.point.ray_rho);
+  }
+  return estimate;
+}
+
+void WindowProblem::SetEstimate(WindowEstimate estimate) {
+  state = std::move(estimate.state);
+  for (size_t l = 0; l < landmarks.size(); ++l) {
+    landmarks[l].point.ray_rho = estimate.ray_rhos[l];
+  }
+}
+
 NormalEquations Linearise(const WindowProblem& problem, double damping) {
   const int n = problem.state.size();
   NormalEquations out;
@@ -118,14 +136,22 @@ double Optimise(WindowProblem& problem, int max_iterations) {
                                              .max_retries = kMaxRetries,
                                              .enough = kEnough,
                                              .tolerance = 1e-6};
-  return LevenbergMarquardt(options, Linearise, Step, Cost, &problem).cost;
+  const auto solve = [](const WindowProblem& at, const NormalEquations& equations) -> VectorXd {
+    return SolveWindow(at.state, equations.H, equations.g);
+  };
+  return LevenbergMarquardt(options, Linearise, solve, Step, Cost, &problem).cost;
 }
 
-MatrixXd WindowCovariance(const WindowProblem& problem) {
-  const NormalEquations equations = Linearise(problem, 0);
-  const auto n = equations.H.rows();
-  const MatrixXd P = SolveScaled(equations.H, MatrixXd::Identity(n, n));
-  return 0.5 * (P + P.transpose());
+MatrixXd WindowCovariance(const WindowProblem& problem, const std::vector<int>& rows) {
+  const MatrixXd H = Linearise(problem, 0).H;
+  MatrixXd units = MatrixXd::Zero(H.rows(), static_cast<Eigen::Index>(rows.size()));
+  for (size_t k = 0; k < rows.size(); ++k) {
+    units(rows[k], static_cast<Eigen::Index>(k)) = 1;
+  }
+  const MatrixXd columns = SolveWindow(problem.state, H, units)(rows, Eigen::all);
+  MatrixXd P = MatrixXd::Zero(H.rows(), H.cols());
+  P(rows, rows) = 0.5 * (columns + columns.transpose());
+  return P;
 }
 
 void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {

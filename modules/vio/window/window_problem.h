@@ -36,11 +36,20 @@ struct WindowPrior {
   Eigen::VectorXd g;
 };
 
+// What optimising moves.
+struct WindowEstimate {
+  WindowState state;
+  std::vector<Eigen::Vector3d> ray_rhos;  // of each landmark
+};
+
 struct WindowProblem {
   WindowState state;
   std::vector<std::optional<ImuFactor>> imu_factors;  // imu_factors[i]: from frame i - 1 to frame i
   std::vector<Landmark> landmarks;
   WindowPrior prior;
+
+  WindowEstimate Estimate() const;
+  void SetEstimate(WindowEstimate estimate);
 };
 
 // The cost and its derivatives by the window's error, landmarks eliminated:
@@ -68,8 +77,8 @@ NormalEquations Linearise(const WindowProblem& problem, double damping);
 // Optimises state and landmarks in place; the final cost.
 double Optimise(WindowProblem& problem, int max_iterations);
 
-// Marginal covariance of the window's error.
-Eigen::MatrixXd WindowCovariance(const WindowProblem& problem);
+// Marginal covariance of the window's error: these rows and columns of it, zero elsewhere.
+Eigen::MatrixXd WindowCovariance(const WindowProblem& problem, const std::vector<int>& rows);
 
 // Takes the oldest full frame out of the window (all of it, or all but its pose), with the
 // landmarks anchored in it, the IMU factor to the next frame and what the prior says of it; what
