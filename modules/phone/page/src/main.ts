@@ -100,6 +100,8 @@ async function startXr(): Promise<boolean> {
     enter();
   };
   device.start();
+  enter();
+  showHint({ text: "Move the phone slowly, so that AR finds its way.", tone: "do" });
   return true;
 }
 

@@ -11,7 +11,7 @@ import { CameraReadback, greySizeOf } from "./camera_readback";
 import { cameraYamlOf, odomPose } from "./frames";
 
 const kImageInterval_ms = 95; // features are followed from image to image: ten of them a second
-const kNoCamera_ms = 5000;
+const kNoCamera_ms = 5000; // with poses
 
 export interface XrImage extends Luma {
   utime: number;
@@ -35,6 +35,7 @@ export class XrOdometry {
   private size?: Size; // of images
   private started?: Omit<XrImage, keyof Luma>; // of the image that is being read back
   private newest_ms = -Infinity; // when an image was begun
+  private blindSince_ms?: number; // poses, but no camera
   private ended = false;
 
   static async isSupported(): Promise<boolean> {
@@ -77,7 +78,6 @@ export class XrOdometry {
   // Once who listens is there.
   start() {
     this.session.requestAnimationFrame(this.onAnimationFrame);
-    setTimeout(() => !this.size && this.stop(), kNoCamera_ms);
   }
 
   get hasCamera(): boolean {
@@ -101,6 +101,7 @@ export class XrOdometry {
     this.giveImage();
     const pose = frame.getViewerPose(this.space);
     const view = pose?.views.find(({ camera }) => camera);
+    if (pose && !view && !this.size && time_ms - (this.blindSince_ms ??= time_ms) > kNoCamera_ms) return this.stop();
     if (!pose || pose.emulatedPosition || !view) return this.giveLost(time_ms);
     const T_odom_body = odomPose(view.transform);
     this.readImage(time_ms, view, T_odom_body);
