@@ -12,7 +12,7 @@ namespace pangea::vio {
 namespace {
 
 constexpr int kIterations = 10;
-constexpr float kConverged_px = 0.01F;
+constexpr float kConverged_px = 0.02F;
 // Correction of what image-to-image tracking says, beyond which it is another place.
 constexpr float kMaxCorrection_px = 2.0F;
 // Correlation of the patch with what is found.
@@ -46,8 +46,10 @@ std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
 
 }  // namespace
 
+template <int kSide>
 bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
-                            const Eigen::Matrix2f& a, Values* values) {
+                            const Eigen::Matrix2f& a, float* values) {
+  constexpr float kHalf = (kSide - 1) / 2.0F;
   const float reach_x = kHalf * (std::abs(a(0, 0)) + std::abs(a(0, 1)));
   const float reach_y = kHalf * (std::abs(a(1, 0)) + std::abs(a(1, 1)));
   if (!(at.x() - reach_x >= 0 && at.y() - reach_y >= 0 &&
@@ -56,14 +58,14 @@ bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
     return false;
   }
   // Row by row, eight pixels at a time; the last of a row is read again for those beyond it.
-  constexpr int kPadded = (kSize + 7) / 8 * 8;
+  constexpr int kPadded = (kSide + 7) / 8 * 8;
   const auto step = static_cast<int>(image.step);
   std::array<int, kPadded> offset;
   std::array<float, kPadded> fx, fy, grey;
-  for (int v = 0; v < kSize; ++v) {
+  for (int v = 0; v < kSide; ++v) {
     const Eigen::Vector2f p0 = at + a * Eigen::Vector2f(-kHalf, static_cast<float>(v) - kHalf);
     for (int u = 0; u < kPadded; ++u) {
-      const auto along = static_cast<float>(std::min(u, kSize - 1));
+      const auto along = static_cast<float>(std::min(u, kSide - 1));
       const float px = p0.x() + along * a(0, 0);
       const float py = p0.y() + along * a(1, 0);
       const int x = static_cast<int>(px), y = static_cast<int>(py);
@@ -79,7 +81,7 @@ bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
         cv::v_store(&grey[u + 4 * half], top[half] + f * (bottom[half] - top[half]));
       }
     }
-    std::memcpy(values->data() + v * kSize, grey.data(), kSize * sizeof(float));
+    std::memcpy(values + v * kSide, grey.data(), kSide * sizeof(float));
   }
   return true;
 }
@@ -97,26 +99,30 @@ float ReferencePatch::Normalise(Values* values) {
 std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
                                                    const Eigen::Vector2f& pixel) {
   ReferencePatch patch;
-  const Eigen::Matrix2f a = Eigen::Matrix2f::Identity();
-  const Eigen::Vector2f dx = Eigen::Vector2f::UnitX();
-  const Eigen::Vector2f dy = Eigen::Vector2f::UnitY();
-  Values left, right, up, down;
-  if (!Sample(image, pixel, a, &patch.look_) || !Sample(image, pixel - dx, a, &left) ||
-      !Sample(image, pixel + dx, a, &right) || !Sample(image, pixel - dy, a, &up) ||
-      !Sample(image, pixel + dy, a, &down)) {
+  // A pixel more on each side, for its derivatives.
+  constexpr int kSide = kSize + 2;
+  using Square = Eigen::Array<float, kSide, kSide, Eigen::RowMajor>;
+  Square values;
+  if (!Sample<kSide>(image, pixel, Eigen::Matrix2f::Identity(), values.data())) {
     return std::nullopt;
   }
+  using Inner = Eigen::Array<float, kSize, kSize, Eigen::RowMajor>;
+  const auto moved = [&values](int x, int y) -> Inner {
+    return values.block<kSize, kSize>(1 + y, 1 + x);
+  };
+  patch.look_ = moved(0, 0).reshaped<Eigen::RowMajor>();
   const float length = Normalise(&patch.look_);
   if (length == 0) {
     return std::nullopt;
   }
-  const Values gx = (right - left) / (2 * length);
-  const Values gy = (down - up) / (2 * length);
+  const Inner gx = (moved(1, 0) - moved(-1, 0)) / (2 * length);
+  const Inner gy = (moved(0, 1) - moved(0, -1)) / (2 * length);
   for (int i = 0; i < kCount; ++i) {
     const int row = i / kSize;
     const float u = static_cast<float>(i - row * kSize) - kHalf;
     const float v = static_cast<float>(row) - kHalf;
-    patch.jacobian_.row(i) << gx[i], gy[i], gx[i] * u, gy[i] * u, gx[i] * v, gy[i] * v;
+    const float x = gx.data()[i], y = gy.data()[i];
+    patch.jacobian_.row(i) << x, y, x * u, y * u, x * v, y * v;
   }
   // Normalising makes the look blind to brightness and contrast: so is its derivative.
   for (int column = 0; column < 6; ++column) {
@@ -137,7 +143,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
   Eigen::Vector2f at = guess;
   Values values;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!Sample(image, at, a, &values) || Normalise(&values) == 0) {
+    if (!Sample<kSize>(image, at, a, values.data()) || Normalise(&values) == 0) {
       return std::nullopt;
     }
     const Eigen::Matrix<float, 6, 1> step = gain_ * (jacobian_.transpose() * (values - look_));

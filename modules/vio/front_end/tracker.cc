@@ -11,6 +11,8 @@ constexpr int kCornerBlock_px = 5;
 // From products of the pyramid's derivatives (Scharr's filter) to the units of
 // cv::cornerMinEigenVal.
 constexpr float kGradientScale = 1.F / (4 * 4 * 5 * 255.F) / (4 * 4 * 5 * 255.F);
+// Of the image's strongest corner, from one image to the next.
+constexpr double kStrongestKept = 0.98;
 // Features may come closer to each other while tracked than they were found, down to this share.
 constexpr double kMergeShare = 0.4;
 
@@ -30,7 +32,7 @@ void Tracker::Reset() {
   features_.clear();
   last_pyramid_.clear();
   pyramid_.clear();
-  next_id_ = 0;
+  next_id_ = num_images_ = 0;
 }
 
 void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
@@ -42,6 +44,7 @@ void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
 const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
                                    const Eigen::Quaterniond& q_cam_lastcam) {
   statistics_ = {};
+  ++num_images_;
   Prepare(image);
   if (!features_.empty()) {
     const std::vector<Bearing> before = Bearings();
@@ -76,15 +79,16 @@ std::vector<Tracker::Bearing> Tracker::Bearings() const {
 }
 
 std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
-                                std::vector<cv::Point2f> from, Levels levels,
-                                std::vector<cv::Point2f>* to) const {
+                                std::vector<cv::Point2f> from, Levels levels, int window_px,
+                                std::vector<cv::Point2f>* to) {
   std::vector<uchar> ok;
   if (from.empty()) {
     return ok;
   }
+  const int last = static_cast<int>(std::min(from_pyramid.size(), to_pyramid.size())) / 2 - 1;
+  levels = {std::min(levels.finest, last), std::min(levels.coarsest, last)};
   const auto part = [&levels](const Pyramid& pyramid) {
-    const int coarsest = std::min(levels.coarsest, static_cast<int>(pyramid.size()) / 2 - 1);
-    return Pyramid(pyramid.begin() + 2 * levels.finest, pyramid.begin() + 2 * coarsest + 2);
+    return Pyramid(pyramid.begin() + 2 * levels.finest, pyramid.begin() + 2 * levels.coarsest + 2);
   };
   const float scale = 1.F / static_cast<float>(1 << levels.finest);
   for (size_t i = 0; i < from.size(); ++i) {
@@ -92,8 +96,7 @@ std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_p
     (*to)[i] *= scale;
   }
   cv::calcOpticalFlowPyrLK(part(from_pyramid), part(to_pyramid), from, *to, ok, cv::noArray(),
-                           cv::Size(options_.window_px, options_.window_px),
-                           levels.coarsest - levels.finest,
+                           cv::Size(window_px, window_px), levels.coarsest - levels.finest,
                            cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
                                             kKltIterations, kKltConverged_px),
                            cv::OPTFLOW_USE_INITIAL_FLOW);
@@ -127,7 +130,8 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
     from.push_back(features_[i].pixel);
     to.push_back(rotated[i] + dt_s * features_[i].flow);
   }
-  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevels, &to);
+  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevels,
+                                    std::min(kNearWindow_px, options_.window_px), &to);
   std::vector<Found> found(features_.size());
   for (size_t i = 0; i < features_.size(); ++i) {
     if (ok[i] && features_[i].patch) {
@@ -150,10 +154,12 @@ void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& r
     }
   }
   const Levels all{0, options_.pyramid_levels - 1};
-  const std::vector<uchar> forward_ok = Klt(last_pyramid_, pyramid_, from, all, &to);
+  const std::vector<uchar> forward_ok =
+      Klt(last_pyramid_, pyramid_, from, all, options_.window_px, &to);
   // Back from the result with the start as the guess: only the finest levels have work to do.
   std::vector<cv::Point2f> back = from;
-  const std::vector<uchar> backward_ok = Klt(pyramid_, last_pyramid_, to, {0, 1}, &back);
+  const std::vector<uchar> backward_ok =
+      Klt(pyramid_, last_pyramid_, to, {0, 1}, options_.window_px, &back);
   for (size_t k = 0; k < which.size(); ++k) {
     Feature& feature = features_[which[k]];
     if (!forward_ok[k]) {
@@ -282,16 +288,26 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
 
 std::vector<std::pair<float, cv::Point>> Tracker::FindCorners(const cv::Rect& cell) const {
   const cv::Mat1f response = CornerResponse(cell);
+  // No weaker one will be taken (AddFeatures).
+  const auto least = static_cast<float>(
+      std::max(options_.min_eigenvalue, options_.quality * kStrongestKept * strongest_));
+  const int inner = response.cols - 2;
+  Eigen::ArrayXf column_max(response.cols), block_max(inner);
   std::vector<std::pair<float, cv::Point>> corners;
   for (int y = 1; y + 1 < response.rows; ++y) {
-    const float* above = response.ptr<float>(y - 1);
-    const float* row = response.ptr<float>(y);
-    const float* below = response.ptr<float>(y + 1);
-    for (int x = 1; x + 1 < response.cols; ++x) {
+    using Row = Eigen::Map<const Eigen::ArrayXf>;
+    const Row above(response[y - 1], response.cols), row(response[y], response.cols),
+        below(response[y + 1], response.cols);
+    column_max = above.max(row).max(below);
+    block_max =
+        column_max.head(inner).max(column_max.segment(1, inner)).max(column_max.tail(inner));
+    for (int x = 1; x <= inner; ++x) {
       const float r = row[x];
-      if (r >= options_.min_eigenvalue && r > row[x - 1] && r >= row[x + 1] &&
-          r > std::max({above[x - 1], above[x], above[x + 1]}) &&
-          r >= std::max({below[x - 1], below[x], below[x + 1]})) {
+      if (r < block_max[x - 1] || r < least) {
+        continue;
+      }
+      // Of equal ones the last in its row, and the first row.
+      if (r > row[x - 1] && r > std::max({above[x - 1], above[x], above[x + 1]})) {
         corners.emplace_back(r, cv::Point(cell.x + x, cell.y + y));
       }
     }
@@ -312,10 +328,13 @@ void Tracker::AddFeatures() {
     const int row = static_cast<int>(feature.pixel.y) * rows / camera_.height;
     taken[row * columns + column] = true;
   }
+  // Every second cell, the others in the next image, while there is no lack of features.
+  const int parity =
+      static_cast<int>(features_.size()) < options_.max_features / 2 ? -1 : num_images_ % 2;
   std::vector<std::pair<float, cv::Point>> corners;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      if (taken[row * columns + column]) {
+      if (taken[row * columns + column] || (row + column) % 2 == parity) {
         continue;
       }
       const int x0 = column * camera_.width / columns;
@@ -330,7 +349,7 @@ void Tracker::AddFeatures() {
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   if (!corners.empty()) {
     // The image's strongest corner, over all recent images: the empty cells alone may be blank.
-    strongest_ = std::max(0.98 * strongest_, static_cast<double>(corners.front().first));
+    strongest_ = std::max(kStrongestKept * strongest_, static_cast<double>(corners.front().first));
   }
   for (const auto& [response, at] : corners) {
     if (static_cast<int>(features_.size()) >= options_.max_features ||

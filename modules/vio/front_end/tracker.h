@@ -107,14 +107,15 @@ class Tracker {
     int finest, coarsest;
   };
   // Of the first search: the prediction is good, and the patch finds what KLT has come near.
-  static constexpr Levels kNearLevels{0, 1};
+  static constexpr Levels kNearLevels{1, 1};
+  static constexpr int kNearWindow_px = 15;
   using Found = std::optional<Eigen::Vector2f>;  // where in the newest image
 
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
-  std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
-                         std::vector<cv::Point2f> from, Levels levels,
-                         std::vector<cv::Point2f>* to) const;
+  static std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
+                                std::vector<cv::Point2f> from, Levels levels, int window_px,
+                                std::vector<cv::Point2f>* to);
   std::vector<cv::Point2f> Rotated(const Eigen::Quaterniond& q_cam_lastcam);
   std::vector<Found> FindAsPredicted(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
                                      float dt_s);
@@ -136,6 +137,7 @@ class Tracker {
   Pyramid last_pyramid_;
   std::vector<Feature> features_;  // oldest first
   int32_t next_id_ = 0;
+  int num_images_ = 0;
   double strongest_ = 0;  // eigenvalue, running
   Statistics statistics_;
   TrackedFrame frame_;
