@@ -126,6 +126,15 @@ std::filesystem::path ProgramDirectory() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path();
 }
 
+std::string SiblingProgram(const std::string& name) {
+  const std::filesystem::path path = ProgramDirectory() / name;
+  if (!std::filesystem::exists(path)) {
+    throw std::runtime_error(fmt::format(
+        "{} is missing: build all programs (scripts/build release programs)", path.string()));
+  }
+  return path.string();
+}
+
 std::optional<std::filesystem::path> FindOnPath(const std::string& program) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "/usr/bin");

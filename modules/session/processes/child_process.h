@@ -54,6 +54,8 @@ class ChildProcess {
 
 // Directory of the running program: its siblings are there.
 std::filesystem::path ProgramDirectory();
+// Full path of one of them. Throws std::runtime_error when it is not there.
+std::string SiblingProgram(const std::string& name);
 // Full path of a program on PATH, or nothing.
 std::optional<std::filesystem::path> FindOnPath(const std::string& program);
 

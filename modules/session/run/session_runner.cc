@@ -5,9 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
-#include <iostream>
 #include <iterator>
 #include <map>
 #include <stdexcept>
@@ -31,9 +29,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStartTimeout_s = 20;  // for the server processes to report
-constexpr double kStuckAfter_s =
-    300;                          // without a verification result, while the server is not idle
-constexpr double kQuiet_s = 2.5;  // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStuckAfter_s = 300;   // without a verification result, though not idle
+constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
 constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
@@ -95,15 +92,6 @@ class Runner {
     return ids;
   }
 
-  static std::string Program(const std::string& name) {
-    const fs::path path = ProgramDirectory() / name;
-    if (!fs::exists(path)) {
-      throw std::runtime_error(
-          fmt::format("{} is missing: build it (scripts/build)", path.string()));
-    }
-    return path.string();
-  }
-
   fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
 
   // Only this session's processes know them.
@@ -115,7 +103,6 @@ class Runner {
     }
   }
 
-  // The file.
   template <typename Options>
   std::string WriteOptions(const std::string& process, Options options) const {
     YamlOptions yaml;
@@ -139,16 +126,16 @@ class Runner {
 
   void StartServer() {
     KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
-    kept_.Start("agent_handler",
-                {Program("pangea-agent-handler"), "--link", buses_.link, "--server", buses_.server,
-                 "--journal", options_.journal.string(), "--keys", (options_.out / "keys").string(),
-                 "--options", WriteOptions("agent_handler", server_options_.agent_handler)});
+    kept_.Start("agent_handler", {SiblingProgram("pangea-agent-handler"), "--link", buses_.link,
+                                  "--server", buses_.server, "--journal", options_.journal.string(),
+                                  "--keys", (options_.out / "keys").string(), "--options",
+                                  WriteOptions("agent_handler", server_options_.agent_handler)});
     const std::map<std::string, std::string> options = TextsByProcess(server_options_);
     for (const std::string name : kServerProcesses) {
       if (name != "agent_handler") {
         std::string program = "pangea-" + name;
         std::ranges::replace(program, '_', '-');
-        kept_.Start(name, {Program(program), "--bus", buses_.server, "--options",
+        kept_.Start(name, {SiblingProgram(program), "--bus", buses_.server, "--options",
                            WriteOptionsText(name, options.at(name))});
       }
       server_names_.push_back(name);
@@ -179,7 +166,7 @@ class Runner {
       }
       anchors_.Join(player.script, &monitor_.agent_bus(id));
       const std::string name = fmt::format("uplink_{}", id);
-      kept_.Start(name, {Program("pangea-uplink"), "--agent", std::to_string(id), "--key",
+      kept_.Start(name, {SiblingProgram("pangea-uplink"), "--agent", std::to_string(id), "--key",
                          KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--spool",
                          (options_.out / fmt::format("spool_{}", id)).string(), "--options",
                          WriteOptions(name, player.script.uplink)});
@@ -188,7 +175,7 @@ class Runner {
 
   void StartLinkEmulator(int32_t id, const LinkConditions& conditions) {
     const std::string name = fmt::format("link_emulator_{}", id);
-    kept_.Start(name, {Program("pangea-link-emulator"), "--agent", std::to_string(id),
+    kept_.Start(name, {SiblingProgram("pangea-link-emulator"), "--agent", std::to_string(id),
                        "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
                        buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
   }
@@ -197,8 +184,9 @@ class Runner {
   void StartPlayer(Player& player) {
     const int32_t id = player.script.id;
     const bool stored = !player.script.keyframes.empty();
-    std::vector<std::string> argv = {Program(stored ? "pangea-keyframe-player" : "pangea-vio"),
-                                     "--agent", std::to_string(id), "--bus", buses_.agents.at(id)};
+    std::vector<std::string> argv = {
+        SiblingProgram(stored ? "pangea-keyframe-player" : "pangea-vio"), "--agent",
+        std::to_string(id), "--bus", buses_.agents.at(id)};
     const std::vector<std::string> input = InputOf(player, options_.rate);
     argv.insert(argv.end(), input.begin(), input.end());
     const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bus/process.h"
+#include "session/processes/child_process.h"
 #include "session/processes/kept_processes.h"
 #include "session/server/checkpoints.h"
 #include "session/session_file/session_file.h"
@@ -108,12 +109,7 @@ void Start(KeptProcesses* kept, const std::string& process, const std::vector<st
 std::string ProgramOf(const std::string& process) {
   std::string name = "pangea-" + process;
   std::ranges::replace(name, '_', '-');
-  const fs::path path = ProgramDirectory() / name;
-  if (!fs::exists(path)) {
-    throw std::runtime_error(
-        fmt::format("{} is missing: it belongs beside pangea-server", path.string()));
-  }
-  return path.string();
+  return SiblingProgram(name);
 }
 
 double SteadySeconds() {
