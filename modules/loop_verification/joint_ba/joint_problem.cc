@@ -85,6 +85,9 @@ bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vect
   LevenbergMarquardt(
       options,
       [&](const JointState& state, double damping) { return Linearise(state, loss, damping); },
+      [](const JointState&, const JointEquations& equations) {
+        return SolveScaled(equations.H, equations.g);
+      },
       [&](const JointEquations& equations, const Eigen::VectorXd& step, JointState* state) {
         Move(equations, step, state);
       },

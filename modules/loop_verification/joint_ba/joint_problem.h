@@ -32,6 +32,10 @@ struct JointState {
   std::vector<Rigid3> T_w_body;         // of each frame; w: window m's axes
   std::array<double, 2> log_scale{};    // of each side
   std::vector<Eigen::Vector3d> points;  // (x, y, inverse depth)
+
+  // All of it is what a step moves (core/least_squares/levenberg_marquardt.h).
+  JointState Estimate() const { return *this; }
+  void SetEstimate(JointState estimate) { *this = std::move(estimate); }
 };
 
 // The cost's derivatives by the frames' errors, points eliminated:
