@@ -3,8 +3,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "loop_verification/joint_ba/ba_factors.h"
-
 namespace pangea {
 namespace {
 
@@ -32,6 +30,39 @@ RowMajor<15, 7> PoseJacobian(const Eigen::Matrix<double, 15, 15>& J, const ImuSt
 }
 
 }  // namespace
+
+Rigid3 PoseFromBlock(const double* block) {
+  return {Eigen::Map<const Eigen::Quaterniond>(block),
+          Eigen::Map<const Eigen::Vector3d>(block + 4)};
+}
+
+void PoseToBlock(const Rigid3& pose, double* block) {
+  Eigen::Map<Eigen::Quaterniond> q(block);
+  Eigen::Map<Eigen::Vector3d> t(block + 4);
+  q = pose.q;
+  t = pose.t;
+}
+
+bool RigidManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
+  PoseToBlock(PoseFromBlock(x).Plus(Eigen::Map<const Vector6d>(delta)), x_plus_delta);
+  return true;
+}
+
+bool RigidManifold::PlusJacobian(const double*, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>>(jacobian).setIdentity();
+  return true;
+}
+
+bool RigidManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
+  Eigen::Map<Vector6d> difference(y_minus_x);
+  difference = PoseFromBlock(y).Minus(PoseFromBlock(x));
+  return true;
+}
+
+bool RigidManifold::MinusJacobian(const double*, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>>(jacobian).setIdentity();
+  return true;
+}
 
 ImuState StateFromBlocks(const double* pose, const double* motion) {
   return {PoseFromBlock(pose), Eigen::Vector3d::Map(motion), Eigen::Vector3d::Map(motion + 3),
@@ -138,6 +169,36 @@ bool CameraPriorFactor::Evaluate(double const* const* parameters, double* residu
     Matrix6d J = Matrix6d::Identity();
     J.bottomRightCorner<3, 3>() = RightJacobianInverse(-error.tail<3>());
     AsMatrix<6, 7>(jacobians[0]) << inverse_sigma_.asDiagonal() * J, Vector6d::Zero();
+  }
+  return true;
+}
+
+bool EdgeFactor::Evaluate(double const* const* parameters, double* residuals,
+                          double** jacobians) const {
+  EdgeResidual::Jacobians J;
+  Eigen::Map<Vector6d> r(residuals);
+  r = residual_.Evaluate(PoseFromBlock(parameters[0]), PoseFromBlock(parameters[1]),
+                         parameters[2][0], jacobians == nullptr ? nullptr : &J);
+  if (jacobians == nullptr) {
+    return true;
+  }
+  if (jacobians[0] != nullptr) {
+    AsMatrix<6, 7>(jacobians[0]) << J.from, Vector6d::Zero();
+  }
+  if (jacobians[1] != nullptr) {
+    AsMatrix<6, 7>(jacobians[1]) << J.to, Vector6d::Zero();
+  }
+  if (jacobians[2] != nullptr) {
+    Eigen::Map<Vector6d>(jacobians[2], 6) = J.scale;
+  }
+  return true;
+}
+
+bool ScalePriorFactor::Evaluate(double const* const* parameters, double* residuals,
+                                double** jacobians) const {
+  residuals[0] = parameters[0][0] / sigma_;
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    jacobians[0][0] = 1.0 / sigma_;
   }
   return true;
 }

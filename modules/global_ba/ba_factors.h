@@ -2,18 +2,34 @@
 
 // Residuals of the global bundle adjustment, with analytic Jacobians.
 //
-// Blocks: a pose T_map_body is 7 doubles with RigidManifold
-// (loop_verification/joint_ba/ba_factors.h: tangent (dp, dtheta) in the left frame); a motion is 9:
-// velocity in the map frame (m/s), gyro bias (rad/s), accelerometer bias (m/s^2); a landmark is its
-// position in the map frame (metres).
+// Blocks: a pose T_map_body is 7 doubles (quaternion x y z w, translation) with the project's
+// tangent (dp, dtheta) in the left frame; a motion is 9: velocity in the map frame (m/s), gyro bias
+// (rad/s), accelerometer bias (m/s^2); a landmark is its position in the map frame (metres).
+// RigidManifold's PlusJacobian is [I6; 0], so a factor writes its derivative by the tangent into
+// the first six columns and zero into the seventh.
 
+#include <ceres/manifold.h>
 #include <ceres/sized_cost_function.h>
 
 #include "core/imu/imu_factor.h"
+#include "loop_verification/joint_ba/edge_residual.h"
 
 namespace pangea {
 
 using MotionBlock = Eigen::Matrix<double, 9, 1>;
+
+Rigid3 PoseFromBlock(const double* block);
+void PoseToBlock(const Rigid3& pose, double* block);
+
+class RigidManifold : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return 7; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
+  bool PlusJacobian(const double* x, double* jacobian) const override;
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
+  bool MinusJacobian(const double* x, double* jacobian) const override;
+};
 
 ImuState StateFromBlocks(const double* pose, const double* motion);
 
@@ -68,6 +84,28 @@ class CameraPriorFactor : public ceres::SizedCostFunction<6, 7> {
  private:
   Rigid3 prior_;
   Vector6d inverse_sigma_;
+};
+
+// An odometry edge. Blocks: from's T_map_body (7), to's T_map_body (7), log scale kappa (1).
+class EdgeFactor : public ceres::SizedCostFunction<6, 7, 7, 1> {
+ public:
+  explicit EdgeFactor(const EdgeResidual& residual) : residual_(residual) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  EdgeResidual residual_;
+};
+
+// r = kappa / sigma.
+class ScalePriorFactor : public ceres::SizedCostFunction<1, 1> {
+ public:
+  explicit ScalePriorFactor(double sigma) : sigma_(sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  double sigma_;
 };
 
 }  // namespace pangea

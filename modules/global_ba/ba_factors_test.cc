@@ -6,7 +6,6 @@
 
 #include "core/testing/numeric_jacobian.h"
 #include "global_ba/ba_test_world.h"
-#include "loop_verification/joint_ba/ba_factors.h"
 
 namespace pangea {
 namespace {

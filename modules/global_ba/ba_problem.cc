@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "global_ba/ba_factors.h"
-#include "loop_verification/joint_ba/ba_factors.h"
 
 namespace pangea {
 namespace {
@@ -20,9 +19,9 @@ ceres::LossFunction* Weight(double weight) {
 
 ceres::CostFunction* MakeEdgeFactor(const BaKeyframe& keyframe) {
   const BaEdge& edge = *keyframe.edge;
-  return new EdgeFactor(
+  return new EdgeFactor(EdgeResidual(
       edge.T_previous_this, edge.covariance,
-      keyframe.unknown_scale > 0 ? EdgeFactor::Metres::kOdometry : EdgeFactor::Metres::kWorld);
+      keyframe.unknown_scale > 0 ? EdgeResidual::Metres::kOdometry : EdgeResidual::Metres::kWorld));
 }
 
 }  // namespace

@@ -1,52 +1,104 @@
 #include "loop_verification/joint_ba/frame_information.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <algorithm>
+#include <limits>
+#include <utility>
 
 namespace pangea {
+namespace {
 
-FrameInformation EliminatePoints(const ceres::CRSMatrix& jacobian, int num_frame_columns) {
-  const int n = num_frame_columns;
-  const auto num_points = static_cast<size_t>((jacobian.num_cols - n) / 3);
-  // Of the rows that touch a point, its columns last; at the end those of the rows without one.
-  std::vector<Eigen::MatrixXd> JtJ(num_points + 1, Eigen::MatrixXd::Zero(n + 3, n + 3));
-  for (int row = 0; row < jacobian.num_rows; ++row) {
-    const int begin = jacobian.rows[row], end = jacobian.rows[row + 1];
-    size_t point = num_points;
-    std::vector<int> columns;
-    for (int i = begin; i < end; ++i) {
-      const int past_frames = jacobian.cols[i] - n;
-      if (past_frames >= 0) {
-        point = static_cast<size_t>(past_frames / 3);
-      }
-      columns.push_back(past_frames < 0 ? jacobian.cols[i] : n + past_frames % 3);
-    }
-    for (int i = begin; i < end; ++i) {
-      for (int j = begin; j < end; ++j) {
-        JtJ[point](columns[i - begin], columns[j - begin]) +=
-            jacobian.values[i] * jacobian.values[j];
-      }
-    }
-  }
-  FrameInformation information{JtJ.back().topLeftCorner(n, n), {}};
-  for (size_t point = 0; point < num_points; ++point) {
-    const Eigen::MatrixXd W = JtJ[point].topRightCorner(n, 3);
-    const Eigen::Matrix3d V = JtJ[point].bottomRightCorner<3, 3>();
-    information.of_point.emplace_back(JtJ[point].topLeftCorner(n, n) -
-                                      W * V.inverse() * W.transpose());
-    information.total += information.of_point.back();
-  }
-  return information;
+using Eigen::MatrixXd;
+
+double PositionTrace(const Matrix6d& covariance) {
+  return covariance.topLeftCorner<3, 3>().trace();
 }
 
-std::optional<Matrix6d> CovarianceOfFirst(const Eigen::MatrixXd& information) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(information);
+}  // namespace
+
+template <typename Visit>
+void InformationShare::ForEachBlock(Eigen::Index size, const Visit& visit) const {
+  for (size_t a = 0; a < columns.size(); ++a) {
+    for (size_t b = 0; b < columns.size(); ++b) {
+      if (columns[a] < size && columns[b] < size) {
+        visit(H.block(6 * static_cast<Eigen::Index>(a), 6 * static_cast<Eigen::Index>(b),
+                      BlockSize(a), BlockSize(b)),
+              columns[a], columns[b]);
+      }
+    }
+  }
+}
+
+void InformationShare::AddTo(double factor, MatrixXd* whole) const {
+  ForEachBlock(whole->cols(), [&](const auto& block, int row, int column) {
+    if (row >= column) {
+      whole->block(row, column, block.rows(), block.cols()) += factor * block;
+    }
+  });
+}
+
+double InformationShare::Dot(const MatrixXd& whole) const {
+  double sum = 0;
+  ForEachBlock(whole.cols(), [&](const auto& block, int row, int column) {
+    sum += whole.block(row, column, block.rows(), block.cols()).cwiseProduct(block).sum();
+  });
+  return sum;
+}
+
+std::optional<Matrix6d> CovarianceOfFirst(const MatrixXd& information) {
+  const Eigen::LLT<MatrixXd> llt(information);
   if (llt.info() != Eigen::Success) {
     return std::nullopt;
   }
-  const Eigen::MatrixXd columns = llt.solve(Eigen::MatrixXd::Identity(information.rows(), 6));
+  const MatrixXd columns = llt.solve(MatrixXd::Identity(information.rows(), 6));
   const Matrix6d covariance = columns.topRows<6>();
   return covariance.allFinite() ? std::make_optional(covariance) : std::nullopt;
+}
+
+std::optional<Matrix6d> CovarianceWithoutOne(const MatrixXd& total,
+                                             const std::vector<InformationShare>& of_point,
+                                             const std::vector<JoinedPoints>& landmarks) {
+  const Eigen::LLT<MatrixXd> llt(total);
+  const MatrixXd C = llt.solve(MatrixXd::Identity(total.rows(), total.cols()));
+  if (llt.info() != Eigen::Success || !C.allFinite()) {
+    return std::nullopt;
+  }
+  // The inverse of total - S is C + C B^T (I - B C B^T)^-1 B C for S = B^T B and C the inverse of
+  // total. So without S the trace grows by at least that of C S C, and at most by that over
+  // 1 - tr(C S). Those that may say most come first: what bounds the others is soon reached.
+  const MatrixXd C_position = C.leftCols<3>();
+  const MatrixXd C2 = C_position * C_position.transpose();
+  std::vector<std::pair<double, size_t>> order;
+  for (size_t i = 0; i < landmarks.size(); ++i) {
+    double share = 0, growth = 0;
+    for (const int point : landmarks[i].points) {
+      share += of_point[point].Dot(C);
+      growth += of_point[point].Dot(C2);
+    }
+    const double at_most =
+        share < 1 ? growth / (1 - share) : std::numeric_limits<double>::infinity();
+    order.emplace_back(-at_most, i);
+  }
+  std::sort(order.begin(), order.end());
+  Matrix6d worst = C.topLeftCorner<6, 6>();
+  const double trace = PositionTrace(worst);
+  for (const auto& [minus_growth, i] : order) {
+    if (trace - minus_growth <= PositionTrace(worst)) {
+      break;
+    }
+    MatrixXd rest = total;
+    for (const int point : landmarks[i].points) {
+      of_point[point].AddTo(-1, &rest);
+    }
+    const std::optional<Matrix6d> without = CovarianceOfFirst(rest);
+    if (!without) {
+      return std::nullopt;
+    }
+    if (PositionTrace(*without) > PositionTrace(worst)) {
+      worst = *without;
+    }
+  }
+  return worst;
 }
 
 }  // namespace pangea

@@ -1,7 +1,5 @@
 #include "loop_verification/joint_ba/joint_ba.h"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -35,15 +33,13 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   result.inlier.assign(matches.size(), true);
   double chi2_sum = 0;
   // Round one finds the outliers, round two is the estimate.
-  constexpr double kCauchyScale = 2.0, kHuberScale = 2.0;
-  if (!problem.Solve(matches, result.inlier, new ceres::CauchyLoss(kCauchyScale))) {
-    return std::nullopt;
+  constexpr double kLossScale = 2.0;  // sigmas
+  for (const auto loss : {RobustLoss::Kind::kCauchy, RobustLoss::Kind::kHuber}) {
+    if (!problem.Solve(matches, result.inlier, {.kind = loss, .scale = kLossScale})) {
+      return std::nullopt;
+    }
+    problem.Classify(&result.inlier, &chi2_sum);
   }
-  problem.Classify(matches, &result.inlier, &chi2_sum);
-  if (!problem.Solve(matches, result.inlier, new ceres::HuberLoss(kHuberScale))) {
-    return std::nullopt;
-  }
-  problem.Classify(matches, &result.inlier, &chi2_sum);
   for (const bool inlier : result.inlier) {
     result.num_inlier_observations += inlier ? 1 : 0;
   }

@@ -9,8 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "loop_verification/correspondences/projection_search.h"
-#include "loop_verification/loop_verification_test_world.h"
+#include "loop_verification/joint_ba/joint_ba_test_windows.h"
 
 namespace pangea {
 namespace {
@@ -40,36 +39,8 @@ int LandmarkAt(const Window& window, const CornerRef& corner) {
   return window.landmark_of_corner[corner.frame][corner.corner];
 }
 
-// Two walks through one room, and what matches from the true alignment; all are inliers.
-class JointBaTest : public testing::Test {
+class JointBaTest : public JointBaTestWindows {
  protected:
-  JointBaTest() {
-    const auto room = MakeTestRoom({.seed = 3, .num_points = 400});
-    TestAgentOptions walk_m, walk_c;
-    walk_m.num_keyframes = walk_c.num_keyframes = 6;
-    walk_m.pixel_sigma = walk_c.pixel_sigma = 0.3;
-    walk_c.map = {2, 2000};
-    walk_c.radius = 2.3;
-    const TestAgent agent_m = RunTestAgent(room, walk_m), agent_c = RunTestAgent(room, walk_c);
-    for (const TestAgent* agent : {&agent_m, &agent_c}) {
-      for (const Keyframe& keyframe : agent->keyframes) {
-        store_.Add(keyframe);
-      }
-    }
-    windows_.m = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
-    windows_.c = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
-    T_m_c_ = windows_.m.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
-             agent_c.T_room_body[5] * windows_.c.T_w_body.back().Inverse();
-    for (const Direction direction : kBothDirections) {
-      for (int frame = 0; frame < 5; ++frame) {
-        const SearchResult found = SearchByProjection(windows_, direction, frame,
-                                                      {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
-        matches_.insert(matches_.end(), found.matches.begin(), found.matches.end());
-      }
-    }
-    options_.max_chi2 = options_.max_depth_chi2 = 1e3;
-  }
-
   // Trace of the position's covariance from the matches whose landmarks `keep` lets pass.
   template <typename Keep>
   double PositionTrace(const Keep& keep) const {
@@ -82,12 +53,6 @@ class JointBaTest : public testing::Test {
     const auto result = SolveJointBa(windows_, kept, T_m_c_, options_);
     return result ? result->covariance.topLeftCorner<3, 3>().trace() : 0;
   }
-
-  SubmapStore store_;
-  WindowPair windows_;
-  Rigid3 T_m_c_;
-  std::vector<PointMatch> matches_;
-  JointBaOptions options_;
 };
 
 // What the optimisation says of its covariance without the landmark that says most is what an

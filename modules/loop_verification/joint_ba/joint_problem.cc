@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
+#include <numeric>
+#include <set>
+
+#include "core/least_squares/levenberg_marquardt.h"
 
 namespace pangea {
 namespace {
@@ -23,182 +25,34 @@ Matrix6d Floored(const Matrix6d& covariance) {
 JointProblem::JointProblem(const WindowPair& windows, const Rigid3& T_m_c,
                            const JointBaOptions& options)
     : windows_{&windows.m, &windows.c}, options_(options) {
-  size_t size = 0;
-  for (const int side : {kSideM, kSideC}) {
-    pose_offset_[side] = size;
-    size += 7 * windows_[side]->frames.size();
-    scale_offset_[side] = size;
-    size += 1;
-  }
-  for (const int side : {kSideM, kSideC}) {
-    point_offset_[side] = size;
-    size += 3 * windows_[side]->landmarks.size();
-  }
-  blocks_.resize(size);
+  const size_t num_frames = windows.m.frames.size() + windows.c.frames.size();
+  T_body_cam_.resize(num_frames);
+  state_.T_w_body.resize(num_frames);
   for (const int side : {kSideM, kSideC}) {
     const Window& window = *windows_[side];
     for (int f = 0; f <= window.newest(); ++f) {
-      PoseToBlock(side == kSideM ? window.T_w_body[f] : T_m_c * window.T_w_body[f], Pose(side, f));
+      const int frame = Frame(side, f);
+      T_body_cam_[frame] = window.keyframe(f).camera.T_body_cam;
+      state_.T_w_body[frame] = side == kSideM ? window.T_w_body[f] : T_m_c * window.T_w_body[f];
+      if (f > 0) {
+        const OdometryEdge& edge = *window.keyframe(f).edge;
+        edges_.push_back({Frame(side, f - 1), frame, side,
+                          EdgeResidual(edge.T_from_this, Floored(edge.covariance))});
+      }
     }
-    for (size_t l = 0; l < window.landmarks.size(); ++l) {
-      const WindowLandmark& landmark = window.landmarks[l];
+    for (const WindowLandmark& landmark : window.landmarks) {
       const Eigen::Vector2d ray = window.frames[landmark.host.frame]->ray(landmark.host.corner);
-      const PointKey key{side, static_cast<int>(l)};
-      std::copy_n(std::array{ray.x(), ray.y(), landmark.inverse_depth}.data(), 3, Point(key));
+      solved_[side].emplace_back(ray.x(), ray.y(), landmark.inverse_depth);
     }
   }
 }
 
-bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vector<bool>& use,
-                         ceres::LossFunction* loss) {
-  problem_.emplace();
-  reprojections_.clear();
-  AddPosesAndEdges();
-  const std::set<size_t> halved = MutualMatches(matches, use);
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  std::set<PointKey> added;
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (use[i]) {
-      const double share = halved.contains(i) ? std::sqrt(0.5) : 1.0;
-      AddMatch(matches[i], share, loss, &added);
-      reprojections_.back().match = i;
-    }
+int JointProblem::Frame(int side, int window_frame) const {
+  const int num_c = windows_[kSideC]->newest() + 1;
+  if (side == kSideM) {
+    return num_c + window_frame;
   }
-  for (const PointKey& key : added) {
-    ordering->AddElementToGroup(Point(key), 0);
-  }
-  for (double* block : FrameBlocks()) {
-    ordering->AddElementToGroup(block, 1);
-  }
-  ordering->AddElementToGroup(Newest(kSideM), 1);
-
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_SCHUR;
-  solver.linear_solver_ordering = ordering;
-  solver.max_num_iterations = options_.iterations;
-  solver.num_threads = 1;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &*problem_, &summary);
-  used_points_ = std::move(added);
-  return summary.IsSolutionUsable();
-}
-
-void JointProblem::Classify(const std::vector<PointMatch>& matches, std::vector<bool>* inlier,
-                            double* chi2_sum) {
-  *chi2_sum = 0;
-  for (const Reprojection& reprojection : reprojections_) {
-    const PointMatch& match = matches[reprojection.match];
-    Eigen::Vector2d r;
-    const double* blocks[] = {reprojection.host, reprojection.target, reprojection.point};
-    const bool valid = reprojection.factor->Evaluate(blocks, r.data(), nullptr);
-    const WindowLandmark& landmark = Landmark(match);
-    const double kappa = *Scale(HolderSide(match));
-    const double depth_error = (reprojection.point[2] - std::exp(-kappa) * landmark.inverse_depth) /
-                               landmark.inverse_depth_sigma;
-    const double chi2 = r.squaredNorm() / (reprojection.share * reprojection.share);
-    (*inlier)[reprojection.match] =
-        valid && chi2 < options_.max_chi2 && depth_error * depth_error < options_.max_depth_chi2;
-    if ((*inlier)[reprojection.match]) {
-      *chi2_sum += chi2;
-    }
-  }
-}
-
-std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
-    const std::vector<PointMatch>& matches, const std::vector<bool>& use) {
-  const auto information = Information();
-  const auto all = information ? CovarianceOfFirst(information->total) : std::nullopt;
-  if (!all) {
-    return std::nullopt;
-  }
-  std::map<PointKey, size_t> index;
-  for (const PointKey& key : used_points_) {
-    index.emplace(key, index.size());
-  }
-  Marginals marginals{*all, *all, std::nullopt};
-  Eigen::MatrixXd of_sure = information->total;
-  for (const JoinedLandmark& landmark : Landmarks(matches, use)) {
-    Eigen::MatrixXd rest = information->total;
-    for (const PointKey& key : landmark.points) {
-      rest -= information->of_point[index.at(key)];
-      if (!landmark.sure) {
-        of_sure -= information->of_point[index.at(key)];
-      }
-    }
-    const std::optional<Matrix6d> without = CovarianceOfFirst(rest);
-    if (!without) {
-      return std::nullopt;
-    }
-    if (without->topLeftCorner<3, 3>().trace() >
-        marginals.without_one.topLeftCorner<3, 3>().trace()) {
-      marginals.without_one = *without;
-    }
-  }
-  marginals.of_sure = CovarianceOfFirst(of_sure);
-  return marginals;
-}
-
-std::optional<FrameInformation> JointProblem::Information() {
-  ceres::Problem::EvaluateOptions evaluate;
-  evaluate.apply_loss_function = false;
-  evaluate.num_threads = 1;
-  evaluate.parameter_blocks = FrameBlocks();
-  const int num_frame_columns = 6 * (static_cast<int>(evaluate.parameter_blocks.size()) - 2) + 2;
-  for (const PointKey& key : used_points_) {
-    evaluate.parameter_blocks.push_back(Point(key));
-  }
-  ceres::CRSMatrix jacobian;
-  if (!problem_->Evaluate(evaluate, nullptr, nullptr, nullptr, &jacobian)) {
-    return std::nullopt;
-  }
-  return EliminatePoints(jacobian, num_frame_columns);
-}
-
-std::vector<JointProblem::JoinedLandmark> JointProblem::Landmarks(
-    const std::vector<PointMatch>& matches, const std::vector<bool>& use) const {
-  std::map<PointKey, PointKey> leader;
-  for (const PointKey& key : used_points_) {
-    leader.emplace(key, key);
-  }
-  for (size_t i = 0; i < matches.size(); ++i) {
-    const int side = HolderSide(matches[i]);
-    const PointKey own{side, matches[i].landmark}, other{1 - side, Other(matches[i])};
-    if (use[i] && leader.contains(own) && leader.contains(other)) {
-      const PointKey from = leader.at(other), to = leader.at(own);
-      for (auto& [key, value] : leader) {
-        value = value == from ? to : value;
-      }
-    }
-  }
-  std::map<PointKey, JoinedLandmark> landmarks;
-  for (const auto& [key, value] : leader) {
-    landmarks[value].points.push_back(key);
-  }
-  for (size_t i = 0; i < matches.size(); ++i) {
-    const PointKey key{HolderSide(matches[i]), matches[i].landmark};
-    if (use[i] && leader.contains(key) && matches[i].distance <= options_.sure_hamming) {
-      landmarks.at(leader.at(key)).sure = true;
-    }
-  }
-  std::vector<JoinedLandmark> joined;
-  for (auto& [key, landmark] : landmarks) {
-    joined.push_back(std::move(landmark));
-  }
-  return joined;
-}
-
-std::vector<double*> JointProblem::FrameBlocks() {
-  std::vector<double*> blocks = {Newest(kSideC)};
-  for (int f = 0; f < windows_[kSideC]->newest(); ++f) {
-    blocks.push_back(Pose(kSideC, f));
-  }
-  for (int f = 0; f < windows_[kSideM]->newest(); ++f) {
-    blocks.push_back(Pose(kSideM, f));
-  }
-  blocks.push_back(Scale(kSideM));
-  blocks.push_back(Scale(kSideC));
-  return blocks;
+  return window_frame == num_c - 1 ? 0 : window_frame + 1;
 }
 
 // Windows of one map have its unknown scale in common.
@@ -209,70 +63,260 @@ double JointProblem::ScaleSigma(int side) const {
                     : std::max(options_.scale_sigma, UnknownScaleSigma(newest.scale_sigma));
 }
 
-void JointProblem::AddPosesAndEdges() {
+bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vector<bool>& use,
+                         const RobustLoss& loss) {
+  points_.clear();
+  state_.points.clear();
   for (const int side : {kSideM, kSideC}) {
-    for (int f = 0; f <= windows_[side]->newest(); ++f) {
-      problem_->AddParameterBlock(Pose(side, f), 7, new RigidManifold);
-    }
-    problem_->AddParameterBlock(Scale(side), 1);
-    problem_->AddResidualBlock(new ScalePriorFactor(ScaleSigma(side)), nullptr, Scale(side));
-    for (int f = 1; f <= windows_[side]->newest(); ++f) {
-      const OdometryEdge& edge = *windows_[side]->keyframe(f).edge;
-      problem_->AddResidualBlock(new EdgeFactor(edge.T_from_this, Floored(edge.covariance)),
-                                 nullptr, Pose(side, f - 1), Pose(side, f), Scale(side));
-    }
+    index_[side].assign(solved_[side].size(), -1);
   }
-  problem_->SetParameterBlockConstant(Newest(kSideM));
-}
-
-std::set<size_t> JointProblem::MutualMatches(const std::vector<PointMatch>& matches,
-                                             const std::vector<bool>& use) const {
-  std::set<std::array<int, 3>> pairs;  // (holder's side, its landmark, the other's landmark)
-  const auto pair_of = [this](const PointMatch& match) {
-    return std::array<int, 3>{HolderSide(match), match.landmark, Other(match)};
-  };
+  const std::vector<bool> mutual = MutualMatches(matches, use);
   for (size_t i = 0; i < matches.size(); ++i) {
     if (use[i]) {
-      pairs.insert(pair_of(matches[i]));
+      AddMatch(matches[i], i, mutual[i] ? std::sqrt(0.5) : 1.0);
     }
   }
-  std::set<size_t> mutual;
-  for (size_t i = 0; i < matches.size(); ++i) {
-    const auto [side, own, other] = pair_of(matches[i]);
-    if (use[i] && pairs.contains({1 - side, other, own})) {
-      mutual.insert(i);
+  if (!std::isfinite(Cost(state_, loss))) {
+    return false;
+  }
+  // A step that promises less than a fifth of a sigma of one direction is the last.
+  const LevenbergMarquardtOptions options = {
+      .max_iterations = options_.iterations, .max_retries = 6, .enough = 0.02, .tolerance = 1e-6};
+  LevenbergMarquardt(
+      options,
+      [&](const JointState& state, double damping) { return Linearise(state, loss, damping); },
+      [](const JointState&, const JointEquations& equations) {
+        return SolveScaled(equations.H, equations.g);
+      },
+      [&](const JointEquations& equations, const Eigen::VectorXd& step, JointState* state) {
+        Move(equations, step, state);
+      },
+      [&](const JointState& state) { return Cost(state, loss); }, &state_);
+  for (const int side : {kSideM, kSideC}) {
+    for (size_t l = 0; l < index_[side].size(); ++l) {
+      if (index_[side][l] >= 0) {
+        solved_[side][l] = state_.points[index_[side][l]];
+      }
     }
+  }
+  return true;
+}
+
+void JointProblem::AddMatch(const PointMatch& match, size_t index, double share) {
+  const int side = HolderSide(match);
+  const Window& holder = *windows_[side];
+  const Window& observer = *windows_[1 - side];
+  const WindowLandmark& landmark = holder.landmarks[match.landmark];
+  int& known = index_[side][match.landmark];
+  if (known < 0) {
+    known = static_cast<int>(points_.size());
+    const KeyframeView& host = *holder.frames[landmark.host.frame];
+    const double sigma = CornerSigma(holder.corner(landmark.host), options_.pixel_sigma);
+    points_.push_back({side,
+                       Frame(side, landmark.host.frame),
+                       host.ray(landmark.host.corner),
+                       share / sigma * host.pixel_jacobian(landmark.host.corner),
+                       landmark.inverse_depth,
+                       landmark.inverse_depth_sigma,
+                       {}});
+    state_.points.push_back(solved_[side][match.landmark]);
+  }
+  const KeyframeView& target = *observer.frames[match.observed.frame];
+  const double sigma = CornerSigma(observer.corner(match.observed), options_.pixel_sigma);
+  points_[known].seen.push_back(
+      {Frame(1 - side, match.observed.frame), target.ray(match.observed.corner),
+       share / sigma * target.pixel_jacobian(match.observed.corner), share, index});
+}
+
+std::vector<bool> JointProblem::MutualMatches(const std::vector<PointMatch>& matches,
+                                              const std::vector<bool>& use) const {
+  std::set<std::array<int, 3>> pairs;  // (holder's side, its landmark, the other's landmark)
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (use[i]) {
+      pairs.insert({HolderSide(matches[i]), matches[i].landmark, Other(matches[i])});
+    }
+  }
+  std::vector<bool> mutual(matches.size(), false);
+  for (size_t i = 0; i < matches.size(); ++i) {
+    mutual[i] = use[i] && pairs.contains(
+                              {1 - HolderSide(matches[i]), Other(matches[i]), matches[i].landmark});
   }
   return mutual;
 }
 
-void JointProblem::AddMatch(const PointMatch& match, double share, ceres::LossFunction* loss,
-                            std::set<PointKey>* added) {
-  const int side = HolderSide(match);
-  const Window& holder = *windows_[side];
-  const Window& observer = *windows_[1 - side];
-  const WindowLandmark& landmark = Landmark(match);
-  const KeyframeView& host = *holder.frames[landmark.host.frame];
-  const KeyframeView& target = *observer.frames[match.observed.frame];
-  const PointKey key{side, match.landmark};
-  double* point = Point(key);
-  if (added->insert(key).second) {
-    const double sigma = CornerSigma(holder.corner(landmark.host), options_.pixel_sigma);
-    problem_->AddResidualBlock(
-        new PointPriorFactor(host.ray(landmark.host.corner),
-                             share / sigma * host.pixel_jacobian(landmark.host.corner),
-                             landmark.inverse_depth, landmark.inverse_depth_sigma),
-        nullptr, point, Scale(side));
+std::vector<PosedCamera> JointProblem::Cameras(const JointState& state) const {
+  std::vector<PosedCamera> cameras;
+  cameras.reserve(T_body_cam_.size());
+  for (size_t f = 0; f < T_body_cam_.size(); ++f) {
+    cameras.emplace_back(state.T_w_body[f], T_body_cam_[f]);
   }
-  const double sigma = CornerSigma(observer.corner(match.observed), options_.pixel_sigma);
-  auto* factor =
-      new ReprojectionFactor(host.keyframe().camera.T_body_cam, target.keyframe().camera.T_body_cam,
-                             target.ray(match.observed.corner),
-                             share / sigma * target.pixel_jacobian(match.observed.corner));
-  double* host_pose = Pose(side, landmark.host.frame);
-  double* target_pose = Pose(1 - side, match.observed.frame);
-  problem_->AddResidualBlock(factor, loss, host_pose, target_pose, point);
-  reprojections_.push_back({factor, host_pose, target_pose, point, share, 0});
+  return cameras;
+}
+
+double JointProblem::Cost(const JointState& state, const RobustLoss& loss) const {
+  const std::vector<PosedCamera> cameras = Cameras(state);
+  double cost = 0;
+  for (const int side : {kSideM, kSideC}) {
+    const double r = state.log_scale[side] / ScaleSigma(side);
+    cost += 0.5 * r * r;
+  }
+  for (const Edge& edge : edges_) {
+    cost += 0.5 * edge.residual
+                      .Evaluate(state.T_w_body[edge.from], state.T_w_body[edge.to],
+                                state.log_scale[edge.side])
+                      .squaredNorm();
+  }
+  for (size_t p = 0; p < points_.size(); ++p) {
+    cost += points_[p].Cost(state.points[p], cameras, state.log_scale[points_[p].side], loss);
+  }
+  return cost;
+}
+
+std::vector<int> JointProblem::ColumnsOf(const HostedPoint& point) const {
+  std::vector<int> columns = {PoseColumn(point.host)};
+  for (const HostedPoint::Sighting& sighting : point.seen) {
+    columns.push_back(PoseColumn(sighting.frame));
+  }
+  columns.push_back(ScaleColumn(point.side));
+  return columns;
+}
+
+JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss& loss,
+                                       double damping) const {
+  const int n = num_columns();
+  JointEquations out;
+  // The held frame's columns are cut off at the end.
+  out.H.setZero(n + 6, n + 6);
+  out.g.setZero(n + 6);
+  out.cost = Cost(state, loss);
+  for (const int side : {kSideM, kSideC}) {
+    const double information = 1 / (ScaleSigma(side) * ScaleSigma(side));
+    out.H(ScaleColumn(side), ScaleColumn(side)) += information;
+    out.g[ScaleColumn(side)] += information * state.log_scale[side];
+  }
+  const auto add = [&out](const InformationShare& share, const Eigen::VectorXd& g) {
+    share.AddTo(1, &out.H);
+    for (size_t block = 0; block < share.columns.size(); ++block) {
+      const int size = block + 1 < share.columns.size() ? 6 : 1;
+      out.g.segment(share.columns[block], size) += g.segment(static_cast<int>(6 * block), size);
+    }
+  };
+  for (const Edge& edge : edges_) {
+    EdgeResidual::Jacobians jacobians;
+    const Vector6d r = edge.residual.Evaluate(state.T_w_body[edge.from], state.T_w_body[edge.to],
+                                              state.log_scale[edge.side], &jacobians);
+    Eigen::Matrix<double, 6, 13> J;
+    J << jacobians.from, jacobians.to, jacobians.scale;
+    add({J.transpose() * J, {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)}},
+        J.transpose() * r);
+  }
+  const std::vector<PosedCamera> cameras = Cameras(state);
+  out.points.reserve(points_.size());
+  for (size_t p = 0; p < points_.size(); ++p) {
+    const double kappa = state.log_scale[points_[p].side];
+    out.points.push_back(Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping));
+    add({out.points.back().H, ColumnsOf(points_[p])}, out.points.back().g);
+  }
+  out.H.conservativeResize(n, n);
+  out.g.conservativeResize(n);
+  return out;
+}
+
+void JointProblem::Move(const JointEquations& equations, const Eigen::VectorXd& step,
+                        JointState* state) const {
+  for (int f = 0; f + 1 < num_frames(); ++f) {
+    state->T_w_body[f] = state->T_w_body[f].Plus(step.segment<6>(PoseColumn(f)));
+  }
+  for (const int side : {kSideM, kSideC}) {
+    state->log_scale[side] += step[ScaleColumn(side)];
+  }
+  for (size_t p = 0; p < points_.size(); ++p) {
+    const std::vector<int> columns = ColumnsOf(points_[p]);
+    Eigen::VectorXd e = Eigen::VectorXd::Zero(static_cast<int>(6 * (columns.size() - 1)) + 1);
+    for (size_t block = 0; block < columns.size(); ++block) {
+      const int size = block + 1 < columns.size() ? 6 : 1;
+      if (columns[block] < step.size()) {
+        e.segment(static_cast<int>(6 * block), size) = step.segment(columns[block], size);
+      }
+    }
+    state->points[p] += equations.points[p].Step(e);
+  }
+}
+
+void JointProblem::Classify(std::vector<bool>* inlier, double* chi2_sum) const {
+  *chi2_sum = 0;
+  const std::vector<PosedCamera> cameras = Cameras(state_);
+  for (size_t p = 0; p < points_.size(); ++p) {
+    const HostedPoint& point = points_[p];
+    const double depth = point.DepthResidual(state_.points[p], state_.log_scale[point.side]);
+    for (const HostedPoint::Sighting& sighting : point.seen) {
+      const auto r = point.Residual(sighting, state_.points[p], cameras);
+      const double chi2 = r ? r->squaredNorm() / (sighting.share * sighting.share) : 0;
+      const bool is_inlier =
+          r && chi2 < options_.max_chi2 && depth * depth < options_.max_depth_chi2;
+      (*inlier)[sighting.match] = is_inlier;
+      *chi2_sum += is_inlier ? chi2 : 0;
+    }
+  }
+}
+
+std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
+    const std::vector<PointMatch>& matches, const std::vector<bool>& use) const {
+  JointEquations equations = Linearise(state_, {RobustLoss::Kind::kNone}, 0);
+  const auto all = CovarianceOfFirst(equations.H);
+  if (!all) {
+    return std::nullopt;
+  }
+  std::vector<InformationShare> shares;
+  for (size_t p = 0; p < points_.size(); ++p) {
+    shares.push_back({std::move(equations.points[p].H), ColumnsOf(points_[p])});
+  }
+  const std::vector<JoinedPoints> landmarks = Landmarks(matches, use);
+  const auto without_one = CovarianceWithoutOne(equations.H, shares, landmarks);
+  if (!without_one) {
+    return std::nullopt;
+  }
+  for (const JoinedPoints& landmark : landmarks) {
+    for (const int point : landmark.points) {
+      if (!landmark.sure) {
+        shares[point].AddTo(-1, &equations.H);
+      }
+    }
+  }
+  return Marginals{*all, *without_one, CovarianceOfFirst(equations.H)};
+}
+
+std::vector<JoinedPoints> JointProblem::Landmarks(const std::vector<PointMatch>& matches,
+                                                  const std::vector<bool>& use) const {
+  std::vector<int> leader(points_.size());
+  std::iota(leader.begin(), leader.end(), 0);
+  const auto find = [&](int point) {
+    while (leader[point] != point) {
+      point = leader[point] = leader[leader[point]];
+    }
+    return point;
+  };
+  std::vector<bool> sure(points_.size(), false);
+  for (size_t i = 0; i < matches.size(); ++i) {
+    const int side = HolderSide(matches[i]);
+    const int own = index_[side][matches[i].landmark];
+    if (!use[i] || own < 0) {
+      continue;
+    }
+    sure[own] = sure[own] || matches[i].distance <= options_.sure_hamming;
+    const int other = Other(matches[i]) < 0 ? -1 : index_[1 - side][Other(matches[i])];
+    if (other >= 0) {
+      leader[find(other)] = find(own);
+    }
+  }
+  std::vector<JoinedPoints> landmarks(points_.size());
+  for (int p = 0; p < static_cast<int>(points_.size()); ++p) {
+    JoinedPoints& landmark = landmarks[find(p)];
+    landmark.points.push_back(p);
+    landmark.sure = landmark.sure || sure[p];
+  }
+  std::erase_if(landmarks, [](const JoinedPoints& landmark) { return landmark.points.empty(); });
+  return landmarks;
 }
 
 }  // namespace pangea

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include "vio/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/levenberg_marquardt.h"
 
 namespace pangea::vio {
 namespace {

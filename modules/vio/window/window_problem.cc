@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "vio/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/levenberg_marquardt.h"
 #include "vio/window/landmark_factor.h"
 #include "vio/window/window_factors.h"
 #include "vio/window/window_solver.h"

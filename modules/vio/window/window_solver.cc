@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "vio/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/levenberg_marquardt.h"
 
 namespace pangea::vio {
 namespace {

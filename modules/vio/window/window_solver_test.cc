@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "vio/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/levenberg_marquardt.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_test_world.h"
 

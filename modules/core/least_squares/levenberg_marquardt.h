@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace pangea::vio {
+namespace pangea {
 
 // The solution x of H x = b, H symmetric and positive semidefinite, scaled to a unit diagonal
 // first: the units differ by orders of magnitude. Columns of b are solved together.
@@ -73,4 +73,4 @@ LevenbergMarquardtResult LevenbergMarquardt(const LevenbergMarquardtOptions& opt
   return result;
 }
 
-}  // namespace pangea::vio
+}  // namespace pangea

@@ -1,8 +1,8 @@
-#include "vio/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/levenberg_marquardt.h"
 
 #include <Eigen/Cholesky>
 
-namespace pangea::vio {
+namespace pangea {
 
 Eigen::MatrixXd SolveScaled(const Eigen::MatrixXd& H, const Eigen::MatrixXd& b) {
   const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
@@ -17,4 +17,4 @@ Eigen::MatrixXd SolveScaled(const Eigen::MatrixXd& H, const Eigen::MatrixXd& b) 
   return scale.asDiagonal() * y;
 }
 
-}  // namespace pangea::vio
+}  // namespace pangea

@@ -1,0 +1,87 @@
+#pragma once
+
+// The residuals of one point of the joint window bundle adjustment (joint_ba.h), linearised, and
+// the point eliminated (Schur complement).
+//
+// A point is (x, y, inverse depth) in the camera of its host. Its residuals:
+//   seen:   r = S (pi(p_target_cam) - ray), under a robust loss;
+//   prior:  r = [S (xy - ray); (rho - exp(-kappa) rho_0) / sigma_rho], kappa the log scale of the
+//           host's window: that is truly exp(kappa) times as large as its odometry says.
+// All that the frames' errors do to the residuals goes through the point's and the camera's place
+// in the world, so products of Jacobians are of 3x3 matrices.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "core/rigid3.h"
+
+namespace pangea {
+
+// rho(|r|^2) / 2, and the weight rho' of iterated reweighting (Huber 1964; Cauchy's).
+struct RobustLoss {
+  enum class Kind { kNone, kHuber, kCauchy };
+  Kind kind = Kind::kNone;
+  double scale = 1;  // sigmas
+
+  double Cost(double squared_residual) const;
+  double Weight(double squared_residual) const;
+};
+
+// A camera where a state has it. w: the axes of the bundle adjustment.
+struct PosedCamera {
+  PosedCamera(const Rigid3& T_w_body, const Rigid3& T_body_cam);
+
+  Eigen::Vector3d p_w_body;
+  Eigen::Vector3d p_w_cam;
+  Eigen::Matrix3d R_w_cam;
+};
+
+struct HostedPoint {
+  struct Sighting {
+    int frame = 0;
+    Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();  // times the root of `share`
+    double share = 1;                                         // of one measurement
+    size_t match = 0;
+  };
+
+  int side = 0;  // whose scale
+  int host = 0;  // frame
+  // What the host's map knows of it.
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();
+  double inverse_depth = 0;
+  double inverse_depth_sigma = 0;
+  std::vector<Sighting> seen;  // by others than the host
+
+  // Of one sighting, whitened; nothing behind the camera.
+  std::optional<Eigen::Vector2d> Residual(const Sighting& sighting, const Eigen::Vector3d& point,
+                                          const std::vector<PosedCamera>& cameras) const;
+  // Of the depth against its prior, sigmas.
+  double DepthResidual(const Eigen::Vector3d& point, double kappa) const;
+  // Infinite when the point is behind a camera that sees it.
+  double Cost(const Eigen::Vector3d& point, const std::vector<PosedCamera>& cameras, double kappa,
+              const RobustLoss& loss) const;
+};
+
+// What is left of a point's residuals once it is eliminated: 1/2 e^T H e + g^T e, with e the errors
+// of the frames' poses that it touches (its host's, then those of its sightings, six each) and of
+// kappa. Its own step is -L^-T (d + Y e).
+struct EliminatedPoint {
+  Eigen::MatrixXd H;  // symmetric
+  Eigen::VectorXd g;
+  Eigen::Matrix3d L;  // V = L L^T, damped
+  Eigen::Vector3d d;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> Y;
+
+  Eigen::Vector3d Step(const Eigen::VectorXd& e) const;
+};
+
+// At a state in which no point is behind a camera that sees it. `damping`: Levenberg-Marquardt's,
+// of the point.
+EliminatedPoint Eliminate(const HostedPoint& hosted, const Eigen::Vector3d& point,
+                          const std::vector<PosedCamera>& cameras, double kappa,
+                          const RobustLoss& loss, double damping);
+
+}  // namespace pangea
