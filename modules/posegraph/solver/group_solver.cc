@@ -7,7 +7,6 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "posegraph/solver/pose_cost.h"
 
@@ -31,23 +30,30 @@ double GraduatedWeight(double squared_residual, double c2, double mu) {
 using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
 // Of the inverse of P' L D L' P, the 4x4 block on the diagonal at `column`: Y' D^-1 Y with
-// L Y = P e. Y has few rows: those above the four columns in the elimination tree (Davis, Direct
-// Methods for Sparse Linear Systems, 2006, section 3.2).
+// L Y = P e. Y has few rows: those on the path of the elimination tree from the four columns up
+// (Davis, Direct Methods for Sparse Linear Systems, 2006, section 3.2), which meet and so lie on
+// one path. A column's parent is its first row below the diagonal.
 Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int column) {
   const Eigen::SparseMatrix<double>& L = factor.matrixL().nestedExpression();
-  std::map<int, Eigen::RowVector4d> Y;
+  const int size = static_cast<int>(L.cols());
+  Eigen::Matrix4Xd Y = Eigen::Matrix4Xd::Zero(4, size);  // transposed
+  int j = size;
   for (int k = 0; k < 4; ++k) {
     const int row = factor.permutationP().indices()[column + k];
-    Y.try_emplace(row, Eigen::RowVector4d::Zero()).first->second[k] = 1;
+    Y(k, row) = 1;
+    j = std::min(j, row);
   }
   Matrix4d block = Matrix4d::Zero();
-  for (; !Y.empty(); Y.erase(Y.begin())) {
-    const auto& [j, y] = *Y.begin();
-    block += y.transpose() * y / D[j];
+  while (j < size) {
+    const Vector4d y = Y.col(j);
+    block += y * y.transpose() / D[j];
+    int parent = size;
     for (Eigen::SparseMatrix<double>::InnerIterator entry(L, j); entry; ++entry) {
-      Y.try_emplace(static_cast<int>(entry.row()), Eigen::RowVector4d::Zero()).first->second -=
-          entry.value() * y;
+      const int row = static_cast<int>(entry.row());
+      Y.col(row) -= entry.value() * y;
+      parent = std::min(parent, row);
     }
+    j = parent;
   }
   return block;
 }
