@@ -86,8 +86,9 @@ TEST_F(StandbyTest, TakesOverWhenTheCoreIsSilentWithAllThatWasReplicated) {
     server_->Round(now_);
   }
   AddKeyframes(2);
-  EXPECT_FALSE(TakesOverWithin(standby, SiteLease::kHeld_us - 200'000));
-  EXPECT_TRUE(TakesOverWithin(standby, 500'000));
+  // The lease last moved at most one renewal ago.
+  EXPECT_FALSE(TakesOverWithin(standby, SiteLease::kHeld_us - SiteLease::kRenew_us - 200'000));
+  EXPECT_TRUE(TakesOverWithin(standby, SiteLease::kRenew_us + 500'000));
   EXPECT_THAT(EventsOf(copy_), SizeIs(7));
   EXPECT_EQ(EventsOf(copy_), EventsOf(server_->journal_path()));
   const JournalCursor cursor = JournalCursor::Read(copy_, *streams_);

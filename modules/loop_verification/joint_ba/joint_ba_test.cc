@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "loop_verification/joint_ba/joint_ba_test_windows.h"
+#include "loop_verification/joint_ba/joint_ba_test_world.h"
 
 namespace pangea {
 namespace {
