@@ -32,7 +32,7 @@ void Tracker::Reset() {
   features_.clear();
   last_pyramid_.clear();
   pyramid_.clear();
-  next_id_ = num_images_ = 0;
+  next_id_ = 0;
 }
 
 void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
@@ -44,7 +44,6 @@ void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
 const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
                                    const Eigen::Quaterniond& q_cam_lastcam) {
   statistics_ = {};
-  ++num_images_;
   Prepare(image);
   if (!features_.empty()) {
     const std::vector<Bearing> before = Bearings();
@@ -130,8 +129,8 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
     from.push_back(features_[i].pixel);
     to.push_back(rotated[i] + dt_s * features_[i].flow);
   }
-  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevels,
-                                    std::min(kNearWindow_px, options_.window_px), &to);
+  const std::vector<uchar> ok =
+      Klt(last_pyramid_, pyramid_, from, kNearLevels, options_.window_px, &to);
   std::vector<Found> found(features_.size());
   for (size_t i = 0; i < features_.size(); ++i) {
     if (ok[i] && features_[i].patch) {
@@ -328,13 +327,10 @@ void Tracker::AddFeatures() {
     const int row = static_cast<int>(feature.pixel.y) * rows / camera_.height;
     taken[row * columns + column] = true;
   }
-  // Every second cell, the others in the next image, while there is no lack of features.
-  const int parity =
-      static_cast<int>(features_.size()) < options_.max_features / 2 ? -1 : num_images_ % 2;
   std::vector<std::pair<float, cv::Point>> corners;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      if (taken[row * columns + column] || (row + column) % 2 == parity) {
+      if (taken[row * columns + column]) {
         continue;
       }
       const int x0 = column * camera_.width / columns;

@@ -107,8 +107,7 @@ class Tracker {
     int finest, coarsest;
   };
   // Of the first search: the prediction is good, and the patch finds what KLT has come near.
-  static constexpr Levels kNearLevels{1, 1};
-  static constexpr int kNearWindow_px = 15;
+  static constexpr Levels kNearLevels{0, 1};
   using Found = std::optional<Eigen::Vector2f>;  // where in the newest image
 
   void Prepare(const cv::Mat& image);
@@ -137,7 +136,6 @@ class Tracker {
   Pyramid last_pyramid_;
   std::vector<Feature> features_;  // oldest first
   int32_t next_id_ = 0;
-  int num_images_ = 0;
   double strongest_ = 0;  // eigenvalue, running
   Statistics statistics_;
   TrackedFrame frame_;
