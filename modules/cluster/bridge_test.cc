@@ -34,7 +34,8 @@ class Bridge : public testing::Test {
       GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
     }
     nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_bridge");
-    server_ = std::make_unique<TestServer>(nats_->access());
+    server_ =
+        std::make_unique<TestServer>(nats_->access(), testing::TempDir() + "/cluster_bridge.lcm");
   }
 
   TestWorker& AddWorker() {

@@ -27,12 +27,11 @@ constexpr char kSite[] = "hall";
 constexpr size_t kMaxMatches = 4;
 const MapId kMap{1, 1'700'000'000'000'000};
 
-std::string FreshJournal(const std::string& name) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
+std::string FreshJournal(const std::string& path) {
   for (const char* suffix : {"", ".stream"}) {
-    std::filesystem::remove(path.string() + suffix);
+    std::filesystem::remove(path + suffix);
   }
-  return path.string();
+  return path;
 }
 
 // Some within the map, some with another.
@@ -84,8 +83,8 @@ void NatsServer::Start() {
   throw std::runtime_error("nats-server does not start; see " + store_.string() + ".log");
 }
 
-TestServer::TestServer(const NatsAccess& access)
-    : access_(access), journal_path_(FreshJournal("cluster_bridge.lcm")) {
+TestServer::TestServer(const NatsAccess& access, const std::string& journal_path)
+    : access_(access), journal_path_(FreshJournal(journal_path)) {
   journal_file_ = std::make_unique<Journal>(
       journal_path_, [](const std::string&, Bytes, const JournalPlace&) { return true; });
   StartBridge(kSite);

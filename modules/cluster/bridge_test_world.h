@@ -51,7 +51,8 @@ class NatsServer {
 // agent_handler and place_recognition: one agent's map, a match a keyframe.
 class TestServer {
  public:
-  explicit TestServer(const NatsAccess& access);
+  // The journal is a new file there, no other test program's.
+  TestServer(const NatsAccess& access, const std::string& journal_path);
 
   // The next keyframe, and its match with this many candidates.
   void Add(int candidates);

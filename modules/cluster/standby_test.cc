@@ -48,7 +48,8 @@ class StandbyTest : public testing::Test {
       GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
     }
     nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_standby");
-    server_ = std::make_unique<TestServer>(nats_->access());
+    server_ =
+        std::make_unique<TestServer>(nats_->access(), testing::TempDir() + "/cluster_standby.lcm");
     streams_ = std::make_unique<SiteStreams>(nats_->access(), "hall");
     for (const char* suffix : {"", ".stream"}) {
       fs::remove(copy_ + suffix);
