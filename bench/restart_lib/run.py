@@ -20,13 +20,12 @@ def write_journal(options, site, keyframes):
                     "--keyframes", str(keyframes)], check=True)
 
 
-def make_site(options, keyframes):
-    """A new site with a journal of so many keyframes."""
-    site = options.work.resolve() / str(keyframes)
+def make_site(options, name):
+    """A new site without a journal."""
+    site = options.work.resolve() / str(name)
     shutil.rmtree(site, ignore_errors=True)
     subprocess.run([options.build.resolve() / "bin/pangea-site", "create", site, "--bus", url(options.port),
                     "--link", url(options.port + 1)], check=True, stdout=subprocess.DEVNULL)
-    write_journal(options, site, keyframes)
     return site
 
 
@@ -53,6 +52,8 @@ def metrics(status, begin):
 
 
 def start(options, site):
+    """Metrics of each process of a server on the site, from its start until all are ready."""
+    sys.path.insert(0, os.fspath(options.build.resolve() / "python"))
     from pangea import status_t
     from pangea.bus import Bus
     bus = Bus(url(options.port))
@@ -69,8 +70,8 @@ def start(options, site):
 
 def measure(options, keyframes):
     """One of {keyframes, start, processes: {name: metrics}} for each start."""
-    sys.path.insert(0, os.fspath(options.build.resolve() / "python"))
     site = make_site(options, keyframes)
+    write_journal(options, site, keyframes)
     for number in range(1, options.starts + 1 + (options.later > 0)):
         if number > options.starts:
             keyframes += options.later

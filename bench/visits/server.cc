@@ -1,10 +1,8 @@
 #include "bench/visits/server.h"
 
 #include <algorithm>
-#include <type_traits>
 #include <utility>
 
-#include "bench/process_use.h"
 #include "files/scratch_file.h"
 
 namespace pangea::bench {
@@ -55,27 +53,9 @@ ThinnedMaps Journal::Thin(const Thinning::Options& options, int64_t now_utime) {
   return thinned;
 }
 
-template <typename Work>
-auto Server::Measured(const std::string& process, const Work& work) {
-  const double heap = HeapBytes(), cpu_ms = CpuMs();
-  const auto account = [&] {
-    Use& use = use_[process];
-    use.heap_bytes += HeapBytes() - heap;
-    use.cpu_ms += CpuMs() - cpu_ms;
-  };
-  if constexpr (std::is_void_v<decltype(work())>) {
-    work();
-    account();
-  } else {
-    auto result = work();
-    account();
-    return result;
-  }
-}
-
 Server::Server(const Journal& journal) {
   const auto records = std::make_shared<ScratchFile>();
-  Measured("place_recognition", [&] {
+  use_.Measure("place_recognition", [&] {
     recognition_ = std::make_unique<PlaceRecognition>(PlaceRecognitionOptions{}, records);
     for (const auto& entries : journal.maps) {
       for (const Journal::Entry& entry : entries) {
@@ -90,15 +70,15 @@ Server::Server(const Journal& journal) {
       }
     }
   };
-  Measured("inter_map_ba", [&] {
+  use_.Measure("inter_map_ba", [&] {
     inter_map_ba_ = std::make_unique<InterMapBa>(InterMapBaOptions{}, records);
     all(inter_map_ba_.get());
   });
-  Measured("fusion", [&] {
+  use_.Measure("fusion", [&] {
     fusion_ = std::make_unique<Fusion>(FusionOptions{}, records);
     all(fusion_.get());
   });
-  Measured("posegraph", [&] {
+  use_.Measure("posegraph", [&] {
     graph_ = std::make_unique<PoseGraph>(PoseGraphOptions{});
     for (const auto& entries : journal.maps) {
       for (const Journal::Entry& entry : entries) {
@@ -113,7 +93,7 @@ Server::Server(const Journal& journal) {
 }
 
 void Server::Finish() {
-  TellGroups(Measured("posegraph", [&] { return graph_->Finish(); }));
+  TellGroups(use_.Measure("posegraph", [&] { return graph_->Finish(); }));
 }
 
 void Server::TellGroups(const PoseGraphUpdate& update) {
@@ -124,17 +104,17 @@ void Server::TellGroups(const PoseGraphUpdate& update) {
 
 Constraint Server::Verify(const KeyframeId& query, const PlaceCandidate& candidate) {
   if (candidate.kind == PlaceKind::kIntra) {
-    return Measured("inter_map_ba", [&] { return inter_map_ba_->Verify(query, candidate); });
+    return use_.Measure("inter_map_ba", [&] { return inter_map_ba_->Verify(query, candidate); });
   }
-  return Measured("fusion", [&] { return fusion_->Verify(query, candidate); });
+  return use_.Measure("fusion", [&] { return fusion_->Verify(query, candidate); });
 }
 
 std::vector<Constraint> Server::Take(const Keyframe& keyframe, Journal* journal) {
   const PlaceMatch match =
-      Measured("place_recognition", [&] { return recognition_->Add(keyframe); });
-  Measured("inter_map_ba", [&] { inter_map_ba_->Add(keyframe); });
-  Measured("fusion", [&] { fusion_->Add(keyframe); });
-  Measured("posegraph", [&] { graph_->Take(keyframe); });
+      use_.Measure("place_recognition", [&] { return recognition_->Add(keyframe); });
+  use_.Measure("inter_map_ba", [&] { inter_map_ba_->Add(keyframe); });
+  use_.Measure("fusion", [&] { fusion_->Add(keyframe); });
+  use_.Measure("posegraph", [&] { graph_->Take(keyframe); });
   if (keyframe.id.seq == 0) {
     journal->maps.emplace_back();
   }
@@ -143,18 +123,10 @@ std::vector<Constraint> Server::Take(const Keyframe& keyframe, Journal* journal)
   for (const PlaceCandidate& candidate : match.candidates) {
     results.push_back(Verify(keyframe.id, candidate));
     journal->constraints.try_emplace(results.back().Id(), results.back());
-    Measured("posegraph", [&] { graph_->Take(results.back()); });
+    use_.Measure("posegraph", [&] { graph_->Take(results.back()); });
   }
-  TellGroups(Measured("posegraph", [&] { return graph_->Settle(); }));
+  TellGroups(use_.Measure("posegraph", [&] { return graph_->Settle(); }));
   return results;
-}
-
-std::map<std::string, Use> Server::TakeUse() {
-  std::map<std::string, Use> use = use_;
-  for (auto& [process, own] : use_) {
-    own.cpu_ms = 0;
-  }
-  return use;
 }
 
 }  // namespace pangea::bench

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/use_by_process.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
 #include "fusion/fusion.h"
@@ -34,11 +35,6 @@ struct Journal {
   ThinnedMaps Thin(const Thinning::Options& options, int64_t now_utime);
 };
 
-struct Use {
-  double heap_bytes = 0;
-  double cpu_ms = 0;
-};
-
 class Server {
  public:
   // With what the journal has.
@@ -51,12 +47,10 @@ class Server {
   void Finish();
 
   // By process; of the CPU since it was last asked.
-  std::map<std::string, Use> TakeUse();
+  std::map<std::string, Use> TakeUse() { return use_.Take(); }
   std::vector<MapState> States() const { return graph_->States(); }
 
  private:
-  template <typename Work>
-  auto Measured(const std::string& process, const Work& work);
   Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate);
   void TellGroups(const PoseGraphUpdate& update);
 
@@ -64,7 +58,7 @@ class Server {
   std::unique_ptr<InterMapBa> inter_map_ba_;
   std::unique_ptr<Fusion> fusion_;
   std::unique_ptr<PoseGraph> graph_;
-  std::map<std::string, Use> use_;
+  UseByProcess use_;
 };
 
 }  // namespace pangea::bench

@@ -64,9 +64,10 @@ std::vector<Keyframe> VisitAgain(const std::vector<Keyframe>& keyframes, int64_t
                                  uint64_t visit) {
   Noise noise(visit);
   Walk walk;
-  std::vector<Keyframe> again;
-  for (const Keyframe& stored : keyframes) {
-    Keyframe keyframe = stored;
+  std::vector<Keyframe> again = keyframes;
+  for (size_t k = 0; k < again.size(); ++k) {
+    const Keyframe& stored = keyframes[k];
+    Keyframe& keyframe = again[k];
     keyframe.id.map.opened_utime = opened_utime;
     if (keyframe.edge) {
       const Rigid3 drift = walk.Step(stored, keyframes[stored.edge->from_seq].T_odom_body, &noise);
@@ -83,7 +84,6 @@ std::vector<Keyframe> VisitAgain(const std::vector<Keyframe>& keyframes, int64_t
       point.inverse_depth = std::max(
           kMinInverseDepth, static_cast<float>(point.inverse_depth + noise.Normal(0.5 * sigma)));
     }
-    again.push_back(std::move(keyframe));
   }
   return again;
 }
