@@ -190,12 +190,15 @@ std::optional<MapState> GlobalBa::Advance() {
 
 void GlobalBa::Begin(StatePointer state) {
   std::vector<MatchedPlaces> places;
-  for (const Pair& pair : tied_) {
-    const auto corners = matched_.find(pair);
-    const auto record =
-        corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
-    if (record) {
-      places.push_back({pair.first, pair.second, CornersFromRecord(*record)});
+  for (const MapId& map : state->maps) {
+    for (auto pair = tied_.lower_bound({{map, 0}, {}});
+         pair != tied_.end() && pair->first.map == map; ++pair) {
+      const auto corners = matched_.find(*pair);
+      const auto record =
+          corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
+      if (record) {
+        places.push_back({pair->first, pair->second, CornersFromRecord(*record)});
+      }
     }
   }
   problem_ = std::make_unique<BaProblem>(MakeGroupWorld(*state, places, options_.world, &store_),

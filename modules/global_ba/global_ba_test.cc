@@ -11,7 +11,8 @@ namespace pangea {
 namespace {
 
 struct Server {
-  explicit Server(const BaTestMessages& messages) : ba(GlobalBaOptions{}) {
+  explicit Server(const BaTestMessages& messages, std::shared_ptr<RecordStore> records = nullptr)
+      : ba(GlobalBaOptions{}, std::move(records)) {
     for (const Keyframe& keyframe : messages.keyframes) {
       ba.Take(keyframe);
     }
@@ -66,6 +67,50 @@ TEST(GlobalBa, TheOrderOfMessagesDoesNotMatter) {
   for (size_t i = 0; i < in_order->keyframes.size(); ++i) {
     EXPECT_EQ(in_order->keyframes[i].T_map_body.t, shuffled->keyframes[i].T_map_body.t);
   }
+}
+
+class CountingStore : public RecordStore {
+ public:
+  std::optional<int64_t> Append(std::span<const uint8_t> record) override {
+    const auto offset = static_cast<int64_t>(bytes_.size());
+    bytes_.insert(bytes_.end(), record.begin(), record.end());
+    return offset;
+  }
+  bool Read(int64_t offset, std::span<uint8_t> record) override {
+    ++num_reads_;
+    std::copy_n(bytes_.begin() + offset, record.size(), record.begin());
+    return true;
+  }
+  std::string problem() const override { return ""; }
+  int num_reads() const { return num_reads_; }
+
+ private:
+  std::vector<uint8_t> bytes_;
+  int num_reads_ = 0;
+};
+
+// Otherwise an adjustment would cost more with each group that the server has.
+TEST(GlobalBa, NothingIsReadOfOtherGroups) {
+  const BaTestMessages group = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  const auto alone = std::make_shared<CountingStore>();
+  ASSERT_TRUE(Server(group, alone).Finish());
+  const auto beside_another = std::make_shared<CountingStore>();
+  Server server(group, beside_another);
+  constexpr int32_t kOthers = 100;
+  for (PlaceMatch match : group.matches) {
+    match.query.map.agent_id += kOthers;
+    for (PlaceCandidate& candidate : match.candidates) {
+      candidate.match.map.agent_id += kOthers;
+    }
+    server.ba.Take(match);
+  }
+  for (Constraint constraint : group.constraints) {
+    constraint.from.map.agent_id += kOthers;
+    constraint.to.map.agent_id += kOthers;
+    server.ba.Take(constraint);
+  }
+  ASSERT_TRUE(server.Finish());
+  EXPECT_EQ(beside_another->num_reads(), alone->num_reads());
 }
 
 // What was not verified, because constraints beside it tell as much, still ties landmarks; what was

@@ -78,18 +78,17 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
                                                      const Outlook& outlook) {
   const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
-  for (const KeyframeId& id : refined_) {
-    const auto pose = group.T_map_body.find(id);
+  for (const auto& [id, T_map_body] : group.T_map_body) {
     const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - options_.own_recent;
-    if (pose == group.T_map_body.end() || is_recent ||
-        (pose->second.t - outlook.T_map_cam.t).norm() > options_.max_distance_m) {
+    if (is_recent || (T_map_body.t - outlook.T_map_cam.t).norm() > options_.max_distance_m ||
+        !refined_.contains(id)) {
       continue;
     }
     const auto view = store_.Find(id);
     if (view == nullptr) {
       continue;
     }
-    const Rigid3 T_map_cam = pose->second * view->keyframe().camera.T_body_cam;
+    const Rigid3 T_map_cam = T_map_body * view->keyframe().camera.T_body_cam;
     if (axis.dot(T_map_cam.q * Vector3d::UnitZ()) < std::cos(kMaxAxes_rad)) {
       continue;
     }

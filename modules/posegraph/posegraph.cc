@@ -108,6 +108,7 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
   loop.relative =
       MakeRelative4(constraint.T_from_to, constraint.covariance, node_from.T_odom_body.q,
                     node_from.roll_pitch_covariance, node_to.T_odom_body.q);
+  maps_[from.map].loops_from.push_back(static_cast<int>(loops_.size()));
   loops_.push_back(loop);
   if (!loop.intra()) {
     const bool forward = maps_[from.map].id < maps_[to.map].id;
@@ -115,6 +116,7 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
     const auto it =
         pairs_.try_emplace(pair, maps_[pair.first].chain, maps_[pair.second].chain, options_.merge)
             .first;
+    const bool merged = IsMerged(*it);
     it->second.Add({.id = loop.id,
                     .node_a = forward ? from.node : to.node,
                     .node_b = forward ? to.node : from.node,
@@ -122,7 +124,9 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
                     .num_inliers = loop.num_inliers,
                     .derived = loop.derived});
     undone_.erase(pair);
-    Regroup();
+    if (IsMerged(*it) != merged) {
+      Regroup();
+    }
   }
   if (group_of_[from.map] == group_of_[to.map]) {
     Group& group = GroupOf(from.map);
@@ -140,9 +144,10 @@ void PoseGraph::Regroup() {
     }
     return map;
   };
-  for (const auto& [pair, evidence] : pairs_) {
-    if (evidence.decision().merge && !undone_.contains(pair)) {
-      const auto [older, newer] = std::minmax({find(pair.first), find(pair.second)});
+  for (const auto& entry : pairs_) {
+    if (IsMerged(entry)) {
+      const auto& [a, b] = entry.first;
+      const auto [older, newer] = std::minmax({find(a), find(b)});
       root[newer] = older;
     }
   }
@@ -162,15 +167,36 @@ void PoseGraph::Regroup() {
   groups_ = std::move(groups);
 }
 
-std::vector<Loop*> PoseGraph::LoopsOf(const Group& group) {
-  std::vector<Loop*> loops;
-  for (Loop& loop : loops_) {
-    if (group_of_[loop.from.map] == group.maps.front() &&
-        group_of_[loop.to.map] == group.maps.front()) {
-      loops.push_back(&loop);
+std::vector<int> PoseGraph::LoopNumbersOf(const Group& group) const {
+  std::vector<int> numbers;
+  for (const int map : group.maps) {
+    for (const int loop : maps_[map].loops_from) {
+      if (group_of_[loops_[loop].to.map] == group.maps.front()) {
+        numbers.push_back(loop);
+      }
     }
   }
+  std::ranges::sort(numbers);
+  return numbers;
+}
+
+std::vector<Loop*> PoseGraph::LoopsOf(const Group& group) {
+  std::vector<Loop*> loops;
+  for (const int loop : LoopNumbersOf(group)) {
+    loops.push_back(&loops_[loop]);
+  }
   return loops;
+}
+
+std::vector<const PoseGraph::PairEntry*> PoseGraph::PairsOf(const Group& group) const {
+  std::vector<const PairEntry*> pairs;
+  for (const int map : group.maps) {
+    for (auto pair = pairs_.lower_bound({map, 0}); pair != pairs_.end() && pair->first.first == map;
+         ++pair) {
+      pairs.push_back(&*pair);
+    }
+  }
+  return pairs;
 }
 
 bool PoseGraph::SolveIsDue(const Group& group) const {
@@ -220,12 +246,10 @@ bool PoseGraph::UndoMerges(const Group& group) {
     in_force[{a, b}] += loop->on ? weight : 0;
   }
   bool any = false;
-  for (const auto& [pair, evidence] : pairs_) {
-    const auto [a, b] = std::minmax(pair.first, pair.second);
-    const bool here = group_of_[a] == group.maps.front() && group_of_[b] == group.maps.front();
-    if (here && evidence.decision().merge && !undone_.contains(pair) &&
-        in_force[{a, b}] < kMinLoopsInForce) {
-      undone_.insert(pair);
+  for (const PairEntry* entry : PairsOf(group)) {
+    const auto [a, b] = std::minmax(entry->first.first, entry->first.second);
+    if (group_of_[a] == group_of_[b] && IsMerged(*entry) && in_force[{a, b}] < kMinLoopsInForce) {
+      undone_.insert(entry->first);
       any = true;
     }
   }
@@ -302,11 +326,8 @@ MapState PoseGraph::StateOf(const Group& group) const {
           {{map.id, node.seq}, node.utime, told.at(number).T_map_body(static_cast<int>(i))});
     }
   }
-  for (const Loop& loop : loops_) {
-    if (group_of_[loop.from.map] == group.maps.front() &&
-        group_of_[loop.to.map] == group.maps.front()) {
-      ++(loop.on ? state.num_constraints : state.num_switched_off);
-    }
+  for (const int loop : LoopNumbersOf(group)) {
+    ++(loops_[loop].on ? state.num_constraints : state.num_switched_off);
   }
   return state;
 }

@@ -131,7 +131,8 @@ class PoseGraph {
   struct MapChain {
     MapId id;
     OdometryChain chain;
-    std::vector<Pose4> poses;  // of each node, in the map frame
+    std::vector<Pose4> poses;     // of each node, in the map frame
+    std::vector<int> loops_from;  // indices into loops_, of loops that begin in it
     Pose4 T_map_odom;
     double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)
     int newest_solved = -1;
@@ -162,6 +163,7 @@ class PoseGraph {
     int keyframes_unpublished = 0;
   };
   using Pair = std::pair<int, int>;
+  using PairEntry = std::pair<const Pair, PairEvidence>;
   // What of a map is solved: from the first node to the last that has a loop; what comes after is
   // joined to the solution by odometry alone.
   struct SolvedMap {
@@ -176,7 +178,14 @@ class PoseGraph {
   void AddLoop(const Constraint& constraint, NodeRef from, NodeRef to);
   bool TryAdd(const Constraint& constraint);
   Group& GroupOf(int map) { return groups_.at(group_of_[map]); }
+  // Both ends in the group; ascending.
+  std::vector<int> LoopNumbersOf(const Group& group) const;
   std::vector<Loop*> LoopsOf(const Group& group);
+  // Whose first map is in the group; ascending.
+  std::vector<const PairEntry*> PairsOf(const Group& group) const;
+  bool IsMerged(const PairEntry& pair) const {
+    return pair.second.decision().merge && !undone_.contains(pair.first);
+  }
   void Regroup();
   bool SolveIsDue(const Group& group) const;
   // Solves what is due until nothing is.
@@ -199,7 +208,7 @@ class PoseGraph {
   };
   // Along the merges with most agreeing viewpoints: the next map of a group of which some are
   // placed.
-  Placed PlaceNext(const std::set<int>& placed) const;
+  Placed PlaceNext(const Group& group, const std::set<int>& placed) const;
   void Place(const Group& group);
   void ResetLoops(const Group& group, const std::vector<Loop*>& loops);
   bool FitsOdometry(const Loop& loop) const;

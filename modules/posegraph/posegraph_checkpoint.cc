@@ -160,6 +160,9 @@ bool PoseGraph::Read(ByteReader* reader) {
       })) {
     return false;
   }
+  for (size_t i = 0; i < loops_.size(); ++i) {
+    maps_[loops_[i].from.map].loops_from.push_back(static_cast<int>(i));
+  }
   return ReadPairs(reader) && ReadGroups(reader) && ReadSeen(reader);
 }
 

@@ -38,7 +38,7 @@ void PoseGraph::Join(Group* group, const std::vector<int>& restored_group_of) {
   const std::set<int> fixed = parts.at(part_of(group->maps.front()));
   std::set<int> placed = fixed;
   while (placed.size() < group->maps.size()) {
-    const Placed next = PlaceNext(placed);
+    const Placed next = PlaceNext(*group, placed);
     const Pose4 T_map_before = next.T_map_odom * maps_[next.map].T_map_odom.Inverse();
     for (const int number : parts.at(part_of(next.map))) {
       MapChain& map = maps_[number];

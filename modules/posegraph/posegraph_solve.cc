@@ -51,9 +51,9 @@ std::vector<PairEvidence::Innovation> PoseGraph::Innovations(
         {Residual({chain[loop->from.node].T_odom_body.t, 0}, {p_to, 0}, loop->relative),
          loop->relative.covariance, chain.DriftBetween(loop->from.node, loop->to.node, p_to)});
   }
-  for (const auto& [pair, evidence] : pairs_) {
-    if (evidence.decision().merge && group_of_[pair.first] == group.maps.front() &&
-        group_of_[pair.second] == group.maps.front()) {
+  for (const PairEntry* entry : PairsOf(group)) {
+    const auto& [pair, evidence] = *entry;
+    if (evidence.decision().merge && group_of_[pair.first] == group_of_[pair.second]) {
       const auto more = evidence.Innovations();
       innovations.insert(innovations.end(), more.begin(), more.end());
     }
@@ -82,19 +82,18 @@ double PoseGraph::OdometryVariance(const Group& group, const std::vector<Loop*>&
   return std::exp(high);
 }
 
-PoseGraph::Placed PoseGraph::PlaceNext(const std::set<int>& placed) const {
-  const std::pair<const Pair, PairEvidence>* best = nullptr;
-  for (const auto& entry : pairs_) {
-    const auto& [pair, evidence] = entry;
+PoseGraph::Placed PoseGraph::PlaceNext(const Group& group, const std::set<int>& placed) const {
+  const PairEntry* best = nullptr;
+  for (const PairEntry* entry : PairsOf(group)) {
+    const Pair& pair = entry->first;
     const bool leads_on = placed.contains(pair.first) != placed.contains(pair.second) &&
                           group_of_[pair.first] == group_of_[pair.second];
-    const bool merged = evidence.decision().merge && !undone_.contains(pair);
-    const auto rank = [this](const std::pair<const Pair, PairEvidence>& e) {
+    const auto rank = [this](const PairEntry& e) {
       return std::tuple(-e.second.decision().viewpoints, maps_[e.first.first].id,
                         maps_[e.first.second].id);
     };
-    if (leads_on && merged && (best == nullptr || rank(entry) < rank(*best))) {
-      best = &entry;
+    if (leads_on && IsMerged(*entry) && (best == nullptr || rank(*entry) < rank(*best))) {
+      best = entry;
     }
   }
   const auto& [a, b] = best->first;
@@ -107,7 +106,7 @@ void PoseGraph::Place(const Group& group) {
   std::set<int> placed = {group.maps.front()};
   maps_[group.maps.front()].T_map_odom = {};
   while (placed.size() < group.maps.size()) {
-    const Placed next = PlaceNext(placed);
+    const Placed next = PlaceNext(group, placed);
     maps_[next.map].T_map_odom = next.T_map_odom;
     placed.insert(next.map);
   }
@@ -124,10 +123,9 @@ void PoseGraph::Place(const Group& group) {
 
 void PoseGraph::ResetLoops(const Group& group, const std::vector<Loop*>& loops) {
   std::set<int64_t> agreeing;
-  for (const auto& [pair, evidence] : pairs_) {
-    if (group_of_[pair.first] == group.maps.front()) {
-      agreeing.insert(evidence.decision().agreeing.begin(), evidence.decision().agreeing.end());
-    }
+  for (const PairEntry* entry : PairsOf(group)) {
+    const std::vector<int64_t>& ids = entry->second.decision().agreeing;
+    agreeing.insert(ids.begin(), ids.end());
   }
   for (Loop* loop : loops) {
     loop->on = loop->intra() ? FitsOdometry(*loop) : agreeing.contains(loop->id);
