@@ -9,7 +9,7 @@
 // weighted by log(keyframes / keyframes met), the idf of Sivic & Zisserman. The constants were
 // measured: docs/decisions/place_recognition_index.md.
 //
-// Deterministic; no result depends on time. Memory: kTables * 5.5 bytes a corner, a quarter more
+// Deterministic; no result depends on time. Memory: kTables * 5.5 bytes a corner, a tenth more
 // while much waits to be packed, and 40 MB (posting_lists.h).
 
 #include <array>
@@ -52,9 +52,9 @@ class DescriptorIndex {
   static constexpr size_t kMaxPostingsPerWord = 128;
   // After so many keyframes it is one table's turn, next time the next one's. It is packed if one
   // posting a word waits, and this share of what is packed, so that the work of n keyframes does
-  // not grow with n squared.
+  // not grow with n squared. Not more waits, since each that does is far from the next in memory.
   static constexpr int kPackEvery = 20;
-  static constexpr size_t kPackShare = 8;
+  static constexpr size_t kPackShare = 32;
 
   struct Table {
     std::array<uint16_t, kWordBits> word_bits{};

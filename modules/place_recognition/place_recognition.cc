@@ -150,12 +150,18 @@ bool PlaceRecognition::IsRecent(const RecognisedKeyframe& query, int other) cons
 
 std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
     const std::vector<Place>& hits) const {
-  std::vector<Place> sorted = hits;
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const Place& a, const Place& b) { return a.score > b.score; });
+  // Of equals the older first. A heap, since a few of the best are all that is wanted.
+  const auto worse = [](const Place& a, const Place& b) {
+    return std::pair(a.score, -a.keyframe) < std::pair(b.score, -b.keyframe);
+  };
+  std::vector<Place> heap = hits;
+  std::ranges::make_heap(heap, worse);
   std::vector<Place> places;
   std::map<MapId, std::vector<int32_t>> taken;
-  for (const Place& hit : sorted) {
+  while (!heap.empty() && places.size() < kMaxPlaces) {
+    std::ranges::pop_heap(heap, worse);
+    const Place hit = heap.back();
+    heap.pop_back();
     const KeyframeId& id = stored_.id(hit.keyframe);
     std::vector<int32_t>& seqs = taken[id.map];
     if (std::none_of(seqs.begin(), seqs.end(), [&](int32_t seq) {
@@ -163,9 +169,6 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
         })) {
       seqs.push_back(id.seq);
       places.push_back(hit);
-    }
-    if (places.size() >= kMaxPlaces) {
-      break;
     }
   }
   return places;

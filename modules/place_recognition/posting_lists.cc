@@ -27,8 +27,8 @@ void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
 }
 
 void PostingLists::Pack() {
-  // Count, gap and signature of a posting, at most.
-  constexpr size_t kMostBytes = 5 + 5 + sizeof(uint32_t);
+  // Count, newest keyframe, gap and signature of a posting, at most.
+  constexpr size_t kMostBytes = 5 + 5 + 5 + sizeof(uint32_t);
   std::vector<uint8_t> packed;
   packed.reserve(packed_.size() + kMostBytes * waiting_.size());
   for (uint32_t word = 0; word < newest_.size(); ++word) {
@@ -81,11 +81,9 @@ void PostingLists::PackWord(uint32_t word, std::vector<uint8_t>* packed) const {
   const uint8_t* const end = packed_.data() + begin_[word + 1];
   Reader reader(packed_.data() + begin_[word], end);
   PutNumber(static_cast<uint32_t>(reader.count() + waiting.size()), packed);
+  PutNumber(static_cast<uint32_t>(waiting.front()->keyframe), packed);
   packed->insert(packed->end(), reader.gaps(), reader.signatures());
-  int32_t keyframe = 0;
-  for (size_t i = 0; i < reader.count(); ++i) {
-    keyframe = reader.NextKeyframe();
-  }
+  int32_t keyframe = reader.newest();
   for (auto it = waiting.rbegin(); it != waiting.rend(); ++it) {
     PutNumber(static_cast<uint32_t>((*it)->keyframe - keyframe), packed);
     keyframe = (*it)->keyframe;

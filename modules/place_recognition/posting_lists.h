@@ -2,10 +2,10 @@
 
 // The postings of one table of the index, by word, in little more than their signatures.
 //
-// All but the newest are packed: word after word, each list as its count, the gaps from keyframe to
-// keyframe (both as base-128 varints; lists of an inverted index are coded so since Witten, Moffat
-// & Bell, Managing Gigabytes, 1999), and the signatures. The newest wait in a chain for each word
-// until Pack. A packed posting takes 5.5 bytes, a waiting one 12; a word 8.
+// All but the newest are packed: word after word, each list as its count, its newest keyframe, the
+// gaps from keyframe to keyframe (all as base-128 varints; lists of an inverted index are coded so
+// since Witten, Moffat & Bell, Managing Gigabytes, 1999), and the signatures. The newest wait in a
+// chain for each word until Pack. A packed posting takes 5.5 bytes, a waiting one 12; a word 12.
 //
 // Deterministic; what is visited does not depend on when Pack was called. Not thread safe.
 
@@ -72,9 +72,11 @@ class PostingLists {
    public:
     Reader(const uint8_t* begin, const uint8_t* end) : at_(begin) {
       count_ = begin == end ? 0 : NextNumber();
+      newest_ = begin == end ? 0 : static_cast<int32_t>(NextNumber());
       signatures_ = end - sizeof(uint32_t) * count_;
     }
     size_t count() const { return count_; }
+    int32_t newest() const { return newest_; }
     int32_t NextKeyframe() {
       keyframe_ += static_cast<int32_t>(NextNumber());
       return keyframe_;
@@ -100,6 +102,7 @@ class PostingLists {
     const uint8_t* at_;
     const uint8_t* signatures_ = nullptr;
     size_t count_ = 0;
+    int32_t newest_ = 0;
     int32_t keyframe_ = 0;
   };
 
