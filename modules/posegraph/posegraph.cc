@@ -1,16 +1,8 @@
 #include "posegraph/posegraph.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace pangea {
-namespace {
-
-// A merge needs this many loops that the robust solve keeps.
-constexpr int kMinLoopsInForce = 2;
-
-}  // namespace
-
 PoseGraph::PoseGraph(const PoseGraphOptions& options, int64_t first_revision)
     : options_(options), next_revision_(first_revision) {}
 
@@ -19,6 +11,7 @@ int PoseGraph::MapNumber(const MapId& id) {
   if (is_new) {
     maps_.emplace_back().id = id;
     group_of_.push_back(it->second);
+    solved_in_.push_back(it->second);
     Group group;
     group.maps = {it->second};
     groups_[it->second] = group;
@@ -54,12 +47,8 @@ void PoseGraph::Take(const Keyframe& keyframe) {
   group.unpublished = true;
   ++group.keyframes_unpublished;
   group.keyframes_waiting += group.waiting_loops > 0 ? 1 : 0;
-  size_t num_keyframes = 0;
-  for (const int m : group.maps) {
-    num_keyframes += maps_[m].chain.size();
-  }
   if (group.keyframes_unpublished >=
-      std::max<int>(options_.state_every, static_cast<int>(num_keyframes / 50))) {
+      std::max<int>(options_.state_every, static_cast<int>(NumKeyframes(group) / 50))) {
     group.publish_now = true;
   }
   std::erase_if(parked_, [&](const Constraint& constraint) {
@@ -131,94 +120,43 @@ void PoseGraph::AddLoop(const Constraint& constraint, NodeRef from, NodeRef to) 
   if (group_of_[from.map] == group_of_[to.map]) {
     Group& group = GroupOf(from.map);
     ++group.waiting_loops;
+    group.changed.insert({from.map, to.map});
     group.stale = true;
   }
 }
 
-void PoseGraph::Regroup() {
-  std::vector<int> root(maps_.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int map) {
-    while (root[map] != map) {
-      map = root[map];
-    }
-    return map;
-  };
-  for (const auto& entry : pairs_) {
-    if (IsMerged(entry)) {
-      const auto& [a, b] = entry.first;
-      const auto [older, newer] = std::minmax({find(a), find(b)});
-      root[newer] = older;
-    }
-  }
-  std::map<int, Group> groups;
-  for (int map = 0; map < static_cast<int>(maps_.size()); ++map) {
-    group_of_[map] = find(map);
-    groups[group_of_[map]].maps.push_back(map);
-  }
-  for (auto& [oldest, group] : groups) {
-    const auto before = groups_.find(oldest);
-    if (before != groups_.end() && before->second.maps == group.maps) {
-      group = before->second;
-    } else {
-      group.stale = group.publish_now = true;
-    }
-  }
-  groups_ = std::move(groups);
-}
-
-std::vector<int> PoseGraph::LoopNumbersOf(const Group& group) const {
-  std::vector<int> numbers;
-  for (const int map : group.maps) {
-    for (const int loop : maps_[map].loops_from) {
-      if (group_of_[loops_[loop].to.map] == group.maps.front()) {
-        numbers.push_back(loop);
-      }
-    }
-  }
-  std::ranges::sort(numbers);
-  return numbers;
-}
-
-std::vector<Loop*> PoseGraph::LoopsOf(const Group& group) {
-  std::vector<Loop*> loops;
-  for (const int loop : LoopNumbersOf(group)) {
-    loops.push_back(&loops_[loop]);
-  }
-  return loops;
-}
-
-std::vector<const PoseGraph::PairEntry*> PoseGraph::PairsOf(const Group& group) const {
-  std::vector<const PairEntry*> pairs;
-  for (const int map : group.maps) {
-    for (auto pair = pairs_.lower_bound({map, 0}); pair != pairs_.end() && pair->first.first == map;
-         ++pair) {
-      pairs.push_back(&*pair);
-    }
-  }
-  return pairs;
-}
-
 bool PoseGraph::SolveIsDue(const Group& group) const {
-  size_t num_keyframes = 0;
-  for (const int map : group.maps) {
-    num_keyframes += maps_[map].chain.size();
-  }
-  const int enough = 1 + static_cast<int>(num_keyframes) / options_.keyframes_per_waiting_loop;
+  const int enough =
+      1 + static_cast<int>(NumKeyframes(group)) / options_.keyframes_per_waiting_loop;
   return group.waiting_loops >= enough ||
          (group.waiting_loops > 0 && group.keyframes_waiting >= options_.max_keyframes_waiting);
+}
+
+bool PoseGraph::WholeIsDue(const Group& group) const {
+  constexpr int64_t kShare = 10;
+  if (!group.stale || NumKeyframes(group) <= static_cast<size_t>(options_.local_keyframes)) {
+    return group.stale;
+  }
+  const auto num_loops = static_cast<int64_t>(LoopNumbersOf(group).size());
+  return kShare * (num_loops - group.whole_loops) >= num_loops;
 }
 
 void PoseGraph::SolveDue(bool from_the_beginning) {
   const auto due = [&](const auto& entry) {
     const Group& group = entry.second;
     return (group.regrouped && group.stale) || SolveIsDue(group) ||
-           (from_the_beginning && group.stale);
+           (from_the_beginning && (group.waiting_loops > 0 || WholeIsDue(group)));
   };
   for (auto it = std::ranges::find_if(groups_, due); it != groups_.end();
        it = std::ranges::find_if(groups_, due)) {
-    Solve(&it->second, from_the_beginning);
-    if (UndoMerges(it->second)) {
+    Group& group = it->second;
+    const bool whole = from_the_beginning && WholeIsDue(group);
+    if (!whole && group.regrouped && JoinsALargeOne(group)) {
+      Join(&group);
+    } else {
+      Solve(&group, whole);
+    }
+    if (UndoMerges(group)) {
       Regroup();
     }
   }
@@ -236,24 +174,6 @@ PoseGraphUpdate PoseGraph::Settle(bool from_the_beginning) {
     }
   }
   return update;
-}
-
-bool PoseGraph::UndoMerges(const Group& group) {
-  std::map<Pair, int> in_force;
-  for (const Loop* loop : LoopsOf(group)) {
-    const auto [a, b] = std::minmax(loop->from.map, loop->to.map);
-    const int weight = loop->derived ? kMinLoopsInForce : 1;
-    in_force[{a, b}] += loop->on ? weight : 0;
-  }
-  bool any = false;
-  for (const PairEntry* entry : PairsOf(group)) {
-    const auto [a, b] = std::minmax(entry->first.first, entry->first.second);
-    if (group_of_[a] == group_of_[b] && IsMerged(*entry) && in_force[{a, b}] < kMinLoopsInForce) {
-      undone_.insert(entry->first);
-      any = true;
-    }
-  }
-  return any;
 }
 
 PoseGraphUpdate PoseGraph::Finish() {

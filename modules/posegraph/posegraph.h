@@ -50,6 +50,9 @@ struct PoseGraphOptions {
   // or for so many new keyframes since the first waiting loop.
   int keyframes_per_waiting_loop = 300;
   int max_keyframes_waiting = 10;
+  // Of a group with more keyframes than this a solve moves the maps that have new loops, and those
+  // that share loops with them; all others stay, until the group's loops have grown by a tenth.
+  int local_keyframes = 1000;
   // A group's state is published again after so many new keyframes, and 2 % of the group.
   int state_every = 10;
 
@@ -61,6 +64,8 @@ struct PoseGraphOptions {
                 "of a group: it waits for one more loop before it solves");
     archive.Add("max_keyframes_waiting", &max_keyframes_waiting, {0, 1000000}, "",
                 "new keyframes for which loops wait at most");
+    archive.Add("local_keyframes", &local_keyframes, {1, 100000000}, "",
+                "of a group of which a solve moves only what is near new loops");
     archive.Add("state_every", &state_every, {1, 1000000}, "",
                 "new keyframes, and 2 % of the group");
     archive.Section("merge", &merge, "when maps become one group");
@@ -156,7 +161,9 @@ class PoseGraph {
     bool stale = false;            // loops since the last solve from the beginning
     int waiting_loops = 0;         // since the last solve
     int keyframes_waiting = 0;     // since the first of them
-    int64_t known_loops = 0;       // loops_ that the last graduated solve saw
+    int64_t known_loops = 0;       // its loops that the last graduated solve saw
+    int64_t whole_loops = 0;       // that the last solve from the beginning saw
+    std::set<int> changed;         // maps with loops since the last solve
     double odometry_variance = 1;  // its factor
     bool unpublished = true;
     bool publish_now = false;
@@ -188,6 +195,9 @@ class PoseGraph {
   }
   void Regroup();
   bool SolveIsDue(const Group& group) const;
+  size_t NumKeyframes(const Group& group) const;
+  // Whether the group is solved from the beginning once nothing more comes.
+  bool WholeIsDue(const Group& group) const;
   // Solves what is due until nothing is.
   void SolveDue(bool from_the_beginning);
   // Then publishes.
@@ -195,11 +205,17 @@ class PoseGraph {
   // Merges that their loops no longer carry; whether there were any.
   bool UndoMerges(const Group& group);
 
-  // After a restart, of groups that maps have joined since the checkpoint: its solution stays, the
-  // others are laid beside it; the next solve from the beginning is due (posegraph_join.cc).
+  // Of groups that maps have joined since they were solved, after a restart or when they are large:
+  // the solution of the oldest map's part stays, the others are laid beside it; the next solve from
+  // the beginning is due (posegraph_join.cc).
   void JoinRestored();
-  void Join(Group* group, const std::vector<int>& restored_group_of);
+  using Parts = std::map<int, std::set<int>>;
+  // Maps that were solved together, by what they were solved in.
+  Parts PartsOf(const Group& group) const;
+  bool JoinsALargeOne(const Group& group) const;
+  void Join(Group* group);
   void SolveJoined(Group* group, const std::set<int>& fixed_maps);
+  void NoteSolved(Group* group);
 
   void Solve(Group* group, bool from_the_beginning);
   struct Placed {
@@ -210,6 +226,8 @@ class PoseGraph {
   // placed.
   Placed PlaceNext(const Group& group, const std::set<int>& placed) const;
   void Place(const Group& group);
+  // Maps that neither have new loops nor share loops in force with one that has.
+  std::set<int> FarMaps(const Group& group, const std::vector<Loop*>& loops) const;
   void ResetLoops(const Group& group, const std::vector<Loop*>& loops);
   bool FitsOdometry(const Loop& loop) const;
   double OdometryVariance(const Group& group, const std::vector<Loop*>& loops) const;
@@ -221,7 +239,9 @@ class PoseGraph {
                GroupSolver* solver) const;
   void AddLoops(const std::vector<Loop*>& loops, const std::vector<SolvedMap>& solved,
                 GroupSolver* solver) const;
-  void Apply(const GroupSolver& solver, const std::vector<SolvedMap>& solved);
+  // Which loops are in force, and where the maps are that were not fixed.
+  void Apply(const GroupSolver& solver, std::vector<SolvedMap> solved,
+             const std::set<int>& fixed_maps, const std::vector<Loop*>& loops);
 
   // Each of the group's maps as it is told.
   std::map<int, RefinedMap> RefinedMaps(const Group& group) const;
@@ -243,7 +263,8 @@ class PoseGraph {
   std::set<Pair> undone_;        // merges that the robust solve does not carry, until new evidence
   std::map<int, Group> groups_;  // by their oldest map
   std::vector<int> group_of_;    // of each map
-  std::vector<int> restored_group_of_;  // until the first settling after a restart
+  std::vector<int> solved_in_;   // of each map: the group's oldest when it was last solved
+  bool restored_ = false;        // until the first settling after a restart
   std::vector<Constraint> parked_;
   std::set<int64_t> seen_;               // accepted constraints
   std::vector<Refinement> refinements_;  // no two share a map

@@ -117,6 +117,8 @@ void PoseGraph::SaveGroups(ByteWriter* writer) const {
     writer->Put(group.waiting_loops);
     writer->Put(group.keyframes_waiting);
     writer->Put(group.known_loops);
+    writer->Put(group.whole_loops);
+    writer->Put(std::vector<int>(group.changed.begin(), group.changed.end()));
     writer->Put(group.odometry_variance);
     writer->Put(group.unpublished);
     writer->Put(group.publish_now);
@@ -129,7 +131,8 @@ bool PoseGraph::Restore(ByteReader* reader) {
   if (!graph.Read(reader)) {
     return false;
   }
-  graph.restored_group_of_ = graph.group_of_;
+  graph.solved_in_ = graph.group_of_;
+  graph.restored_ = true;
   *this = std::move(graph);
   return true;
 }
@@ -199,6 +202,10 @@ bool PoseGraph::ReadGroups(ByteReader* reader) {
     reader->Get(&group.waiting_loops);
     reader->Get(&group.keyframes_waiting);
     reader->Get(&group.known_loops);
+    reader->Get(&group.whole_loops);
+    std::vector<int> changed;
+    reader->Get(&changed);
+    group.changed = {changed.begin(), changed.end()};
     reader->Get(&group.odometry_variance);
     reader->Get(&group.unpublished);
     reader->Get(&group.publish_now);

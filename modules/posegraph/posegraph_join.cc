@@ -1,6 +1,6 @@
-// The first answer after a restart: maps that joined a group since the checkpoint are solved alone,
-// beside a solution that stays as it was. A large group takes long from the beginning, and that is
-// still to be done then; but its agents know where they are.
+// The first answer after a restart, and when maps join a large group: they are solved alone, beside
+// a solution that stays as it was. A large group takes long from the beginning, and that is still
+// to be done then; but its agents know where they are.
 
 #include <algorithm>
 #include <utility>
@@ -10,14 +10,13 @@
 namespace pangea {
 
 void PoseGraph::JoinRestored() {
-  if (restored_group_of_.empty()) {
+  if (!std::exchange(restored_, false)) {
     return;
   }
-  const std::vector<int> restored_group_of = std::exchange(restored_group_of_, {});
   bool undone = false;
   for (auto& [oldest, group] : groups_) {
     if (group.regrouped && group.stale) {
-      Join(&group, restored_group_of);
+      Join(&group);
       undone |= UndoMerges(group);
     }
   }
@@ -26,21 +25,32 @@ void PoseGraph::JoinRestored() {
   }
 }
 
-// The oldest map's part of the group stays; a part that was solved by itself moves as one.
-void PoseGraph::Join(Group* group, const std::vector<int>& restored_group_of) {
-  std::map<int, std::set<int>> parts;
-  const auto part_of = [&](int map) {
-    return map < static_cast<int>(restored_group_of.size()) ? restored_group_of[map] : map;
-  };
-  for (const int map : group->maps) {
-    parts[part_of(map)].insert(map);
+PoseGraph::Parts PoseGraph::PartsOf(const Group& group) const {
+  Parts parts;
+  for (const int map : group.maps) {
+    parts[solved_in_[map]].insert(map);
   }
-  const std::set<int> fixed = parts.at(part_of(group->maps.front()));
+  return parts;
+}
+
+bool PoseGraph::JoinsALargeOne(const Group& group) const {
+  const Parts parts = PartsOf(group);
+  size_t num_keyframes = 0;
+  for (const int map : parts.at(solved_in_[group.maps.front()])) {
+    num_keyframes += maps_[map].chain.size();
+  }
+  return parts.size() > 1 && num_keyframes > static_cast<size_t>(options_.local_keyframes);
+}
+
+// The oldest map's part of the group stays; a part that was solved by itself moves as one.
+void PoseGraph::Join(Group* group) {
+  const Parts parts = PartsOf(*group);
+  const std::set<int> fixed = parts.at(solved_in_[group->maps.front()]);
   std::set<int> placed = fixed;
   while (placed.size() < group->maps.size()) {
     const Placed next = PlaceNext(*group, placed);
     const Pose4 T_map_before = next.T_map_odom * maps_[next.map].T_map_odom.Inverse();
-    for (const int number : parts.at(part_of(next.map))) {
+    for (const int number : parts.at(solved_in_[next.map])) {
       MapChain& map = maps_[number];
       map.T_map_odom = T_map_before * map.T_map_odom;
       for (Pose4& pose : map.poses) {
@@ -66,14 +76,8 @@ void PoseGraph::SolveJoined(Group* group, const std::set<int>& fixed_maps) {
   AddMaps(*group, fixed_maps, &solved, &solver);
   AddLoops(loops, solved, &solver);
   solver.SolveGraduated();
-  for (size_t i = 0; i < loops.size(); ++i) {
-    loops[i]->on = solver.loop_on(static_cast<int>(i));
-  }
-  std::erase_if(solved, [&](const SolvedMap& map) { return fixed_maps.contains(map.number); });
-  Apply(solver, solved);
-  group->regrouped = false;
-  group->waiting_loops = group->keyframes_waiting = 0;
-  group->publish_now = group->unpublished = true;
+  Apply(solver, solved, fixed_maps, loops);
+  NoteSolved(group);
 }
 
 }  // namespace pangea

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "core/median.h"
@@ -147,30 +148,58 @@ void PoseGraph::Solve(Group* group, bool from_the_beginning) {
     ResetLoops(*group, loops);
     group->odometry_variance = OdometryVariance(*group, loops);
   }
-  group->publish_now = group->unpublished = true;
-  group->regrouped = false;
+  const bool local =
+      !graduated && NumKeyframes(*group) > static_cast<size_t>(options_.local_keyframes);
+  const std::set<int> fixed = local ? FarMaps(*group, loops) : std::set<int>();
   group->stale = !cold;
-  group->waiting_loops = group->keyframes_waiting = 0;
-  if (loops.empty()) {
+  group->whole_loops = cold ? num_loops : group->whole_loops;
+  NoteSolved(group);
+  std::vector<Loop*> near;
+  std::vector<bool> may_go;
+  for (int64_t i = 0; i < num_loops; ++i) {
+    if (!fixed.contains(loops[i]->from.map) || !fixed.contains(loops[i]->to.map)) {
+      near.push_back(loops[i]);
+      may_go.push_back(i >= group->known_loops);
+    }
+  }
+  if (near.empty()) {
     return;
   }
 
-  std::vector<SolvedMap> solved = SolvedMaps(*group, loops);
+  std::vector<SolvedMap> solved = SolvedMaps(*group, near);
   GroupSolver solver(options_.solver);
-  AddMaps(*group, {}, &solved, &solver);
-  AddLoops(loops, solved, &solver);
+  AddMaps(*group, fixed, &solved, &solver);
+  AddLoops(near, solved, &solver);
   if (graduated) {
     solver.SolveGraduated();
     group->known_loops = num_loops;
   } else {
-    std::vector<bool> may_go(loops.size(), true);
-    std::fill_n(may_go.begin(), std::min(group->known_loops, num_loops), false);
     solver.SolveWarm(may_go);
   }
-  for (size_t i = 0; i < loops.size(); ++i) {
-    loops[i]->on = solver.loop_on(static_cast<int>(i));
+  Apply(solver, solved, fixed, near);
+}
+
+void PoseGraph::NoteSolved(Group* group) {
+  for (const int map : group->maps) {
+    solved_in_[map] = group->maps.front();
   }
-  Apply(solver, solved);
+  group->regrouped = false;
+  group->waiting_loops = group->keyframes_waiting = 0;
+  group->changed.clear();
+  group->publish_now = group->unpublished = true;
+}
+
+std::set<int> PoseGraph::FarMaps(const Group& group, const std::vector<Loop*>& loops) const {
+  std::set<int> near = group.changed;
+  for (const Loop* loop : loops) {
+    if (loop->on &&
+        (group.changed.contains(loop->from.map) || group.changed.contains(loop->to.map))) {
+      near.insert({loop->from.map, loop->to.map});
+    }
+  }
+  std::set<int> far;
+  std::ranges::set_difference(group.maps, near, std::inserter(far, far.end()));
+  return far;
 }
 
 std::vector<PoseGraph::SolvedMap> PoseGraph::SolvedMaps(const Group& group,
@@ -238,7 +267,12 @@ void PoseGraph::AddLoops(const std::vector<Loop*>& loops, const std::vector<Solv
   }
 }
 
-void PoseGraph::Apply(const GroupSolver& solver, const std::vector<SolvedMap>& solved) {
+void PoseGraph::Apply(const GroupSolver& solver, std::vector<SolvedMap> solved,
+                      const std::set<int>& fixed_maps, const std::vector<Loop*>& loops) {
+  for (size_t i = 0; i < loops.size(); ++i) {
+    loops[i]->on = solver.loop_on(static_cast<int>(i));
+  }
+  std::erase_if(solved, [&](const SolvedMap& map) { return fixed_maps.contains(map.number); });
   std::vector<int> newest;
   for (const SolvedMap& map : solved) {
     newest.push_back(map.offset + map.last);
