@@ -162,6 +162,19 @@ KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
   return window;
 }
 
+KeyframeWindow SubmapStore::WindowBehind(const KeyframeId& id, int count) {
+  KeyframeWindow window;
+  for (KeyframeId next = id; static_cast<int>(window.size()) < count;) {
+    const int32_t before = next.seq++;
+    auto view = Find(next);
+    if (view == nullptr || !view->keyframe().edge || view->keyframe().edge->from_seq != before) {
+      break;
+    }
+    window.push_back(std::move(view));
+  }
+  return window;
+}
+
 void SubmapStore::NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
   lost_[{map, to_seq}] = from_seq;
 }

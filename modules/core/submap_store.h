@@ -99,6 +99,8 @@ class SubmapStore {
   // The keyframe and up to `count` - 1 before it, along the odometry edges; shorter where the map
   // begins or an edge is missing, empty when the keyframe is not there.
   KeyframeWindow WindowUpTo(const KeyframeId& id, int count);
+  // At most `count` keyframes behind it, each joined to the one before; none where it is not there.
+  KeyframeWindow WindowBehind(const KeyframeId& id, int count);
   // Whether WindowUpTo would be cut short by a keyframe that is missing: more may arrive.
   bool WindowIsComplete(const KeyframeId& id, int count) const;
   // Whether the walk from the newer keyframe back along the edges meets no missing keyframe before

@@ -48,6 +48,19 @@ TEST(SubmapStore, ViewUndistortsAndFindsLandmarks) {
   EXPECT_EQ(store.Find({kMap, 1}), nullptr);
 }
 
+TEST(SubmapStore, WindowBehindEndsWhereAKeyframeIsMissing) {
+  SubmapStore store;
+  for (const int32_t seq : {0, 1, 2, 4, 5}) {
+    store.Add(MakeKeyframe(seq));
+  }
+  const KeyframeWindow behind = store.WindowBehind({kMap, 0}, 4);
+  ASSERT_EQ(behind.size(), 2u);
+  EXPECT_EQ(behind[0]->keyframe().id.seq, 1);
+  EXPECT_EQ(behind[1]->keyframe().id.seq, 2);
+  EXPECT_EQ(store.WindowBehind({kMap, 0}, 1).size(), 1u);
+  EXPECT_TRUE(store.WindowBehind({kMap, 5}, 4).empty());
+}
+
 TEST(SubmapStore, WindowFollowsTheEdges) {
   SubmapStore store;
   store.Add(MakeKeyframe(3));

@@ -35,15 +35,14 @@ void ShowMatches(const Verification& v, LoopVerificationReport* report) {
 
 }  // namespace
 
-Constraint Aligner::Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                          const PlaceCandidate& candidate, const LoopVerificationGate& gate,
-                          LoopVerificationReport* report) const {
-  Verification verification(options_, frames_m, frames_c, candidate, gate);
+Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
+                          const LoopVerificationGate& gate, LoopVerificationReport* report) const {
+  Verification verification(options_, keyframes, candidate, gate);
   verification.guess_tilt_sigma =
       std::sqrt(TiltVariance(verification.windows, options_.guess_tilt_floor));
   Constraint constraint;
   constraint.from = candidate.match;
-  constraint.to = frames_c.back()->keyframe().id;
+  constraint.to = keyframes.c.back()->keyframe().id;
   constraint.kind = candidate.kind;
   for (const VerificationStep& step : kVerificationSteps) {
     constraint.reason = step.run(options_, &verification);

@@ -22,10 +22,9 @@ class Aligner {
     return std::max(options_.window.num_keyframes, options_.visibility_keyframes);
   }
 
-  // `frames_m` ends with the candidate's match, `frames_c` with the query; num_keyframes() each, or
-  // fewer where their map begins.
-  Constraint Align(const KeyframeWindow& frames_m, const KeyframeWindow& frames_c,
-                   const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+  // num_keyframes() up to the match and to the query, or fewer where their map begins.
+  Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
+                   const LoopVerificationGate& gate,
                    LoopVerificationReport* report = nullptr) const;
 
  private:

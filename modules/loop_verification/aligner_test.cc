@@ -28,9 +28,17 @@ Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match
     }
   }
   return Aligner(options).Align(
-      store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
-      store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes), candidate,
-      kNoGate, report);
+      {store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
+       store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes),
+       {}},
+      candidate, kNoGate, report);
+}
+
+// Whose windows hold what the odometry gave a depth, and nothing else.
+LoopVerificationOptions OnlyTracked() {
+  LoopVerificationOptions options;
+  options.window.triangulation.few_landmarks = -1;
+  return options;
 }
 
 TestAgentOptions SecondAgent(int run) {
@@ -112,7 +120,8 @@ TEST(AlignerTest, RefusesAnotherRoom) {
     const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 0, 30));
     EXPECT_FALSE(constraint.accepted);
     EXPECT_THAT(constraint.reason, testing::AnyOf("PnP found too few inliers", "PnP found no pose",
-                                                  "too few matched points with a depth"));
+                                                  "too few matched points with a depth",
+                                                  "too few points found by projection"));
   }
 }
 
@@ -211,7 +220,7 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   const auto frames_c = store.WindowUpTo(c.keyframes[9].id, options.visibility_keyframes);
   LoopVerificationReport report;
   const Constraint constraint = Aligner(options).Align(
-      frames_m, frames_c, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);
+      {frames_m, frames_c, {}}, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);
   ASSERT_TRUE(constraint.accepted) << constraint.reason;
 
   const Eigen::Quaterniond q_m = m.keyframes[10].T_odom_body.q, q_c = c.keyframes[9].T_odom_body.q;
@@ -254,7 +263,8 @@ TEST(AlignerTest, RefusesWhatIsTooUncertain) {
     walk_m.radius = 0.6;
     walk_c.radius = 0.8;
     const TestAgent m = RunTestAgent(wall, walk_m), c = RunTestAgent(wall, walk_c);
-    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    const Constraint constraint =
+        Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0), OnlyTracked());
     EXPECT_GT(constraint.num_inliers, 100);
     EXPECT_EQ(constraint.reason, num_points == 60 ? "too uncertain" : "");
   }
@@ -282,7 +292,8 @@ TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
     walk_m.radius = 0.6;
     walk_c.radius = 0.8;
     const TestAgent m = RunTestAgent(points, walk_m), c = RunTestAgent(points, walk_c);
-    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    const Constraint constraint =
+        Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0), OnlyTracked());
     EXPECT_EQ(constraint.reason, reason) << num_near;
   }
 }
@@ -315,7 +326,8 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
     walk_m.radius = 0.6;
     walk_c.radius = 0.8;
     const TestAgent m = RunTestAgent(points, walk_m), c = RunTestAgent(points_c, walk_c);
-    const Constraint constraint = Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0));
+    const Constraint constraint =
+        Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 40, 0), OnlyTracked());
     EXPECT_EQ(constraint.reason, vague ? "hangs on vague matches" : "");
     EXPECT_LT(std::sqrt(constraint.covariance(0, 0)), 0.1);
   }
@@ -394,7 +406,7 @@ TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   const PlaceCandidate candidate = MakeTestCandidate(agent, 76, agent, 9, 40, 10);
   const auto align = [&](const DriftGateOptions& options) {
     return Aligner({}).Align(
-        store.WindowUpTo({walk.map, 9}, 5), store.WindowUpTo({walk.map, 76}, 5), candidate,
+        {store.WindowUpTo({walk.map, 9}, 5), store.WindowUpTo({walk.map, 76}, 5), {}}, candidate,
         MakeDriftGate(options, *store.PathBetween({walk.map, 9}, {walk.map, 76}),
                       agent.keyframes[76].T_odom_body.t));
   };
@@ -405,6 +417,20 @@ TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   DriftGateOptions no_yaw;
   no_yaw.max_yaw = no_yaw.max_yaw_per_m = 0;
   EXPECT_EQ(align(no_yaw).reason, "more drift than odometry makes");
+}
+
+// As on real phones, where a keyframe has depths for few of its corners.
+TEST(Aligner, FewDepthsAreEnoughWhereCornersAreMatchedBetweenNeighbours) {
+  TestAgent m = RunTestAgent(MakeTestRoom({}), {});
+  TestAgent c = RunTestAgent(MakeTestRoom({}), SecondAgent(0));
+  for (TestAgent* agent : {&m, &c}) {
+    for (Keyframe& keyframe : agent->keyframes) {
+      keyframe.points.resize(std::min<size_t>(keyframe.points.size(), 4));
+    }
+  }
+  const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 15);
+  EXPECT_EQ(Align(c, 9, m, 10, candidate).reason, "");
+  EXPECT_FALSE(Align(c, 9, m, 10, candidate, OnlyTracked()).accepted);
 }
 
 }  // namespace

@@ -3,6 +3,11 @@
 #include <utility>
 
 namespace pangea {
+namespace {
+
+constexpr int kKeyframesBehind = 4;
+
+}  // namespace
 
 Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& candidate,
                              const std::string& reason) {
@@ -55,29 +60,32 @@ Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& c
 
 Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& candidate,
                                LoopVerificationReport* report) {
-  const KeyframeWindow frames_c = store_.WindowUpTo(query, aligner_.num_keyframes());
-  const KeyframeWindow frames_m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
-  if (frames_c.empty() || frames_m.empty()) {
+  CandidateKeyframes keyframes;
+  keyframes.m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
+  keyframes.c = store_.WindowUpTo(query, aligner_.num_keyframes());
+  if (keyframes.m.empty() || keyframes.c.empty()) {
     return RefusedConstraint(query, candidate, "a keyframe was lost");
   }
   for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
-    if (corner_c >= static_cast<int>(frames_c.back()->keyframe().corners.size()) ||
-        corner_m >= static_cast<int>(frames_m.back()->keyframe().corners.size())) {
+    if (corner_c >= static_cast<int>(keyframes.c.back()->keyframe().corners.size()) ||
+        corner_m >= static_cast<int>(keyframes.m.back()->keyframe().corners.size())) {
       return RefusedConstraint(query, candidate, "a matched corner does not exist");
     }
   }
   LoopVerificationGate gate = [](const Rigid3&) { return std::string(); };
   if (query.map == candidate.match.map) {
-    if (frames_c.front()->keyframe().id.seq <= candidate.match.seq) {
+    if (keyframes.c.front()->keyframe().id.seq <= candidate.match.seq) {
       return RefusedConstraint(query, candidate, "the two keyframes are neighbours");
     }
     const auto path_m = store_.PathBetween(candidate.match, query);
     if (!path_m) {
       return RefusedConstraint(query, candidate, "no odometry leads from one to the other");
     }
-    gate = MakeDriftGate(drift_, *path_m, frames_c.back()->keyframe().T_odom_body.t);
+    // Of another map they may still be on their way, and the result must not hang on that.
+    keyframes.after_m = store_.WindowBehind(candidate.match, kKeyframesBehind);
+    gate = MakeDriftGate(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
   }
-  return aligner_.Align(frames_m, frames_c, candidate, gate, report);
+  return aligner_.Align(keyframes, candidate, gate, report);
 }
 
 }  // namespace pangea

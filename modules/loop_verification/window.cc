@@ -4,6 +4,8 @@
 #include <map>
 #include <utility>
 
+#include "loop_verification/matched_corners.h"
+
 namespace pangea {
 namespace {
 
@@ -14,23 +16,25 @@ struct Estimate {
   double relative() const { return sigma / inverse_depth; }
 };
 
-WindowLandmark MakeLandmark(const Window& window, int32_t id, const Estimate& estimate) {
+}  // namespace
+
+WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,
+                                  double inverse_depth, double inverse_depth_sigma) {
   WindowLandmark landmark;
   landmark.id = id;
-  landmark.host = estimate.host;
-  landmark.inverse_depth = estimate.inverse_depth;
-  landmark.inverse_depth_sigma = estimate.sigma;
-  const Eigen::Vector2d ray = window.frames[estimate.host.frame]->ray(estimate.host.corner);
-  const Rigid3& T_w_cam = window.T_w_cam[estimate.host.frame];
-  landmark.p_w = T_w_cam * (Eigen::Vector3d(ray.x(), ray.y(), 1.0) / estimate.inverse_depth);
+  landmark.host = host;
+  landmark.inverse_depth = inverse_depth;
+  landmark.inverse_depth_sigma = inverse_depth_sigma;
+  const Eigen::Vector2d ray = window.frames[host.frame]->ray(host.corner);
+  const Rigid3& T_w_cam = window.T_w_cam[host.frame];
+  landmark.p_w = T_w_cam * (Eigen::Vector3d(ray.x(), ray.y(), 1.0) / inverse_depth);
   // p - o is proportional to 1/rho: d(p)/d(rho) = -(p - o) / rho.
-  landmark.depth_sigma_w = -(landmark.p_w - T_w_cam.t) * estimate.relative();
+  landmark.depth_sigma_w = -(landmark.p_w - T_w_cam.t) * (inverse_depth_sigma / inverse_depth);
   return landmark;
 }
 
-}  // namespace
-
-Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
+Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
+                  const KeyframeWindow& after) {
   Window window;
   window.frames = std::move(frames);
   const Eigen::Vector3d origin = window.frames.back()->keyframe().T_odom_body.t;
@@ -65,7 +69,8 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
   }
 
   const auto add = [&window](int32_t id, const Estimate& estimate) {
-    WindowLandmark landmark = MakeLandmark(window, id, estimate);
+    WindowLandmark landmark =
+        MakeWindowLandmark(window, id, estimate.host, estimate.inverse_depth, estimate.sigma);
     const int index = static_cast<int>(window.landmarks.size());
     for (int f = 0; f <= window.newest(); ++f) {
       std::vector<int> corners;
@@ -89,6 +94,8 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options) {
   for (const Estimate& estimate : alone) {
     add(kNoLandmark, estimate);
   }
+  TriangulateMatchedCorners(options.triangulation, options.max_relative_depth_sigma, after,
+                            &window);
   return window;
 }
 

@@ -15,16 +15,33 @@
 
 namespace pangea {
 
+struct TriangulationOptions {
+  int few_landmarks = 150;  // of a window; with more, none are added
+  int max_hamming = kAlikeHamming;
+  double max_ratio = 0.85;
+
+  template <typename Archive>
+  void Visit(Archive& archive) {
+    archive.Add("few_landmarks", &few_landmarks, {-1, 100000}, "",
+                "a window with more gets none; -1: no window does");
+    archive.Add("max_hamming", &max_hamming, {0, kDescriptorBits}, "bits",
+                "between descriptors that match");
+    archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
+  }
+};
+
 struct WindowOptions {
   int num_keyframes = 5;  // M: the keyframe and M - 1 before it
   // Inverse depths less certain than this share of themselves are no map points.
   double max_relative_depth_sigma = 0.4;
+  TriangulationOptions triangulation;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("num_keyframes", &num_keyframes, {1, 50}, "", "the keyframe and those before it");
     archive.Add("max_relative_depth_sigma", &max_relative_depth_sigma, {0.01, 2}, "",
                 "share of itself by which the inverse depth of a map point may be uncertain");
+    archive.Section("triangulation", &triangulation, "of corners that no track gave a depth");
   }
 };
 
@@ -60,7 +77,13 @@ struct Window {
   }
 };
 
-Window MakeWindow(KeyframeWindow frames, const WindowOptions& options);
+// Without its observations.
+WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,
+                                  double inverse_depth, double inverse_depth_sigma);
+
+// `after`: keyframes of the map behind the newest one, which only triangulate its corners.
+Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
+                  const KeyframeWindow& after = {});
 
 // Forward: a point of m in a camera of c. Reverse: a point of c in a camera of m.
 enum class Direction { kForward, kReverse };

@@ -19,7 +19,7 @@ struct SearchOptions {
   double max_radius_px = 40;
   double max_depth_m = 60;      // the deeper, the worse triangulated
   double max_view_angle = 0.9;  // radians between the two lines of sight
-  double max_scale = 2.2;       // ratio of the two distances
+  double max_scale = 3.5;       // ratio of the two distances
 
   template <typename Archive>
   void Visit(Archive& archive) {

@@ -14,16 +14,15 @@ KeyframeWindow Last(const KeyframeWindow& frames, int count) {
 
 }  // namespace
 
-Verification::Verification(const CommonStepOptions& options, const KeyframeWindow& all_m,
-                           const KeyframeWindow& all_c, const PlaceCandidate& candidate,
-                           const LoopVerificationGate& gate)
+Verification::Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
+                           const PlaceCandidate& candidate, const LoopVerificationGate& gate)
     : options(options),
-      all_m(all_m),
-      all_c(all_c),
+      keyframes(keyframes),
       candidate(candidate),
       gate(gate),
-      windows{MakeWindow(Last(all_m, options.window.num_keyframes), options.window),
-              MakeWindow(Last(all_c, options.window.num_keyframes), options.window)} {}
+      windows{MakeWindow(Last(keyframes.m, options.window.num_keyframes), options.window,
+                         keyframes.after_m),
+              MakeWindow(Last(keyframes.c, options.window.num_keyframes), options.window)} {}
 
 std::vector<PointObservation> Verification::Observations(const std::vector<PointMatch>& of) const {
   std::vector<PointObservation> observations;

@@ -56,15 +56,19 @@ struct LoopVerificationReport {
 // alignment of the two maps' odom frames.
 using LoopVerificationGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
 
+// What a candidate is verified from. They go back further than the windows.
+struct CandidateKeyframes {
+  KeyframeWindow m;        // ends with the match
+  KeyframeWindow c;        // ends with the query
+  KeyframeWindow after_m;  // behind the match: they help to triangulate its corners
+};
+
 struct Verification {
-  // `all_m` and `all_c` end with the two keyframes, and go back further than the windows.
-  Verification(const CommonStepOptions& options, const KeyframeWindow& all_m,
-               const KeyframeWindow& all_c, const PlaceCandidate& candidate,
-               const LoopVerificationGate& gate);
+  Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
+               const PlaceCandidate& candidate, const LoopVerificationGate& gate);
 
   const CommonStepOptions& options;
-  const KeyframeWindow& all_m;
-  const KeyframeWindow& all_c;
+  const CandidateKeyframes& keyframes;
   const PlaceCandidate& candidate;
   const LoopVerificationGate& gate;
   WindowPair windows;

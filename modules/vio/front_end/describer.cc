@@ -236,8 +236,8 @@ float Describer::Angle(int octave, const cv::Point2f& level_pixel) const {
   return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
 }
 
-void Describer::Compute(const std::vector<Candidate>& candidates,
-                        std::vector<Corner>* corners) const {
+std::vector<Corner> Describer::Compute(const std::vector<Candidate>& candidates) const {
+  std::vector<Corner> corners(candidates.size());
   std::vector<cv::KeyPoint> keypoints;
   for (size_t octave = 0; octave < scales_.size(); ++octave) {
     keypoints.clear();
@@ -255,7 +255,7 @@ void Describer::Compute(const std::vector<Candidate>& candidates,
     orb_->compute(pyramid_[octave], keypoints, descriptors);
     for (int row = 0; row < descriptors.rows; ++row) {
       const Candidate& candidate = candidates[static_cast<size_t>(keypoints[row].class_id)];
-      Corner& corner = (*corners)[static_cast<size_t>(keypoints[row].class_id)];
+      Corner& corner = corners[static_cast<size_t>(keypoints[row].class_id)];
       corner.octave = static_cast<int8_t>(octave);
       corner.landmark_id = candidate.landmark_id;
       corner.pixel = candidate.landmark_id != kNoLandmark
@@ -264,32 +264,43 @@ void Describer::Compute(const std::vector<Candidate>& candidates,
       std::memcpy(corner.descriptor.data(), descriptors.ptr(row), sizeof(Descriptor));
     }
   }
+  return corners;
 }
 
-std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
-  BuildPyramid(image);
-  std::vector<Candidate> candidates = PlaceLandmarks(frame);
-  const int wanted = options_.max_corners - static_cast<int>(candidates.size());
-  // Octaves share the rest by their side length, as a corner's density in the image would have it.
+// Octaves share what is wanted by their side length, as a corner's density in the image would have
+// it.
+std::vector<Describer::Candidate> Describer::FindCorners(int wanted) const {
   double share_sum = 0;
   for (const double scale : scales_) {
     share_sum += 1.0 / scale;
   }
-  std::vector<Candidate> others;
+  std::vector<Candidate> corners;
   double carried_over = 0;  // what coarser octaves could not use goes to the finer ones
   for (int octave = static_cast<int>(scales_.size()) - 1; octave >= 0; --octave) {
     carried_over += wanted / scales_[octave] / share_sum;
     const auto found =
         FindCorners(octave, std::max(0, static_cast<int>(std::lround(carried_over))));
     carried_over -= static_cast<double>(found.size());
-    others.insert(others.end(), found.begin(), found.end());
+    corners.insert(corners.end(), found.begin(), found.end());
   }
-  candidates.insert(candidates.end(), others.begin(), others.end());
-  if (static_cast<int>(candidates.size()) > options_.max_corners) {
-    candidates.resize(options_.max_corners);
-  }
-  std::vector<Corner> corners(candidates.size());
-  Compute(candidates, &corners);
+  return corners;
+}
+
+std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
+  BuildPyramid(image);
+  std::vector<Candidate> landmarks = PlaceLandmarks(frame);
+  landmarks.resize(std::min(landmarks.size(), static_cast<size_t>(options_.max_corners)));
+  int left = options_.max_corners - static_cast<int>(landmarks.size());
+  const std::vector<Corner> blobs =
+      blobs_.Describe(image, std::min(options_.max_blobs, left), options_.cell_px);
+  left -= static_cast<int>(blobs.size());
+  std::vector<Candidate> others = FindCorners(left);
+  others.resize(std::min(others.size(), static_cast<size_t>(left)));
+
+  std::vector<Corner> corners = Compute(landmarks);
+  corners.insert(corners.end(), blobs.begin(), blobs.end());
+  const std::vector<Corner> described = Compute(others);
+  corners.insert(corners.end(), described.begin(), described.end());
   return corners;
 }
 

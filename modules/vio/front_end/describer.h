@@ -1,8 +1,9 @@
 #pragma once
 
-// Describes a keyframe once: its tracked landmarks first, then FAST corners spread over the whole
-// image and a pyramid, each with a 256-bit rotation-aware binary descriptor (ORB: Rublee et al.,
-// ICCV 2011, the intensity centroid's angle and learned tests as OpenCV has them).
+// Describes a keyframe once: its tracked landmarks first, then blobs (blobs.h), then FAST corners
+// spread over the whole image and a pyramid. Landmarks and corners have a 256-bit rotation-aware
+// binary descriptor (ORB: Rublee et al., ICCV 2011, the intensity centroid's angle and learned
+// tests as OpenCV has them), blobs one of their own, as wide and like no other's.
 //
 // Matching is across viewpoints and distances, so a tracked landmark is described on the octaves
 // where it is a corner, not where the tracker happens to follow it.
@@ -15,12 +16,14 @@
 
 #include "core/camera_model.h"
 #include "core/keyframe.h"
+#include "vio/front_end/blobs.h"
 #include "vio/front_end/tracks.h"
 
 namespace pangea::vio {
 
 struct DescriberOptions {
   int max_corners = 600;  // at most kMaxCorners
+  int max_blobs = 240;    // of these
   int octaves = 8;
   double scale_factor = kOctaveScale;  // between octaves; CornerSigma assumes it
   int fast_threshold = 20;
@@ -30,6 +33,7 @@ struct DescriberOptions {
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("max_corners", &max_corners, {10, kMaxCorners}, "", "of a keyframe");
+    archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "", "of these, beside landmarks");
     archive.Add("octaves", &octaves, {1, 16}, "", "of the image pyramid");
     archive.Add("scale_factor", &scale_factor, {1.1, 1.5}, "",
                 "between octaves; the corners' sigmas assume 1.2");
@@ -44,7 +48,7 @@ class Describer {
  public:
   Describer(const CameraModel& camera, const DescriberOptions& options);
 
-  // Corners of the image: those with a landmark_id first, in the order of the frame.
+  // Corners of the image: those with a landmark_id first, in the order of the frame; then blobs.
   std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame);
 
  private:
@@ -58,6 +62,7 @@ class Describer {
 
   void BuildPyramid(const cv::Mat& image);
   std::vector<Candidate> FindCorners(int octave, int wanted) const;
+  std::vector<Candidate> FindCorners(int wanted) const;
   std::vector<Candidate> PlaceLandmarks(const TrackedFrame& frame) const;
   std::vector<cv::KeyPoint> WeakCorners(int octave, const cv::Rect& part) const;
   static float StrongestNear(const std::vector<cv::KeyPoint>& corners,
@@ -66,7 +71,7 @@ class Describer {
   cv::Point2f ToLevel(int octave, const Eigen::Vector2f& pixel) const;
   Eigen::Vector2f ToImage(int octave, const cv::Point2f& level_pixel) const;
   float Angle(int octave, const cv::Point2f& level_pixel) const;
-  void Compute(const std::vector<Candidate>& candidates, std::vector<Corner>* corners) const;
+  std::vector<Corner> Compute(const std::vector<Candidate>& candidates) const;
 
   CameraModel camera_;
   DescriberOptions options_;
@@ -74,6 +79,7 @@ class Describer {
   std::vector<cv::Mat> pyramid_;
   std::vector<std::vector<cv::KeyPoint>> strong_;  // corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;
+  BlobDescriber blobs_;
 };
 
 }  // namespace pangea::vio

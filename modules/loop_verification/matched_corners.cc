@@ -1,0 +1,248 @@
+#include "loop_verification/matched_corners.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "core/nearest_corner.h"
+
+namespace pangea {
+namespace {
+
+constexpr double kPixelSigma = 1;  // of a corner on octave 0
+constexpr double kOtherCorner_px = 4;
+constexpr double kMaxLineSigmas = 3;  // from the epipolar line
+constexpr double kMaxRayChi2 = 9.2;   // 99 % of 2 degrees of freedom
+constexpr double kLeastBaseline_m = 0.02;
+constexpr double kNearest_m = 0.2, kFarthest_m = 60;
+// Verification takes the errors of landmarks as independent; an error that all have in common is a
+// wrong scale.
+constexpr double kMaxOdometrySigma = 0.05;  // a share of the depth
+constexpr size_t kMaxAdded = 250;           // what a verification takes grows with each
+constexpr int kNotOfTheWindow = -1;
+
+// Another keyframe that may see the corners of the newest one, the host.
+struct Neighbour {
+  int frame = kNotOfTheWindow;
+  const KeyframeView* view = nullptr;
+  Rigid3 T_cam_host;
+  double sigma_m = 0, sigma_rad = 0;  // of the odometry between the two
+  std::vector<int> corners;           // that are no landmark yet
+};
+
+// The host's corner as a neighbour sees it.
+struct Sight {
+  const Neighbour* neighbour = nullptr;
+  int corner = 0;
+  double sigma = 0;         // of the rays' difference on the plane z = 1
+  double corner_sigma = 0;  // the neighbour's part of it
+};
+
+struct InverseDepth {
+  double value = 0, sigma = 0;  // 1/m
+  double odometry_sigma = 0;    // the part of it that all corners of the host have in common
+};
+
+Eigen::Vector3d Ray(const KeyframeView& view, int corner) { return view.ray(corner).homogeneous(); }
+
+double RaySigma(const KeyframeView& view, int corner) {
+  const Keyframe& keyframe = view.keyframe();
+  return CornerSigma(keyframe.corners[corner], kPixelSigma) * keyframe.camera.PixelAngle();
+}
+
+class Triangulation {
+ public:
+  Triangulation(const TriangulationOptions& options, const Window& window,
+                const KeyframeWindow& after)
+      : options_(options), host_(*window.frames.back()) {
+    OdometryError error;
+    for (int f = window.newest() - 1; f >= 0; --f) {
+      error.Add(*window.keyframe(f + 1).edge);
+      AddNeighbour(f, *window.frames[f], error, window.landmark_of_corner[f]);
+    }
+    error = {};
+    for (const auto& view : after) {
+      error.Add(*view->keyframe().edge);
+      AddNeighbour(kNotOfTheWindow, *view, error,
+                   std::vector<int>(view->keyframe().corners.size(), -1));
+    }
+  }
+
+  std::vector<Sight> Sights(int corner) const {
+    std::vector<Sight> sights;
+    for (const Neighbour& neighbour : neighbours_) {
+      if (const auto sight = Find(corner, neighbour)) {
+        sights.push_back(*sight);
+      }
+    }
+    return sights;
+  }
+
+  // Gauss-Newton over the inverse depth alone; nothing if a ray contradicts it.
+  std::optional<InverseDepth> Solve(int corner, const std::vector<Sight>& sights) const {
+    constexpr int kIterations = 10;
+    constexpr double kStart = 0.5, kEnough = 1e-6;  // 1/m
+    const Eigen::Vector3d ray = Ray(host_, corner);
+    InverseDepth depth{kStart, 0, 0};
+    double step = 1;
+    for (int i = 0; i < kIterations && std::abs(step) > kEnough; ++i) {
+      double information = 0, gradient = 0;
+      for (const Sight& sight : sights) {
+        const auto [r, J] = Residual(sight, ray, depth.value);
+        information += J.squaredNorm();
+        gradient += J.dot(r);
+      }
+      if (!(information > 0)) {
+        return std::nullopt;
+      }
+      step = gradient / information;
+      depth.value -= step;
+      if (!(depth.value > 1 / kFarthest_m && depth.value < 1 / kNearest_m)) {
+        return std::nullopt;
+      }
+    }
+    const bool contradicted = std::ranges::any_of(sights, [&](const Sight& sight) {
+      return Residual(sight, ray, depth.value).first.squaredNorm() > kMaxRayChi2;
+    });
+    if (contradicted) {
+      return std::nullopt;
+    }
+    SetSigmas(corner, sights, &depth);
+    return depth;
+  }
+
+ private:
+  // Of the odometry's edges one after the other, the same in all directions.
+  struct OdometryError {
+    double var_m = 0, var_rad = 0;
+    void Add(const OdometryEdge& edge) {
+      var_m += edge.covariance.topLeftCorner<3, 3>().trace() / 3;
+      var_rad += edge.covariance.bottomRightCorner<3, 3>().trace() / 3;
+    }
+  };
+
+  void AddNeighbour(int frame, const KeyframeView& view, const OdometryError& error,
+                    const std::vector<int>& landmark_of_corner) {
+    Neighbour neighbour;
+    neighbour.frame = frame;
+    neighbour.view = &view;
+    neighbour.T_cam_host = view.T_odom_cam().Inverse() * host_.T_odom_cam();
+    neighbour.sigma_m = std::sqrt(error.var_m);
+    neighbour.sigma_rad = std::sqrt(error.var_rad);
+    for (int i = 0; i < static_cast<int>(landmark_of_corner.size()); ++i) {
+      if (landmark_of_corner[i] < 0 && view.has_ray(i)) {
+        neighbour.corners.push_back(i);
+      }
+    }
+    if (neighbour.T_cam_host.t.norm() > kLeastBaseline_m) {
+      neighbours_.push_back(std::move(neighbour));
+    }
+  }
+
+  double Sigma(int host_corner, const Neighbour& neighbour, int corner) const {
+    return std::hypot(RaySigma(host_, host_corner), RaySigma(*neighbour.view, corner),
+                      neighbour.sigma_rad);
+  }
+
+  // The nearest descriptor near the epipolar line, if no other there is as near.
+  std::optional<Sight> Find(int host_corner, const Neighbour& neighbour) const {
+    const Eigen::Vector3d line =
+        neighbour.T_cam_host.t.cross(neighbour.T_cam_host.q * Ray(host_, host_corner));
+    const double norm = line.head<2>().norm();
+    std::vector<int> near;
+    for (const int i : neighbour.corners) {
+      const double distance = std::abs(line.dot(Ray(*neighbour.view, i))) / norm;
+      if (distance < kMaxLineSigmas * Sigma(host_corner, neighbour, i)) {
+        near.push_back(i);
+      }
+    }
+    const std::vector<Corner>& corners = neighbour.view->keyframe().corners;
+    const Descriptor& descriptor = host_.keyframe().corners[host_corner].descriptor;
+    const NearestCorner nearest = FindNearest(
+        corners, near, [&](int i) { return HammingDistance(corners[i].descriptor, descriptor); },
+        options_.max_hamming, kOtherCorner_px);
+    if (nearest.index < 0 || !nearest.PassesRatio(options_.max_ratio)) {
+      return std::nullopt;
+    }
+    return Sight{&neighbour, nearest.index, Sigma(host_corner, neighbour, nearest.index),
+                 RaySigma(*neighbour.view, nearest.index)};
+  }
+
+  // In sigmas, and its derivative by the inverse depth.
+  static std::pair<Eigen::Vector2d, Eigen::Vector2d> Residual(const Sight& sight,
+                                                              const Eigen::Vector3d& host_ray,
+                                                              double inverse_depth) {
+    const Rigid3& T = sight.neighbour->T_cam_host;
+    const Eigen::Vector3d p = T.q * host_ray + T.t * inverse_depth;
+    const Eigen::Vector2d projected = p.head<2>() / p.z();
+    return {(projected - sight.neighbour->view->ray(sight.corner)) / sight.sigma,
+            (T.t.head<2>() - projected * T.t.z()) / (p.z() * sight.sigma)};
+  }
+
+  // Only the neighbours' own pixel noise averages out over them.
+  void SetSigmas(int host_corner, const std::vector<Sight>& sights, InverseDepth* depth) const {
+    double information = 0, own = 0, host = 0, odometry = 0;
+    for (const Sight& sight : sights) {
+      const double J = Residual(sight, Ray(host_, host_corner), depth->value).second.norm();
+      const double step = depth->value * sight.neighbour->sigma_m;  // as seen from the point
+      information += J * J;
+      own += std::pow(J * sight.corner_sigma / sight.sigma, 2);
+      host += J * RaySigma(host_, host_corner) / sight.sigma;
+      odometry += J * std::hypot(sight.neighbour->sigma_rad, step) / sight.sigma;
+    }
+    depth->sigma = std::hypot(std::sqrt(own), host, odometry) / information;
+    depth->odometry_sigma = odometry / information;
+  }
+
+  const TriangulationOptions& options_;
+  const KeyframeView& host_;
+  std::vector<Neighbour> neighbours_;
+};
+
+void AddLandmark(int host_corner, const InverseDepth& depth, const std::vector<Sight>& sights,
+                 Window* window) {
+  const CornerRef host{window->newest(), host_corner};
+  WindowLandmark landmark =
+      MakeWindowLandmark(*window, kNoLandmark, host, depth.value, depth.sigma);
+  landmark.observations = {host};
+  for (const Sight& sight : sights) {
+    if (sight.neighbour->frame != kNotOfTheWindow) {
+      landmark.observations.push_back({sight.neighbour->frame, sight.corner});
+    }
+  }
+  std::ranges::sort(landmark.observations, {}, &CornerRef::frame);
+  for (const CornerRef& seen : landmark.observations) {
+    window->landmark_of_corner[seen.frame][seen.corner] =
+        static_cast<int>(window->landmarks.size());
+  }
+  window->landmarks.push_back(std::move(landmark));
+}
+
+}  // namespace
+
+void TriangulateMatchedCorners(const TriangulationOptions& options, double max_relative_depth_sigma,
+                               const KeyframeWindow& after, Window* window) {
+  if (static_cast<int>(window->landmarks.size()) > options.few_landmarks) {
+    return;
+  }
+  const Triangulation triangulation(options, *window, after);
+  const size_t most = window->landmarks.size() + kMaxAdded;
+  const int host = window->newest();
+  const int num_corners = static_cast<int>(window->newest_keyframe().corners.size());
+  for (int corner = 0; corner < num_corners && window->landmarks.size() < most; ++corner) {
+    if (window->landmark_of_corner[host][corner] >= 0 || !window->frames[host]->has_ray(corner)) {
+      continue;
+    }
+    const std::vector<Sight> sights = triangulation.Sights(corner);
+    const auto depth = triangulation.Solve(corner, sights);
+    if (depth && depth->sigma < max_relative_depth_sigma * depth->value &&
+        depth->odometry_sigma < kMaxOdometrySigma * depth->value) {
+      AddLandmark(corner, *depth, sights, window);
+    }
+  }
+}
+
+}  // namespace pangea
