@@ -17,7 +17,7 @@
 #include "vio/command_line.h"
 #include "vio/front_end/test_images.h"
 #include "vio/vio_process_test_world.h"
-#include "vio/window/vio_test_world.h"
+#include "vio/window/testing/vio_test_world.h"
 
 namespace pangea::vio {
 namespace {

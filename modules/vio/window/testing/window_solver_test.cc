@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "core/least_squares/levenberg_marquardt.h"
+#include "vio/window/testing/window_test_world.h"
 #include "vio/window/window_problem.h"
-#include "vio/window/window_test_world.h"
 
 namespace pangea::vio {
 namespace {
