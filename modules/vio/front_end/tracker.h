@@ -52,7 +52,8 @@ struct TrackerOptions {
                 "cells of the image that features are spread over");
     archive.Add("min_distance_px", &min_distance_px, {1, 1000}, "px", "between features");
     archive.Add("window_px", &window_px, {3, 101}, "px", "of the KLT");
-    archive.Add("pyramid_levels", &pyramid_levels, {0, 10}, "", "of the KLT, above the image");
+    archive.Add("pyramid_levels", &pyramid_levels, {1, 10}, "",
+                "of the KLT, with the image itself");
     archive.Add("max_forward_backward_px", &max_forward_backward_px, {0.01, 100}, "px",
                 "between a feature and itself tracked back");
     archive.Add("border_px", &border_px, {0, 1000}, "px", "of the image without features");
