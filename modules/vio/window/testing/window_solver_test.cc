@@ -33,6 +33,8 @@ void ExpectTheDenseSolution(const WindowProblem& problem) {
   const VectorXd scale = equations.H.diagonal().cwiseSqrt();
   const MatrixXd difference = scale.asDiagonal() * (x - dense);
   EXPECT_LT(difference.norm(), 1e-8 * (scale.asDiagonal() * dense).norm());
+  // To the last bit it is only where a wrong factor has handed over to the dense solver.
+  EXPECT_NE(x, dense);
 }
 
 // A new window; then with what marginalisations leave: a prior on velocity and biases of the oldest
