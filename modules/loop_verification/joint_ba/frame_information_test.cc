@@ -13,8 +13,8 @@ using Eigen::MatrixXd;
 
 constexpr int kSize = 13;  // two poses and a scale
 
-// A prior, and points of some landmarks that each see a few directions: some say little, some
-// nearly all that is known of theirs.
+// A weak prior, and points of some landmarks that each see one direction: some say little of it,
+// some nearly all that is known.
 struct Information {
   MatrixXd total;
   std::vector<InformationShare> of_point;
@@ -25,12 +25,12 @@ Information RandomInformation(uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   Information out;
-  out.total = MatrixXd::Identity(kSize, kSize);
+  out.total = 0.3 * MatrixXd::Identity(kSize, kSize);
   for (int i = 0; i < 12; ++i) {
     out.landmarks.push_back({{}, true});
-    const double size = std::exp(2 * normal(random));
+    const double size = 0.3 * std::exp(normal(random));
     for (int k = 0; k <= i % 3; ++k) {
-      const MatrixXd J = MatrixXd::NullaryExpr(2, kSize, [&] { return size * normal(random); });
+      const MatrixXd J = MatrixXd::NullaryExpr(1, kSize, [&] { return size * normal(random); });
       out.landmarks.back().points.push_back(static_cast<int>(out.of_point.size()));
       out.of_point.push_back({J.transpose() * J, {0, 6, 12}});
       out.of_point.back().AddTo(1, &out.total);
