@@ -7,29 +7,15 @@
 #include <algorithm>
 #include <random>
 
-#include "core/testing/synthetic_world.h"
+#include "anchors/anchors_test_world.h"
 
 namespace pangea {
 namespace {
 
 using Placement = AnchorEdit::Placement;
 
-class AnchorsTest : public testing::Test {
+class AnchorsTest : public AnchorsTestWorld {
  protected:
-  AnchorsTest() : anchors_(AnchorsOptions()) {
-    SyntheticWorldOptions options;
-    options.num_keyframes = 20;
-    options.with_corners = false;
-    world_ = MakeSyntheticWorld(options);
-    for (const SyntheticAgent& agent : world_.agents) {
-      for (const Keyframe& keyframe : agent.keyframes) {
-        anchors_.Take(keyframe);
-      }
-    }
-  }
-
-  const MapId& map(int agent) const { return world_.agents[agent].map; }
-
   AnchorEdit Edit(int agent, int seq) const {
     AnchorEdit edit;
     edit.anchor = {agent + 1, 100 + seq};
@@ -46,29 +32,11 @@ class AnchorsTest : public testing::Test {
     return world_.T_hall_body({edit.map, edit.keyframe_seq}) * edit.T_ref_anchor.t;
   }
 
-  // The true map, moved by T; of some agents.
-  MapState State(const std::vector<int>& agents, int64_t revision, const Rigid3& T = {}) const {
-    MapState state;
-    state.group = map(agents[0]);
-    state.revision = revision;
-    for (const int agent : agents) {
-      state.maps.push_back(map(agent));
-      for (const Keyframe& keyframe : world_.agents[agent].keyframes) {
-        state.keyframes.push_back(
-            {keyframe.id, keyframe.utime, T * world_.T_hall_body(keyframe.id)});
-      }
-    }
-    return state;
-  }
-
   // Where an agent has it, in the hall: by its newest keyframe.
   Eigen::Vector3d SeenBy(int agent, const AnchorState& state) const {
     const Keyframe& newest = world_.agents[agent].keyframes.back();
     return world_.T_hall_body(newest.id) * (newest.T_odom_body.Inverse() * state.T_odom_anchor.t);
   }
-
-  SyntheticWorld world_;
-  Anchors anchors_;
 };
 
 TEST_F(AnchorsTest, AMapThatIsAloneHasItsOwnAnchors) {

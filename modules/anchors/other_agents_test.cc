@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/testing/synthetic_world.h"
+#include "anchors/anchors_test_world.h"
 
 namespace pangea {
 namespace {
@@ -12,39 +12,13 @@ namespace {
 constexpr int64_t kNow = 1'700'000'000'000'000;
 constexpr int kSeq = 15;
 
-class OtherAgentsTest : public testing::Test {
+class OtherAgentsTest : public AnchorsTestWorld {
  protected:
-  OtherAgentsTest() : anchors_(AnchorsOptions()) {
-    SyntheticWorldOptions options;
-    options.num_keyframes = 20;
-    options.with_corners = false;
-    world_ = MakeSyntheticWorld(options);
-    for (const SyntheticAgent& agent : world_.agents) {
-      for (const Keyframe& keyframe : agent.keyframes) {
-        anchors_.Take(keyframe);
-      }
-    }
-  }
-
   const Keyframe& Newest(int agent) const { return world_.agents[agent].keyframes[kSeq]; }
   void Hear(int agent, int64_t utime) {
-    others_.Take(world_.agents[agent].map, Newest(agent).T_odom_body, utime);
-  }
-  void Fuse() {
-    MapState state;
-    state.group = world_.agents[0].map;
-    state.revision = 1;
-    for (const SyntheticAgent& agent : world_.agents) {
-      state.maps.push_back(agent.map);
-      for (const Keyframe& keyframe : agent.keyframes) {
-        state.keyframes.push_back({keyframe.id, keyframe.utime, world_.T_hall_body(keyframe.id)});
-      }
-    }
-    anchors_.Take(state);
+    others_.Take(map(agent), Newest(agent).T_odom_body, utime);
   }
 
-  SyntheticWorld world_;
-  Anchors anchors_;
   OtherAgents others_;
 };
 

@@ -27,16 +27,9 @@ int CountOf(SiteStreams::Reader reader) {
   return count;
 }
 
-class Bridge : public testing::Test {
+class Bridge : public ClusterTest {
  protected:
-  void SetUp() override {
-    if (NatsServerProgram().empty()) {
-      GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
-    }
-    nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_bridge");
-    server_ =
-        std::make_unique<TestServer>(nats_->access(), testing::TempDir() + "/cluster_bridge.lcm");
-  }
+  Bridge() : ClusterTest("bridge") {}
 
   TestWorker& AddWorker() {
     workers_.push_back(std::make_unique<TestWorker>(nats_->access()));
@@ -79,8 +72,6 @@ class Bridge : public testing::Test {
     }
   }
 
-  std::unique_ptr<NatsServer> nats_;
-  std::unique_ptr<TestServer> server_;
   std::vector<std::unique_ptr<TestWorker>> workers_;
   int64_t ahead_us_ = 0;  // of the bridges' clock
 };

@@ -263,4 +263,12 @@ void TestWorker::Round(int64_t now_utime) {
   }
 }
 
+void ClusterTest::SetUp() {
+  if (NatsServerProgram().empty()) {
+    GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
+  }
+  nats_ = std::make_unique<NatsServer>(files_);
+  server_ = std::make_unique<TestServer>(nats_->access(), files_ + ".lcm");
+}
+
 }  // namespace pangea

@@ -4,6 +4,8 @@
 // thread: the bridges are the real ones; agent_handler, place_recognition and the verifiers do as
 // little as their part of the bus asks.
 
+#include <gtest/gtest.h>
+
 #include <chrono>
 #include <deque>
 #include <filesystem>
@@ -136,6 +138,18 @@ class TestWorker {
   bool pauses_ = false;
   int to_lose_ = 0;
   bool killed_ = false;
+};
+
+// A nats-server and the core of the site beside it; skipped where none is installed.
+class ClusterTest : public testing::Test {
+ protected:
+  // `name`: of the files, no other test's.
+  explicit ClusterTest(const std::string& name) : files_(testing::TempDir() + "/cluster_" + name) {}
+  void SetUp() override;
+
+  const std::string files_;
+  std::unique_ptr<NatsServer> nats_;
+  std::unique_ptr<TestServer> server_;
 };
 
 }  // namespace pangea

@@ -41,18 +41,16 @@ std::vector<Written> EventsOf(const std::string& journal) {
   return events;
 }
 
-class StandbyTest : public testing::Test {
+class StandbyTest : public ClusterTest {
  protected:
+  StandbyTest() : ClusterTest("standby") {}
   void SetUp() override {
-    if (NatsServerProgram().empty()) {
-      GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
-    }
-    nats_ = std::make_unique<NatsServer>(testing::TempDir() + "/cluster_standby");
-    server_ =
-        std::make_unique<TestServer>(nats_->access(), testing::TempDir() + "/cluster_standby.lcm");
-    streams_ = std::make_unique<SiteStreams>(nats_->access(), "hall");
-    for (const char* suffix : {"", ".stream"}) {
-      fs::remove(copy_ + suffix);
+    ClusterTest::SetUp();
+    if (!IsSkipped()) {
+      streams_ = std::make_unique<SiteStreams>(nats_->access(), "hall");
+      for (const char* suffix : {"", ".stream"}) {
+        fs::remove(copy_ + suffix);
+      }
     }
   }
   void AddKeyframes(int count) {
@@ -73,8 +71,6 @@ class StandbyTest : public testing::Test {
 
   const std::string copy_ = testing::TempDir() + "/cluster_copy.lcm";
   int64_t now_ = WallUtime();
-  std::unique_ptr<NatsServer> nats_;
-  std::unique_ptr<TestServer> server_;
   std::unique_ptr<SiteStreams> streams_;  // of the standby's host
 };
 

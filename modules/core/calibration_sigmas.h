@@ -5,7 +5,7 @@
 namespace pangea {
 
 struct CalibrationSigmas {
-  // rad; constraints of walks need it (docs/decisions/imu_intrinsics.md)
+  // rad; constraints of walks need it (docs/decisions/imu.md)
   double rotation = 0.001;
   double position_m = 0.005;
   double time_offset_s = 0.005;

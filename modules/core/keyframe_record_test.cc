@@ -63,6 +63,8 @@ TEST(KeyframeRecord, ComesBackToTheLastBit) {
   EXPECT_EQ(back->camera.time_offset_s, keyframe.camera.time_offset_s);
   EXPECT_EQ(back->camera.readout_s, keyframe.camera.readout_s);
   EXPECT_EQ(back->v_odom_body, keyframe.v_odom_body);
+  EXPECT_EQ(back->scale_sigma, keyframe.scale_sigma);
+  EXPECT_EQ(back->T_body_cam_covariance, keyframe.T_body_cam_covariance);
   EXPECT_EQ(back->gyro_bias, keyframe.gyro_bias);
   EXPECT_EQ(back->accel_bias, keyframe.accel_bias);
   EXPECT_EQ(back->camera.distortion, keyframe.camera.distortion);

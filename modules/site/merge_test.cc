@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "files/text_file.h"
@@ -41,6 +42,8 @@ TEST_F(MergeTest, HasAllOfTheFirstAndBehindItTheSecondsKeyframes) {
   ASSERT_EQ(merged.size(), of_first.size() + 31);
   EXPECT_TRUE(std::equal(of_first.begin(), of_first.end(), merged.begin()));
   EXPECT_EQ(Count(merged, "KEYFRAME_2"), 31);
+  // Both walks were captured at once, and times do not step back.
+  EXPECT_TRUE(std::ranges::is_sorted(merged, {}, &StoredEvent::utime));
   EXPECT_EQ(FoundAtOpening(ReadSite(out)), "");
   EXPECT_EQ(ReadSite(out).description.name, "both");
 }
@@ -58,16 +61,22 @@ TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
 
 TEST_F(MergeTest, NumbersAnchorEditsOn) {
   const Site a = MakeSite(folder / "a", {EditEvent({1, 7}, 1, 0), EditEvent({1, 7}, 2, 1)});
-  const Site b = MakeSite(
-      folder / "b", {EditEvent({2, 7}, 1, 0), EditEvent({1, 7}, 1, 1), EditEvent({2, 8}, 1, 5)});
-  EXPECT_EQ(MergeSites(a, b, out, {}).anchor_edits, 4);
+  // Of one revision by two agents both count.
+  StoredEvent by_another = EditEvent({1, 7}, 2, 6);
+  anchor_edit_t message{};
+  ASSERT_TRUE(DecodeMessage(by_another.data, &message));
+  message.agent_id = 2;
+  by_another.data = EncodeMessage(message);
+  const Site b = MakeSite(folder / "b", {EditEvent({2, 7}, 1, 0), EditEvent({1, 7}, 1, 1),
+                                         EditEvent({2, 8}, 1, 5), by_another});
+  EXPECT_EQ(MergeSites(a, b, out, {}).anchor_edits, 5);
   int64_t next = 0;
   for (const StoredEvent& event : EventsOf(ReadSite(out))) {
     anchor_edit_t edit{};
     ASSERT_TRUE(DecodeMessage(event.data, &edit));
     EXPECT_EQ(edit.seq, next++);
   }
-  EXPECT_EQ(next, 4);
+  EXPECT_EQ(next, 5);
 }
 
 TEST_F(MergeTest, KeepsResultsBetweenTheSecondsMaps) {

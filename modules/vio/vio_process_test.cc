@@ -17,7 +17,7 @@
 #include "vio/command_line.h"
 #include "vio/front_end/test_images.h"
 #include "vio/vio_process_test_world.h"
-#include "vio/window/vio_test_world.h"
+#include "vio/window/testing/vio_test_world.h"
 
 namespace pangea::vio {
 namespace {
@@ -47,6 +47,7 @@ size_t SharedLandmarks(const Keyframe& first, const Keyframe& second) {
   return static_cast<size_t>(
       std::ranges::count_if(a, [&b](int32_t landmark_id) { return b.contains(landmark_id); }));
 }
+
 // Driving evenly does not tell it; walking does.
 TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
   for (const double drive_mps : {0.0, 1.5}) {
@@ -68,6 +69,37 @@ TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
     }
     EXPECT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
     EXPECT_EQ(said > 0, drive_mps > 0) << said;
+  }
+}
+
+// So do its keyframes; one with too few depths to tell says what the one before said.
+TEST_F(VioProcessTest, EachKeyframeSaysHowWellItKnowsTheScale) {
+  for (const double drive_mps : {0.0, 1.5}) {
+    keyframes_.clear();
+    VioTestWorldOptions motion;
+    motion.seed = 4;
+    motion.drive_mps = drive_mps;
+    VioTestWorld world(motion);
+    const cv::Mat image = RandomTexture(world.camera().width, world.camera().height, 11);
+    VioProcess process(bus_, options_, 0);
+    process.Open(world.camera(), motion.imu_noise);
+    for (int frame = 0; frame < 220; ++frame) {
+      VioTestWorld::Input input = world.Next();
+      if (frame >= 100) {
+        input.frame.observations.resize(6);
+      }
+      process.AddTracks(input.frame, image, input.imu);
+    }
+    bus_.Drain();
+    int with_few_depths = 0;
+    std::vector<double> sigmas;
+    for (const Keyframe& keyframe : keyframes_) {
+      EXPECT_GT(keyframe.scale_sigma, 0) << keyframe.id.seq;
+      with_few_depths += keyframe.points.size() < 8 ? 1 : 0;
+      sigmas.push_back(keyframe.scale_sigma);
+    }
+    EXPECT_GT(with_few_depths, 0);
+    EXPECT_EQ(UnknownScaleSigma(sigmas) > 0, drive_mps > 0) << sigmas.size();
   }
 }
 

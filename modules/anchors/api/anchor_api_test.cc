@@ -1,113 +1,15 @@
-// Every route, what is refused, conflicts and time-outs, without a socket and a bus.
-
-#include "anchors/api/anchor_api.h"
+// Every route, what is placed and what is refused.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
-#include "core/testing/synthetic_world.h"
+#include "anchors/api/anchor_api_test_world.h"
 
 namespace pangea {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-constexpr int64_t kSecond_us = 1'000'000;
-
-struct Heard {
-  int status = 0;  // 0: no answer yet
-  json body;
-  std::map<std::string, std::string> headers;
-};
-
-class AnchorApiTest : public testing::Test {
- protected:
-  AnchorApiTest()
-      : anchors_(options_),
-        api_(anchors_, options_, [this](const AnchorEdit& edit) { requested_.push_back(edit); }) {
-    SyntheticWorldOptions options;
-    options.num_keyframes = 20;
-    world_ = MakeSyntheticWorld(options);
-    for (const SyntheticAgent& agent : world_.agents) {
-      for (const Keyframe& keyframe : agent.keyframes) {
-        anchors_.Take(keyframe);
-      }
-    }
-    Pass(0);
-  }
-
-  const MapId& map(int agent) const { return world_.agents[agent].map; }
-  void Pass(int64_t us) { api_.Tick(now_utime_ += us, complete_); }
-
-  std::shared_ptr<Heard> Ask(const std::string& method, const std::string& target,
-                             const std::string& body = "", const std::string& if_match = "") {
-    auto heard = std::make_shared<Heard>();
-    api_.Answer({method, target, "localhost", if_match, body}, [heard](web::WebAnswer answer) {
-      EXPECT_EQ(heard->status, 0) << "answered twice";
-      heard->status = answer.status;
-      heard->headers.insert(answer.headers.begin(), answer.headers.end());
-      heard->body = answer.body.empty() ? json() : json::parse(answer.body);
-    });
-    return heard;
-  }
-  Heard Get(const std::string& target) { return *Ask("GET", target); }
-
-  // As agent_handler and AnchorsProcess do.
-  void Journal(AnchorEdit edit) {
-    edit.seq = next_seq_++;
-    if (edit.agent_id == 0) {
-      edit.right = AnchorRight::kEditAll;
-    }
-    const std::string refused = anchors_.Take(edit);
-    api_.Take(edit, refused);
-  }
-  void JournalNewest() { Journal(requested_.back()); }
-
-  std::string NewBody(int agent, const Eigen::Vector3d& p) const {
-    return fmt::format(
-        R"({{"name": "kettle", "payload": "hot", "pose": {{"group": "{}", "position": [{}, {}, {}]}}}})",
-        ToString(map(agent)), p.x(), p.y(), p.z());
-  }
-  // An anchor near agent 1, journalled.
-  json Make() {
-    const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
-    JournalNewest();
-    EXPECT_EQ(heard->status, 201) << heard->body;
-    return heard->body;
-  }
-  Eigen::Vector3d NearAgent() const {
-    return world_.agents[0].keyframes[15].T_odom_body * Eigen::Vector3d(1.5, 0.3, 0);
-  }
-  void Fuse() {
-    MapState state;
-    state.group = map(0);
-    state.revision = 1;
-    for (const SyntheticAgent& agent : world_.agents) {
-      state.maps.push_back(agent.map);
-      for (const Keyframe& keyframe : agent.keyframes) {
-        state.keyframes.push_back({keyframe.id, keyframe.utime, world_.T_hall_body(keyframe.id)});
-      }
-    }
-    anchors_.Take(state);
-  }
-  static Eigen::Vector3d PositionOf(const json& anchor) {
-    const json& p = anchor.at("pose").at("position");
-    return {p[0].get<double>(), p[1].get<double>(), p[2].get<double>()};
-  }
-
-  AnchorsOptions options_;
-  SyntheticWorld world_;
-  Anchors anchors_;
-  AnchorApi api_;
-  std::vector<AnchorEdit> requested_;
-  bool complete_ = true;
-  int64_t now_utime_ = 1'700'000'000'000'000;
-  int64_t next_seq_ = 0;
-};
 
 TEST_F(AnchorApiTest, AnAnchorIsMadeOnceTheJournalHasIt) {
   const Eigen::Vector3d p = NearAgent();
@@ -213,129 +115,6 @@ TEST_F(AnchorApiTest, WhatCannotBePlacedIsRefusedBeforeItIsJournalled) {
   EXPECT_TRUE(requested_.empty());
 }
 
-TEST_F(AnchorApiTest, ItIsRequestedEachSecondAndGivenUpAfterFive) {
-  const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
-  for (int i = 0; i < 49; ++i) {
-    Pass(kSecond_us / 10);
-  }
-  EXPECT_EQ(heard->status, 0);
-  EXPECT_EQ(requested_.size(), 5u);
-  Pass(kSecond_us / 10);
-  EXPECT_EQ(heard->status, 503);
-  EXPECT_THAT(heard->body.value("error", ""), HasSubstr("pangea-agent-handler"));
-  Pass(kSecond_us);
-  EXPECT_EQ(requested_.size(), 5u);
-  JournalNewest();  // later nevertheless
-  EXPECT_EQ(Get("/v1/anchors").body["anchors"].size(), 1u);
-}
-
-TEST_F(AnchorApiTest, AChangeKeepsWhatItDoesNotName) {
-  const json made = Make();
-  const std::string target = "/v1/anchors/" + made["id"].get<std::string>();
-  const auto renamed = Ask("PUT", target, R"({"name": "pot"})");
-  ASSERT_EQ(requested_.back().revision, 2);
-  EXPECT_EQ(requested_.back().placement, AnchorEdit::Placement::kSame);
-  JournalNewest();
-  ASSERT_EQ(renamed->status, 200);
-  EXPECT_EQ(renamed->headers["ETag"], "\"2\"");
-  EXPECT_EQ(renamed->body["name"], "pot");
-  EXPECT_EQ(renamed->body["payload"], "hot");
-  EXPECT_EQ(renamed->body["pose"], made["pose"]);
-  const auto moved = Ask(
-      "PUT", target,
-      fmt::format(R"({{"pose": {{"keyframe": {{"map": "{}", "seq": 3}}, "position": [1, 0, 0]}}}})",
-                  ToString(map(0))));
-  JournalNewest();
-  EXPECT_EQ(moved->body["name"], "pot");
-  EXPECT_GT((PositionOf(moved->body) - PositionOf(made)).norm(), 0.1);
-  const auto empty = Ask("PUT", target, "{}");
-  EXPECT_EQ(empty->status, 400);
-}
-
-TEST_F(AnchorApiTest, AnEditOfWhatIsOldIsAConflict) {
-  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
-  Ask("PUT", target, R"({"name": "pot"})");
-  JournalNewest();
-  const size_t before = requested_.size();
-  EXPECT_EQ(Ask("PUT", target, R"({"name": "x", "revision": 1})")->status, 409);
-  EXPECT_EQ(Ask("PUT", target, R"({"name": "x"})", "\"1\"")->status, 409);
-  EXPECT_EQ(Ask("DELETE", target, "", "\"1\"")->status, 409);
-  EXPECT_EQ(Ask("DELETE", target, "", "yesterday")->status, 400);
-  EXPECT_EQ(requested_.size(), before);
-  const auto good = Ask("PUT", target, R"({"name": "x"})", "\"2\"");
-  EXPECT_EQ(Ask("PUT", target, R"({"name": "y"})", "\"2\"")->status, 409) << "one is under way";
-  JournalNewest();
-  EXPECT_EQ(good->status, 200);
-}
-
-TEST_F(AnchorApiTest, TwoChangesAtOnceHaveTwoRevisions) {
-  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
-  const auto first = Ask("PUT", target, R"({"name": "first"})");
-  const AnchorEdit first_edit = requested_.back();
-  const auto second = Ask("PUT", target, R"({"name": "second"})");
-  EXPECT_EQ(requested_.back().revision, 3);
-  Journal(first_edit);
-  JournalNewest();
-  EXPECT_EQ(first->status, 200);
-  EXPECT_EQ(second->status, 200);
-  EXPECT_EQ(Get(target).body["name"], "second");
-}
-
-TEST_F(AnchorApiTest, AChangeThatTheJournalNeverHadLocksNobodyOut) {
-  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
-  const auto lost = Ask("PUT", target, R"({"name": "lost"})");
-  Pass(5 * kSecond_us);
-  EXPECT_EQ(lost->status, 503);
-  const auto next = Ask("PUT", target, R"({"name": "next"})", "\"1\"");
-  EXPECT_EQ(requested_.back().revision, 3) << "the lost one may still come";
-  JournalNewest();
-  EXPECT_EQ(next->status, 200);
-}
-
-TEST_F(AnchorApiTest, WhoeverLosesToAnotherIsToldSo) {
-  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
-  const auto ours = Ask("PUT", target, R"({"name": "ours"})");
-  AnchorEdit theirs = requested_.back();
-  theirs.agent_id = 2;
-  theirs.right = AnchorRight::kEditAll;
-  theirs.name = "theirs";
-  Journal(theirs);
-  EXPECT_EQ(ours->status, 0);
-  JournalNewest();  // of equal revisions the highest agent wins
-  EXPECT_EQ(ours->status, 409);
-  EXPECT_THAT(ours->body.value("error", ""), HasSubstr("agent 2"));
-  EXPECT_EQ(Get(target).body["name"], "theirs");
-
-  // Another tool on the server drew the same revision.
-  const auto again = Ask("PUT", target, R"({"name": "again"})");
-  AnchorEdit other_tool = requested_.back();
-  other_tool.name = "other tool";
-  Journal(other_tool);
-  EXPECT_EQ(again->status, 409);
-}
-
-TEST_F(AnchorApiTest, DeletedForEver) {
-  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
-  const auto deleted = Ask("DELETE", target);
-  EXPECT_EQ(deleted->status, 0);
-  const auto changed = Ask("PUT", target, R"({"name": "late"})");
-  const AnchorEdit change = requested_.back();
-  Journal(requested_[requested_.size() - 2]);
-  EXPECT_EQ(deleted->status, 204);
-  Journal(change);
-  EXPECT_EQ(changed->status, 410);
-  EXPECT_EQ(Get(target).status, 410);
-  EXPECT_EQ(Ask("DELETE", target)->status, 410);
-  EXPECT_EQ(Get("/v1/anchors").body["anchors"].size(), 0u);
-}
-
-TEST_F(AnchorApiTest, WhatTheJournalsEditIsRefusedForIsSaid) {
-  const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
-  api_.Take(requested_.back(), "anchor edit: there are 10000 anchors, max_anchors");
-  EXPECT_EQ(heard->status, 409);
-  EXPECT_THAT(heard->body.value("error", ""), HasSubstr("max_anchors"));
-}
-
 TEST_F(AnchorApiTest, AgentsAndTheirAnchors) {
   Make();
   const json agents = Get("/v1/agents").body["agents"];
@@ -415,20 +194,6 @@ TEST_F(AnchorApiTest, OnlyTheMethodsThereAre) {
     EXPECT_EQ(heard->status, 405) << target;
     EXPECT_EQ(heard->headers["Allow"], methods) << target;
   }
-}
-
-TEST_F(AnchorApiTest, EditsUnderWayAreBounded) {
-  std::vector<std::shared_ptr<Heard>> heard;
-  for (size_t i = 0; i <= AnchorApi::kMaxPending; ++i) {
-    heard.push_back(Ask("POST", "/v1/anchors", NewBody(0, NearAgent())));
-  }
-  EXPECT_EQ(heard[0]->status, 0);
-  EXPECT_EQ(heard.back()->status, 503);
-  std::set<AnchorId> ids;
-  for (const AnchorEdit& edit : requested_) {
-    ids.insert(edit.anchor);
-  }
-  EXPECT_EQ(ids.size(), AnchorApi::kMaxPending) << "no number twice";
 }
 
 TEST_F(AnchorApiTest, ItsDescriptionIsJson) {

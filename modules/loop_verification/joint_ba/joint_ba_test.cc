@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -100,6 +101,32 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   const auto none = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(none);
   EXPECT_FALSE(none->covariance_of_sure);
+}
+
+// Where no map knows its scale, nobody knows how far the two are from each other; one that does
+// tells it.
+TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
+  constexpr double kSigma = 0.3;
+  const auto relative_sigma = [&](bool m_is_metric) {
+    SubmapStore store;
+    WindowPair windows;
+    for (const auto& [window, map, is_metric] :
+         {std::tuple(&windows.m, MapId{1, 1000}, m_is_metric),
+          std::tuple(&windows.c, MapId{2, 2000}, false)}) {
+      for (const auto& said : store_.WindowUpTo({map, 5}, 5)) {
+        Keyframe keyframe = said->keyframe();
+        keyframe.scale_sigma = is_metric ? 0 : kSigma;
+        store.Add(keyframe);
+      }
+      *window = MakeWindow(store.WindowUpTo({map, 5}, 5), {});
+    }
+    const auto result = SolveJointBa(windows, matches_, T_m_c_, options_);
+    EXPECT_TRUE(result);
+    const Eigen::Vector3d& t = result->T_Km_Kc.t;
+    return std::sqrt(t.dot(result->covariance.topLeftCorner<3, 3>() * t)) / t.squaredNorm();
+  };
+  EXPECT_GT(relative_sigma(false), 0.5 * kSigma);
+  EXPECT_LT(relative_sigma(true), 0.2 * kSigma);
 }
 
 // What no number of corners averages out: a rotation, and the step that looks the same at the

@@ -78,29 +78,15 @@ std::vector<Tracker::Bearing> Tracker::Bearings() const {
 }
 
 std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
-                                std::vector<cv::Point2f> from, Levels levels, int window_px,
-                                std::vector<cv::Point2f>* to) {
+                                const std::vector<cv::Point2f>& from, int coarsest_level,
+                                std::vector<cv::Point2f>* to) const {
   std::vector<uchar> ok;
-  if (from.empty()) {
-    return ok;
-  }
-  const int last = static_cast<int>(std::min(from_pyramid.size(), to_pyramid.size())) / 2 - 1;
-  levels = {std::min(levels.finest, last), std::min(levels.coarsest, last)};
-  const auto part = [&levels](const Pyramid& pyramid) {
-    return Pyramid(pyramid.begin() + 2 * levels.finest, pyramid.begin() + 2 * levels.coarsest + 2);
-  };
-  const float scale = 1.F / static_cast<float>(1 << levels.finest);
-  for (size_t i = 0; i < from.size(); ++i) {
-    from[i] *= scale;
-    (*to)[i] *= scale;
-  }
-  cv::calcOpticalFlowPyrLK(part(from_pyramid), part(to_pyramid), from, *to, ok, cv::noArray(),
-                           cv::Size(window_px, window_px), levels.coarsest - levels.finest,
-                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
-                                            kKltIterations, kKltConverged_px),
-                           cv::OPTFLOW_USE_INITIAL_FLOW);
-  for (cv::Point2f& pixel : *to) {
-    pixel /= scale;
+  if (!from.empty()) {
+    cv::calcOpticalFlowPyrLK(from_pyramid, to_pyramid, from, *to, ok, cv::noArray(),
+                             cv::Size(options_.window_px, options_.window_px), coarsest_level,
+                             cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
+                                              kKltIterations, kKltConverged_px),
+                             cv::OPTFLOW_USE_INITIAL_FLOW);
   }
   return ok;
 }
@@ -129,8 +115,7 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
     from.push_back(features_[i].pixel);
     to.push_back(rotated[i] + dt_s * features_[i].flow);
   }
-  const std::vector<uchar> ok =
-      Klt(last_pyramid_, pyramid_, from, kNearLevels, options_.window_px, &to);
+  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevel, &to);
   std::vector<Found> found(features_.size());
   for (size_t i = 0; i < features_.size(); ++i) {
     if (ok[i] && features_[i].patch) {
@@ -152,13 +137,11 @@ void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& r
       to.push_back(rotated[i]);
     }
   }
-  const Levels all{0, options_.pyramid_levels - 1};
   const std::vector<uchar> forward_ok =
-      Klt(last_pyramid_, pyramid_, from, all, options_.window_px, &to);
+      Klt(last_pyramid_, pyramid_, from, options_.pyramid_levels - 1, &to);
   // Back from the result with the start as the guess: only the finest levels have work to do.
   std::vector<cv::Point2f> back = from;
-  const std::vector<uchar> backward_ok =
-      Klt(pyramid_, last_pyramid_, to, {0, 1}, options_.window_px, &back);
+  const std::vector<uchar> backward_ok = Klt(pyramid_, last_pyramid_, to, kNearLevel, &back);
   for (size_t k = 0; k < which.size(); ++k) {
     Feature& feature = features_[which[k]];
     if (!forward_ok[k]) {

@@ -52,7 +52,8 @@ struct TrackerOptions {
                 "cells of the image that features are spread over");
     archive.Add("min_distance_px", &min_distance_px, {1, 1000}, "px", "between features");
     archive.Add("window_px", &window_px, {3, 101}, "px", "of the KLT");
-    archive.Add("pyramid_levels", &pyramid_levels, {0, 10}, "", "of the KLT, above the image");
+    archive.Add("pyramid_levels", &pyramid_levels, {1, 10}, "",
+                "of the KLT, with the image itself");
     archive.Add("max_forward_backward_px", &max_forward_backward_px, {0.01, 100}, "px",
                 "between a feature and itself tracked back");
     archive.Add("border_px", &border_px, {0, 1000}, "px", "of the image without features");
@@ -103,18 +104,15 @@ class Tracker {
   };
 
   using Pyramid = std::vector<cv::Mat>;  // each level and its derivatives, in turn
-  struct Levels {
-    int finest, coarsest;
-  };
-  // Of the first search: the prediction is good, and the patch finds what KLT has come near.
-  static constexpr Levels kNearLevels{0, 1};
+  // Where a search begins whose guess is good: coarser levels have no work to do.
+  static constexpr int kNearLevel = 1;
   using Found = std::optional<Eigen::Vector2f>;  // where in the newest image
 
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
-  static std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
-                                std::vector<cv::Point2f> from, Levels levels, int window_px,
-                                std::vector<cv::Point2f>* to);
+  std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
+                         const std::vector<cv::Point2f>& from, int coarsest_level,
+                         std::vector<cv::Point2f>* to) const;
   std::vector<cv::Point2f> Rotated(const Eigen::Quaterniond& q_cam_lastcam);
   std::vector<Found> FindAsPredicted(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
                                      float dt_s);

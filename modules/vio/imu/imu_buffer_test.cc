@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "vio/window/window_test_world.h"
+#include "vio/window/testing/window_test_world.h"
 
 namespace pangea::vio {
 namespace {

@@ -22,7 +22,7 @@ struct ImuIntrinsics {
   Eigen::Matrix<double, kImuIntrinsicsSize, 1> Stacked() const;
   void Add(const Eigen::Matrix<double, kImuIntrinsicsSize, 1>& error);
   // Of the body whose axes are the gyro's: what rotated the gyro rotates the accelerometer (to
-  // first order; docs/decisions/imu_intrinsics.md).
+  // first order; docs/decisions/imu.md).
   ImuIntrinsics OfGyroAxes() const;
 };
 

@@ -8,13 +8,13 @@ namespace {
 
 constexpr size_t kMinSamples = 20;  // fewer say little
 // What is not white, but acts as noise: motion between samples, stamps, sensitivity across axes.
-// Chosen among 1, 2 and 4 (docs/decisions/imu_noise.md).
+// Chosen among 1, 2 and 4 (docs/decisions/imu.md).
 constexpr double kMostShare = 2;
 // The usual parts' noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)): a given value up to this is possible
 // whatever a few rounded samples show.
 constexpr double kUsualGyroDensity = 2e-4, kUsualAccelDensity = 2e-3;
 // Random walks, of which a minute tells next to nothing: a range about EuRoC's part and phones'
-// (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)); chosen, not measured (docs/decisions/imu_noise.md).
+// (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)); chosen, not measured (docs/decisions/imu.md).
 constexpr double kLeastGyroWalk = 1e-5, kMostGyroWalk = 2e-4;
 constexpr double kLeastAccelWalk = 1e-4, kMostAccelWalk = 3e-3;
 

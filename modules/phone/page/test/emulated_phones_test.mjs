@@ -5,10 +5,9 @@ import { readFileSync } from "node:fs";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
 import { cameraFile, EmulatedPhone } from "./emulated_phone.mjs";
+import { recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
-
-const recording = (n) => `${options.recordings}/phone_${n}`;
 
 // Joins with a camera that shows the recording, and with the recording's calibration.
 async function started(server, name, n) {

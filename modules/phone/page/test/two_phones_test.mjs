@@ -4,13 +4,11 @@
 
 import { cpSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
-import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
-import { checkOther, noteOthers } from "./others_truth.mjs";
+import { check, options, run } from "../../../viewer/page/test/harness.mjs";
+import { checkFused, checkShown, chooseTarget, photograph, placeAt } from "./anchor_truth.mjs";
+import { atEnd, checkEachOther, joined, recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
-
-const recording = (n) => `${options.recordings}/phone_${n}`;
 
 // The same without calibration of its camera.
 function uncalibrated(folder) {
@@ -19,19 +17,6 @@ function uncalibrated(folder) {
   rmSync(`${copy}/mav0/cam0/sensor.yaml`);
   return copy;
 }
-
-async function joined(browser, server, name, folder) {
-  const page = await openPage(browser, server.invite(name), { viewport: { width: 960, height: 720 } });
-  await page.locator("#name").fill(name);
-  await page.locator("#folder").setInputFiles(folder);
-  await page.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 300_000 });
-  check(`${name} has joined, and the link is open`, true);
-  await noteDrawn(page);
-  await noteOthers(page);
-  return page;
-}
-
-const atEnd = (page) => page.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
 
 await run(async () => {
   const [first, second] = [1, 2].map((n) => new Truth(recording(n)));
@@ -50,9 +35,6 @@ await run(async () => {
   await Promise.all([atEnd(anna), atEnd(ben)]);
   await checkFused([anna, ben]);
   await checkShown(ben, second, target);
-  const agentOf = (page) => page.evaluate(() => pangea.walk.membership.agent);
-  const both = [{ page: anna, truth: first, agent: await agentOf(anna) }, { page: ben, truth: second, agent: await agentOf(ben) }];
-  await checkOther(both[0], both[1]);
-  await checkOther(both[1], both[0]);
+  await checkEachOther({ page: anna, truth: first }, { page: ben, truth: second });
   await browser.close();
 });

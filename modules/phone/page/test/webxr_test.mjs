@@ -2,14 +2,14 @@
 // beside it a page that plays another recording as always, at a real server: they fuse, the second shows the anchor of the first, and each shows the other.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
-import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
-import { checkFused, checkShown, chooseTarget, noteDrawn, photograph } from "./anchor_truth.mjs";
+import { check, options, run } from "../../../viewer/page/test/harness.mjs";
+import { checkFused, checkShown, chooseTarget, photograph } from "./anchor_truth.mjs";
 import { installFakeXr, projectionOf } from "./fake_xr.mjs";
-import { checkOther, noteOthers } from "./others_truth.mjs";
+import { noteOthers } from "./others_truth.mjs";
+import { atEnd, checkEachOther, joined, openInvited, recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
 
-const recording = (n) => `${options.recordings}/phone_${n}`;
 const kFocal = 445; // of the device's pinhole camera
 const kFrame_ms = 100;
 
@@ -121,7 +121,7 @@ await run(async () => {
   const server = new Server();
   await server.start();
   const browser = await server.browser();
-  const anna = await openPage(browser, server.invite("Anna"), { viewport: { width: 960, height: 720 } }, (page) => page.addInitScript(installFakeXr, { frame_ms: 20 }));
+  const anna = await openInvited(browser, server, "Anna", (page) => page.addInitScript(installFakeXr, { frame_ms: 20 }));
   await playAsXr(anna, recording(1), first);
   await anna.locator("#name").fill("Anna");
   await anna.locator("#start").click();
@@ -129,30 +129,22 @@ await run(async () => {
   check("the device's odometry has joined, and the link is open", true);
   await noteOthers(anna);
   const placing = place(anna, first, target);
-  const ben = await openPage(browser, server.invite("Ben"), { viewport: { width: 960, height: 720 } });
-  await ben.locator("#name").fill("Ben");
-  await ben.locator("#folder").setInputFiles(recording(2));
-  await ben.waitForFunction(() => pangea.walk?.link === "open", undefined, { timeout: 300_000 });
-  await noteDrawn(ben);
-  await noteOthers(ben);
+  const ben = await joined(browser, server, "Ben", recording(2));
   void photograph(ben, `${options.out}/phone_webxr_2.png`);
   check("it places an anchor", await placing, `${target.distance.toFixed(1)} m away`);
   await anna.waitForFunction(() => window.xrEnded, undefined, { timeout: 300_000 });
   await anna.screenshot({ path: `${options.out}/phone_webxr_1.png` });
-  await ben.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
+  await atEnd(ben);
   const { images, sent } = await anna.evaluate(() => ({ images: pangea.walk.numImages, sent: pangea.walk.uplink.counters }));
   check("its images became keyframes", sent.keyframes_acked > 20, `${images} images, ${sent.keyframes_acked} keyframes acknowledged`);
   await anna.waitForFunction(() => pangea.walk.pose.group, undefined, { timeout: 60_000 }).catch(() => {});
   await checkFused([anna, ben]);
   await checkShown(ben, second, target);
   const index = new Map(await anna.evaluate(() => [...xrIndex]));
-  const agentOf = (page) => page.evaluate(() => pangea.walk.membership.agent);
   const device = {
-    page: anna, truth: first, agent: await agentOf(anna), camera: new Matrix4().makeRotationX(Math.PI),
+    page: anna, truth: first, camera: new Matrix4().makeRotationX(Math.PI),
     timeOf: (utime) => index.get(utime) && index.get(utime) + first.readout_us / 2,
   };
-  const other = { page: ben, truth: second, agent: await agentOf(ben) };
-  await checkOther(device, other);
-  await checkOther(other, device);
+  await checkEachOther(device, { page: ben, truth: second });
   await browser.close();
 });

@@ -121,7 +121,7 @@ export class AnchorTools {
 
   private pointerDown({ offsetX, offsetY, button, pointerId }: PointerEvent) {
     this.down = button === 0 ? { x: offsetX, y: offsetY } : undefined;
-    const index = button === 0 && !this.placing ? this.stage.anchorAt(offsetX, offsetY) : undefined;
+    const index = button === 0 && !this.placing ? this.stage.picking.anchorAt(offsetX, offsetY) : undefined;
     if (index === undefined || !this.editable) return;
     this.drag = { index, from: this.model.anchorPose(index)!.t, moved: false };
     this.stage.holdCamera(true);
@@ -134,7 +134,7 @@ export class AnchorTools {
     this.drag.moved ||= Math.hypot(offsetX - this.down.x, offsetY - this.down.y) > kClickPixels;
     if (!this.drag.moved) return;
     const normal = shiftKey ? new Vector3(0, 0, 1) : this.stage.viewDirection();
-    const at = this.stage.onPlane(offsetX, offsetY, this.drag.from, normal);
+    const at = this.stage.picking.onPlane(offsetX, offsetY, this.drag.from, normal);
     if (at) this.model.moveAnchor(this.drag.index, at);
     this.stage.redraw();
   }
@@ -148,7 +148,7 @@ export class AnchorTools {
     } else if (clicked && this.placing) {
       void this.placeAt(offsetX, offsetY);
     } else if (clicked) {
-      this.stage.choose(this.stage.anchorAt(offsetX, offsetY));
+      this.stage.choose(this.stage.picking.anchorAt(offsetX, offsetY));
       this.draw();
     }
   }
@@ -168,7 +168,7 @@ export class AnchorTools {
   }
 
   private async placeAt(x: number, y: number) {
-    const place = this.stage.pick(x, y);
+    const place = this.stage.picking.pick(x, y);
     if (!place) {
       this.announce("No map point there");
       return;

@@ -120,8 +120,8 @@ addEventListener("keydown", ({ key, target }) => {
 
 function hover(x: number, y: number) {
   const box = canvas.getBoundingClientRect();
-  const anchor = model.anchors.get(stage.anchorAt(x - box.left, y - box.top) ?? -1);
-  const constraint = anchor ? undefined : stage.constraintAt(x - box.left, y - box.top);
+  const anchor = model.anchors.get(stage.picking.anchorAt(x - box.left, y - box.top) ?? -1);
+  const constraint = anchor ? undefined : stage.picking.constraintAt(x - box.left, y - box.top);
   stage.highlight(constraint);
   const tip = byId("tip");
   tip.textContent = anchor

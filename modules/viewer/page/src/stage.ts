@@ -1,20 +1,17 @@
 // The drawing: points, trajectories, constraints, agents. A frame sends the graphics card what changed
 // since the last one and nothing else.
 
-import {
-  Box3, Color, GridHelper, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
-} from "three";
+import { Box3, Color, GridHelper, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { AgentDrawing } from "./agents";
 import { AnchorDrawings } from "./anchors";
 import { Lines, PointCloud } from "./buffers";
 import { Model } from "./model";
+import { type Drawn, Picking } from "./picking";
 import type { AgentSaid, ConstraintSaid, Update } from "./protocol";
 import { agentColour, colours } from "../../../web/page/palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
-const kHoverPixels = 8;
-const kPickPixels = 12; // from a map point
 const kFlight_m = 3; // from an anchor that it flies to
 const kSettle_ms = 350; // of what is left to where things belong, all but 1/e is gone in such a time
 
@@ -35,6 +32,7 @@ export class Stage {
   private readonly hovered: Lines;
   private readonly agents = new Map<number, AgentDrawing>();
   private readonly anchors: AnchorDrawings;
+  readonly picking: Picking;
   private flight?: { target: Vector3; position: Vector3 };
   private readonly colourOf = new Map<number, Color>(); // of an agent
   private grid?: GridHelper;
@@ -75,6 +73,7 @@ export class Stage {
     this.anchors = new AnchorDrawings(labels);
     this.scene.add(this.anchors.object);
     this.refused.object.visible = false;
+    this.picking = new Picking(this.camera, canvas, model, this.points, (what) => this[what].object.visible);
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.recolour();
   }
@@ -98,7 +97,7 @@ export class Stage {
     this.dirty = this.posesDirty = true;
   }
 
-  show(what: "points" | "accepted" | "refused" | "anchors", visible: boolean) {
+  show(what: Drawn, visible: boolean) {
     this[what].object.visible = visible;
     this.dirty = true;
   }
@@ -190,36 +189,11 @@ export class Stage {
     }
   }
 
-  // The constraint under the pointer, among those shown.
-  constraintAt(x: number, y: number): ConstraintSaid | undefined {
-    let best: ConstraintSaid | undefined;
-    let least = kHoverPixels;
-    for (const constraint of this.model.constraints) {
-      if (!constraint || !(constraint.accepted ? this.accepted : this.refused).object.visible) continue;
-      const ends = this.onScreen(constraint);
-      const distance = ends ? distanceToSegment(new Vector2(x, y), ...ends) : Infinity;
-      if (distance < least) [best, least] = [constraint, distance];
-    }
-    return best;
-  }
-
   highlight(constraint: ConstraintSaid | undefined) {
     this.hovered.clear();
     const ends = constraint && this.model.ends(constraint);
     if (ends) this.hovered.add(...ends, styleOf(constraint));
     this.dirty = true;
-  }
-
-  // Both ends in pixels of the canvas; nothing behind the camera.
-  onScreen(constraint: ConstraintSaid): [Vector2, Vector2] | undefined {
-    const ends = this.model.ends(constraint);
-    if (!ends) return undefined;
-    const { clientWidth, clientHeight } = this.renderer.domElement;
-    const [a, b] = ends.map((k) => this.model.keyframes[k].shown.t.clone().project(this.camera));
-    if (a.z > 1 || b.z > 1) return undefined;
-    const pixel = (p: Vector3) =>
-      new Vector2(((p.x + 1) / 2) * clientWidth, ((1 - p.y) / 2) * clientHeight);
-    return [pixel(a), pixel(b)];
   }
 
   // --- anchors
@@ -231,53 +205,6 @@ export class Stage {
   choose(index: number | undefined) {
     this.anchors.chosen = index ?? -1;
     this.dirty = true;
-  }
-
-  // In pixels of the canvas; nothing behind the camera.
-  pixelOf(p: Vector3): Vector2 | undefined {
-    const { clientWidth, clientHeight } = this.renderer.domElement;
-    const at = p.clone().project(this.camera);
-    if (at.z > 1) return undefined;
-    return new Vector2(((at.x + 1) / 2) * clientWidth, ((1 - at.y) / 2) * clientHeight);
-  }
-
-  anchorAt(x: number, y: number): number | undefined {
-    if (!this.anchors.object.visible) return undefined;
-    let best: number | undefined;
-    let least = kPickPixels;
-    for (const index of this.model.anchors.keys()) {
-      const pose = this.model.anchorPose(index);
-      const distance = (pose && this.pixelOf(pose.t)?.distanceTo(new Vector2(x, y))) ?? Infinity;
-      if (distance < least) [best, least] = [index, distance];
-    }
-    return best;
-  }
-
-  // The map point or the keyframe under the pointer, in the body frame of the keyframe that saw it.
-  pick(x: number, y: number): { keyframe: number; p_body: Vector3 } | undefined {
-    const { keyframes } = this.model;
-    const pointer = new Vector2(x, y);
-    const p = new Vector3();
-    let best: { keyframe: number; p_body: Vector3 } | undefined;
-    let least = kPickPixels;
-    const offer = (keyframe: number, px: number, py: number, pz: number) => {
-      const { t, q } = keyframes[keyframe].shown;
-      p.set(px, py, pz).applyQuaternion(q).add(t);
-      const distance = this.pixelOf(p)?.distanceTo(pointer) ?? Infinity;
-      if (distance < least) [best, least] = [{ keyframe, p_body: new Vector3(px, py, pz) }, distance];
-    };
-    if (this.points.object.visible) this.points.forEach(offer);
-    keyframes.forEach((keyframe, k) => keyframe.arrived && offer(k, 0, 0, 0));
-    return best;
-  }
-
-  // Where the pointer's ray meets a plane.
-  onPlane(x: number, y: number, point: Vector3, normal: Vector3): Vector3 | undefined {
-    const { clientWidth, clientHeight } = this.renderer.domElement;
-    const caster = new Raycaster();
-    caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.camera);
-    const plane = new Plane().setFromNormalAndCoplanarPoint(normal, point);
-    return caster.ray.intersectPlane(plane, new Vector3()) ?? undefined;
   }
 
   viewDirection(): Vector3 {
@@ -395,12 +322,6 @@ function styleOf(constraint: ConstraintSaid): [number, number, number, number] {
   const { accepted, refused } = colours();
   const colour = new Color(constraint.accepted ? accepted : refused);
   return [colour.r, colour.g, colour.b, constraint.accepted ? 0 : 5];
-}
-
-function distanceToSegment(p: Vector2, a: Vector2, b: Vector2): number {
-  const ab = b.clone().sub(a);
-  const along = ab.lengthSq() > 0 ? p.clone().sub(a).dot(ab) / ab.lengthSq() : 0;
-  return p.distanceTo(a.clone().addScaledVector(ab, Math.min(1, Math.max(0, along))));
 }
 
 function tooLarge(fitted: Box3, box: Box3): boolean {

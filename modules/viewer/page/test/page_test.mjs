@@ -79,7 +79,7 @@ async function testHover(page, accepted) {
   const spots = await page.evaluate((wanted) => {
     const { model, stage } = pangea;
     return model.constraints.filter((c) => c.accepted === wanted).slice(0, 20).flatMap((c) => {
-      const ends = stage.onScreen(c);
+      const ends = stage.picking.onScreen(c);
       return ends ? [{ x: (ends[0].x + ends[1].x) / 2, y: (ends[0].y + ends[1].y) / 2 }] : [];
     });
   }, accepted);
@@ -197,7 +197,7 @@ const pointsToClick = (count) => {
   const found = [];
   stage.points.forEach((k, x, y, z) => {
     const { t, q } = model.keyframes[k].shown;
-    const pixel = stage.pixelOf(t.clone().set(x, y, z).applyQuaternion(q).add(t));
+    const pixel = stage.picking.pixelOf(t.clone().set(x, y, z).applyQuaternion(q).add(t));
     if (found.length === count || document.elementFromPoint(pixel?.x, pixel?.y)?.id !== "stage") return;
     if (found.every((other) => other.distanceTo(pixel) > 150)) found.push(pixel);
   });
@@ -215,7 +215,7 @@ async function placeAnchor(page, point, name) {
 const anchorNow = () => {
   const [index] = pangea.model.anchors.keys();
   const { t } = pangea.model.anchorPose(index);
-  const pixel = pangea.stage.pixelOf(t);
+  const pixel = pangea.stage.picking.pixelOf(t);
   return { at: [t.x, t.y, t.z], x: pixel.x, y: pixel.y, revision: pangea.model.anchors.get(index).said.revision };
 };
 const distance = (a, b) => Math.hypot(...a.map((value, i) => value - b[i]));
@@ -233,7 +233,7 @@ async function testLiveAnchors(page) {
   check("anchors: it is where it was put", off_px < 13, `${off_px.toFixed(1)} px off`);
   await page.locator(".anchor .what").click();
   await becomes(page, "anchors: the camera goes there", () =>
-    pangea.stage.pixelOf(pangea.model.anchorPose([...pangea.model.anchors.keys()][0]).t).distanceTo({
+    pangea.stage.picking.pixelOf(pangea.model.anchorPose([...pangea.model.anchors.keys()][0]).t).distanceTo({
       x: document.getElementById("stage").clientWidth / 2, y: document.getElementById("stage").clientHeight / 2 }) < 3);
   await page.waitForTimeout(500);
 
@@ -287,7 +287,7 @@ async function testAnchorsOfLog(page) {
   check("anchors: they are where the log has them", off < 0.03, `${off} m off`);
   await page.locator('.anchor[data-key="3"] .what').click();
   await becomes(page, "anchors: a click flies there", () => {
-    const at = pangea.stage.pixelOf(pangea.model.anchorPose(3).t);
+    const at = pangea.stage.picking.pixelOf(pangea.model.anchorPose(3).t);
     const canvas = document.getElementById("stage");
     return Math.hypot(at.x - canvas.clientWidth / 2, at.y - canvas.clientHeight / 2) < 3;
   });

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "core/imu/preintegration.h"
-#include "vio/window/test_nees.h"
-#include "vio/window/test_ride.h"
+#include "vio/window/testing/test_nees.h"
+#include "vio/window/testing/test_ride.h"
 
 namespace pangea::vio {
 namespace {

@@ -1,4 +1,4 @@
-#include "vio/window/window_test_world.h"
+#include "vio/window/testing/window_test_world.h"
 
 #include "core/testing/numeric_jacobian.h"
 #include "core/testing/test_cameras.h"

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "vio/window/estimator.h"
-#include "vio/window/test_ride.h"
+#include "vio/window/testing/test_ride.h"
 
 namespace pangea::vio {
 namespace {

@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "vio/window/test_nees.h"
-#include "vio/window/test_ride.h"
+#include "vio/window/testing/test_nees.h"
+#include "vio/window/testing/test_ride.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

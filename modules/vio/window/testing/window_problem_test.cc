@@ -8,9 +8,9 @@
 #include <numeric>
 
 #include "core/testing/numeric_jacobian.h"
+#include "vio/window/testing/window_test_world.h"
 #include "vio/window/window_factors.h"
 #include "vio/window/window_start.h"
-#include "vio/window/window_test_world.h"
 
 namespace pangea::vio {
 namespace {

@@ -1,4 +1,4 @@
-#include "vio/window/vio_test_world.h"
+#include "vio/window/testing/vio_test_world.h"
 
 #include <Eigen/LU>
 #include <algorithm>

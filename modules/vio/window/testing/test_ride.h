@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "vio/window/estimator.h"
-#include "vio/window/vio_test_world.h"
+#include "vio/window/testing/vio_test_world.h"
 
 namespace pangea::vio {
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "vio/window/estimator.h"
-#include "vio/window/test_ride.h"
+#include "vio/window/testing/test_ride.h"
 
 namespace pangea::vio {
 namespace {

@@ -1,4 +1,4 @@
-#include "vio/window/test_nees.h"
+#include "vio/window/testing/test_nees.h"
 
 #include <gtest/gtest.h>
 

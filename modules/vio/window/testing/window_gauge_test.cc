@@ -7,9 +7,9 @@
 #include <iostream>
 #include <map>
 
-#include "vio/window/vio_test_world.h"
+#include "vio/window/testing/vio_test_world.h"
+#include "vio/window/testing/window_test_world.h"
 #include "vio/window/window_problem.h"
-#include "vio/window/window_test_world.h"
 
 namespace pangea::vio {
 namespace {

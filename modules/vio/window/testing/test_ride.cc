@@ -1,4 +1,4 @@
-#include "vio/window/test_ride.h"
+#include "vio/window/testing/test_ride.h"
 
 namespace pangea::vio {
 namespace {

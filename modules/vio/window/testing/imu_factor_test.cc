@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/testing/test_random.h"
-#include "vio/window/window_test_world.h"
+#include "vio/window/testing/window_test_world.h"
 
 namespace pangea::vio {
 namespace {

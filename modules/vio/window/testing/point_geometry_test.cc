@@ -8,7 +8,7 @@
 
 #include "core/testing/numeric_jacobian.h"
 #include "core/testing/test_random.h"
-#include "vio/window/window_test_world.h"
+#include "vio/window/testing/window_test_world.h"
 
 namespace pangea::vio {
 namespace {

@@ -1,0 +1,194 @@
+// Which constraints make two maps one, undo it, or join a map after a restart.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "posegraph/posegraph.h"
+#include "posegraph/posegraph_test_world.h"
+
+namespace pangea {
+namespace {
+
+TEST(PoseGraph, OneMatchDoesNotMergeThreeViewpointsDo) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  const std::vector<Constraint> constraints = BetweenMaps(MakeConstraints(world, 12, 0));
+  ASSERT_GE(constraints.size(), 6u);
+  EXPECT_TRUE(graph.AddConstraint(constraints[0]).states.empty());
+  EXPECT_EQ(graph.counters().groups, 2);
+  AddConstraints(constraints, &graph);
+  EXPECT_EQ(graph.counters().groups, 1);
+  const std::vector<MapState> states = graph.States();
+  EXPECT_EQ(states[0].maps.size(), 2u);
+  EXPECT_EQ(states[0].group, world.agents[0].map);
+  EXPECT_LT(JointAte(world, states[0]), 0.1);
+}
+
+// The same three matches again and again are one viewpoint, however many keyframes stand there.
+TEST(PoseGraph, ManyMatchesOfOneViewpointDoNotMerge) {
+  SyntheticWorldOptions options = PosesOnly(2, 60);
+  options.step_m = 0.003;
+  options.start_apart = 0;
+  options.edge_sigma_m = 0.0003;
+  const SyntheticWorld world = MakeSyntheticWorld(options);
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  AddConstraints(MakeConstraints(world, 100, 0), &graph);
+  EXPECT_GT(graph.counters().unused, 50);
+  EXPECT_EQ(graph.counters().groups, 2);
+}
+
+// Wrong constraints that agree with each other by chance or by a look-alike: too few, or rivalled.
+TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  for (const Constraint& constraint : BetweenMaps(MakeConstraints(world, 200, 1.0))) {
+    graph.AddConstraint(constraint);
+    EXPECT_EQ(graph.counters().groups, 2);
+  }
+}
+
+std::vector<KeyframePair> PairsBetweenMaps(const SyntheticWorld& world) {
+  std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
+  std::erase_if(pairs, [](const KeyframePair& pair) { return pair.from.map == pair.to.map; });
+  return pairs;
+}
+
+// A constraint as it would be if map b lay elsewhere by `T`: all of these agree.
+Constraint Shifted(const SyntheticWorld& world, const KeyframePair& pair, const Rigid3& T) {
+  Random random(StableHash(pair.from, pair.to, 1));
+  Constraint constraint = MakeTrueConstraint(world, pair.from, pair.to, {}, random);
+  constraint.T_from_to = world.T_hall_body(pair.from).Inverse() * T * world.T_hall_body(pair.to);
+  return constraint;
+}
+
+TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const size_t stride = pairs.size() / 30;
+  const Rigid3 wrong(YawRotation(0.4), {5, 3, 0});
+  for (size_t i = 0; i < 6; ++i) {
+    graph.AddConstraint(Shifted(world, pairs[i * stride], wrong));
+  }
+  EXPECT_EQ(graph.counters().groups, 1);
+  bool undone = false;
+  for (size_t i = 6; i < 28; ++i) {
+    const PoseGraphUpdate update = graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+    if (graph.counters().groups == 2 && !update.corrections.empty()) {
+      undone = true;
+      // The newer map's agent is told that its odom frame is its own again.
+      EXPECT_EQ(update.corrections.back().map, world.agents[1].map);
+      EXPECT_EQ(update.corrections.back().group, world.agents[1].map);
+      EXPECT_LT(update.corrections.back().T_map_odom.t.norm(), 1e-12);
+    }
+  }
+  EXPECT_TRUE(undone);
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
+}
+
+TEST(PoseGraph, ADerivedConstraintMergesAloneUntilManyContradictIt) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const size_t stride = pairs.size() / 30;
+  Constraint derived = Shifted(world, pairs[0], Rigid3(YawRotation(0.4), {5, 3, 0}));
+  derived.kind = PlaceKind::kDerived;
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  graph.AddConstraint(derived);
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_EQ(graph.counters().in_force, 1);
+  for (size_t i = 1; i < 28; ++i) {
+    graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+  }
+  EXPECT_EQ(graph.counters().groups, 1);
+  EXPECT_EQ(graph.counters().switched_off, 1);
+  EXPECT_LT(JointAte(world, graph.States()[0]), 0.1);
+}
+
+std::vector<uint8_t> Saved(PoseGraph* graph) {
+  ByteRecordWriter writer;
+  graph->Save(&writer);
+  return writer.Take();
+}
+
+TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
+  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  Constraint derived = Shifted(world, pairs[0], {});
+  derived.kind = PlaceKind::kDerived;
+  PoseGraph graph({});
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      graph.Take(keyframe);
+    }
+  }
+  graph.Take(derived);
+  const std::vector<uint8_t> bytes = Saved(&graph);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  EXPECT_EQ(restored.counters().groups, 1);
+  // A loop within one map has the group solved again; between the maps the derived one is alone.
+  const std::vector<Constraint> constraints = MakeConstraints(world, 60, 0);
+  const auto intra = std::ranges::find(constraints, PlaceKind::kIntra, &Constraint::kind);
+  ASSERT_NE(intra, constraints.end());
+  restored.AddConstraint(*intra);
+  restored.Finish();
+  EXPECT_EQ(restored.counters().groups, 1);
+  EXPECT_EQ(restored.counters().in_force, 2);
+}
+
+// What comes after the restart is laid beside the solution; a solve from the beginning comes later,
+// and is that of a graph which took all at once.
+TEST(PoseGraph, AMapThatCameAfterTheCheckpointJoinsItsSolution) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 100));
+  const MapId& late = world.agents[2].map;
+  const std::vector<Constraint> constraints = MakeConstraints(world, 120, 0.1);
+  PoseGraph before({}), all({});
+  const auto take = [&](PoseGraph* graph, bool of_late) {
+    for (const SyntheticAgent& agent : world.agents) {
+      for (const Keyframe& keyframe : agent.keyframes) {
+        if ((agent.map == late) == of_late) {
+          graph->Take(keyframe);
+        }
+      }
+    }
+    for (const Constraint& constraint : constraints) {
+      if ((constraint.from.map == late || constraint.to.map == late) == of_late) {
+        graph->Take(constraint);
+      }
+    }
+  };
+  take(&before, false);
+  take(&all, false);
+  take(&all, true);
+  const std::vector<uint8_t> bytes = Saved(&before);
+  const MapState solution = before.States().at(0);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  take(&restored, true);
+  const PoseGraphUpdate first = restored.Settle();
+  ASSERT_EQ(first.states.size(), 1u);
+  EXPECT_EQ(first.states[0].maps.size(), 3u);
+  EXPECT_EQ(first.corrections.size(), 3u);
+  for (size_t i = 0; i < solution.keyframes.size(); ++i) {
+    EXPECT_EQ(first.states[0].keyframes[i].T_map_body.t, solution.keyframes[i].T_map_body.t);
+  }
+  EXPECT_LT(JointAte(world, first.states[0]), 0.06);
+  restored.Finish();
+  all.Finish();
+  const MapState later = restored.States().at(0), once = all.States().at(0);
+  for (size_t i = 0; i < once.keyframes.size(); ++i) {
+    EXPECT_EQ(later.keyframes.at(i).T_map_body.t, once.keyframes[i].T_map_body.t);
+  }
+}
+
+}  // namespace
+}  // namespace pangea
