@@ -294,8 +294,8 @@ TEST_F(LogToolsTest, TrajectoriesAndPoints) {
   EXPECT_GT(fs::file_size(Path("map.ply")), 10000U);
 }
 
-// Verification results made again from the log say what the log says, but for a few: acceptance was
-// laxer when the sample was captured.
+// Verification results made again from the log say what the log says, but for some: acceptance was
+// laxer when the sample was captured, and windows had only tracked landmarks.
 TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedResults) {
   std::istringstream results(ListResults(kSample));
   std::map<std::string, Explanation> same;  // by reason
@@ -307,7 +307,7 @@ TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedResults) {
       same.emplace(explanation.said.reason, explanation);
     }
   }
-  EXPECT_GT(num_same, 0.9 * num_results);
+  EXPECT_GT(num_same, 0.8 * num_results);
   EXPECT_GE(same.size(), 3U);
   for (const auto& [reason, explanation] : same) {
     EXPECT_NE(ToText(explanation).find(reason), std::string::npos);

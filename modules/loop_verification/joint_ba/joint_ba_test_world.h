@@ -28,8 +28,10 @@ class JointBaTestWindows : public testing::Test {
         store_.Add(keyframe);
       }
     }
-    windows_.m = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), {});
-    windows_.c = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), {});
+    WindowOptions only_tracked;
+    only_tracked.triangulation.few_landmarks = -1;
+    windows_.m = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), only_tracked);
+    windows_.c = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), only_tracked);
     T_m_c_ = windows_.m.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
              agent_c.T_room_body[5] * windows_.c.T_w_body.back().Inverse();
     for (const Direction direction : kBothDirections) {

@@ -81,7 +81,7 @@ TEST(Blobs, AreFoundAgainFromTwiceAsFar) {
   EXPECT_LT(wrong, right / 4);
 }
 
-// The share of bits that differ is the angle between the histograms, of half a turn.
+// The share of bits that differ is the angle between the histograms over pi.
 TEST(SignsOfProjections, KeepAngles) {
   std::mt19937 random(3);
   std::normal_distribution<float> normal;

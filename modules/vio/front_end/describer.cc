@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <utility>
 
 namespace pangea::vio {
@@ -53,6 +54,17 @@ std::vector<T> SpreadOver(const std::vector<T>& corners, int cell_px, int column
     kept.push_back(sorted[ranked[i].second]);
   }
   return kept;
+}
+
+// Whoever takes only the first of them gets some of each.
+void Alternate(std::span<const Corner> a, std::span<const Corner> b, std::vector<Corner>* out) {
+  for (size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
+    for (const auto& list : {a, b}) {
+      if (i < list.size()) {
+        out->push_back(list[i]);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -288,19 +300,21 @@ std::vector<Describer::Candidate> Describer::FindCorners(int wanted) const {
 
 std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
   BuildPyramid(image);
-  std::vector<Candidate> landmarks = PlaceLandmarks(frame);
-  landmarks.resize(std::min(landmarks.size(), static_cast<size_t>(options_.max_corners)));
-  int left = options_.max_corners - static_cast<int>(landmarks.size());
+  std::vector<Candidate> candidates = PlaceLandmarks(frame);
+  candidates.resize(std::min(candidates.size(), static_cast<size_t>(options_.max_corners)));
+  const auto num_landmarks = static_cast<std::ptrdiff_t>(candidates.size());
+  const int left = options_.max_corners - static_cast<int>(num_landmarks);
   const std::vector<Corner> blobs =
       blobs_.Describe(image, std::min(options_.max_blobs, left), options_.cell_px);
-  left -= static_cast<int>(blobs.size());
-  std::vector<Candidate> others = FindCorners(left);
-  others.resize(std::min(others.size(), static_cast<size_t>(left)));
-
-  std::vector<Corner> corners = Compute(landmarks);
-  corners.insert(corners.end(), blobs.begin(), blobs.end());
-  const std::vector<Corner> described = Compute(others);
-  corners.insert(corners.end(), described.begin(), described.end());
+  const size_t num_others = static_cast<size_t>(left) - blobs.size();
+  const std::vector<Candidate> others = FindCorners(static_cast<int>(num_others));
+  candidates.insert(
+      candidates.end(), others.begin(),
+      others.begin() + static_cast<std::ptrdiff_t>(std::min(others.size(), num_others)));
+  const std::vector<Corner> described = Compute(candidates);
+  const auto first_other = described.begin() + num_landmarks;
+  std::vector<Corner> corners(described.begin(), first_other);
+  Alternate({first_other, described.end()}, blobs, &corners);
   return corners;
 }
 

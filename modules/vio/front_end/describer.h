@@ -48,7 +48,8 @@ class Describer {
  public:
   Describer(const CameraModel& camera, const DescriberOptions& options);
 
-  // Corners of the image: those with a landmark_id first, in the order of the frame; then blobs.
+  // Corners of the image: those with a landmark_id first, in the order of the frame; then
+  // the others, each blob beside a corner.
   std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame);
 
  private:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -43,6 +44,23 @@ TEST(Describer, PutsEveryLandmarkFirstWithItsPixel) {
   for (size_t i = landmarks; i < corners.size(); ++i) {
     EXPECT_EQ(corners[i].landmark_id, kNoLandmark);
   }
+}
+
+// A link that carries only some of them takes the first.
+TEST(Describer, BlobsAndCornersTakeTurns) {
+  DescriberOptions options;
+  options.max_blobs = 0;
+  const cv::Mat image = RandomTexture(752, 480, 2);
+  const std::vector<Corner> only_corners = Describer(PlainCamera(), options).Describe(image, {});
+  options.max_blobs = 100;
+  const std::vector<Corner> both = Describer(PlainCamera(), options).Describe(image, {});
+  EXPECT_EQ(both.size(), only_corners.size());
+  int blobs = 0;
+  for (int i = 0; i < 100; ++i) {
+    blobs += std::ranges::none_of(
+        only_corners, [&](const Corner& corner) { return corner.pixel == both[i].pixel; });
+  }
+  EXPECT_NEAR(blobs, 50, 10);
 }
 
 TEST(Describer, CoversTheImageAndSeveralOctaves) {
