@@ -119,7 +119,7 @@ TEST_F(VioProcessTest, PublishesPosesAndCompleteKeyframes) {
   EXPECT_EQ(Counter("finished"), 1);
   EXPECT_EQ(Counter("keyframes"), static_cast<int64_t>(keyframes_.size()));
   ASSERT_GE(keyframes_.size(), 10u);
-  EXPECT_LT(bytes_ / keyframes_.size(), 28'000u);
+  EXPECT_LT(bytes_ / keyframes_.size(), 32'000u);
   for (size_t i = 0; i < keyframes_.size(); ++i) {
     const Keyframe& keyframe = keyframes_[i];
     EXPECT_EQ(keyframe.id, (KeyframeId{{7, kMapUtime}, static_cast<int32_t>(i)}));

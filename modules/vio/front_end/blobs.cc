@@ -67,8 +67,9 @@ std::vector<int> SpreadOver(const std::vector<cv::KeyPoint>& blobs, int cell_px,
                             size_t wanted) {
   std::vector<int> order(blobs.size());
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::ranges::greater(),
-                           [&](int i) { return blobs[static_cast<size_t>(i)].response; });
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return blobs[static_cast<size_t>(a)].response > blobs[static_cast<size_t>(b)].response;
+  });
   std::map<int, int> count;
   std::vector<std::pair<int, int>> ranked;  // rank in its cell, blob
   for (const int i : order) {
@@ -76,7 +77,8 @@ std::vector<int> SpreadOver(const std::vector<cv::KeyPoint>& blobs, int cell_px,
     const int cell = static_cast<int>(at.y) / cell_px * columns + static_cast<int>(at.x) / cell_px;
     ranked.emplace_back(count[cell]++, i);
   }
-  std::ranges::stable_sort(ranked, std::ranges::less(), &std::pair<int, int>::first);
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<int> kept;
   for (size_t k = 0; k < std::min(wanted, ranked.size()); ++k) {
     kept.push_back(ranked[k].second);
@@ -98,12 +100,12 @@ Descriptor SignsOfProjections(std::span<const float> histogram) {
   size_t bit = 0;
   for (const auto& half : kSigns) {
     Bins bins = centred;
-    std::ranges::for_each(bins, [mean](int& x) { x -= mean; });
+    std::for_each(bins.begin(), bins.end(), [mean](int& x) { x -= mean; });
     for (const Bins& signs : half) {
-      std::ranges::transform(bins, signs, bins.begin(), std::multiplies<>());
+      std::transform(bins.begin(), bins.end(), signs.begin(), bins.begin(), std::multiplies<>());
       HadamardTransform(&bins);
       // The second transform would leave the range of int.
-      std::ranges::for_each(bins, [](int& x) { x /= 16; });
+      std::for_each(bins.begin(), bins.end(), [](int& x) { x /= 16; });
     }
     for (const int x : bins) {
       descriptor[bit / 64] |= static_cast<uint64_t>(x > 0) << (bit % 64);

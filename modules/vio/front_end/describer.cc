@@ -312,9 +312,8 @@ std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame
       candidates.end(), others.begin(),
       others.begin() + static_cast<std::ptrdiff_t>(std::min(others.size(), num_others)));
   const std::vector<Corner> described = Compute(candidates);
-  const auto first_other = described.begin() + num_landmarks;
-  std::vector<Corner> corners(described.begin(), first_other);
-  Alternate({first_other, described.end()}, blobs, &corners);
+  std::vector<Corner> corners(described.begin(), described.begin() + num_landmarks);
+  Alternate(std::span(described).subspan(static_cast<size_t>(num_landmarks)), blobs, &corners);
   return corners;
 }
 

@@ -22,7 +22,7 @@
 namespace pangea::vio {
 
 struct DescriberOptions {
-  int max_corners = 600;  // at most kMaxCorners
+  int max_corners = 700;  // at most kMaxCorners
   int max_blobs = 240;    // of these
   int octaves = 8;
   double scale_factor = kOctaveScale;  // between octaves; CornerSigma assumes it
