@@ -204,7 +204,9 @@ void AgentHandlerProcess::SendAcks() {
 }
 
 void AgentHandlerProcess::SendAnchors() {
-  for (auto& [agent_id, agent] : agents_) {
+  for (auto& entry : agents_) {
+    const auto agent_id = entry.first;
+    auto& agent = entry.second;
     if (agent.session.HasUplink() && now_us_ - agent.heard_us < kAway_us) {
       anchors_.SendDue(agent_id, now_us_, [&](LinkKind kind, std::vector<uint8_t> body) {
         return SendDown(agent_id, &agent, agent.session.Seal(kind, std::move(body)));
