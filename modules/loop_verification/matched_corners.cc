@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -104,10 +103,12 @@ class Triangulation {
         return std::nullopt;
       }
     }
-    const bool contradicted = std::ranges::any_of(sights, [&](const Sight& sight) {
-      return Residual(sight, ray, depth.value).first.squaredNorm() > kMaxRayChi2;
+    const bool agreed = std::ranges::all_of(sights, [&](const Sight& sight) {
+      const Rigid3& T = sight.neighbour->T_cam_host;
+      const bool in_front = (T.q * ray + T.t * depth.value).z() > 0;
+      return in_front && Residual(sight, ray, depth.value).first.squaredNorm() <= kMaxRayChi2;
     });
-    if (contradicted) {
+    if (!agreed) {
       return std::nullopt;
     }
     SetSigmas(corner, sights, &depth);
