@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-MAX_WASM_BYTES = 3_100_000
+MAX_WASM_BYTES = 3_000_000
 MAX_HEAP_MB = 64
 MAX_ATE_RATIO = 1.1
 
