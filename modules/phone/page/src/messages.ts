@@ -42,7 +42,7 @@ export type LinkState = "connecting" | "open" | "refused" | "replaced";
 
 export type FromWorker =
   | { kind: "opened" }
-  | { kind: "failed"; text: string } // the agent cannot be opened
+  | { kind: "failed"; text: string } // the agent cannot be opened, or is broken
   | { kind: "taken"; utime: number } // the agent is done with the image
   | { kind: "pose"; pose: AgentPose }
   | { kind: "anchors"; anchors: ShownAnchor[] }

@@ -12,6 +12,7 @@ const kModule = "/pangea_agent.mjs"; // lies beside the page
 const kAlone = 1; // the id of an agent without a membership: nobody hears it
 
 const say = (message: FromWorker) => postMessage(message);
+const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
 const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now()));
 
 class AgentHost {
@@ -113,9 +114,9 @@ let host: Promise<AgentHost> | undefined;
 onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === "open") {
     host = AgentHost.open(data);
-    host.then(() => say({ kind: "opened" }), (error) => say({ kind: "failed", text: String(error.message ?? error) }));
+    host.then(() => say({ kind: "opened" }), fail);
   } else {
     // What comes while it is being opened waits, in order.
-    host?.then((opened) => opened.on(data), () => {});
+    host?.then((opened) => opened.on(data)).catch(fail);
   }
 };

@@ -6,6 +6,11 @@ const kOther = [1, 4, 1.5]; // its camera looks along odom's -y
 const kMap = "1/1700000000000000";
 const half = Math.SQRT1_2;
 
+// A bug that the agent itself does not catch.
+function breakIfTold(imuYaml) {
+  if (/breaks/.test(imuYaml)) throw new Error("a bug");
+}
+
 class FakeAgent {
   constructor(config) {
     this.config = config;
@@ -23,6 +28,7 @@ class FakeAgent {
   }
   addImage(utime) {
     ++this.numImages;
+    breakIfTold(this.config.imuYaml);
     this.pose = {
       utime, state: "tracking", reason: "", map: kMap, fused: false, numTracked: 120,
       T_odom_body: [0.01 * this.numImages, 0, 1.5, half, 0, 0, half], // upright, the camera to odom's y
@@ -83,6 +89,7 @@ class FakeCalibration {
   }
   addImage() {
     ++this.numImages;
+    breakIfTold(this.config.imuYaml);
   }
   progress() {
     return { share: Math.min(1, this.numImages / kEnough), missing: this.numImages < kEnough ? "rotation about z" : "" };

@@ -116,18 +116,37 @@ async function testKeptCalibration(page) {
   await page.locator("#stop").click();
 }
 
-// The recording that was made, without its calibration.
-async function testUncalibrated(browser, url, zip) {
-  const page = await openPage(browser, `${url}#rate=max`);
+// Plays the recording that was made, with its files changed.
+async function playChanged(page, zip, change) {
   const files = unzipSync(new Uint8Array(await readFile(zip)));
-  for (const name of Object.keys(files)) if (name.endsWith("sensor.yaml")) delete files[name];
+  for (const name of Object.keys(files)) if (name.endsWith("sensor.yaml")) change(files, name);
   const buffer = Buffer.from(zipSync(files));
   await page.locator("#zip").setInputFiles({ name: "a.zip", mimeType: "application/zip", buffer });
+}
+
+// Without its calibration.
+async function testUncalibrated(browser, url, zip) {
+  const page = await openPage(browser, `${url}#rate=max`);
+  await playChanged(page, zip, (files, name) => delete files[name]);
   await becomes(page, "a recording without calibration is calibrated, then played", () => pangea.walk?.vio?.counters.images > 2);
   check("with a rotation that nobody knew", /fake, with the rotation unknown/.test((await told(page)).cameraYaml));
   await becomes(page, "from its begin to its end", () =>
     /100 %/.test(document.getElementById("numbers").textContent) && pangea.walk.numImages > 15);
   await page.close();
+}
+
+// An agent, or a calibration, that is broken.
+async function testBroken(browser, url, zip) {
+  for (const what of ["agent", "calibration"]) {
+    const page = await openPage(browser, `${url}#rate=max`);
+    await playChanged(page, zip, (files, name) => {
+      if (name.includes("imu0")) files[name] = Buffer.concat([files[name], Buffer.from("\n# breaks\n")]);
+      else if (what === "calibration") delete files[name];
+    });
+    await becomes(page, `where the ${what} breaks the page says so, and is as before`, () =>
+      document.getElementById("notice").textContent === "a bug" && document.getElementById("welcome").checkVisibility());
+    await page.close();
+  }
 }
 
 async function testAnchor(page) {
@@ -278,6 +297,7 @@ await run(async () => {
   await testUpload(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);
+  await testBroken(browser, url, zip);
   await testXr(browser, url);
   await testXrRefused(browser, url);
   await testRefusals(browser, url);

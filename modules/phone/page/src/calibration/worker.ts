@@ -9,6 +9,7 @@ import type { FromCalibration, ToCalibration } from "./messages";
 const kModule = "/pangea_agent.mjs"; // lies beside the page
 
 const say = (message: FromCalibration) => postMessage(message);
+const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
 
 function sayOutcome({ cameraYaml, refused }: CalibrationOutcome) {
   say(refused === "" ? { kind: "done", cameraYaml } : { kind: "refused", text: refused });
@@ -49,9 +50,9 @@ onmessage = ({ data }: MessageEvent<ToCalibration>) => {
   if (data.kind === "open") {
     calibration = import(/* @vite-ignore */ kModule).then((module: { default: WasmModuleFactory }) =>
       CameraCalibration.load(module.default, data.config));
-    calibration.catch((error) => say({ kind: "failed", text: String(error.message ?? error) }));
+    calibration.catch(fail);
   } else {
     // What comes while it is being loaded waits, in order.
-    calibration?.then((opened) => take(opened, data), () => {});
+    calibration?.then((opened) => take(opened, data)).catch(fail);
   }
 };
