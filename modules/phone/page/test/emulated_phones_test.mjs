@@ -3,7 +3,7 @@
 
 import { readFileSync } from "node:fs";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
-import { checkFused, checkShown, chooseTarget, noteDrawn, photograph, placeAt } from "./anchor_truth.mjs";
+import { checkFused, checkShown, chooseTargets, noteDrawn, photograph, placeAll } from "./anchor_truth.mjs";
 import { cameraFile, EmulatedPhone } from "./emulated_phone.mjs";
 import { recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
@@ -38,12 +38,12 @@ async function rates(page) {
 
 await run(async () => {
   const [first, second] = [1, 2].map((n) => new Truth(recording(n)));
-  const target = chooseTarget(first, second);
+  const targets = chooseTargets(first, second);
   const server = new Server();
   await server.start();
   const anna = await started(server, "Anna", 1);
   void photograph(anna.page, `${options.out}/phone_emulated_1.png`);
-  check("page 1 places an anchor", await placeAt(anna.page, first, target, anna.phone.offset_us));
+  await placeAll(anna.page, first, targets, anna.phone.offset_us);
   await anna.playing;
   await rates(anna.page);
   // Her camera would begin again from the start.
@@ -53,6 +53,6 @@ await run(async () => {
   await ben.playing;
   await rates(ben.page);
   await checkFused([anna.page, ben.page]);
-  await checkShown(ben.page, second, target, ben.phone.offset_us);
+  await checkShown(ben.page, second, targets, ben.phone.offset_us);
   await Promise.all([anna, ben].map(({ browser }) => browser.close()));
 });

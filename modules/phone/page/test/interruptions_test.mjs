@@ -2,16 +2,15 @@
 // killed while it is gone. No keyframe is lost; Ben's old map stays, and his new one fuses.
 
 import { execFileSync } from "node:child_process";
-import { realpathSync } from "node:fs";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
 import { Network } from "./network.mjs";
+import { recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
 
 const kGone_s = 60;
 const kLeft = 8; // keyframes that Ben leaves behind
 const kAllSent_ms = 600_000; // after the network is back, and the recordings played
 
-const recording = (n) => realpathSync(`${options.recordings}/phone_${n}`);
 const seconds = (time_s) => new Promise((done) => setTimeout(done, 1000 * time_s));
 
 async function joined(browser, server, network, name, n) {
