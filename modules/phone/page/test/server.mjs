@@ -7,6 +7,8 @@ import { tmpdir } from "node:os";
 import { connect } from "node:net";
 import { launch, options, start } from "../../../viewer/page/test/harness.mjs";
 
+const kNewKey_ms = 3000; // until the gateway has looked into keys/, once a second
+
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 async function until(what, condition, timeout_ms = 30_000) {
@@ -42,11 +44,22 @@ export class Server {
     return /https:\S+#join=\S+/.exec(said)[0];
   }
 
+  makeKey(agent) {
+    const key = `${this.site}/keys/agent_${agent}.key`;
+    execFileSync(`${options.bin}/pangea-agent-handler`, ["keygen", "--agent", String(agent), "--out", key]);
+    return key;
+  }
+
+  // One without an invite, that the gateway knows.
+  async makeAgent(agent) {
+    const key = this.makeKey(agent);
+    await pause(kNewKey_ms);
+    return { agent, key };
+  }
+
   // An agent that is a program, playing a recording.
   startNative(agent, recording) {
-    const keys = `${this.site}/keys`;
-    execFileSync(`${options.bin}/pangea-agent-handler`, ["keygen", "--agent", String(agent), "--out", `${keys}/agent_${agent}.key`]);
-    this.run("pangea-uplink", "--agent", String(agent), "--key", `${keys}/agent_${agent}.key`, "--bus", this.agentBus, "--link", this.link);
+    this.run("pangea-uplink", "--agent", String(agent), "--key", this.makeKey(agent), "--bus", this.agentBus, "--link", this.link);
     this.run("pangea-vio", "--agent", String(agent), "--recording", recording, "--bus", this.agentBus, "--rate", "1");
   }
 

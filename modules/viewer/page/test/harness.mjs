@@ -10,8 +10,9 @@ export const { values: options } = parseArgs({
     chromium: { type: "string" },
     log: { type: "string" },
     page: { type: "string" }, // folder of the phone's page
-    recordings: { type: "string" }, // of phones: phone_1, phone_2, phone_3
+    recordings: { type: "string" }, // of phones: phone_1, phone_2, ...
     out: { type: "string" }, // for screenshots
+    wasm: { type: "string" }, // folder of pangea-agent.mjs
   },
 });
 
