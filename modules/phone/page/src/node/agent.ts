@@ -154,10 +154,12 @@ class Session {
     this.tum?.close();
     this.keyframeLog?.close();
     const sorted = [...this.times_ms].sort((a, b) => a - b);
+    const share = (q: number) => (sorted[Math.floor(q * (sorted.length - 1))] ?? 0).toFixed(2);
+    const mean_ms = sorted.reduce((sum, time_ms) => sum + time_ms, 0) / Math.max(1, sorted.length);
     console.error(
       `pangea-agent: ${this.times_ms.length} images, ${this.dropped} dropped, ${this.tracked} tracked, ` +
-        `${this.keyframes} keyframes, ${this.waiting} not acknowledged; median ` +
-        `${(sorted[sorted.length >> 1] ?? 0).toFixed(2)} ms of CPU an image, heap ${(this.agent.heapBytes() / 1e6).toFixed(1)} MB`,
+        `${this.keyframes} keyframes, ${this.waiting} not acknowledged; ms of CPU an image: ` +
+        `median ${share(0.5)}, 95 % ${share(0.95)}, mean ${mean_ms.toFixed(2)}; heap ${(this.agent.heapBytes() / 1e6).toFixed(1)} MB`,
     );
     if (this.tracked === 0) console.error(`pangea-agent: no pose: ${this.reason}`);
     return this.tracked > 0 ? 0 : kNoPose;
