@@ -22,7 +22,8 @@ if(PANGEA_SANITIZE)
   endif()
   add_link_options(-fsanitize=${PANGEA_SANITIZE})
   if(PANGEA_SANITIZE MATCHES "fuzzer")  # a report must end the run, or nobody sees it
-    add_compile_options(-fno-sanitize-recover=all -D_GLIBCXX_ASSERTIONS)
+    add_compile_options(-fno-sanitize-recover=all -D_GLIBCXX_ASSERTIONS
+      -fsanitize-ignorelist=${CMAKE_SOURCE_DIR}/tests/fuzz/sanitizer_ignored.txt)
   endif()
 endif()
 

@@ -70,6 +70,9 @@ void CheckedScan::Verify(const Checksums& checksums) {
     const auto index = static_cast<size_t>(number - checksums.first_event);
     if (piece.crc32() != checksums.crc32[index]) {
       piece.kind = LogPiece::Kind::kDamage;
+      if (!in_place) {
+        continue;  // its number may be what is damaged
+      }
     }
     expected = number - 1;
     in_place = true;
