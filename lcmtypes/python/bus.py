@@ -20,6 +20,7 @@ import re
 import select
 import socket
 import struct
+import sys
 import time
 import urllib.parse
 
@@ -186,6 +187,10 @@ def _receiving_socket(group, port, buffer_bytes, host_only):
     receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     if buffer_bytes:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+        given = receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # the rest is the kernel's own
+        if given < buffer_bytes:
+            print(f"bus: the kernel gives a receive buffer of {given // 1000} kB, not {buffer_bytes // 1000} kB: bursts are lost; "
+                  f"sysctl -w net.core.rmem_max={buffer_bytes}", file=sys.stderr)
     receiver.bind(("", port))
     receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + b"\0\0\0\0")
     return receiver

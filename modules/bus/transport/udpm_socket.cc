@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <iostream>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -124,6 +125,13 @@ class Socket {
     const sockaddr_in address = Inet(host, port);
     Check(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), "the group");
   }
+  // Of what the kernel gives, half is for its own bookkeeping.
+  int ReceiveBuffer() const {
+    int bytes = 0;
+    socklen_t size = sizeof(bytes);
+    Check(getsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes, &size), "a receive buffer");
+    return bytes / 2;
+  }
   int Release() { return std::exchange(fd_, -1); }
 
  private:
@@ -141,6 +149,16 @@ class Socket {
   }
   int fd_;
 };
+
+void ReserveReceiveBuffer(int bytes, Socket* socket) {
+  socket->Set(SOL_SOCKET, SO_RCVBUF, bytes, "a receive buffer");
+  if (const int given = socket->ReceiveBuffer(); given < bytes) {
+    std::cerr << fmt::format(
+        "bus: the kernel gives a receive buffer of {} kB, not {} kB: bursts of keyframes are lost "
+        "and sent again; sysctl -w net.core.rmem_max={}\n",
+        given / 1000, bytes / 1000, bytes);
+  }
+}
 
 }  // namespace
 
@@ -169,8 +187,8 @@ int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments) {
   socket.Set(SOL_SOCKET, SO_ATTACH_FILTER,
              sock_fprog{static_cast<unsigned short>(code.size()), code.data()}, "a packet filter");
   socket.Set(SOL_SOCKET, SO_REUSEADDR, 1, "sharing the port");
-  if (address.recv_buf_size > 0) {  // more than net.core.rmem_max the kernel does not give
-    socket.Set(SOL_SOCKET, SO_RCVBUF, address.recv_buf_size, "a receive buffer");
+  if (address.recv_buf_size > 0) {
+    ReserveReceiveBuffer(address.recv_buf_size, &socket);
   }
   socket.Bind(address.port);
   ip_mreq membership{};

@@ -32,7 +32,8 @@ UdpmAddress ParseUdpmUrl(const std::string& url);
 // Throws std::system_error when this machine has no route to the group.
 void CheckRoute(const UdpmAddress& address);
 
-// Opens the socket, non-blocking; throws std::system_error.
+// Opens the socket, non-blocking; throws std::system_error. Says on stderr when the kernel gives it
+// a smaller receive buffer than asked for, and what to do.
 int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments);
 
 }  // namespace pangea

@@ -227,6 +227,17 @@ TEST(UdpmUrl, WithoutABufferSizeTheSocketHasAsMuchAsInTheDefaultUrl) {
   EXPECT_GT(ReceiveBufferOf(url), ReceiveBufferOf(url + "&recv_buf_size=100000"));
 }
 
+// More than net.core.rmem_max the kernel does not give.
+TEST(UdpmUrl, ABufferSmallerThanAskedForIsSaidWithWhatToDo) {
+  testing::internal::CaptureStderr();
+  ReceiveBufferOf("udpm://239.255.76.67:20011?ttl=0&recv_buf_size=2000000000");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              testing::HasSubstr("sysctl -w net.core.rmem_max=2000000000"));
+  testing::internal::CaptureStderr();
+  ReceiveBufferOf("udpm://239.255.76.67:20011?ttl=0&recv_buf_size=100000");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
 TEST(UdpmUrl, WhatMakesNoSenseIsAnErrorThatNamesIt) {
   const std::pair<const char*, const char*> kUrls[] = {
       {"udpm://127.0.0.1:7667", "'127.0.0.1' is no multicast address"},
