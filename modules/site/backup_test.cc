@@ -2,14 +2,35 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <fstream>
 #include <thread>
+#include <vector>
 
 #include "files/text_file.h"
 #include "site/archive_file.h"
 #include "site/site_files.h"
 #include "site/site_test_world.h"
+
+namespace {
+
+// Of what is written next the first byte is another one on the disk.
+std::atomic<bool> disk_lies = false;
+
+}  // namespace
+
+// In place of the C library's, in this program.
+extern "C" ssize_t pwrite(int fd, const void* data, size_t size, off_t offset) {
+  const auto* const first = static_cast<const uint8_t*>(data);
+  std::vector<uint8_t> bytes(first, first + size);
+  if (size > 0 && disk_lies.exchange(false)) {
+    bytes[0] ^= 1;
+  }
+  return syscall(SYS_pwrite64, fd, bytes.data(), size, offset);
+}
 
 namespace pangea::site {
 namespace {
@@ -110,6 +131,14 @@ TEST_P(BackupTest, LeavesNothingOnAFullDisk) {
   EXPECT_THAT(OnFullDisk(300'000, [&] { Restore(copy, folder / "again"); }),
               HasSubstr("cannot be written"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
+TEST_P(BackupTest, SeesThatTheDiskKeptSomethingElse) {
+  disk_lies = true;
+  EXPECT_NE(WhyNot([&] { BackUp(site, copy, false); }), "");
+  EXPECT_FALSE(disk_lies) << "nothing was written";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+  BackUp(site, copy, false);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, BackupTest, testing::Values("copy.tar.zst", "copy"),
