@@ -1,6 +1,7 @@
 // A server process that restores a checkpoint and reads the rest of the journal says what one says
 // that reads all of it, byte for byte, then and of what comes later.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,6 +15,8 @@
 #include <vector>
 
 #include "bus/retransmission/journal_reader.h"
+#include "bus/status_log.h"
+#include "checkpoint/checkpoint_file.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
@@ -207,6 +210,23 @@ TEST_P(RestartCheckpoint, OneOfAnotherJournalOrOtherOptionsIsNotUsed) {
   EXPECT_EQ(Difference(Said(Journal(count), count, restored_), full), "");
   std::ofstream(checkpoint_) << "no checkpoint";
   EXPECT_EQ(Difference(Said(Journal(count), count, restored_), full), "");
+}
+
+TEST_P(RestartCheckpoint, OneOfAnotherProcessOrVersionIsNotUsed) {
+  const size_t count = events_.size() / 8;
+  const std::string journal = Journal(count);
+  WriteCheckpoint(journal);
+  const CheckpointKey own = CheckpointReader(checkpoint_).head().key;
+  EXPECT_EQ(own.process, GetParam().name);
+  const auto why_not = [&](const std::string& process, uint32_t format) {
+    CheckpointWriter(checkpoint_, {process, format, ""}, ReadJournalState(journal, {})).Commit();
+    testing::internal::CaptureStderr();
+    StartLog("test", "");
+    Said(journal, count, restored_);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(why_not("another", own.format), testing::HasSubstr("it is one of another"));
+  EXPECT_THAT(why_not(own.process, own.format + 1), testing::HasSubstr("it is of another version"));
 }
 
 // What came after the checkpoint is read as if all had been read. The pose graph begins with the
