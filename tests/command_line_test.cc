@@ -166,5 +166,24 @@ TEST(Eval, StretchesHaveALength) {
   }
 }
 
+TEST(Eval, TheEstimateComesFirst) {
+  const Outcome outcome = RunCommand("pangea-eval ate " PANGEA_SOURCE_DIR "/logs a.tum");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("is a folder: give ESTIMATE first, then REFERENCE"));
+}
+
+// Nobody answers on this link.
+TEST(Uplink, SaysWhatIsLostWithoutASpool) {
+  const Outcome outcome = RunCommand(
+      "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "
+      "&& "
+      "timeout -s INT 10 pangea-uplink --agent 1 --key lost/key --bus 'udpm://239.255.76.67:20013' "
+      "--link 'udpm://239.255.76.68:20014' & sleep 2 && "
+      "pangea-keyframe-player --agent 1 --bus 'udpm://239.255.76.67:20013' "
+      "--keyframes " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --rate 20; wait)");
+  EXPECT_THAT(outcome.output,
+              HasSubstr("32 keyframes were not acknowledged and are lost: --spool FOLDER"));
+}
+
 }  // namespace
 }  // namespace pangea::tests

@@ -101,6 +101,10 @@ std::vector<EvaluationInput> EvalCommandLine::ReadInputs() const {
   }
   std::vector<EvaluationInput> inputs;
   for (size_t i = 0; i < files_.size(); i += 2) {
+    if (std::filesystem::is_directory(files_[i])) {
+      throw std::runtime_error(
+          fmt::format("{}: is a folder: give ESTIMATE first, then REFERENCE", files_[i]));
+    }
     std::vector<std::string> warnings;
     inputs.push_back({std::filesystem::path(files_[i]).filename().string(),
                       ReadTrajectory(files_[i], &warnings), ReadReference(files_[i + 1])});

@@ -54,8 +54,15 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
   StartLog("pangea-uplink",
            fmt::format("agent {}, bus {}, link {}, key {}, {}, {}", a.agent_id, a.bus, a.link,
                        a.key, a.spool.empty() ? "no spool" : "spool " + a.spool, options_source));
-  OptionsAnnouncer announcer(agent_bus, fmt::format("uplink_{}", a.agent_id), told_options);
-  return RunPolledProcess(agent_bus, link_bus, process, announcer);
+  const std::string name = fmt::format("uplink_{}", a.agent_id);
+  OptionsAnnouncer announcer(agent_bus, name, told_options);
+  const int exit_code = RunPolledProcess(agent_bus, link_bus, process, announcer);
+  if (!spool && process.num_waiting() > 0) {
+    Log(name, fmt::format("ended; {} keyframes were not acknowledged and are lost: --spool FOLDER "
+                          "keeps them for the next start",
+                          process.num_waiting()));
+  }
+  return exit_code;
 }
 
 }  // namespace

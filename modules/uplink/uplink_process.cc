@@ -317,7 +317,7 @@ void UplinkProcess::Tick(int64_t now_utime) {
   }
   next_status_utime_ = now_utime + kStatusInterval_us;
   const Sender& sender = uplink_.sender();
-  const auto spooled = static_cast<int64_t>(sender.spooled());
+  const int64_t spooled = num_waiting();
   const auto edits_waiting = static_cast<int64_t>(anchors_.edits_waiting());
   node_.Set("keyframes_acked", uplink_.keyframes_acked());
   node_.Set("keyframes_lost", uplink_.keyframes_lost());

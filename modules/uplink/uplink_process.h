@@ -27,6 +27,8 @@ class UplinkProcess : public PolledProcess {
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
+  // Keyframes that the server has yet to acknowledge.
+  int64_t num_waiting() const { return static_cast<int64_t>(uplink_.sender().spooled()); }
 
  private:
   void OnKeyframe(Bytes data);
