@@ -70,7 +70,7 @@ TEST_F(AgentKeyTest, MistakesGetAnAnswerWithoutTheSecret) {
        {std::pair{"agent: 4\n", "key:"}, std::pair{"agent: 4\nkey: 12345\n", "hexadecimal"},
         std::pair{"agent: 0\n", "1 .. 65535"}, std::pair{"agent: 4x\n", "1 .. 65535"},
         std::pair{"agents: 4\n", "agent:"}}) {
-    EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", text)); }),
+    EXPECT_THAT(ReasonOf([&, text = text] { ReadKeyFile(Write("bad.key", text)); }),
                 testing::AllOf(HasSubstr("bad.key"), HasSubstr(said)));
   }
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("long.key", std::string(5000, '#'))); }),

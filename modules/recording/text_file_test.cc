@@ -54,7 +54,7 @@ TEST_F(TextFileTest, WhatIsNoFileIsNamedWithTheCause) {
         {Path("fifo"), "it is a FIFO; only regular files are read"},
         {folder_, "it is a folder; only regular files are read"},
         {std::string("/dev/zero"), "it is a device; only regular files are read"}}) {
-    EXPECT_EQ(Complaint([&] { OpenFile(path); }), path + ": cannot be opened: " + why);
+    EXPECT_EQ(Complaint([path = path] { OpenFile(path); }), path + ": cannot be opened: " + why);
   }
   EXPECT_FALSE(Exists(Path("loop")));
 }
