@@ -10,6 +10,7 @@
 #include <random>
 
 #include "core/matching.h"
+#include "vio/front_end/blob_descriptor.h"
 #include "vio/front_end/test_images.h"
 
 namespace pangea::vio {
@@ -32,7 +33,7 @@ cv::Mat ImageOfOneBlob(double x, double y, double sigma_px) {
 TEST(Blobs, AreWhereTheyAre) {
   for (const double sigma_px : {3.0, 6.0, 12.0}) {
     const double x = 300.3, y = 200.6;
-    const auto blobs = BlobDescriber().Describe(ImageOfOneBlob(x, y, sigma_px), 1, kCell_px);
+    const auto blobs = DescribeBlobs(ImageOfOneBlob(x, y, sigma_px), 1, kCell_px);
     ASSERT_EQ(blobs.size(), 1u);
     EXPECT_NEAR(blobs[0].pixel.x(), x, 0.15) << sigma_px;
     EXPECT_NEAR(blobs[0].pixel.y(), y, 0.15) << sigma_px;
@@ -43,22 +44,21 @@ TEST(Blobs, AreWhereTheyAre) {
 // An octave of ours is a factor of 1.2.
 TEST(Blobs, OctavesGrowWithTheSize) {
   const auto octave = [](double sigma_px) {
-    return BlobDescriber().Describe(ImageOfOneBlob(300, 200, sigma_px), 1, kCell_px)[0].octave;
+    return DescribeBlobs(ImageOfOneBlob(300, 200, sigma_px), 1, kCell_px)[0].octave;
   };
   EXPECT_NEAR(octave(20) - octave(10), std::log(2) / std::log(kOctaveScale), 1);
 }
 
 TEST(Blobs, AreSpreadOverTheImageAndNoMoreThanWanted) {
-  const auto blobs = BlobDescriber().Describe(RandomTexture(752, 480, 2), kWanted, kCell_px);
+  const auto blobs = DescribeBlobs(RandomTexture(752, 480, 2), kWanted, kCell_px);
   EXPECT_LE(blobs.size(), static_cast<size_t>(kWanted));
   std::array<int, 4> part{};
   for (const Corner& blob : blobs) {
     ++part[(blob.pixel.x() > 376 ? 1 : 0) + (blob.pixel.y() > 240 ? 2 : 0)];
   }
   EXPECT_GT(*std::ranges::min_element(part), kWanted / 8);
-  EXPECT_TRUE(BlobDescriber().Describe(RandomTexture(752, 480, 2), 0, kCell_px).empty());
-  EXPECT_TRUE(
-      BlobDescriber().Describe(cv::Mat(480, 752, CV_8U, cv::Scalar(80)), 9, kCell_px).empty());
+  EXPECT_TRUE(DescribeBlobs(RandomTexture(752, 480, 2), 0, kCell_px).empty());
+  EXPECT_TRUE(DescribeBlobs(cv::Mat(480, 752, CV_8U, cv::Scalar(80)), 9, kCell_px).empty());
 }
 
 // What corners do not survive: twice as far, and rolled.
@@ -67,8 +67,8 @@ TEST(Blobs, AreFoundAgainFromTwiceAsFar) {
   cv::Mat far(480, 752, CV_8U, cv::Scalar(128));
   const cv::Matx23d far_from_near(0.45, -0.2, 200, 0.2, 0.45, 60);
   cv::warpAffine(near, far, far_from_near, far.size(), cv::INTER_AREA, cv::BORDER_TRANSPARENT);
-  const auto blobs_near = BlobDescriber().Describe(near, kWanted, kCell_px);
-  const auto blobs_far = BlobDescriber().Describe(far, kWanted, kCell_px);
+  const auto blobs_near = DescribeBlobs(near, kWanted, kCell_px);
+  const auto blobs_far = DescribeBlobs(far, kWanted, kCell_px);
   int right = 0, wrong = 0;
   for (const CornerMatch& match : MatchCorners(blobs_near, blobs_far, {})) {
     const Eigen::Vector2f& a = blobs_near[match.a].pixel;

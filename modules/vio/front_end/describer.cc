@@ -8,6 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "vio/front_end/blobs.h"
+#include "vio/front_end/spread.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -28,32 +31,6 @@ std::array<int, kPatchRadius + 1> DiscHalfWidths() {
     widths[v] = static_cast<int>(std::lround(std::sqrt(kPatchRadius * kPatchRadius - v * v)));
   }
   return widths;
-}
-
-// Keeps the strongest corner of each cell first, then the second of each, and so on: an even
-// spread without losing the strong ones.
-template <typename T>
-std::vector<T> SpreadOver(const std::vector<T>& corners, int cell_px, int columns, size_t wanted) {
-  std::vector<T> sorted = corners;
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const T& a, const T& b) { return a.response > b.response; });
-  std::vector<std::pair<int, size_t>> ranked;
-  std::vector<int> count(1, 0);
-  for (size_t i = 0; i < sorted.size(); ++i) {
-    const size_t cell = static_cast<size_t>(sorted[i].level_pixel.y) / cell_px * columns +
-                        static_cast<size_t>(sorted[i].level_pixel.x) / cell_px;
-    if (cell >= count.size()) {
-      count.resize(cell + 1, 0);
-    }
-    ranked.emplace_back(count[cell]++, i);
-  }
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<T> kept;
-  for (size_t i = 0; i < std::min(wanted, ranked.size()); ++i) {
-    kept.push_back(sorted[ranked[i].second]);
-  }
-  return kept;
 }
 
 // Whoever takes only the first of them gets some of each.
@@ -148,7 +125,8 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
     return std::pair(a.level_pixel.y, a.level_pixel.x) <
            std::pair(b.level_pixel.y, b.level_pixel.x);
   });
-  return SpreadOver(candidates, cell_px, columns, static_cast<size_t>(wanted));
+  return SpreadOver(std::move(candidates), &Candidate::level_pixel, cell_px, level.cols,
+                    static_cast<size_t>(wanted));
 }
 
 float Describer::StrongestNear(const std::vector<cv::KeyPoint>& corners,
@@ -305,7 +283,7 @@ std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame
   const auto num_landmarks = static_cast<std::ptrdiff_t>(candidates.size());
   const int left = options_.max_corners - static_cast<int>(num_landmarks);
   const std::vector<Corner> blobs =
-      blobs_.Describe(image, std::min(options_.max_blobs, left), options_.cell_px);
+      DescribeBlobs(image, std::min(options_.max_blobs, left), options_.cell_px);
   const size_t num_others = static_cast<size_t>(left) - blobs.size();
   const std::vector<Candidate> others = FindCorners(static_cast<int>(num_others));
   candidates.insert(

@@ -16,7 +16,6 @@
 
 #include "core/camera_model.h"
 #include "core/keyframe.h"
-#include "vio/front_end/blobs.h"
 #include "vio/front_end/tracks.h"
 
 namespace pangea::vio {
@@ -80,7 +79,6 @@ class Describer {
   std::vector<cv::Mat> pyramid_;
   std::vector<std::vector<cv::KeyPoint>> strong_;  // corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;
-  BlobDescriber blobs_;
 };
 
 }  // namespace pangea::vio
