@@ -5,6 +5,8 @@ find_package(OpenSSL 3.0 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(Ceres 2.1 REQUIRED)
 find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d video calib3d)
+find_package(JPEG REQUIRED)
+find_package(PNG REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
@@ -31,4 +33,9 @@ endforeach()
 # OpenCV's config sets plain include directories; as a SYSTEM target its headers stay quiet.
 add_library(pangea_opencv INTERFACE IMPORTED)
 target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
-target_link_libraries(pangea_opencv INTERFACE ${OpenCV_LIBS})
+target_link_libraries(pangea_opencv INTERFACE
+  opencv_core opencv_imgproc opencv_features2d opencv_video opencv_calib3d)
+
+# What writes images or reads them in any format: it loads GDAL and much else.
+add_library(pangea_image_files INTERFACE IMPORTED)
+target_link_libraries(pangea_image_files INTERFACE pangea_opencv opencv_imgcodecs)

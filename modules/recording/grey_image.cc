@@ -6,12 +6,12 @@
 #include <array>
 #include <climits>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
 
 #include "files/text_file.h"
+#include "recording/image_decoders.h"
 
 namespace pangea {
 namespace {
@@ -83,18 +83,6 @@ size_t MaxBytes(cv::Size size) { return 8 * static_cast<size_t>(size.area()) + (
 
 std::string Text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
 
-// The turn that a camera wrote into a JPEG is left out: the calibration is of the rows as they were
-// read out.
-cv::Mat Decode(std::span<const uint8_t> bytes) {
-  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
-                        const_cast<uint8_t*>(bytes.data()));  // NOLINT: imdecode only reads
-  try {
-    return cv::imdecode(encoded, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const std::exception&) {  // cv::Exception, bad_alloc
-    return {};
-  }
-}
-
 }  // namespace
 
 ImageHeader ReadImageHeader(std::span<const uint8_t> bytes) {
@@ -130,8 +118,8 @@ GreyImage DecodeGrey(std::span<const uint8_t> bytes, cv::Size expected) {
   if (bytes.size() > MaxBytes(expected)) {
     return {{}, fmt::format("too many bytes for {} pixels", Text(expected)), size};
   }
-  cv::Mat pixels = Decode(bytes);
-  if (pixels.size() != expected || pixels.type() != CV_8U) {
+  const cv::Mat pixels = format == "PNG" ? DecodePng(bytes, size) : DecodeJpeg(bytes, size);
+  if (pixels.empty()) {
     return {{}, fmt::format("corrupt image: the {} cannot be decoded", format), size};
   }
   return {pixels, "", size};

@@ -2,7 +2,7 @@
 
 // Images that come from outside, PNG or JPEG, as 8-bit grey. Nothing in one is trusted: the size
 // that its header says is compared with the calibration's before a pixel is decoded, so that what
-// an image may cost is known, and whatever a decoder throws is a reason like any other.
+// an image may cost is known, and whatever a decoder finds wrong is a reason like any other.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

@@ -49,6 +49,25 @@ TEST(GreyImage, DecodesPngAndJpeg) {
   }
 }
 
+// Colour, alpha and 16 bits become grey as cv::imread has it.
+TEST(GreyImage, PixelsAreThoseOfOpenCv) {
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3}) {
+    for (const char* extension : {".png", ".jpg"}) {
+      if (CV_MAT_DEPTH(type) == CV_16U && extension == std::string_view(".jpg")) {
+        continue;
+      }
+      cv::Mat image(kSize, type);
+      cv::randu(image, 0, CV_MAT_DEPTH(type) == CV_16U ? 65536 : 256);
+      std::vector<uint8_t> bytes;
+      cv::imencode(extension, image, bytes);
+      const cv::Mat expected = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+      const GreyImage grey = DecodeGrey(bytes, kSize);
+      ASSERT_EQ(grey.pixels.size(), kSize) << grey.why;
+      EXPECT_EQ(cv::norm(grey.pixels, expected, cv::NORM_INF), 0) << extension << " " << type;
+    }
+  }
+}
+
 TEST(GreyImage, TheSizeIsReadBeforeAPixelIsDecoded) {
   EXPECT_EQ(Why(PngThatClaims(60000, 60000)), "60000x60000 pixels instead of 32x24");
   EXPECT_EQ(Why(PngThatClaims(0, 24)), "corrupt image: a PNG without its size");
