@@ -1,6 +1,9 @@
 #include "vio/command_line.h"
 
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <CLI/CLI.hpp>
 #include <iostream>
@@ -118,6 +121,16 @@ void Check(const Arguments& a) {
   }
 }
 
+// The images of a frame and of a keyframe's scale space are given back and asked for again each
+// time; by default the C library returns them to the system, which clears every page: a tenth of
+// the odometry's time.
+void KeepFreedMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 16 << 20);  // bytes
+  mallopt(M_TRIM_THRESHOLD, 32 << 20);
+#endif
+}
+
 }  // namespace
 
 int RunCommandLine(int argc, char** argv) {
@@ -144,6 +157,7 @@ int RunCommandLine(int argc, char** argv) {
     arguments.process.told_options = yaml.PrintWithoutHelp();
     // The agent shares its machine with the other processes, and one thread gives the same bytes.
     cv::setNumThreads(1);
+    KeepFreedMemory();
     return Run(arguments, file_options.live_imu, options.Source());
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-vio: {}\n", error.what());
