@@ -32,14 +32,17 @@ void KnownConstraints::Add(const Constraint& constraint) {
 
 bool KnownConstraints::IsRedundant(const KeyframeId& a, const KeyframeId& b,
                                    const SubmapStore& store) const {
-  if (a.map != b.map) {
-    const auto between = by_maps_.find(std::minmax(a.map, b.map));
-    if (between == by_maps_.end() ||
-        between->second.size() < static_cast<size_t>(options_.min_between_maps)) {
-      return false;
-    }
+  const Nearby nearby = NearbyOf(a, b, store);
+  if (nearby.gain_bits >= options_.min_gain_bits) {
+    return false;
   }
-  return GainBits(a, b, store) < options_.min_gain_bits;
+  return a.map == b.map ? nearby.count >= options_.min_nearby
+                        : NumBetween(a.map, b.map) >= options_.min_between_maps;
+}
+
+int KnownConstraints::NumBetween(const MapId& a, const MapId& b) const {
+  const auto found = by_maps_.find(std::minmax(a, b));
+  return found == by_maps_.end() ? 0 : static_cast<int>(found->second.size());
 }
 
 void KnownConstraints::Save(ByteWriter* writer) const {
@@ -73,8 +76,8 @@ void KnownConstraints::Restore(ByteReader* reader) {
   }
 }
 
-double KnownConstraints::GainBits(const KeyframeId& one, const KeyframeId& other,
-                                  const SubmapStore& store) const {
+KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& one, const KeyframeId& other,
+                                                    const SubmapStore& store) const {
   const auto [a, b] = std::minmax(one, other);
   const auto found = by_maps_.find({a.map, b.map});
   std::vector<double> sigmas;
@@ -96,10 +99,11 @@ double KnownConstraints::GainBits(const KeyframeId& one, const KeyframeId& other
     }
   }
   if (sigmas.empty()) {
-    return std::numeric_limits<double>::infinity();
+    return {0, std::numeric_limits<double>::infinity()};
   }
+  const int count = static_cast<int>(sigmas.size());
   const double sigma = Median(std::move(sigmas));
-  return 0.5 * std::log2(1 + 1 / (sigma * sigma * known));
+  return {count, 0.5 * std::log2(1 + 1 / (sigma * sigma * known))};
 }
 
 }  // namespace pangea

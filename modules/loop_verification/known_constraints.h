@@ -9,7 +9,8 @@
 // independent, though they share odometry. A constraint of their median sigma would add
 // 0.5 * log2(1 + I_new / I_known) bits to each coordinate. Where that is little it is redundant.
 // The first constraints between two maps are never redundant: whether the maps are one rests on
-// them.
+// them. Nor are, within one map, the first within reach: a single one would move the map by
+// whatever it is wrong, and only others show it.
 
 #include <map>
 #include <utility>
@@ -24,6 +25,7 @@ namespace pangea {
 struct KnownConstraintOptions {
   double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
   double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
+  int min_nearby = 10;        // chosen, not measured
   int min_between_maps = 10;  // chosen, not measured; a fusion takes 3 viewpoints, 6 at one spot
 
   template <typename Archive>
@@ -33,6 +35,8 @@ struct KnownConstraintOptions {
                 "0: all are verified");
     archive.Add("drift_per_m", &drift_per_m, {0, 1}, "",
                 "sigma of the odometry, of its path, between keyframes verified and this one");
+    archive.Add("min_nearby", &min_nearby, {0, 1000000}, "",
+                "constraints of one map within reach before another is redundant");
     archive.Add("min_between_maps", &min_between_maps, {0, 1000000}, "",
                 "constraints between two maps before any is redundant");
   }
@@ -49,12 +53,19 @@ class KnownConstraints {
   void Add(const Constraint& constraint);
   void Save(ByteWriter* writer) const;
   void Restore(ByteReader* reader);
-  // What a constraint between the two would add to each coordinate, bits; infinite where nothing
-  // is known. Odometry is `store`'s.
-  double GainBits(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
+  struct Nearby {
+    int count = 0;
+    // What a constraint between the two would add to each coordinate; infinite where nothing is
+    // known.
+    double gain_bits = 0;
+  };
+  // Odometry is `store`'s.
+  Nearby NearbyOf(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
   bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
 
  private:
+  int NumBetween(const MapId& a, const MapId& b) const;
+
   struct Known {
     int32_t seq_a = 0, seq_b = 0;
     double sigma_m = 0;  // of the position, its worst direction

@@ -43,7 +43,7 @@ class KnownConstraintsTest : public testing::Test {
   }
 
   double GainBits(const KeyframeId& a, const KeyframeId& b) const {
-    return known_.GainBits(a, b, store_);
+    return known_.NearbyOf(a, b, store_).gain_bits;
   }
 
   SubmapStore store_;
@@ -78,15 +78,24 @@ TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   EXPECT_FALSE(known_.IsRedundant({kA, 14}, {kB, 14}, store_));
 }
 
-// Whether two maps are one rests on them; within one map nothing does.
+// Whether two maps are one rests on them.
 TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
   KnownConstraints known({.min_between_maps = 2});
   known.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  known.Add(Accepted({kA, 10}, {kA, 50}, 0.02));
   EXPECT_FALSE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
-  EXPECT_TRUE(known.IsRedundant({kA, 10}, {kA, 51}, store_));
   known.Add(Accepted({kA, 10}, {kB, 12}, 0.02));
   EXPECT_TRUE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
+}
+
+// A single one moves the map by whatever it is wrong.
+TEST_F(KnownConstraintsTest, TheFirstAtOnePlaceOfAMapAreNeverRedundant) {
+  KnownConstraints known({.min_nearby = 3});
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(known.IsRedundant({kA, 10}, {kA, 50}, store_)) << i;
+    known.Add(Accepted({kA, 10}, {kA, 50}, 0.02));
+  }
+  EXPECT_TRUE(known.IsRedundant({kA, 11}, {kA, 51}, store_));
+  EXPECT_FALSE(known.IsRedundant({kA, 45}, {kA, 51}, store_)) << "none within reach";
 }
 
 TEST_F(KnownConstraintsTest, AMapThatNoOdometryCrossesIsNotKnown) {
