@@ -112,7 +112,7 @@ class RestartCheckpoint : public testing::TestWithParam<Named> {
 
   // The first so many events as a journal.
   std::string Journal(size_t count) const {
-    const std::string path = folder_ / "journal.lcm";
+    std::string path = folder_ / "journal.lcm";
     LogFileWriter writer(path);
     for (size_t i = 0; i < count; ++i) {
       if (IsJournalled(events_[i].channel)) {

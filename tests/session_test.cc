@@ -42,7 +42,7 @@ class SessionTest : public ::testing::Test {
     const std::string pixel = "pixel: [418, 374]";
     demo.replace(demo.find(pixel), pixel.size(), "pixel: [209, 187]");
     demo.replace(demo.find(",\n         anchor_error_m"), std::string::npos, "}\n");
-    const fs::path file = *folder_ / "demo.yaml";
+    fs::path file = *folder_ / "demo.yaml";
     std::ofstream(file) << demo;
     return file;
   }

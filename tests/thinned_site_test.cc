@@ -74,7 +74,7 @@ class ThinnedSite : public testing::Test {
 
   // The second walk as a visit that the journal does not have.
   fs::path WriteWalk(int visit) const {
-    const fs::path file = folder / fmt::format("visit_{}.lcm", visit);
+    fs::path file = folder / fmt::format("visit_{}.lcm", visit);
     LogFileWriter log(file.string());
     for (keyframe_t keyframe : walk) {
       keyframe.id.map.opened_utime += visit;

@@ -51,11 +51,19 @@ bool CheckedScan::Read() {
   return true;
 }
 
+// Repeated while it finds damage: the mended file no longer says which event that was, and whoever
+// reads it must come to the same.
+void CheckedScan::Verify(const Checksums& checksums) {
+  while (FindDamage(checksums)) {
+  }
+}
+
 // From the list backwards. Which of its events another is, its place says, and behind damage, which
 // may have taken any number of events, the event itself.
-void CheckedScan::Verify(const Checksums& checksums) {
+bool CheckedScan::FindDamage(const Checksums& checksums) {
   int64_t expected = checksums.event_number() - 1;
   bool in_place = true;
+  bool found = false;
   for (auto it = std::next(waiting_.rbegin());
        it != waiting_.rend() && expected >= checksums.first_event; ++it) {
     Piece& piece = it->piece;
@@ -70,13 +78,12 @@ void CheckedScan::Verify(const Checksums& checksums) {
     const auto index = static_cast<size_t>(number - checksums.first_event);
     if (piece.crc32() != checksums.crc32[index]) {
       piece.kind = LogPiece::Kind::kDamage;
-      if (!in_place) {
-        continue;  // its number may be what is damaged
-      }
+      found = true;
     }
     expected = number - 1;
     in_place = true;
   }
+  return found;
 }
 
 }  // namespace pangea

@@ -44,6 +44,8 @@ class CheckedScan {
   };
   bool Read();
   void Verify(const Checksums& checksums);
+  // Whether there was any that was not known yet.
+  bool FindDamage(const Checksums& checksums);
 
   LogScan scan_;
   std::deque<Waiting> waiting_;

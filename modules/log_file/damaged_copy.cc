@@ -49,7 +49,7 @@ std::string DamagedName(const std::string& file) {
 }
 
 std::string KeepDamaged(const std::string& file, int fd, const std::vector<FileRange>& parts) {
-  const std::string name = DamagedName(file);
+  std::string name = DamagedName(file);
   const int to = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   const bool copied = to >= 0 && Copy(fd, parts, to) && fsync(to) == 0 &&
                       SyncFolder(std::filesystem::absolute(name).parent_path());

@@ -91,7 +91,7 @@ class LogAnchorsTest : public testing::Test {
     Write(log, "ANCHOR", old);
   }
   std::string Session() {
-    const std::string path = Path("session.lcm");
+    std::string path = Path("session.lcm");
     LogFileWriter log(path);
     ReadLog(kSample, [&](const LogEvent& event) {
       log.Write(utime_ = event.utime, event.channel, event.data);
@@ -101,7 +101,7 @@ class LogAnchorsTest : public testing::Test {
     return path;
   }
   std::string Journal() {
-    const std::string path = Path("journal.lcm");
+    std::string path = Path("journal.lcm");
     LogFileWriter log(path);
     WriteEdits(log);
     return path;

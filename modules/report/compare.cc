@@ -18,7 +18,7 @@ constexpr char kReport[] = "report.json";
 constexpr char kTiming[] = "timing.json";
 
 fs::path ReportOf(const fs::path& run) {
-  const fs::path file = fs::is_directory(run) ? run / kReport : run;
+  fs::path file = fs::is_directory(run) ? run / kReport : run;
   if (!fs::is_regular_file(file)) {
     throw std::runtime_error(
         fmt::format("{}: no report here; give a folder of run, replay or report", file.string()));

@@ -154,7 +154,7 @@ class ArchiveTest : public testing::Test {
 
   // Refused, and nothing is left of it.
   std::string Refused() const {
-    const std::string why = WhyNot([&] { Restore(file, folder / "again"); });
+    std::string why = WhyNot([&] { Restore(file, folder / "again"); });
     for (const auto& entry : fs::directory_iterator(folder)) {
       EXPECT_FALSE(entry.path().filename().string().starts_with("again")) << entry.path();
     }

@@ -102,7 +102,7 @@ StoredEvent EventOf(const AnchorEdit& edit) {
 }  // namespace
 
 fs::path FreshFolder(const std::string& name) {
-  const fs::path folder =
+  fs::path folder =
       fs::path(testing::TempDir()) / ("pangea_site_" + name + "_" + std::to_string(getpid()));
   fs::remove_all(folder);
   fs::create_directories(folder);
@@ -165,7 +165,7 @@ StoredEvent OptionsEvent(const std::string& process, const std::string& yaml) {
 }
 
 Site MakeSite(const fs::path& folder, const std::vector<StoredEvent>& events) {
-  const Site site = CreateSite(folder, NewDescription(folder.filename()));
+  Site site = CreateSite(folder, NewDescription(folder.filename()));
   JournalWriter writer(site.journal());
   int since_sync = 0;
   for (const StoredEvent& event : events) {

@@ -29,7 +29,7 @@ const MapId kMap{2, 77};
 
 // 3 s of images at 20 Hz, 64 x 48 pixels.
 fs::path Recording() {
-  const fs::path folder = fs::path(testing::TempDir()) / "anchor_app_recording";
+  fs::path folder = fs::path(testing::TempDir()) / "anchor_app_recording";
   const fs::path mav0 = folder / "mav0";
   fs::remove_all(folder);
   fs::create_directories(mav0 / "cam0/data");
