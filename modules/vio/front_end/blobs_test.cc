@@ -11,6 +11,7 @@
 
 #include "core/matching.h"
 #include "vio/front_end/blob_descriptor.h"
+#include "vio/front_end/spread.h"
 #include "vio/front_end/test_images.h"
 
 namespace pangea::vio {
@@ -49,6 +50,15 @@ TEST(Blobs, OctavesGrowWithTheSize) {
   EXPECT_NEAR(octave(20) - octave(10), std::log(2) / std::log(kOctaveScale), 1);
 }
 
+// It is anywhere along itself.
+TEST(Blobs, ALineIsNone) {
+  cv::Mat image(480, 640, CV_8U);
+  for (int u = 0; u < image.cols; ++u) {
+    image.col(u).setTo(60 + 120 * std::exp(-0.02 * (u - 300) * (u - 300)));
+  }
+  EXPECT_TRUE(DescribeBlobs(image, kWanted, kCell_px).empty());
+}
+
 TEST(Blobs, AreSpreadOverTheImageAndNoMoreThanWanted) {
   const auto blobs = DescribeBlobs(RandomTexture(752, 480, 2), kWanted, kCell_px);
   EXPECT_LE(blobs.size(), static_cast<size_t>(kWanted));
@@ -59,6 +69,19 @@ TEST(Blobs, AreSpreadOverTheImageAndNoMoreThanWanted) {
   EXPECT_GT(*std::ranges::min_element(part), kWanted / 8);
   EXPECT_TRUE(DescribeBlobs(RandomTexture(752, 480, 2), 0, kCell_px).empty());
   EXPECT_TRUE(DescribeBlobs(cv::Mat(480, 752, CV_8U, cv::Scalar(80)), 9, kCell_px).empty());
+}
+
+TEST(SpreadOver, TakesTheStrongestOfEachCellFirst) {
+  struct Item {
+    cv::Point2f at;
+    float response;
+  };
+  const std::vector<Item> items = {{{1, 1}, 3}, {{50, 1}, 1}, {{2, 2}, 5}, {{3, 3}, 4}};
+  std::vector<float> responses;
+  for (const Item& item : SpreadOver(items, &Item::at, kCell_px, 80, 3)) {
+    responses.push_back(item.response);
+  }
+  EXPECT_EQ(responses, (std::vector<float>{5, 1, 4}));
 }
 
 // What corners do not survive: twice as far, and rolled.
