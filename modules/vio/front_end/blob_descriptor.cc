@@ -145,7 +145,8 @@ std::vector<float> DirectionsOf(const ScaleSpace& space, const Blob& blob) {
   std::array<float, kDirections> raw{}, smooth{};
   GradientPatch(space, blob, 0, kHalfSide)
       .ForEach(kWindow, [&](const WindowSample& sample, float gx, float gy) {
-        const int bin = static_cast<int>(DirectionBin(gx, gy, kDirections) + 0.5F) % kDirections;
+        const int bin =
+            static_cast<int>(std::lround(DirectionBin(gx, gy, kDirections))) % kDirections;
         raw[static_cast<size_t>(bin)] += sample.weight * std::sqrt(gx * gx + gy * gy);
       });
   const auto around = [](const auto& bins, int i) {
