@@ -31,5 +31,7 @@ wasm_package(CLI11::CLI11)
 wasm_package(fmt::fmt)
 target_compile_definitions(fmt::fmt INTERFACE FMT_HEADER_ONLY)
 wasm_package(lcm::lcm)
+wasm_package(JPEG::JPEG)  # named, not compiled: files of images are read by others
+wasm_package(PNG::PNG)
 wasm_package(Eigen3::Eigen)
 target_include_directories(Eigen3::Eigen SYSTEM INTERFACE /usr/include/eigen3)
