@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -87,6 +91,62 @@ TEST(GreyImage, OtherFormatsAreRefusedByName) {
   }
   EXPECT_EQ(Why(Bytes("no image")), "corrupt image: neither PNG nor JPEG");
   EXPECT_EQ(Why({}), "corrupt image: neither PNG nor JPEG");
+}
+
+void PutBigEndian(uint32_t value, std::vector<uint8_t>* bytes) {
+  for (const int shift : {24, 16, 8, 0}) {
+    bytes->push_back(static_cast<uint8_t>(value >> shift));
+  }
+}
+
+// RFC 2083, section 4.2.3: "t", no more text, deflated: `size` letters.
+std::vector<uint8_t> CompressedText(size_t size) {
+  const std::vector<uint8_t> letters(size, 'a');
+  std::vector<uint8_t> chunk = Bytes({"zTXtt\0\0", 7});
+  uLongf length = compressBound(size);
+  std::vector<uint8_t> deflated(length);
+  compress(deflated.data(), &length, letters.data(), size);
+  chunk.insert(chunk.end(), deflated.begin(), deflated.begin() + static_cast<long>(length));
+  std::vector<uint8_t> bytes;
+  PutBigEndian(static_cast<uint32_t>(chunk.size() - 4), &bytes);
+  bytes.insert(bytes.end(), chunk.begin(), chunk.end());
+  PutBigEndian(static_cast<uint32_t>(crc32(0, chunk.data(), static_cast<uInt>(chunk.size()))),
+               &bytes);
+  return bytes;
+}
+
+// 100 texts, together 600 kB in the file and 600 MB of memory.
+TEST(GreyImage, TextsOfAPngAreNotUnpacked) {
+  constexpr size_t kHeader = 33;
+  std::vector<uint8_t> bytes = Encoded(".png");
+  const std::vector<uint8_t> text = CompressedText(6'000'000);
+  for (int i = 0; i < 100; ++i) {
+    bytes.insert(bytes.begin() + kHeader, text.begin(), text.end());
+  }
+  const auto peak_kB = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const long before_kB = peak_kB();
+  EXPECT_EQ(DecodeGrey(bytes, kSize).why, "");
+  EXPECT_LT(peak_kB() - before_kB, 50'000);
+}
+
+// Each costs a pass over the whole image.
+TEST(GreyImage, AJpegOfManyScansIsRefused) {
+  std::vector<uint8_t> bytes;
+  cv::imencode(".jpg", cv::Mat(kSize, CV_8UC1, cv::Scalar(77)), bytes,
+               {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_EQ(DecodeGrey(bytes, kSize).why, "");
+  constexpr std::array<uint8_t, 2> kStartOfScan = {0xff, 0xda};
+  const auto last =
+      std::find_end(bytes.begin(), bytes.end(), kStartOfScan.begin(), kStartOfScan.end());
+  const std::vector<uint8_t> scan(last, bytes.end() - 2);
+  for (int i = 0; i < 1000; ++i) {
+    bytes.insert(bytes.end() - 2, scan.begin(), scan.end());
+  }
+  EXPECT_EQ(Why(bytes), "corrupt image: the JPEG cannot be decoded");
 }
 
 // Whatever the decoder makes of half an image, it ends here.

@@ -45,6 +45,9 @@ void AskForGrey(png_structp png, png_infop info) {
   png_read_update_info(png, info);
 }
 
+// A camera writes ten. Each costs a pass over the whole image, however short it is.
+constexpr int kMaxScans = 100;
+
 struct JpegErrors {
   jpeg_error_mgr base;
   std::jmp_buf leave;
@@ -57,6 +60,12 @@ struct JpegErrors {
 // What was cut off would be grey.
 void OnJpegMessage(j_common_ptr info, int level) {
   if (level < 0 && info->err->msg_code == JWRN_JPEG_EOF) {
+    OnJpegError(info);
+  }
+}
+
+void OnJpegProgress(j_common_ptr info) {
+  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > kMaxScans) {
     OnJpegError(info);
   }
 }
@@ -80,6 +89,8 @@ cv::Mat DecodePng(std::span<const uint8_t> bytes, cv::Size size) {
     png_destroy_read_struct(&png, &info, nullptr);
     return {};
   }
+  // Keeps none of the texts, each of which may unpack to 8 MB.
+  png_set_chunk_cache_max(png, 1);
   png_set_read_fn(png, &bytes, ReadPng);
   png_read_info(png, info);
   AskForGrey(png, info);
@@ -97,6 +108,8 @@ cv::Mat DecodeJpeg(std::span<const uint8_t> bytes, cv::Size size) {
   cv::Mat pixels(size, CV_8U);
   jpeg_decompress_struct jpeg{};
   JpegErrors errors{};
+  jpeg_progress_mgr progress{};
+  progress.progress_monitor = OnJpegProgress;
   jpeg.err = jpeg_std_error(&errors.base);
   errors.base.error_exit = OnJpegError;
   errors.base.emit_message = OnJpegMessage;
@@ -105,6 +118,7 @@ cv::Mat DecodeJpeg(std::span<const uint8_t> bytes, cv::Size size) {
     jpeg_destroy_decompress(&jpeg);
     return {};
   }
+  jpeg.progress = &progress;
   jpeg_mem_src(&jpeg, bytes.data(), bytes.size());
   jpeg_read_header(&jpeg, TRUE);
   jpeg.out_color_space = JCS_GRAYSCALE;

@@ -9,12 +9,13 @@
 namespace pangea::vio {
 namespace {
 
-// Lowe's values, but for the layers (he has three).
 constexpr int kLayers = 2;
+// Lowe's values.
 constexpr double kFirstSigma_px = 1.6;
 constexpr double kSigmaOfAnImage_px = 0.5;
-constexpr float kLeastContrast = 0.02F / kLayers;
 constexpr float kMaxRatioOfCurvatures = 10;
+// Less than his 0.03: white walls have little.
+constexpr float kLeastContrast = 0.01F;
 constexpr int kRim_px = 5;
 constexpr int kMinSide_px = 24;
 constexpr float kMaxOffset = 0.75F;  // pixels, layers

@@ -1,8 +1,9 @@
 #pragma once
 
 // Blobs of an image: extrema of differences of Gaussians over place and scale (Lowe, IJCV 2004,
-// sections 3 and 4). Written anew for a keyframe's budget: half of OpenCV's time, as the image is
-// not doubled, an octave has two layers, and kernels end at three sigmas.
+// sections 3 and 4), for a keyframe's budget: two layers an octave in place of three, kernels that
+// end at three sigmas, and no search for the pixel next to which the extremum lies
+// (docs/decisions/real_revisits.md).
 
 #include <opencv2/core.hpp>
 #include <vector>
