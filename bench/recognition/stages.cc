@@ -102,8 +102,8 @@ class Stages {
                                  : static_cast<LoopVerifier&>(inter_);
     LoopVerificationReport report;
     const Constraint constraint = verifier.Verify(query.id, *candidate, &report);
-    retrieved.pnp_inliers = report.pnp_inliers;
-    retrieved.landmarks = report.landmarks;
+    retrieved.pnp_inliers = static_cast<int>(report.Measured("min_pnp_inliers"));
+    retrieved.landmarks = static_cast<int>(report.Measured("min_inliers"));
     retrieved.accepted = constraint.accepted;
     if (retrieved.landmarks > 0) {
       const Vector6d error =

@@ -103,84 +103,40 @@ std::vector<std::string> NotesOf(const LoggedOptions& logged, const std::string&
 std::unique_ptr<LoopVerifier> VerifierOf(PlaceKind kind, const LoggedOptions& logged,
                                          Explanation* explanation) {
   if (kind == PlaceKind::kIntra) {
-    explanation->limits = logged.options.inter_map_ba.alignment;
     explanation->options_notes = NotesOf(logged, "inter_map_ba");
     return std::make_unique<InterMapBa>(logged.options.inter_map_ba);
   }
-  explanation->limits = logged.options.fusion.alignment;
   explanation->options_notes = NotesOf(logged, "fusion");
   return std::make_unique<Fusion>(logged.options.fusion);
 }
 
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
-// Up to where a candidate may be refused before the bundle adjustment.
-std::string FirstStepsText(const Explanation& e) {
-  const LoopVerificationReport& report = e.report;
-  const LoopVerificationOptions& limits = e.limits;
-  return fmt::format(
-      "candidate      {} corners matched, score {:.4f}\n"
-      "PnP            {}, {} landmarks (at least {})\n"
-      "visibility     {} points ought to be seen (at least {}), {:.0f} % found (at least {:.0f}), "
-      "in {:.0f} % of the view (at least {:.0f})\n",
-      e.candidate.corner_matches.size(), e.candidate.score, CountOf(report.first),
-      report.pnp_inliers, limits.min_pnp_inliers, report.comparable, limits.min_comparable,
-      100 * report.found_share, 100 * limits.min_found_share, 100 * report.first_supported_share,
-      100 * limits.min_first_supported_share);
-}
-
-// The gates that only some candidates come to.
-std::string LastGatesText(const LoopVerificationReport& report,
-                          const LoopVerificationOptions& limits) {
-  std::string text;
-  if (report.sigma_without_one_m > 0) {
-    text += fmt::format("               worst {:.3f} m without the landmark that says most\n",
-                        report.sigma_without_one_m);
-  }
-  if (report.sigma_of_sure_m > 0) {
-    text += fmt::format(
-        "               worst {:.3f} m by surely alike landmarks alone (at most {:.3f})\n",
-        report.sigma_of_sure_m, limits.max_sigma_m);
-  }
-  if (report.supported_share > 0) {
-    text += fmt::format("on the way     in {:.0f} % of the view (at least {:.0f})\n",
-                        100 * report.supported_share, 100 * limits.min_supported_share);
-  }
-  if (report.halves_chi2 > 0) {
-    text += fmt::format("halves         differ by {:.1f} (at most {:.1f})\n", report.halves_chi2,
-                        limits.max_halves_chi2);
-  }
-  return text;
-}
-
 std::string WindowBaText(const Explanation& e) {
-  const LoopVerificationReport& report = e.report;
-  const LoopVerificationOptions& limits = e.limits;
   const Constraint& c = e.again;
   const Vector6d sigma = c.covariance.diagonal().cwiseSqrt();
-  std::string text = fmt::format(
-      "window BA      {} in the two keyframes; {} observations, {:.0f} % of all (at least {:.0f})\n"
-      "               inliers miss by {} px at PnP's pose, {} px after (median)\n",
-      CountOf(report.found), c.num_inliers, 100 * c.inlier_ratio, 100 * limits.min_inlier_ratio,
-      MissOf(report.found, &ShownMatch::miss_before_px),
-      MissOf(report.found, &ShownMatch::miss_after_px));
-  text += fmt::format(
-      "tilt           {:.2f} degrees between the two gravities, chi-squared {:.1f} (at most "
-      "{:.1f})\n",
-      Degrees(report.tilt), report.tilt_chi2, limits.max_tilt_chi2);
-  text +=
-      fmt::format("landmarks      {} (at least {}) in {} cells of the image (at least {})\n",
-                  report.landmarks, limits.min_inliers, report.cells, limits.min_occupied_cells);
-  text += fmt::format(
-      "uncertainty    {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} degrees (worst at most {:.3f} "
-      "m, {:.2f} degrees)\n",
-      sigma[0], sigma[1], sigma[2], Degrees(sigma[3]), Degrees(sigma[4]), Degrees(sigma[5]),
-      limits.max_sigma_m, Degrees(limits.max_sigma_rad));
-  text += LastGatesText(report, limits);
-  text += fmt::format("pose           {:.3f} {:.3f} {:.3f} m, {:.1f} degrees from match to query\n",
-                      c.T_from_to.t.x(), c.T_from_to.t.y(), c.T_from_to.t.z(),
-                      Degrees(LogSo3(c.T_from_to.q).norm()));
-  return text;
+  return fmt::format(
+      "window BA    {} in the two keyframes; {} observations\n"
+      "             inliers miss by {} px at PnP's pose, {} px after (median)\n"
+      "uncertainty  {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} degrees\n"
+      "pose         {:.3f} {:.3f} {:.3f} m, {:.1f} degrees from match to query\n",
+      CountOf(e.report.found), c.num_inliers, MissOf(e.report.found, &ShownMatch::miss_before_px),
+      MissOf(e.report.found, &ShownMatch::miss_after_px), sigma[0], sigma[1], sigma[2],
+      Degrees(sigma[3]), Degrees(sigma[4]), Degrees(sigma[5]), c.T_from_to.t.x(), c.T_from_to.t.y(),
+      c.T_from_to.t.z(), Degrees(LogSo3(c.T_from_to.q).norm()));
+}
+
+// A step to a paragraph of lines, down to the one that refused.
+std::string MeasuredText(const LoopVerificationReport& report) {
+  std::string text;
+  std::string_view step;
+  for (const Measurement& m : report.measured) {
+    text += fmt::format("{:31}  {:25}  {:>8.4g}  at {} {:.4g}\n", m.step == step ? "" : m.step,
+                        m.option, m.value, m.at_least ? "least" : "most ", m.limit);
+    step = m.step;
+  }
+  return report.refused_by.empty() ? text
+                                   : text + fmt::format("refused by: {}\n", report.refused_by);
 }
 
 }  // namespace
@@ -245,8 +201,12 @@ std::string ToText(const Explanation& e) {
   for (const std::string& note : e.options_notes) {
     text += note + "\n";
   }
-  return text + FirstStepsText(e) +
-         (e.report.found.empty() ? "window BA      not reached\n" : WindowBaText(e));
+  text += fmt::format(
+      "candidate    {} corners matched, score {:.4f}\n"
+      "PnP          {}\n",
+      e.candidate.corner_matches.size(), e.candidate.score, CountOf(e.report.first));
+  text += e.report.found.empty() ? "window BA    not reached\n" : WindowBaText(e);
+  return text + "\n" + MeasuredText(e.report);
 }
 
 }  // namespace pangea::session

@@ -20,7 +20,6 @@ struct Explanation {
   Constraint again;  // made again from the same keyframes
   LoopVerificationReport report;
   Keyframe from, to;
-  LoopVerificationOptions limits;          // that it was made again with
   std::vector<std::string> options_notes;  // for people: where these are from
 };
 

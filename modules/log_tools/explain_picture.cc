@@ -115,12 +115,13 @@ cv::Mat MatchesRow(const std::vector<ShownMatch>& matches, const Pair& images) {
 std::string ResultOf(const Explanation& explanation) {
   const Constraint& result = explanation.again;
   const LoopVerificationReport& report = explanation.report;
-  std::string text = fmt::format("{}   ({:.0f} % found of {} points that ought to be seen",
-                                 result.accepted ? "ACCEPTED" : "REFUSED: " + result.reason,
-                                 100 * report.found_share, report.comparable);
-  if (report.landmarks > 0) {
-    text +=
-        fmt::format("; {} landmarks in {} of the image's 24 cells", report.landmarks, report.cells);
+  std::string text =
+      fmt::format("{}   ({:.0f} % found of {} points that ought to be seen",
+                  result.accepted ? "ACCEPTED" : "REFUSED: " + result.reason,
+                  100 * report.Measured("min_found_share"), report.Measured("min_comparable"));
+  if (const double landmarks = report.Measured("min_inliers"); landmarks > 0) {
+    text += fmt::format("; {} landmarks in {} of the image's 24 cells", landmarks,
+                        report.Measured("min_occupied_cells"));
   }
   return text + ")";
 }

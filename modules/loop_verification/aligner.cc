@@ -45,6 +45,7 @@ Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandid
   constraint.to = keyframes.c.back()->keyframe().id;
   constraint.kind = candidate.kind;
   for (const VerificationStep& step : kVerificationSteps) {
+    verification.step = step.name;
     constraint.reason = step.run(options_, &verification);
     if (!constraint.reason.empty()) {
       verification.report.refused_by = step.name;

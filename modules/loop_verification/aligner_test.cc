@@ -100,8 +100,8 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
       q_m * constraint.covariance.bottomRightCorner<3, 3>() * q_m.conjugate();
   const Eigen::Matrix2d information = of_rotation.topLeftCorner<2, 2>().inverse();
   const double chi2 = rotation.head<2>().dot(information * rotation.head<2>());
-  EXPECT_NEAR(report.tilt, rotation.norm(), 1e-4);
-  EXPECT_NEAR(report.tilt_chi2 / chi2, 1, 0.01);
+  EXPECT_NEAR(report.Measured("max_tilt"), rotation.norm(), 1e-4);
+  EXPECT_NEAR(report.Measured("max_tilt_chi2") / chi2, 1, 0.01);
   const Eigen::Vector2d across(-rotation.y(), rotation.x());
   EXPECT_GT(std::abs(across.dot(information * across) / chi2 - 1), 0.1) << "then axes would matter";
 }
@@ -119,11 +119,12 @@ TEST(AlignerTest, EachBarIsObeyed) {
     options.*bar = value;
     LoopVerificationReport report;
     const Constraint constraint = Align(c, 9, m, 10, candidate, options, &report);
-    return report.refused_by + ": " + constraint.reason;
+    return std::string(report.refused_by) + ": " + constraint.reason;
   };
   using Options = LoopVerificationOptions;
   EXPECT_EQ(refused(&Options::min_pnp_inliers, 10000), "PnP: too few matched points with a depth");
-  EXPECT_EQ(refused(&Options::min_pnp_inliers, accepted.pnp_inliers + 1),
+  EXPECT_EQ(refused(&Options::min_pnp_inliers,
+                    static_cast<int>(accepted.Measured("min_pnp_inliers")) + 1),
             "PnP: PnP found too few inliers");
   EXPECT_EQ(refused(&Options::max_view_angle, 0.05), "views: views do not overlap");
   EXPECT_EQ(refused(&Options::max_distance_m, 0.1), "views: views do not overlap");

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <map>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -19,39 +20,43 @@ double PositionSigma(const Matrix6d& covariance) {
 // Where the rest of the view leaves a direction open, one near point decides it, right or wrong:
 // it was looked for where the guess had it, and whatever was found there fits. So of what is
 // known in the worst direction no landmark may say more than all others together.
-bool OneSaysMost(const JointBaResult& ba, LoopVerificationReport* report) {
-  const double sigma_m = PositionSigma(ba.covariance);
-  report->sigma_without_one_m = PositionSigma(ba.covariance_without_one);
-  return report->sigma_without_one_m * report->sigma_without_one_m > 2 * sigma_m * sigma_m;
+bool OneSaysMost(Verification* v) {
+  return !v->AtMost("sigma without one", PositionSigma(v->ba->covariance_without_one),
+                    std::numbers::sqrt2 * PositionSigma(v->ba->covariance));
 }
 
 // One wrong match can be found out; two or three together, all near, agree. They are looked for
 // where the guess has them, so they fit, but they look alike only vaguely: what is surely the
 // same must keep the promise without them.
-bool HangsOnVagueMatches(const JointBaResult& ba, double max_sigma_m,
-                         LoopVerificationReport* report) {
+bool HangsOnVagueMatches(Verification* v, double max_sigma_m) {
   constexpr double kNotFixed_m = 1e3;
-  report->sigma_of_sure_m =
-      ba.covariance_of_sure ? PositionSigma(*ba.covariance_of_sure) : kNotFixed_m;
-  return report->sigma_of_sure_m > max_sigma_m;
+  const auto& covariance = v->ba->covariance_of_sure;
+  return !v->AtMost("max_sigma_m of sure", covariance ? PositionSigma(*covariance) : kNotFixed_m,
+                    max_sigma_m);
 }
 
-// Of the landmarks, and of the cells that they occupy in one of the two keyframes.
-void CountInliers(Verification* v) {
+// Distinct ones, and the image cells that they occupy in one of the two keyframes.
+struct InlierCounts {
+  size_t landmarks = 0;
+  size_t cells = 0;
+};
+
+InlierCounts CountInliers(const Verification& v) {
   std::set<std::pair<Direction, int>> landmarks;
   std::map<Direction, std::set<int>> cells;
-  for (const PointMatch& match : v->InlierMatches()) {
+  for (const PointMatch& match : v.InlierMatches()) {
     landmarks.emplace(match.direction, match.landmark);
-    const Window& observer = v->windows.Observer(match.direction);
+    const Window& observer = v.windows.Observer(match.direction);
     if (match.observed.frame == observer.newest()) {
       cells[match.direction].insert(ImageCell(
           observer.newest_keyframe().camera, observer.corner(match.observed).pixel.cast<double>()));
     }
   }
-  v->report.landmarks = static_cast<int>(landmarks.size());
+  InlierCounts counts{landmarks.size(), 0};
   for (const auto& [direction, occupied] : cells) {
-    v->report.cells = std::max(v->report.cells, static_cast<int>(occupied.size()));
+    counts.cells = std::max(counts.cells, occupied.size());
   }
+  return counts;
 }
 
 }  // namespace
@@ -77,29 +82,35 @@ std::string Optimise(const InlierOptions& options, Verification* verification) {
 }
 
 std::string CheckInliers(const InlierOptions& options, Verification* verification) {
-  CountInliers(verification);
-  if (verification->report.landmarks < options.min_inliers) {
+  Verification& v = *verification;
+  const InlierCounts counts = CountInliers(v);
+  const bool enough =
+      v.AtLeast("min_inliers", static_cast<double>(counts.landmarks), options.min_inliers);
+  const bool most = v.AtLeast("min_inlier_ratio", v.inlier_ratio(), options.min_inlier_ratio);
+  const bool spread = v.AtLeast("min_occupied_cells", static_cast<double>(counts.cells),
+                                options.min_occupied_cells);
+  if (!enough) {
     return "too few inliers";
   }
-  if (verification->inlier_ratio() < options.min_inlier_ratio) {
+  if (!most) {
     return "too many outliers";
   }
-  return verification->report.cells < options.min_occupied_cells ? "inliers too close together"
-                                                                 : "";
+  return spread ? "" : "inliers too close together";
 }
 
 std::string CheckCertainty(const CertaintyOptions& options, Verification* verification) {
-  const JointBaResult& ba = *verification->ba;
-  if (PositionSigma(ba.covariance) > options.max_sigma_m ||
-      LargestSigma(ba.covariance.bottomRightCorner<3, 3>()) > options.max_sigma_rad) {
+  Verification& v = *verification;
+  const Matrix6d& covariance = v.ba->covariance;
+  const bool placed = v.AtMost("max_sigma_m", PositionSigma(covariance), options.max_sigma_m);
+  const bool rotated = v.AtMost("max_sigma_rad", LargestSigma(covariance.bottomRightCorner<3, 3>()),
+                                options.max_sigma_rad);
+  if (!placed || !rotated) {
     return "too uncertain";
   }
-  if (OneSaysMost(ba, &verification->report)) {
+  if (OneSaysMost(verification)) {
     return "hangs on one landmark";
   }
-  return HangsOnVagueMatches(ba, options.max_sigma_m, &verification->report)
-             ? "hangs on vague matches"
-             : "";
+  return HangsOnVagueMatches(verification, options.max_sigma_m) ? "hangs on vague matches" : "";
 }
 
 std::string CheckHalves(const HalvesOptions& options, Verification* verification) {
@@ -112,8 +123,10 @@ std::string CheckHalves(const HalvesOptions& options, Verification* verification
   }
   const Vector6d difference = left->T_Km_Kc.Minus(right->T_Km_Kc);
   const Matrix6d covariance = left->covariance + right->covariance;
-  v.report.halves_chi2 = difference.dot(covariance.ldlt().solve(difference));
-  return v.report.halves_chi2 > options.max_halves_chi2 ? "the halves of the view disagree" : "";
+  return v.AtMost("max_halves_chi2", difference.dot(covariance.ldlt().solve(difference)),
+                  options.max_halves_chi2)
+             ? ""
+             : "the halves of the view disagree";
 }
 
 }  // namespace pangea

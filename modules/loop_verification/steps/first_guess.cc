@@ -65,8 +65,10 @@ std::string GuessPose(const FirstGuessOptions& options, Verification* verificati
   for (const int i : v.pnp->inliers) {
     landmarks.emplace(v.first_matches[i].direction, v.first_matches[i].landmark);
   }
-  v.report.pnp_inliers = static_cast<int>(landmarks.size());
-  return v.report.pnp_inliers < options.min_pnp_inliers ? "PnP found too few inliers" : "";
+  return v.AtLeast("min_pnp_inliers", static_cast<double>(landmarks.size()),
+                   options.min_pnp_inliers)
+             ? ""
+             : "PnP found too few inliers";
 }
 
 }  // namespace pangea

@@ -23,12 +23,10 @@ std::string CheckGravity(const GravityOptions& options, Verification* verificati
   const Eigen::Matrix2d covariance =
       visual.topLeftCorner<2, 2>() +
       TiltVariance(verification->windows, options.gravity_floor) * Eigen::Matrix2d::Identity();
-  LoopVerificationReport& report = verification->report;
-  report.tilt = tilt.norm();
-  report.tilt_chi2 = tilt.dot(covariance.ldlt().solve(tilt));
-  return report.tilt > options.max_tilt || report.tilt_chi2 > options.max_tilt_chi2
-             ? "roll or pitch contradicts gravity"
-             : "";
+  const bool small = verification->AtMost("max_tilt", tilt.norm(), options.max_tilt);
+  const bool likely = verification->AtMost("max_tilt_chi2", tilt.dot(covariance.ldlt().solve(tilt)),
+                                           options.max_tilt_chi2);
+  return small && likely ? "" : "roll or pitch contradicts gravity";
 }
 
 }  // namespace pangea

@@ -4,7 +4,8 @@
 // first: a bad candidate dies in the first two.
 //
 // Each step reads and writes the Verification, and returns why it refuses, or an empty string. A
-// new one is a function with an options struct of its own, and its lines here.
+// new one is a function with an options struct of its own, and its lines here. What it measures by
+// AtLeast and AtMost, `pangea-log explain` shows.
 
 #include <string_view>
 

@@ -14,6 +14,12 @@ KeyframeWindow Last(const KeyframeWindow& frames, int count) {
 
 }  // namespace
 
+double LoopVerificationReport::Measured(std::string_view option) const {
+  const auto last = std::find_if(measured.rbegin(), measured.rend(),
+                                 [&](const Measurement& m) { return m.option == option; });
+  return last == measured.rend() ? 0 : last->value;
+}
+
 Verification::Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
                            const PlaceCandidate& candidate, const LoopVerificationGate& gate)
     : options(options),
@@ -23,6 +29,16 @@ Verification::Verification(const CommonStepOptions& options, const CandidateKeyf
       windows{MakeWindow(Last(keyframes.m, options.window.num_keyframes), options.window,
                          keyframes.after_m),
               MakeWindow(Last(keyframes.c, options.window.num_keyframes), options.window)} {}
+
+bool Verification::AtLeast(std::string_view option, double value, double limit) {
+  report.measured.push_back({step, option, value, true, limit});
+  return !(value < limit);
+}
+
+bool Verification::AtMost(std::string_view option, double value, double limit) {
+  report.measured.push_back({step, option, value, false, limit});
+  return !(value > limit);
+}
 
 std::vector<PointObservation> Verification::Observations(const std::vector<PointMatch>& of) const {
   std::vector<PointObservation> observations;

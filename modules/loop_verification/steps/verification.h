@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/server_messages.h"
@@ -32,24 +33,25 @@ struct CommonStepOptions {
   }
 };
 
+// A value that a step demands something of.
+struct Measurement {
+  std::string_view step;    // its name in the list
+  std::string_view option;  // the limit's name
+  double value = 0;
+  bool at_least = false;  // else at most
+  double limit = 0;
+};
+
 // What the steps saw, beside the verification result: for tests, for choosing the options, and for
 // people.
 struct LoopVerificationReport {
-  std::string refused_by;  // the step's name
-  int pnp_inliers = 0;
-  int comparable = 0;  // points that ought to be found in the two keyframes
-  double found_share = 0;
-  double first_supported_share = 0;
-  double supported_share = 0;  // 0 when it was not looked at
-  int landmarks = 0;           // distinct inliers of the BA
-  int cells = 0;               // image cells these occupy in one of the keyframes
-  double tilt = 0;             // radians
-  double tilt_chi2 = 0;
-  double sigma_without_one_m = 0;  // worst, were the landmark that says most not there
-  double sigma_of_sure_m = 0;      // worst, were there none but sure landmarks
-  double halves_chi2 = 0;          // 0 when it was not looked at
-  std::vector<ShownMatch> first;   // the candidate's and the nearest descriptors'; inliers of PnP
-  std::vector<ShownMatch> found;   // by projection, in the two keyframes; inliers of the BA
+  std::string_view refused_by;        // the step's name
+  std::vector<Measurement> measured;  // in the order of the steps
+  std::vector<ShownMatch> first;      // the candidate's and the nearest descriptors'; PnP's inliers
+  std::vector<ShownMatch> found;      // by projection, in the two keyframes; inliers of the BA
+
+  // The last that was measured for this limit; 0 where no step came to it.
+  double Measured(std::string_view option) const;
 };
 
 // A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
@@ -79,7 +81,12 @@ struct Verification {
   PoseEstimate pose;                // the guess, refined
   std::vector<PointMatch> matches;  // that the BA used
   std::optional<JointBaResult> ba;
+  std::string_view step;  // that looks at it now
   LoopVerificationReport report;
+
+  // Whether the value is as demanded; it goes into the report.
+  bool AtLeast(std::string_view option, double value, double limit);
+  bool AtMost(std::string_view option, double value, double limit);
 
   std::vector<PointObservation> Observations(const std::vector<PointMatch>& of) const;
   // Of the matches the BA used.

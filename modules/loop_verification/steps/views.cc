@@ -11,9 +11,9 @@ std::string CheckViews(const ViewOptions& options, Verification* verification) {
   const Eigen::Vector3d axis_m = m.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d axis_c = T_m_c.q * (c.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
   const double angle = std::acos(std::clamp(axis_m.dot(axis_c), -1.0, 1.0));
-  return angle > options.max_view_angle || T_m_c.t.norm() > options.max_distance_m
-             ? "views do not overlap"
-             : "";
+  const bool alike = verification->AtMost("max_view_angle", angle, options.max_view_angle);
+  const bool near = verification->AtMost("max_distance_m", T_m_c.t.norm(), options.max_distance_m);
+  return alike && near ? "" : "views do not overlap";
 }
 
 }  // namespace pangea

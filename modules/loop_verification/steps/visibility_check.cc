@@ -65,10 +65,11 @@ double VisibilityCount::supported_share() const {
 
 std::string CheckVisibility(const VisibilityOptions& options, Verification* verification) {
   Verification& v = *verification;
+  VisibilityCount count;
   // The second round looks again from the refined pose.
   for (int round = 0; round < 2; ++round) {
     std::vector<PointMatch> matches;
-    VisibilityCount count;
+    count = {};
     for (const Direction direction : kBothDirections) {
       const Window& observer = v.windows.Observer(direction);
       const SearchResult result =
@@ -76,25 +77,23 @@ std::string CheckVisibility(const VisibilityOptions& options, Verification* veri
       matches.insert(matches.end(), result.matches.begin(), result.matches.end());
       count.Add(observer.newest_keyframe().camera, result);
     }
-    if (static_cast<int>(matches.size()) < options.min_found) {
+    if (!v.AtLeast("min_found", static_cast<double>(matches.size()), options.min_found)) {
       return "too few points found by projection";
     }
     v.pose = RefinePose(v.Observations(matches), v.pose.T_m_c, v.guess_tilt_sigma);
-    v.report.comparable = count.comparable();
-    v.report.found_share = count.found_share();
-    v.report.first_supported_share = count.supported_share();
   }
-  if (v.report.comparable < options.min_comparable) {
+  const bool enough = v.AtLeast("min_comparable", count.comparable(), options.min_comparable);
+  const bool found = v.AtLeast("min_found_share", count.found_share(), options.min_found_share);
+  const bool supported = v.AtLeast("min_first_supported_share", count.supported_share(),
+                                   options.min_first_supported_share);
+  if (!enough) {
     return "too few points ought to be seen from both";
   }
-  return v.report.found_share < options.min_found_share ||
-                 v.report.first_supported_share < options.min_first_supported_share
-             ? kContradicted
-             : "";
+  return found && supported ? "" : kContradicted;
 }
 
 std::string CheckWiderVisibility(const VisibilityOptions& options, Verification* verification) {
-  const Verification& v = *verification;
+  Verification& v = *verification;
   const WindowPair wide{MakeWindow(v.keyframes.m, v.options.window, v.keyframes.after_m),
                         MakeWindow(v.keyframes.c, v.options.window)};
   const PoseEstimate pose{v.ba->T_m_c, v.pose.covariance};
@@ -106,8 +105,9 @@ std::string CheckWiderVisibility(const VisibilityOptions& options, Verification*
                 SearchByProjection(wide, direction, frame, pose, v.options.search));
     }
   }
-  verification->report.supported_share = count.supported_share();
-  return count.supported_share() < options.min_supported_share ? kContradicted : "";
+  return v.AtLeast("min_supported_share", count.supported_share(), options.min_supported_share)
+             ? ""
+             : kContradicted;
 }
 
 }  // namespace pangea
