@@ -45,7 +45,7 @@ bool PoseGraph::JoinsALargeOne(const Group& group) const {
 // The oldest map's part of the group stays; a part that was solved by itself moves as one.
 void PoseGraph::Join(Group* group) {
   const Parts parts = PartsOf(*group);
-  const std::set<int> fixed = parts.at(solved_in_[group->maps.front()]);
+  const std::set<int>& fixed = parts.at(solved_in_[group->maps.front()]);
   std::set<int> placed = fixed;
   while (placed.size() < group->maps.size()) {
     const Placed next = PlaceNext(*group, placed);
