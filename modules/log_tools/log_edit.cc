@@ -119,14 +119,20 @@ void CheckNew(const std::string& path) {
 
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings) {
-  Expression(cut.channels);  // before a file is made
   CheckNew(out);
-  LogFileWriter writer(out);
-  ReadCut(log, cut, readings, WhileReading::kTellProgress,
-          [&writer](const LogEvent& event, double) {
-            writer.Write(event.utime, event.channel, event.data);
-          });
-  return writer.count();
+  std::optional<LogFileWriter> writer;  // an empty file would be no log
+  ReadCut(log, cut, readings, WhileReading::kTellProgress, [&](const LogEvent& event, double) {
+    if (!writer) {
+      writer.emplace(out);
+    }
+    writer->Write(event.utime, event.channel, event.data);
+  });
+  if (!writer) {
+    throw std::runtime_error(fmt::format(
+        "{}: no event of {} from {:g} to {:g} s; pangea-log info shows channels and times", log,
+        cut.channels, cut.from_s, cut.to_s));
+  }
+  return writer->count();
 }
 
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,

@@ -34,7 +34,8 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
 void CheckNew(const std::string& path);
 
 // Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
-// read, an output that exists or cannot be written, and an expression that is none.
+// read, an output that exists or cannot be written, an expression that is none, and a cut without
+// an event.
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings = nullptr);
 // All events of the logs in the order of capture; of equal times the earlier log's first.

@@ -154,6 +154,8 @@ TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
   EXPECT_THROW(CutLog(kSample, {}, Path("one.lcm")), std::runtime_error);
   EXPECT_EQ(Summarise(Path("one.lcm")).events, events);
   EXPECT_THROW(CutLog(kSample, {.channels = "("}, Path("other.lcm")), std::runtime_error);
+  EXPECT_THROW(CutLog(kSample, {.from_s = 6, .to_s = 2}, Path("other.lcm")), std::runtime_error);
+  EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
 // An independent reading of the file has the cost that our own convention gives.
