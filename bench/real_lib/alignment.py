@@ -39,10 +39,8 @@ def _eliminate(a, v, p, q):
 
 @dataclass
 class Centred:
-    """One piece: means, and the moments about them."""
+    """One piece: the moments about its means."""
 
-    mean_estimate: tuple
-    mean_reference: tuple
     rotation: tuple  # reference to estimate
     covariance: float  # sum of estimate . R reference
     spread: float  # sum of reference^2
@@ -56,9 +54,6 @@ class Centred:
         """Residuals at this scale, each squared."""
         return [math.dist(e, rot.scaled(scale, rot.rotate(self.rotation, r))) ** 2 for e, r in zip(self.estimate, self.reference)]
 
-    def to_estimate(self, p, scale):
-        return rot.add(rot.scaled(scale, rot.rotate(self.rotation, rot.subtract(p, self.mean_reference))), self.mean_estimate)
-
 
 def centred(estimate, reference):
     n = len(estimate)
@@ -71,7 +66,7 @@ def centred(estimate, reference):
          [zx - xz, xy + yx, yy - xx - zz, yz + zy], [xy - yx, zx + xz, yz + zy, zz - xx - yy]]
     q = rot.normalised(largest_eigenvector(N))
     covariance = sum(sum(x * y for x, y in zip(e, rot.rotate(q, r))) for e, r in zip(est, ref))
-    return Centred(*means, q, covariance, sum(sum(x * x for x in r) for r in ref), est, ref)
+    return Centred(q, covariance, sum(sum(x * x for x in r) for r in ref), est, ref)
 
 
 def common_scale(pieces):
