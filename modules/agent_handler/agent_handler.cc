@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "bus/parse_message.h"
 #include "link/compression.h"
 
 namespace pangea {
@@ -20,11 +21,7 @@ std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity*
   if (!bytes) {
     return "keyframe does not decompress";
   }
-  KeyframeMessage message{};
-  if (!DecodeMessage(*bytes, &message)) {
-    return "keyframe does not decode";
-  }
-  const auto keyframe = Parse(message);
+  const auto keyframe = ParseMessage<KeyframeMessage>(*bytes);
   if (!keyframe.value) {
     return keyframe.refused;
   }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "bus/parse_message.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 
@@ -40,12 +41,11 @@ std::string KeyframeTokens(const KeyframeId& id) {
 }
 
 std::string TokensOf(const std::string& channel, Bytes data) {
-  KeyframeMessage keyframe{};
-  if (!channel.starts_with(channels::kKeyframePrefix) || !DecodeMessage(data, &keyframe)) {
+  if (!channel.starts_with(channels::kKeyframePrefix)) {
     return channel;
   }
-  const auto parsed = Parse(keyframe);
-  return parsed.value ? KeyframeTokens(parsed.value->id) : channel;
+  const auto keyframe = ParseMessage<KeyframeMessage>(data);
+  return keyframe.value ? KeyframeTokens(keyframe.value->id) : channel;
 }
 
 std::string Tokens(const MapId& map) {

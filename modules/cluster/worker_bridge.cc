@@ -5,6 +5,7 @@
 #include <functional>
 #include <utility>
 
+#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "core/constraint_id.h"
 #include "messages/channels.h"
@@ -176,8 +177,7 @@ void WorkerBridge::TakeMatches(int64_t now_utime) {
     if (!taken) {
       return;
     }
-    place_match_t data{};
-    auto match = DecodeMessage(taken->data, &data) ? Parse(data) : Parsed<PlaceMatch>{};
+    auto match = ParseMessage<place_match_t>(taken->data);
     if (match.value) {
       TakeMatch(*std::move(match.value), taken->claim, now_utime);
     } else {

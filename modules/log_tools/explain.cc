@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "bus/parse_message.h"
 #include "core/median.h"
 #include "fusion/fusion.h"
 #include "inter_map_ba/inter_map_ba.h"
@@ -20,17 +21,12 @@
 namespace pangea::session {
 namespace {
 
-template <typename Message>
-auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
-  Message message{};
-  return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
-}
-
 Constraint FindResult(const std::string& log, int64_t id, LogReadings* readings) {
   std::optional<Constraint> found;
   const auto find = [&](const LogEvent& event) {
     if (event.channel == channels::kConstraint) {
-      if (auto constraint = ParseEvent<constraint_t>(event); constraint && constraint->Id() == id) {
+      if (auto constraint = ParseMessage<constraint_t>(event.data).value;
+          constraint && constraint->Id() == id) {
         found = std::move(constraint);
       }
     }
@@ -53,8 +49,9 @@ PlaceCandidate FindCandidate(const std::string& log, const Constraint& constrain
   }
   std::optional<PlaceCandidate> found;
   const auto find = [&](const LogEvent& event) {
-    const auto match =
-        event.channel == channels::kPlaceMatch ? ParseEvent<place_match_t>(event) : std::nullopt;
+    const auto match = event.channel == channels::kPlaceMatch
+                           ? ParseMessage<place_match_t>(event.data).value
+                           : std::nullopt;
     if (!match || match->query != constraint.to) {
       return;
     }
@@ -147,7 +144,7 @@ std::string ListResults(const std::string& log, LogReadings* readings) {
     if (event.channel != channels::kConstraint) {
       return;
     }
-    if (const auto constraint = ParseEvent<constraint_t>(event)) {
+    if (const auto constraint = ParseMessage<constraint_t>(event.data).value) {
       text += fmt::format("{:>20}  {} in {}  {}\n", constraint->Id(), ToString(constraint->to),
                           ToString(constraint->from),
                           constraint->accepted ? "accepted" : constraint->reason);
@@ -166,7 +163,7 @@ Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* 
   bool from = false, to = false;
   const auto add = [&](const LogEvent& event) {
     auto keyframe = event.channel.starts_with(channels::kKeyframePrefix)
-                        ? ParseEvent<KeyframeMessage>(event)
+                        ? ParseMessage<KeyframeMessage>(event.data).value
                         : std::nullopt;
     if (!keyframe) {
       return;

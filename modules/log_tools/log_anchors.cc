@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "anchors/anchor_book.h"
+#include "bus/parse_message.h"
 #include "log_file/log_event.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -57,8 +58,7 @@ class Collector {
  private:
   template <typename Message, typename Handler>
   void Take(Bytes data, const Handler& handler) {
-    Message message{};
-    auto parsed = DecodeMessage(data, &message) ? Parse(message) : decltype(Parse(message)){};
+    auto parsed = ParseMessage<Message>(data);
     if (parsed.value) {
       handler(*parsed.value);
     } else {

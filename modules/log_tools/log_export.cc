@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 
+#include "bus/parse_message.h"
 #include "files/text_file.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
@@ -20,11 +21,10 @@ namespace {
 std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log, LogReadings* readings) {
   std::map<KeyframeId, OdometryEdge> edges;
   const auto add = [&edges](const LogEvent& event) {
-    KeyframeMessage message{};
-    if (event.channel.starts_with(channels::kKeyframePrefix) &&
-        DecodeMessage(event.data, &message)) {
-      if (const auto keyframe = Parse(message); keyframe.value && keyframe.value->edge) {
-        edges.emplace(keyframe.value->id, *keyframe.value->edge);
+    if (event.channel.starts_with(channels::kKeyframePrefix)) {
+      const auto keyframe = ParseMessage<KeyframeMessage>(event.data).value;
+      if (keyframe && keyframe->edge) {
+        edges.emplace(keyframe->id, *keyframe->edge);
       }
     }
   };

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bus/node.h"
+#include "bus/parse_message.h"
 #include "core/keyframe.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -114,11 +115,8 @@ void AddPose(Bytes data, PoseTrack* track) {
 using Frames = std::map<MapId, std::map<int64_t, MapId>>;
 
 void AddFrame(Bytes data, Frames* frames) {
-  correction_t message{};
-  if (DecodeMessage(data, &message)) {
-    if (const auto correction = Parse(message); correction.value) {
-      (*frames)[correction.value->map][correction.value->revision] = correction.value->group;
-    }
+  if (const auto correction = ParseMessage<correction_t>(data).value) {
+    (*frames)[correction->map][correction->revision] = correction->group;
   }
 }
 
@@ -138,11 +136,7 @@ void Finish(const Frames& frames, PoseTrack* track) {
 }
 
 bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
-  KeyframeMessage message{};
-  if (!DecodeMessage(data, &message)) {
-    return false;
-  }
-  const auto keyframe = Parse(message);
+  const auto keyframe = ParseMessage<KeyframeMessage>(data);
   if (keyframe.value) {
     session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value, session_s));
     session->cameras.insert_or_assign(keyframe.value->id.map.agent_id, keyframe.value->camera);
@@ -151,11 +145,7 @@ bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
 }
 
 bool AddConstraint(Bytes data, CapturedSession* session) {
-  constraint_t message{};
-  if (!DecodeMessage(data, &message)) {
-    return false;
-  }
-  const auto constraint = Parse(message);
+  const auto constraint = ParseMessage<constraint_t>(data);
   if (constraint.value) {
     session->constraints.insert_or_assign(constraint.value->Id(), *constraint.value);
   }
@@ -163,11 +153,7 @@ bool AddConstraint(Bytes data, CapturedSession* session) {
 }
 
 bool AddAnchorEdit(Bytes data, CapturedSession* session) {
-  anchor_edit_t message{};
-  if (!DecodeMessage(data, &message)) {
-    return false;
-  }
-  auto edit = Parse(message);
+  auto edit = ParseMessage<anchor_edit_t>(data);
   if (!edit.value) {
     return false;
   }
@@ -182,11 +168,7 @@ bool AddAnchorEdit(Bytes data, CapturedSession* session) {
 }
 
 bool AddAnchor(Bytes data, CapturedSession* session) {
-  anchor_t message{};
-  if (!DecodeMessage(data, &message)) {
-    return false;
-  }
-  const auto state = Parse(message);
+  const auto state = ParseMessage<anchor_t>(data);
   if (state.value && !state.value->gone) {
     session->anchors_placed.insert(state.value->anchor);
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "bus/parse_message.h"
 #include "log_file/checksums.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -9,12 +10,6 @@
 
 namespace pangea::site {
 namespace {
-
-template <typename Message>
-auto ParseEvent(Bytes data) -> decltype(Parse(Message{}).value) {
-  Message message{};
-  return DecodeMessage(data, &message) ? Parse(message).value : std::nullopt;
-}
 
 std::string KeyframeName(Bytes data) {
   KeyframeMessage message{};
@@ -32,16 +27,16 @@ std::string NameOf(const LogEvent& event) {
     return KeyframeName(event.data);
   }
   if (event.channel == channels::kPlaceMatch) {
-    const auto match = ParseEvent<place_match_t>(event.data);
+    const auto match = ParseMessage<place_match_t>(event.data).value;
     return match ? "match " + ToString(match->query) : "";
   }
   if (event.channel == channels::kConstraint) {
-    const auto constraint = ParseEvent<constraint_t>(event.data);
+    const auto constraint = ParseMessage<constraint_t>(event.data).value;
     return constraint ? fmt::format("constraint {} {}", ToString(constraint->to), constraint->Id())
                       : "";
   }
   if (event.channel == channels::kAnchorEdit) {
-    const auto edit = ParseEvent<anchor_edit_t>(event.data);
+    const auto edit = ParseMessage<anchor_edit_t>(event.data).value;
     return edit ? fmt::format("edit {} {} {}", ToString(edit->anchor), edit->revision,
                               edit->agent_id)
                 : "";

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "files/scratch_file.h"
 #include "messages/anchor_messages.h"
@@ -15,12 +16,6 @@
 
 namespace pangea::site {
 namespace {
-
-template <typename Message>
-auto ParseEvent(const LogEvent& event) -> decltype(Parse(Message{}).value) {
-  Message message{};
-  return DecodeMessage(event.data, &message) ? Parse(message).value : std::nullopt;
-}
 
 bool IsKeyframe(const LogEvent& event) {
   return event.channel.starts_with(channels::kKeyframePrefix);
@@ -40,13 +35,13 @@ void Take(const LogEvent& event, Thinning* thinning) {
     }
   };
   if (IsKeyframe(event)) {
-    if (const auto keyframe = ParseEvent<KeyframeMessage>(event)) {
+    if (const auto keyframe = ParseMessage<KeyframeMessage>(event.data).value) {
       thinning->Take(*keyframe, event.utime);
     }
   } else if (event.channel == channels::kConstraint) {
-    take(ParseEvent<constraint_t>(event));
+    take(ParseMessage<constraint_t>(event.data).value);
   } else if (event.channel == channels::kAnchorEdit) {
-    take(ParseEvent<anchor_edit_t>(event));
+    take(ParseMessage<anchor_edit_t>(event.data).value);
   }
 }
 
@@ -77,7 +72,7 @@ void ThinnedJournal::Rewrite(const LogEvent& event, const Write& write) {
 }
 
 void ThinnedJournal::RewriteKeyframe(const LogEvent& event, const Write& write) const {
-  auto keyframe = ParseEvent<KeyframeMessage>(event);
+  auto keyframe = ParseMessage<KeyframeMessage>(event.data).value;
   const auto edge = keyframe ? thinned_.edges.find(keyframe->id) : thinned_.edges.end();
   if (edge != thinned_.edges.end()) {
     keyframe->edge = edge->second.edge;
@@ -89,7 +84,7 @@ void ThinnedJournal::RewriteKeyframe(const LogEvent& event, const Write& write) 
 }
 
 void ThinnedJournal::RewriteMatch(const LogEvent& event, const Write& write) const {
-  auto match = ParseEvent<place_match_t>(event);
+  auto match = ParseMessage<place_match_t>(event.data).value;
   if (!match) {
     return write(event);
   }
@@ -108,7 +103,7 @@ void ThinnedJournal::RewriteMatch(const LogEvent& event, const Write& write) con
 
 // Derived ones are all written anew at the end.
 void ThinnedJournal::RewriteConstraint(const LogEvent& event, const Write& write) const {
-  const auto constraint = ParseEvent<constraint_t>(event);
+  const auto constraint = ParseMessage<constraint_t>(event.data).value;
   if (!constraint ||
       (constraint->kind != PlaceKind::kDerived && !thinned_.gone.contains(constraint->from) &&
        !thinned_.gone.contains(constraint->to))) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
@@ -26,9 +27,7 @@ void AnchorEdits::Index(const AnchorEdit& edit, const JournalPlace& place) {
 }
 
 bool AnchorEdits::Load(Bytes data, const JournalPlace& place) {
-  anchor_edit_t message{};
-  const bool decoded = DecodeMessage(data, &message);
-  const auto edit = decoded ? Parse(message) : Parsed<AnchorEdit>{};
+  const auto edit = ParseMessage<anchor_edit_t>(data);
   if (!edit.value) {
     return false;
   }

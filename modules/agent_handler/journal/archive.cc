@@ -8,6 +8,7 @@
 #include <iostream>
 #include <utility>
 
+#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
@@ -47,15 +48,6 @@ seq_gap_t ToMessage(const SeqGap& gap) {
   message.from_seq = gap.from_seq;
   message.to_seq = gap.to_seq;
   return message;
-}
-
-template <typename Message>
-auto DecodeAndParse(Bytes data) -> decltype(Parse(Message{})) {
-  Message message{};
-  if (!DecodeMessage(data, &message)) {
-    return {std::nullopt, std::string(Message::getTypeName()) + " does not decode"};
-  }
-  return Parse(message);
 }
 
 }  // namespace
@@ -129,7 +121,7 @@ void Archive::OnRetransmission(const again_t& message) {
 
 // Each tells its options every few seconds; they are of its start.
 void Archive::OnOptions(const std::string& channel, Bytes data) {
-  auto options = DecodeAndParse<options_t>(data);
+  auto options = ParseMessage<options_t>(data);
   if (!options.value) {
     return node_.Refuse(options.refused);
   }
@@ -158,12 +150,12 @@ void Archive::NoteJournalled(const KeyframeId& id) {
 std::optional<Keyframe> Archive::Newest(const MapId& map) const {
   const auto places = index_.Find(JournalChannel::kKeyframe, {map, have_.at(map)});
   return places.empty() ? std::nullopt
-                        : DecodeAndParse<KeyframeMessage>(journal_->Read(places.front())).value;
+                        : ParseMessage<KeyframeMessage>(journal_->Read(places.front())).value;
 }
 
 bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
   if (channel.starts_with(channels::kKeyframePrefix)) {
-    if (const auto keyframe = DecodeAndParse<KeyframeMessage>(data); keyframe.value) {
+    if (const auto keyframe = ParseMessage<KeyframeMessage>(data); keyframe.value) {
       const KeyframeId& id = keyframe.value->id;
       index_.AddKeyframe(id, place);
       NoteJournalled(id);
@@ -193,7 +185,7 @@ bool Archive::LoadAnchorEdit(Bytes data, const JournalPlace& place) {
 }
 
 bool Archive::LoadOptions(Bytes data) {
-  auto options = DecodeAndParse<options_t>(data);
+  auto options = ParseMessage<options_t>(data);
   if (!options.value) {
     node_.Count("journal_events_unreadable");
     return !IsDamaged<options_t>(data);
@@ -204,7 +196,7 @@ bool Archive::LoadOptions(Bytes data) {
 
 template <typename Message>
 bool Archive::LoadAnswer(Bytes data, const JournalPlace& place) {
-  const auto answer = DecodeAndParse<Message>(data);
+  const auto answer = ParseMessage<Message>(data);
   if (!answer.value) {
     node_.Count("journal_events_unreadable");
     return !IsDamaged<Message>(data);
@@ -266,7 +258,7 @@ std::vector<KeyframeId> Archive::Sync() {
 
 template <typename Message>
 void Archive::OnAnswer(const std::string& channel, Bytes data) {
-  const auto answer = DecodeAndParse<Message>(data);
+  const auto answer = ParseMessage<Message>(data);
   if (!answer.value) {
     return node_.Refuse(answer.refused);
   }

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "bus/parse_message.h"
 #include "log_file/log_event.h"
 #include "messages/messages.h"
 
@@ -56,14 +57,12 @@ bool JournalRecords::Read(int64_t offset, std::span<uint8_t> record) {
   if (offset < kJournal) {
     return others_ != nullptr && others_->Read(offset, record);
   }
-  KeyframeMessage message{};
-  if (DecodeMessage(ReadEventData(fd_, offset - kJournal), &message)) {
-    if (const auto keyframe = Parse(message); keyframe.value) {
-      const std::vector<uint8_t> made = encoder_(*keyframe.value);
-      if (made.size() == record.size()) {
-        std::copy(made.begin(), made.end(), record.begin());
-        return true;
-      }
+  const std::vector<uint8_t> data = ReadEventData(fd_, offset - kJournal);
+  if (const auto keyframe = ParseMessage<KeyframeMessage>(data); keyframe.value) {
+    const std::vector<uint8_t> made = encoder_(*keyframe.value);
+    if (made.size() == record.size()) {
+      std::copy(made.begin(), made.end(), record.begin());
+      return true;
     }
   }
   problem_ = "a keyframe cannot be read from the journal any more";

@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -87,11 +88,7 @@ void AnchorApp::OnKeyframe(int32_t agent, Bytes data) {
 }
 
 void AnchorApp::OnAnchor(int32_t agent, Bytes data) {
-  anchor_t message;
-  if (!DecodeMessage(data, &message)) {
-    return;
-  }
-  if (const auto state = Parse(message); state.value) {
+  if (const auto state = ParseMessage<anchor_t>(data); state.value) {
     placer_.OnAnchor(agent, state.value->anchor, state.value->revision);
   }
 }

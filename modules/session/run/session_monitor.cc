@@ -6,6 +6,7 @@
 #include <set>
 
 #include "bus/node.h"
+#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -74,11 +75,7 @@ void SessionMonitor::WatchAgent(int32_t id, Bus& bus) {
 }
 
 void SessionMonitor::OnMapState(Bytes data) {
-  map_state_t message;
-  if (!DecodeMessage(data, &message)) {
-    return;
-  }
-  const auto state = Parse(message);
+  const auto state = ParseMessage<map_state_t>(data);
   if (!state.value) {
     return;
   }
@@ -104,11 +101,7 @@ void SessionMonitor::OnMapState(Bytes data) {
 }
 
 void SessionMonitor::OnCorrection(int32_t agent_id, Bytes data) {
-  correction_t message;
-  if (!DecodeMessage(data, &message)) {
-    return;
-  }
-  const auto correction = Parse(message);
+  const auto correction = ParseMessage<correction_t>(data);
   if (!correction.value) {
     return;
   }
