@@ -82,7 +82,6 @@ class GlobalBa {
 
  private:
   using Pair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
-  using Corners = std::vector<std::pair<int, int>>;
   using StatePointer = std::shared_ptr<const MapState>;
 
   // What a refinement rests on.

@@ -30,8 +30,11 @@
 
 namespace pangea {
 
+// With four sources they fit 1200 bytes (landmarks_t).
+inline constexpr int kMostLandmarks = (1200 - 154) / static_cast<int>(25 + sizeof(Descriptor));
+
 struct MapPointsOptions {
-  int max_landmarks = 18;      // in one message: with max_sources it fits 1200 bytes
+  int max_landmarks = kMostLandmarks;
   int max_sources = 4;         // keyframes they come from
   double ahead_s = 0.5;        // how far the agent's motion is led on
   double max_distance_m = 8;   // from the agent to a source
@@ -45,7 +48,7 @@ struct MapPointsOptions {
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("max_landmarks", &max_landmarks, {1, 18}, "",
+    archive.Add("max_landmarks", &max_landmarks, {1, kMostLandmarks}, "",
                 "in one message of at most 1200 bytes");
     archive.Add("max_sources", &max_sources, {1, 4}, "", "keyframes they come from");
     archive.Add("ahead_s", &ahead_s, {0, 10}, "s", "by which the agent's motion is led on");

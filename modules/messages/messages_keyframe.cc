@@ -81,7 +81,7 @@ void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
 // Returns what is wrong, or an empty string.
 std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
   if (m.num_corners < 0 || m.num_corners > kMaxCorners) {
-    return "more than 700 corners";
+    return "too many corners";
   }
   if (m.num_descriptor_bytes != m.num_corners * static_cast<int>(sizeof(Descriptor))) {
     return "descriptor bytes do not match the corners";

@@ -21,8 +21,8 @@
 namespace pangea::vio {
 
 struct DescriberOptions {
-  int max_corners = 700;  // at most kMaxCorners
-  int max_blobs = 240;    // of these
+  int max_corners = kMaxCorners;
+  int max_blobs = 240;  // of these
   int octaves = 8;
   double scale_factor = kOctaveScale;  // between octaves; CornerSigma assumes it
   int fast_threshold = 20;
