@@ -7,7 +7,8 @@
 
 namespace pangea::bench {
 
-Cores::Cores(bool recognition_alone) : recognition_alone_(recognition_alone) {
+Cores::Cores(bool recognition_alone, const GlobalBaOptions& global_ba)
+    : recognition_alone_(recognition_alone) {
   const auto records = std::make_shared<ScratchFile>();
   use_.Measure("place_recognition", [&] {
     recognition_ = std::make_unique<PlaceRecognition>(PlaceRecognitionOptions{}, records);
@@ -15,7 +16,7 @@ Cores::Cores(bool recognition_alone) : recognition_alone_(recognition_alone) {
   inter_map_ba_ = std::make_unique<InterMapBa>(InterMapBaOptions{}, records);
   fusion_ = std::make_unique<Fusion>(FusionOptions{}, records);
   graph_ = std::make_unique<PoseGraph>(PoseGraphOptions{});
-  global_ba_ = std::make_unique<GlobalBa>(GlobalBaOptions{}, records);
+  global_ba_ = std::make_unique<GlobalBa>(global_ba, records);
   map_points_ = std::make_unique<MapPoints>(MapPointsOptions{}, records);
 }
 
@@ -49,12 +50,16 @@ void Cores::Remember(const Step& step) {
   use_.Measure("map_points", [&] { map_points_->Take(keyframe); });
 }
 
-void Cores::Start() {
+void Cores::Start(bool adjust) {
   if (recognition_alone_) {
     return;
   }
   const PoseGraphUpdate update = use_.Measure("posegraph", [&] { return graph_->Finish(); });
+  started_ = adjust;
   Tell(update);
+  if (adjust) {
+    AdjustDue();
+  }
   use_.Measure("map_points", [&] {
     for (const MapState& state : update.states) {
       map_points_->TakeRefined(state);
@@ -136,6 +141,10 @@ void Cores::Quiet() {
     return;
   }
   Tell(use_.Measure("posegraph", [&] { return graph_->Finish(); }));
+  AdjustDue();
+}
+
+void Cores::AdjustDue() {
   while (global_ba_->HasWork()) {
     const auto refined = use_.Measure("global_ba", [&] { return global_ba_->Advance(); });
     if (refined) {

@@ -22,12 +22,13 @@ namespace pangea::bench {
 class Cores {
  public:
   // `recognition_alone`: the others get nothing.
-  explicit Cores(bool recognition_alone);
+  Cores(bool recognition_alone, const GlobalBaOptions& global_ba);
 
   // As from a journal.
   void Remember(const Step& step);
   // Every group is solved, and its keyframes count as adjusted: the city has been there for long.
-  void Start();
+  // `adjust`: they are.
+  void Start(bool adjust);
 
   // The keyframe as it comes from an agent, and the results of its candidates.
   std::vector<Constraint> Take(const Keyframe& keyframe);
@@ -43,6 +44,7 @@ class Cores {
 
  private:
   Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate);
+  void AdjustDue();
   void Tell(const PoseGraphUpdate& update);
   void SendPoints(const Keyframe& keyframe);
 

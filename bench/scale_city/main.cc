@@ -28,6 +28,7 @@ struct Arguments {
   int visits = 4, agents = 4;
   bool recognition_alone = false;
   CityOptions city;
+  GlobalBaOptions global_ba;
 };
 
 void Write(const Step& step, site::JournalWriter* journal) {
@@ -46,7 +47,7 @@ class Bench {
   explicit Bench(const Arguments& arguments)
       : arguments_(arguments),
         city_(arguments.log, arguments.city),
-        cores_(arguments.recognition_alone) {}
+        cores_(arguments.recognition_alone, arguments.global_ba) {}
 
   nlohmann::json Run() {
     const int a_hall = arguments_.visits * city_.keyframes_a_visit();
@@ -89,7 +90,7 @@ class Bench {
     if (journal != nullptr) {
       journal->Finish();
     }
-    cores_.Start();
+    cores_.Start(arguments_.city.joined);
   }
 
   nlohmann::json Come(int hall) {
@@ -174,6 +175,9 @@ int main(int argc, char** argv) {
                  "one of so many cells of that hall looks so")
       ->capture_default_str();
   app.add_flag("--joined", arguments.city.joined, "all halls are one group");
+  app.add_option("--whole-keyframes", arguments.global_ba.local.keyframes,
+                 "of the largest group that global_ba always adjusts as a whole")
+      ->capture_default_str();
   app.add_flag("--recognition-alone", arguments.recognition_alone, "the other cores get nothing");
   app.add_option("--journal", arguments.journal, "the city as a journal, to be made");
   CLI11_PARSE(app, argc, argv);

@@ -79,8 +79,8 @@ struct BaProblem::Solver {
 BaProblem::Solver::Solver(const BaWorld& world, const BaOptions& ba, ceres::LossFunction* loss) {
   motion_offset = kPoseSize * world.keyframes.size();
   camera_offset = motion_offset + kMotionSize * world.keyframes.size();
-  scale_offset = camera_offset + kPoseSize * world.T_body_cam.size();
-  landmark_offset = scale_offset + world.T_body_cam.size();
+  scale_offset = camera_offset + kPoseSize * world.cameras.size();
+  landmark_offset = scale_offset + world.cameras.size();
   blocks.resize(landmark_offset + kLandmarkSize * world.landmarks.size());
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   AddInertial(world, ba);
@@ -104,6 +104,10 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
     problem.AddParameterBlock(Motion(i), kMotionSize);
     options.linear_solver_ordering->AddElementToGroup(Pose(i), 1);
     options.linear_solver_ordering->AddElementToGroup(Motion(i), 1);
+    if (keyframe.held) {
+      problem.SetParameterBlockConstant(Pose(i));
+      problem.SetParameterBlockConstant(Motion(i));
+    }
     if (keyframe.previous >= 0 && keyframe.preintegration) {
       problem.AddResidualBlock(new PreintegrationFactor(*keyframe.preintegration, ba.imu),
                                Weight(keyframe.edge ? 1 - ba.edge_weight : 1),
@@ -117,7 +121,7 @@ void BaProblem::Solver::AddInertial(const BaWorld& world, const BaOptions& ba) {
 }
 
 void BaProblem::Solver::AddEdges(const BaWorld& world, const BaOptions& ba) {
-  std::vector<double> sigmas(world.T_body_cam.size(), ba.edge_scale_sigma);
+  std::vector<double> sigmas(world.cameras.size(), ba.edge_scale_sigma);
   for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
     const BaKeyframe& keyframe = world.keyframes[i];
     if (keyframe.previous >= 0 && keyframe.edge) {
@@ -126,20 +130,28 @@ void BaProblem::Solver::AddEdges(const BaWorld& world, const BaOptions& ba) {
     }
     sigmas[keyframe.camera] = std::max(sigmas[keyframe.camera], keyframe.unknown_scale);
   }
-  for (int i = 0; i < static_cast<int>(world.T_body_cam.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(world.cameras.size()); ++i) {
     problem.AddResidualBlock(new ScalePriorFactor(sigmas[i]), nullptr, EdgeLogScale(i));
     options.linear_solver_ordering->AddElementToGroup(EdgeLogScale(i), 1);
+    if (world.cameras[i].held) {
+      *EdgeLogScale(i) = world.cameras[i].edge_log_scale;
+      problem.SetParameterBlockConstant(EdgeLogScale(i));
+    }
   }
 }
 
 void BaProblem::Solver::AddCameras(const BaWorld& world, const BaOptions& ba) {
-  for (int i = 0; i < static_cast<int>(world.T_body_cam.size()); ++i) {
-    PoseToBlock(world.T_body_cam[i], Camera(i));
+  for (int i = 0; i < static_cast<int>(world.cameras.size()); ++i) {
+    const Rigid3& T_body_cam = world.cameras[i].T_body_cam;
+    PoseToBlock(T_body_cam, Camera(i));
     problem.AddParameterBlock(Camera(i), kPoseSize, new RigidManifold);
     options.linear_solver_ordering->AddElementToGroup(Camera(i), 1);
-    problem.AddResidualBlock(new CameraPriorFactor(world.T_body_cam[i], ba.camera_position_sigma,
-                                                   ba.camera_rotation_sigma),
-                             nullptr, Camera(i));
+    problem.AddResidualBlock(
+        new CameraPriorFactor(T_body_cam, ba.camera_position_sigma, ba.camera_rotation_sigma),
+        nullptr, Camera(i));
+    if (world.cameras[i].held) {
+      problem.SetParameterBlockConstant(Camera(i));
+    }
   }
 }
 
@@ -201,8 +213,9 @@ void BaProblem::ReadBack() {
   for (int i = 0; i < static_cast<int>(world_.keyframes.size()); ++i) {
     world_.keyframes[i].imu = StateFromBlocks(solver_->Pose(i), solver_->Motion(i));
   }
-  for (int i = 0; i < static_cast<int>(world_.T_body_cam.size()); ++i) {
-    world_.T_body_cam[i] = PoseFromBlock(solver_->Camera(i));
+  for (int i = 0; i < static_cast<int>(world_.cameras.size()); ++i) {
+    world_.cameras[i].T_body_cam = PoseFromBlock(solver_->Camera(i));
+    world_.cameras[i].edge_log_scale = *solver_->EdgeLogScale(i);
   }
   for (int i = 0; i < static_cast<int>(world_.landmarks.size()); ++i) {
     world_.landmarks[i] = Eigen::Vector3d::Map(solver_->Landmark(i));

@@ -20,6 +20,9 @@
 // Cauchy's loss what does not fit shows and is dropped, with Huber's the rest is estimated.
 // Position and yaw of the whole are free: damping leaves them where they began.
 //
+// What is held stays as it is: then it is the minimum over the rest alone. A world that is at its
+// minimum therefore stays there, whatever of it is held.
+//
 // In pieces of a few iterations, so that whoever runs it may look up in between and drop it. One
 // thread, no clock: the same world gives the same bytes.
 
@@ -48,6 +51,14 @@ struct BaKeyframe {
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;
   double unknown_scale = 0;  // sigma of its map's scale; 0 for a metric map
+  bool held = false;         // stays as it is
+};
+
+// What the keyframes of a map have in common.
+struct BaCamera {
+  Rigid3 T_body_cam;
+  double edge_log_scale = 0;  // how much longer the map's edges are than they should be
+  bool held = false;          // stays as it is; otherwise edge_log_scale starts at zero
 };
 
 struct BaObservation {
@@ -59,7 +70,7 @@ struct BaObservation {
 
 // Indices are into its own vectors. A keyframe comes after its `previous`.
 struct BaWorld {
-  std::vector<Rigid3> T_body_cam;  // of each camera
+  std::vector<BaCamera> cameras;
   std::vector<BaKeyframe> keyframes;
   std::vector<Eigen::Vector3d> landmarks;  // map frame
   std::vector<BaObservation> observations;

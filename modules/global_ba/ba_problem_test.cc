@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "global_ba/ba_test_world.h"
 
@@ -133,13 +134,46 @@ TEST(BaProblem, TheSameStartGivesTheSameBytes) {
 TEST(BaProblem, FindsHowTheCamerasAreRotated) {
   BaTestWorld world = MakeBaTestWorld({});
   const Eigen::Quaterniond off = ExpSo3({0.004, -0.003, 0.003});
-  for (Rigid3& T_body_cam : world.start.T_body_cam) {
-    T_body_cam.q = off * T_body_cam.q;
+  for (BaCamera& camera : world.start.cameras) {
+    camera.T_body_cam.q = off * camera.T_body_cam.q;
   }
   const BaWorld solved = Solved(world.start);
-  for (size_t i = 0; i < solved.T_body_cam.size(); ++i) {
-    const Vector6d error = solved.T_body_cam[i].Minus(world.truth.T_body_cam[i]);
+  for (size_t i = 0; i < solved.cameras.size(); ++i) {
+    const Vector6d error = solved.cameras[i].T_body_cam.Minus(world.truth.cameras[i].T_body_cam);
     EXPECT_LT(error.tail<3>().norm(), 0.25 * LogSo3(off).norm());
+  }
+}
+
+// So that a part of a large world can be adjusted alone.
+TEST(BaProblem, WhatMovesReturnsToTheMinimumBesideWhatIsHeld) {
+  BaOptions to_the_end;
+  to_the_end.function_tolerance = 1e-12;
+  to_the_end.max_iterations = 100;
+  const BaTestWorld world =
+      MakeBaTestWorld({.outlier_share = 0.02, .edge_sigma_m = 0.001, .edge_scale_error = 0.01});
+  const BaWorld solved = Solved(Solved(world.start, to_the_end), to_the_end);
+  ASSERT_GT(std::abs(solved.cameras[0].edge_log_scale), 1e-3);
+  BaWorld part = solved;
+  std::mt19937_64 rng(1);
+  std::normal_distribution<double> normal(0, 0.02);
+  for (BaCamera& camera : part.cameras) {
+    camera.held = true;
+  }
+  for (BaKeyframe& keyframe : part.keyframes) {
+    keyframe.held = keyframe.id.seq % 10 < 5;
+    if (!keyframe.held) {
+      keyframe.imu.T_odom_body.t.x() += normal(rng);
+      keyframe.imu.v_odom_body.y() += normal(rng);
+      keyframe.imu.accel_bias.setZero();
+    }
+  }
+  const BaWorld found = Solved(part, to_the_end);
+  for (size_t i = 0; i < found.keyframes.size(); ++i) {
+    const ImuState &imu = found.keyframes[i].imu, &expected = solved.keyframes[i].imu;
+    const double tolerance = found.keyframes[i].held ? 0 : 1e-4;
+    EXPECT_LE((imu.T_odom_body.t - expected.T_odom_body.t).norm(), tolerance);
+    EXPECT_LE((imu.v_odom_body - expected.v_odom_body).norm(), 10 * tolerance);
+    EXPECT_LE((imu.accel_bias - expected.accel_bias).norm(), 10 * tolerance);
   }
 }
 

@@ -24,11 +24,12 @@ Vector3d RandomVector(std::mt19937_64& rng, double sigma) {
 // A lively round about the cloud, the camera towards its middle.
 class Flight {
  public:
-  explicit Flight(int agent) : phase_(0.7 * agent), radius_(4 + 0.3 * agent) {}
+  Flight(int agent, double drift_m_s)
+      : phase_(0.7 * agent), radius_(4 + 0.3 * agent), drift_m_s_(drift_m_s) {}
 
   Rigid3 Pose(double t) const {
     const double angle = 0.35 * t + phase_;
-    const Vector3d p(radius_ * std::cos(angle) + 0.2 * std::sin(2.1 * t),
+    const Vector3d p(drift_m_s_ * t + radius_ * std::cos(angle) + 0.2 * std::sin(2.1 * t),
                      radius_ * std::sin(angle) + 0.2 * std::sin(1.7 * t),
                      1.5 + 0.4 * std::sin(1.3 * t + phase_));
     const Eigen::Quaterniond nod =
@@ -48,6 +49,7 @@ class Flight {
   static constexpr double kH = 1e-4;
   double phase_;
   double radius_;
+  double drift_m_s_;
 };
 
 class Maker {
@@ -57,6 +59,8 @@ class Maker {
   BaTestWorld Make() {
     for (int i = 0; i < options_.landmarks; ++i) {
       world_.landmarks.push_back(Vector3d(0, 0, 1.5) + RandomVector(rng_, 1.2));
+      world_.landmarks.back().x() +=
+          options_.drift_m_s * options_.step_s * options_.keyframes * i / options_.landmarks;
     }
     for (int agent = 0; agent < options_.agents; ++agent) {
       Fly(agent);
@@ -69,8 +73,8 @@ class Maker {
 
  private:
   void Fly(int agent) {
-    const Flight flight(agent);
-    world_.T_body_cam.push_back(EurocTestCamera().T_body_cam);
+    const Flight flight(agent, options_.drift_m_s);
+    world_.cameras.push_back({.T_body_cam = EurocTestCamera().T_body_cam});
     Vector3d gyro_bias = RandomVector(rng_, 0.01), accel_bias = RandomVector(rng_, 0.05);
     for (int k = 0; k < options_.keyframes; ++k) {
       const double t = 1 + options_.step_s * k;
@@ -133,7 +137,8 @@ class Maker {
     for (int i = 0; i < static_cast<int>(world_.landmarks.size()); ++i) {
       const Vector3d p_cam = T_cam_map * world_.landmarks[i];
       const auto pixel = camera.Project(p_cam);
-      if (p_cam.z() < 0.5 || !pixel || !camera.Contains(*pixel)) {
+      if (p_cam.z() < 0.5 || p_cam.z() > options_.max_depth_m || !pixel ||
+          !camera.Contains(*pixel)) {
         continue;
       }
       BaObservation seen{index, i, p_cam.hnormalized(), Eigen::Matrix2d::Identity() / sigma};

@@ -19,6 +19,8 @@ struct BaTestOptions {
   int keyframes = 20;  // of each agent
   double step_s = 0.5;
   int landmarks = 150;
+  double drift_m_s = 0;      // of the rounds along x, and the cloud is as long
+  double max_depth_m = 1e3;  // of a landmark that is seen
   double pixel_sigma = 0.5;  // of the rays, what they claim
   double outlier_share = 0;  // rays of somewhere else
   double edge_sigma_m = 0;   // of odometry edges, what they claim (rad: a tenth); 0: there are none

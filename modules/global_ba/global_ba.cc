@@ -1,32 +1,13 @@
 #include "global_ba/global_ba.h"
 
 #include <algorithm>
-#include <cmath>
+#include <set>
+#include <utility>
 
 #include "core/byte_record.h"
 
 namespace pangea {
 namespace {
-
-// Whether a state has the shape of a refinement: the same steps from keyframe to keyframe.
-bool HasShape(const MapState& state, const std::vector<KeyframePose>& refined) {
-  constexpr double kSame_m = 1e-4;
-  std::map<KeyframeId, Eigen::Vector3d> positions;
-  for (const KeyframePose& pose : state.keyframes) {
-    positions[pose.id] = pose.T_map_body.t;
-  }
-  for (size_t i = 1; i < refined.size(); ++i) {
-    const auto from = positions.find(refined[i - 1].id), to = positions.find(refined[i].id);
-    if (from == positions.end() || to == positions.end()) {
-      return false;
-    }
-    const double step = (refined[i].T_map_body.t - refined[i - 1].T_map_body.t).norm();
-    if (std::abs((to->second - from->second).norm() - step) > kSame_m) {
-      return false;
-    }
-  }
-  return true;
-}
 
 std::vector<uint8_t> ToRecord(const std::vector<std::pair<int, int>>& corners) {
   ByteRecordWriter writer;
@@ -51,6 +32,18 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
   return corners;
 }
 
+// Largest move of a keyframe that was adjusted before.
+double LargestShift(const BaWorld& world, const AdjustedGroup& before, const StatePoses& poses) {
+  double largest = 0;
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    if (before.Find(keyframe.id) != nullptr) {
+      const double shift = (keyframe.imu.T_odom_body.t - poses.at(keyframe.id).t).norm();
+      largest = std::max(largest, shift);
+    }
+  }
+  return largest;
+}
+
 }  // namespace
 
 GlobalBa::GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records)
@@ -63,8 +56,8 @@ void GlobalBa::Save(ByteWriter* writer) const {
     writer->Put(pair.second);
     writer->Put(corners.Bytes(records_.get()).value_or(std::vector<uint8_t>{}));
   }
-  writer->PutCount(tied_.size());
-  for (const Pair& pair : tied_) {
+  writer->PutCount(ties_.all().size());
+  for (const KeyframePair& pair : ties_.all()) {
     writer->Put(pair.first);
     writer->Put(pair.second);
   }
@@ -72,27 +65,27 @@ void GlobalBa::Save(ByteWriter* writer) const {
 }
 
 bool GlobalBa::Restore(ByteReader* reader) {
-  std::map<Pair, Record> matched;
+  std::map<KeyframePair, Record> matched;
   for (size_t left = reader->GetCount(1); left > 0; --left) {
-    Pair pair;
+    KeyframePair pair;
     std::vector<uint8_t> corners;
     reader->Get(&pair.first);
     reader->Get(&pair.second);
     reader->Get(&corners);
     matched.emplace_hint(matched.end(), pair, Record(std::move(corners), records_.get()));
   }
-  std::set<Pair> tied;
+  Ties ties;
   for (size_t left = reader->GetCount(1); left > 0; --left) {
-    Pair pair;
+    KeyframePair pair;
     reader->Get(&pair.first);
     reader->Get(&pair.second);
-    tied.insert(tied.end(), pair);
+    ties.Insert(pair);
   }
   if (!store_.Restore(reader) || !reader->at_end()) {
     return false;
   }
   matched_ = std::move(matched);
-  tied_ = std::move(tied);
+  ties_ = std::move(ties);
   return true;
 }
 
@@ -105,7 +98,7 @@ void GlobalBa::Take(Keyframe keyframe) {
 
 void GlobalBa::Take(const PlaceMatch& match) {
   for (const PlaceCandidate& candidate : match.candidates) {
-    const Pair pair(match.query, candidate.match);
+    const KeyframePair pair(match.query, candidate.match);
     if (matched_.size() < kMaxMatched && !matched_.contains(pair)) {
       matched_.emplace(pair, Record(ToRecord(candidate.corner_matches), records_.get()));
     }
@@ -113,15 +106,14 @@ void GlobalBa::Take(const PlaceMatch& match) {
 }
 
 void GlobalBa::Take(const Constraint& constraint) {
-  const Pair pair(constraint.to, constraint.from);
-  if (constraint.accepted) {
-    if (tied_.insert(pair).second) {
+  const KeyframePair pair(constraint.to, constraint.from);
+  if (!constraint.accepted && constraint.reason != kRedundant) {
+    matched_.erase(pair);
+  } else if (ties_.Insert(pair)) {
+    if (constraint.accepted) {
       DropIfAbout(constraint.to.map);
     }
-  } else if (constraint.reason == kRedundant) {
-    tied_.insert(pair);
-  } else {
-    matched_.erase(pair);
+    new_ties_.insert(pair);
   }
 }
 
@@ -135,19 +127,19 @@ void GlobalBa::Take(MapState state) {
     }
   }
   const auto refined = refined_.find(shared->group);
-  if (refined != refined_.end() && refined->second.first == BasisOf(*shared) &&
-      !HasShape(*shared, refined->second.second)) {
+  if (refined != refined_.end() && refined->second.basis == BasisOf(*shared) &&
+      !refined->second.adjusted.IsShapeOf(PosesOf(*shared))) {
     refined_.erase(refined);
   }
-  if (in_work_ != nullptr && BasisOf(*states_[in_work_->group]) != BasisOf(*in_work_)) {
-    DropIfAbout(in_work_->group);
+  if (work_ != nullptr && BasisOf(*states_[work_->state->group]) != BasisOf(*work_->state)) {
+    DropIfAbout(work_->state->group);
   }
 }
 
 void GlobalBa::DropIfAbout(const MapId& map) {
-  if (in_work_ != nullptr && std::ranges::binary_search(in_work_->maps, map)) {
-    problem_.reset();
-    in_work_.reset();
+  if (work_ != nullptr && std::ranges::binary_search(work_->state->maps, map)) {
+    new_ties_.insert(work_->new_ties.begin(), work_->new_ties.end());
+    work_.reset();
     ++counters_.dropped;
   }
 }
@@ -163,56 +155,132 @@ GlobalBa::StatePointer GlobalBa::NextDue() const {
     if (map == state->group && state->num_constraints > 0 &&
         static_cast<int>(state->keyframes.size()) >= options_.min_keyframes &&
         std::ranges::all_of(state->maps, is_current) &&
-        (known == refined_.end() || known->second.first != BasisOf(*state))) {
+        (known == refined_.end() || known->second.whole_is_due ||
+         known->second.basis != BasisOf(*state))) {
       return state;
     }
   }
   return nullptr;
 }
 
+bool GlobalBa::IsLocal(const MapState& state, const StatePoses& poses) const {
+  const auto known = refined_.find(state.group);
+  if (known == refined_.end()) {
+    return false;
+  }
+  const auto& [basis, adjusted, whole_keyframes, whole_is_due] = known->second;
+  const auto count = static_cast<double>(state.keyframes.size());
+  return count > options_.local.keyframes && !whole_is_due &&
+         count < options_.local.whole_growth * static_cast<double>(whole_keyframes) &&
+         adjusted.IsShapeOf(poses);
+}
+
 std::optional<MapState> GlobalBa::Advance() {
-  if (problem_ == nullptr) {
+  if (work_ == nullptr) {
     if (StatePointer due = NextDue()) {
       Begin(std::move(due));
     }
     return std::nullopt;
   }
-  if (problem_->Advance()) {
+  if (work_->problem->Advance()) {
     return std::nullopt;
   }
-  MapState refined = Refined();
-  refined_[in_work_->group] = {BasisOf(*in_work_), refined.keyframes};
-  problem_.reset();
-  in_work_.reset();
-  ++counters_.finished;
-  return refined;
+  return Finish();
 }
 
 void GlobalBa::Begin(StatePointer state) {
-  std::vector<MatchedPlaces> places;
-  for (const MapId& map : state->maps) {
-    for (auto pair = tied_.lower_bound({{map, 0}, {}});
-         pair != tied_.end() && pair->first.map == map; ++pair) {
-      const auto corners = matched_.find(*pair);
-      const auto record =
-          corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
-      if (record) {
-        places.push_back({pair->first, pair->second, CornersFromRecord(*record)});
-      }
-    }
-  }
-  problem_ = std::make_unique<BaProblem>(MakeGroupWorld(*state, places, options_.world, &store_),
-                                         options_.ba);
-  in_work_ = std::move(state);
+  const StatePoses poses = PosesOf(*state);
+  work_ = std::make_unique<Work>();
+  work_->local = IsLocal(*state, poses);
+  work_->new_ties = TakeNewTies(*state, poses);
+  work_->state = std::move(state);
+  work_->problem = work_->local ? Local(poses) : Whole(*work_->state, poses);
   ++counters_.begun;
 }
 
-MapState GlobalBa::Refined() const {
-  MapState refined = *in_work_;
-  refined.keyframes.clear();
-  for (const BaKeyframe& keyframe : problem_->world().keyframes) {
-    refined.keyframes.push_back({keyframe.id, keyframe.utime, keyframe.imu.T_odom_body});
+std::vector<KeyframePair> GlobalBa::TakeNewTies(const MapState& state, const StatePoses& poses) {
+  std::vector<KeyframePair> taken;
+  for (const MapId& map : state.maps) {
+    for (auto pair = new_ties_.lower_bound({{map, 0}, {}});
+         pair != new_ties_.end() && pair->first.map == map;) {
+      if (poses.contains(pair->first) && poses.contains(pair->second)) {
+        taken.push_back(*pair);
+        pair = new_ties_.erase(pair);
+      } else {
+        ++pair;
+      }
+    }
   }
+  return taken;
+}
+
+std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePoses& poses) {
+  std::vector<MatchedPlaces> places;
+  for (const MapId& map : state.maps) {
+    for (const KeyframePair& pair : ties_.OfMap(map)) {
+      AddPlace(pair, &places);
+    }
+  }
+  return std::make_unique<BaProblem>(MakeGroupWorld(poses, places, options_.world, &store_),
+                                     options_.ba);
+}
+
+std::unique_ptr<BaProblem> GlobalBa::Local(const StatePoses& poses) {
+  const AdjustedGroup& adjusted = refined_.at(work_->state->group).adjusted;
+  const LocalPart part = ChooseLocalPart(poses, adjusted, ties_, work_->new_ties,
+                                         options_.local.max_neighbours, &store_);
+  std::vector<MatchedPlaces> places;
+  for (const std::set<KeyframeId>* keyframes : {&part.moving, &part.held}) {
+    for (const KeyframeId& id : *keyframes) {
+      for (const KeyframePair& pair : ties_.OfQuery(id)) {
+        if (part.moving.contains(pair.second) || part.held.contains(pair.second)) {
+          AddPlace(pair, &places);
+        }
+      }
+    }
+  }
+  return std::make_unique<BaProblem>(
+      MakeLocalWorld(poses, part, adjusted, places, options_.world, &store_), options_.ba);
+}
+
+void GlobalBa::AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places) {
+  const auto corners = matched_.find(pair);
+  const auto record =
+      corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
+  if (record) {
+    places->push_back({pair.first, pair.second, CornersFromRecord(*record)});
+  }
+}
+
+MapState GlobalBa::Finish() {
+  const std::unique_ptr<Work> work = std::exchange(work_, nullptr);
+  const BaWorld& world = work->problem->world();
+  MapState refined = *work->state;
+  const StatePoses poses = PosesOf(refined);
+  for (const MapId& map : refined.maps) {
+    if (map != refined.group) {
+      refined_.erase(map);
+    }
+  }
+  Refined& known = refined_[refined.group];
+  known.basis = BasisOf(refined);
+  if (work->local) {
+    const double shift = LargestShift(world, known.adjusted, poses);
+    known.whole_is_due = shift > options_.local.max_shift_m;
+    known.adjusted = AfterAdjustment(world, poses, &known.adjusted);
+  } else {
+    known.whole_is_due = false;
+    known.whole_keyframes = refined.keyframes.size();
+    known.adjusted = AfterAdjustment(world, poses, nullptr);
+  }
+  for (const auto& [id, utime, told] : std::exchange(refined.keyframes, {})) {
+    if (const ImuState* imu = known.adjusted.Find(id)) {
+      refined.keyframes.push_back({id, utime, imu->T_odom_body});
+    }
+  }
+  std::ranges::sort(refined.keyframes, {}, &KeyframePose::id);
+  ++counters_.finished;
+  counters_.finished_local += work->local ? 1 : 0;
   return refined;
 }
 

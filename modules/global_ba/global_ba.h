@@ -10,9 +10,12 @@
 // together.
 //
 // A group is due when its loops or keyframes are not those of its last refinement, or when the pose
-// graph has forgotten that one (it was started again). Work goes in
-// pieces, and is dropped when a message of its maps is taken. Map frame: the state's. One thread,
-// no clock: the same calls in the same order give the same bytes.
+// graph has forgotten that one (it was started again). A large group is adjusted near what is new
+// (local_part.h), the rest held where the last refinement has it; as a whole when it has none, when
+// it has grown by half since it was (two groups that became one have), and when a local adjustment
+// has moved what was adjusted before further than that may be wrong. Either way the refinement is
+// of the whole group. Work goes in pieces, and is dropped when a message of its maps is taken. Map
+// frame: the state's. One thread, no clock: the same calls in the same order give the same bytes.
 
 #include <cstdint>
 #include <map>
@@ -27,12 +30,15 @@
 #include "core/submap_store.h"
 #include "global_ba/ba_problem.h"
 #include "global_ba/group_world.h"
+#include "global_ba/local_part.h"
+#include "global_ba/ties.h"
 
 namespace pangea {
 
 struct GlobalBaOptions {
   GroupWorldOptions world;
   BaOptions ba;
+  LocalOptions local;
   int min_keyframes = 10;  // of a group
 
   template <typename Archive>
@@ -40,6 +46,7 @@ struct GlobalBaOptions {
     archive.Add("min_keyframes", &min_keyframes, {2, 1000000}, "", "of a group that is adjusted");
     archive.Section("landmarks", &world.landmarks, "tracks and matches joined to landmarks");
     archive.Section("redundancy", &world.redundancy, "keyframes that are left out");
+    archive.Section("local", &local, "adjustments of a part of a large group");
     archive.Section("ba", &ba, "bundle adjustment");
   }
 };
@@ -50,6 +57,7 @@ class GlobalBa {
     int64_t begun = 0;
     int64_t dropped = 0;  // because of a message
     int64_t finished = 0;
+    int64_t finished_local = 0;  // of these
   };
 
   // `records`: for keyframes and matches.
@@ -72,7 +80,7 @@ class GlobalBa {
   void Take(MapState state);
 
   // Whether a group is due or in work.
-  bool HasWork() const { return problem_ != nullptr || NextDue() != nullptr; }
+  bool HasWork() const { return work_ != nullptr || NextDue() != nullptr; }
   // One piece of work, if there is any. The refined state when that was the last.
   std::optional<MapState> Advance();
 
@@ -81,7 +89,6 @@ class GlobalBa {
   const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
-  using Pair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
   using StatePointer = std::shared_ptr<const MapState>;
 
   // What a refinement rests on.
@@ -91,26 +98,42 @@ class GlobalBa {
     int constraints = 0, switched_off = 0;
     bool operator==(const Basis&) const = default;
   };
+  struct Refined {
+    Basis basis;
+    AdjustedGroup adjusted;
+    size_t whole_keyframes = 0;  // of the group when it was last adjusted as a whole
+    bool whole_is_due = false;
+  };
+  struct Work {
+    StatePointer state;
+    std::vector<KeyframePair> new_ties;
+    bool local = false;
+    std::unique_ptr<BaProblem> problem;
+  };
   static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
   static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond ties nothing
 
   StatePointer NextDue() const;
+  bool IsLocal(const MapState& state, const StatePoses& poses) const;
   void Begin(StatePointer state);
+  // Ties of the group that no refinement has.
+  std::vector<KeyframePair> TakeNewTies(const MapState& state, const StatePoses& poses);
+  std::unique_ptr<BaProblem> Whole(const MapState& state, const StatePoses& poses);
+  std::unique_ptr<BaProblem> Local(const StatePoses& poses);
+  void AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places);
   void DropIfAbout(const MapId& map);
-  MapState Refined() const;
+  MapState Finish();
 
   GlobalBaOptions options_;
   std::shared_ptr<RecordStore> records_;
   SubmapStore store_;
-  std::map<Pair, Record> matched_;  // corners, by place recognition
-  // Whose matched corners tie landmarks: accepted, or beside accepted ones and so redundant.
-  std::set<Pair> tied_;
+  std::map<KeyframePair, Record> matched_;  // corners, by place recognition
+  Ties ties_;
+  std::set<KeyframePair> new_ties_;       // not in the refinement of a group that has both ends
   std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
-  // By group.
-  std::map<MapId, std::pair<Basis, std::vector<KeyframePose>>> refined_;
-  StatePointer in_work_;
-  std::unique_ptr<BaProblem> problem_;
+  std::map<MapId, Refined> refined_;      // by group
+  std::unique_ptr<Work> work_;
   Counters counters_;
 };
 

@@ -1,8 +1,12 @@
 #include "global_ba/group_world.h"
 
 #include <algorithm>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
+#include <set>
+#include <utility>
 
 namespace pangea {
 namespace {
@@ -27,55 +31,138 @@ void SetUnknownScales(const std::vector<std::vector<double>>& sigmas_of_maps, Ba
   }
 }
 
-}  // namespace
+// Keys of a sorted container that are of the map.
+template <typename Keyframes>
+auto NumOfMap(const Keyframes& keyframes, const MapId& map) {
+  constexpr int32_t kLast = std::numeric_limits<int32_t>::max();
+  return std::distance(keyframes.lower_bound({map, 0}), keyframes.upper_bound({map, kLast}));
+}
 
-BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& places,
-                       const GroupWorldOptions& options, SubmapStore* store) {
-  std::map<KeyframeId, Rigid3> poses;
-  for (const KeyframePose& pose : state.keyframes) {
-    poses[pose.id] = pose.T_map_body;
-  }
-  BaWorld world;
-  std::vector<std::vector<double>> scale_sigmas;  // by camera
-  std::map<KeyframeId, int> index;
-  for (const auto& [id, T_map_body] : poses) {
-    const auto view = store->Find(id);
+// A world that grows: keyframes, what of them stays, then landmarks.
+class Maker {
+ public:
+  explicit Maker(SubmapStore* store) : store_(store) {}
+
+  // In ascending order.
+  void Add(const KeyframeId& id, const Rigid3& T_map_body) {
+    const auto view = store_->Find(id);
     if (view == nullptr) {
-      continue;
+      return;
     }
     const Keyframe& keyframe = view->keyframe();
     BaKeyframe start = Start(keyframe, T_map_body);
     // A camera for each map, as the last keyframe has it.
-    const bool same_map = !world.keyframes.empty() && world.keyframes.back().id.map == id.map;
-    world.T_body_cam.resize(world.T_body_cam.size() + (same_map ? 0 : 1));
-    world.T_body_cam.back() = keyframe.camera.T_body_cam;
-    start.camera = static_cast<int>(world.T_body_cam.size()) - 1;
-    scale_sigmas.resize(world.T_body_cam.size());
-    scale_sigmas.back().push_back(keyframe.scale_sigma);
+    const bool same_map = !world_.keyframes.empty() && world_.keyframes.back().id.map == id.map;
+    world_.cameras.resize(world_.cameras.size() + (same_map ? 0 : 1));
+    world_.cameras.back().T_body_cam = keyframe.camera.T_body_cam;
+    start.camera = static_cast<int>(world_.cameras.size()) - 1;
+    scale_sigmas_.resize(world_.cameras.size());
+    scale_sigmas_.back().push_back(keyframe.scale_sigma);
     if (keyframe.edge && keyframe.preintegration) {
-      const auto previous = index.find({id.map, keyframe.edge->from_seq});
-      if (previous != index.end()) {
+      const auto previous = index_.find({id.map, keyframe.edge->from_seq});
+      if (previous != index_.end()) {
         start.previous = previous->second;
         start.preintegration = keyframe.preintegration;
         start.edge = {keyframe.edge->T_from_this, keyframe.edge->covariance};
       }
     }
-    index[id] = static_cast<int>(world.keyframes.size());
-    world.keyframes.push_back(std::move(start));
+    index_[id] = static_cast<int>(world_.keyframes.size());
+    world_.keyframes.push_back(std::move(start));
+    stays_.push_back(Stays::kUnlessRedundant);
   }
-  SetUnknownScales(scale_sigmas, &world);
-  std::vector<MatchedKeyframes> matches;
-  std::vector<bool> needed(world.keyframes.size(), false);
-  for (const MatchedPlaces& place : places) {
-    const auto query = index.find(place.query);
-    const auto match = index.find(place.match);
-    if (query != index.end() && match != index.end()) {
-      matches.push_back({query->second, match->second, place.corners});
-      needed[query->second] = needed[match->second] = true;
+
+  // Begins where the adjustment before left it, which also left out what was redundant.
+  void StartFrom(const AdjustedGroup& adjusted, const StatePoses& state, const LocalPart& part) {
+    for (size_t i = 0; i < world_.keyframes.size(); ++i) {
+      BaKeyframe& keyframe = world_.keyframes[i];
+      keyframe.held = !part.moving.contains(keyframe.id);
+      if (const ImuState* known = adjusted.Find(keyframe.id)) {
+        keyframe.imu = MovedTo(keyframe.imu.T_odom_body, *known);
+        stays_[i] = Stays::kAlways;
+      } else if (keyframe.held) {
+        stays_[i] = Stays::kNot;
+      }
+    }
+    HoldCameras(adjusted, state, part);
+  }
+
+  BaWorld Finish(const std::vector<MatchedPlaces>& places, const GroupWorldOptions& options) {
+    SetUnknownScales(scale_sigmas_, &world_);
+    std::vector<MatchedKeyframes> matches;
+    for (const MatchedPlaces& place : places) {
+      const auto query = index_.find(place.query);
+      const auto match = index_.find(place.match);
+      if (query != index_.end() && match != index_.end()) {
+        matches.push_back({query->second, match->second, place.corners});
+        NeedEnds(query->second, match->second);
+      }
+    }
+    AddLandmarks(matches, options.landmarks, store_, &world_);
+    return WithoutRedundant(world_, stays_, options.redundancy);
+  }
+
+ private:
+  void NeedEnds(int query, int match) {
+    for (const int end : {query, match}) {
+      stays_[end] = stays_[end] == Stays::kNot ? Stays::kNot : Stays::kAlways;
     }
   }
-  AddLandmarks(matches, options.landmarks, store, &world);
-  return WithoutRedundant(world, needed, options.redundancy);
+
+  void HoldCameras(const AdjustedGroup& adjusted, const StatePoses& state, const LocalPart& part) {
+    for (const BaKeyframe& keyframe : world_.keyframes) {
+      const MapId& map = keyframe.id.map;
+      const auto known = adjusted.cameras.find(map);
+      BaCamera& camera = world_.cameras[keyframe.camera];
+      if (known != adjusted.cameras.end() && !camera.held &&
+          2 * NumOfMap(part.moving, map) < NumOfMap(state, map)) {
+        camera = known->second;
+        camera.held = true;
+      }
+    }
+  }
+
+  SubmapStore* store_;
+  BaWorld world_;
+  std::vector<std::vector<double>> scale_sigmas_;  // by camera
+  std::vector<Stays> stays_;                       // by keyframe
+  std::map<KeyframeId, int> index_;
+};
+
+// Those of landmarks that nothing that moves sees do not matter.
+void DropWhatIsHeld(BaWorld* world) {
+  std::vector<bool> moves(world->landmarks.size(), false);
+  for (const BaObservation& seen : world->observations) {
+    moves[seen.landmark] = moves[seen.landmark] || !world->keyframes[seen.keyframe].held;
+  }
+  std::erase_if(world->observations,
+                [&](const BaObservation& seen) { return !moves[seen.landmark]; });
+  DropLonelyLandmarks(world);
+}
+
+}  // namespace
+
+BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
+                       const GroupWorldOptions& options, SubmapStore* store) {
+  Maker maker(store);
+  for (const auto& [id, T_map_body] : state) {
+    maker.Add(id, T_map_body);
+  }
+  return maker.Finish(places, options);
+}
+
+BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
+                       const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
+                       const GroupWorldOptions& options, SubmapStore* store) {
+  Maker maker(store);
+  std::set<KeyframeId> all = part.held;
+  all.insert(part.moving.begin(), part.moving.end());
+  for (const KeyframeId& id : all) {
+    maker.Add(id, state.at(id));
+  }
+  maker.StartFrom(adjusted, state, part);
+  BaWorld world = maker.Finish(places, options);
+  DropWhatIsHeld(&world);
+  return world;
 }
 
 }  // namespace pangea

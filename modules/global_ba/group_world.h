@@ -1,13 +1,16 @@
 #pragma once
 
-// A group as the bundle adjustment starts with it: the pose graph's poses, the odometry's
-// velocities and biases, the landmarks.
+// A group, or a part of it, as the bundle adjustment starts with it: the pose graph's poses, the
+// odometry's velocities and biases, or where it was adjusted before the adjustment's, and the
+// landmarks.
 
 #include <vector>
 
 #include "core/server_messages.h"
 #include "core/submap_store.h"
+#include "global_ba/adjusted_group.h"
 #include "global_ba/landmarks.h"
+#include "global_ba/local_part.h"
 #include "global_ba/redundancy.h"
 
 namespace pangea {
@@ -25,7 +28,13 @@ struct GroupWorldOptions {
 };
 
 // Keyframes of the state that the store does not have, and redundant ones, are left out.
-BaWorld MakeGroupWorld(const MapState& state, const std::vector<MatchedPlaces>& places,
+BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
+                       const GroupWorldOptions& options, SubmapStore* store);
+
+// The part alone. A map's camera is held if most of its keyframes stay where they are: they know
+// more of it.
+BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
+                       const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
                        const GroupWorldOptions& options, SubmapStore* store);
 
 }  // namespace pangea

@@ -26,7 +26,7 @@ class Builder {
   Builder(const LandmarkOptions& options, SubmapStore* store, BaWorld* world)
       : options_(options), store_(store), world_(world) {
     for (const BaKeyframe& keyframe : world->keyframes) {
-      T_map_cam_.push_back(keyframe.imu.T_odom_body * world->T_body_cam[keyframe.camera]);
+      T_map_cam_.push_back(keyframe.imu.T_odom_body * world->cameras[keyframe.camera].T_body_cam);
     }
   }
 

@@ -39,7 +39,7 @@ struct Group {
     for (const Keyframe& keyframe : messages.keyframes) {
       store.Add(keyframe);
     }
-    return MakeGroupWorld(messages.state, places, GroupWorldOptions{}, &store);
+    return MakeGroupWorld(PosesOf(messages.state), places, GroupWorldOptions{}, &store);
   }
 
   BaTestWorld truth;
@@ -209,7 +209,7 @@ TEST(Landmarks, AWrongMatchIsLeftOut) {
   for (const BaObservation& seen : world.observations) {
     const BaKeyframe& keyframe = world.keyframes[seen.keyframe];
     const Eigen::Vector3d p_cam =
-        (keyframe.imu.T_odom_body * world.T_body_cam[keyframe.camera]).Inverse() *
+        (keyframe.imu.T_odom_body * world.cameras[keyframe.camera].T_body_cam).Inverse() *
         world.landmarks[seen.landmark];
     EXPECT_LT((seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm(),
               LandmarkOptions{}.max_start_sigmas);
@@ -246,9 +246,10 @@ TEST(GroupWorld, EachMapHasItsLastCamera) {
     keyframe.camera.T_body_cam.t.x() = 0.1 * keyframe.id.map.agent_id + 1e-6 * keyframe.id.seq;
   }
   const BaWorld world = group.World();
-  ASSERT_EQ(world.T_body_cam.size(), 2u);
+  ASSERT_EQ(world.cameras.size(), 2u);
   for (int agent = 0; agent < 2; ++agent) {
-    EXPECT_DOUBLE_EQ(world.T_body_cam[agent].t.x(), 0.1 * (agent + 1) + 1e-6 * (kKeyframes - 1));
+    EXPECT_DOUBLE_EQ(world.cameras[agent].T_body_cam.t.x(),
+                     0.1 * (agent + 1) + 1e-6 * (kKeyframes - 1));
     EXPECT_EQ(world.keyframes[agent * kKeyframes].camera, agent);
   }
 }

@@ -25,9 +25,14 @@ class Culling {
     }
   }
 
-  void Run(const std::vector<bool>& needed) {
-    for (int i = 0; i < static_cast<int>(needed.size()); ++i) {
-      if (!needed[i] && MayLeave(i) && IsSeenByOthers(i)) {
+  void Run(const std::vector<Stays>& stays) {
+    for (int i = 0; i < static_cast<int>(stays.size()); ++i) {
+      if (stays[i] == Stays::kNot) {
+        Remove(i);
+      }
+    }
+    for (int i = 0; i < static_cast<int>(stays.size()); ++i) {
+      if (stays[i] == Stays::kUnlessRedundant && MayLeave(i) && IsSeenByOthers(i)) {
         Remove(i);
       }
     }
@@ -35,7 +40,7 @@ class Culling {
 
   BaWorld Result() const {
     BaWorld result;
-    result.T_body_cam = world_.T_body_cam;
+    result.cameras = world_.cameras;
     std::vector<int> new_index(gone_.size(), -1);
     for (size_t i = 0; i < gone_.size(); ++i) {
       if (!gone_[i]) {
@@ -79,7 +84,22 @@ class Culling {
       --observers_[landmark];
     }
     const BaKeyframe& keyframe = world_.keyframes[i];
-    BaKeyframe& next = world_.keyframes[next_[i]];
+    if (keyframe.previous >= 0) {
+      next_[keyframe.previous] = next_[i];
+    }
+    if (next_[i] >= 0) {
+      Bridge(keyframe, &world_.keyframes[next_[i]]);
+    }
+  }
+
+  static void Bridge(const BaKeyframe& keyframe, BaKeyframe* over) {
+    BaKeyframe& next = *over;
+    next.previous = keyframe.previous;
+    if (keyframe.previous < 0) {
+      next.preintegration.reset();
+      next.edge.reset();
+      return;
+    }
     next.preintegration = Compose(*keyframe.preintegration, *next.preintegration);
     if (keyframe.edge && next.edge) {
       next.edge = {keyframe.edge->T_previous_this * next.edge->T_previous_this,
@@ -88,8 +108,6 @@ class Culling {
     } else {
       next.edge.reset();
     }
-    next.previous = keyframe.previous;
-    next_[keyframe.previous] = next_[i];
   }
 
   const RedundancyOptions& options_;
@@ -102,10 +120,10 @@ class Culling {
 
 }  // namespace
 
-BaWorld WithoutRedundant(const BaWorld& world, const std::vector<bool>& needed,
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Stays>& stays,
                          const RedundancyOptions& options) {
   Culling culling(world, options);
-  culling.Run(needed);
+  culling.Run(stays);
   return culling.Result();
 }
 

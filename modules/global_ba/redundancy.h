@@ -26,9 +26,11 @@ struct RedundancyOptions {
   }
 };
 
-// The world without its redundant keyframes, looked at in their order; `needed` has one entry a
+enum class Stays { kUnlessRedundant, kAlways, kNot };
+
+// The world without its redundant keyframes, looked at in their order; `stays` has one entry a
 // keyframe.
-BaWorld WithoutRedundant(const BaWorld& world, const std::vector<bool>& needed,
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Stays>& stays,
                          const RedundancyOptions& options);
 
 }  // namespace pangea

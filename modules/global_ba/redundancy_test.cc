@@ -12,8 +12,8 @@ namespace {
 // Keyframes every 0.2 s that all see nearly the same.
 BaWorld Dense() { return MakeBaTestWorld({.keyframes = 20, .step_s = 0.2, .landmarks = 60}).truth; }
 
-std::vector<bool> None(const BaWorld& world) {
-  return std::vector<bool>(world.keyframes.size(), false);
+std::vector<Stays> None(const BaWorld& world) {
+  return std::vector<Stays>(world.keyframes.size(), Stays::kUnlessRedundant);
 }
 
 TEST(Redundancy, CullsWhatOthersSee) {
@@ -95,18 +95,38 @@ TEST(Redundancy, AMissingEdgeIsNotBridged) {
 
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
-  std::vector<bool> needed = None(world);
-  for (size_t i = 0; i < needed.size(); i += 3) {
-    needed[i] = true;
+  std::vector<Stays> stays = None(world);
+  for (size_t i = 0; i < stays.size(); i += 3) {
+    stays[i] = Stays::kAlways;
   }
-  const BaWorld culled = WithoutRedundant(world, needed, {});
+  const BaWorld culled = WithoutRedundant(world, stays, {});
   EXPECT_LT(culled.keyframes.size(), world.keyframes.size());
   std::set<KeyframeId> left;
   for (const BaKeyframe& keyframe : culled.keyframes) {
     left.insert(keyframe.id);
   }
-  for (size_t i = 0; i < needed.size(); i += 3) {
+  for (size_t i = 0; i < stays.size(); i += 3) {
     EXPECT_TRUE(left.contains(world.keyframes[i].id));
+  }
+}
+
+TEST(Redundancy, WhatDoesNotStayIsBridgedHoweverLongTheGap) {
+  const BaWorld world = MakeBaTestWorld({.edge_sigma_m = 0.01}).truth;
+  std::vector<Stays> stays(world.keyframes.size(), Stays::kAlways);
+  for (size_t i = 0; i < stays.size(); ++i) {
+    const int32_t seq = world.keyframes[i].id.seq;
+    stays[i] = seq == 0 || seq == 19 || (seq > 4 && seq < 9) ? Stays::kNot : Stays::kAlways;
+  }
+  const BaWorld left = WithoutRedundant(world, stays, {});
+  EXPECT_EQ(left.keyframes.size(), 2 * (20 - 6));
+  for (const BaKeyframe& keyframe : left.keyframes) {
+    const bool begins = keyframe.id.seq == 1;
+    EXPECT_EQ(keyframe.previous < 0, begins);
+    EXPECT_EQ(keyframe.preintegration.has_value(), !begins);
+    EXPECT_EQ(keyframe.edge.has_value(), !begins);
+    if (keyframe.id.seq == 9) {
+      EXPECT_NEAR(keyframe.preintegration->duration_s, 5 * 0.5, 1e-6);
+    }
   }
 }
 

@@ -1,0 +1,71 @@
+#include "global_ba/adjusted_group.h"
+
+#include <cmath>
+
+namespace pangea {
+
+StatePoses PosesOf(const MapState& state) {
+  StatePoses poses;
+  for (const KeyframePose& pose : state.keyframes) {
+    poses[pose.id] = pose.T_map_body;
+  }
+  return poses;
+}
+
+const ImuState* AdjustedGroup::Find(const KeyframeId& id) const {
+  const auto known = keyframes.find(id);
+  return known != keyframes.end() && known->second ? &*known->second : nullptr;
+}
+
+bool AdjustedGroup::IsShapeOf(const StatePoses& state) const {
+  constexpr double kSame_m = 1e-4;
+  const Eigen::Vector3d* p_before = nullptr;
+  const Eigen::Vector3d* told_before = nullptr;
+  for (const auto& [id, imu] : keyframes) {
+    if (!imu) {
+      continue;
+    }
+    const auto told = state.find(id);
+    if (told == state.end()) {
+      return false;
+    }
+    const Eigen::Vector3d& p = imu->T_odom_body.t;
+    const Eigen::Vector3d& p_told = told->second.t;
+    if (p_before != nullptr &&
+        std::abs((p_told - *told_before).norm() - (p - *p_before).norm()) > kSame_m) {
+      return false;
+    }
+    p_before = &p;
+    told_before = &p_told;
+  }
+  return true;
+}
+
+ImuState MovedTo(const Rigid3& T_map_body, const ImuState& adjusted) {
+  const Eigen::Quaterniond rotation = T_map_body.q * adjusted.T_odom_body.q.conjugate();
+  return {T_map_body, rotation * adjusted.v_odom_body, adjusted.gyro_bias, adjusted.accel_bias};
+}
+
+AdjustedGroup AfterAdjustment(const BaWorld& world, const StatePoses& state,
+                              const AdjustedGroup* before) {
+  AdjustedGroup after;
+  if (before != nullptr) {
+    after.cameras = before->cameras;
+  }
+  for (const auto& [id, T_map_body] : state) {
+    const ImuState* known = before == nullptr ? nullptr : before->Find(id);
+    std::optional<ImuState>& imu = after.keyframes[id];
+    if (known != nullptr) {
+      imu = MovedTo(T_map_body, *known);
+    }
+  }
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    if (!keyframe.held) {
+      after.keyframes[keyframe.id] = keyframe.imu;
+    }
+    after.cameras[keyframe.id.map] = world.cameras[keyframe.camera];
+  }
+  return after;
+}
+
+}  // namespace pangea

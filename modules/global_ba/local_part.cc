@@ -1,0 +1,163 @@
+#include "global_ba/local_part.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+class Chooser {
+ public:
+  Chooser(const StatePoses& state, const AdjustedGroup& adjusted, const Ties& ties,
+          SubmapStore* store)
+      : state_(state), adjusted_(adjusted), ties_(ties), store_(store) {}
+
+  LocalPart Choose(const std::vector<KeyframePair>& new_ties, int max_neighbours) {
+    for (const auto& [id, pose] : state_) {
+      if (!adjusted_.Knows(id)) {
+        new_.insert(id);
+      }
+    }
+    for (const auto& [query, match] : new_ties) {
+      new_.insert(query);
+      new_.insert(match);
+    }
+    LocalPart part;
+    part.moving = new_;
+    for (const KeyframeId& id : Neighbours(max_neighbours)) {
+      part.moving.insert(id);
+    }
+    part.held = Around(part.moving);
+    for (const KeyframeId& id : part.moving) {
+      part.held.erase(id);
+    }
+    return part;
+  }
+
+ private:
+  using Shared = std::map<KeyframeId, int>;  // landmarks
+
+  // Those that share most landmarks with what is new.
+  std::vector<KeyframeId> Neighbours(int max_count) {
+    Shared all;
+    const auto count = [&](const KeyframeId& id) {
+      for (const auto& [near, shared] : Along(id)) {
+        if (!new_.contains(near) && adjusted_.Find(near) != nullptr) {
+          all[near] += shared;
+        }
+      }
+    };
+    for (const KeyframeId& id : new_) {
+      count(id);
+      std::ranges::for_each(PartnersOf(id), count);
+    }
+    std::vector<std::pair<int, KeyframeId>> ranked;
+    for (const auto& [id, shared] : all) {
+      ranked.emplace_back(-shared, id);
+    }
+    std::ranges::sort(ranked);
+    ranked.resize(std::min(ranked.size(), static_cast<size_t>(max_count)));
+    std::vector<KeyframeId> neighbours;
+    for (const auto& [shared, id] : ranked) {
+      neighbours.push_back(id);
+    }
+    return neighbours;
+  }
+
+  // All that see landmarks of theirs, along their maps and where ties lead from there.
+  std::set<KeyframeId> Around(const std::set<KeyframeId>& ids) {
+    std::set<KeyframeId> around, partners;
+    const auto add = [&](const KeyframeId& id) {
+      for (const auto& [near, shared] : Along(id)) {
+        around.insert(near);
+      }
+    };
+    std::ranges::for_each(ids, add);
+    for (const KeyframeId& id : around) {
+      const std::vector<KeyframeId> of_one = PartnersOf(id);
+      partners.insert(of_one.begin(), of_one.end());
+    }
+    std::ranges::for_each(partners, add);
+    return around;
+  }
+
+  // In the group.
+  std::vector<KeyframeId> PartnersOf(const KeyframeId& id) const {
+    std::vector<KeyframeId> partners = ties_.PartnersOf(id);
+    std::erase_if(partners, [this](const KeyframeId& p) { return !state_.contains(p); });
+    return partners;
+  }
+
+  // The keyframe, and those before and behind it as long as they see landmarks of it; at least to
+  // the next that takes part, which inertial measurements join to it.
+  const Shared& Along(const KeyframeId& id) {
+    const auto [known, is_new] = along_.try_emplace(id);
+    if (is_new) {
+      Shared& along = known->second;
+      along[id] = static_cast<int>(LandmarksOf(id).size());
+      const auto here = state_.find(id);
+      bool joined = false;
+      for (auto it = std::next(here); it != state_.end() && Add(id, it->first, &joined, &along);) {
+        ++it;
+      }
+      joined = false;
+      for (auto it = here;
+           it != state_.begin() && Add(id, std::prev(it)->first, &joined, &along);) {
+        --it;
+      }
+    }
+    return known->second;
+  }
+
+  // Whether it belongs to those along `id`.
+  bool Add(const KeyframeId& id, const KeyframeId& near, bool* joined, Shared* along) {
+    const int shared = near.map == id.map ? NumShared(id, near) : 0;
+    if (near.map != id.map || (shared == 0 && *joined)) {
+      return false;
+    }
+    (*along)[near] = shared;
+    *joined = *joined || new_.contains(near) || adjusted_.Find(near) != nullptr;
+    return true;
+  }
+
+  int NumShared(const KeyframeId& a, const KeyframeId& b) {
+    std::vector<int32_t> shared;
+    std::ranges::set_intersection(LandmarksOf(a), LandmarksOf(b), std::back_inserter(shared));
+    return static_cast<int>(shared.size());
+  }
+
+  const std::vector<int32_t>& LandmarksOf(const KeyframeId& id) {
+    const auto [known, is_new] = landmarks_.try_emplace(id);
+    std::vector<int32_t>& landmarks = known->second;
+    if (const auto view = is_new ? store_->Find(id) : nullptr) {
+      for (const Corner& corner : view->keyframe().corners) {
+        if (corner.landmark_id != kNoLandmark) {
+          landmarks.push_back(corner.landmark_id);
+        }
+      }
+      std::ranges::sort(landmarks);
+      const auto repeats = std::ranges::unique(landmarks);
+      landmarks.erase(repeats.begin(), repeats.end());
+    }
+    return landmarks;
+  }
+
+  const StatePoses& state_;
+  const AdjustedGroup& adjusted_;
+  const Ties& ties_;
+  SubmapStore* store_;
+  std::set<KeyframeId> new_;
+  std::map<KeyframeId, std::vector<int32_t>> landmarks_;
+  std::map<KeyframeId, Shared> along_;
+};
+
+}  // namespace
+
+LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted, const Ties& ties,
+                          const std::vector<KeyframePair>& new_ties, int max_neighbours,
+                          SubmapStore* store) {
+  return Chooser(state, adjusted, ties, store).Choose(new_ties, max_neighbours);
+}
+
+}  // namespace pangea

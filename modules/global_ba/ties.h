@@ -1,0 +1,37 @@
+#pragma once
+
+// Pairs of keyframes whose matched corners tie landmarks: accepted, or beside accepted ones and so
+// redundant.
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "core/ids.h"
+
+namespace pangea {
+
+using KeyframePair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
+
+class Ties {
+ public:
+  // False for a repeat.
+  bool Insert(const KeyframePair& pair) {
+    by_match_.emplace(pair.second, pair.first);
+    return by_query_.insert(pair).second;
+  }
+
+  const std::set<KeyframePair>& all() const { return by_query_; }
+  // Those whose query is of the map, ascending.
+  std::vector<KeyframePair> OfMap(const MapId& map) const;
+  // Those whose query it is, ascending.
+  std::vector<KeyframePair> OfQuery(const KeyframeId& query) const;
+  // The other keyframe of each pair that it is in.
+  std::vector<KeyframeId> PartnersOf(const KeyframeId& id) const;
+
+ private:
+  std::set<KeyframePair> by_query_;
+  std::set<KeyframePair> by_match_;  // (match, query)
+};
+
+}  // namespace pangea
