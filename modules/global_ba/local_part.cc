@@ -19,14 +19,20 @@ class Chooser {
         new_.insert(id);
       }
     }
-    for (const auto& [query, match] : new_ties) {
-      new_.insert(query);
-      new_.insert(match);
-    }
     LocalPart part;
     part.moving = new_;
-    for (const KeyframeId& id : Neighbours(max_neighbours)) {
-      part.moving.insert(id);
+    const size_t max_moving = new_.size() + static_cast<size_t>(max_neighbours);
+    for (const auto& [query, match] : new_ties) {
+      for (const KeyframeId& end : {query, match}) {
+        if (part.moving.size() < max_moving) {
+          part.moving.insert(end);
+        }
+      }
+    }
+    std::vector<KeyframeId> newest(part.moving.begin(), part.moving.end());
+    while (!newest.empty() && part.moving.size() < max_moving) {
+      newest = Neighbours(newest, part.moving, max_moving - part.moving.size());
+      part.moving.insert(newest.begin(), newest.end());
     }
     part.held = Around(part.moving);
     for (const KeyframeId& id : part.moving) {
@@ -38,17 +44,18 @@ class Chooser {
  private:
   using Shared = std::map<KeyframeId, int>;  // landmarks
 
-  // Those that share most landmarks with what is new.
-  std::vector<KeyframeId> Neighbours(int max_count) {
+  // Those that share most landmarks with these, and are not among `known`.
+  std::vector<KeyframeId> Neighbours(const std::vector<KeyframeId>& ids,
+                                     const std::set<KeyframeId>& known, size_t max_count) {
     Shared all;
     const auto count = [&](const KeyframeId& id) {
       for (const auto& [near, shared] : Along(id)) {
-        if (!new_.contains(near) && adjusted_.Find(near) != nullptr) {
+        if (!known.contains(near) && adjusted_.Find(near) != nullptr) {
           all[near] += shared;
         }
       }
     };
-    for (const KeyframeId& id : new_) {
+    for (const KeyframeId& id : ids) {
       count(id);
       std::ranges::for_each(PartnersOf(id), count);
     }
@@ -57,7 +64,7 @@ class Chooser {
       ranked.emplace_back(-shared, id);
     }
     std::ranges::sort(ranked);
-    ranked.resize(std::min(ranked.size(), static_cast<size_t>(max_count)));
+    ranked.resize(std::min(ranked.size(), max_count));
     std::vector<KeyframeId> neighbours;
     for (const auto& [shared, id] : ranked) {
       neighbours.push_back(id);

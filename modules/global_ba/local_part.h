@@ -2,8 +2,8 @@
 
 // The part of a group that an adjustment moves when the rest has been adjusted before (the local
 // bundle adjustment of Mur-Artal et al., TRO 2015, section VI.D, over what is new since then): new
-// keyframes and the ends of new ties, and those that share landmarks with them. Held are those that
-// share landmarks with what moves.
+// keyframes and the ends of new ties, then those that share landmarks with them, then with these,
+// up to a bound. Held are those that share landmarks with what moves.
 
 #include <set>
 #include <vector>
