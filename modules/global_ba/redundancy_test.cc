@@ -95,29 +95,29 @@ TEST(Redundancy, AMissingEdgeIsNotBridged) {
 
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
-  std::vector<Stays> stays = None(world);
-  for (size_t i = 0; i < stays.size(); i += 3) {
-    stays[i] = Stays::kAlways;
+  std::vector<Stays> fates = None(world);
+  for (size_t i = 0; i < fates.size(); i += 3) {
+    fates[i] = Stays::kAlways;
   }
-  const BaWorld culled = WithoutRedundant(world, stays, {});
+  const BaWorld culled = WithoutRedundant(world, fates, {});
   EXPECT_LT(culled.keyframes.size(), world.keyframes.size());
   std::set<KeyframeId> left;
   for (const BaKeyframe& keyframe : culled.keyframes) {
     left.insert(keyframe.id);
   }
-  for (size_t i = 0; i < stays.size(); i += 3) {
+  for (size_t i = 0; i < fates.size(); i += 3) {
     EXPECT_TRUE(left.contains(world.keyframes[i].id));
   }
 }
 
 TEST(Redundancy, WhatDoesNotStayIsBridgedHoweverLongTheGap) {
   const BaWorld world = MakeBaTestWorld({.edge_sigma_m = 0.01}).truth;
-  std::vector<Stays> stays(world.keyframes.size(), Stays::kAlways);
-  for (size_t i = 0; i < stays.size(); ++i) {
+  std::vector<Stays> fates(world.keyframes.size(), Stays::kAlways);
+  for (size_t i = 0; i < fates.size(); ++i) {
     const int32_t seq = world.keyframes[i].id.seq;
-    stays[i] = seq == 0 || seq == 19 || (seq > 4 && seq < 9) ? Stays::kNot : Stays::kAlways;
+    fates[i] = seq == 0 || seq == 19 || (seq > 4 && seq < 9) ? Stays::kNot : Stays::kAlways;
   }
-  const BaWorld left = WithoutRedundant(world, stays, {});
+  const BaWorld left = WithoutRedundant(world, fates, {});
   EXPECT_EQ(left.keyframes.size(), 2 * (20 - 6));
   for (const BaKeyframe& keyframe : left.keyframes) {
     const bool begins = keyframe.id.seq == 1;
