@@ -35,18 +35,22 @@ void Vio::OpenNewMap() {
   estimator_.emplace(options_.estimator, camera_, noise_);
 }
 
-int64_t Vio::ImuTimeOf(int64_t image_utime) const {
+int64_t Vio::ImuTimeOf(int64_t image_utime) const { return ImuTimeOfRow(image_utime, 1); }
+
+int64_t Vio::ImuTimeOfRow(int64_t image_utime, double row) const {
   // Never less than the calibration says, so that samples come in order while the estimate moves.
   const double offset_s = std::max(camera_.time_offset_s, estimator_->camera().time_offset_s);
-  return image_utime + std::llround(1e6 * offset_s);
+  return image_utime + std::llround(1e6 * (offset_s + row * camera_.readout_s));
 }
 
-// The gyroscope's rotation between the last image and this one, as a rotation of the camera.
+// The gyroscope's rotation between the last image's middle row and this one's, as a rotation of the
+// camera.
 Eigen::Quaterniond Vio::CameraRotation(int64_t utime) {
   Eigen::Quaterniond q_last_now = Eigen::Quaterniond::Identity();
-  const int64_t end = ImuTimeOf(utime);
+  constexpr double kMiddleRow = 0.5;
+  const int64_t end = ImuTimeOfRow(utime, kMiddleRow);
   if (last_utime_) {
-    int64_t at = ImuTimeOf(*last_utime_);
+    int64_t at = ImuTimeOfRow(*last_utime_, kMiddleRow);
     for (const ImuSample& sample : rotation_imu_) {
       const int64_t until = std::min(sample.utime, end);
       if (until > at) {
@@ -82,7 +86,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.map = map_;
   output.T_odom_body = result.T_odom_body;
   output.v_odom_body = result.v_odom_body;
-  output.omega_body = result.omega_body;
+  output.motion = result.motion;
   output.is_keyframe = result.is_keyframe;
   output.imu_contradicted = result.imu_contradicted;
   output.num_tracked = static_cast<int>(frame.observations.size());
@@ -109,8 +113,7 @@ Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
   Keyframe keyframe;
   keyframe.camera = estimator_->camera();
   keyframe.corners = described_.at(output.utime);
-  TakeOutReadout({output.omega_body, output.T_odom_body.q.conjugate() * output.v_odom_body},
-                 keyframe);
+  TakeOutReadout(output.motion, keyframe);
   return {keyframe.camera, std::move(keyframe.corners), estimator_->Poses()};
 }
 
@@ -151,8 +154,7 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
     keyframe.corners = std::move(node.mapped());
   }
   keyframe.points = Points(finished, keyframe.corners);
-  TakeOutReadout({finished.omega_body, finished.T_odom_body.q.conjugate() * finished.v_odom_body},
-                 keyframe);
+  TakeOutReadout(finished.motion, keyframe);
   keyframe.group_revision = group_revision_;
   keyframe.scale_sigma =
       std::min(finished.scale_sigma.value_or(scale_sigma_.value_or(0)), kMaxScaleSigma);

@@ -47,7 +47,7 @@ struct VioOutput {
   MapId map;
   Rigid3 T_odom_body;  // valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
+  BodyMotion motion;  // from there on
   int num_tracked = 0;
   // How well the scale is known, a share: of the newest keyframe that tells.
   std::optional<double> scale_sigma;
@@ -74,7 +74,7 @@ class Vio {
   // The same, and a new map: what comes next is from another time, perhaps an earlier one.
   std::vector<Keyframe> StartAnew();
 
-  // The IMU's time of an image.
+  // The IMU's time of an image's last row.
   int64_t ImuTimeOf(int64_t image_utime) const;
   const MapId& map() const { return map_; }
   int maps_opened() const { return maps_opened_; }
@@ -91,6 +91,7 @@ class Vio {
 
  private:
   void OpenNewMap();
+  int64_t ImuTimeOfRow(int64_t image_utime, double row) const;  // row: 0 the first, 1 the last
   Eigen::Quaterniond CameraRotation(int64_t utime);
   VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
                      std::span<const ImuSample> imu);

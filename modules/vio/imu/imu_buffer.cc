@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "vio/imu/imu_noise.h"
 
@@ -74,6 +75,28 @@ const ImuSample& ImuBuffer::At(int64_t utime) const {
       std::partition_point(samples_.begin(), samples_.end(),
                            [utime](const ImuSample& one) { return one.utime < utime; });
   return sample == samples_.end() ? samples_.back() : *sample;
+}
+
+BodyMotion ImuBuffer::MotionFrom(int64_t utime, double duration_s, const ImuIntrinsics& intrinsics,
+                                 const ImuState& state) const {
+  BodyMotion motion;
+  const auto duration_us = std::llround(1e6 * duration_s);
+  if (duration_us <= 0) {
+    motion.omega = intrinsics.Corrected(At(utime)).gyro - state.gyro_bias;
+    return motion;
+  }
+  const auto moved = [&](int64_t until) {
+    return Integrate(utime, until, intrinsics, state.gyro_bias, state.accel_bias).measured;
+  };
+  const Preintegration half = moved(utime + duration_us / 2), whole = moved(utime + duration_us);
+  // Through both rotations: t omega + t^2 / 2 alpha.
+  const Eigen::Vector3d slope_half = LogSo3(half.delta_q) / half.duration_s;
+  const Eigen::Vector3d slope_whole = LogSo3(whole.delta_q) / whole.duration_s;
+  motion.alpha = 2 * (slope_whole - slope_half) / (whole.duration_s - half.duration_s);
+  motion.omega = slope_whole - 0.5 * whole.duration_s * motion.alpha;
+  motion.a = whole.delta_v / whole.duration_s -
+             state.T_odom_body.q.conjugate() * Eigen::Vector3d(0, 0, kGravity);
+  return motion;
 }
 
 std::vector<ImuSample> ImuBuffer::Latest(size_t count) const {

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "core/imu/imu.h"
+#include "core/imu/imu_factor.h"
 #include "core/imu/preintegration.h"
+#include "vio/imu/body_motion.h"
 #include "vio/imu/imu_intrinsics.h"
 
 namespace pangea::vio {
@@ -30,6 +32,10 @@ class ImuBuffer {
                                  const Eigen::Vector3d& accel_bias) const;
   // The first at or after this time, else the last of all. There must be one.
   const ImuSample& At(int64_t utime) const;
+  // Rotation and acceleration from a time on, so that they hold at the middle and the end of
+  // `duration_s`; for none, the rotation rate then. The velocity is left open.
+  BodyMotion MotionFrom(int64_t utime, double duration_s, const ImuIntrinsics& intrinsics,
+                        const ImuState& state) const;
   // The newest of them, `count` or as many as there are.
   std::vector<ImuSample> Latest(size_t count) const;
 

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <vector>
+
 #include "vio/window/testing/window_test_world.h"
 
 namespace pangea::vio {
@@ -32,6 +35,38 @@ TEST(ImuBuffer, IntegratesExactlyTheSpan) {
       buffer.Integrate(kFirst_us + 50'000, kFirst_us + 93'000, {}, bg, ba).measured;
   EXPECT_LT((a.delta_v + a.delta_q * b.delta_v - whole.delta_v).norm(), 1e-9);
   EXPECT_LT(LogSo3((a.delta_q * b.delta_q).conjugate() * whole.delta_q).norm(), 1e-9);
+}
+
+// A hand that starts to turn: the rate grows while the rows are read out.
+TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
+  constexpr double kReadout_s = 0.03;
+  const Vector3d omega(0.2, -0.4, 0.1), alpha(15, -8, 4), bias(0.01, 0.02, -0.01);
+  ImuBuffer buffer(ImuNoise{});
+  std::vector<ImuSample> samples;
+  for (int i = 0; i <= 20; ++i) {
+    const double s = 0.005 * i;
+    samples.push_back({kFirst_us + 5'000 * i, omega + s * alpha + bias, Vector3d(1, 2, 9.81)});
+  }
+  buffer.Add(samples);
+  ImuState state;
+  state.gyro_bias = bias;
+  const BodyMotion motion = buffer.MotionFrom(kFirst_us + 10'000, kReadout_s, {}, state);
+  EXPECT_LT((motion.omega - (omega + 0.01 * alpha)).norm(), 1e-3);
+  EXPECT_LT((motion.alpha - alpha).norm(), 0.1);
+  EXPECT_LT((motion.a - Vector3d(1, 2, 0)).norm(), 0.2);  // the force turns with the body
+  for (const double share : {0.5, 1.0}) {
+    const auto moved = buffer.Integrate(kFirst_us + 10'000,
+                                        kFirst_us + 10'000 + std::llround(1e6 * share * kReadout_s),
+                                        {}, bias, Vector3d::Zero());
+    EXPECT_LT(motion.After(share * kReadout_s).q.angularDistance(moved.measured.delta_q), 1e-9);
+  }
+}
+
+TEST(ImuBuffer, MotionOfAGlobalShutterIsTheRotationRate) {
+  const BodyMotion motion = Filled(100).MotionFrom(kFirst_us + 10'000, 0, {}, ImuState{});
+  EXPECT_EQ(motion.omega, Filled(100).At(kFirst_us + 10'000).gyro);
+  EXPECT_EQ(motion.alpha, Vector3d::Zero());
+  EXPECT_EQ(motion.a, Vector3d::Zero());
 }
 
 TEST(ImuBuffer, TheLastSampleHoldsALittleLonger) {

@@ -153,7 +153,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   // The state is where the body was by the time offset as the frame came.
   keyframe.T_odom_body = state.PoseAhead(index, state.Ahead(index, 0));
   keyframe.v_odom_body = frame.imu.v_odom_body;
-  keyframe.omega_body = frame.omega_body;
+  keyframe.motion = state.MotionAhead(index, state.Ahead(index, 0));
   keyframe.gyro_bias = frame.imu.gyro_bias;
   keyframe.accel_bias = frame.imu.accel_bias;
   const int at = state.Offset(index);

@@ -18,11 +18,19 @@ TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
   const MatrixXd P = 1e-6 * MatrixXd::Identity(size, size);
   const FinishedKeyframe keyframe = FinishKeyframe(state, P, TrackHistory{}, kFrame);
   const WindowFrame& frame = state.frames[kFrame];
-  const Rigid3 moved(frame.imu.T_odom_body.q * ExpSo3(kLate_s * frame.omega_body),
-                     frame.imu.T_odom_body.t + kLate_s * frame.imu.v_odom_body);
+  const BodyMotion motion{frame.omega_body, frame.alpha_body,
+                          frame.imu.T_odom_body.q.conjugate() * frame.imu.v_odom_body,
+                          frame.a_body};
+  const Rigid3 moved = frame.imu.T_odom_body * motion.After(kLate_s);
   EXPECT_GT((keyframe.T_odom_body.t - frame.imu.T_odom_body.t).norm(), 0.001);
   EXPECT_LT((keyframe.T_odom_body.t - moved.t).norm(), 1e-9);
   EXPECT_LT(keyframe.T_odom_body.q.angularDistance(moved.q), 1e-9);
+  // And moves on as the body did then.
+  constexpr double kOn_s = 0.02;
+  const Rigid3 at_once = frame.imu.T_odom_body * motion.After(kLate_s + kOn_s);
+  const Rigid3 later = keyframe.T_odom_body * keyframe.motion.After(kOn_s);
+  EXPECT_LT((later.t - at_once.t).norm(), 1e-6);
+  EXPECT_LT(later.q.angularDistance(at_once.q), 1e-4);
 }
 
 // The window has the rotation first, a keyframe the translation.

@@ -1,7 +1,11 @@
 #include "vio/live/rolling_shutter.h"
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
+
+#include "core/median.h"
 
 namespace pangea::vio {
 namespace {
@@ -12,8 +16,41 @@ using Eigen::Vector3d;
 // The camera that exposed a row, seen from the camera at the image's time.
 Rigid3 RowCamera(const CameraModel& camera, const BodyMotion& motion, double row) {
   const double s = camera.readout_s * row / (camera.height - 1);
-  const Rigid3 T_body_later(ExpSo3(s * motion.omega), s * motion.v);
-  return camera.T_body_cam.Inverse() * T_body_later * camera.T_body_cam;
+  return camera.T_body_cam.Inverse() * motion.After(s) * camera.T_body_cam;
+}
+
+struct SeenDepth {
+  Eigen::Vector2f pixel;
+  float inverse_depth;
+};
+
+std::vector<SeenDepth> SeenDepths(const Keyframe& keyframe) {
+  std::vector<SeenDepth> seen;
+  for (const MapPoint& point : keyframe.points) {
+    seen.push_back(
+        {keyframe.corners[static_cast<size_t>(point.corner)].pixel, point.inverse_depth});
+  }
+  return seen;
+}
+
+// The median of the map points nearest in the image; as if far away where there are none.
+double InverseDepthNear(const Eigen::Vector2f& pixel, const std::vector<SeenDepth>& seen) {
+  constexpr size_t kNearest = 5;
+  if (seen.empty()) {
+    return 0;
+  }
+  std::vector<std::pair<float, float>> by_distance;  // squared pixels, 1/m
+  for (const SeenDepth& at : seen) {
+    by_distance.emplace_back((at.pixel - pixel).squaredNorm(), at.inverse_depth);
+  }
+  const size_t num = std::min(kNearest, by_distance.size());
+  std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(num),
+                    by_distance.end());
+  std::vector<float> nearest;
+  for (size_t i = 0; i < num; ++i) {
+    nearest.push_back(by_distance[i].second);
+  }
+  return static_cast<double>(Median(std::move(nearest)));
 }
 
 }  // namespace
@@ -27,6 +64,7 @@ void TakeOutReadout(const BodyMotion& motion, Keyframe& keyframe) {
   for (MapPoint& point : keyframe.points) {
     point_of[static_cast<size_t>(point.corner)] = &point;
   }
+  const std::vector<SeenDepth> seen = SeenDepths(keyframe);
   for (size_t i = 0; i < keyframe.corners.size(); ++i) {
     Corner& corner = keyframe.corners[i];
     const auto ray = camera.Unproject(corner.pixel.cast<double>());
@@ -34,7 +72,8 @@ void TakeOutReadout(const BodyMotion& motion, Keyframe& keyframe) {
       continue;
     }
     const Rigid3 T_cam_row = RowCamera(camera, motion, static_cast<double>(corner.pixel.y()));
-    const double rho = point_of[i] != nullptr ? static_cast<double>(point_of[i]->inverse_depth) : 0;
+    const double rho = point_of[i] != nullptr ? static_cast<double>(point_of[i]->inverse_depth)
+                                              : InverseDepthNear(corner.pixel, seen);
     // (x, y, z) * rho, so that a point at infinity is no special case.
     const Vector3d moved = T_cam_row.q * Vector3d(ray->x(), ray->y(), 1) + rho * T_cam_row.t;
     const auto pixel = camera.Project(moved);

@@ -4,19 +4,13 @@
 // saw later, row by row, with the camera's motion during read-out taken out. Consumers of a
 // keyframe then need not know of rows.
 
-#include <Eigen/Core>
-
 #include "core/keyframe.h"
+#include "vio/imu/body_motion.h"
 
 namespace pangea::vio {
 
-// The body's motion while the image was read out, in the body frame.
-struct BodyMotion {
-  Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // rad/s
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();      // m/s
-};
-
-// Moves corners (map points by their depth, all others as if far away) and the points' depths.
+// Moves corners (map points by their depth, all others by the depths of the map points around
+// them) and the points' depths, by the body's motion from the image's time on.
 // Corners that leave the image stay as they are. Does nothing for a global shutter.
 void TakeOutReadout(const BodyMotion& motion, Keyframe& keyframe);
 

@@ -27,9 +27,8 @@ std::optional<Vector2d> SeenByRow(const CameraModel& camera, const BodyMotion& m
   Vector2d pixel(camera.cx, camera.cy);
   for (int i = 0; i < 20; ++i) {
     const double s = camera.readout_s * pixel.y() / (camera.height - 1);
-    const Rigid3 T_body_later(ExpSo3(s * motion.omega), s * motion.v);
     const Vector3d p_row =
-        (T_body_later * camera.T_body_cam).Inverse() * (camera.T_body_cam * p_cam);
+        (motion.After(s) * camera.T_body_cam).Inverse() * (camera.T_body_cam * p_cam);
     const auto next = camera.Project(p_row);
     if (!next) {
       return std::nullopt;
@@ -41,7 +40,7 @@ std::optional<Vector2d> SeenByRow(const CameraModel& camera, const BodyMotion& m
 
 TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
   const CameraModel camera = Phone(0.03);
-  const BodyMotion motion{{0.4, -0.9, 0.6}, {0.8, -0.3, 0.5}};
+  const BodyMotion motion{{0.4, -0.9, 0.6}, {15, 5, -20}, {0.8, -0.3, 0.5}, {2, 1, -3}};
   std::mt19937_64 rng(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
   Keyframe keyframe;
@@ -60,14 +59,11 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
     }
     // The depth the row's camera measured.
     const double s = camera.readout_s * seen->y() / (camera.height - 1);
-    const Rigid3 T_body_later(ExpSo3(s * motion.omega), s * motion.v);
     const Vector3d p_row =
-        (T_body_later * camera.T_body_cam).Inverse() * (camera.T_body_cam * p_cam);
-    if (!far) {
-      keyframe.points.push_back(
-          {static_cast<int>(expected.size()), static_cast<float>(1 / p_row.z()), 1e-4F});
-      depth.push_back(z);
-    }
+        (motion.After(s) * camera.T_body_cam).Inverse() * (camera.T_body_cam * p_cam);
+    keyframe.points.push_back(
+        {static_cast<int>(expected.size()), static_cast<float>(1 / p_row.z()), 1e-4F});
+    depth.push_back(z);
     keyframe.corners.emplace_back().pixel = seen->cast<float>();
     expected.push_back(*still);
     shift = std::max(shift, (*still - *seen).norm());
@@ -78,15 +74,34 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
     EXPECT_LT((keyframe.corners[i].pixel.cast<double>() - expected[i]).norm(), 0.01) << i;
   }
   for (size_t i = 0; i < depth.size(); ++i) {
-    EXPECT_NEAR(1 / static_cast<double>(keyframe.points[i].inverse_depth), depth[i], 1e-4);
+    EXPECT_NEAR(static_cast<double>(keyframe.points[i].inverse_depth), 1 / depth[i], 1e-5);
   }
+}
+
+// Of a corner that no track gave a depth the map points around it tell how far it is.
+TEST(RollingShutter, CornersWithoutDepthMoveAsTheirNeighboursDo) {
+  const BodyMotion motion{Vector3d::Zero(), Vector3d::Zero(), {0.8, -0.3, 0.5}, Vector3d::Zero()};
+  Keyframe keyframe;
+  keyframe.camera = Phone(0.03);
+  for (int i = 0; i < 3; ++i) {  // near on the left, far on the right
+    keyframe.corners.emplace_back().pixel = Eigen::Vector2f(100, 400);
+    keyframe.points.push_back({2 * i, 1 / 2.0F, 1e-4F});
+    keyframe.corners.emplace_back().pixel = Eigen::Vector2f(540, 400);
+    keyframe.points.push_back({2 * i + 1, 1 / 20.0F, 1e-4F});
+  }
+  keyframe.corners.emplace_back().pixel = Eigen::Vector2f(100, 400);
+  keyframe.corners.emplace_back().pixel = Eigen::Vector2f(540, 400);
+  keyframe.points.resize(6);
+  TakeOutReadout(motion, keyframe);
+  EXPECT_GT((keyframe.corners[0].pixel - Eigen::Vector2f(100, 400)).norm(), 2);
+  EXPECT_LT((keyframe.corners[6].pixel - keyframe.corners[0].pixel).norm(), 1e-3);
 }
 
 TEST(RollingShutter, AGlobalShutterIsLeftAlone) {
   Keyframe keyframe;
   keyframe.camera = Phone(0);
   keyframe.corners.emplace_back().pixel = {100, 200};
-  TakeOutReadout({{1, 2, 3}, {4, 5, 6}}, keyframe);
+  TakeOutReadout({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}, keyframe);
   EXPECT_EQ(keyframe.corners[0].pixel, Eigen::Vector2f(100, 200));
 }
 

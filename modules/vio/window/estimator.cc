@@ -138,8 +138,11 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   frame.time_offset_s = problem.state.time_offset_s;
   frame.stamp_sigma_s = stamp_jitter.sigma_s();
   frame.imu = imu;
-  frame.omega_body =
-      problem.state.imu_intrinsics.Corrected(imu_samples.At(frame.imu_utime)).gyro - imu.gyro_bias;
+  const BodyMotion motion =
+      imu_samples.MotionFrom(frame.imu_utime, camera.readout_s, problem.state.imu_intrinsics, imu);
+  frame.omega_body = motion.omega;
+  frame.alpha_body = motion.alpha;
+  frame.a_body = motion.a;
   problem.state.frames.push_back(frame);
   problem.imu_factors.push_back(std::move(factor));
 }
@@ -329,7 +332,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   const int newest = problem.state.Newest();
   result.T_odom_body = problem.state.PoseAhead(newest, problem.state.Ahead(newest, 0));
   result.v_odom_body = Newest().imu.v_odom_body;
-  result.omega_body = Newest().omega_body;
+  result.motion = problem.state.MotionAhead(newest, problem.state.Ahead(newest, 0));
   result.gyro_bias = Newest().imu.gyro_bias;
   result.accel_bias = Newest().imu.accel_bias;
   result.is_keyframe = Newest().is_keyframe;

@@ -22,6 +22,7 @@
 #include "core/keyframe.h"
 #include "core/rigid3.h"
 #include "vio/front_end/tracks.h"
+#include "vio/imu/body_motion.h"
 #include "vio/imu/stationary_options.h"
 #include "vio/window/window_poses.h"
 
@@ -82,7 +83,7 @@ struct FinishedKeyframe {
   int64_t utime = 0;  // of its TrackedFrame
   Rigid3 T_odom_body;
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
+  BodyMotion motion;  // from there on
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y
@@ -107,7 +108,7 @@ struct FrameResult {
   std::string reason;  // why it is not tracking
   Rigid3 T_odom_body;  // at this frame; valid while tracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate
+  BodyMotion motion;  // from there on
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   bool is_keyframe = false;       // this frame will be finished as a keyframe later

@@ -33,9 +33,13 @@ Eigen::Matrix<double, 2, 3> RayJacobian(const Vector3d& y) {
   return J;
 }
 
-// How fast a point moves that a frame carries along, m/s.
-Vector3d CarriedBy(const WindowFrame& frame, const Rigid3& T_odom_body, const Vector3d& p_odom) {
-  return frame.imu.v_odom_body + (T_odom_body.q * frame.omega_body).cross(p_odom - T_odom_body.t);
+// How fast a point moves that a frame carries along, m/s; `T_odom_body`: the frame that much ahead.
+Vector3d CarriedBy(const WindowFrame& frame, double ahead_s, const Rigid3& T_odom_body,
+                   const Vector3d& p_odom) {
+  const Vector3d rotation = ahead_s * frame.omega_body + 0.5 * ahead_s * ahead_s * frame.alpha_body;
+  const Vector3d omega = RightJacobian(rotation) * (frame.omega_body + ahead_s * frame.alpha_body);
+  return frame.imu.v_odom_body + ahead_s * (frame.imu.T_odom_body.q * frame.a_body) +
+         (T_odom_body.q * omega).cross(p_odom - T_odom_body.t);
 }
 
 Rigid3 BodyPose(const WindowState& state, const FrameRay& seen) {
@@ -77,7 +81,8 @@ PointInOdom::PointInOdom(const WindowState& state, const AnchoredPoint& point) {
   by_translation = T_a.R();
   by_rotation = by_translation * Hat(-x_body);
   by_point = by_translation * state.T_body_cam.R() * PointJacobian(point.ray_rho);
-  by_anchor_stamp = CarriedBy(state.frames[point.anchor], T_a, p_odom);
+  by_anchor_stamp = CarriedBy(state.frames[point.anchor],
+                              state.Ahead(point.anchor, point.anchor_row_s), T_a, p_odom);
 }
 
 Vector3d InOdom(const WindowState& state, const AnchoredPoint& point) {
@@ -115,7 +120,8 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOd
   out.J_anchor = -out.J_frame;
   out.J_calibration.leftCols<3>() = J_body * Hat(y_body) + J_odom * point.by_rotation;
   out.J_calibration.middleCols<3>(3) = J_odom * point.by_translation - J_body;
-  out.J_frame_stamp = -(J_odom * CarriedBy(state.frames[seen.frame], T_c, point.p_odom));
+  out.J_frame_stamp = -(J_odom * CarriedBy(state.frames[seen.frame],
+                                           state.Ahead(seen.frame, seen.row_s), T_c, point.p_odom));
   out.J_anchor_stamp = J_odom * point.by_anchor_stamp;
   out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
   out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;

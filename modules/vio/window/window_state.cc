@@ -35,8 +35,16 @@ CameraModel WindowState::Calibrated(CameraModel given) const {
 
 Rigid3 WindowState::PoseAhead(int frame, double ahead_s) const {
   const WindowFrame& f = frames[frame];
-  return {f.imu.T_odom_body.q * ExpSo3(ahead_s * f.omega_body),
-          f.imu.T_odom_body.t + ahead_s * f.imu.v_odom_body};
+  const Quaterniond& q = f.imu.T_odom_body.q;
+  const double half_square = 0.5 * ahead_s * ahead_s;
+  return {q * ExpSo3(ahead_s * f.omega_body + half_square * f.alpha_body),
+          f.imu.T_odom_body.t + ahead_s * f.imu.v_odom_body + half_square * (q * f.a_body)};
+}
+
+BodyMotion WindowState::MotionAhead(int frame, double ahead_s) const {
+  const WindowFrame& f = frames[frame];
+  const Vector3d v_body = f.imu.T_odom_body.q.conjugate() * f.imu.v_odom_body;
+  return BodyMotion{f.omega_body, f.alpha_body, v_body, f.a_body}.From(ahead_s);
 }
 
 void WindowState::Retract(const VectorXd& error) {

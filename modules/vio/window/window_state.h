@@ -18,6 +18,7 @@
 #include "core/imu/imu_factor.h"
 #include "core/imu/preintegration.h"
 #include "core/rigid3.h"
+#include "vio/imu/body_motion.h"
 #include "vio/imu/imu_intrinsics.h"
 
 namespace pangea::vio {
@@ -43,7 +44,10 @@ struct WindowFrame {
   double stamp_error_s = 0;
   double stamp_sigma_s = 0;  // 0: stamps are exact, and the error is no variable
   ImuState imu;
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rotation rate there, rad/s
+  // How it moves on from there while the rows are read out (body_motion.h).
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d a_body = Eigen::Vector3d::Zero();
   bool is_window_keyframe = false;  // it holds its place; else the next frame replaces it
   bool is_keyframe = false;         // it is, or will be, published
   bool is_published = false;
@@ -72,11 +76,12 @@ struct WindowState {
   CameraModel Calibrated(CameraModel given) const;
 
   // The body when a row of a frame's image was exposed, that much after the image's time: the
-  // frame's pose, moved on at its velocity and rotation rate.
+  // frame's pose, moved on.
   double Ahead(int frame, double row_s) const {
     return time_offset_s - frames[frame].time_offset_s + frames[frame].stamp_error_s + row_s;
   }
   Rigid3 PoseAhead(int frame, double ahead_s) const;
+  BodyMotion MotionAhead(int frame, double ahead_s) const;
 
   // state (+) error, in the coordinates above.
   void Retract(const Eigen::VectorXd& error);

@@ -120,6 +120,8 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
     frame.imu_utime = 1'000'000 + kSampleStep_us * kSamplesPerImuFactor * i;
     frame.utime = frame.imu_utime - 2'000;
     frame.omega_body = RandomVector(rng, 0.3);
+    frame.alpha_body = Vector3d(6, -9, 4);
+    frame.a_body = Vector3d(1, -2, 0.5);
     frame.is_window_keyframe = true;
     if (options.stamp_sigma_s > 0 && i % 2 == 0) {
       frame.stamp_sigma_s = options.stamp_sigma_s;
