@@ -9,7 +9,7 @@
 
 namespace pangea::calibration {
 Input TracksOf(const EurocRecording& recording, const PartOfRecording& part,
-               std::optional<Eigen::Quaterniond> q_body_cam) {
+               const std::optional<Eigen::Quaterniond>& q_body_cam) {
   Collector collector(recording.camera().width, recording.camera().height, recording.imu_noise(),
                       q_body_cam);
   for (const ImuSample& sample : recording.imu()) {

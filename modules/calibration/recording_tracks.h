@@ -15,6 +15,6 @@ struct PartOfRecording {
 
 // `q_body_cam` as of Input.
 Input TracksOf(const EurocRecording& recording, const PartOfRecording& part,
-               std::optional<Eigen::Quaterniond> q_body_cam);
+               const std::optional<Eigen::Quaterniond>& q_body_cam);
 
 }  // namespace pangea::calibration

@@ -20,23 +20,23 @@ const ImuState* AdjustedGroup::Find(const KeyframeId& id) const {
 bool AdjustedGroup::IsShapeOf(const StatePoses& state) const {
   constexpr double kSame_m = 1e-4;
   const Eigen::Vector3d* p_before = nullptr;
-  const Eigen::Vector3d* told_before = nullptr;
+  const Eigen::Vector3d* p_state_before = nullptr;
   for (const auto& [id, imu] : keyframes) {
     if (!imu) {
       continue;
     }
-    const auto told = state.find(id);
-    if (told == state.end()) {
+    const auto posed = state.find(id);
+    if (posed == state.end()) {
       return false;
     }
     const Eigen::Vector3d& p = imu->T_odom_body.t;
-    const Eigen::Vector3d& p_told = told->second.t;
+    const Eigen::Vector3d& p_state = posed->second.t;
     if (p_before != nullptr &&
-        std::abs((p_told - *told_before).norm() - (p - *p_before).norm()) > kSame_m) {
+        std::abs((p_state - *p_state_before).norm() - (p - *p_before).norm()) > kSame_m) {
       return false;
     }
     p_before = &p;
-    told_before = &p_told;
+    p_state_before = &p_state;
   }
   return true;
 }

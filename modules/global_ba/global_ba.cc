@@ -56,8 +56,8 @@ void GlobalBa::Save(ByteWriter* writer) const {
     writer->Put(pair.second);
     writer->Put(corners.Bytes(records_.get()).value_or(std::vector<uint8_t>{}));
   }
-  writer->PutCount(ties_.all().size());
-  for (const KeyframePair& pair : ties_.all()) {
+  writer->PutCount(pairs_.all().size());
+  for (const KeyframePair& pair : pairs_.all()) {
     writer->Put(pair.first);
     writer->Put(pair.second);
   }
@@ -74,18 +74,18 @@ bool GlobalBa::Restore(ByteReader* reader) {
     reader->Get(&corners);
     matched.emplace_hint(matched.end(), pair, Record(std::move(corners), records_.get()));
   }
-  Ties ties;
+  MatchedPairs pairs;
   for (size_t left = reader->GetCount(1); left > 0; --left) {
     KeyframePair pair;
     reader->Get(&pair.first);
     reader->Get(&pair.second);
-    ties.Insert(pair);
+    pairs.Insert(pair);
   }
   if (!store_.Restore(reader) || !reader->at_end()) {
     return false;
   }
   matched_ = std::move(matched);
-  ties_ = std::move(ties);
+  pairs_ = std::move(pairs);
   return true;
 }
 
@@ -109,11 +109,11 @@ void GlobalBa::Take(const Constraint& constraint) {
   const KeyframePair pair(constraint.to, constraint.from);
   if (!constraint.accepted && constraint.reason != kRedundant) {
     matched_.erase(pair);
-  } else if (ties_.Insert(pair)) {
+  } else if (pairs_.Insert(pair)) {
     if (constraint.accepted) {
       DropIfAbout(constraint.to.map);
     }
-    new_ties_.insert(pair);
+    new_pairs_.insert(pair);
   }
 }
 
@@ -138,7 +138,7 @@ void GlobalBa::Take(MapState state) {
 
 void GlobalBa::DropIfAbout(const MapId& map) {
   if (work_ != nullptr && std::ranges::binary_search(work_->state->maps, map)) {
-    new_ties_.insert(work_->new_ties.begin(), work_->new_ties.end());
+    new_pairs_.insert(work_->new_pairs.begin(), work_->new_pairs.end());
     work_.reset();
     ++counters_.dropped;
   }
@@ -192,20 +192,20 @@ void GlobalBa::Begin(StatePointer state) {
   const StatePoses poses = PosesOf(*state);
   work_ = std::make_unique<Work>();
   work_->local = IsLocal(*state, poses);
-  work_->new_ties = TakeNewTies(*state, poses);
+  work_->new_pairs = TakeNewPairs(*state, poses);
   work_->state = std::move(state);
   work_->problem = work_->local ? Local(poses) : Whole(*work_->state, poses);
   ++counters_.begun;
 }
 
-std::vector<KeyframePair> GlobalBa::TakeNewTies(const MapState& state, const StatePoses& poses) {
+std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const StatePoses& poses) {
   std::vector<KeyframePair> taken;
   for (const MapId& map : state.maps) {
-    for (auto pair = new_ties_.lower_bound({{map, 0}, {}});
-         pair != new_ties_.end() && pair->first.map == map;) {
+    for (auto pair = new_pairs_.lower_bound({{map, 0}, {}});
+         pair != new_pairs_.end() && pair->first.map == map;) {
       if (poses.contains(pair->first) && poses.contains(pair->second)) {
         taken.push_back(*pair);
-        pair = new_ties_.erase(pair);
+        pair = new_pairs_.erase(pair);
       } else {
         ++pair;
       }
@@ -217,7 +217,7 @@ std::vector<KeyframePair> GlobalBa::TakeNewTies(const MapState& state, const Sta
 std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePoses& poses) {
   std::vector<MatchedPlaces> places;
   for (const MapId& map : state.maps) {
-    for (const KeyframePair& pair : ties_.OfMap(map)) {
+    for (const KeyframePair& pair : pairs_.OfMap(map)) {
       AddPlace(pair, &places);
     }
   }
@@ -227,12 +227,12 @@ std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePos
 
 std::unique_ptr<BaProblem> GlobalBa::Local(const StatePoses& poses) {
   const AdjustedGroup& adjusted = refined_.at(work_->state->group).adjusted;
-  const LocalPart part = ChooseLocalPart(poses, adjusted, ties_, work_->new_ties,
+  const LocalPart part = ChooseLocalPart(poses, adjusted, pairs_, work_->new_pairs,
                                          options_.local.max_neighbours, &store_);
   std::vector<MatchedPlaces> places;
   for (const std::set<KeyframeId>* keyframes : {&part.moving, &part.held}) {
     for (const KeyframeId& id : *keyframes) {
-      for (const KeyframePair& pair : ties_.OfQuery(id)) {
+      for (const KeyframePair& pair : pairs_.OfQuery(id)) {
         if (part.moving.contains(pair.second) || part.held.contains(pair.second)) {
           AddPlace(pair, &places);
         }

@@ -31,7 +31,7 @@
 #include "global_ba/ba_problem.h"
 #include "global_ba/group_world.h"
 #include "global_ba/local_part.h"
-#include "global_ba/ties.h"
+#include "global_ba/matched_pairs.h"
 
 namespace pangea {
 
@@ -106,19 +106,19 @@ class GlobalBa {
   };
   struct Work {
     StatePointer state;
-    std::vector<KeyframePair> new_ties;
+    std::vector<KeyframePair> new_pairs;
     bool local = false;
     std::unique_ptr<BaProblem> problem;
   };
   static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
-  static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond ties nothing
+  static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond is not used
 
   StatePointer NextDue() const;
   bool IsLocal(const MapState& state, const StatePoses& poses) const;
   void Begin(StatePointer state);
-  // Ties of the group that no refinement has.
-  std::vector<KeyframePair> TakeNewTies(const MapState& state, const StatePoses& poses);
+  // Matched pairs of the group that no refinement has.
+  std::vector<KeyframePair> TakeNewPairs(const MapState& state, const StatePoses& poses);
   std::unique_ptr<BaProblem> Whole(const MapState& state, const StatePoses& poses);
   std::unique_ptr<BaProblem> Local(const StatePoses& poses);
   void AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places);
@@ -129,8 +129,8 @@ class GlobalBa {
   std::shared_ptr<RecordStore> records_;
   SubmapStore store_;
   std::map<KeyframePair, Record> matched_;  // corners, by place recognition
-  Ties ties_;
-  std::set<KeyframePair> new_ties_;       // not in the refinement of a group that has both ends
+  MatchedPairs pairs_;
+  std::set<KeyframePair> new_pairs_;      // not in the refinement of a group that has both ends
   std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
   std::map<MapId, Refined> refined_;      // by group
   std::unique_ptr<Work> work_;

@@ -113,8 +113,8 @@ TEST(GlobalBa, NothingIsReadOfOtherGroups) {
   EXPECT_EQ(beside_another->num_reads(), alone->num_reads());
 }
 
-// What was not verified, because constraints beside it tell as much, still ties landmarks; what was
-// refused does not.
+// What was not verified, because constraints beside it tell as much, still adds observations; what
+// was refused does not.
 TEST(GlobalBa, RedundantMatchesTieLandmarks) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto accepted = Server(messages).Finish();

@@ -68,7 +68,7 @@ class Maker {
     }
     index_[id] = static_cast<int>(world_.keyframes.size());
     world_.keyframes.push_back(std::move(start));
-    stays_.push_back(Stays::kUnlessRedundant);
+    cull_.push_back(Cull::kIfRedundant);
   }
 
   // Begins where the adjustment before left it, which also left out what was redundant.
@@ -78,9 +78,9 @@ class Maker {
       keyframe.held = !part.moving.contains(keyframe.id);
       if (const ImuState* known = adjusted.Find(keyframe.id)) {
         keyframe.imu = MovedTo(keyframe.imu.T_odom_body, *known);
-        stays_[i] = Stays::kAlways;
+        cull_[i] = Cull::kNever;
       } else if (keyframe.held) {
-        stays_[i] = Stays::kNot;
+        cull_[i] = Cull::kAlways;
       }
     }
     HoldCameras(adjusted, state, part);
@@ -98,13 +98,13 @@ class Maker {
       }
     }
     AddLandmarks(matches, options.landmarks, store_, &world_);
-    return WithoutRedundant(world_, stays_, options.redundancy);
+    return WithoutRedundant(world_, cull_, options.redundancy);
   }
 
  private:
   void NeedEnds(int query, int match) {
     for (const int end : {query, match}) {
-      stays_[end] = stays_[end] == Stays::kNot ? Stays::kNot : Stays::kAlways;
+      cull_[end] = cull_[end] == Cull::kAlways ? Cull::kAlways : Cull::kNever;
     }
   }
 
@@ -124,7 +124,7 @@ class Maker {
   SubmapStore* store_;
   BaWorld world_;
   std::vector<std::vector<double>> scale_sigmas_;  // by camera
-  std::vector<Stays> stays_;                       // by keyframe
+  std::vector<Cull> cull_;                         // by keyframe
   std::map<KeyframeId, int> index_;
 };
 

@@ -9,11 +9,11 @@ namespace {
 
 class Chooser {
  public:
-  Chooser(const StatePoses& state, const AdjustedGroup& adjusted, const Ties& ties,
+  Chooser(const StatePoses& state, const AdjustedGroup& adjusted, const MatchedPairs& pairs,
           SubmapStore* store)
-      : state_(state), adjusted_(adjusted), ties_(ties), store_(store) {}
+      : state_(state), adjusted_(adjusted), pairs_(pairs), store_(store) {}
 
-  LocalPart Choose(const std::vector<KeyframePair>& new_ties, int max_neighbours) {
+  LocalPart Choose(const std::vector<KeyframePair>& new_pairs, int max_neighbours) {
     for (const auto& [id, pose] : state_) {
       if (!adjusted_.Knows(id)) {
         new_.insert(id);
@@ -22,7 +22,7 @@ class Chooser {
     LocalPart part;
     part.moving = new_;
     const size_t max_moving = new_.size() + static_cast<size_t>(max_neighbours);
-    for (const auto& [query, match] : new_ties) {
+    for (const auto& [query, match] : new_pairs) {
       for (const KeyframeId& end : {query, match}) {
         if (part.moving.size() < max_moving) {
           part.moving.insert(end);
@@ -72,7 +72,7 @@ class Chooser {
     return neighbours;
   }
 
-  // All that see landmarks of theirs, along their maps and where ties lead from there.
+  // All that see landmarks of theirs, along their maps and where matched pairs lead from there.
   std::set<KeyframeId> Around(const std::set<KeyframeId>& ids) {
     std::set<KeyframeId> around, partners;
     const auto add = [&](const KeyframeId& id) {
@@ -91,7 +91,7 @@ class Chooser {
 
   // In the group.
   std::vector<KeyframeId> PartnersOf(const KeyframeId& id) const {
-    std::vector<KeyframeId> partners = ties_.PartnersOf(id);
+    std::vector<KeyframeId> partners = pairs_.PartnersOf(id);
     std::erase_if(partners, [this](const KeyframeId& p) { return !state_.contains(p); });
     return partners;
   }
@@ -152,7 +152,7 @@ class Chooser {
 
   const StatePoses& state_;
   const AdjustedGroup& adjusted_;
-  const Ties& ties_;
+  const MatchedPairs& pairs_;
   SubmapStore* store_;
   std::set<KeyframeId> new_;
   std::map<KeyframeId, std::vector<int32_t>> landmarks_;
@@ -161,10 +161,10 @@ class Chooser {
 
 }  // namespace
 
-LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted, const Ties& ties,
-                          const std::vector<KeyframePair>& new_ties, int max_neighbours,
-                          SubmapStore* store) {
-  return Chooser(state, adjusted, ties, store).Choose(new_ties, max_neighbours);
+LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted,
+                          const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
+                          int max_neighbours, SubmapStore* store) {
+  return Chooser(state, adjusted, pairs, store).Choose(new_pairs, max_neighbours);
 }
 
 }  // namespace pangea

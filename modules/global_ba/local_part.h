@@ -2,15 +2,15 @@
 
 // The part of a group that an adjustment moves when the rest has been adjusted before (the local
 // bundle adjustment of Mur-Artal et al., TRO 2015, section VI.D, over what is new since then): new
-// keyframes and the ends of new ties, then those that share landmarks with them, then with these,
-// up to a bound. Held are those that share landmarks with what moves.
+// keyframes and the ends of new matched pairs, then those that share landmarks with them, then with
+// these, up to a bound. Held are those that share landmarks with what moves.
 
 #include <set>
 #include <vector>
 
 #include "core/submap_store.h"
 #include "global_ba/adjusted_group.h"
-#include "global_ba/ties.h"
+#include "global_ba/matched_pairs.h"
 
 namespace pangea {
 
@@ -38,8 +38,8 @@ struct LocalPart {
   std::set<KeyframeId> held;  // and those between that the adjustment before left out
 };
 
-LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted, const Ties& ties,
-                          const std::vector<KeyframePair>& new_ties, int max_neighbours,
-                          SubmapStore* store);
+LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted,
+                          const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
+                          int max_neighbours, SubmapStore* store);
 
 }  // namespace pangea

@@ -25,14 +25,14 @@ class Culling {
     }
   }
 
-  void Run(const std::vector<Stays>& stays) {
-    for (int i = 0; i < static_cast<int>(stays.size()); ++i) {
-      if (stays[i] == Stays::kNot) {
+  void Run(const std::vector<Cull>& cull) {
+    for (int i = 0; i < static_cast<int>(cull.size()); ++i) {
+      if (cull[i] == Cull::kAlways) {
         Remove(i);
       }
     }
-    for (int i = 0; i < static_cast<int>(stays.size()); ++i) {
-      if (stays[i] == Stays::kUnlessRedundant && MayLeave(i) && IsSeenByOthers(i)) {
+    for (int i = 0; i < static_cast<int>(cull.size()); ++i) {
+      if (cull[i] == Cull::kIfRedundant && MayLeave(i) && IsSeenByOthers(i)) {
         Remove(i);
       }
     }
@@ -120,10 +120,10 @@ class Culling {
 
 }  // namespace
 
-BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Stays>& stays,
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Cull>& cull,
                          const RedundancyOptions& options) {
   Culling culling(world, options);
-  culling.Run(stays);
+  culling.Run(cull);
   return culling.Result();
 }
 

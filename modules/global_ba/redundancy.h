@@ -26,11 +26,12 @@ struct RedundancyOptions {
   }
 };
 
-enum class Stays { kUnlessRedundant, kAlways, kNot };
+// Whether a keyframe is to leave.
+enum class Cull { kIfRedundant, kNever, kAlways };
 
-// The world without its redundant keyframes, looked at in their order; `stays` has one entry a
+// The world without its redundant keyframes, looked at in their order; `cull` has one entry a
 // keyframe.
-BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Stays>& stays,
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Cull>& cull,
                          const RedundancyOptions& options);
 
 }  // namespace pangea

@@ -12,8 +12,8 @@ namespace {
 // Keyframes every 0.2 s that all see nearly the same.
 BaWorld Dense() { return MakeBaTestWorld({.keyframes = 20, .step_s = 0.2, .landmarks = 60}).truth; }
 
-std::vector<Stays> None(const BaWorld& world) {
-  return std::vector<Stays>(world.keyframes.size(), Stays::kUnlessRedundant);
+std::vector<Cull> None(const BaWorld& world) {
+  return std::vector<Cull>(world.keyframes.size(), Cull::kIfRedundant);
 }
 
 TEST(Redundancy, CullsWhatOthersSee) {
@@ -95,29 +95,29 @@ TEST(Redundancy, AMissingEdgeIsNotBridged) {
 
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
-  std::vector<Stays> fates = None(world);
-  for (size_t i = 0; i < fates.size(); i += 3) {
-    fates[i] = Stays::kAlways;
+  std::vector<Cull> cull = None(world);
+  for (size_t i = 0; i < cull.size(); i += 3) {
+    cull[i] = Cull::kNever;
   }
-  const BaWorld culled = WithoutRedundant(world, fates, {});
+  const BaWorld culled = WithoutRedundant(world, cull, {});
   EXPECT_LT(culled.keyframes.size(), world.keyframes.size());
   std::set<KeyframeId> left;
   for (const BaKeyframe& keyframe : culled.keyframes) {
     left.insert(keyframe.id);
   }
-  for (size_t i = 0; i < fates.size(); i += 3) {
+  for (size_t i = 0; i < cull.size(); i += 3) {
     EXPECT_TRUE(left.contains(world.keyframes[i].id));
   }
 }
 
 TEST(Redundancy, WhatDoesNotStayIsBridgedHoweverLongTheGap) {
   const BaWorld world = MakeBaTestWorld({.edge_sigma_m = 0.01}).truth;
-  std::vector<Stays> fates(world.keyframes.size(), Stays::kAlways);
-  for (size_t i = 0; i < fates.size(); ++i) {
+  std::vector<Cull> cull(world.keyframes.size(), Cull::kNever);
+  for (size_t i = 0; i < cull.size(); ++i) {
     const int32_t seq = world.keyframes[i].id.seq;
-    fates[i] = seq == 0 || seq == 19 || (seq > 4 && seq < 9) ? Stays::kNot : Stays::kAlways;
+    cull[i] = seq == 0 || seq == 19 || (seq > 4 && seq < 9) ? Cull::kAlways : Cull::kNever;
   }
-  const BaWorld left = WithoutRedundant(world, fates, {});
+  const BaWorld left = WithoutRedundant(world, cull, {});
   EXPECT_EQ(left.keyframes.size(), 2 * (20 - 6));
   for (const BaKeyframe& keyframe : left.keyframes) {
     const bool begins = keyframe.id.seq == 1;

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -81,7 +83,7 @@ void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
 // Returns what is wrong, or an empty string.
 std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
   if (m.num_corners < 0 || m.num_corners > kMaxCorners) {
-    return "too many corners";
+    return fmt::format("num_corners {} out of 0 to {}", m.num_corners, kMaxCorners);
   }
   if (m.num_descriptor_bytes != m.num_corners * static_cast<int>(sizeof(Descriptor))) {
     return "descriptor bytes do not match the corners";

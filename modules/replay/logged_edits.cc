@@ -36,11 +36,10 @@ LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readi
   return edits;
 }
 
-void Merge(LoggedEdits edits, LoggedEdits* all) {
-  for (auto& [keyframe, of_keyframe] : edits) {
+void Merge(const LoggedEdits& edits, LoggedEdits* all) {
+  for (const auto& [keyframe, of_keyframe] : edits) {
     auto& known = (*all)[keyframe];
-    known.insert(known.end(), std::make_move_iterator(of_keyframe.begin()),
-                 std::make_move_iterator(of_keyframe.end()));
+    known.insert(known.end(), of_keyframe.begin(), of_keyframe.end());
   }
 }
 

@@ -21,6 +21,6 @@ using LoggedEdits = std::map<KeyframeId, std::vector<anchor_edit_t>>;
 LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readings = nullptr);
 
 // Edits of several logs.
-void Merge(LoggedEdits edits, LoggedEdits* all);
+void Merge(const LoggedEdits& edits, LoggedEdits* all);
 
 }  // namespace pangea::session

@@ -44,7 +44,8 @@ std::vector<AnchorEdit> EditSpool::TakeLeft() {
     }
     if (auto edit = Read(entry.path())) {
       revisions_[edit->anchor] = edit->revision;
-      left[edit->anchor] = *std::move(edit);
+      const AnchorId anchor = edit->anchor;
+      left[anchor] = *std::move(edit);
     } else {
       damaged.push_back(entry.path());
     }

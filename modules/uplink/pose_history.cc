@@ -44,7 +44,7 @@ void PoseHistory::AddPose(int64_t utime, const MapId& map, const Rigid3& T_odom_
 }
 
 void PoseHistory::AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body) {
-  const auto live = map == map_ ? Live(utime) : std::nullopt;
+  auto live = map == map_ ? Live(utime) : std::nullopt;
   if (!live || (!corrections_.empty() && utime <= corrections_.back().utime)) {
     return;  // a repeat, or one from before the poses that are kept
   }
@@ -70,7 +70,7 @@ std::optional<Rigid3> PoseHistory::Live(int64_t utime) const {
 }
 
 std::optional<Rigid3> PoseHistory::At(int64_t utime, const MapId& map) const {
-  const auto live = map == map_ ? Live(utime) : std::nullopt;
+  auto live = map == map_ ? Live(utime) : std::nullopt;
   if (!live || corrections_.empty()) {
     return live;
   }

@@ -69,7 +69,7 @@ Sightings SightingsOf(const AnchorTrack& track) {
 
 // Between two poses around it, else the nearest within a frame or so.
 std::optional<Rigid3> PoseAt(const Trajectory& poses, int64_t utime) {
-  if (const auto between = Interpolate(poses, utime, kMaxPoseGap_us)) {
+  if (auto between = Interpolate(poses, utime, kMaxPoseGap_us)) {
     return between;
   }
   const auto off = [utime](const StampedPose& pose) { return std::abs(pose.utime - utime); };

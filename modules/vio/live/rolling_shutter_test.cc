@@ -91,10 +91,10 @@ TEST(RollingShutter, CornersWithoutDepthMoveAsTheirNeighboursDo) {
   }
   keyframe.corners.emplace_back().pixel = Eigen::Vector2f(100, 400);
   keyframe.corners.emplace_back().pixel = Eigen::Vector2f(540, 400);
-  keyframe.points.resize(6);
   TakeOutReadout(motion, keyframe);
   EXPECT_GT((keyframe.corners[0].pixel - Eigen::Vector2f(100, 400)).norm(), 2);
   EXPECT_LT((keyframe.corners[6].pixel - keyframe.corners[0].pixel).norm(), 1e-3);
+  EXPECT_LT((keyframe.corners[7].pixel - keyframe.corners[1].pixel).norm(), 1e-3);
 }
 
 TEST(RollingShutter, AGlobalShutterIsLeftAlone) {

@@ -1,8 +1,8 @@
-#include "global_ba/ties.h"
+#include "global_ba/matched_pairs.h"
 
 namespace pangea {
 
-std::vector<KeyframePair> Ties::OfMap(const MapId& map) const {
+std::vector<KeyframePair> MatchedPairs::OfMap(const MapId& map) const {
   std::vector<KeyframePair> pairs;
   for (auto pair = by_query_.lower_bound({{map, 0}, {}});
        pair != by_query_.end() && pair->first.map == map; ++pair) {
@@ -11,7 +11,7 @@ std::vector<KeyframePair> Ties::OfMap(const MapId& map) const {
   return pairs;
 }
 
-std::vector<KeyframePair> Ties::OfQuery(const KeyframeId& query) const {
+std::vector<KeyframePair> MatchedPairs::OfQuery(const KeyframeId& query) const {
   std::vector<KeyframePair> pairs;
   for (auto pair = by_query_.lower_bound({query, {}});
        pair != by_query_.end() && pair->first == query; ++pair) {
@@ -20,7 +20,7 @@ std::vector<KeyframePair> Ties::OfQuery(const KeyframeId& query) const {
   return pairs;
 }
 
-std::vector<KeyframeId> Ties::PartnersOf(const KeyframeId& id) const {
+std::vector<KeyframeId> MatchedPairs::PartnersOf(const KeyframeId& id) const {
   std::vector<KeyframeId> partners;
   for (const std::set<KeyframePair>* pairs : {&by_query_, &by_match_}) {
     for (auto pair = pairs->lower_bound({id, {}}); pair != pairs->end() && pair->first == id;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Pairs of keyframes whose matched corners tie landmarks: accepted, or beside accepted ones and so
-// redundant.
+// Pairs of keyframes whose matched corners observe the same landmarks: accepted constraints, and
+// candidates redundant beside them.
 
 #include <set>
 #include <utility>
@@ -13,7 +13,7 @@ namespace pangea {
 
 using KeyframePair = std::pair<KeyframeId, KeyframeId>;  // (query, match)
 
-class Ties {
+class MatchedPairs {
  public:
   // False for a repeat.
   bool Insert(const KeyframePair& pair) {
