@@ -71,10 +71,11 @@ export class Camera {
   private async readTrack() {
     const clock = new ArrivalClock();
     const reader = new MediaStreamTrackProcessor({ track: this.track, maxBufferSize: 2 }).readable.getReader();
-    while (!this.stopped) {
+    // To the stream's end, also after stop(): what waits in it has to be closed too.
+    for (;;) {
       const { value: frame, done } = await reader.read();
       if (done) return;
-      const utime = clock.map(frame.timestamp, utimeOf(performance.now()));
+      const utime = this.stopped ? undefined : clock.map(frame.timestamp, utimeOf(performance.now()));
       if (utime === undefined) frame.close();
       else await this.give(utime, frame);
     }
@@ -97,8 +98,8 @@ export class Camera {
 
   // The frame goes back to the camera at once: it has a few only, and gives no more while they are kept.
   private async give(utime: number, frame: VideoFrame) {
-    const [luma, picture] = await Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
-    frame.close();
+    const taken = Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
+    const [luma, picture] = await taken.finally(() => frame.close());
     if (this.onImage) this.onImage({ utime, picture, ...luma });
     else picture.close();
   }
