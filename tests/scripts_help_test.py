@@ -1,0 +1,37 @@
+#!/usr/bin/env python3
+"""--help of what is started by hand says what it does and does nothing, however long the real run takes."""
+
+import subprocess
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ["scripts", "bench"]
+NOT_BY_HAND = {"scripts/wasm_libraries"}  # its output is a folder's name, for scripts/build
+
+
+def scripts():
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).iterdir()):
+            if path.is_file() and path.stat().st_mode & 0o100 and not path.suffix and str(path.relative_to(ROOT)) not in NOT_BY_HAND:
+                yield path
+
+
+class ScriptsHelp(unittest.TestCase):
+    def test_help(self):
+        count = 0
+        for path in scripts():
+            with self.subTest(path.name):
+                text = path.read_text()
+                # Looked at before it is run: one without help would install packages, or build for half an hour.
+                first = next(line for line in text.splitlines() if line and not line.startswith(("#", "set ")))
+                self.assertTrue("argparse" in text if "python" in text.splitlines()[0] else first.endswith('scripts/usage"')
+                                or first == '. "$(dirname "$0")/usage"', f"{path}: no --help")
+                shown = subprocess.run([path, "--help"], capture_output=True, text=True, timeout=20, cwd="/", check=True).stdout
+                self.assertIn(path.name, shown)
+            count += 1
+        self.assertGreater(count, 20)
+
+
+if __name__ == "__main__":
+    unittest.main()
