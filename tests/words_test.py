@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One word for one thing, the field's: the words that this project once invented stand nowhere any more."""
+"""One word for one thing, the field's: the words that this project once invented stand nowhere any more. And few of them."""
 
 import re
 import unittest
@@ -79,6 +79,29 @@ def found(roots, suffixes):
         for word, say in words:
             out += [f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: '{hit.group(0)}': say {say}" for hit in word.finditer(text)]
     return sorted(out)
+
+
+# At most so many words, as wc counts them: what a reader takes in at one sitting, and what fits a page.
+LONGEST = {"README.md": 900, "bench/README.md": 3000, "docs/decisions/*.md": 420}
+ALL_PAGES = ["README.md", "docs/*.md", "docs/decisions/*.md", "bench/README.md", "lcmtypes/README.md", "logs/README.md"]
+MOST_WORDS = 22400
+
+
+def words_of(pattern):
+    return {str(path.relative_to(ROOT)): len(path.read_text().split()) for path in ROOT.glob(pattern)}
+
+
+class Length(unittest.TestCase):
+    def test_pages(self):
+        for pattern, most in LONGEST.items():
+            self.assertTrue(words_of(pattern), pattern)
+            for name, count in words_of(pattern).items():
+                self.assertLessEqual(count, most, name)
+
+    def test_all(self):
+        count = sum(sum(words_of(pattern).values()) for pattern in ALL_PAGES)
+        self.assertGreater(count, MOST_WORDS / 2)
+        self.assertLessEqual(count, MOST_WORDS, "say each thing once, and link to it")
 
 
 class Words(unittest.TestCase):
