@@ -9,7 +9,7 @@ namespace {
 
 // When a frame's image was taken, by the IMU's clock.
 int64_t TakenAt(const WindowState& state, const WindowFrame& frame) {
-  return frame.utime + std::llround(1e6 * state.time_offset_s) +
+  return frame.utime + std::llround(1e6 * state.OffsetOf(frame)) +
          std::llround(1e6 * frame.stamp_error_s);
 }
 

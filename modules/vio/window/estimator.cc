@@ -12,9 +12,9 @@
 #include "vio/keyframes/frame_choice.h"
 #include "vio/keyframes/keyframe_publisher.h"
 #include "vio/keyframes/track_history.h"
+#include "vio/window/image_stamps.h"
 #include "vio/window/landmark_check.h"
 #include "vio/window/landmark_store.h"
-#include "vio/window/stamp_jitter.h"
 #include "vio/window/unmodelled_acceleration.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_solver.h"
@@ -53,6 +53,7 @@ struct Estimator::Impl {
         initialiser(c, noise, o.pixel_sigma, o.accel_bias_sigma, o.stationary),
         imu_samples(noise),
         stationary_detector(c, ray_sigma, o.stationary),
+        stamps(c),
         choice(o, c) {
     problem.state.T_body_cam = c.T_body_cam;
     problem.state.time_offset_s = c.time_offset_s;
@@ -72,8 +73,13 @@ struct Estimator::Impl {
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
   std::optional<std::string> Implausible() const;
+  // Of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
-    return frame_utime + std::llround(1e6 * problem.state.time_offset_s);
+    return frame_utime + std::llround(1e6 * (problem.state.time_offset_s +
+                                             problem.state.interval_share * excess_interval_s));
+  }
+  int64_t ImuTime(const WindowFrame& frame) const {
+    return frame.utime + std::llround(1e6 * problem.state.OffsetOf(frame));
   }
   WindowFrame& Newest() { return problem.state.frames.back(); }
   const WindowFrame& LastWindowKeyframe() const {
@@ -92,7 +98,8 @@ struct Estimator::Impl {
   LandmarkStore landmarks;
   ImuBuffer imu_samples;  // since the last published keyframe
   StationaryDetector stationary_detector;
-  StampJitter stamp_jitter;
+  ImageStamps stamps;
+  double excess_interval_s = 0;  // of the newest image
   FrameChoice choice;
   KeyframePublisher publisher;
   int64_t last_tracked = 0;  // utime of the newest image that is one
@@ -135,8 +142,9 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   WindowFrame frame;
   frame.utime = utime;
   frame.imu_utime = ImuTime(utime);
-  frame.time_offset_s = problem.state.time_offset_s;
-  frame.stamp_sigma_s = stamp_jitter.sigma_s();
+  frame.excess_interval_s = excess_interval_s;
+  frame.time_offset_s = problem.state.OffsetOf(frame);
+  frame.stamp_sigma_s = stamps.sigma_s();
   frame.imu = imu;
   const BodyMotion motion =
       imu_samples.MotionFrom(frame.imu_utime, camera.readout_s, problem.state.imu_intrinsics, imu);
@@ -253,9 +261,8 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
     MarginaliseOldest(problem, what);
   }
   landmarks.Forget(history);
-  const int64_t needed = std::min(state.frames.front().imu_utime,
-                                  ImuTime(publisher.last_utime().value_or(Newest().utime)));
-  imu_samples.Forget(needed);
+  const int published = state.Find(publisher.last_utime().value_or(0)).value_or(state.Newest());
+  imu_samples.Forget(std::min(state.frames.front().imu_utime, ImuTime(state.frames[published])));
 }
 
 // The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
@@ -292,7 +299,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
 FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   FrameResult result;
   imu_samples.Add(imu);
-  stamp_jitter.AddFrame(frame.utime);
+  stamps.AddImage(frame.utime);
   const auto fail = [&](const std::string& reason) {
     lost = true;
     result.state = EstimatorState::kLost;
@@ -312,12 +319,14 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
       return result;
     }
     Start(*initial.state);
+    stamps.SetReference();
     Solve(kStartIterations);
   } else {
     const double gap_s = Seconds(frame.utime - Newest().utime);
     if (gap_s > kMaxFrameGap_s) {
       return fail(fmt::format("no images for {:.1f} s", gap_s));
     }
+    excess_interval_s = stamps.excess_interval_s();
     if (const auto wrong = AddToWindow(frame)) {
       return fail(*wrong);
     }
@@ -360,7 +369,13 @@ FrameResult Estimator::AddFrame(const TrackedFrame& frame, std::span<const ImuSa
 
 std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
 
-CameraModel Estimator::camera() const { return impl_->problem.state.Calibrated(impl_->camera); }
+CameraModel Estimator::camera() const {
+  const WindowState& state = impl_->problem.state;
+  CameraModel camera = state.Calibrated(impl_->camera);
+  camera.time_offset_s =
+      state.frames.empty() ? state.time_offset_s : state.OffsetOf(state.frames.back());
+  return camera;
+}
 
 WindowPoses Estimator::Poses() const {
   const WindowState& state = impl_->problem.state;

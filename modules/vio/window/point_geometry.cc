@@ -83,6 +83,7 @@ PointInOdom::PointInOdom(const WindowState& state, const AnchoredPoint& point) {
   by_point = by_translation * state.T_body_cam.R() * PointJacobian(point.ray_rho);
   by_anchor_stamp = CarriedBy(state.frames[point.anchor],
                               state.Ahead(point.anchor, point.anchor_row_s), T_a, p_odom);
+  anchor_excess_interval_s = state.frames[point.anchor].excess_interval_s;
 }
 
 Vector3d InOdom(const WindowState& state, const AnchoredPoint& point) {
@@ -126,6 +127,9 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOd
   out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
   out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;
   out.J_calibration.col(kIntrinsics) += ray - seen.ray;
+  out.J_calibration.col(kIntervalShare) =
+      state.frames[seen.frame].excess_interval_s * out.J_frame_stamp +
+      point.anchor_excess_interval_s * out.J_anchor_stamp;
   out.J_point = J_odom * point.by_point;
   return out;
 }

@@ -9,6 +9,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
+constexpr double kIntervalShareSigma = 0.3;  // between stamps of the begin and of the end, +-1/2
 constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
 
 // Of a moving start: next to nothing on tilt and velocity.
@@ -52,7 +53,7 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   MatrixXd P = MatrixXd::Zero(n, n);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(given.rotation), Vector3d::Constant(given.position_m),
-      given.time_offset_s, given.focal, given.centre, given.centre;
+      given.time_offset_s, given.focal, given.centre, given.centre, kIntervalShareSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
   P.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) =
       ImuIntrinsicsCovariance(noise);

@@ -52,6 +52,7 @@ void WindowState::Retract(const VectorXd& error) {
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
   intrinsics += error.segment<3>(kIntrinsics);
+  interval_share += error[kIntervalShare];
   imu_intrinsics.Add(error.segment<kImuIntrinsicsSize>(kImuIntrinsics));
   int at = kSharedSize;
   for (WindowFrame& frame : frames) {
@@ -76,6 +77,7 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
   e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
   e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
   e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
+  e[kIntervalShare] = a.interval_share - b.interval_share;
   e.segment<kImuIntrinsicsSize>(kImuIntrinsics) =
       a.imu_intrinsics.Stacked() - b.imu_intrinsics.Stacked();
   int at = kSharedSize;

@@ -28,9 +28,9 @@ inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 // After it comes, where stamps jitter, the error of the frame's stamp.
 inline constexpr int kStampError = kFrameSize;
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
-// intrinsics.
-inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7;
-inline constexpr int kCalibrationSize = 10;
+// intrinsics, interval share.
+inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7, kIntervalShare = 10;
+inline constexpr int kCalibrationSize = 11;
 // Then the IMU intrinsics, and then the frames.
 inline constexpr int kImuIntrinsics = kCalibrationSize;
 inline constexpr int kSharedSize = kCalibrationSize + kImuIntrinsicsSize;
@@ -39,8 +39,10 @@ inline constexpr int kSharedSize = kCalibrationSize + kImuIntrinsicsSize;
 struct WindowFrame {
   int64_t utime = 0;         // of its TrackedFrame
   int64_t imu_utime = 0;     // utime + time_offset_s
-  double time_offset_s = 0;  // when it came
-  // The image was taken this much after its stamp says, and what it may be (stamp_jitter.h).
+  double time_offset_s = 0;  // WindowState::OffsetOf it, when it came
+  // How much further apart images are than at the start (image_stamps.h).
+  double excess_interval_s = 0;
+  // The image was taken this much after its stamp says, and what it may be (image_stamps.h).
   double stamp_error_s = 0;
   double stamp_sigma_s = 0;  // 0: stamps are exact, and the error is no variable
   ImuState imu;
@@ -62,6 +64,10 @@ struct WindowFrame {
 struct WindowState {
   Rigid3 T_body_cam;
   double time_offset_s = 0;  // t_imu = t_image + time_offset_s
+  // By which share of the interval between images the offset grows with it. A camera that exposes
+  // as long as its frame rate lets it has -1/2 where a stamp is of the end of the exposure, 1/2
+  // where it is of the begin, and 0 where it is of the middle or the exposure is short.
+  double interval_share = 0;
   // Of the given camera: how much longer its focal length is, as a share of it, and where its
   // centre is, in focal lengths (x, y).
   Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
@@ -75,10 +81,14 @@ struct WindowState {
   // The given camera as it is thought to be: extrinsics, time offset, focal length and centre.
   CameraModel Calibrated(CameraModel given) const;
 
+  double OffsetOf(const WindowFrame& frame) const {
+    return time_offset_s + interval_share * frame.excess_interval_s;
+  }
   // The body when a row of a frame's image was exposed, that much after the image's time: the
   // frame's pose, moved on.
   double Ahead(int frame, double row_s) const {
-    return time_offset_s - frames[frame].time_offset_s + frames[frame].stamp_error_s + row_s;
+    const WindowFrame& f = frames[frame];
+    return OffsetOf(f) - f.time_offset_s + f.stamp_error_s + row_s;
   }
   Rigid3 PoseAhead(int frame, double ahead_s) const;
   BodyMotion MotionAhead(int frame, double ahead_s) const;

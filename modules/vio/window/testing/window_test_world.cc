@@ -96,6 +96,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
   state.intrinsics = RandomVector(rng, 0.01);
+  state.interval_share = -0.3;
   state.imu_intrinsics.Add(RandomImuIntrinsics(0.01, rng));
   state.frames = {FirstFrame(0.002, rng)};
   problem.imu_factors.resize(1);
@@ -123,6 +124,8 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
     frame.alpha_body = Vector3d(6, -9, 4);
     frame.a_body = Vector3d(1, -2, 0.5);
     frame.is_window_keyframe = true;
+    frame.excess_interval_s = RandomVector(rng, options.interval_sigma_s).x();
+    frame.time_offset_s = 0.002 + state.interval_share * frame.excess_interval_s;
     if (options.stamp_sigma_s > 0 && i % 2 == 0) {
       frame.stamp_sigma_s = options.stamp_sigma_s;
       frame.stamp_error_s = RandomVector(rng, options.stamp_sigma_s).x();

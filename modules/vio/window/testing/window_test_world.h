@@ -19,7 +19,8 @@ struct WindowTestOptions {
   double ray_noise = 0;      // sigmas
   double row_s = 0;          // rows are exposed up to this after the image's time
   double stamp_sigma_s = 0;  // of the frames' stamps; every second frame's is a variable
-  double late_s = 0;         // the time offset has moved by this since the frames came
+  double interval_sigma_s = 0.01;  // of the intervals between images
+  double late_s = 0;               // the time offset has moved by this since the frames came
 };
 
 // State and landmarks are true; the prior says nothing.

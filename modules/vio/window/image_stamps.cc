@@ -1,0 +1,57 @@
+#include "vio/window/image_stamps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/median.h"
+
+namespace pangea::vio {
+namespace {
+
+constexpr size_t kIntervals = 5;
+constexpr double kJitters = 4;        // sigmas
+constexpr double kRounding_s = 1e-3;  // stamps in milliseconds
+
+}  // namespace
+
+void ImageStamps::AddImage(int64_t utime) {
+  jitter_.AddFrame(utime);
+  utimes_.push_back(utime);
+  if (utimes_.size() > kIntervals + 1) {
+    utimes_.pop_front();
+  }
+  if (const double now_s = interval_s(); now_s > 0) {
+    shortest_s_ = shortest_s_ > 0 ? std::min(shortest_s_, now_s) : now_s;
+    longest_s_ = std::max(longest_s_, now_s);
+  }
+}
+
+bool ImageStamps::IsDifferent(double a_s, double b_s) const {
+  return std::abs(a_s - b_s) > kRounding_s + kJitters * jitter_.sigma_s();
+}
+
+double ImageStamps::excess_interval_s() const {
+  const double now_s = interval_s();
+  return reference_s_ > 0 && IsDifferent(now_s, reference_s_) ? now_s - reference_s_ : 0;
+}
+
+double ImageStamps::sigma_s() const {
+  const bool exposure_makes_it = !exposure_is_known_ && IsDifferent(shortest_s_, longest_s_);
+  const double uniform_s = 0.5 * interval_s() / std::sqrt(12.0);
+  return std::max(exposure_makes_it ? uniform_s : 0, jitter_.sigma_s());
+}
+
+double ImageStamps::interval_s() const {
+  if (utimes_.size() <= kIntervals) {
+    return 0;
+  }
+  std::vector<double> intervals_s;
+  for (size_t i = 1; i < utimes_.size(); ++i) {
+    intervals_s.push_back(1e-6 * static_cast<double>(utimes_[i] - utimes_[i - 1]));
+  }
+  return Median(std::move(intervals_s));
+}
+
+}  // namespace pangea::vio
