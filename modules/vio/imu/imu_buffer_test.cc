@@ -41,19 +41,24 @@ TEST(ImuBuffer, IntegratesExactlyTheSpan) {
 TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
   constexpr double kReadout_s = 0.03;
   const Vector3d omega(0.2, -0.4, 0.1), alpha(15, -8, 4), bias(0.01, 0.02, -0.01);
+  ImuState state;
+  state.gyro_bias = bias;
+  state.accel_bias = Vector3d(0.3, -0.2, 0.4);
+  state.T_odom_body.q = ExpSo3({0.4, -0.3, 0.2});
+  const Vector3d a(1, 2, 0);
+  const Vector3d force =
+      a + state.T_odom_body.q.conjugate() * Vector3d(0, 0, kGravity) + state.accel_bias;
   ImuBuffer buffer(ImuNoise{});
   std::vector<ImuSample> samples;
   for (int i = 0; i <= 20; ++i) {
     const double s = 0.005 * i;
-    samples.push_back({kFirst_us + 5'000 * i, omega + s * alpha + bias, Vector3d(1, 2, 9.81)});
+    samples.push_back({kFirst_us + 5'000 * i, omega + s * alpha + bias, force});
   }
   buffer.Add(samples);
-  ImuState state;
-  state.gyro_bias = bias;
   const BodyMotion motion = buffer.MotionFrom(kFirst_us + 10'000, kReadout_s, {}, state);
   EXPECT_LT((motion.omega - (omega + 0.01 * alpha)).norm(), 1e-3);
   EXPECT_LT((motion.alpha - alpha).norm(), 0.1);
-  EXPECT_LT((motion.a - Vector3d(1, 2, 0)).norm(), 0.2);  // the force turns with the body
+  EXPECT_LT((motion.a - a).norm(), 0.2);  // the force turns with the body
   for (const double share : {0.5, 1.0}) {
     const auto moved = buffer.Integrate(kFirst_us + 10'000,
                                         kFirst_us + 10'000 + std::llround(1e6 * share * kReadout_s),
