@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/imu/preintegration.h"
 #include "core/median.h"
+#include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
 #include "vio/initialization/initial_solution.h"
 
@@ -73,6 +75,20 @@ double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::
     sum += (sample.*of).norm();
   }
   return sum / static_cast<double>(samples.size());
+}
+
+// What the first row would have seen, were the point far away: where a hand shakes, the rotation
+// during the read-out is off by several pixels at the last row.
+Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
+                       const BodyMotion& motion) {
+  if (camera.readout_s <= 0 || camera.height < 2) {
+    return seen.ray;
+  }
+  const double row_s = camera.readout_s * static_cast<double>(seen.pixel.y()) / (camera.height - 1);
+  const Eigen::Quaterniond& q_body_cam = camera.T_body_cam.q;
+  const Vector3d ray =
+      q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.ray.homogeneous()));
+  return ray.z() > 0 ? Vector2d(ray.hnormalized()) : seen.ray;
 }
 
 }  // namespace
@@ -163,6 +179,8 @@ std::optional<InitialState> Initialiser::TryStationary() const {
 
 std::vector<StartFrame> Initialiser::StartFrames() const {
   const int64_t shift = std::llround(1e6 * time_offset_change_s_);
+  ImuBuffer samples(noise_);
+  samples.Add(samples_);
   std::vector<StartFrame> frames;
   for (const TrackedFrame& frame : frames_) {
     StartFrame start;
@@ -170,8 +188,9 @@ std::vector<StartFrame> Initialiser::StartFrames() const {
     if (!frames.empty()) {
       start.imu = SamplesBetween(samples_, frames.back().utime, start.utime);
     }
+    const BodyMotion motion = samples.MotionFrom(start.utime, camera_.readout_s, {}, ImuState{});
     for (const Observation& observation : frame.observations) {
-      start.rays[observation.landmark_id] = observation.ray;
+      start.rays[observation.landmark_id] = RayOfFirstRow(observation, camera_, motion);
     }
     frames.push_back(std::move(start));
   }

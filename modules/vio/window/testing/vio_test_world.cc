@@ -39,6 +39,13 @@ double PathTime(double t, double begin, double end) {
   return s;
 }
 
+// A hand's: rad for an acceleration of at most 1 rad/s^2 about each axis.
+Vector3d Shake(double s) {
+  const Vector3d frequency(17.3, 21.9, 19.1);  // rad/s
+  const Vector3d phase(0, 1, 2);
+  return ((s * frequency + phase).array().sin() / frequency.array().square()).matrix();
+}
+
 // Their own generator: a world is the same with an exact IMU and with another.
 ImuIntrinsics RandomImuIntrinsics(const ImuNoise& noise, uint64_t seed) {
   std::mt19937_64 rng(seed);
@@ -59,6 +66,7 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   camera_ = PinholeTestCamera(640, 480, 400);
   camera_.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng_, 0.05)),
                         RandomVector(rng_, 0.05)};
+  camera_.readout_s = options.readout_s;
   true_T_body_cam_.q =
       ExpSo3(RandomVector(rng_, options.extrinsics_rotation_sigma)) * camera_.T_body_cam.q;
   true_T_body_cam_.t = camera_.T_body_cam.t + RandomVector(rng_, options.extrinsics_position_sigma);
@@ -101,7 +109,8 @@ Rigid3 VioTestWorld::PoseAt(double t) const {
                           0.12 * std::sin(1.1 * s + phase_.z()),
                           0.25 * s + 0.5 * std::sin(0.7 * s + phase_.x()));
   const Eigen::Quaterniond q = YawRotation(rotation.z()) * ExpSo3(Vector3d(0, rotation.y(), 0)) *
-                               ExpSo3(Vector3d(rotation.x(), 0, 0));
+                               ExpSo3(Vector3d(rotation.x(), 0, 0)) *
+                               ExpSo3(options_.shake_radps2 * Shake(s));
   return {q, walk + hand};
 }
 
@@ -129,13 +138,24 @@ ImuSample VioTestWorld::SampleAt(int64_t utime) {
           (I + true_imu_intrinsics_.accel).inverse() * force};
 }
 
-std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, const Rigid3& T_odom_cam) const {
+std::optional<Vector2d> VioTestWorld::SeenFrom(const Rigid3& T_odom_cam,
+                                               const Vector3d& point) const {
   const Vector3d p_cam = T_odom_cam.Inverse() * point;
   if (p_cam.z() < 0.3 || p_cam.z() > kSight_m) {
     return std::nullopt;
   }
   const auto pixel = true_intrinsics_.Project(p_cam);
   return pixel && camera_.Contains(*pixel, 5) ? pixel : std::nullopt;
+}
+
+std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, double t) const {
+  constexpr int kIterations = 3;  // each leaves some 3 % of the error
+  auto pixel = SeenFrom(PoseAt(t) * true_T_body_cam_, point);
+  for (int i = 0; pixel && options_.readout_s > 0 && i < kIterations; ++i) {
+    const double row_s = options_.readout_s * pixel->y() / (camera_.height - 1);
+    pixel = SeenFrom(PoseAt(t + row_s) * true_T_body_cam_, point);
+  }
+  return pixel;
 }
 
 // To the right of where the camera looks as it sets off.
@@ -150,13 +170,14 @@ Vector3d VioTestWorld::CrowdMoved(double t) const {
   return distance * right.normalized();
 }
 
-void VioTestWorld::ObserveCrowd(double t, const Rigid3& T_odom_cam) {
+void VioTestWorld::ObserveCrowd(double t) {
   const bool is_there = t >= options_.crowd_comes_s && t < options_.crowd_end_s;
   const auto wanted = static_cast<size_t>(
       is_there ? std::lround(options_.crowd_share * static_cast<double>(kTracks)) : 0);
   const Vector3d moved = CrowdMoved(t);
+  const Rigid3 T_odom_cam = PoseAt(t) * true_T_body_cam_;
   std::erase_if(tracks_, [&](const auto& item) {
-    return item.second.in_crowd && (wanted == 0 || !Seen(item.second.point + moved, T_odom_cam));
+    return item.second.in_crowd && (wanted == 0 || !Seen(item.second.point + moved, t));
   });
   const auto in_crowd = [](const auto& item) { return item.second.in_crowd; };
   auto count = static_cast<size_t>(std::count_if(tracks_.begin(), tracks_.end(), in_crowd));
@@ -180,21 +201,19 @@ void VioTestWorld::ObserveCrowd(double t, const Rigid3& T_odom_cam) {
 
 TrackedFrame VioTestWorld::Observe(int64_t utime) {
   const double t = Seconds(utime) + true_time_offset_s_;
-  const Rigid3 T_odom_cam = PoseAt(t) * true_T_body_cam_;
   std::uniform_real_distribution<double> uniform;
   std::erase_if(tracks_, [&](const auto& item) {
-    return !item.second.in_crowd &&
-           (!Seen(item.second.point, T_odom_cam) || uniform(rng_) < kLossPerFrame);
+    return !item.second.in_crowd && (!Seen(item.second.point, t) || uniform(rng_) < kLossPerFrame);
   });
   if (options_.crowd_share > 0) {
-    ObserveCrowd(t, T_odom_cam);
+    ObserveCrowd(t);
   }
   const Vector3d moved = CrowdMoved(t);
   for (int tries = 0; tracks_.size() < kTracks && tries < 5000; ++tries) {
     const Vector3d& point = points_[rng_() % points_.size()];
     const bool taken = std::any_of(tracks_.begin(), tracks_.end(),
                                    [&](const auto& item) { return item.second.point == point; });
-    if (!taken && Seen(point, T_odom_cam)) {
+    if (!taken && Seen(point, t)) {
       Track track{point};
       track.slides = uniform(rng_) < options_.outlier_share;
       track.velocity = RandomVector(rng_, 2.0).head<2>();
@@ -206,7 +225,7 @@ TrackedFrame VioTestWorld::Observe(int64_t utime) {
   TrackedFrame frame{utime, {}};
   for (auto& [id, track] : tracks_) {
     const Vector3d point = track.in_crowd ? Vector3d(track.point + moved) : track.point;
-    Vector2d pixel = *Seen(point, T_odom_cam) + RandomVector(rng_, options_.pixel_noise).head<2>();
+    Vector2d pixel = *Seen(point, t) + RandomVector(rng_, options_.pixel_noise).head<2>();
     if (track.slides) {
       track.slid += track.velocity;
       pixel += track.slid;
@@ -222,10 +241,11 @@ VioTestWorld::Input VioTestWorld::Next() {
   std::mt19937_64 rng(options_.seed + next_frame_utime_);  // of its own: the world stays as it is
   const int64_t stamp =
       next_frame_utime_ + std::llround(1e6 * RandomVector(rng, options_.stamp_jitter_s).x());
+  const int64_t last_row_utime = stamp + std::llround(1e6 * options_.readout_s);
   do {
     input.imu.push_back(SampleAt(next_imu_utime_));
     next_imu_utime_ += kImuPeriod_us;
-  } while (input.imu.back().utime < stamp);
+  } while (input.imu.back().utime < last_row_utime);
   input.frame = Observe(next_frame_utime_);
   input.frame.utime = stamp;
   next_frame_utime_ += std::llround(1e6 / options_.frame_rate_hz);

@@ -51,6 +51,8 @@ struct VioTestWorldOptions {
   // The body stands still in between, seconds.
   double stationary_begin_s = -10, stationary_end_s = -10;
   double stamp_jitter_s = 0;  // of the images' stamps
+  double readout_s = 0;     // above 0: the rows are exposed one after another, the first one first
+  double shake_radps2 = 0;  // above 0: the hand shakes, with this angular acceleration at most
   // A crowd or a bus, 2 to 4 m away, has this share of the tracks. It comes, sets off with 1 m/s^2
   // or is at its speed at once, and is gone at the end.
   double crowd_share = 0;
@@ -72,7 +74,7 @@ class VioTestWorld {
   struct Input {
     TrackedFrame frame;
     int64_t taken_utime = 0;     // its stamp, had it no error
-    std::vector<ImuSample> imu;  // since the previous call, to the first at or after the frame
+    std::vector<ImuSample> imu;  // since the previous call, to the first at or after the last row
   };
   Input Next();
   // A tracker drops these.
@@ -99,10 +101,13 @@ class VioTestWorld {
   Rigid3 PoseAt(double t) const;
   Eigen::Vector3d VelocityAt(double t) const;
   ImuSample SampleAt(int64_t utime);
-  std::optional<Eigen::Vector2d> Seen(const Eigen::Vector3d& point, const Rigid3& T_odom_cam) const;
+  std::optional<Eigen::Vector2d> SeenFrom(const Rigid3& T_odom_cam,
+                                          const Eigen::Vector3d& point) const;
+  // In the image of that time, by the row that meets the point.
+  std::optional<Eigen::Vector2d> Seen(const Eigen::Vector3d& point, double t) const;
   Eigen::Vector3d CrowdMoved(double t) const;
   // Its tracks come, go on and end.
-  void ObserveCrowd(double t, const Rigid3& T_odom_cam);
+  void ObserveCrowd(double t);
   TrackedFrame Observe(int64_t utime);
 
   VioTestWorldOptions options_;
