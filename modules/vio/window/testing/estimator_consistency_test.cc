@@ -68,7 +68,7 @@ Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& cov
 // The last keyframe of each ride: the rides are independent, the keyframes of one are not.
 TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
   NeesOfRides position, yaw, tilt, velocity, gyro_bias, accel_bias, edges;
-  for (const Ride& ride : ShortRides(40, ExactImuIntrinsics())) {
+  for (const Ride& ride : ShortRides(40, {})) {
     ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
     const std::vector<ImuState> truth = TruthOf(ride);
     const FinishedKeyframe& last = ride.finished.back();
@@ -111,7 +111,9 @@ TEST(EstimatorConsistency, PositionAndYawAreNeverBetterKnownThanAtTheStart) {
 // Believed to be exact, these IMUs have the accelerometer's bias at 5, tilt and edges at 2.7.
 TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
   NeesOfRides tilt, velocity, accel_bias, edges;
-  for (const Ride& ride : ShortRides(20, ImuNoise{})) {
+  VioTestWorldOptions options;
+  options.imu_noise = ImuNoise{};
+  for (const Ride& ride : ShortRides(20, options)) {
     ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
     const std::vector<ImuState> truth = TruthOf(ride);
     const FinishedKeyframe& last = ride.finished.back();
@@ -126,6 +128,28 @@ TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
   velocity.ExpectHonest("velocity with a wrong IMU");
   accel_bias.ExpectHonest("accelerometer bias with a wrong IMU");
   edges.ExpectHonest("edges with a wrong IMU");
+}
+
+// A phone's rolling shutter in a hand that shakes: its rotation rate changes while the rows are
+// read out.
+TEST(EstimatorConsistency, RowsThatAccelerateAreBelievedNoMore) {
+  VioTestWorldOptions options;
+  options.readout_s = 0.03;
+  options.shake_radps2 = 15;
+  NeesOfRides tilt, velocity, edges;
+  for (const Ride& ride : ShortRides(20, options)) {
+    ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
+    const std::vector<ImuState> truth = TruthOf(ride);
+    const FinishedKeyframe& last = ride.finished.back();
+    const auto& P = last.covariance;
+    const auto e = ErrorOf(last, truth.back());
+    tilt.Add(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
+    velocity.Add(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
+    edges.Add(EdgeErrorOf(last, truth[truth.size() - 2], truth.back()), last.edge->covariance);
+  }
+  tilt.ExpectHonest("tilt with rows that accelerate");
+  velocity.ExpectHonest("velocity with rows that accelerate");
+  edges.ExpectHonest("edges with rows that accelerate");
 }
 
 }  // namespace

@@ -9,12 +9,10 @@ EstimatorOptions Options() {
   return options;
 }
 
-std::deque<Ride> MakeRides(uint64_t count, const ImuNoise& noise, int frames) {
+std::deque<Ride> MakeRides(uint64_t count, VioTestWorldOptions options, int frames) {
   std::deque<Ride> rides;
   for (uint64_t seed = 1; seed <= count; ++seed) {
-    VioTestWorldOptions options;
     options.seed = seed;
-    options.imu_noise = noise;
     options.extrinsics_rotation_sigma = 0.002;
     options.extrinsics_position_sigma = 0.002;
     options.focal_sigma = 0.001;
@@ -62,12 +60,12 @@ Rigid3 Ride::T_odom_truth() const {
 }
 
 const std::deque<Ride>& TenRides() {
-  static const std::deque<Ride> rides = MakeRides(10, ExactImuIntrinsics(), 150);
+  static const std::deque<Ride> rides = MakeRides(10, {}, 150);
   return rides;
 }
 
-std::deque<Ride> ShortRides(uint64_t count, const ImuNoise& noise) {
-  return MakeRides(count, noise, 60);
+std::deque<Ride> ShortRides(uint64_t count, const VioTestWorldOptions& options) {
+  return MakeRides(count, options, 60);
 }
 
 }  // namespace pangea::vio

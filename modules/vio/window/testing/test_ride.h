@@ -34,8 +34,8 @@ struct Ride {
 
 // Rides of 15 s to their end, with a calibration that is slightly off; made once.
 const std::deque<Ride>& TenRides();
-// Rides of 6 s like these. The IMU's scale factors and axes are off by what `noise` says, which the
-// estimator is told.
-std::deque<Ride> ShortRides(uint64_t count, const ImuNoise& noise);
+// Rides of 6 s like these, in worlds with these options. The IMU's scale factors and axes are off
+// by what the noise says, which the estimator is told.
+std::deque<Ride> ShortRides(uint64_t count, const VioTestWorldOptions& options);
 
 }  // namespace pangea::vio
