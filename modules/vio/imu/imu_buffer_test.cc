@@ -68,10 +68,25 @@ TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
 }
 
 TEST(ImuBuffer, MotionOfAGlobalShutterIsTheRotationRate) {
-  const BodyMotion motion = Filled(100).MotionFrom(kFirst_us + 10'000, 0, {}, ImuState{});
-  EXPECT_EQ(motion.omega, Filled(100).At(kFirst_us + 10'000).gyro);
+  ImuState state;
+  state.gyro_bias = Vector3d(0.01, 0.02, -0.01);
+  const BodyMotion motion = Filled(100).MotionFrom(kFirst_us + 10'000, 0, {}, state);
+  EXPECT_EQ(motion.omega, Filled(100).At(kFirst_us + 10'000).gyro - state.gyro_bias);
   EXPECT_EQ(motion.alpha, Vector3d::Zero());
   EXPECT_EQ(motion.a, Vector3d::Zero());
+}
+
+// Exact where the axis of the rotation stays.
+TEST(BodyMotion, BegunLaterItIsTheSame) {
+  const Vector3d axis(0.6, -0.8, 0);
+  const BodyMotion motion{2 * axis, 15 * axis, {0.8, -0.3, 0.5}, {2, 1, -3}};
+  constexpr double kBegun_s = 0.1;
+  for (const double s : {0.0, 0.05, 0.3}) {
+    const Rigid3 at_once = motion.After(kBegun_s + s);
+    const Rigid3 later = motion.After(kBegun_s) * motion.From(kBegun_s).After(s);
+    EXPECT_LT((later.t - at_once.t).norm(), 1e-12);
+    EXPECT_LT(LogSo3(later.q * at_once.q.conjugate()).norm(), 1e-12);
+  }
 }
 
 TEST(ImuBuffer, TheLastSampleHoldsALittleLonger) {
