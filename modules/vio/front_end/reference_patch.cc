@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
@@ -27,10 +28,20 @@ constexpr float kMinContrast = 2.0F;
 constexpr float kStiffness = 0.02F;
 constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
 
+// At any address: OpenCV's v_lut_pairs reads a short there, which is undefined at odd ones.
+uint16_t PairAt(const uchar* grey) {
+  uint16_t pair = 0;
+  std::memcpy(&pair, grey, sizeof(pair));
+  return pair;
+}
+
 // Of eight pixels and their right neighbours, blended by `share` of the neighbour.
 std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
                                           const float* share) {
-  const cv::v_uint16x8 pairs = cv::v_reinterpret_as_u16(cv::v_lut_pairs(grey, offset));
+  const cv::v_uint16x8 pairs(PairAt(grey + offset[0]), PairAt(grey + offset[1]),
+                             PairAt(grey + offset[2]), PairAt(grey + offset[3]),
+                             PairAt(grey + offset[4]), PairAt(grey + offset[5]),
+                             PairAt(grey + offset[6]), PairAt(grey + offset[7]));
   const cv::v_int16x8 left = cv::v_reinterpret_as_s16(pairs & cv::v_setall_u16(0xff));
   const cv::v_int16x8 change = cv::v_reinterpret_as_s16(pairs >> 8) - left;
   std::array<cv::v_int32x4, 2> left_of, change_of;
