@@ -12,7 +12,7 @@ const dark = [
 
 const wantsDark = matchMedia("(prefers-color-scheme: dark)");
 
-export const isDark = () => wantsDark.matches;
+const isDark = () => wantsDark.matches;
 export const onThemeChange = (then: () => void) => wantsDark.addEventListener("change", then);
 
 // Agents are numbered from 1; beyond twelve the colours come round again.

@@ -12,7 +12,7 @@ const kMarkerSize = 0.009; // of the distance to the camera
 const kAxesSize = 0.06;
 const kMaxLabels = 100; // names of the nearest; of more none could be read
 
-export interface PlacedAnchor {
+interface PlacedAnchor {
   index: number;
   name: string;
   pose: Pose; // on the stage

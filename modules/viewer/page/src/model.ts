@@ -45,7 +45,7 @@ export interface Keyframe {
   shown: Pose; // where it is, on its way there
 }
 
-export interface Anchor {
+interface Anchor {
   said: AnchorSaid;
   // The keyframe that carries it on the stage, so that it goes where that goes; -1: none yet.
   holder: number;

@@ -59,7 +59,7 @@ export interface FusionSaid {
   agents: number[];
 }
 
-export interface KeyframeSaid {
+interface KeyframeSaid {
   index: number;
   map: number;
   seq: number;
@@ -67,7 +67,7 @@ export interface KeyframeSaid {
   points: Float32Array; // x y z in the body frame, one after the other
 }
 
-export interface SolvedSaid {
+interface SolvedSaid {
   index: number;
   group: number;
   T_map_body: Float32Array;

@@ -11,7 +11,7 @@ import { packRows } from '../sensors/luma';
 export type Pose7 = [number, number, number, number, number, number, number];
 export type Vector3 = [number, number, number];
 
-export interface AgentConfig {
+interface AgentConfig {
   /** 1 to 65535. */
   agent: number;
   /** The agent's key, 64 hexadecimal digits; empty: no uplink, the odometry alone. */

@@ -14,7 +14,7 @@ const kFinal = new Map<number, LinkState>([[4401, "refused"], [4409, "replaced"]
 // Of the gateway that served this page.
 export const gatewayOrigin = () => `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
 
-export function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
+function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16));
 }
 

@@ -12,7 +12,7 @@ export interface ImuSample {
   accel: [number, number, number]; // m/s^2, body
 }
 
-export interface RecordedImage {
+interface RecordedImage {
   utime: number;
   name: string; // among the files
 }

@@ -12,7 +12,7 @@ export interface RecordedPicture extends Luma {
   picture: ImageBitmap;
 }
 
-export interface PlayerSink {
+interface PlayerSink {
   addImu(samples: ImuSample[]): void;
   // Resolves when the agent is done with it.
   addImage(image: RecordedPicture): Promise<void>;

@@ -9,12 +9,12 @@ export type Matrix3 = [Vector3, Vector3, Vector3];
 const kDegree = Math.PI / 180;
 
 // DeviceMotionEvent, its nullable fields resolved.
-export interface MotionReading {
+interface MotionReading {
   acceleration: Vector3; // accelerationIncludingGravity, m/s^2, with the platform's sign
   rate: Vector3; // rotationRate: alpha, beta, gamma, which are about x, y, z, deg/s
 }
 
-export interface BodyMotion {
+interface BodyMotion {
   gyro: Vector3; // rad/s
   accel: Vector3; // specific force, m/s^2: +9.81 upwards when stationary
 }

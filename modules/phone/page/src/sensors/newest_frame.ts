@@ -1,7 +1,7 @@
 // Which camera images the agent gets. One is with it, at most one waits; a newer one takes the place of the waiting one.
 // So a phone that slows down sees fewer images, and never old ones.
 
-export interface Stamped {
+interface Stamped {
   utime: number;
 }
 

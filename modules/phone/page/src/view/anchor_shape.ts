@@ -7,7 +7,7 @@ const kHeight = 0.24;
 const kRadius = 0.06;
 const kLight = new Vector3(0.4, 0.3, 0.85).normalize();
 
-export interface Face {
+interface Face {
   corners: [Vector3, Vector3, Vector3];
   brightness: number; // 0 to 1
 }

@@ -8,7 +8,7 @@ const kHalfWidth = 0.16;
 const kHalfHeight = 0.12;
 const kMark = 0.08;
 
-export type Edge = [Vector3, Vector3];
+type Edge = [Vector3, Vector3];
 
 function makeEdges(): Edge[] {
   const eye = new Vector3();
