@@ -22,7 +22,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr int kEvents = 629;
 constexpr size_t kConstraint = 314;  // a CONSTRAINT
 constexpr size_t kPose = 400;        // 4 kB from here reach into a KEYFRAME_2

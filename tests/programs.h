@@ -8,6 +8,9 @@
 
 namespace pangea::tests {
 
+// The session of two agents that comes with the sources.
+inline const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
+
 struct Outcome {
   int exit_code = 0;
   std::string output;  // stdout and stderr

@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 
-const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr double kCheckpoint_s = 6;
 constexpr float kMark_px = 77;
 

@@ -16,8 +16,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
-
 // The sample replayed once for all tests of this file.
 class ReplayDebugging : public ::testing::Test {
  protected:

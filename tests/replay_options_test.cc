@@ -17,7 +17,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kSample = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 constexpr char kServerPrograms[] =
     "place-recognition inter-map-ba fusion posegraph global-ba map-points anchors";
 

@@ -34,6 +34,16 @@ class NodeRemovalTest : public ::testing::Test {
   std::mt19937_64 random_{5};
 };
 
+Constraint MakeConstraint(const KeyframeId& from, const KeyframeId& to,
+                          const RelativePose& relative) {
+  Constraint constraint;
+  constraint.from = from;
+  constraint.to = to;
+  constraint.T_from_to = relative.T_from_to;
+  constraint.covariance = relative.covariance;
+  return constraint;
+}
+
 // A problem of relative poses, linear in the poses' errors: the reference for what removals leave.
 class DenseGraph {
  public:
@@ -106,11 +116,8 @@ TEST_F(NodeRemovalTest, OfAStarLeavesTheMarginalsToTheBestKnown) {
   NodeRemoval removal;
   DenseGraph dense(poses);
   for (int i = 1; i < 4; ++i) {
-    Constraint constraint;
-    constraint.from = Id(1, 10 * i);
-    constraint.to = Id(2, 0);
-    constraint.T_from_to = poses[i].Inverse() * poses[0];
-    constraint.covariance = (i == 2 ? 0.1 : 1) * RandomCovariance();
+    Constraint constraint = MakeConstraint(Id(1, 10 * i), Id(2, 0), Measure(poses[i], poses[0]));
+    constraint.covariance *= i == 2 ? 0.1 : 1;
     constraint.num_inliers = 20 * i;
     removal.AddConstraint(constraint);
     dense.Add(i, 0, constraint.covariance);
@@ -144,13 +151,9 @@ TEST_F(NodeRemovalTest, AveragesWhatIsBetweenTheSameTwo) {
     dense.Add(i - 1, i, edge.covariance);
   }
   for (const int seen : {1, 3}) {
-    Constraint constraint;
-    constraint.from = Id(1, 0);
-    constraint.to = Id(2, seen);
-    constraint.T_from_to = poses[0].Inverse() * poses[seen];
-    constraint.covariance = RandomCovariance();
-    removal.AddConstraint(constraint);
-    dense.Add(0, seen, constraint.covariance);
+    const RelativePose relative = Measure(poses[0], poses[seen]);
+    removal.AddConstraint(MakeConstraint(Id(1, 0), Id(2, seen), relative));
+    dense.Add(0, seen, relative.covariance);
   }
   removal.RemoveRun({Id(2, 1), Id(2, 2)});
   ASSERT_EQ(removal.factors().size(), 2);
@@ -168,12 +171,9 @@ TEST_F(NodeRemovalTest, OfARunGoesToTheNearerEndAndKeepsTheChain) {
     }
   }
   for (const int seen : {1, 6}) {
-    Constraint constraint;
-    constraint.from = Id(2, 0);
-    constraint.to = Id(1, seen);
-    constraint.T_from_to = poses[seen];
-    constraint.covariance = 1e-12 * Matrix6d::Identity();  // better known than all odometry
-    removal.AddConstraint(constraint);
+    const Matrix6d better_than_odometry = 1e-12 * Matrix6d::Identity();
+    removal.AddConstraint(
+        MakeConstraint(Id(2, 0), Id(1, seen), {poses[seen], better_than_odometry}));
   }
   removal.RemoveRun({Id(1, 1), Id(1, 2), Id(1, 3), Id(1, 4), Id(1, 5), Id(1, 6)});
   EXPECT_TRUE(removal.factors().at(Id(1, 0)).at(Id(1, 7)).odometry);

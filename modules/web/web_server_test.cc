@@ -102,17 +102,8 @@ class WebServerTest : public testing::Test {
   explicit WebServerTest(const WebOptions& options = {"127.0.0.1", 0, {}})
       : server_(options, site_) {}
 
-  void Serve() {
-    for (int i = 0; i < 5; ++i) {
-      server_.Serve(10);
-    }
-  }
-  std::string Ask(const std::string& request) {
-    WebClient client(server_.port());
-    client.Send(request);
-    Serve();
-    return client.Received();
-  }
+  void Serve() { ServeSome(&server_); }
+  std::string Ask(const std::string& request) { return web::Ask(&server_, request); }
 
   TestSite site_;
   WebServer server_;

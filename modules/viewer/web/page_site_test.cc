@@ -24,17 +24,8 @@ using web::WebClient;
 
 class PageSiteTest : public testing::Test {
  protected:
-  void Serve() {
-    for (int i = 0; i < 5; ++i) {
-      server_.Serve(10);
-    }
-  }
-  std::string Ask(const std::string& request) {
-    WebClient client(server_.port());
-    client.Send(request);
-    Serve();
-    return client.Received();
-  }
+  void Serve() { web::ServeSome(&server_); }
+  std::string Ask(const std::string& request) { return web::Ask(&server_, request); }
 
   TestShow show_;
   PageSite site_{

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <string>
 
+#include "web/web_server.h"
+
 namespace pangea::web {
 
 class WebClient {
@@ -47,6 +49,21 @@ class WebClient {
  private:
   int fd_;
 };
+
+// Some turns of a server in the test's own thread: enough for it to take a request and answer.
+inline void ServeSome(WebServer* server) {
+  for (int i = 0; i < 5; ++i) {
+    server->Serve(10);
+  }
+}
+
+// The server's whole answer to a request, over a connection of its own.
+inline std::string Ask(WebServer* server, const std::string& request) {
+  WebClient client(server->port());
+  client.Send(request);
+  ServeSome(server);
+  return client.Received();
+}
 
 // A request for a WebSocket; `origin`: its header's line or nothing.
 inline std::string UpgradeRequest(const std::string& target, const std::string& origin) {
