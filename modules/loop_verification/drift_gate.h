@@ -25,8 +25,9 @@ struct DriftGateOptions {
   }
 };
 
-// For keyframes `path_m` apart along the odometry; `p_odom` is where the newer one is.
+// For two keyframes of one map, `path_m` apart along its odometry. What the gate is given says how
+// far the odometry has drifted from the older (m) to the newer (c), which is at `p_odom_c`.
 LoopVerificationGate MakeDriftGate(const DriftGateOptions& options, double path_m,
-                                   const Eigen::Vector3d& p_odom);
+                                   const Eigen::Vector3d& p_odom_c);
 
 }  // namespace pangea
