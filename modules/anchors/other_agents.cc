@@ -1,7 +1,6 @@
 #include "anchors/other_agents.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 namespace pangea {

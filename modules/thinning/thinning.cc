@@ -1,7 +1,6 @@
 #include "thinning/thinning.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 

@@ -2,9 +2,7 @@
 
 // AnchorsProcess with its API on a web server: HTTP and WebSockets are served between messages.
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "anchors/anchors_process.h"
 #include "anchors/api/anchor_api.h"

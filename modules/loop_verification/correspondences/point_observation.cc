@@ -1,7 +1,6 @@
 #include "loop_verification/correspondences/point_observation.h"
 
 #include <Eigen/Cholesky>
-#include <cmath>
 #include <limits>
 
 namespace pangea {

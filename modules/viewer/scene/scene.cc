@@ -1,7 +1,6 @@
 #include "viewer/scene/scene.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace pangea::viewer {
 namespace {
