@@ -9,8 +9,8 @@ namespace pangea::session {
 double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 
 bool Player::IsOver() const {
-  return script.live && script.duration_s > 0 && started > 0 &&
-         Now() - started >= script.duration_s;
+  return script.live && script.duration_s > 0 && started_s > 0 &&
+         Now() - started_s >= script.duration_s;
 }
 
 std::vector<std::string> InputOf(const Player& player, const std::string& rate) {

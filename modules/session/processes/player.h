@@ -18,13 +18,13 @@ double Now();
 struct Player {
   AgentScript script;
   std::optional<ChildProcess> child;
-  double started = 0;
-  double ended = 0;
+  double started_s = 0;
+  double ended_s = 0;
   double played_before_s = 0;  // seconds of recording played by earlier runs of a restarted vio
   int restarts = 0;
   bool is_told_to_end = false;
 
-  bool done() const { return ended > 0; }
+  bool done() const { return ended_s > 0; }
   // A live one has had its duration.
   bool IsOver() const;
 };

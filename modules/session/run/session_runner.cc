@@ -69,7 +69,7 @@ class Runner {
     summary_.wall_s = Now() - begin_;
     summary_.status = monitor_.statuses();
     for (const Player& player : players_) {
-      summary_.vio_wall_s[player.script.id] = player.ended - player.started;
+      summary_.vio_wall_s[player.script.id] = player.ended_s - player.started_s;
       summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
     }
     return summary_;
@@ -194,8 +194,8 @@ class Runner {
       argv.insert(argv.end(), {"--options", WriteOptions(name, *player.script.vio_options)});
     }
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
-    if (player.started == 0) {
-      player.started = Now();
+    if (player.started_s == 0) {
+      player.started_s = Now();
       if (player.script.live) {
         progress_.PrintLine(DescribeLive(player.script, buses_.agents.at(id)));
       }
@@ -251,7 +251,7 @@ class Runner {
       }
       if (player.child && !player.done()) {
         player.child->Stop(kStopGrace_s);
-        player.ended = Now();
+        player.ended_s = Now();
       }
     }
     summary_.interrupted = StopRequested() && (ends_others || !ends_live);
@@ -272,7 +272,7 @@ class Runner {
     // What a killed vio left may be too short to start in.
     const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
     if (exit->code == 0 || is_rest || player.is_told_to_end || StopRequested()) {
-      player.ended = Now();
+      player.ended_s = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
       // Killed: the same agent goes on where it was, in a new map.
       ++player.restarts;
@@ -280,7 +280,7 @@ class Runner {
       player.played_before_s = monitor_.agent(player.script.id).recorded_s();
       StartPlayer(player);
     } else {
-      player.ended = Now();
+      player.ended_s = Now();
       summary_.failures.push_back(
           fmt::format("agent {}: {}", player.script.id, player.child->LastLine()));
       progress_.PrintLine(summary_.failures.back());
