@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "core/matching.h"
@@ -66,7 +67,8 @@ TEST(Describer, BlobsAndCornersTakeTurns) {
 TEST(Describer, CoversTheImageAndSeveralOctaves) {
   Describer describer(PlainCamera(), {});
   const std::vector<Corner> corners = describer.Describe(RandomTexture(752, 480, 2), {});
-  std::vector<int> part(4, 0), octave(8, 0);
+  std::vector<int> part(4, 0);
+  std::map<int, int> octave;
   for (const Corner& corner : corners) {
     ++part[(corner.pixel.x() > 376 ? 1 : 0) + (corner.pixel.y() > 240 ? 2 : 0)];
     ++octave[corner.octave];
