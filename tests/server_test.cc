@@ -14,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 // On buses of this test's own.
 std::string ServerCommand(const fs::path& folder) {
@@ -77,6 +78,49 @@ TEST(Server, StartsTheGatewayForPhonesAndRunsOnWithoutIt) {
   EXPECT_THAT(outcome.output, HasSubstr("ended\nexit code 0\n"));
   EXPECT_THAT(outcome.output, HasSubstr("give another port); given up after 3 times"));
   EXPECT_THAT(outcome.output, HasSubstr("second exit code 0"));
+}
+
+// What the anchors' API answers to a page of the origin; `$1` is the script's port.
+std::string AskAsPageOf(const std::string& origin) {
+  return fmt::format(
+      "exec 3<>/dev/tcp/127.0.0.1/$1; printf 'GET /v1/anchors HTTP/1.0\\r\\nHost: 127.0.0.1\\r\\n"
+      "Origin: {}\\r\\n\\r\\n' >&3; cat <&3; echo\n",
+      origin);
+}
+
+TEST(Server, LetsThePagesOfGivenOriginsUseTheAnchors) {
+  const fs::path folder = FreshFolder("server_origins");
+  fs::create_directories(folder / "keys");
+  const int port = 20000 + getpid() % 6000 * 2;
+  std::ofstream(folder / "ask.sh")
+      << "for i in $(seq 100); do (: <>/dev/tcp/127.0.0.1/$1) 2>/dev/null && break; sleep 0.1; "
+         "done\n"
+      << AskAsPageOf("https://app.example") << AskAsPageOf("http://10.0.0.7:5173")
+      << AskAsPageOf("https://elsewhere.example");
+  std::ofstream(folder / "run.sh") << fmt::format(
+      "{} --http 127.0.0.1:{} --allow-origin https://app.example --allow-origin "
+      "http://10.0.0.7:5173 & server=$!; bash {}/ask.sh {}; kill -INT $server; wait $server\n",
+      ServerCommand(folder), port, folder.string(), port);
+  const Outcome outcome = RunCommand("sh " + (folder / "run.sh").string());
+  EXPECT_THAT(outcome.output, HasSubstr("Access-Control-Allow-Origin: https://app.example\r\n"));
+  EXPECT_THAT(outcome.output, HasSubstr("Access-Control-Allow-Origin: http://10.0.0.7:5173\r\n"));
+  EXPECT_THAT(outcome.output, HasSubstr("Pages of other origins may not ask"));
+  EXPECT_THAT(outcome.output, Not(HasSubstr("Access-Control-Allow-Origin: https://elsewhere")));
+}
+
+TEST(Server, RefusesOriginsThatAreNoneAndThoseOfNoApi) {
+  const fs::path folder = FreshFolder("server_no_origins");
+  fs::create_directories(folder / "keys");
+  const std::string with_api = ServerCommand(folder) + " --http 127.0.0.1:0";
+  for (const char* origin : {"app.example", "https://app.example/", "'*'"}) {
+    const Outcome outcome = RunCommand(with_api + " --allow-origin " + origin);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.output, HasSubstr(": give scheme and host alone, as https://app.example"));
+    EXPECT_THAT(outcome.output, Not(HasSubstr("started")));
+  }
+  const Outcome outcome = RunCommand(ServerCommand(folder) + " --allow-origin https://app.example");
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, HasSubstr("--allow-origin requires --http"));
 }
 
 TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {

@@ -8,6 +8,7 @@
 #include <cctype>
 #include <charconv>
 #include <cstdint>
+#include <stdexcept>
 
 namespace pangea::web {
 namespace {
@@ -57,6 +58,15 @@ bool IsOrigin(std::string_view text) {
     }
   }
   return false;
+}
+
+void CheckOrigins(const std::vector<std::string>& origins) {
+  for (const std::string& origin : origins) {
+    if (!IsOrigin(origin)) {
+      throw std::runtime_error(fmt::format(
+          "--allow-origin {}: give scheme and host alone, as https://app.example", origin));
+    }
+  }
 }
 
 }  // namespace pangea::web

@@ -21,4 +21,7 @@ bool OriginAllowed(std::string_view origin, std::string_view host);
 // without a path.
 bool IsOrigin(std::string_view text);
 
+// Throws std::runtime_error, naming --allow-origin, for one that is none.
+void CheckOrigins(const std::vector<std::string>& origins);
+
 }  // namespace pangea::web

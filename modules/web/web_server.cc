@@ -102,12 +102,7 @@ void WebServer::Impl::SendToPeers() {
 
 WebServer::WebServer(const WebOptions& options, WebSite& site)
     : impl_(std::make_unique<Impl>(options, site)) {
-  for (const std::string& origin : options.origins) {
-    if (!IsOrigin(origin)) {
-      throw std::runtime_error(fmt::format(
-          "--allow-origin {}: give scheme and host alone, as https://app.example", origin));
-    }
-  }
+  CheckOrigins(options.origins);
   if (options.tls) {
     impl_->UseTls(*options.tls);
   }

@@ -48,6 +48,9 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
   }
   if (process == "anchors" && !options.http.empty()) {
     argv.insert(argv.end(), {"--http", options.http});
+    for (const std::string& origin : options.origins) {
+      argv.insert(argv.end(), {"--allow-origin", origin});
+    }
   }
   if (const auto file = options.options.find(process); file != options.options.end()) {
     argv.insert(argv.end(), {"--options", file->second.string()});

@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "session/server/bridges.h"
 
@@ -22,6 +23,7 @@ struct ServerOptions {
   std::filesystem::path logs;
   std::filesystem::path checkpoints;  // folder
   std::string http;                   // ADDRESS:PORT of the anchors' API; empty: none
+  std::vector<std::string> origins;   // whose pages may use it
   // Of the gateway for phones' browsers, which needs a site; nothing: none. The server runs without
   // it when it cannot start.
   std::optional<uint16_t> phone_port;

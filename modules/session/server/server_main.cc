@@ -11,6 +11,7 @@
 #include "link/wire.h"
 #include "session/server/server.h"
 #include "site/site.h"
+#include "web/web_rules.h"
 
 namespace pangea::session {
 namespace {
@@ -66,8 +67,12 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
   app.add_option("--matches", options.cluster.max_matches, "a worker's matches at a time")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--http", options.http,
-                 "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
+  CLI::Option* http = app.add_option(
+      "--http", options.http,
+      "ADDRESS:PORT of the anchors' API for apps, as 127.0.0.1:8090; without it none");
+  app.add_option("--allow-origin", options.origins,
+                 "pages of this origin may use that API, as https://app.example; repeatable")
+      ->needs(http);
   app.add_option("--phone", options.phone_port,
                  "pangea-gateway too, which lets phones' browsers in, on this TCP port")
       ->expected(0, 1)
@@ -124,6 +129,7 @@ int RunWorker(Arguments* arguments) {
 }
 
 int Run(Arguments* arguments) {
+  web::CheckOrigins(arguments->options.origins);
   if (!arguments->worker.empty()) {
     return RunWorker(arguments);
   }
