@@ -47,8 +47,10 @@ class Results:
         dense = [pose for agent in agents for pose in self._optimised(job.folder, agent)]
         result = self._measured(sorted(dense), len(report["groups"]))
         if result:
-            result["constraints"] = self._constraints(job.folder, agents, report, result["scale"])
             result["fused"] = any(len(group["agents"]) == len(agents) for group in report["groups"])
+            # Maps apart have no scale together: then that of a constraint is its first agent's.
+            alone = None if result["fused"] else self._measured(self._optimised(job.folder, agents[0]), 1)
+            result["constraints"] = self._constraints(job.folder, agents, report, (alone or result)["scale"])
         return result
 
     def _constraints(self, folder, agents, report, scale):
