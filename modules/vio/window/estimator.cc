@@ -75,8 +75,7 @@ struct Estimator::Impl {
   std::optional<std::string> Implausible() const;
   // Of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
-    return frame_utime + std::llround(1e6 * (problem.state.time_offset_s +
-                                             problem.state.interval_share * excess_interval_s));
+    return frame_utime + std::llround(1e6 * problem.state.OffsetAt(excess_interval_s));
   }
   int64_t ImuTime(const WindowFrame& frame) const {
     return frame.utime + std::llround(1e6 * problem.state.OffsetOf(frame));
@@ -369,6 +368,7 @@ FrameResult Estimator::AddFrame(const TrackedFrame& frame, std::span<const ImuSa
 
 std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
 
+// Its time offset is that of the newest image.
 CameraModel Estimator::camera() const {
   const WindowState& state = impl_->problem.state;
   CameraModel camera = state.Calibrated(impl_->camera);

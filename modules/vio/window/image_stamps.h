@@ -24,8 +24,9 @@ class ImageStamps {
   // The last few images' interval (one that is missing does not count), less the reference; 0 while
   // there is none, and within what jitter makes of equal intervals.
   double excess_interval_s() const;
-  // Standard deviation of a stamp's error: of jitter, or of the exposure's middle where the
-  // exposure makes the interval: it is anything up to half an interval off. 0: none that matters.
+  // Standard deviation of a stamp's error: of jitter; of stamps without it that of the exposure's
+  // middle, anything up to half an interval off, once the exposure has changed the interval. 0:
+  // none that matters.
   double sigma_s() const;
 
  private:

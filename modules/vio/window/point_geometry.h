@@ -62,7 +62,7 @@ struct PointInOdom {
   Eigen::Matrix3d by_rotation;      // of T_body_cam
   Eigen::Matrix3d by_translation;   // of T_body_cam
   Eigen::Vector3d by_anchor_stamp;  // m/s
-  double anchor_excess_interval_s;
+  double anchor_excess_interval_s = 0;
 };
 Eigen::Vector3d InOdom(const WindowState& state, const AnchoredPoint& point);
 // Nothing when the point is behind the camera.

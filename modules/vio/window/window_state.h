@@ -81,9 +81,10 @@ struct WindowState {
   // The given camera as it is thought to be: extrinsics, time offset, focal length and centre.
   CameraModel Calibrated(CameraModel given) const;
 
-  double OffsetOf(const WindowFrame& frame) const {
-    return time_offset_s + interval_share * frame.excess_interval_s;
+  double OffsetAt(double excess_interval_s) const {
+    return time_offset_s + interval_share * excess_interval_s;
   }
+  double OffsetOf(const WindowFrame& frame) const { return OffsetAt(frame.excess_interval_s); }
   // The body when a row of a frame's image was exposed, that much after the image's time: the
   // frame's pose, moved on.
   double Ahead(int frame, double row_s) const {

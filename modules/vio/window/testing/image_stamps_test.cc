@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
 
 namespace pangea::vio {
 namespace {
@@ -44,10 +45,15 @@ TEST(ImageStamps, AMissingImageIsNoLongerInterval) {
 TEST(ImageStamps, JitterIsNoLongerInterval) {
   std::mt19937_64 rng(1);
   std::normal_distribution<double> normal(0, 0.005);
-  const auto jittering = [&](int) { return 0.033 + normal(rng); };
+  const auto jittering = [&, late_s = 0.0](int) mutable {
+    const double before_s = std::exchange(late_s, normal(rng));
+    return 0.066 + late_s - before_s;
+  };
   for (int images = 30; images < 60; ++images) {
     EXPECT_EQ(Taken(0.03, images, jittering).excess_interval_s(), 0);
   }
+  // Nor after minutes: the stamps' error is the jitter alone, the interval's would be 0.0095.
+  EXPECT_NEAR(Taken(0.03, 10'000, jittering).sigma_s(), 0.005, 0.003);
 }
 
 TEST(ImageStamps, WhereTheIntervalChangesTheExposureIsUnknown) {
