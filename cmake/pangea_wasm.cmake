@@ -4,7 +4,9 @@ set(PANGEA_WASM_LIBRARIES "" CACHE PATH "What scripts/wasm_libraries has built")
 if(NOT EXISTS ${PANGEA_WASM_LIBRARIES}/complete)
   message(FATAL_ERROR "Build with scripts/build wasm: PANGEA_WASM_LIBRARIES='${PANGEA_WASM_LIBRARIES}' holds no libraries")
 endif()
-add_compile_options(-msimd128 -fwasm-exceptions -ffp-contract=off)
+# -msse2: Eigen has no WebAssembly, and the compiler's headers give SSE2 by it. For old versions of GCC Eigen writes assembler
+# of x86: below 63 = 10 * major + minor, and from major 6; no version is neither but 5.13 and the like.
+add_compile_options(-msimd128 -msse2 -fgnuc-version=5.13 -fwasm-exceptions -ffp-contract=off)
 add_link_options(-msimd128 -fwasm-exceptions)
 
 # Of /usr/include these alone: the rest is of another machine.
@@ -13,6 +15,7 @@ file(MAKE_DIRECTORY ${wasm_headers})
 foreach(package boost CLI fmt lcm nlohmann)
   file(CREATE_LINK /usr/include/${package} ${wasm_headers}/${package} SYMBOLIC)
 endforeach()
+file(TOUCH ${wasm_headers}/mmintrin.h)  # Eigen includes it; the compiler's own is an error here
 
 # wasm_package(target [LIBRARY]...): as pangea_dependencies.cmake has it.
 function(wasm_package target)

@@ -1,11 +1,11 @@
 #include "log_file/damaged_copy.h"
 
 #include <fcntl.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -39,8 +39,12 @@ bool Copy(int from, const std::vector<FileRange>& parts, int to) {
 }  // namespace
 
 std::string DamagedName(const std::string& file) {
-  const std::string first =
-      fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", file, fmt::gmtime(std::time(nullptr)));
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  std::array<char, sizeof("20261231T235959Z")> date{};
+  std::strftime(date.data(), date.size(), "%Y%m%dT%H%M%SZ", &utc);
+  const std::string first = fmt::format("{}.damaged-{}", file, date.data());
   std::string name = first;
   for (int i = 2; std::filesystem::exists(std::filesystem::symlink_status(name)); ++i) {
     name = fmt::format("{}-{}", first, i);
