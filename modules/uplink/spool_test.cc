@@ -143,7 +143,7 @@ TEST_F(SpoolTest, ADamagedFirstByteCostsOneKeyframeAndTheFileStays) {
     spool.Release(kMap, 4);
     ASSERT_EQ(Files().size(), 1u);
     EXPECT_THAT(Files()[0].filename().string(),
-                testing::StartsWith("keyframes_000001.lcm.damaged-"));
+                testing::MatchesRegex("keyframes_000001\\.lcm\\.damaged-[0-9]{8}T[0-9]{6}Z"));
     EXPECT_EQ(spool.bytes(), 0);
     EXPECT_EQ(spool.damaged_bytes(), size);
   }
