@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <span>
 
 #include "calibration/frame_pairs.h"
@@ -34,6 +35,13 @@ constexpr double kMaxSigmaTimeOffset_s = 0.01;
 constexpr double kMaxSigma_px = 2.5;
 constexpr double kMinFieldOfView = 0.7, kMaxFieldOfView = 2.3;  // rad
 constexpr double kMinCostRatio = 2;  // the next best rotation's over the best one's
+// A rotation found is the given one if it is within the 99.9 % bound (chi squared, 3 degrees of
+// freedom: 4.03 sigma) of the given one's error and of the largest error of a found one: 27
+// degrees. Wrong axes are off by 90 at least.
+const double kMaxOffGiven = 4.03 * std::hypot(kSigmaGivenRotation, kMaxSigmaRotation);
+// The given rotation fits worse than another beyond this: 99 %, which the fewest blocks can reach
+// (kMinSeconds of them all say so: 2.52).
+constexpr double kMaxSigmasWorse = 2.33;
 
 // First without the lens: focal length and distortion run away together while the rotation is
 // rough.
@@ -138,6 +146,14 @@ void Fill(const Solution& solution, Result& result) {
   result.inlier_share = solution.inlier_share;
 }
 
+std::vector<FramePair> Some(std::span<const FramePair> pairs) {
+  std::vector<FramePair> some;
+  for (size_t i = 0; i < pairs.size(); i += kChooseOnEvery) {
+    some.push_back(pairs[i]);
+  }
+  return some;
+}
+
 // What best explains a part of the pairs, among the rotations searched.
 struct Choice {
   Hypothesis best;
@@ -164,10 +180,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
   }
   SortByCost(&found);
   found.resize(std::min(found.size(), kMaxRefined));
-  std::vector<FramePair> some;
-  for (size_t i = 0; i < pairs.size(); i += kChooseOnEvery) {
-    some.push_back(pairs[i]);
-  }
+  const std::vector<FramePair> some = Some(pairs);
   const Solver solver(some, input.imu, origin, kSearchVelocityChange);
   for (Hypothesis& hypothesis : found) {
     const Solution solution = Refined(solver, hypothesis, PriorOf(input, hypothesis.parameters));
@@ -184,6 +197,66 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
     }
   }
   return choice;
+}
+
+double Apart(const Parameters& a, const Eigen::Quaterniond& q_body_cam) {
+  return a.camera.T_body_cam.q.angularDistance(q_body_cam);
+}
+
+// How surely `worse` is worse than `better`, in standard deviations: by the signed ranks of the
+// differences of blocks of time, which are independent witnesses (Wilcoxon, Biometrics 1945). Their
+// sizes differ as the motion does, so that their mean tells little.
+double SigmasWorse(const Input& input, std::span<const FramePair> pairs, int64_t origin,
+                   const Parameters& worse, const Parameters& better) {
+  const std::vector<FramePair> some = Some(pairs);
+  const Solver solver(some, input.imu, origin, kSearchVelocityChange);
+  const std::vector<double> costs = solver.Costs(worse, 1), lower = solver.Costs(better, 1);
+  std::map<int64_t, double> blocks;
+  for (size_t i = 0; i < some.size(); ++i) {
+    blocks[static_cast<int64_t>(std::floor(some[i].a_s / kBlock_s))] += costs[i] - lower[i];
+  }
+  std::vector<double> differences;
+  for (const auto& [block, difference] : blocks) {
+    differences.push_back(difference);
+  }
+  std::ranges::sort(differences, {}, [](double d) { return std::abs(d); });
+  double ranks = 0;
+  for (size_t i = 0; i < differences.size(); ++i) {
+    ranks += differences[i] > 0 ? static_cast<double>(i + 1) : 0;
+  }
+  const auto n = static_cast<double>(differences.size());
+  return (ranks - n * (n + 1) / 4) / std::sqrt(n * (n + 1) * (2 * n + 1) / 24);
+}
+
+// Of all rotations what fits instead of the given one, if the points speak against that: the best
+// is not where the given one may be, and where the given one led is not there either or fits worse.
+std::optional<Choice> BetterThanGiven(const Input& input, std::span<const FramePair> pairs,
+                                      int64_t origin, const Parameters& with_given) {
+  Input free = input;
+  free.q_body_cam.reset();
+  const Choice choice = ChooseRotation(free, pairs, origin);
+  const Parameters& best = choice.best.parameters;
+  if (Apart(best, *input.q_body_cam) < kMaxOffGiven) {
+    return std::nullopt;
+  }
+  if (Apart(with_given, *input.q_body_cam) < kMaxOffGiven &&
+      SigmasWorse(input, pairs, origin, with_given, best) < kMaxSigmasWorse) {
+    return std::nullopt;
+  }
+  return choice;
+}
+
+void RefuseGiven(const Eigen::Quaterniond& given, const Choice& better, Result* result) {
+  const Eigen::Quaterniond& q = better.best.parameters.camera.T_body_cam.q;
+  result->refused =
+      fmt::format("the camera's x, y, z do not point along the IMU's {} as given", AxesOf(given));
+  if (better.next_cost > 0 && better.next_cost < kMinCostRatio) {
+    result->refused += ", and the motion does not tell which do: rotate more, about all three axes";
+    return;
+  }
+  result->told_q_body_cam = q;
+  result->refused += fmt::format(": the points say {}, {:.0f} degrees from that", AxesOf(q),
+                                 q.angularDistance(given) / kDegree);
 }
 
 // With either kind of lens; the one that explains more.
@@ -251,6 +324,12 @@ Result Calibrate(const Input& input) {
   }
   const Choice choice = ChooseRotation(input, pairs, origin);
   result.next_cost = choice.next_cost;
+  if (input.q_body_cam && input.doubt_rotation) {
+    if (const auto better = BetterThanGiven(input, pairs, origin, choice.best.parameters)) {
+      RefuseGiven(*input.q_body_cam, *better, &result);
+      return result;
+    }
+  }
   Fill(SolveAll(input, pairs, origin, choice.best.parameters), result);
   result.coverage = CoverageOf(pairs, input.imu, origin, result.parameters);
   AddFloors(input, result);

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "calibration/calibration_test_world.h"
+#include "calibration/search.h"
+#include "core/rigid3.h"
 
 namespace pangea::calibration {
 namespace {
@@ -88,6 +91,46 @@ TEST(Calibrate, TakesWhatIsKnown) {
   const Result result = Calibrate(world.input);
   EXPECT_EQ(result.refused, "");
   EXPECT_EQ(result.next_cost, 0);  // no other rotation was tried
+}
+
+// The one of the 24 rotations that is nearest the true one.
+Eigen::Quaterniond NearestAxes(const TestWorld& world) {
+  const std::vector<Eigen::Quaterniond> rotations = AxisAlignedRotations();
+  return *std::ranges::min_element(rotations, {}, [&](const Eigen::Quaterniond& q) {
+    return q.angularDistance(world.truth.camera.T_body_cam.q);
+  });
+}
+
+TEST(Calibrate, RefusesGivenAxesThatAreWrongAndNamesTheRightOnes) {
+  TestWorld world = MakeTestWorld(Short(9));
+  const Eigen::Quaterniond right = NearestAxes(world);
+  world.input.doubt_rotation = true;
+  world.input.q_body_cam = right;
+  EXPECT_EQ(Calibrate(world.input).refused, "");
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(M_PI / 2, 0, 0), Eigen::Vector3d(0, M_PI, 0),
+                                      Eigen::Vector3d(0, 0, -M_PI / 2)}) {
+    world.input.q_body_cam = right * ExpSo3(turn);
+    const Result result = Calibrate(world.input);
+    EXPECT_THAT(result.refused, HasSubstr("as given: the points say " + AxesOf(right)));
+    ASSERT_TRUE(result.told_q_body_cam);
+    EXPECT_EQ(AxesOf(*result.told_q_body_cam), AxesOf(right));
+  }
+}
+
+// Then the given axes are what tells.
+TEST(Calibrate, TakesGivenAxesWhereTheMotionDoesNotTell) {
+  TestWorldOptions options = Short(3);
+  options.rotation_rms = {1e-4, 0.6, 1e-4};
+  TestWorld world = MakeTestWorld(options);
+  world.input.q_body_cam = NearestAxes(world);
+  world.input.doubt_rotation = true;
+  EXPECT_THAT(Calibrate(world.input).refused, Not(HasSubstr("as given")));
+}
+
+TEST(Calibrate, NamesAxes) {
+  Eigen::Matrix3d R;  // of a phone's back camera
+  R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  EXPECT_EQ(AxesOf(Eigen::Quaterniond(R) * ExpSo3({0.2, -0.3, 0.1})), "-y,-x,-z");
 }
 
 }  // namespace

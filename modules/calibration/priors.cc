@@ -6,8 +6,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kSigmaAxisAligned = 0.25;  // rad: of a rotation found among the 24
-constexpr double kSigmaGivenRotation = 0.1;
-constexpr double kSigmaGyroBias = 0.1;  // rad/s
+constexpr double kSigmaGyroBias = 0.1;      // rad/s
 constexpr double kSigmaLogFocal = 0.3;
 constexpr double kSigmaGivenLogFocal = 0.1;  // with a field of view
 constexpr double kSigmaDistortionEquidistant = 0.03;

@@ -6,6 +6,7 @@
 
 namespace pangea::calibration {
 
+constexpr double kSigmaGivenRotation = 0.1;  // rad
 constexpr double kSigmaTimeOffset_s = 0.1;
 constexpr double kSigmaCentre = 0.02;  // of the wider side
 constexpr double kSigmaDistortion = 0.15;

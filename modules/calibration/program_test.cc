@@ -124,6 +124,13 @@ TEST(Summary, SaysWhatToDoBetter) {
   EXPECT_THAT(text, HasSubstr("no calibration: the focal length"));
 }
 
+TEST(Summary, SaysWhichAxesToGive) {
+  Result result;
+  result.refused = "the camera's x, y, z do not point along the IMU's x,y,z as given";
+  result.told_q_body_cam = Eigen::Quaterniond(Eigen::Vector4d(0, 0, 0, 1));  // x, y, z, w
+  EXPECT_THAT(Summary({}, result), HasSubstr("better: --camera-axes=x,y,z, or none"));
+}
+
 TEST(Summary, SaysWhatTheMotionDidNotTell) {
   Result result = Some();
   Input input;

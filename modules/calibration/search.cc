@@ -1,5 +1,7 @@
 #include "calibration/search.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "calibration/solver.h"
@@ -53,6 +55,21 @@ std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
     }
   }
   return rotations;
+}
+
+std::string AxesOf(const Eigen::Quaterniond& q_body_cam) {
+  const std::vector<Eigen::Quaterniond> rotations = AxisAlignedRotations();
+  const Eigen::Matrix3d R =
+      std::ranges::min_element(rotations, {}, [&](const Eigen::Quaterniond& q) {
+        return q.angularDistance(q_body_cam);
+      })->toRotationMatrix();
+  std::string axes;
+  for (int col = 0; col < 3; ++col) {
+    Eigen::Index row = 0;
+    R.col(col).cwiseAbs().maxCoeff(&row);
+    axes += fmt::format("{}{}{}", col > 0 ? "," : "", R(row, col) < 0 ? "-" : "", "xyz"[row]);
+  }
+  return axes;
 }
 
 std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const ImuSample> imu,

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "calibration/frame_pairs.h"
@@ -20,6 +21,9 @@ constexpr double kSearchVelocityChange = 0.2;
 
 // Rotations camera to body.
 std::vector<Eigen::Quaterniond> AxisAlignedRotations();
+// The body's axes along which the image's right, its down and the line of sight point, to the
+// nearest of these rotations: "-y,-x,-z".
+std::string AxesOf(const Eigen::Quaterniond& q_body_cam);
 
 // Best time offset of each rotation and field of view with its cost per residual, the best first.
 // `camera` has size, kind and read-out; fields of view are of its wider side, radians.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "core/median.h"
 
@@ -19,7 +20,6 @@ constexpr double kConverged = 0.01;  // of a step, in standard deviations
 constexpr double kInlierSigmas = 3;
 constexpr double kRobustAt = 2.4;  // of the Cauchy loss, in standard deviations
 constexpr int kMaxIterations = 25;
-constexpr double kBlock_s = 1.0;  // of residuals that may share an error
 constexpr int kLongBlocks = 8;  // of the whole recording: for what changes slowly, as exposure does
 // Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
 constexpr double kMinFieldOfView = 0.6, kMaxFieldOfView = 2.4;  // rad, of the wider side
@@ -106,14 +106,19 @@ double Solver::RobustCost(const Eigen::VectorXd& residuals, double sigma_px) con
   return 0.5 * c * c * (1 + (residuals / (c * sigma_px)).array().square()).log().sum();
 }
 
-double Solver::Cost(const Parameters& parameters, double sigma_px) const {
-  double cost = 0;
+std::vector<double> Solver::Costs(const Parameters& parameters, double sigma_px) const {
+  std::vector<double> costs;
   for (const PairGeometry& geometry : Geometries(parameters, Rays(parameters.camera))) {
     const Translation translation = RobustTranslation(geometry);
-    cost +=
-        RobustCost(geometry.Residuals(translation), sigma_px) + geometry.ChangeCost(translation);
+    costs.push_back(RobustCost(geometry.Residuals(translation), sigma_px) +
+                    geometry.ChangeCost(translation));
   }
-  return cost;
+  return costs;
+}
+
+double Solver::Cost(const Parameters& parameters, double sigma_px) const {
+  const std::vector<double> costs = Costs(parameters, sigma_px);
+  return std::accumulate(costs.begin(), costs.end(), 0.0);
 }
 
 double Solver::TotalCost(const Parameters& parameters, const Prior& prior, double sigma_px) const {

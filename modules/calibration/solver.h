@@ -16,6 +16,8 @@
 
 namespace pangea::calibration {
 
+constexpr double kBlock_s = 1.0;  // of residuals that may share an error
+
 struct Solution {
   Parameters parameters;
   Information covariance = Information::Identity();
@@ -33,7 +35,8 @@ class Solver {
 
   // Rows whose prior's sigma is 0 stay as they are.
   Solution Solve(const Parameters& start, const Prior& prior) const;
-  // Robust, without prior: for hypotheses.
+  // Robust, without prior: for hypotheses. Of each pair, and of all.
+  std::vector<double> Costs(const Parameters& parameters, double sigma_px) const;
   double Cost(const Parameters& parameters, double sigma_px) const;
 
  private:

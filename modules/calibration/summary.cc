@@ -8,6 +8,7 @@
 
 #include "calibration/parameters.h"
 #include "calibration/priors.h"
+#include "calibration/search.h"
 
 namespace pangea::calibration {
 namespace {
@@ -61,6 +62,9 @@ std::string Values(const Input& input, const Result& result) {
 
 std::vector<std::string> Advice(const Result& result) {
   std::vector<std::string> advice;
+  if (result.told_q_body_cam) {
+    advice.push_back(fmt::format("--camera-axes={}, or none", AxesOf(*result.told_q_body_cam)));
+  }
   for (int axis = 0; axis < 3; ++axis) {
     if (result.sigma_px > 0 && result.coverage.rotation_rms[axis] < kGoodRotation) {
       advice.push_back(fmt::format("rotate more {}: {:.2f} rad/s", kAxes[axis],
