@@ -48,7 +48,8 @@ constexpr double kMaxSigmasWorse = 2.33;
 Solution Refined(const Solver& solver, const Hypothesis& hypothesis, const Prior& prior) {
   Prior first = prior;
   first.sigma.tail<kSize - kLogFocal>().setZero();
-  return solver.Solve(solver.Solve(hypothesis.parameters, first).parameters, prior);
+  const Solution roughly = solver.Solve(hypothesis.parameters, first, kRoughlyConverged);
+  return solver.Solve(roughly.parameters, prior);
 }
 
 // With inertial samples all around, wherever the clocks are.
@@ -90,6 +91,15 @@ void AddFloors(const Input& input, Result& result) {
   add(kDistortion + 1, kLensSigma);
   add(kLogFocal, std::max(input.least_gyro_scale_sigma, noise.gyro_scale_sigma));
   result.sigma = result.covariance.diagonal().cwiseSqrt();
+}
+
+// Standard deviation of what the intervals between images make of the time offset.
+double TimeOffsetSpread(std::span<const FramePair> pairs, double interval_share) {
+  double squared = 0;
+  for (const FramePair& pair : pairs) {
+    squared += pair.a_excess_s * pair.a_excess_s;
+  }
+  return std::abs(interval_share) * std::sqrt(squared / static_cast<double>(pairs.size()));
 }
 
 std::string Refusal(const Result& result) {
@@ -175,7 +185,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
   for (Hypothesis& hypothesis : found) {
     Prior first = PriorOf(input, hypothesis.parameters);
     first.sigma.tail<kSize - kLogFocal>().setZero();
-    const Solution solution = roughly.Solve(hypothesis.parameters, first);
+    const Solution solution = roughly.Solve(hypothesis.parameters, first, kRoughlyConverged);
     hypothesis = {solution.parameters, solution.cost};
   }
   SortByCost(&found);
@@ -333,6 +343,7 @@ Result Calibrate(const Input& input) {
   Fill(SolveAll(input, pairs, origin, choice.best.parameters), result);
   result.coverage = CoverageOf(pairs, input.imu, origin, result.parameters);
   AddFloors(input, result);
+  result.time_offset_spread_s = TimeOffsetSpread(pairs, result.parameters.interval_share);
   result.refused = Refusal(result);
   return result;
 }

@@ -39,6 +39,9 @@ struct Result {
   double sigma_px = 0;
   double inlier_share = 0;
   double image_rate_hz = 0;
+  // What the time offset varies by as the exposure changes the interval between images; standard
+  // deviation. `sigma` is of the offset at the usual interval.
+  double time_offset_spread_s = 0;
   Coverage coverage;
   double next_cost = 0;  // of the next best rotation, over the best one's; 0: there was none
   std::string refused;   // why; empty: it holds

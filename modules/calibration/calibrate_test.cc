@@ -30,7 +30,10 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
   constexpr int kWorlds = 20;
   Tangent nees = Tangent::Zero(), largest = Tangent::Zero();
   for (uint64_t seed = 1; seed <= kWorlds; ++seed) {
-    TestWorld world = MakeTestWorld(Short(seed));
+    TestWorldOptions options = Short(seed);
+    options.slower = 1.4;
+    options.interval_share = -0.4;
+    TestWorld world = MakeTestWorld(options);
     // This one is exact.
     world.input.imu_noise.axes_sigma = world.input.imu_noise.gyro_scale_sigma = 0;
     world.input.least_gyro_scale_sigma = 0;
@@ -61,6 +64,39 @@ TEST(Calibrate, StampsThatJitterMakeItLessSure) {
   EXPECT_GT(result.sigma[kTimeOffset], 2 * exact.sigma[kTimeOffset]);
   const Tangent off = result.parameters.Minus(world.truth).cwiseQuotient(result.sigma);
   EXPECT_LT(off.cwiseAbs().maxCoeff(), 4);
+}
+
+// A camera that in the dark exposes longer takes fewer images, and its stamps are of the
+// exposure's end: what counts is its middle.
+TEST(Calibrate, FindsTheOffsetThatGrowsWithTheInterval) {
+  TestWorldOptions options = Short(10);
+  options.seconds = 18;
+  options.image_hz = 30;
+  options.slower = 1.5;
+  options.interval_share = -0.5;
+  const TestWorld world = MakeTestWorld(options);
+  const Result result = Calibrate(world.input);
+  EXPECT_EQ(result.refused, "");
+  EXPECT_NEAR(result.parameters.interval_share, -0.5, 4 * result.sigma[kIntervalShare]);
+  EXPECT_LT(result.sigma[kIntervalShare], 0.1);
+  EXPECT_LT(result.sigma_px, 1.2 * options.pixel_sigma);
+  // Offsets of a sixtieth of a second in half the images, about the usual interval's.
+  EXPECT_NEAR(result.time_offset_spread_s, 0.5 / 60 * std::sqrt(0.5), 0.002);
+}
+
+// As real tracks have them: neither do they bend the lens, nor keep the solver from converging.
+TEST(Calibrate, OutliersMatterLittle) {
+  TestWorldOptions options = Short(11);
+  options.seconds = 20;
+  options.outlier_share = 0.15;
+  options.pixel_sigma = 0.6;
+  const TestWorld world = MakeTestWorld(options);
+  const Result result = Calibrate(world.input);
+  EXPECT_EQ(result.refused, "");
+  const Tangent off = result.parameters.Minus(world.truth).cwiseQuotient(result.sigma);
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 4);
+  EXPECT_LT(std::abs(result.parameters.camera.distortion[0] - world.truth.camera.distortion[0]),
+            0.008);
 }
 
 TEST(Calibrate, RefusesRotationAboutOneAxis) {

@@ -118,17 +118,22 @@ void AddFrames(const Motion& motion, const TestWorldOptions& options, std::mt199
     const Eigen::Vector3d way(n(rng), n(rng), n(rng));
     points.push_back((4 + 2.5 * u(rng)) * way.normalized());
   }
-  for (int i = 0; i < static_cast<int>(options.seconds * options.image_hz); ++i) {
-    const double t = 0.9 + i / options.image_hz;
+  double interval_s = 1 / options.image_hz;
+  for (double t = 0.9; t < 0.9 + options.seconds - 1e-9; t += interval_s) {
+    interval_s = (t < 0.9 + 0.5 * options.seconds ? 1 : options.slower) / options.image_hz;
+    const double later_s = options.interval_share * (interval_s - 1 / options.image_hz);
     vio::TrackedFrame frame;
-    frame.utime = std::llround(1e6 * (t + options.stamp_sigma_s * n(rng)));
+    frame.utime = std::llround(1e6 * (t - later_s + options.stamp_sigma_s * n(rng)));
     for (size_t id = 0; id < points.size(); ++id) {
       const auto pixel = SeenAt(motion, world.truth.camera, points[id], t);
       if (pixel) {
         vio::Observation observation;
         observation.landmark_id = static_cast<int32_t>(id);
-        observation.pixel =
-            (*pixel + options.pixel_sigma * Eigen::Vector2d(n(rng), n(rng))).cast<float>();
+        const bool outlier =
+            static_cast<double>(id) < options.outlier_share * static_cast<double>(points.size());
+        const Eigen::Vector2d off = outlier ? 6 * Eigen::Vector2d(u(rng), u(rng))
+                                            : options.pixel_sigma * Eigen::Vector2d(n(rng), n(rng));
+        observation.pixel = (*pixel + off).cast<float>();
         frame.observations.push_back(observation);
       }
     }
@@ -142,6 +147,7 @@ TestWorld MakeTestWorld(const TestWorldOptions& options) {
   std::mt19937_64 rng(options.seed);
   TestWorld world;
   world.truth = RandomTruth(rng, options);
+  world.truth.interval_share = options.interval_share;
   world.input.width = world.truth.camera.width;
   world.input.height = world.truth.camera.height;
   const Eigen::Vector3d& rms = options.rotation_rms;

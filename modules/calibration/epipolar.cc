@@ -15,10 +15,11 @@ constexpr double kNoise_px = 0.5;  // what the change of velocity is weighed aga
 // order (a read-out of 30 ms at 3 rad/s leaves 1e-5 rad).
 class RowRotation {
  public:
-  RowRotation(double image_s, const Parameters& parameters, const OrientationCurve& curve)
+  RowRotation(double image_s, double excess_s, const Parameters& parameters,
+              const OrientationCurve& curve)
       : last_row_(parameters.camera.height - 1) {
     const CameraModel& camera = parameters.camera;
-    const double first_s = image_s + camera.time_offset_s;
+    const double first_s = image_s + camera.time_offset_s + parameters.interval_share * excess_s;
     const double last_s = first_s + camera.readout_s;
     const Eigen::Matrix3d R_body_cam = camera.T_body_cam.R();
     middle_ = curve.At(0.5 * (first_s + last_s)) * R_body_cam;
@@ -37,16 +38,22 @@ class RowRotation {
   Eigen::Matrix3d middle_, linear_, quadratic_;
 };
 
+PointRay RayOf(const Eigen::Vector2d& pixel, const CameraModel& camera) {
+  const auto xy = camera.Unproject(pixel);
+  Eigen::Matrix<double, 2, 3> d_ray;
+  if (!xy || !camera.Project(xy->homogeneous(), &d_ray)) {
+    return {Eigen::Vector2d::Constant(std::nan("")), Eigen::Matrix2d::Zero()};
+  }
+  return {*xy, d_ray.leftCols<2>().inverse()};
+}
+
 }  // namespace
 
 PairRays Unprojected(const FramePair& pair, const CameraModel& camera) {
-  const auto n = static_cast<Eigen::Index>(pair.points.size());
-  const Eigen::Vector2d none = Eigen::Vector2d::Constant(std::nan(""));
-  PairRays rays{Eigen::Matrix2Xd(2, n), Eigen::Matrix2Xd(2, n)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const PointPair& point = pair.points[static_cast<size_t>(i)];
-    rays.a.col(i) = camera.Unproject(point.a).value_or(none);
-    rays.b.col(i) = camera.Unproject(point.b).value_or(none);
+  PairRays rays;
+  for (const PointPair& point : pair.points) {
+    rays.a.push_back(RayOf(point.a, camera));
+    rays.b.push_back(RayOf(point.b, camera));
   }
   return rays;
 }
@@ -57,19 +64,20 @@ PairGeometry::PairGeometry(const FramePair& pair, const PairRays& rays,
     : focal_(parameters.camera.fx),
       velocity_change_(velocity_change),
       seconds_(pair.b_s - pair.a_s),
-      normals_(3, rays.a.cols()) {
-  const RowRotation rotation_a(pair.a_s, parameters, curve);
-  const RowRotation rotation_b(pair.b_s, parameters, curve);
+      normals_(3, static_cast<Eigen::Index>(rays.a.size())) {
+  const RowRotation rotation_a(pair.a_s, pair.a_excess_s, parameters, curve);
+  const RowRotation rotation_b(pair.b_s, pair.b_excess_s, parameters, curve);
   const CameraModel& camera = parameters.camera;
-  const auto view = [&camera](const Eigen::Matrix3d& R, const Eigen::Vector2d& ray, double row) {
+  const auto view = [&camera](const Eigen::Matrix3d& R, const PointRay& ray, double row) {
     const double share = row / (camera.height - 1) - 0.5;
-    return View{R * ray.homogeneous(), R.col(0), R.col(1), share, share * camera.readout_s};
+    return View{R * ray.xy.homogeneous(), R.leftCols<2>() * ray.d_pixel, share,
+                share * camera.readout_s};
   };
-  for (Eigen::Index i = 0; i < rays.a.cols(); ++i) {
-    const PointPair& point = pair.points[static_cast<size_t>(i)];
-    a_.push_back(view(rotation_a.At(point.a.y()), rays.a.col(i), point.a.y()));
-    b_.push_back(view(rotation_b.At(point.b.y()), rays.b.col(i), point.b.y()));
-    normals_.col(i) = a_.back().ray.cross(b_.back().ray);
+  for (size_t i = 0; i < rays.a.size(); ++i) {
+    const PointPair& point = pair.points[i];
+    a_.push_back(view(rotation_a.At(point.a.y()), rays.a[i], point.a.y()));
+    b_.push_back(view(rotation_b.At(point.b.y()), rays.b[i], point.b.y()));
+    normals_.col(static_cast<Eigen::Index>(i)) = a_.back().ray.cross(b_.back().ray);
   }
 }
 
@@ -86,10 +94,9 @@ Eigen::Vector3d PairGeometry::RowToRow(Eigen::Index point, const Translation& tr
 double PairGeometry::Gain(Eigen::Index point, const Eigen::Vector3d& v) const {
   const View& a = a_[static_cast<size_t>(point)];
   const View& b = b_[static_cast<size_t>(point)];
-  const Eigen::Vector3d da = b.ray.cross(v), db = v.cross(a.ray);
-  const double squared = std::pow(da.dot(a.right), 2) + std::pow(da.dot(a.down), 2) +
-                         std::pow(db.dot(b.right), 2) + std::pow(db.dot(b.down), 2);
-  return squared > 0 ? focal_ / std::sqrt(squared) : 0;
+  const double squared = (a.d_pixel.transpose() * b.ray.cross(v)).squaredNorm() +
+                         (b.d_pixel.transpose() * v.cross(a.ray)).squaredNorm();
+  return squared > 0 ? 1 / std::sqrt(squared) : 0;
 }
 
 Eigen::VectorXd PairGeometry::Residuals(const Translation& translation) const {

@@ -4,8 +4,9 @@
 // rays m_a, m_b (z = 1), each rotated into one frame at the time of its row,
 //   e = v . (R_a m_a  x  R_b m_b),
 // v the translation between the two rows, up to scale and free in each pair. The residual is
-// Sampson's distance in pixels,
-//   r = f e / |(d e / d m_a, d e / d m_b)|.
+// Sampson's distance in raw pixels u,
+//   r = e / |(d e / d u_a, d e / d u_b)|:
+// in undistorted ones a lens that pulls points inwards would have smaller residuals for nothing.
 // Hartley & Zisserman, 2nd ed., 11.4.3. With rows at t_a, t_b seconds from their images' middle and
 // shares s_a, s_b of the image's height from it (-1/2 to 1/2)
 //   v = d (1 + (t_b - t_a) / T) + s_b b - s_a a,
@@ -26,9 +27,14 @@ namespace pangea::calibration {
 // d (of length 1), a, b.
 using Translation = Eigen::Matrix<double, 9, 1>;
 
-// Rays (x, y, 1) of a pair's points; not a number where the camera has none.
+// Of a pair's points, the ray (x, y, 1) and d (x, y) / d pixel; not a number where the camera has
+// none.
+struct PointRay {
+  Eigen::Vector2d xy;
+  Eigen::Matrix2d d_pixel;
+};
 struct PairRays {
-  Eigen::Matrix2Xd a, b;
+  std::vector<PointRay> a, b;
 };
 PairRays Unprojected(const FramePair& pair, const CameraModel& camera);
 
@@ -54,10 +60,9 @@ class PairGeometry {
 
  private:
   struct View {
-    Eigen::Vector3d ray;    // R m
-    Eigen::Vector3d right;  // R's first two columns
-    Eigen::Vector3d down;
-    double share;  // of the image's height, from the middle row
+    Eigen::Vector3d ray;                  // R m
+    Eigen::Matrix<double, 3, 2> d_pixel;  // d (R m) / d pixel
+    double share;                         // of the image's height, from the middle row
     double row_s;
   };
   bool HasRay(Eigen::Index point) const { return normals_.col(point).allFinite(); }

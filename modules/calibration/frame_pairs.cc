@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "core/median.h"
+#include "vio/window/image_stamps.h"
 
 namespace pangea::calibration {
 namespace {
@@ -27,6 +28,24 @@ std::vector<PointPair> Common(const vio::TrackedFrame& a, const vio::TrackedFram
     }
   }
   return points;
+}
+
+// What the interval exceeds the usual one at each image; within jitter it does not.
+std::vector<double> ExcessIntervals(const std::vector<vio::TrackedFrame>& frames) {
+  vio::ImageStamps stamps{CameraModel{}};
+  std::vector<double> excess_s;
+  for (const vio::TrackedFrame& frame : frames) {
+    stamps.AddImage(frame.utime);
+    if (!stamps.has_reference()) {
+      stamps.SetReference();
+    }
+    excess_s.push_back(stamps.excess_interval_s());
+  }
+  const double usual_s = excess_s.empty() ? 0 : Median(excess_s);
+  for (double& excess : excess_s) {
+    excess -= usual_s;
+  }
+  return excess_s;
 }
 
 double MedianMotion(const std::vector<PointPair>& points) {
@@ -53,6 +72,7 @@ std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, i
   const auto seconds = [origin_utime](const vio::TrackedFrame& frame) {
     return 1e-6 * static_cast<double>(frame.utime - origin_utime);
   };
+  const std::vector<double> excess_s = ExcessIntervals(frames);
   std::vector<FramePair> pairs;
   double next_s = -1e9;
   for (size_t i = 0; i < frames.size(); ++i) {
@@ -69,7 +89,7 @@ std::vector<FramePair> MakePairs(const std::vector<vio::TrackedFrame>& frames, i
       if (points.size() < enough) {
         break;
       }
-      pair = {a_s, seconds(frames[j]), std::move(points)};
+      pair = {a_s, seconds(frames[j]), excess_s[i], excess_s[j], std::move(points)};
       if (MedianMotion(pair.points) > kEnoughMotion_px) {
         break;
       }

@@ -16,6 +16,8 @@ struct PointPair {
 
 struct FramePair {
   double a_s = 0, b_s = 0;  // stamps of the images, seconds since the origin
+  // What the interval between images exceeds the recording's usual one.
+  double a_excess_s = 0, b_excess_s = 0;
   std::vector<PointPair> points;
 };
 

@@ -11,6 +11,7 @@ Parameters Parameters::Plus(const Tangent& step) const {
   Parameters next = *this;
   CameraModel& c = next.camera;
   c.T_body_cam.q = (ExpSo3(step.segment<3>(kRotation)) * c.T_body_cam.q).normalized();
+  next.interval_share += step[kIntervalShare];
   next.gyro_bias += step.segment<3>(kGyroBias);
   c.fx *= std::exp(step[kLogFocal]);
   c.fy = c.fx;
@@ -33,6 +34,7 @@ Tangent Parameters::Minus(const Parameters& other) const {
   d[kCentre + 1] = a.cy - b.cy;
   d.segment<2>(kDistortion) = (a.distortion - b.distortion).head<2>();
   d[kReadout] = a.readout_s - b.readout_s;
+  d[kIntervalShare] = interval_share - other.interval_share;
   return d;
 }
 

@@ -48,6 +48,7 @@ Prior PriorOf(const Input& input, const Parameters& mean) {
       .setConstant(mean.camera.kind == CameraModel::Kind::kEquidistant ? kSigmaDistortionEquidistant
                                                                        : kSigmaDistortion);
   prior.sigma[kReadout] = kSigmaReadout_s;
+  prior.sigma[kIntervalShare] = kSigmaIntervalShare;
   return prior;
 }
 

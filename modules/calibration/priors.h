@@ -11,6 +11,8 @@ constexpr double kSigmaTimeOffset_s = 0.1;
 constexpr double kSigmaCentre = 0.02;  // of the wider side
 constexpr double kSigmaDistortion = 0.15;
 constexpr double kSigmaReadout_s = 0.012;
+// Of stamps of the exposure's begin it is 1/2, of its end -1/2, of an image later -3/2.
+constexpr double kSigmaIntervalShare = 1;
 
 // Without a focal length.
 CameraModel NominalCamera(const Input& input, CameraModel::Kind lens);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace pangea::calibration {
 namespace {
 
@@ -43,7 +45,8 @@ std::string CameraYaml(const Result& result, double rate_hz) {
                       sigma[kDistortion], sigma[kDistortion + 1]);
   text += fmt::format("time_offset_s: {:.6f}  # of the first row: t_imu = t_image + offset\n",
                       c.time_offset_s);
-  text += fmt::format("time_offset_sigma: {:.3g}  # of the middle row\n", sigma[kTimeOffset]);
+  text += fmt::format("time_offset_sigma: {:.3g}  # of the middle row, at any exposure\n",
+                      std::hypot(sigma[kTimeOffset], result.time_offset_spread_s));
   text += fmt::format("readout_s: {:.6f}\nreadout_sigma: {:.3g}\n", c.readout_s, sigma[kReadout]);
   return text;
 }

@@ -16,10 +16,11 @@ constexpr double kLeastSigma_px = 0.02, kLeastMedian_px = 0.2;
 constexpr double kTranslationStep = 1e-5;  // of its numeric derivative
 // Information about a direction of translation that nothing tells.
 constexpr double kDirectionDamping = 1e-3;
-constexpr double kConverged = 0.01;  // of a step, in standard deviations
 constexpr double kInlierSigmas = 3;
 constexpr double kRobustAt = 2.4;  // of the Cauchy loss, in standard deviations
 constexpr int kMaxIterations = 25;
+constexpr double kMaxDamping = 1e6;
+constexpr double kLeastBend = 0.2;  // of the robust loss, where most residuals are outliers
 constexpr int kLongBlocks = 8;  // of the whole recording: for what changes slowly, as exposure does
 // Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
 constexpr double kMinFieldOfView = 0.6, kMaxFieldOfView = 2.4;  // rad, of the wider side
@@ -30,6 +31,7 @@ constexpr double kMaxDistortionEquidistant = 0.15;  // a lens that is far from e
 Tangent DerivativeSteps() {
   Tangent h = Tangent::Constant(1e-5);
   h.segment<2>(kCentre).setConstant(1e-2);
+  h[kIntervalShare] = 1e-3;
   return h;
 }
 
@@ -61,22 +63,63 @@ Information PriorInformation(const Prior& prior) {
   return information;
 }
 
+// Rows without any information stay as they are.
+Information WithHeldRows(Information information) {
+  for (int i = 0; i < kSize; ++i) {
+    information(i, i) += information(i, i) == 0 ? 1e12 : 0;
+  }
+  return information;
+}
+
 }  // namespace
 
-struct Solver::PairTerms {
+struct Solver::PairResiduals {
   Translation translation;
   Eigen::VectorXd residuals;
 };
 
+// A pair's part of the normal equations; `own` rows are of its translation (Steps).
+struct Solver::PairTerms {
+  Eigen::Matrix<double, 8, 8> own;
+  Eigen::Matrix<double, 8, kSize> cross;
+  Information hessian;
+  Own own_gradient;
+  Tangent gradient;
+
+  // Of the translation; `damping` is a share of the diagonal.
+  Eigen::LDLT<Eigen::Matrix<double, 8, 8>> OwnFactor(double damping) const {
+    Eigen::Matrix<double, 8, 8> damped = own;
+    damped.diagonal() *= 1 + damping;
+    return damped.ldlt();
+  }
+};
+
 struct Solver::Linearised {
-  Information hessian = Information::Zero();  // of the data
-  Tangent gradient = Tangent::Zero();         // of the data
-  std::vector<Tangent> gradients;             // of each pair
+  std::vector<PairTerms> pairs;
   Information prior = Information::Zero();
   Tangent prior_gradient = Tangent::Zero();
   double sigma_px = 1;
   double inlier_share = 0;
   double cost = 0;
+  // Sums over residuals, of the robust loss: its weights, its derivative squared, its second
+  // derivative; in standard deviations.
+  double weights = 0, squared_slopes = 0, curvatures = 0;
+};
+
+// The normal equations of the parameters alone, each pair's translation eliminated.
+struct Solver::Reduced {
+  Information hessian = Information::Zero();  // of the data
+  Tangent gradient = Tangent::Zero();         // of the data
+  std::vector<Tangent> gradients;             // of each pair
+
+  Reduced(const Linearised& at, double damping) {
+    for (const PairTerms& pair : at.pairs) {
+      const auto factor = pair.OwnFactor(damping);
+      gradients.push_back(pair.gradient - pair.cross.transpose() * factor.solve(pair.own_gradient));
+      gradient += gradients.back();
+      hessian += pair.hessian - pair.cross.transpose() * factor.solve(pair.cross);
+    }
+  }
 };
 
 Solver::Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu,
@@ -110,8 +153,7 @@ std::vector<double> Solver::Costs(const Parameters& parameters, double sigma_px)
   std::vector<double> costs;
   for (const PairGeometry& geometry : Geometries(parameters, Rays(parameters.camera))) {
     const Translation translation = RobustTranslation(geometry);
-    costs.push_back(RobustCost(geometry.Residuals(translation), sigma_px) +
-                    geometry.ChangeCost(translation));
+    costs.push_back(CostOf(geometry, translation, sigma_px));
   }
   return costs;
 }
@@ -121,16 +163,49 @@ double Solver::Cost(const Parameters& parameters, double sigma_px) const {
   return std::accumulate(costs.begin(), costs.end(), 0.0);
 }
 
-double Solver::TotalCost(const Parameters& parameters, const Prior& prior, double sigma_px) const {
+double Solver::CostOf(const PairGeometry& geometry, const Translation& translation,
+                      double sigma_px) const {
+  return RobustCost(geometry.Residuals(translation), sigma_px) + geometry.ChangeCost(translation);
+}
+
+double Solver::PriorCost(const Parameters& parameters, const Prior& prior) const {
   const Tangent off = parameters.Minus(prior.mean);
-  return Cost(parameters, sigma_px) + 0.5 * off.dot(PriorInformation(prior) * off);
+  return 0.5 * off.dot(PriorInformation(prior) * off);
+}
+
+Solver::State Solver::Begin(const Parameters& parameters) const {
+  State state{parameters, {}, 0};
+  for (const PairGeometry& geometry : Geometries(parameters, Rays(parameters.camera))) {
+    state.translations.push_back(RobustTranslation(geometry));
+  }
+  return state;
+}
+
+Solver::State Solver::Moved(const State& state, const Linearised& at, const Prior& prior,
+                            const Tangent& step, double damping) const {
+  State next{state.parameters.Plus(step), {}, 0};
+  next.cost = PriorCost(next.parameters, prior);
+  const std::vector<PairGeometry> geometries =
+      Geometries(next.parameters, Rays(next.parameters.camera));
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const PairTerms& pair = at.pairs[p];
+    const Own own = -pair.OwnFactor(damping).solve(pair.own_gradient + pair.cross * step);
+    Translation moved = state.translations[p] + Steps(state.translations[p]) * own;
+    moved /= moved.head<3>().norm();
+    const Translation afresh = RobustTranslation(geometries[p]);
+    const double cost = CostOf(geometries[p], moved, at.sigma_px);
+    const double cost_afresh = CostOf(geometries[p], afresh, at.sigma_px);
+    next.translations.push_back(cost < cost_afresh ? moved : afresh);
+    next.cost += std::min(cost, cost_afresh);
+  }
+  return next;
 }
 
 std::vector<Eigen::MatrixXd> Solver::Jacobians(const Parameters& parameters, const Prior& prior,
                                                const std::vector<PairRays>& rays,
-                                               const std::vector<PairTerms>& terms) const {
+                                               const std::vector<PairResiduals>& terms) const {
   std::vector<Eigen::MatrixXd> jacobians;
-  for (const PairTerms& term : terms) {
+  for (const PairResiduals& term : terms) {
     jacobians.push_back(Eigen::MatrixXd::Zero(term.residuals.size(), kSize));
   }
   const Tangent h = DerivativeSteps();
@@ -150,43 +225,41 @@ std::vector<Eigen::MatrixXd> Solver::Jacobians(const Parameters& parameters, con
   return jacobians;
 }
 
-void Solver::AddPair(const PairGeometry& geometry, const PairTerms& terms,
-                     const Eigen::MatrixXd& jacobian, Linearised* at) const {
-  const Eigen::VectorXd& r = terms.residuals;
+Solver::PairTerms Solver::TermsOf(const PairGeometry& geometry, const PairResiduals& at,
+                                  const Eigen::MatrixXd& jacobian, double sigma_px) const {
+  const Eigen::VectorXd& r = at.residuals;
   const Eigen::VectorXd root_weights =
-      (1 + (r / (kRobustAt * at->sigma_px)).array().square()).rsqrt() / at->sigma_px;
-  const Eigen::Matrix<double, 9, 8> steps = Steps(terms.translation);
+      (1 + (r / (kRobustAt * sigma_px)).array().square()).rsqrt() / sigma_px;
+  const Eigen::Matrix<double, 9, 8> steps = Steps(at.translation);
   Eigen::MatrixXd B(r.size(), 8);
   for (int k = 0; k < 8; ++k) {
-    const Translation moved = terms.translation + kTranslationStep * steps.col(k);
+    const Translation moved = at.translation + kTranslationStep * steps.col(k);
     B.col(k) = (geometry.Residuals(moved) - r) / kTranslationStep;
   }
   const Eigen::MatrixXd wB = root_weights.asDiagonal() * B;
   const Eigen::MatrixXd wJ = root_weights.asDiagonal() * jacobian;
   const Eigen::VectorXd wr = root_weights.cwiseProduct(r);
-  using Own = Eigen::Matrix<double, 8, 1>;
   Own prior = Own::Constant(kDirectionDamping);
   prior.tail<6>().setConstant(std::pow(geometry.ChangeSigma(), -2));
-  Own own_gradient = wB.transpose() * wr;
-  own_gradient.tail<6>() += prior[7] * terms.translation.tail<6>();
-  Eigen::Matrix<double, 8, 8> own = wB.transpose() * wB;
-  own.diagonal() += prior;
-  const Eigen::MatrixXd cross = wB.transpose() * wJ;
-  const Eigen::LDLT<Eigen::Matrix<double, 8, 8>> factor(own);
-  at->gradients.push_back(wJ.transpose() * wr - cross.transpose() * factor.solve(own_gradient));
-  at->gradient += at->gradients.back();
-  at->hessian += wJ.transpose() * wJ - cross.transpose() * factor.solve(cross);
+  PairTerms terms{.own = wB.transpose() * wB,
+                  .cross = wB.transpose() * wJ,
+                  .hessian = wJ.transpose() * wJ,
+                  .own_gradient = wB.transpose() * wr,
+                  .gradient = wJ.transpose() * wr};
+  terms.own.diagonal() += prior;
+  terms.own_gradient.tail<6>() += prior[7] * at.translation.tail<6>();
+  return terms;
 }
 
-Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& prior) const {
-  const std::vector<PairRays> rays = Rays(parameters.camera);
-  const std::vector<PairGeometry> geometries = Geometries(parameters, rays);
-  std::vector<PairTerms> terms;
+Solver::Linearised Solver::Linearise(const State& state, const Prior& prior) const {
+  const std::vector<PairRays> rays = Rays(state.parameters.camera);
+  const std::vector<PairGeometry> geometries = Geometries(state.parameters, rays);
+  std::vector<PairResiduals> residuals;
   std::vector<double> absolute;
-  for (const PairGeometry& geometry : geometries) {
-    const Translation translation = RobustTranslation(geometry);
-    terms.push_back({translation, geometry.Residuals(translation)});
-    for (const double r : terms.back().residuals) {
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const Translation& translation = state.translations[p];
+    residuals.push_back({translation, geometries[p].Residuals(translation)});
+    for (const double r : residuals.back().residuals) {
       absolute.push_back(std::abs(r));
     }
   }
@@ -195,13 +268,21 @@ Solver::Linearised Solver::Linearise(const Parameters& parameters, const Prior& 
   const auto inliers = std::count_if(absolute.begin(), absolute.end(),
                                      [&at](double r) { return r < kInlierSigmas * at.sigma_px; });
   at.inlier_share = static_cast<double>(inliers) / static_cast<double>(absolute.size());
-  const std::vector<Eigen::MatrixXd> jacobians = Jacobians(parameters, prior, rays, terms);
-  for (size_t p = 0; p < terms.size(); ++p) {
-    AddPair(geometries[p], terms[p], jacobians[p], &at);
+  for (const double r : absolute) {
+    const double scaled = std::pow(r / (kRobustAt * at.sigma_px), 2), weight = 1 / (1 + scaled);
+    at.weights += weight;
+    at.squared_slopes += std::pow(weight * r / at.sigma_px, 2);
+    at.curvatures += weight * weight * (1 - scaled);
+  }
+  const std::vector<Eigen::MatrixXd> jacobians =
+      Jacobians(state.parameters, prior, rays, residuals);
+  at.cost = PriorCost(state.parameters, prior);
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    at.pairs.push_back(TermsOf(geometries[p], residuals[p], jacobians[p], at.sigma_px));
+    at.cost += CostOf(geometries[p], residuals[p].translation, at.sigma_px);
   }
   at.prior = PriorInformation(prior);
-  at.prior_gradient = at.prior * parameters.Minus(prior.mean);
-  at.cost = TotalCost(parameters, prior, at.sigma_px);
+  at.prior_gradient = at.prior * state.parameters.Minus(prior.mean);
   return at;
 }
 
@@ -214,14 +295,14 @@ bool Solver::Plausible(const CameraModel& camera) const {
 }
 
 // Of the sum of all pairs' gradients, from how those of blocks of time scatter.
-Information Solver::Scatter(const Linearised& at, double block_s) const {
+Information Solver::Scatter(const Reduced& reduced, double block_s) const {
   std::map<int64_t, Tangent> blocks;
   for (size_t p = 0; p < pairs_.size(); ++p) {
     const auto block = static_cast<int64_t>(std::floor(pairs_[p].a_s / block_s));
-    blocks.try_emplace(block, Tangent::Zero()).first->second += at.gradients[p];
+    blocks.try_emplace(block, Tangent::Zero()).first->second += reduced.gradients[p];
   }
   const auto n = static_cast<double>(blocks.size());
-  const Tangent mean = at.gradient / n;
+  const Tangent mean = reduced.gradient / n;
   Information scatter = Information::Zero();
   for (const auto& [block, gradient] : blocks) {
     scatter += (gradient - mean) * (gradient - mean).transpose();
@@ -230,17 +311,21 @@ Information Solver::Scatter(const Linearised& at, double block_s) const {
 }
 
 Information Solver::Covariance(const Linearised& at) const {
-  Information h = at.hessian + at.prior;
-  for (int i = 0; i < kSize; ++i) {
-    h(i, i) += h(i, i) == 0 ? 1e12 : 0;  // a row that is held
-  }
-  const Information usual = h.ldlt().solve(Information::Identity());
+  const Reduced reduced(at, 0);
+  // The loss bends less than its weights say, beyond kRobustAt the other way.
+  const double bend = std::max(kLeastBend, at.curvatures / at.weights);
+  const Information inverse =
+      WithHeldRows(bend * reduced.hessian + at.prior).ldlt().solve(Information::Identity());
+  const auto with = [&](const Information& scatter) -> Information {
+    return inverse * (scatter + at.prior) * inverse;
+  };
   const double seconds = pairs_.back().b_s - pairs_.front().a_s;
-  Information covariance = usual * (Scatter(at, kBlock_s) + at.prior) * usual;
-  const Information slow = usual * (Scatter(at, seconds / kLongBlocks) + at.prior) * usual;
+  const Information independent = with(at.squared_slopes / at.weights * reduced.hessian);
+  const Information slow = with(Scatter(reduced, seconds / kLongBlocks));
+  Information covariance = with(Scatter(reduced, kBlock_s));
   // The largest of the three for each row: blocks may agree by chance.
   for (int i = 0; i < kSize; ++i) {
-    const double largest = std::max({usual(i, i), covariance(i, i), slow(i, i)});
+    const double largest = std::max({independent(i, i), covariance(i, i), slow(i, i)});
     const double scale = std::sqrt(largest / std::max(1e-30, covariance(i, i)));
     covariance.row(i) *= scale;
     covariance.col(i) *= scale;
@@ -248,32 +333,29 @@ Information Solver::Covariance(const Linearised& at) const {
   return covariance;
 }
 
-Solution Solver::Solve(const Parameters& start, const Prior& prior) const {
+Solution Solver::Solve(const Parameters& start, const Prior& prior, double within) const {
   Solution solution;
-  solution.parameters = start;
-  Linearised at = Linearise(start, prior);
+  State state = Begin(start);
+  Linearised at = Linearise(state, prior);
   double damping = 1e-3;
-  for (; solution.iterations < kMaxIterations; ++solution.iterations) {
-    Information h = at.hessian + at.prior;
-    for (int i = 0; i < kSize; ++i) {
-      h(i, i) += damping * h(i, i) + (prior.sigma[i] > 0 ? 0 : 1e12);
+  for (; solution.iterations < kMaxIterations && damping < kMaxDamping; ++solution.iterations) {
+    const Reduced reduced(at, damping);
+    const Tangent gradient = reduced.gradient + at.prior_gradient;
+    Information h = WithHeldRows(reduced.hessian + at.prior);
+    if (gradient.dot(h.ldlt().solve(gradient)) < within * within) {
+      break;
     }
-    const Tangent step = -h.ldlt().solve(at.gradient + at.prior_gradient);
-    const Parameters next = solution.parameters.Plus(step);
-    if (Plausible(next.camera) && TotalCost(next, prior, at.sigma_px) < at.cost) {
-      solution.parameters = next;
-      at = Linearise(next, prior);
+    h.diagonal() *= 1 + damping;
+    const State next = Moved(state, at, prior, -h.ldlt().solve(gradient), damping);
+    if (Plausible(next.parameters.camera) && next.cost < at.cost) {
+      state = next;
+      at = Linearise(state, prior);
       damping = std::max(1e-6, 0.1 * damping);
     } else {
       damping *= 10;
-      if (damping > 1e6) {
-        break;
-      }
-    }
-    if (std::sqrt(step.dot((at.hessian + at.prior) * step)) < kConverged) {
-      break;
     }
   }
+  solution.parameters = state.parameters;
   solution.covariance = Covariance(at);
   solution.sigma_px = at.sigma_px;
   solution.inlier_share = at.inlier_share;

@@ -16,6 +16,7 @@
 
 namespace pangea::calibration {
 
+constexpr double kConverged = 0.1, kRoughlyConverged = 1;
 constexpr double kBlock_s = 1.0;  // of residuals that may share an error
 
 struct Solution {
@@ -33,30 +34,44 @@ class Solver {
   Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu, int64_t origin_utime,
          double velocity_change);
 
-  // Rows whose prior's sigma is 0 stay as they are.
-  Solution Solve(const Parameters& start, const Prior& prior) const;
+  // Until what remains is `within` this many standard deviations (of independent residuals: less
+  // than the covariance says). Rows whose prior's sigma is 0 stay as they are.
+  Solution Solve(const Parameters& start, const Prior& prior, double within = kConverged) const;
   // Robust, without prior: for hypotheses. Of each pair, and of all.
   std::vector<double> Costs(const Parameters& parameters, double sigma_px) const;
   double Cost(const Parameters& parameters, double sigma_px) const;
 
  private:
   struct Linearised;
+  struct PairResiduals;
   struct PairTerms;
-  Linearised Linearise(const Parameters& parameters, const Prior& prior) const;
+  struct Reduced;
+  using Own = Eigen::Matrix<double, 8, 1>;
+  struct State {
+    Parameters parameters;
+    std::vector<Translation> translations;  // of each pair
+    double cost = 0;
+  };
+  State Begin(const Parameters& parameters) const;
+  // Each translation is moved along or found afresh, whichever costs less.
+  State Moved(const State& state, const Linearised& at, const Prior& prior, const Tangent& step,
+              double damping) const;
+  Linearised Linearise(const State& state, const Prior& prior) const;
   // d residuals / d parameters of each pair, translations held.
   std::vector<Eigen::MatrixXd> Jacobians(const Parameters& parameters, const Prior& prior,
                                          const std::vector<PairRays>& rays,
-                                         const std::vector<PairTerms>& terms) const;
-  // A pair's part of the normal equations, its translation eliminated.
-  void AddPair(const PairGeometry& geometry, const PairTerms& terms,
-               const Eigen::MatrixXd& jacobian, Linearised* at) const;
+                                         const std::vector<PairResiduals>& terms) const;
+  PairTerms TermsOf(const PairGeometry& geometry, const PairResiduals& at,
+                    const Eigen::MatrixXd& jacobian, double sigma_px) const;
   std::vector<PairRays> Rays(const CameraModel& camera) const;
   std::vector<PairGeometry> Geometries(const Parameters& parameters,
                                        const std::vector<PairRays>& rays) const;
   double RobustCost(const Eigen::VectorXd& residuals, double sigma_px) const;
-  double TotalCost(const Parameters& parameters, const Prior& prior, double sigma_px) const;
+  double CostOf(const PairGeometry& geometry, const Translation& translation,
+                double sigma_px) const;
+  double PriorCost(const Parameters& parameters, const Prior& prior) const;
   bool Plausible(const CameraModel& camera) const;
-  Information Scatter(const Linearised& at, double block_s) const;
+  Information Scatter(const Reduced& reduced, double block_s) const;
   Information Covariance(const Linearised& at) const;
 
   std::span<const FramePair> pairs_;

@@ -51,6 +51,11 @@ std::string Values(const Input& input, const Result& result) {
   text += Row("time offset, ms (middle row)",
               fmt::format("{:.1f}", 1e3 * result.parameters.MiddleRowOffset_s()),
               fmt::format("{:.2f}", 1e3 * s[kTimeOffset]));
+  if (s[kIntervalShare] < kTold * kSigmaIntervalShare) {
+    text += Row("  of what an image's interval exceeds the usual one, it is more by",
+                fmt::format("{:.2f}", result.parameters.interval_share),
+                fmt::format("{:.2f}", s[kIntervalShare]));
+  }
   text += Row("read-out, ms", fmt::format("{:.1f}", 1e3 * c.readout_s),
               fmt::format("{:.1f}", 1e3 * s[kReadout]), s[kReadout] < kTold * kSigmaReadout_s);
   const Eigen::Vector3d& bias = result.parameters.gyro_bias;

@@ -21,6 +21,7 @@ class ImageStamps {
   void AddImage(int64_t utime);
   // What the interval is now is the reference.
   void SetReference() { reference_s_ = interval_s(); }
+  bool has_reference() const { return reference_s_ > 0; }
   // The last few images' interval (one that is missing does not count), less the reference; 0 while
   // there is none, and within what jitter makes of equal intervals.
   double excess_interval_s() const;
