@@ -229,7 +229,8 @@ double SigmasWorse(const Input& input, std::span<const FramePair> pairs, int64_t
   for (const auto& [block, difference] : blocks) {
     differences.push_back(difference);
   }
-  std::ranges::sort(differences, {}, [](double d) { return std::abs(d); });
+  std::sort(differences.begin(), differences.end(),
+            [](double a, double b) { return std::abs(a) < std::abs(b); });
   double ranks = 0;
   for (size_t i = 0; i < differences.size(); ++i) {
     ranks += differences[i] > 0 ? static_cast<double>(i + 1) : 0;

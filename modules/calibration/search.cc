@@ -59,10 +59,12 @@ std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
 
 std::string AxesOf(const Eigen::Quaterniond& q_body_cam) {
   const std::vector<Eigen::Quaterniond> rotations = AxisAlignedRotations();
-  const Eigen::Matrix3d R =
-      std::ranges::min_element(rotations, {}, [&](const Eigen::Quaterniond& q) {
-        return q.angularDistance(q_body_cam);
-      })->toRotationMatrix();
+  const auto nearest =
+      std::min_element(rotations.begin(), rotations.end(),
+                       [&](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+                         return a.angularDistance(q_body_cam) < b.angularDistance(q_body_cam);
+                       });
+  const Eigen::Matrix3d R = nearest->toRotationMatrix();
   std::string axes;
   for (int col = 0; col < 3; ++col) {
     Eigen::Index row = 0;
