@@ -4,8 +4,8 @@ set(PANGEA_WASM_LIBRARIES "" CACHE PATH "What scripts/wasm_libraries has built")
 if(NOT EXISTS ${PANGEA_WASM_LIBRARIES}/complete)
   message(FATAL_ERROR "Build with scripts/build wasm: PANGEA_WASM_LIBRARIES='${PANGEA_WASM_LIBRARIES}' holds no libraries")
 endif()
-# -msse2: Eigen has no WebAssembly, and the compiler's headers give SSE2 by it. For old versions of GCC Eigen writes assembler
-# of x86: below 63 = 10 * major + minor, and from major 6; no version is neither but 5.13 and the like.
+# -msse2: Eigen has no WebAssembly vectors, and the compiler translates SSE2. -fgnuc-version: Eigen has x86 assembler, which is an
+# error here, where 10 * major + minor of GCC's version is below 63, and elsewhere where major is 6 or more. 5.13 is neither.
 add_compile_options(-msimd128 -msse2 -fgnuc-version=5.13 -fwasm-exceptions -ffp-contract=off)
 add_link_options(-msimd128 -fwasm-exceptions)
 

@@ -156,7 +156,7 @@ void Fill(const Solution& solution, Result& result) {
   result.inlier_share = solution.inlier_share;
 }
 
-std::vector<FramePair> Some(std::span<const FramePair> pairs) {
+std::vector<FramePair> EveryNth(std::span<const FramePair> pairs) {
   std::vector<FramePair> some;
   for (size_t i = 0; i < pairs.size(); i += kChooseOnEvery) {
     some.push_back(pairs[i]);
@@ -190,7 +190,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
   }
   SortByCost(&found);
   found.resize(std::min(found.size(), kMaxRefined));
-  const std::vector<FramePair> some = Some(pairs);
+  const std::vector<FramePair> some = EveryNth(pairs);
   const Solver solver(some, input.imu, origin, kSearchVelocityChange);
   for (Hypothesis& hypothesis : found) {
     const Solution solution = Refined(solver, hypothesis, PriorOf(input, hypothesis.parameters));
@@ -209,7 +209,7 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
   return choice;
 }
 
-double Apart(const Parameters& a, const Eigen::Quaterniond& q_body_cam) {
+double AngleBetween(const Parameters& a, const Eigen::Quaterniond& q_body_cam) {
   return a.camera.T_body_cam.q.angularDistance(q_body_cam);
 }
 
@@ -218,7 +218,7 @@ double Apart(const Parameters& a, const Eigen::Quaterniond& q_body_cam) {
 // sizes differ as the motion does, so that their mean tells little.
 double SigmasWorse(const Input& input, std::span<const FramePair> pairs, int64_t origin,
                    const Parameters& worse, const Parameters& better) {
-  const std::vector<FramePair> some = Some(pairs);
+  const std::vector<FramePair> some = EveryNth(pairs);
   const Solver solver(some, input.imu, origin, kSearchVelocityChange);
   const std::vector<double> costs = solver.Costs(worse, 1), lower = solver.Costs(better, 1);
   std::map<int64_t, double> blocks;
@@ -247,10 +247,10 @@ std::optional<Choice> BetterThanGiven(const Input& input, std::span<const FrameP
   free.q_body_cam.reset();
   const Choice choice = ChooseRotation(free, pairs, origin);
   const Parameters& best = choice.best.parameters;
-  if (Apart(best, *input.q_body_cam) < kMaxOffGiven) {
+  if (AngleBetween(best, *input.q_body_cam) < kMaxOffGiven) {
     return std::nullopt;
   }
-  if (Apart(with_given, *input.q_body_cam) < kMaxOffGiven &&
+  if (AngleBetween(with_given, *input.q_body_cam) < kMaxOffGiven &&
       SigmasWorse(input, pairs, origin, with_given, best) < kMaxSigmasWorse) {
     return std::nullopt;
   }
@@ -265,7 +265,7 @@ void RefuseGiven(const Eigen::Quaterniond& given, const Choice& better, Result* 
     result->refused += ", and the motion does not tell which do: rotate more, about all three axes";
     return;
   }
-  result->told_q_body_cam = q;
+  result->better_q_body_cam = q;
   result->refused += fmt::format(": the points say {}, {:.0f} degrees from that", AxesOf(q),
                                  q.angularDistance(given) / kDegree);
 }
@@ -335,7 +335,7 @@ Result Calibrate(const Input& input) {
   }
   const Choice choice = ChooseRotation(input, pairs, origin);
   result.next_cost = choice.next_cost;
-  if (input.q_body_cam && input.doubt_rotation) {
+  if (input.q_body_cam && input.check_rotation) {
     if (const auto better = BetterThanGiven(input, pairs, origin, choice.best.parameters)) {
       RefuseGiven(*input.q_body_cam, *better, &result);
       return result;

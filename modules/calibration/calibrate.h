@@ -26,8 +26,8 @@ struct Input {
   ImuNoise imu_noise;
   std::optional<double> field_of_view;           // of the wider side, radians
   std::optional<Eigen::Quaterniond> q_body_cam;  // to some degrees
-  // Whether another rotation than the given one fits better. Takes as long as without a given one.
-  bool doubt_rotation = false;
+  // Refuse a given rotation if another fits better. Takes as long as without a given one.
+  bool check_rotation = false;
   // Of a gyroscope as sold; `imu_noise` counts where it says more.
   double least_gyro_scale_sigma = 0.005;
 };
@@ -45,8 +45,8 @@ struct Result {
   Coverage coverage;
   double next_cost = 0;  // of the next best rotation, over the best one's; 0: there was none
   std::string refused;   // why; empty: it holds
-  // What the given rotation should have been.
-  std::optional<Eigen::Quaterniond> told_q_body_cam;
+  // Where the given rotation is refused: the one that fits better.
+  std::optional<Eigen::Quaterniond> better_q_body_cam;
 };
 
 Result Calibrate(const Input& input);

@@ -67,7 +67,7 @@ int Run(const Arguments& a) {
     std::cerr << fmt::format("pangea-calibrate: {}\n", warning);
   }
   Input input = TracksOf(recording, a.part, q_body_cam);
-  input.doubt_rotation = true;
+  input.check_rotation = true;
   if (a.field_of_view_deg > 0) {
     input.field_of_view = kDegree * a.field_of_view_deg;
   }

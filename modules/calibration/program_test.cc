@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "calibration/calibration_folder.h"
+#include "calibration/priors.h"
 #include "calibration/recording_tracks.h"
 #include "calibration/sensor_yaml.h"
 #include "calibration/summary.h"
@@ -83,6 +84,13 @@ TEST_F(Program, WhatIsWrittenIsReadAgain) {
   EXPECT_DOUBLE_EQ(ReadEurocImuCalibration(Path("imu.yaml")).noise.gyro_noise_density, 7e-4);
 }
 
+TEST_F(Program, TheTimeOffsetIsAsUncertainAsTheExposureMakesIt) {
+  Result some = Some();
+  some.sigma[kTimeOffset] = 0.004;
+  some.time_offset_spread_s = 0.003;
+  EXPECT_THAT(CameraYaml(some, 30), HasSubstr("time_offset_sigma: 0.005 "));
+}
+
 TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
   MakeRecording();
   MakeFolder(Path("in"), Path("out"));
@@ -127,7 +135,7 @@ TEST(Summary, SaysWhatToDoBetter) {
 TEST(Summary, SaysWhichAxesToGive) {
   Result result;
   result.refused = "the camera's x, y, z do not point along the IMU's x,y,z as given";
-  result.told_q_body_cam = Eigen::Quaterniond(Eigen::Vector4d(0, 0, 0, 1));  // x, y, z, w
+  result.better_q_body_cam = Eigen::Quaterniond(Eigen::Vector4d(0, 0, 0, 1));  // x, y, z, w
   EXPECT_THAT(Summary({}, result), HasSubstr("better: --camera-axes=x,y,z, or none"));
 }
 
@@ -139,6 +147,9 @@ TEST(Summary, SaysWhatTheMotionDidNotTell) {
   EXPECT_THAT(Summary(input, result), Not(HasSubstr("not told")));
   result.sigma[kReadout] = 0.011;
   EXPECT_THAT(Summary(input, result), HasSubstr("as assumed"));
+  EXPECT_THAT(Summary(input, result), HasSubstr("per change of the image interval"));
+  result.sigma[kIntervalShare] = kSigmaIntervalShare;
+  EXPECT_THAT(Summary(input, result), Not(HasSubstr("per change of the image interval")));
 }
 
 }  // namespace

@@ -57,14 +57,16 @@ std::vector<Eigen::Quaterniond> AxisAlignedRotations() {
   return rotations;
 }
 
-std::string AxesOf(const Eigen::Quaterniond& q_body_cam) {
+Eigen::Quaterniond NearestAxisAligned(const Eigen::Quaterniond& q_body_cam) {
   const std::vector<Eigen::Quaterniond> rotations = AxisAlignedRotations();
-  const auto nearest =
-      std::min_element(rotations.begin(), rotations.end(),
-                       [&](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-                         return a.angularDistance(q_body_cam) < b.angularDistance(q_body_cam);
-                       });
-  const Eigen::Matrix3d R = nearest->toRotationMatrix();
+  return *std::min_element(rotations.begin(), rotations.end(),
+                           [&](const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+                             return a.angularDistance(q_body_cam) < b.angularDistance(q_body_cam);
+                           });
+}
+
+std::string AxesOf(const Eigen::Quaterniond& q_body_cam) {
+  const Eigen::Matrix3d R = NearestAxisAligned(q_body_cam).toRotationMatrix();
   std::string axes;
   for (int col = 0; col < 3; ++col) {
     Eigen::Index row = 0;

@@ -21,7 +21,8 @@ constexpr double kSearchVelocityChange = 0.2;
 
 // Rotations camera to body.
 std::vector<Eigen::Quaterniond> AxisAlignedRotations();
-// The body's axes along which the image's right, its down and the line of sight point, to the
+Eigen::Quaterniond NearestAxisAligned(const Eigen::Quaterniond& q_body_cam);
+// The body's axes along which the image's right, its down and the line of sight point, of the
 // nearest of these rotations: "-y,-x,-z".
 std::string AxesOf(const Eigen::Quaterniond& q_body_cam);
 

@@ -20,7 +20,8 @@ constexpr double kInlierSigmas = 3;
 constexpr double kRobustAt = 2.4;  // of the Cauchy loss, in standard deviations
 constexpr int kMaxIterations = 25;
 constexpr double kMaxDamping = 1e6;
-constexpr double kLeastBend = 0.2;  // of the robust loss, where most residuals are outliers
+constexpr double kMinCurvature =
+    0.2;                        // of the robust loss, over its weights: where most are outliers
 constexpr int kLongBlocks = 8;  // of the whole recording: for what changes slowly, as exposure does
 // Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
 constexpr double kMinFieldOfView = 0.6, kMaxFieldOfView = 2.4;  // rad, of the wider side
@@ -312,10 +313,11 @@ Information Solver::Scatter(const Reduced& reduced, double block_s) const {
 
 Information Solver::Covariance(const Linearised& at) const {
   const Reduced reduced(at, 0);
-  // The loss bends less than its weights say, beyond kRobustAt the other way.
-  const double bend = std::max(kLeastBend, at.curvatures / at.weights);
+  // The sandwich of an M-estimator (Huber, 1967): the loss's second derivative, which is below its
+  // weight and beyond kRobustAt negative, about the scatter of the gradients.
+  const double curvature = std::max(kMinCurvature, at.curvatures / at.weights);
   const Information inverse =
-      WithHeldRows(bend * reduced.hessian + at.prior).ldlt().solve(Information::Identity());
+      WithHeldRows(curvature * reduced.hessian + at.prior).ldlt().solve(Information::Identity());
   const auto with = [&](const Information& scatter) -> Information {
     return inverse * (scatter + at.prior) * inverse;
   };

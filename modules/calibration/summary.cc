@@ -52,7 +52,7 @@ std::string Values(const Input& input, const Result& result) {
               fmt::format("{:.1f}", 1e3 * result.parameters.MiddleRowOffset_s()),
               fmt::format("{:.2f}", 1e3 * s[kTimeOffset]));
   if (s[kIntervalShare] < kTold * kSigmaIntervalShare) {
-    text += Row("  of what an image's interval exceeds the usual one, it is more by",
+    text += Row("  per change of the image interval",
                 fmt::format("{:.2f}", result.parameters.interval_share),
                 fmt::format("{:.2f}", s[kIntervalShare]));
   }
@@ -67,8 +67,8 @@ std::string Values(const Input& input, const Result& result) {
 
 std::vector<std::string> Advice(const Result& result) {
   std::vector<std::string> advice;
-  if (result.told_q_body_cam) {
-    advice.push_back(fmt::format("--camera-axes={}, or none", AxesOf(*result.told_q_body_cam)));
+  if (result.better_q_body_cam) {
+    advice.push_back(fmt::format("--camera-axes={}, or none", AxesOf(*result.better_q_body_cam)));
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (result.sigma_px > 0 && result.coverage.rotation_rms[axis] < kGoodRotation) {
