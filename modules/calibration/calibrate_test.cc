@@ -144,6 +144,18 @@ TEST(Calibrate, RefusesGivenAxesThatAreWrongAndNamesTheRightOnes) {
   }
 }
 
+// With these the solver finds a minimum near them, which explains the points less.
+TEST(Calibrate, RefusesGivenAxesWithALocalMinimum) {
+  TestWorldOptions options = Short(9);
+  options.seconds = 12;
+  TestWorld world = MakeTestWorld(options);
+  Eigen::Matrix3d R;
+  R << 0, 1, 0, 0, 0, -1, -1, 0, 0;
+  world.input.q_body_cam = Eigen::Quaterniond(R);
+  world.input.check_rotation = true;
+  EXPECT_THAT(Calibrate(world.input).refused, HasSubstr("do not point along the IMU's -z,x,-y"));
+}
+
 // Then the given axes are what tells.
 TEST(Calibrate, TakesGivenAxesWhereTheMotionDoesNotTell) {
   TestWorldOptions options = Short(3);
