@@ -6,16 +6,20 @@ namespace pangea {
 namespace {
 
 // Each keyframe carries the camera of its moment. Odometries refine extrinsics, time offset, focal
-// length and centre as they go, and a focusing lens moves the latter two: from infinity to 10 cm, a
-// phone's 7 mm lens by 7 per cent. Another lens, another size of image or a zoom is another camera.
-constexpr double kMaxChange = 0.1;  // of the focal length
+// length, centre and radial distortion as they go, and a focusing lens moves focal length and
+// centre: from infinity to 10 cm, a phone's 7 mm lens by 7 per cent. Another lens, another size of
+// image or a zoom is another camera.
+constexpr double kMaxChange = 0.1;            // of the focal length
+constexpr double kMaxDistortionChange = 0.5;  // of the first two coefficients: five sigmas
 
 bool SameCamera(const CameraModel& a, const CameraModel& b) {
   const Eigen::Array4d changes{(b.fx - a.fx) / a.fx, (b.fy - a.fy) / a.fy, (b.cx - a.cx) / a.fx,
                                (b.cy - a.cy) / a.fy};
+  const Eigen::Array4d distortion = (b.distortion - a.distortion).array().abs();
   return a.kind == b.kind && a.width == b.width && a.height == b.height &&
-         (changes.abs() <= kMaxChange).all() && a.distortion == b.distortion &&
-         a.readout_s == b.readout_s;
+         (changes.abs() <= kMaxChange).all() &&
+         (distortion.head<2>() <= kMaxDistortionChange).all() &&
+         (distortion.tail<2>() == 0).all() && a.readout_s == b.readout_s;
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #pragma once
 
 // What makes keyframes of one map a sequence, whatever order they come in: one camera, whose focal
-// length and centre may move a little, and time that goes forward with seq. A keyframe that breaks
-// it is from a broken or hostile agent. Bounded: the newest maps, and of each the newest keyframes,
-// are remembered.
+// length, centre and distortion may move a little, and time that goes forward with seq. A keyframe
+// that breaks it is from a broken or hostile agent. Bounded: the newest maps, and of each the
+// newest keyframes, are remembered.
 
 #include <cstdint>
 #include <map>

@@ -55,6 +55,9 @@ TEST(MapContinuity, AMapsCameraMayMoveALittle) {
       ++seq;
     }
   }
+  keyframe = At(seq, 100 * seq + 100);
+  keyframe.camera.distortion << 0.3, -0.3, 0, 0;
+  EXPECT_EQ(continuity.Check(keyframe, 5), "");
 }
 
 TEST(MapContinuity, AnotherCameraIsRefused) {
@@ -72,6 +75,7 @@ TEST(MapContinuity, AnotherCameraIsRefused) {
   refuses([](CameraModel* camera) { camera->fy -= 60; });
   refuses([](CameraModel* camera) { camera->cx += 60; });
   refuses([](CameraModel* camera) { camera->cy -= 60; });
+  refuses([](CameraModel* camera) { camera->distortion[1] = 0.6; });
   refuses([](CameraModel* camera) { camera->distortion[3] = 0.01; });
   refuses([](CameraModel* camera) { camera->readout_s = 0.02; });
 }

@@ -261,6 +261,7 @@ std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& 
   is_any |= read("time_offset_sigma", 0, 0, 1, 1, &sigmas.time_offset_s);
   is_any |= read("intrinsics_sigma", 4, 0, 2, focal_px, &sigmas.focal);
   is_any |= read("intrinsics_sigma", 4, 2, 2, focal_px, &sigmas.centre);
+  is_any |= read("distortion_sigma", 2, 0, 2, 1, &sigmas.distortion);
   return is_any ? std::optional(sigmas) : std::nullopt;
 }
 

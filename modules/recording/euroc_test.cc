@@ -160,12 +160,14 @@ TEST_F(EurocTest, HowWellTheCalibrationIsKnown) {
   const std::string camera = Text("cam0/sensor.yaml");
   const double focal_px = EurocRecording(root_).camera().fx;
   Write("cam0/sensor.yaml", camera + "rotation_sigma: [0.001, 0.004, 0.002]\n" +
-                                "intrinsics_sigma: [2, 2.5, 1.5, 1]\n");
+                                "intrinsics_sigma: [2, 2.5, 1.5, 1]\n" +
+                                "distortion_sigma: [0.003, 0.02]\n");
   const auto sigmas = EurocRecording(root_).calibration_sigmas();
   ASSERT_TRUE(sigmas);
   EXPECT_EQ(sigmas->rotation, 0.004);
   EXPECT_DOUBLE_EQ(sigmas->focal, 2.5 / focal_px);
   EXPECT_DOUBLE_EQ(sigmas->centre, 1.5 / focal_px);
+  EXPECT_EQ(sigmas->distortion, 0.02);
   EXPECT_EQ(sigmas->position_m, CalibrationSigmas{}.position_m);  // not given
   Write("cam0/sensor.yaml", camera + "time_offset_sigma: -0.001\n");
   EXPECT_THAT(Complaint(), HasSubstr("'time_offset_sigma' must be above 0"));

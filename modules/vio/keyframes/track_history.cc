@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -13,17 +14,30 @@ namespace {
 
 constexpr size_t kMinShared = 15;  // landmarks that tell whether an image stands still
 
-// Another focal length or centre is as good as another pixel: (pixel - c) e + f d further in.
-Eigen::Matrix<double, 2, 3> ByIntrinsics(const Observation& observation,
-                                         const CameraModel& camera) {
+// d(distorted ray)/d(the first two coefficients of distortion), over the ray.
+Eigen::RowVector2d ByRadialCoefficients(const Eigen::Vector2d& ray, CameraModel::Kind kind) {
+  const double r = ray.norm();
+  if (kind == CameraModel::Kind::kRadtan) {
+    return {r * r, r * r * r * r};
+  }
+  const double theta = std::atan(r), cube = theta * theta * theta;
+  return r > 0 ? Eigen::RowVector2d(cube / r, cube * theta * theta / r)
+               : Eigen::RowVector2d::Zero();
+}
+
+// Another camera is as good as another pixel: (pixel - c) e + f (d + ray by distortion) further in.
+Eigen::Matrix<double, 2, kIntrinsicsSize> ByIntrinsics(const Observation& observation,
+                                                       const CameraModel& camera) {
   Eigen::Matrix<double, 2, 3> J_pixel;  // d(pixel)/d(ray, 1)
   const Eigen::Vector3d ray(observation.ray.x(), observation.ray.y(), 1);
   const auto pixel = camera.Project(ray, &J_pixel);
   if (!pixel) {
-    return Eigen::Matrix<double, 2, 3>::Zero();
+    return Eigen::Matrix<double, 2, kIntrinsicsSize>::Zero();
   }
-  Eigen::Matrix<double, 2, 3> further;
-  further << pixel->x() - camera.cx, camera.fx, 0, pixel->y() - camera.cy, 0, camera.fy;
+  const Eigen::RowVector2d radial = ByRadialCoefficients(observation.ray, camera.kind);
+  Eigen::Matrix<double, 2, kIntrinsicsSize> further;
+  further << pixel->x() - camera.cx, camera.fx, 0, camera.fx * ray.x() * radial,
+      pixel->y() - camera.cy, 0, camera.fy, camera.fy * ray.y() * radial;
   return -J_pixel.leftCols<2>().inverse() * further;
 }
 

@@ -26,15 +26,16 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
       history.AddFrame({1, {{5, pixel.cast<float>(), camera.Unproject(pixel).value()}}}, camera,
                        1e-3);
       const FrameRay& seen = history.Frame(1).at(0).second;
-      const MatrixXd numeric = pangea::NumericJacobian(3, 1e-6, [&](const Vector3d& intrinsics) {
-        WindowState changed;
-        changed.intrinsics = intrinsics;
-        return changed.Calibrated(camera).Unproject(pixel).value();
-      });
+      const MatrixXd numeric =
+          pangea::NumericJacobian(kIntrinsicsSize, 1e-6, [&](const Intrinsics& intrinsics) {
+            WindowState changed;
+            changed.intrinsics = intrinsics;
+            return changed.Calibrated(camera).Unproject(pixel).value();
+          });
       EXPECT_LT((seen.J_intrinsics - numeric).cwiseAbs().maxCoeff(), 1e-6);
       // Half a per cent is still small, also in a distorted corner.
       WindowState state;
-      state.intrinsics = {0.005, -0.0025, 0.0025};
+      state.intrinsics << 0.005, -0.0025, 0.0025, 0.002, -0.002;
       const Vector2d exact = state.Calibrated(camera).Unproject(pixel).value();
       EXPECT_LT((seen.RayBy(state) - exact).norm() * camera.fx, 0.1);
     }

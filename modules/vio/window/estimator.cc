@@ -117,10 +117,11 @@ void Estimator::Impl::Start(const InitialState& initial) {
     history.AddFrame(tracked, camera, ray_sigma);
     if (problem.state.frames.empty()) {
       Append(tracked.utime, from.imu, std::nullopt);
-      problem.prior = initial.stationary ? StartPrior(problem.state, initial.covariance,
-                                                      options.calibration, noise)
-                                         : MovingStartPrior(problem.state, options.calibration,
-                                                            noise, options.accel_bias_sigma);
+      problem.prior =
+          initial.stationary
+              ? StartPrior(problem.state, initial.covariance, camera, options.calibration, noise)
+              : MovingStartPrior(problem.state, camera, options.calibration, noise,
+                                 options.accel_bias_sigma);
     } else {
       Append(tracked.utime, from.imu, MakeImuFactor(Newest(), ImuTime(tracked.utime)));
     }

@@ -125,7 +125,7 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOd
                                            state.Ahead(seen.frame, seen.row_s), T_c, point.p_odom));
   out.J_anchor_stamp = J_odom * point.by_anchor_stamp;
   out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
-  out.J_calibration.middleCols<3>(kIntrinsics) = -seen.J_intrinsics;
+  out.J_calibration.middleCols<kIntrinsicsSize>(kIntrinsics) = -seen.J_intrinsics;
   out.J_calibration.col(kIntrinsics) += ray - seen.ray;
   out.J_calibration.col(kIntervalShare) =
       state.frames[seen.frame].excess_interval_s * out.J_frame_stamp +

@@ -19,7 +19,8 @@ struct FrameRay {
   double sigma = 0;
   double row_s = 0;  // the row's exposure after the image's time (rolling shutter)
   // d(ray)/d(WindowState::intrinsics), which are small: what the pixel's ray is by other ones.
-  Eigen::Matrix<double, 2, 3> J_intrinsics = Eigen::Matrix<double, 2, 3>::Zero();
+  Eigen::Matrix<double, 2, kIntrinsicsSize> J_intrinsics =
+      Eigen::Matrix<double, 2, kIntrinsicsSize>::Zero();
 
   Eigen::Vector2d RayBy(const WindowState& state) const {
     return ray + J_intrinsics * state.intrinsics / (1 + state.intrinsics.x());

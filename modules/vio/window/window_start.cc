@@ -17,6 +17,13 @@ constexpr double kTiltSigma = 0.5;       // rad
 constexpr double kVelocitySigma = 5;     // m/s
 constexpr double kGyroBiasSigma = 0.05;  // rad/s, about what was found
 
+// As CalibrationSigmas::distortion has it.
+double DistortionSigma(const CameraModel& camera, const CalibrationSigmas& given) {
+  constexpr double kMeasured = 0.0003, kNotMeasured = 0.1;
+  return given.distortion > 0 ? given.distortion
+                              : (camera.distortion.isZero() ? kNotMeasured : kMeasured);
+}
+
 // Each sensor has gains and axes of its own, the gyro's are the body's.
 Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> ImuIntrinsicsCovariance(
     const ImuNoise& noise) {
@@ -48,12 +55,15 @@ Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
 }  // namespace
 
 WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
-                       const CalibrationSigmas& given, const ImuNoise& noise) {
+                       const CameraModel& camera, const CalibrationSigmas& given,
+                       const ImuNoise& noise) {
   const int n = kSharedSize + kFrameSize;
   MatrixXd P = MatrixXd::Zero(n, n);
+  const double distortion = DistortionSigma(camera, given);
   Eigen::Matrix<double, kCalibrationSize, 1> sigma;
   sigma << Vector3d::Constant(given.rotation), Vector3d::Constant(given.position_m),
-      given.time_offset_s, given.focal, given.centre, given.centre, kIntervalShareSigma;
+      given.time_offset_s, given.focal, given.centre, given.centre, distortion, distortion,
+      kIntervalShareSigma;
   P.topLeftCorner<kCalibrationSize, kCalibrationSize>() = sigma.cwiseAbs2().asDiagonal();
   P.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) =
       ImuIntrinsicsCovariance(noise);
@@ -69,13 +79,14 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   return prior;
 }
 
-WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
-                             const ImuNoise& noise, double accel_bias_sigma) {
+WindowPrior MovingStartPrior(const WindowState& start, const CameraModel& camera,
+                             const CalibrationSigmas& given, const ImuNoise& noise,
+                             double accel_bias_sigma) {
   Eigen::Matrix<double, 15, 1> sigma;
   sigma << Vector3d(kTiltSigma, kTiltSigma, 0), Vector3d::Zero(),
       Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
       Vector3d::Constant(accel_bias_sigma);
-  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), given, noise);
+  WindowPrior prior = StartPrior(start, sigma.cwiseAbs2().asDiagonal(), camera, given, noise);
   prior.at.frames[0].imu.accel_bias.setZero();
   return prior;
 }

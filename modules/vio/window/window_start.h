@@ -6,18 +6,21 @@
 #include <Eigen/Core>
 
 #include "core/calibration_sigmas.h"
+#include "core/camera_model.h"
 #include "vio/window/window_problem.h"
 
 namespace pangea::vio {
 
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
-WindowPrior MovingStartPrior(const WindowState& start, const CalibrationSigmas& given,
-                             const ImuNoise& noise, double accel_bias_sigma);
+WindowPrior MovingStartPrior(const WindowState& start, const CameraModel& camera,
+                             const CalibrationSigmas& given, const ImuNoise& noise,
+                             double accel_bias_sigma);
 
 // `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
 // the left, all differences plain (InitialState).
 WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
-                       const CalibrationSigmas& given, const ImuNoise& noise);
+                       const CameraModel& camera, const CalibrationSigmas& given,
+                       const ImuNoise& noise);
 
 }  // namespace pangea::vio

@@ -30,6 +30,7 @@ CameraModel WindowState::Calibrated(CameraModel given) const {
   given.cy += given.fy * intrinsics.z();
   given.fx *= 1 + intrinsics.x();
   given.fy *= 1 + intrinsics.x();
+  given.distortion.head<2>() += intrinsics.tail<2>();
   return given;
 }
 
@@ -51,7 +52,7 @@ void WindowState::Retract(const VectorXd& error) {
   T_body_cam.q = (ExpSo3(error.segment<3>(kExtrinsics)) * T_body_cam.q).normalized();
   T_body_cam.t += error.segment<3>(kExtrinsics + 3);
   time_offset_s += error[kTimeOffset];
-  intrinsics += error.segment<3>(kIntrinsics);
+  intrinsics += error.segment<kIntrinsicsSize>(kIntrinsics);
   interval_share += error[kIntervalShare];
   imu_intrinsics.Add(error.segment<kImuIntrinsicsSize>(kImuIntrinsics));
   int at = kSharedSize;
@@ -76,7 +77,7 @@ VectorXd Difference(const WindowState& a, const WindowState& b) {
   e.segment<3>(kExtrinsics) = LogSo3(a.T_body_cam.q * b.T_body_cam.q.conjugate());
   e.segment<3>(kExtrinsics + 3) = a.T_body_cam.t - b.T_body_cam.t;
   e[kTimeOffset] = a.time_offset_s - b.time_offset_s;
-  e.segment<3>(kIntrinsics) = a.intrinsics - b.intrinsics;
+  e.segment<kIntrinsicsSize>(kIntrinsics) = a.intrinsics - b.intrinsics;
   e[kIntervalShare] = a.interval_share - b.interval_share;
   e.segment<kImuIntrinsicsSize>(kImuIntrinsics) =
       a.imu_intrinsics.Stacked() - b.imu_intrinsics.Stacked();

@@ -29,11 +29,13 @@ inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 inline constexpr int kStampError = kFrameSize;
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
 // intrinsics, interval share.
-inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7, kIntervalShare = 10;
-inline constexpr int kCalibrationSize = 11;
+inline constexpr int kExtrinsics = 0, kTimeOffset = 6, kIntrinsics = 7, kIntervalShare = 12;
+inline constexpr int kIntrinsicsSize = 5, kCalibrationSize = 13;
 // Then the IMU intrinsics, and then the frames.
 inline constexpr int kImuIntrinsics = kCalibrationSize;
 inline constexpr int kSharedSize = kCalibrationSize + kImuIntrinsicsSize;
+
+using Intrinsics = Eigen::Matrix<double, kIntrinsicsSize, 1>;
 
 // A frame of the window: the body at the image's time as the time offset stood when it came.
 struct WindowFrame {
@@ -68,9 +70,9 @@ struct WindowState {
   // as long as its frame rate lets it has -1/2 where a stamp is of the end of the exposure, 1/2
   // where it is of the begin, and 0 where it is of the middle or the exposure is short.
   double interval_share = 0;
-  // Of the given camera: how much longer its focal length is, as a share of it, and where its
-  // centre is, in focal lengths (x, y).
-  Eigen::Vector3d intrinsics = Eigen::Vector3d::Zero();
+  // Of the given camera: how much longer its focal length is, as a share of it, where its centre
+  // is, in focal lengths (x, y), and what its first two (radial) coefficients of distortion lack.
+  Intrinsics intrinsics = Intrinsics::Zero();
   ImuIntrinsics imu_intrinsics;
   std::vector<WindowFrame> frames;  // oldest first
 
@@ -78,7 +80,8 @@ struct WindowState {
   int size() const { return Offset(static_cast<int>(frames.size())); }
   int Newest() const { return static_cast<int>(frames.size()) - 1; }
   std::optional<int> Find(int64_t utime) const;
-  // The given camera as it is thought to be: extrinsics, time offset, focal length and centre.
+  // The given camera as it is thought to be: extrinsics, time offset, focal length, centre,
+  // distortion.
   CameraModel Calibrated(CameraModel given) const;
 
   double OffsetAt(double excess_interval_s) const {

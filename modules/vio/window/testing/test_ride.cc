@@ -3,8 +3,11 @@
 namespace pangea::vio {
 namespace {
 
-EstimatorOptions Options() {
+EstimatorOptions Options(const VioTestWorldOptions& world) {
   EstimatorOptions options;
+  if (world.unknown_distortion == 0) {
+    options.calibration.distortion = 0.0003;
+  }
   options.pixel_sigma = VioTestWorldOptions{}.pixel_noise;
   return options;
 }
@@ -27,7 +30,7 @@ std::deque<Ride> MakeRides(uint64_t count, VioTestWorldOptions options, int fram
 }  // namespace
 
 Ride::Ride(const VioTestWorldOptions& options)
-    : world(options), estimator(Options(), world.camera(), options.imu_noise) {}
+    : world(options), estimator(Options(options), world.camera(), options.imu_noise) {}
 
 void Ride::Feed(const VioTestWorld::Input& input) {
   last = estimator.AddFrame(input.frame, input.imu);

@@ -77,6 +77,7 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   const Vector3d centre = RandomVector(intrinsics_rng, options.centre_sigma);
   true_intrinsics_.cx += camera_.fx * centre.x();
   true_intrinsics_.cy += camera_.fy * centre.y();
+  true_intrinsics_.distortion[0] += options.unknown_distortion;
   true_intrinsics_.fx *= longer;
   true_intrinsics_.fy *= longer;
   true_imu_intrinsics_ = RandomImuIntrinsics(options.imu_noise, options.seed + 1000);

@@ -65,6 +65,8 @@ struct VioTestWorldOptions {
   double time_offset_sigma = 0;          // s
   double focal_sigma = 0;                // of the focal length
   double centre_sigma = 0;               // of the focal length
+  // The lens's first coefficient, given as 0. Else the estimator knows that the lens has none.
+  double unknown_distortion = 0;
 };
 
 class VioTestWorld {

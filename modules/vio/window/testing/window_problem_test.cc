@@ -314,7 +314,7 @@ TEST(Optimise, DampsWhenTheFullStepIsWorse) {
         100 * MatrixXd::Identity(window.problem.state.size(), window.problem.state.size());
     window.problem.state.intrinsics = window.truth.state.intrinsics;  // they are known
     window.problem.state.imu_intrinsics = window.truth.state.imu_intrinsics;
-    window.problem.prior.H.diagonal().segment<3>(kIntrinsics).setConstant(1e8);
+    window.problem.prior.H.diagonal().segment<kIntrinsicsSize>(kIntrinsics).setConstant(1e8);
     const double start = Cost(window.problem);
     worse += Cost(FullStep(window.problem)) > start ? 1 : 0;
     WindowProblem once = window.problem;
@@ -333,7 +333,7 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   const VectorXd spread = RandomError(start, 0.05, 3).tail(kFrameSize);
   const Eigen::Matrix<double, 15, 15> plain =
       spread * spread.transpose() + 1e-2 * Eigen::Matrix<double, 15, 15>::Identity();
-  const WindowPrior prior = StartPrior(start, plain, {}, ImuNoise{});
+  const WindowPrior prior = StartPrior(start, plain, CameraModel{}, {}, ImuNoise{});
   const MatrixXd P = prior.H.inverse();
   // Errors drawn as the initialiser means them, seen as the window does: p + dp = Exp(dtheta) p +
   // xi.
@@ -361,6 +361,22 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   EXPECT_NEAR(P(kImuIntrinsics + 10, kImuIntrinsics + 12), -0.5 * variance, 1e-9);
   EXPECT_NEAR(std::sqrt(P(kExtrinsics, kExtrinsics)), 0.001, 1e-9);
   EXPECT_NEAR(std::sqrt(P(kTimeOffset, kTimeOffset)), 0.005, 1e-9);
+}
+
+TEST(StartPrior, CoefficientsOfDistortionThatAreAllZeroWereNotMeasured) {
+  WindowState start;
+  start.frames.emplace_back();
+  CameraModel measured;
+  measured.distortion[1] = 0.02;
+  const CalibrationSigmas exact{.distortion = 1e-5};
+  const auto sigma = [&](const CameraModel& camera, const CalibrationSigmas& given) {
+    const WindowPrior prior =
+        StartPrior(start, Eigen::Matrix<double, 15, 15>::Identity(), camera, given, ImuNoise{});
+    return 1 / std::sqrt(prior.H(kIntrinsics + 3, kIntrinsics + 3));
+  };
+  EXPECT_NEAR(sigma(CameraModel{}, {}), 0.1, 1e-6);
+  EXPECT_NEAR(sigma(measured, {}), 0.0003, 1e-8);
+  EXPECT_NEAR(sigma(CameraModel{}, exact), 1e-5, 1e-10);
 }
 
 }  // namespace

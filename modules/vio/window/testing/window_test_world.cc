@@ -56,7 +56,9 @@ Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions&
     seen.frame = i;
     seen.sigma = kRaySigma;
     seen.row_s = i == anchor ? landmark.point.anchor_row_s : row(rng);
-    seen.J_intrinsics << RandomVector(rng, 1).transpose(), RandomVector(rng, 1).transpose();
+    for (int k = 0; k < kIntrinsicsSize; ++k) {
+      seen.J_intrinsics.col(k) = RandomVector(rng, 1).head<2>();
+    }
     const Vector3d noise = RandomVector(rng, options.ray_noise * kRaySigma);
     // Where the prediction is the ray itself.
     for (int k = 0; k < 20; ++k) {
@@ -95,7 +97,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   // A little askew.
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
-  state.intrinsics = RandomVector(rng, 0.01);
+  state.intrinsics << RandomVector(rng, 0.01), RandomVector(rng, 0.01).head<2>();
   state.interval_share = -0.3;
   state.imu_intrinsics.Add(RandomImuIntrinsics(0.01, rng));
   state.frames = {FirstFrame(0.002, rng)};
