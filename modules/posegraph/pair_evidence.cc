@@ -217,7 +217,8 @@ bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoin
            options_.max_rival_share * std::max(count, options_.min_viewpoints_at_one_spot);
   }
   if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
-    return count >= options_.min_viewpoints_at_one_spot &&
+    return (count >= options_.min_viewpoints_at_one_spot ||
+            strong >= options_.min_strong_viewpoints_at_one_spot) &&
            rival_viewpoints <= options_.max_rival_share_at_one_spot * count;
   }
   return (count >= options_.min_viewpoints || strong >= options_.min_strong_viewpoints) &&

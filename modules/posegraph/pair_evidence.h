@@ -34,6 +34,7 @@ struct MergeOptions {
   // look-alikes standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
   int min_viewpoints_at_one_spot = 6;
+  int min_strong_viewpoints_at_one_spot = 4;  // as many fewer as elsewhere
   double max_rival_share_at_one_spot = 0.25;
   // The largest rival may have this share of the viewpoints.
   double max_rival_share = 0.5;
@@ -57,6 +58,8 @@ struct MergeOptions {
                 "of what the agreeing viewpoints see; less is one spot");
     archive.Add("min_viewpoints_at_one_spot", &min_viewpoints_at_one_spot, {1, 1000}, "",
                 "that must agree where all see one spot");
+    archive.Add("min_strong_viewpoints_at_one_spot", &min_strong_viewpoints_at_one_spot, {1, 1000},
+                "", "that are enough there, if each is strong");
     archive.Add("max_rival_share_at_one_spot", &max_rival_share_at_one_spot, {0, 1}, "",
                 "of the viewpoints, where all see one spot");
     archive.Add("max_rival_share", &max_rival_share, {0, 1}, "", "of the viewpoints");

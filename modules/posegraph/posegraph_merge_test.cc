@@ -40,6 +40,30 @@ TEST(PoseGraph, ManyMatchesOfOneViewpointDoNotMerge) {
   EXPECT_EQ(graph.counters().groups, 2);
 }
 
+// How many viewpoints merge two maps which both see one spot only.
+int ViewpointsAtOneSpot(int num_inliers) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
+  PoseGraphOptions options;
+  options.merge.min_scene_extent_m = 1000;
+  PoseGraph graph(options);
+  AddKeyframes(world, &graph);
+  int viewpoints = 0;
+  for (Constraint& constraint : BetweenMaps(MakeConstraints(world, 20, 0))) {
+    constraint.num_inliers = num_inliers;
+    graph.AddConstraint(constraint);
+    ++viewpoints;
+    if (graph.counters().groups == 1) {
+      return viewpoints;
+    }
+  }
+  return -1;
+}
+
+TEST(PoseGraph, AtOneSpotMoreViewpointsAreNeededThoughFewerOfStrongOnes) {
+  EXPECT_EQ(ViewpointsAtOneSpot(79), 6);
+  EXPECT_EQ(ViewpointsAtOneSpot(80), 4);
+}
+
 // Wrong constraints that agree with each other by chance or by a look-alike: too few, or rivalled.
 TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
