@@ -82,6 +82,8 @@ TEST(WithUsualWalks, BoundsThem) {
   given.accel_random_walk = 0.024;
   EXPECT_EQ(WithUsualWalks(given).gyro_random_walk, 1e-5);
   EXPECT_EQ(WithUsualWalks(given).accel_random_walk, 3e-3);
+  given.accel_random_walk = 3e-4;
+  EXPECT_EQ(WithUsualWalks(given).accel_random_walk, 1e-3);
   EXPECT_EQ(WithUsualWalks(ImuNoise{}).accel_random_walk, ImuNoise{}.accel_random_walk);
 }
 
