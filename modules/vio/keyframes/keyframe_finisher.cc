@@ -33,10 +33,11 @@ struct SeenPoint {
 };
 
 // What the window's error does to the inverse depth.
-Eigen::RowVectorXd DepthJacobian(const WindowState& state, const SeenPoint& seen) {
+Eigen::RowVectorXd DepthJacobian(RowViews& views, const SeenPoint& seen) {
+  const WindowState& state = views.state();
   const std::vector<FrameRay>& rays = seen.rays;
   const NormalEquations::Elimination elimination =
-      EliminateLandmark(state, {seen.landmark_id, seen.at.point, rays});
+      EliminateLandmark(views, {seen.landmark_id, seen.at.point, rays});
   const Eigen::RowVectorXd gain = elimination.gain.row(2);
   Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
   J.head<kCalibrationSize>() = gain.head<kCalibrationSize>();
@@ -80,9 +81,10 @@ std::vector<SeenPoint> PointsSeen(const WindowState& state, const TrackHistory& 
 void AddDepths(const WindowState& state, const MatrixXd& P, const std::vector<SeenPoint>& points,
                FinishedKeyframe* keyframe) {
   const std::vector<int> rows = RowsOfPoses(state);
+  RowViews views(state);
   MatrixXd J(points.size(), rows.size());
   for (size_t k = 0; k < points.size(); ++k) {
-    J.row(static_cast<Eigen::Index>(k)) = DepthJacobian(state, points[k])(rows);
+    J.row(static_cast<Eigen::Index>(k)) = DepthJacobian(views, points[k])(rows);
   }
   const MatrixXd P_rows = P(rows, rows);
   // Variance: that of the rays, and what the errors of calibration and frames do to it.

@@ -203,8 +203,9 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   publisher.NoteContradicted(problem);
   std::vector<int32_t> outliers;
   const int newest = problem.state.Newest();
+  RowViews rows(problem.state);
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
-    if (!IsOutlier(problem.state, landmark)) {
+    if (!IsOutlier(rows, landmark)) {
       return false;
     }
     history.RemoveLandmark(landmark.id);
@@ -268,12 +269,13 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
 // The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
 // that do not fit go without a word.
 void Estimator::Impl::FoldLandmarks(int frame) {
+  RowViews rows(problem.state);
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
     if (landmark.point.anchor != frame) {
       return false;
     }
     landmarks.StartAnew(landmark.id, Newest().utime);
-    return !FitsAsWhole(problem.state, landmark);
+    return !FitsAsWhole(rows, landmark);
   });
 }
 

@@ -22,11 +22,11 @@ struct LandmarkError {
   double sum = 0;    // of squares, sigmas
   double worst = 0;  // ray, sigmas
 };
-LandmarkError ErrorOf(const WindowState& state, const Landmark& landmark) {
+LandmarkError ErrorOf(RowViews& rows, const Landmark& landmark) {
   LandmarkError error;
-  const Eigen::Vector3d p_odom = InOdom(state, landmark.point);
+  const Eigen::Vector3d p_odom = InOdom(rows, landmark.point);
   for (const FrameRay& ray : landmark.rays) {
-    const double e = RayError(state, p_odom, ray);
+    const double e = RayError(rows, p_odom, ray);
     error.sum += e * e;
     error.worst = std::max(error.worst, e);
   }
@@ -40,15 +40,14 @@ bool IsSeenIn(int frame, const Landmark& landmark) {
                      [frame](const FrameRay& ray) { return ray.frame == frame; });
 }
 
-bool IsOutlier(const WindowState& state, const Landmark& landmark) {
-  const LandmarkError error = ErrorOf(state, landmark);
+bool IsOutlier(RowViews& rows, const Landmark& landmark) {
+  const LandmarkError error = ErrorOf(rows, landmark);
   const double rms = std::sqrt(error.sum / (2.0 * static_cast<double>(landmark.rays.size())));
   return !(rms < kMaxLandmarkRms && error.worst < kMaxRayError);
 }
 
-bool FitsAsWhole(const WindowState& state, const Landmark& landmark) {
-  return ErrorOf(state, landmark).sum <=
-         ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
+bool FitsAsWhole(RowViews& rows, const Landmark& landmark) {
+  return ErrorOf(rows, landmark).sum <= ChiSquare95(2 * static_cast<int>(landmark.rays.size()) - 3);
 }
 
 }  // namespace pangea::vio

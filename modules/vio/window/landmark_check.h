@@ -8,8 +8,8 @@ namespace pangea::vio {
 
 bool IsSeenIn(int frame, const Landmark& landmark);
 // A ray is far off, or all of them together.
-bool IsOutlier(const WindowState& state, const Landmark& landmark);
+bool IsOutlier(RowViews& rows, const Landmark& landmark);
 // Whether its rays pass a chi-square test at 95 %.
-bool FitsAsWhole(const WindowState& state, const Landmark& landmark);
+bool FitsAsWhole(RowViews& rows, const Landmark& landmark);
 
 }  // namespace pangea::vio

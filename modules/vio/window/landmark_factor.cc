@@ -71,7 +71,8 @@ Matrix<double, kRay, 2> FrameJacobian(const Matrix<double, 2, kPoseSize>& J_pose
 }
 
 template <int kRay>
-LandmarkTerms<kRay> LineariseLandmark(const WindowState& state, const Landmark& landmark) {
+LandmarkTerms<kRay> LineariseLandmark(RowViews& rows, const Landmark& landmark) {
+  const WindowState& state = rows.state();
   using Terms = LandmarkTerms<kRay>;
   const size_t m = landmark.rays.size();
   const WindowFrame& anchor_frame = state.frames[landmark.point.anchor];
@@ -81,10 +82,10 @@ LandmarkTerms<kRay> LineariseLandmark(const WindowState& state, const Landmark& 
   for (size_t j = 0; j < m; ++j) {
     out.anchor = landmark.rays[j].frame == landmark.point.anchor ? j : out.anchor;
   }
-  const PointInOdom point(state, landmark.point);
+  const PointInOdom point(rows, landmark.point);
   for (size_t j = 0; j < m; ++j) {
     const FrameRay& seen = landmark.rays[j];
-    const auto predicted = PredictRay(state, point, seen);
+    const auto predicted = PredictRay(rows, point, seen);
     if (!predicted) {
       out.cost += HuberCost(kBehind);  // and no derivative: it says nothing of where to go
       continue;
@@ -220,13 +221,12 @@ void AddElimination(const LandmarkTerms<kRay>& terms,
 }
 
 template <int kRay>
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out) {
-  const LandmarkTerms<kRay> terms = LineariseLandmark<kRay>(state, landmark);
+void AddLandmark(RowViews& rows, const Landmark& landmark, double damping, NormalEquations* out) {
+  const LandmarkTerms<kRay> terms = LineariseLandmark<kRay>(rows, landmark);
   std::vector<FrameColumns> columns;
   columns.reserve(landmark.rays.size());
   for (const FrameRay& seen : landmark.rays) {
-    columns.push_back(ColumnsOf(state, seen.frame));
+    columns.push_back(ColumnsOf(rows.state(), seen.frame));
   }
   out->cost += terms.cost;
   out->eliminations.push_back(Eliminate<kRay>(terms, damping));
@@ -242,30 +242,29 @@ bool HasStamps(const WindowState& state, const Landmark& landmark) {
 
 }  // namespace
 
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out) {
-  HasStamps(state, landmark) ? AddLandmark<kPoseSize + 1>(state, landmark, damping, out)
-                             : AddLandmark<kPoseSize>(state, landmark, damping, out);
+void AddLandmark(RowViews& rows, const Landmark& landmark, double damping, NormalEquations* out) {
+  HasStamps(rows.state(), landmark) ? AddLandmark<kPoseSize + 1>(rows, landmark, damping, out)
+                                    : AddLandmark<kPoseSize>(rows, landmark, damping, out);
 }
 
-NormalEquations::Elimination EliminateLandmark(const WindowState& state, const Landmark& landmark) {
-  return HasStamps(state, landmark)
-             ? Eliminate<kPoseSize + 1>(LineariseLandmark<kPoseSize + 1>(state, landmark), 0)
-             : Eliminate<kPoseSize>(LineariseLandmark<kPoseSize>(state, landmark), 0);
+NormalEquations::Elimination EliminateLandmark(RowViews& rows, const Landmark& landmark) {
+  return HasStamps(rows.state(), landmark)
+             ? Eliminate<kPoseSize + 1>(LineariseLandmark<kPoseSize + 1>(rows, landmark), 0)
+             : Eliminate<kPoseSize>(LineariseLandmark<kPoseSize>(rows, landmark), 0);
 }
 
-double LandmarkCost(const WindowState& state, const Landmark& landmark) {
-  const Vector3d p_odom = InOdom(state, landmark.point);
+double LandmarkCost(RowViews& rows, const Landmark& landmark) {
+  const Vector3d p_odom = InOdom(rows, landmark.point);
   double cost = 0;
   for (const FrameRay& seen : landmark.rays) {
-    const double error = RayError(state, p_odom, seen);
+    const double error = RayError(rows, p_odom, seen);
     cost += HuberCost(std::isfinite(error) ? error : kBehind);
   }
   return cost;
 }
 
-double RayError(const WindowState& state, const Vector3d& p_odom, const FrameRay& seen) {
-  const auto ray = PredictRayOnly(state, p_odom, seen);
+double RayError(RowViews& rows, const Vector3d& p_odom, const FrameRay& seen) {
+  const auto ray = PredictRayOnly(rows, p_odom, seen);
   return ray ? (*ray - seen.ray).norm() / seen.sigma : std::numeric_limits<double>::infinity();
 }
 

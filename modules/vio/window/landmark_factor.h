@@ -9,16 +9,15 @@ namespace pangea::vio {
 
 // Adds to cost and gradient, and to the upper triangle of H; appends the elimination. `damping`:
 // Levenberg-Marquardt's, of the landmark.
-void AddLandmark(const WindowState& state, const Landmark& landmark, double damping,
-                 NormalEquations* out);
+void AddLandmark(RowViews& rows, const Landmark& landmark, double damping, NormalEquations* out);
 
 // The elimination alone.
-NormalEquations::Elimination EliminateLandmark(const WindowState& state, const Landmark& landmark);
+NormalEquations::Elimination EliminateLandmark(RowViews& rows, const Landmark& landmark);
 
 // The cost alone.
-double LandmarkCost(const WindowState& state, const Landmark& landmark);
+double LandmarkCost(RowViews& rows, const Landmark& landmark);
 
 // Whitened distance of a ray from where it should be; infinite for a point behind the camera.
-double RayError(const WindowState& state, const Eigen::Vector3d& p_odom, const FrameRay& seen);
+double RayError(RowViews& rows, const Eigen::Vector3d& p_odom, const FrameRay& seen);
 
 }  // namespace pangea::vio

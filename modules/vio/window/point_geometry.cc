@@ -33,21 +33,8 @@ Eigen::Matrix<double, 2, 3> RayJacobian(const Vector3d& y) {
   return J;
 }
 
-// How fast a point moves that a frame carries along, m/s; `T_odom_body`: the frame that much ahead.
-Vector3d CarriedBy(const WindowFrame& frame, double ahead_s, const Rigid3& T_odom_body,
-                   const Vector3d& p_odom) {
-  const Vector3d rotation = ahead_s * frame.omega_body + 0.5 * ahead_s * ahead_s * frame.alpha_body;
-  const Vector3d omega = RightJacobian(rotation) * (frame.omega_body + ahead_s * frame.alpha_body);
-  return frame.imu.v_odom_body + ahead_s * (frame.imu.T_odom_body.q * frame.a_body) +
-         (T_odom_body.q * omega).cross(p_odom - T_odom_body.t);
-}
-
 Rigid3 BodyPose(const WindowState& state, const FrameRay& seen) {
   return state.PoseAhead(seen.frame, state.Ahead(seen.frame, seen.row_s));
-}
-
-Rigid3 AnchorPose(const WindowState& state, const AnchoredPoint& point) {
-  return state.PoseAhead(point.anchor, state.Ahead(point.anchor, point.anchor_row_s));
 }
 
 Rigid3 CameraPose(const WindowState& state, const FrameRay& seen) {
@@ -74,37 +61,69 @@ std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const Frame
 
 }  // namespace
 
-PointInOdom::PointInOdom(const WindowState& state, const AnchoredPoint& point) {
-  const Rigid3 T_a = AnchorPose(state, point);
+const RowView& RowViews::At(int frame, double row_s) {
+  std::optional<RowView>& view = last_[frame];
+  if (!view || view->row_s != row_s) {
+    view.emplace();
+    view->row_s = row_s;
+    view->ahead_s = state_->Ahead(frame, row_s);
+    view->T_odom_body = state_->PoseAhead(frame, view->ahead_s);
+    view->R_odom_body = view->T_odom_body.R();
+  }
+  return *view;
+}
+
+Vector3d RowViews::CarriedBy(int frame, double row_s, const Vector3d& p_odom) {
+  At(frame, row_s);
+  RowView& view = *last_[frame];
+  if (!view.omega_odom) {
+    const WindowFrame& f = state_->frames[frame];
+    const double ahead_s = view.ahead_s;
+    const Vector3d rotation = ahead_s * f.omega_body + 0.5 * ahead_s * ahead_s * f.alpha_body;
+    view.omega_odom =
+        view.R_odom_body * (RightJacobian(rotation) * (f.omega_body + ahead_s * f.alpha_body));
+    view.v_odom = f.imu.v_odom_body + ahead_s * (f.imu.T_odom_body.q * f.a_body);
+  }
+  return *view.v_odom + view.omega_odom->cross(p_odom - view.T_odom_body.t);
+}
+
+PointInOdom::PointInOdom(RowViews& rows, const AnchoredPoint& point) {
+  const WindowState& state = rows.state();
+  const RowView& anchor = rows.At(point.anchor, point.anchor_row_s);
   const Vector3d x_body = state.T_body_cam.q * point.InCamera();
-  p_odom = T_a * (x_body + state.T_body_cam.t);
-  by_translation = T_a.R();
+  by_translation = anchor.R_odom_body;
+  p_odom = by_translation * (x_body + state.T_body_cam.t) + anchor.T_odom_body.t;
   by_rotation = by_translation * Hat(-x_body);
   by_point = by_translation * state.T_body_cam.R() * PointJacobian(point.ray_rho);
-  by_anchor_stamp = CarriedBy(state.frames[point.anchor],
-                              state.Ahead(point.anchor, point.anchor_row_s), T_a, p_odom);
+  by_anchor_stamp = rows.CarriedBy(point.anchor, point.anchor_row_s, p_odom);
   anchor_excess_interval_s = state.frames[point.anchor].excess_interval_s;
 }
 
-Vector3d InOdom(const WindowState& state, const AnchoredPoint& point) {
-  return AnchorPose(state, point) * (state.T_body_cam * point.InCamera());
+Vector3d InOdom(RowViews& rows, const AnchoredPoint& point) {
+  const RowView& anchor = rows.At(point.anchor, point.anchor_row_s);
+  return anchor.R_odom_body * (rows.state().T_body_cam * point.InCamera()) + anchor.T_odom_body.t;
 }
 
-std::optional<Vector2d> PredictRayOnly(const WindowState& state, const Vector3d& p_odom,
+std::optional<Vector2d> PredictRayOnly(RowViews& rows, const Vector3d& p_odom,
                                        const FrameRay& seen) {
-  const Vector3d y = state.T_body_cam.Inverse() * (BodyPose(state, seen).Inverse() * p_odom);
+  const WindowState& state = rows.state();
+  const RowView& view = rows.At(seen.frame, seen.row_s);
+  const Vector3d y_body =
+      view.R_odom_body.transpose() * (p_odom - view.T_odom_body.t) - state.T_body_cam.t;
+  const Vector3d y = state.T_body_cam.q.conjugate() * y_body;
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
   }
   return seen.AsGiven(state, y.head<2>() / y.z());
 }
 
-std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOdom& point,
+std::optional<PredictedRay> PredictRay(RowViews& rows, const PointInOdom& point,
                                        const FrameRay& seen) {
-  const Rigid3 T_c = BodyPose(state, seen);
-  const Matrix3d R_body_odom = T_c.R().transpose();
+  const WindowState& state = rows.state();
+  const RowView& view = rows.At(seen.frame, seen.row_s);
+  const Matrix3d R_body_odom = view.R_odom_body.transpose();
   const Matrix3d R_cam_body = state.T_body_cam.R().transpose();
-  const Vector3d y_body = R_body_odom * (point.p_odom - T_c.t) - state.T_body_cam.t;
+  const Vector3d y_body = R_body_odom * (point.p_odom - view.T_odom_body.t) - state.T_body_cam.t;
   const Vector3d y = R_cam_body * y_body;
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
@@ -121,8 +140,7 @@ std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOd
   out.J_anchor = -out.J_frame;
   out.J_calibration.leftCols<3>() = J_body * Hat(y_body) + J_odom * point.by_rotation;
   out.J_calibration.middleCols<3>(3) = J_odom * point.by_translation - J_body;
-  out.J_frame_stamp = -(J_odom * CarriedBy(state.frames[seen.frame],
-                                           state.Ahead(seen.frame, seen.row_s), T_c, point.p_odom));
+  out.J_frame_stamp = -(J_odom * rows.CarriedBy(seen.frame, seen.row_s, point.p_odom));
   out.J_anchor_stamp = J_odom * point.by_anchor_stamp;
   out.J_calibration.col(kTimeOffset) = out.J_frame_stamp + out.J_anchor_stamp;
   out.J_calibration.middleCols<kIntrinsicsSize>(kIntrinsics) = -seen.J_intrinsics;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "vio/window/window_state.h"
 
@@ -44,6 +45,28 @@ struct AnchoredPoint {
   }
 };
 
+// A body when a row was exposed.
+struct RowView {
+  double row_s = 0, ahead_s = 0;
+  Rigid3 T_odom_body;
+  Eigen::Matrix3d R_odom_body;
+  std::optional<Eigen::Vector3d> v_odom, omega_odom;
+};
+// Those of a window that does not change; of each frame the last row is kept, as one whose rows are
+// all exposed at once has no other.
+class RowViews {
+ public:
+  explicit RowViews(const WindowState& state) : state_(&state), last_(state.frames.size()) {}
+  const WindowState& state() const { return *state_; }
+  const RowView& At(int frame, double row_s);
+  // How fast a point moves that the frame carries along, m/s.
+  Eigen::Vector3d CarriedBy(int frame, double row_s, const Eigen::Vector3d& p_odom);
+
+ private:
+  const WindowState* state_;
+  std::vector<std::optional<RowView>> last_;
+};
+
 // Where a point should be seen by the given intrinsics, and d(ray) by the errors of the anchor's
 // pose, the seeing frame's pose, their stamps, the calibration, and (alpha, beta, rho). In its own
 // anchor the blocks of the two frames cancel.
@@ -57,7 +80,7 @@ struct PredictedRay {
 // A point as all its rays need it: where it is in odom, and how the errors of its anchor's side
 // move it there.
 struct PointInOdom {
-  PointInOdom(const WindowState& state, const AnchoredPoint& point);
+  PointInOdom(RowViews& rows, const AnchoredPoint& point);
   Eigen::Vector3d p_odom;
   Eigen::Matrix3d by_point;         // (alpha, beta, rho)
   Eigen::Matrix3d by_rotation;      // of T_body_cam
@@ -65,11 +88,11 @@ struct PointInOdom {
   Eigen::Vector3d by_anchor_stamp;  // m/s
   double anchor_excess_interval_s = 0;
 };
-Eigen::Vector3d InOdom(const WindowState& state, const AnchoredPoint& point);
+Eigen::Vector3d InOdom(RowViews& rows, const AnchoredPoint& point);
 // Nothing when the point is behind the camera.
-std::optional<Eigen::Vector2d> PredictRayOnly(const WindowState& state,
-                                              const Eigen::Vector3d& p_odom, const FrameRay& seen);
-std::optional<PredictedRay> PredictRay(const WindowState& state, const PointInOdom& point,
+std::optional<Eigen::Vector2d> PredictRayOnly(RowViews& rows, const Eigen::Vector3d& p_odom,
+                                              const FrameRay& seen);
+std::optional<PredictedRay> PredictRay(RowViews& rows, const PointInOdom& point,
                                        const FrameRay& seen);
 
 struct Triangulated {

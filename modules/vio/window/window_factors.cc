@@ -160,8 +160,9 @@ double Cost(const WindowProblem& problem) {
       cost += 0.5 * std::pow(frame.stamp_error_s / frame.stamp_sigma_s, 2);
     }
   }
+  RowViews rows(state);
   for (const Landmark& landmark : problem.landmarks) {
-    cost += LandmarkCost(state, landmark);
+    cost += LandmarkCost(rows, landmark);
   }
   return cost;
 }

@@ -65,9 +65,10 @@ NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
   if (state.frames[oldest].has_stamp_error()) {
     AddStampError(state, oldest, &out);
   }
+  RowViews rows(state);
   for (const Landmark& landmark : problem.landmarks) {
     if (landmark.point.anchor == oldest) {
-      AddLandmark(state, landmark, 0, &out);
+      AddLandmark(rows, landmark, 0, &out);
     }
   }
   MirrorUpper(&out.H);
@@ -124,8 +125,9 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
       AddStampError(problem.state, i, &out);
     }
   }
+  RowViews rows(problem.state);
   for (const Landmark& landmark : problem.landmarks) {
-    AddLandmark(problem.state, landmark, damping, &out);
+    AddLandmark(rows, landmark, damping, &out);
   }
   MirrorUpper(&out.H);
   return out;

@@ -33,7 +33,8 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
     for (const Landmark& landmark : problem.landmarks) {
       for (const FrameRay& seen : landmark.rays) {
         const int anchor = landmark.point.anchor;
-        const auto predicted = PredictRay(state, PointInOdom(state, landmark.point), seen);
+        RowViews rows(state);
+        const auto predicted = PredictRay(rows, PointInOdom(rows, landmark.point), seen);
         ASSERT_TRUE(predicted);
         MatrixXd J = MatrixXd::Zero(2, state.size());
         J.leftCols(kCalibrationSize) = predicted->J_calibration;
@@ -52,7 +53,8 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
         J.middleCols<3>(state.Offset(seen.frame) + kVelocity) +=
             state.Ahead(seen.frame, seen.row_s) * predicted->J_frame.rightCols<3>();
         const MatrixXd numeric = NumericJacobian(state, [&](const WindowState& s) -> VectorXd {
-          return PredictRayOnly(s, InOdom(s, landmark.point), seen).value();
+          RowViews changed(s);
+          return PredictRayOnly(changed, InOdom(changed, landmark.point), seen).value();
         });
         EXPECT_LT((J - numeric).cwiseAbs().maxCoeff(), 1e-7) << "seed " << seed;
       }
@@ -62,15 +64,15 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
 
 TEST(PredictRay, DerivativesByThePointMatchDifferences) {
   const WindowProblem problem = TestWindow(Rolling(6));
+  RowViews rows(problem.state);
   for (const Landmark& landmark : problem.landmarks) {
     for (const FrameRay& seen : landmark.rays) {
-      const auto predicted =
-          PredictRay(problem.state, PointInOdom(problem.state, landmark.point), seen);
+      const auto predicted = PredictRay(rows, PointInOdom(rows, landmark.point), seen);
       ASSERT_TRUE(predicted);
       const MatrixXd numeric = pangea::NumericJacobian(3, 1e-6, [&](const Vector3d& change) {
         AnchoredPoint moved = landmark.point;
         moved.ray_rho += change;
-        return PredictRayOnly(problem.state, InOdom(problem.state, moved), seen).value();
+        return PredictRayOnly(rows, InOdom(rows, moved), seen).value();
       });
       EXPECT_LT((predicted->J_point - numeric).cwiseAbs().maxCoeff(), 1e-7);
     }
@@ -80,8 +82,8 @@ TEST(PredictRay, DerivativesByThePointMatchDifferences) {
 TEST(PredictRay, InItsOwnAnchorAPointIsItsRay) {
   const WindowProblem problem = TestWindow(Rolling(1));
   const Landmark& landmark = problem.landmarks[0];
-  const auto predicted =
-      PredictRay(problem.state, PointInOdom(problem.state, landmark.point), landmark.rays[0]);
+  RowViews rows(problem.state);
+  const auto predicted = PredictRay(rows, PointInOdom(rows, landmark.point), landmark.rays[0]);
   ASSERT_TRUE(predicted);
   const FrameRay& own = landmark.rays[0];
   EXPECT_LT((own.ray - predicted->ray).norm(), 1e-12);
@@ -95,12 +97,11 @@ TEST(PredictRay, NothingBehindTheCamera) {
   const Landmark& landmark = problem.landmarks[0];
   Eigen::Quaterniond& q = problem.state.frames[1].imu.T_odom_body.q;
   q = q * YawRotation(M_PI);
-  EXPECT_FALSE(
-      PredictRay(problem.state, PointInOdom(problem.state, landmark.point), landmark.rays[1]));
-  EXPECT_FALSE(
-      PredictRayOnly(problem.state, InOdom(problem.state, landmark.point), landmark.rays[1]));
-  EXPECT_TRUE(
-      std::isinf(RayError(problem.state, InOdom(problem.state, landmark.point), landmark.rays[1])));
+  RowViews rows(problem.state);
+  EXPECT_FALSE(PredictRay(rows, PointInOdom(rows, landmark.point), landmark.rays[1]));
+  const Vector3d p_odom = InOdom(rows, landmark.point);
+  EXPECT_FALSE(PredictRayOnly(rows, p_odom, landmark.rays[1]));
+  EXPECT_TRUE(std::isinf(RayError(rows, p_odom, landmark.rays[1])));
 }
 
 TEST(Triangulate, IsExactWithoutNoise) {

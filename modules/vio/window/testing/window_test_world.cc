@@ -62,7 +62,8 @@ Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions&
     const Vector3d noise = RandomVector(rng, options.ray_noise * kRaySigma);
     // Where the prediction is the ray itself.
     for (int k = 0; k < 20; ++k) {
-      seen.ray = PredictRayOnly(state, InOdom(state, landmark.point), seen).value();
+      RowViews rows(state);
+      seen.ray = PredictRayOnly(rows, InOdom(rows, landmark.point), seen).value();
     }
     seen.ray += noise.head<2>();
     landmark.rays.push_back(seen);
