@@ -152,7 +152,7 @@ cv::Mat Equalizer::Apply(const cv::Mat& image) {
         LookUp(pairs.data(), image.ptr<uint8_t>(y) + strip.begin, strip.end - strip.begin,
                &of_pixels[2 * static_cast<size_t>(strip.begin)]);
       }
-      // Apart from the look-ups, which are no vector instructions, as this is.
+      // Apart from the look-ups: only this can be vector instructions.
       BlendRow(of_pixels, weights, out.ptr<uint8_t>(y));
     }
   }

@@ -92,6 +92,15 @@ TEST(PredictRay, InItsOwnAnchorAPointIsItsRay) {
   EXPECT_LT(predicted->J_calibration.leftCols<kIntrinsics>().cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST(RowViews, AreOfTheRowThatIsAskedFor) {
+  const WindowState state = TestWindow(Rolling(1)).state;
+  RowViews rows(state);
+  for (const double row_s : {0.0, 0.01, 0.0, 0.02}) {
+    const Rigid3 expected = state.PoseAhead(1, state.Ahead(1, row_s));
+    EXPECT_EQ(rows.At(1, row_s).T_odom_body.t, expected.t);
+  }
+}
+
 TEST(PredictRay, NothingBehindTheCamera) {
   WindowProblem problem = TestWindow({});
   const Landmark& landmark = problem.landmarks[0];
