@@ -78,7 +78,10 @@ int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_firs
     }
   }
   for (const auto& [id, point] : points) {
-    problem->points.push_back(point);
+    // One ray gives no depth: a camera that moves ahead would meet the point where it is, and stop.
+    if (point.rays.size() > 1) {
+      problem->points.push_back(point);
+    }
   }
   return rays;
 }

@@ -186,6 +186,31 @@ TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
   EXPECT_NEAR(from_whole->rms_sigma, 1, 0.1);
 }
 
+Rigid3 Forward(double t) {
+  const Rigid3 T = Lively(t);
+  return {T.q, T.t + Vector3d(1.5 * t, 0, 0)};
+}
+
+// A point that the closed form has close before one camera and behind the others counts one ray,
+// and nothing moves it on when that camera moves ahead.
+TEST(Refine, APointThatCountsOneRayDoesNotHoldTheScale) {
+  StartWorld world = Record(Forward, 0, kRaySigma);
+  world.frames.resize(11);
+  const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  LinearStart third = Scaled(*start, 0.33);
+  const auto velocity = [&] {
+    const auto refined =
+        Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, third, kRaySigma, kAccelBiasSigma);
+    return refined ? refined->states.back().v_odom_body : Vector3d(Vector3d::Zero());
+  };
+  const Vector3d without = velocity();
+  constexpr int kId = 1000, kFrame = 5;
+  third.p_first[kId] = third.T_first_body[kFrame] * kT_body_cam * Vector3d(0.01, 0.01, 0.11);
+  world.frames[kFrame].rays[kId] = {0.1, 0.1};
+  EXPECT_LT((velocity() - without).norm(), 0.01 * without.norm());
+}
+
 TEST(Refine, DoesNotTryWithPointsBehindTheCamera) {
   const StartWorld world = Record(Lively, 0, kRaySigma);
   auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
