@@ -16,6 +16,10 @@ constexpr double kStrongestKept = 0.98;
 // Features may come closer to each other while tracked than they were found, down to this share.
 constexpr double kMergeShare = 0.4;
 
+// While this share of the features is there, each empty cell is searched in one image of so many.
+constexpr double kEnoughShare = 0.5;
+constexpr int kTurns = 3;
+
 constexpr int kKltIterations = 20;
 constexpr double kKltConverged_px = 0.03;
 
@@ -33,6 +37,7 @@ void Tracker::Reset() {
   last_pyramid_.clear();
   pyramid_.clear();
   next_id_ = 0;
+  turn_ = 0;
 }
 
 void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
@@ -91,6 +96,28 @@ std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_p
   return ok;
 }
 
+// In the last image's half size alone: what the patch then finds needs no more. An image smaller
+// than KLT's window has no half size.
+std::vector<uchar> Tracker::KltNear(std::vector<cv::Point2f> from,
+                                    std::vector<cv::Point2f>* to) const {
+  if (std::min(pyramid_.size(), last_pyramid_.size()) < 2 * kNearLevel + 2) {
+    return Klt(last_pyramid_, pyramid_, from, 0, to);
+  }
+  const auto half = [](const Pyramid& pyramid) {
+    return Pyramid(pyramid.begin() + 2 * kNearLevel, pyramid.begin() + 2 * kNearLevel + 2);
+  };
+  const auto scale = [](float factor, std::vector<cv::Point2f>* points) {
+    for (cv::Point2f& point : *points) {
+      point *= factor;
+    }
+  };
+  scale(1.F / (1 << kNearLevel), &from);
+  scale(1.F / (1 << kNearLevel), to);
+  const std::vector<uchar> ok = Klt(half(last_pyramid_), half(pyramid_), from, 0, to);
+  scale(1 << kNearLevel, to);
+  return ok;
+}
+
 // Where the camera's rotation takes the features; those it takes out of the image end.
 std::vector<cv::Point2f> Tracker::Rotated(const Eigen::Quaterniond& q_cam_lastcam) {
   std::vector<cv::Point2f> rotated;
@@ -115,7 +142,7 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
     from.push_back(features_[i].pixel);
     to.push_back(rotated[i] + dt_s * features_[i].flow);
   }
-  const std::vector<uchar> ok = Klt(last_pyramid_, pyramid_, from, kNearLevel, &to);
+  const std::vector<uchar> ok = KltNear(from, &to);
   std::vector<Found> found(features_.size());
   for (size_t i = 0; i < features_.size(); ++i) {
     if (ok[i] && features_[i].patch) {
@@ -310,10 +337,13 @@ void Tracker::AddFeatures() {
     const int row = static_cast<int>(feature.pixel.y) * rows / camera_.height;
     taken[row * columns + column] = true;
   }
+  const bool in_turns =
+      static_cast<double>(features_.size()) > kEnoughShare * options_.max_features;
+  ++turn_;
   std::vector<std::pair<float, cv::Point>> corners;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      if (taken[row * columns + column]) {
+      if (taken[row * columns + column] || (in_turns && (row + column + turn_) % kTurns != 0)) {
         continue;
       }
       const int x0 = column * camera_.width / columns;

@@ -113,6 +113,7 @@ class Tracker {
   std::vector<uchar> Klt(const Pyramid& from_pyramid, const Pyramid& to_pyramid,
                          const std::vector<cv::Point2f>& from, int coarsest_level,
                          std::vector<cv::Point2f>* to) const;
+  std::vector<uchar> KltNear(std::vector<cv::Point2f> from, std::vector<cv::Point2f>* to) const;
   std::vector<cv::Point2f> Rotated(const Eigen::Quaterniond& q_cam_lastcam);
   std::vector<Found> FindAsPredicted(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
                                      float dt_s);
@@ -134,6 +135,7 @@ class Tracker {
   Pyramid last_pyramid_;
   std::vector<Feature> features_;  // oldest first
   int32_t next_id_ = 0;
+  int turn_ = 0;
   double strongest_ = 0;  // eigenvalue, running
   Statistics statistics_;
   TrackedFrame frame_;
