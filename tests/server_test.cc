@@ -108,6 +108,29 @@ TEST(Server, LetsThePagesOfGivenOriginsUseTheAnchors) {
   EXPECT_THAT(outcome.output, Not(HasSubstr("Access-Control-Allow-Origin: https://elsewhere")));
 }
 
+TEST(Server, AnswersAppsThatAskByAGivenName) {
+  const fs::path folder = FreshFolder("server_names");
+  fs::create_directories(folder / "keys");
+  const int port = 20000 + getpid() % 6000 * 2;
+  std::ofstream ask(folder / "ask.sh");
+  ask << "for i in $(seq 100); do (: <>/dev/tcp/127.0.0.1/$1) 2>/dev/null && break; sleep 0.1; "
+         "done\n";
+  for (const char* host : {"hall.example", "elsewhere.example"}) {
+    ask << fmt::format(
+        "exec 3<>/dev/tcp/127.0.0.1/$1; printf 'GET /v1/openapi.json HTTP/1.0\\r\\nHost: {}\\r\\n"
+        "\\r\\n' >&3; echo {}: $(head -n 1 <&3)\n",
+        host, host);
+  }
+  ask.close();
+  std::ofstream(folder / "run.sh") << fmt::format(
+      "{} --http 127.0.0.1:{} --http-name hall.example & server=$!; bash {}/ask.sh {}; "
+      "kill -INT $server; wait $server\n",
+      ServerCommand(folder), port, folder.string(), port);
+  const Outcome outcome = RunCommand("sh " + (folder / "run.sh").string());
+  EXPECT_THAT(outcome.output, HasSubstr("\nhall.example: HTTP/1.0 200"));
+  EXPECT_THAT(outcome.output, HasSubstr("\nelsewhere.example: HTTP/1.0 403"));
+}
+
 TEST(Server, RefusesOriginsThatAreNoneAndThoseOfNoApi) {
   const fs::path folder = FreshFolder("server_no_origins");
   fs::create_directories(folder / "keys");

@@ -51,6 +51,9 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
     for (const std::string& origin : options.origins) {
       argv.insert(argv.end(), {"--allow-origin", origin});
     }
+    for (const std::string& name : options.names) {
+      argv.insert(argv.end(), {"--name", name});
+    }
   }
   if (const auto file = options.options.find(process); file != options.options.end()) {
     argv.insert(argv.end(), {"--options", file->second.string()});

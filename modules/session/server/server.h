@@ -24,6 +24,7 @@ struct ServerOptions {
   std::filesystem::path checkpoints;  // folder
   std::string http;                   // ADDRESS:PORT of the anchors' API; empty: none
   std::vector<std::string> origins;   // whose pages may use it
+  std::vector<std::string> names;     // of this machine, by which apps may ask it
   // Of the gateway for phones' browsers, which needs a site; nothing: none. The server runs without
   // it when it cannot start.
   std::optional<uint16_t> phone_port;

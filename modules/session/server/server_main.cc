@@ -73,6 +73,9 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
   app.add_option("--allow-origin", options.origins,
                  "pages of this origin may use that API, as https://app.example; repeatable")
       ->needs(http);
+  app.add_option("--http-name", options.names,
+                 "a name of this machine by which apps may ask that API; repeatable")
+      ->needs(http);
   app.add_option("--phone", options.phone_port,
                  "pangea-gateway too, which lets phones' browsers in, on this TCP port")
       ->expected(0, 1)
