@@ -3,6 +3,8 @@
 import json
 import re
 
+from real_lib.plan import seconds
+
 # What each session suffers.
 CONDITIONS = ("good", "lossy", "killed")
 # The server's processes that are killed in turn, ten times.
@@ -13,6 +15,7 @@ LOSSY = {"loss": 0.2, "delay_ms": 2000}
 SPOTS = [(0.5, 0.5), (0.35, 0.6), (0.65, 0.45), (0.5, 0.7), (0.6, 0.6)]
 # When: after the start-up, and early enough to reach the other while it walks, also where keyframes are 20 s late.
 FIRST_S, LAST = 6, 0.6
+LAST_KEYFRAME_S = 1  # an anchor is placed when the next keyframe has come
 
 
 def image_size(recording):
@@ -22,24 +25,44 @@ def image_size(recording):
     return int(found[1]), int(found[2])
 
 
-def anchors(count, seconds, size):
-    step = (LAST * seconds - FIRST_S) / max(count - 1, 1)
-    return [{"agent": 1, "at": round(FIRST_S + i * step, 2), "name": f"anchor_{i + 1}",
+def anchors(count, times, size):
+    """Spread over these seconds of agent 1's recording, and over its image."""
+    return [{"agent": 1, "at": round(times[i * (len(times) - 1) // max(count - 1, 1)], 3), "name": f"anchor_{i + 1}",
              "pixel": [round(share * length) for share, length in zip(SPOTS[i % len(SPOTS)], size)]}
             for i in range(count)]
 
 
-def session_yaml(condition, options):
-    """A session file; JSON is YAML."""
-    link = {"link": LOSSY} if condition == "lossy" else {}
+def evenly(begin, end, count):
+    return [begin + i * (end - begin) / max(count - 1, 1) for i in range(count)]
+
+
+def two_recordings(options):
+    """The agents; when agent 1 places anchors."""
     first, second = (str(recording.resolve()) for recording in options.recordings)
-    duration = {"duration": options.seconds}
-    session = {
-        "agents": [{"id": 1, "recording": first, **duration, **link},
-                   {"id": 2, "recording": second, "delay": 3, **duration, **link}],
-        "anchors": anchors(options.anchors, options.seconds, image_size(options.recordings[0])),
-    }
+    agents = [{"id": 1, "recording": first, "duration": options.seconds},
+              {"id": 2, "recording": second, "duration": options.seconds, "delay": 3}]
+    return agents, evenly(FIRST_S, LAST * options.seconds, options.anchors), options.seconds
+
+
+def cut_in_two(options, truth):
+    """One recording: agent 2 has the second part, when agent 1 has ended. Anchors are placed at images whose pose is known."""
+    recording, length = options.recordings[0], seconds(options.recordings[0])
+    cut = options.cut or length / 2
+    (begin, end), (again, last) = [(cut, length), (0, cut)] if options.swap else [(0, cut), (cut, length)]
+    agents = [{"id": 1, "recording": str(recording.resolve()), "start": begin, "duration": end - begin},
+              {"id": 2, "recording": str(recording.resolve()), "start": again, "duration": last - again, "delay": end - begin}]
+    times = [t for t in truth if begin + FIRST_S <= t <= end - LAST_KEYFRAME_S]
+    if not times:
+        raise SystemExit(f"anchors: the reference has no image of {recording} from {begin + FIRST_S:g} to {end - LAST_KEYFRAME_S:g} s")
+    return agents, times, length
+
+
+def session_yaml(condition, options, truth=None):
+    """A session file; JSON is YAML. `truth`: of one recording that is cut in two, the seconds of images whose pose is known."""
+    agents, times, length = two_recordings(options) if truth is None else cut_in_two(options, truth)
+    for agent in agents:
+        agent.update({"link": LOSSY} if condition == "lossy" else {})
+    session = {"agents": agents, "anchors": anchors(options.anchors, times, image_size(options.recordings[0]))}
     if condition == "killed":
-        step = (options.seconds - 10) / len(KILLED)
-        session["faults"] = [{"at": round(10 + i * step, 1), "kill": process} for i, process in enumerate(KILLED)]
+        session["faults"] = [{"at": round(t, 1), "kill": process} for t, process in zip(evenly(10, length - 5, len(KILLED)), KILLED)]
     return json.dumps(session, indent=1) + "\n"

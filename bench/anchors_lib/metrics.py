@@ -2,19 +2,24 @@
 
 import statistics
 
-FIELDS = ["error_m", "error_px", "largest_jump_m", "error_at_fusion_m", "error_10s_m", "error_end_m", "error_max_m"]
+FIELDS = ["error_m", "error_px", "largest_jump_m", "error_at_fusion_m", "error_10s_m", "error_end_m", "error_max_m", "error_in_view_m",
+          "error_in_view_share"]
+
+
+def was_shown(agent):
+    return agent.get("shown", agent.get("error_m") is not None)
 
 
 def metrics(report, placed):
     """Over all anchors as the other agent shows them: median and worst of each field."""
     anchors = report.get("anchors", [])
-    seen = [agent for anchor in anchors for agent in anchor["agents"] if agent.get("error_m") is not None]
+    seen = [agent for anchor in anchors for agent in anchor["agents"] if was_shown(agent)]
     names = [anchor["name"] for anchor in anchors]
     found = {"placed": sum(anchor.get("placed", True) for anchor in anchors), "shown": len(seen),
              "lost": placed - len(seen), "doubled": len(names) - len(set(names))}
     for field in FIELDS:
         values = [agent[field] for agent in seen if agent.get(field) is not None]
-        found[field] = {"median": statistics.median(values), "worst": max(values)} if values else None
+        found[field] = {"median": statistics.median(values), "worst": max(values), "anchors": len(values)} if values else None
     return found
 
 
@@ -32,4 +37,7 @@ def table(found):
         cells = [f["error_m"], f["error_px"], f["error_at_fusion_m"], f["error_10s_m"], f["error_end_m"],
                  f["largest_jump_m"]]
         lines.append(f"| {name} | {f['shown']} | " + " | ".join(number(cell) for cell in cells) + " |")
+    for name, f in found.items():
+        if f and (view := f["error_in_view_m"]):
+            lines.append(f"\n{name}, in agent 2's image: {view['anchors']}: {number(view)} m, {number(f['error_in_view_share'])} of the distance.")
     return "\n".join(lines) + "\n\nMedian; worst, over the anchors as the other agent shows them.\n"

@@ -90,7 +90,15 @@ class Plan(accuracy.Plan):
         return found or (self.reference_job and self.reference_job.folder / REFERENCE)
 
 
+def stamps(mav0):
+    """Nanoseconds of the images."""
+    return [int(line.split(",")[0]) for line in (mav0 / "cam0/data.csv").read_text().splitlines() if line and line[0].isdigit()]
+
+
+def begin(mav0):
+    return min(stamps(mav0)) / 1e9
+
+
 def seconds(recording):
-    stamps = [int(line.split(",")[0]) for line in (accuracy.mav0_of(recording) / "cam0/data.csv").read_text().splitlines()
-              if line and line[0].isdigit()]
-    return (max(stamps) - min(stamps)) / 1e9
+    found = stamps(accuracy.mav0_of(recording))
+    return (max(found) - min(found)) / 1e9

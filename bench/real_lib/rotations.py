@@ -55,6 +55,10 @@ def compose(A, B):
     return multiply(A[0], B[0]), add(rotate(A[0], B[1]), A[1])
 
 
+def apply(A, p):
+    return add(rotate(A[0], p), A[1])
+
+
 def inverse(A):
     q = conjugate(A[0])
     return q, scaled(-1, rotate(q, A[1]))
