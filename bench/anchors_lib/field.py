@@ -6,7 +6,7 @@ import re
 from real_lib.plan import seconds
 
 # What each session suffers.
-CONDITIONS = ("good", "lossy", "killed")
+CONDITIONS = ("good", "lossy", "killed", "next_day")
 # The server's processes that are killed in turn, ten times.
 KILLED = ["anchors", "agent_handler", "posegraph", "fusion", "place_recognition"] * 2
 LOSSY = {"loss": 0.2, "delay_ms": 2000}
@@ -42,6 +42,14 @@ def two_recordings(options):
     agents = [{"id": 1, "recording": first, "duration": options.seconds},
               {"id": 2, "recording": second, "duration": options.seconds, "delay": 3}]
     return agents, evenly(FIRST_S, LAST * options.seconds, options.anchors), options.seconds
+
+
+def next_day_yaml(options):
+    """Two session files: agent 1 alone, then agent 2 alone."""
+    (first, second), times, _ = two_recordings(options)
+    del second["delay"]
+    placed = anchors(options.anchors, times, image_size(options.recordings[0]))
+    return [json.dumps(session, indent=1) + "\n" for session in ({"agents": [first], "anchors": placed}, {"agents": [second]})]
 
 
 def cut_in_two(options, truth):

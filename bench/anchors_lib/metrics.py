@@ -16,7 +16,7 @@ def metrics(report, placed):
     seen = [agent for anchor in anchors for agent in anchor["agents"] if was_shown(agent)]
     names = [anchor["name"] for anchor in anchors]
     found = {"placed": sum(anchor.get("placed", True) for anchor in anchors), "shown": len(seen),
-             "lost": placed - len(seen), "doubled": len(names) - len(set(names))}
+             "lost": placed - len(seen), "doubled": len(names) - len(set(names)), "localised_s": report.get("localised_s")}
     for field in FIELDS:
         values = [agent[field] for agent in seen if agent.get(field) is not None]
         found[field] = {"median": statistics.median(values), "worst": max(values), "anchors": len(values)} if values else None
@@ -40,4 +40,6 @@ def table(found):
     for name, f in found.items():
         if f and (view := f["error_in_view_m"]):
             lines.append(f"\n{name}, in agent 2's image: {view['anchors']}: {number(view)} m, {number(f['error_in_view_share'])} of the distance.")
+        if f and f["localised_s"]:
+            lines.append(f"\n{name}: agent 2 shows the first {f['localised_s']:.1f} s after its first pose.")
     return "\n".join(lines) + "\n\nMedian; worst, over the anchors as the other agent shows them.\n"

@@ -1,8 +1,8 @@
-"""Where agent 2 shows agent 1's anchors, by a reference's camera poses: up to scale, and at few images.
+"""Where agent 2 shows agent 1's anchors, by known camera poses: ground truth in two sessions, or a reference up to scale, at few images.
 
-An anchor's place is its place in the camera that it was placed by, carried by the reference to agent 2's camera:
-T_cam2_cam1 p_cam1. Lengths of the reference are brought to the joint map's metres, so an error of the map's scale does not count.
-Best known is a place in view: the reference has matched the two images, or others near them. Elsewhere its own bend counts too.
+An anchor's place is its place in the camera that it was placed by, carried by these poses to agent 2's camera: T_cam2_cam1 p_cam1.
+Lengths of a reference are brought to the joint map's metres, so an error of the map's scale does not count. Best known is a place in
+view: the reference has matched the two images, or others near them. Elsewhere its own bend counts too.
 """
 
 import bisect
@@ -72,7 +72,7 @@ class Viewer:
         self.camera = camera
         self.frames = []
         self.first_shown = {}
-        tracked = messages.frames(log, agent)
+        self.tracked = tracked = messages.frames(log, agent)
         for frame in tracked:
             for anchor in frame.shown:
                 self.first_shown.setdefault(anchor, frame.wall_us)
@@ -82,6 +82,16 @@ class Viewer:
                 frame = nearest(tracked, stamps, t)
                 if frame:
                     self.frames.append((frame, piece.frame, T_ref_cam, rot.inverse(rot.compose(frame.T_odom_body, T_body_cam))))
+
+    def localised_s(self):
+        """Wall time from its first pose until it first shows an anchor."""
+        return 1e-6 * (min(self.first_shown.values()) - self.tracked[0].wall_us) if self.first_shown else None
+
+    def largest_jump_m(self, anchor):
+        """From an image to the next, in one map; None: it was never shown."""
+        steps = [math.dist(a.shown[anchor][1], b.shown[anchor][1]) for a, b in zip(self.tracked, self.tracked[1:])
+                 if a.map == b.map and anchor in a.shown and anchor in b.shown]
+        return max(steps, default=None)
 
     def errors(self, anchor, place):
         """Of each image that it is shown with: (seconds since it was first shown, metres, metres from the camera, pixels in view)."""
@@ -113,38 +123,66 @@ class Camera:
         return WIDTH_PX / self.size[0] * (math.dist(here, there) if here else math.hypot(*self.size))
 
 
-class Reference:
-    """Of one recording."""
+class Recording:
+    """What its images were taken with."""
+
+    def __init__(self, recording):
+        self.mav0 = mav0_of(recording)
+        yaml = (self.mav0 / "cam0/sensor.yaml").read_text()
+        self.T_rig_body, self.T_rig_cam = (trajectory.extrinsics(self.mav0 / sensor / "sensor.yaml") for sensor in ("imu0", "cam0"))
+        self.T_body_cam = rot.between(self.T_rig_body, self.T_rig_cam)
+        self.camera = Camera(numbers(yaml, "resolution"), numbers(yaml, "intrinsics"))
+
+
+class Reference(Recording):
+    """Of one recording that is cut in two."""
 
     def __init__(self, recording, file=None):
-        mav0 = mav0_of(recording)
-        beside = [mav0 / REFERENCE, mav0.parent / REFERENCE]
+        super().__init__(recording)
+        beside = [self.mav0 / REFERENCE, self.mav0.parent / REFERENCE]
         found = file or next((path for path in beside if path.is_file()), None)
         if not found:
             raise SystemExit(f"anchors: {recording}: no {REFERENCE} is beside it, and --reference is not given")
         self.pieces = trajectory.read_pieces(found)
-        self.begin = begin(mav0)
-        yaml = (mav0 / "cam0/sensor.yaml").read_text()
-        self.T_body_cam = rot.between(*(trajectory.extrinsics(mav0 / sensor / "sensor.yaml") for sensor in ("imu0", "cam0")))
-        self.camera = Camera(numbers(yaml, "resolution"), numbers(yaml, "intrinsics"))
+        self.begin = begin(self.mav0)
 
     def seconds(self):
         """Of the recording, of the images whose pose is known."""
         return [t - self.begin for piece in self.pieces for t, _ in piece.poses]
 
-    def fill(self, anchors, session):
+    def fill(self, report, session):
         """The errors into report.json's `anchors`, where the reference knows them."""
         pieces = in_metres(session, (1, 2), self.pieces, self.T_body_cam)
-        if not pieces:
-            return
-        known = places(session, 1, pieces, self.T_body_cam)
-        viewer = Viewer(session / "agent_2.lcm", 2, pieces, self.T_body_cam, self.camera)
-        for anchor in anchors:
-            identity = tuple(map(int, anchor["id"].split("/"))) if anchor["id"] else None
-            errors = viewer.errors(identity, known[identity]) if identity in known else []
-            for agent in anchor["agents"]:
-                if agent["id"] == 2:
-                    agent.update(summary(errors))
+        if pieces:
+            viewer = Viewer(session / "agent_2.lcm", 2, pieces, self.T_body_cam, self.camera)
+            fill(report, places(session, 1, pieces, self.T_body_cam), viewer)
+
+
+def fill_next_day(report, first, second, recordings):
+    """The errors of what agent 1 placed in the session `first`, whose report it is, and agent 2 shows in the session `second`."""
+    maker, looker = map(Recording, recordings)
+    viewer = Viewer(second / "agent_2.lcm", 2, ground_truth(looker), looker.T_body_cam, looker.camera)
+    for anchor in report["anchors"]:
+        anchor["agents"] = [{"id": 2, "largest_jump_m": viewer.largest_jump_m(identity(anchor))}]
+    fill(report, places(first, 1, ground_truth(maker), maker.T_body_cam), viewer)
+
+
+def ground_truth(recording):
+    poses = trajectory.read_groundtruth(recording.mav0 / "state_groundtruth_estimate0/data.csv")
+    return [trajectory.Piece(trajectory.moved(poses, recording.T_rig_cam), 0)]
+
+
+def identity(anchor):
+    return tuple(map(int, anchor["id"].split("/"))) if anchor["id"] else None
+
+
+def fill(report, known, viewer):
+    for anchor in report["anchors"]:
+        place = known.get(identity(anchor))
+        for agent in anchor["agents"]:
+            if agent["id"] == 2:
+                agent.update(summary(viewer.errors(identity(anchor), place) if place else []))
+    report["localised_s"] = viewer.localised_s()
 
 
 def summary(errors):
