@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "anchors/anchors.h"
 #include "bench/process_use.h"
 #include "bus/bus.h"
 #include "files/scratch_file.h"
@@ -118,6 +119,11 @@ std::map<std::string, std::function<Subject()>> Subjects() {
        [] {
          auto core = std::make_shared<Fusion>(FusionOptions{}, std::make_shared<ScratchFile>());
          return Subject{[core](const Keyframe& keyframe) { core->Add(keyframe); }};
+       }},
+      {"anchors",
+       [=] {
+         return taking(
+             std::make_shared<Anchors>(AnchorsOptions{}, std::make_shared<ScratchFile>()));
        }},
       {"posegraph", [=] { return taking(std::make_shared<PoseGraph>(PoseGraphOptions{})); }},
       {"global_ba",

@@ -25,7 +25,7 @@ Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
 
 void Anchors::Take(const Keyframe& keyframe) {
   const MapId& map = keyframe.id.map;
-  tracks_[map].Add(keyframe);
+  tracks_.try_emplace(map, records_.get()).first->second.Add(keyframe);
   positions_.reset();
   if (const auto waiting = waiting_.extract(map); !waiting.empty()) {
     for (const AnchorId& id : waiting.mapped()) {
@@ -270,6 +270,15 @@ std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group
     }
   }
   return nearest;
+}
+
+RecordCounters Anchors::store_counters() const {
+  RecordCounters sum;
+  for (const auto& [map, track] : tracks_) {
+    sum.in_memory += track.counters().in_memory;
+    sum.unreadable += track.counters().unreadable;
+  }
+  return sum;
 }
 
 size_t Anchors::num_placed() const {

@@ -8,11 +8,12 @@
 // when the pose graph or a bundle adjustment moves these, when maps are fused, and when a fusion is
 // undone.
 //
-// No clock, no thread: the same calls give the same results. Bounded: max_anchors, and about 2 kB a
-// keyframe.
+// No clock, no thread: the same calls give the same results. Bounded: max_anchors, and what
+// odometry_track.h has of a keyframe.
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,6 +25,7 @@
 #include "anchors/placement.h"
 #include "core/anchor.h"
 #include "core/group_states.h"
+#include "core/record_store.h"
 #include "core/server_messages.h"
 
 namespace pangea {
@@ -50,8 +52,11 @@ struct AnchorsOptions {
 
 class Anchors {
  public:
-  explicit Anchors(const AnchorsOptions& options)
-      : options_(options), book_(static_cast<size_t>(options.max_anchors)) {}
+  // `records` may be null.
+  explicit Anchors(const AnchorsOptions& options, std::shared_ptr<RecordStore> records = nullptr)
+      : options_(options),
+        records_(std::move(records)),
+        book_(static_cast<size_t>(options.max_anchors)) {}
 
   void Take(const Keyframe& keyframe);
   // Why it is refused, or an empty string.
@@ -92,6 +97,8 @@ class Anchors {
 
   size_t num_anchors() const { return book_.entries().size() - book_.num_deleted(); }
   size_t num_placed() const;
+  RecordCounters store_counters() const;
+  const RecordStore* records() const { return records_.get(); }
   size_t num_waiting() const { return waiting_.size(); }
   // Why anchors could not be placed, since the last call.
   std::vector<std::string> TakeNotPlaced() { return std::exchange(not_placed_, {}); }
@@ -114,6 +121,7 @@ class Anchors {
   std::vector<AnchorId> DeletedOf(const MapId& map) const;
 
   const AnchorsOptions options_;
+  const std::shared_ptr<RecordStore> records_;
   AnchorBook book_;
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;

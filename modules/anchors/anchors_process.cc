@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "bus/record_status.h"
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -26,10 +27,11 @@ const MapId kAllMaps{1, 0};
 
 }  // namespace
 
-AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options)
+AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options,
+                               std::shared_ptr<RecordStore> records)
     : options_(options),
       node_(bus, "anchors"),
-      anchors_(options),
+      anchors_(options, std::move(records)),
       journal_(node_, {.in_order = true, .gives_up = true, .states = true},
                {.keyframe = [this](const Keyframe& keyframe) { anchors_.Take(keyframe); },
                 .have = [this](const Have&) { have_received_ = true; },
@@ -156,9 +158,10 @@ void AnchorsProcess::PublishStatus(int64_t now_utime) {
   }
   node_.Set("anchors", static_cast<int64_t>(anchors_.num_anchors()));
   node_.Set("anchors_placed", static_cast<int64_t>(anchors_.num_placed()));
-  node_.PublishStatus(
-      now_utime, static_cast<int64_t>(anchors_.num_waiting()),
-      fmt::format("{} anchors, {} of them placed", anchors_.num_anchors(), anchors_.num_placed()));
+  const std::string note = NoteRecords(anchors_.store_counters(), anchors_.records(), &node_);
+  node_.PublishStatus(now_utime, static_cast<int64_t>(anchors_.num_waiting()),
+                      fmt::format("{} anchors, {} of them placed{}", anchors_.num_anchors(),
+                                  anchors_.num_placed(), note));
 }
 
 }  // namespace pangea

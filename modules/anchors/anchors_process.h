@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -30,7 +31,9 @@ namespace pangea {
 
 class AnchorsProcess : public Process {
  public:
-  AnchorsProcess(Bus& bus, const AnchorsOptions& options);
+  // `records`: what it sets aside; may be null.
+  AnchorsProcess(Bus& bus, const AnchorsOptions& options,
+                 std::shared_ptr<RecordStore> records = nullptr);
 
   void Tick(int64_t now_utime) override;
   // Says where every anchor is.

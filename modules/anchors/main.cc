@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "anchors/anchors_process.h"
@@ -12,6 +13,7 @@
 //                                     HTTP <--> AnchorApi --> ANCHOR_REQUEST_0
 int main(int argc, char** argv) {
   pangea::AnchorsOptions options;
+  pangea::ScratchFileOptions scratch;
   pangea::YamlOptions yaml;
   options.Visit(yaml);
   std::string http;
@@ -26,17 +28,18 @@ int main(int argc, char** argv) {
         ->needs(http_option);
   };
   const auto make = [&](pangea::Bus& bus) -> std::unique_ptr<pangea::Process> {
+    auto records = std::make_shared<pangea::ScratchFile>(scratch);
     if (http.empty()) {
-      return std::make_unique<pangea::AnchorsProcess>(bus, options);
+      return std::make_unique<pangea::AnchorsProcess>(bus, options, std::move(records));
     }
     pangea::web::WebOptions web_options = pangea::ListenAt(http);
     web_options.origins = origins;
     web_options.names = names;
-    return std::make_unique<pangea::AnchorsServer>(bus, options, web_options);
+    return std::make_unique<pangea::AnchorsServer>(bus, options, std::move(records), web_options);
   };
   return pangea::ProcessMain(
       argc, argv,
       {"pangea-anchors", "Holds anchors in the maps, and tells agents and apps where they are",
-       yaml, nullptr, nullptr, add_arguments},
+       yaml, &scratch, nullptr, add_arguments},
       make);
 }

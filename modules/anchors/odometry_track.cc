@@ -5,8 +5,12 @@
 #include <cstdlib>
 #include <limits>
 
+#include "core/byte_record.h"
+
 namespace pangea {
 namespace {
+
+constexpr size_t kPointBytes = sizeof(int32_t) + 4 * sizeof(float);
 
 bool SameCamera(const CameraModel& a, const CameraModel& b) {
   return a.kind == b.kind && a.width == b.width && a.height == b.height && a.fx == b.fx &&
@@ -14,21 +18,24 @@ bool SameCamera(const CameraModel& a, const CameraModel& b) {
          a.T_body_cam.q.coeffs() == b.T_body_cam.q.coeffs() && a.T_body_cam.t == b.T_body_cam.t;
 }
 
-std::vector<TrackedPoint> PointsOf(const Keyframe& keyframe) {
-  std::vector<TrackedPoint> points;
+std::vector<uint8_t> EncodedPoints(const Keyframe& keyframe) {
+  ByteRecordWriter writer;
+  writer.Reserve(keyframe.points.size() * kPointBytes);
   for (const MapPoint& point : keyframe.points) {
     if (const auto p_cam = PointInCamera(keyframe, point)) {
-      points.push_back({keyframe.corners[point.corner].landmark_id, p_cam->cast<float>(),
-                        std::sqrt(point.inverse_depth_var) / point.inverse_depth});
+      writer.Put(keyframe.corners[point.corner].landmark_id);
+      writer.Put(Eigen::Vector3f(p_cam->cast<float>()));
+      writer.Put(static_cast<float>(std::sqrt(point.inverse_depth_var) / point.inverse_depth));
     }
   }
-  return points;
+  return writer.Take();
 }
 
 }  // namespace
 
 void OdometryTrack::Add(const Keyframe& keyframe) {
-  TrackedKeyframe tracked;
+  TrackedKeyframe tracked(Record(EncodedPoints(keyframe), records_));
+  counters_.in_memory += tracked.points.in_memory() ? 1 : 0;
   tracked.utime = keyframe.utime;
   tracked.T_odom_body = keyframe.T_odom_body;
   tracked.v_odom_body = keyframe.v_odom_body;
@@ -41,8 +48,23 @@ void OdometryTrack::Add(const Keyframe& keyframe) {
       !keyframes_.empty() && SameCamera(*keyframes_.rbegin()->second.camera, keyframe.camera)
           ? keyframes_.rbegin()->second.camera
           : std::make_shared<const CameraModel>(keyframe.camera);
-  tracked.points = PointsOf(keyframe);
   keyframes_.emplace(keyframe.id.seq, std::move(tracked));
+}
+
+std::vector<TrackedPoint> OdometryTrack::Points(const TrackedKeyframe& keyframe) const {
+  const auto bytes = keyframe.points.Bytes(records_);
+  if (!bytes) {
+    ++counters_.unreadable;
+    return {};
+  }
+  std::vector<TrackedPoint> points(bytes->size() / kPointBytes);
+  ByteRecordReader reader(*bytes);
+  for (TrackedPoint& point : points) {
+    reader.Get(&point.landmark_id);
+    reader.Get(&point.p_cam);
+    reader.Get(&point.relative_depth_sigma);
+  }
+  return points;
 }
 
 const TrackedKeyframe* OdometryTrack::Find(int32_t seq) const {

@@ -1,16 +1,19 @@
 #pragma once
 
-// What anchors need of an agent's map: where its odometry had each keyframe, and the points it saw.
-// About 2 kB a keyframe, without corners and descriptors.
+// What anchors need of an agent's map: where its odometry had each keyframe, some 300 bytes in
+// memory; and, for an anchor behind a pixel, the points it saw: some 5 kB in a RecordStore, or in
+// memory where that has no room.
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/keyframe.h"
+#include "core/record_store.h"
 
 namespace pangea {
 
@@ -21,6 +24,8 @@ struct TrackedPoint {
 };
 
 struct TrackedKeyframe {
+  explicit TrackedKeyframe(Record its_points) : points(std::move(its_points)) {}
+
   int64_t utime = 0;
   Rigid3 T_odom_body;
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
@@ -28,7 +33,7 @@ struct TrackedKeyframe {
   double edge_position_variance_m2 = 0;
   double edge_rotation_variance_rad2 = 0;
   std::shared_ptr<const CameraModel> camera;  // one of all keyframes that have the same
-  std::vector<TrackedPoint> points;
+  Record points;
 
   Rigid3 T_odom_cam() const { return T_odom_body * camera->T_body_cam; }
 };
@@ -37,6 +42,9 @@ struct TrackedKeyframe {
 class OdometryTrack {
  public:
   using Keyframes = std::map<int32_t, TrackedKeyframe>;  // by seq
+
+  // `records` may be null, and outlives it.
+  explicit OdometryTrack(RecordStore* records = nullptr) : records_(records) {}
 
   void Add(const Keyframe& keyframe);
 
@@ -50,8 +58,13 @@ class OdometryTrack {
   std::optional<Rigid3> Between(int64_t utime) const;
   // Variances (m^2, rad^2) of the odometry between two keyframes, summed over the edges.
   std::pair<double, double> Drift(int32_t seq_a, int32_t seq_b) const;
+  // None when they cannot be read, which is counted.
+  std::vector<TrackedPoint> Points(const TrackedKeyframe& keyframe) const;
+  const RecordCounters& counters() const { return counters_; }
 
  private:
+  RecordStore* records_;
+  mutable RecordCounters counters_;
   Keyframes keyframes_;
 };
 

@@ -50,7 +50,7 @@ std::vector<SurfacePoint> PointsInView(const OdometryTrack& track, int64_t utime
       continue;
     }
     const Rigid3 T_cam_source = T_cam_odom * keyframe.T_odom_cam();
-    for (const TrackedPoint& point : keyframe.points) {
+    for (const TrackedPoint& point : track.Points(keyframe)) {
       const Vector3d p_cam = T_cam_source * Vector3d(point.p_cam.cast<double>());
       if (p_cam.z() < kMinDepth_m ||
           (point.landmark_id != kNoLandmark && !landmarks.insert(point.landmark_id).second)) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/testing/synthetic_world.h"
+#include "core/testing/test_record_store.h"
 
 namespace pangea {
 namespace {
@@ -157,6 +158,31 @@ TEST_F(PlacementTest, SaysWhyNot) {
   AnchorEdit beyond = Edit(Placement::kPixel, 10);
   beyond.pixel = {1e5, 1e5};
   EXPECT_TRUE(std::holds_alternative<NotPlaced>(Place(beyond, track_, 8)));
+}
+
+// What lies in a record store, half of it for lack of room in memory, places it as before.
+TEST_F(PlacementTest, TheSameWithPointsSetAside) {
+  test::TestRecordStore records(agent().keyframes.size() / 2);
+  OdometryTrack track(&records);
+  for (const Keyframe& keyframe : agent().keyframes) {
+    track.Add(keyframe);
+  }
+  EXPECT_EQ(records.size(), agent().keyframes.size() / 2);
+  EXPECT_EQ(track.counters().in_memory, std::ssize(agent().keyframes) / 2);
+  const auto place = [&](int seq, const OdometryTrack& by) {
+    AnchorEdit edit = Edit(Placement::kPixel, seq);
+    const Keyframe& keyframe = agent().keyframes[seq];
+    edit.pixel = keyframe.corners[keyframe.points[10].corner].pixel.cast<double>();
+    return Place(edit, by, 8);
+  };
+  for (const int seq : {4, 14, 25}) {
+    EXPECT_EQ(Positions(track, std::get<AnchorPlacement>(place(seq, track))),
+              Positions(track_, std::get<AnchorPlacement>(place(seq, track_))));
+  }
+
+  records.broken = true;
+  EXPECT_TRUE(std::holds_alternative<NotPlaced>(place(4, track)));
+  EXPECT_GT(track.counters().unreadable, 0);
 }
 
 // A cubic through positions and velocities is exact for motion under constant jerk.

@@ -89,7 +89,7 @@ class Server {
       global_ba_.emplace(bus, options.global_ba, scratch);
     }
     if (wanted("anchors")) {
-      anchors_.emplace(bus, options.anchors);
+      anchors_.emplace(bus, options.anchors, scratch);
     }
   }
 

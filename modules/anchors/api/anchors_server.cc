@@ -27,8 +27,9 @@ web::WebOptions ListenAt(const std::string& address_and_port) {
 }
 
 AnchorsServer::AnchorsServer(Bus& bus, const AnchorsOptions& options,
+                             std::shared_ptr<RecordStore> records,
                              const web::WebOptions& web_options)
-    : process_(bus, options),
+    : process_(bus, options, std::move(records)),
       api_(process_.anchors(), options, [this](const AnchorEdit& edit) { process_.Request(edit); }),
       server_(web_options, api_) {
   process_.OnEditTaken(std::bind_front(&AnchorApi::Take, &api_));

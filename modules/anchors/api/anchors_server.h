@@ -2,6 +2,7 @@
 
 // AnchorsProcess with its API on a web server: HTTP and WebSockets are served between messages.
 
+#include <memory>
 #include <string>
 
 #include "anchors/anchors_process.h"
@@ -16,7 +17,8 @@ web::WebOptions ListenAt(const std::string& address_and_port);
 class AnchorsServer : public Process {
  public:
   // Throws std::runtime_error when it cannot listen there; else says on stdout where it does.
-  AnchorsServer(Bus& bus, const AnchorsOptions& options, const web::WebOptions& web_options);
+  AnchorsServer(Bus& bus, const AnchorsOptions& options, std::shared_ptr<RecordStore> records,
+                const web::WebOptions& web_options);
 
   void Tick(int64_t now_utime) override { process_.Tick(now_utime); }
   void BetweenMessages(int64_t now_utime) override;
