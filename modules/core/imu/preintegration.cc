@@ -50,8 +50,9 @@ Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   Eigen::Matrix<double, 6, 1> noise;  // white noise density to variance over dt
   noise.head<3>().setConstant(noise_.gyro_noise_density * noise_.gyro_noise_density / dt);
   noise.tail<3>().setConstant(noise_.accel_noise_density * noise_.accel_noise_density / dt);
-  p.covariance = A * p.covariance * A.transpose() + B * noise.asDiagonal() * B.transpose();
-  p.bias_jacobian = A * p.bias_jacobian - B;
+  const Eigen::Matrix<double, 9, 9> moved = out.Propagate(p.covariance).transpose();
+  p.covariance = out.Propagate(moved) + (B * noise.asDiagonal()).lazyProduct(B.transpose());
+  p.bias_jacobian = out.Propagate(p.bias_jacobian) - B;
 
   const Eigen::Vector3d dv = R_mid * accel * dt;
   p.delta_p += p.delta_v * dt + 0.5 * dt * dv;

@@ -34,6 +34,19 @@ class Preintegrator {
   struct Step {
     Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
     Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();
+
+    // A M, without the zeros and ones of A.
+    template <int kColumns>
+    Eigen::Matrix<double, 9, kColumns> Propagate(
+        const Eigen::Matrix<double, 9, kColumns>& M) const {
+      Eigen::Matrix<double, 9, kColumns> out = M;
+      out.template topRows<3>().noalias() =
+          A.topLeftCorner<3, 3>().lazyProduct(M.template topRows<3>());
+      out.template bottomRows<6>().noalias() +=
+          A.bottomLeftCorner<6, 3>().lazyProduct(M.template topRows<3>());
+      out.template bottomRows<3>() += A(6, 3) * M.template middleRows<3>(3);
+      return out;
+    }
   };
   // Motion from `a` to `b`: the mean of the two samples holds in between. Samples must be in order.
   Step Add(const ImuSample& a, const ImuSample& b);

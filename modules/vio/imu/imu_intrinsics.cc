@@ -49,7 +49,7 @@ ScaledPreintegration IntegrateScaled(std::span<const ImuSample> samples, const I
         integrator.Add(intrinsics.Corrected(a), intrinsics.Corrected(b));
     const Vector3d gyro = 0.5 * (a.gyro + b.gyro);
     const Vector3d accel = 0.5 * (a.accel + b.accel);
-    span.jacobian = step.A * span.jacobian;
+    span.jacobian = step.Propagate(span.jacobian);
     for (int k = 0; k < 3; ++k) {
       span.jacobian.middleCols<3>(3 * k) += gyro[k] * step.B.leftCols<3>();
       span.jacobian.middleCols<3>(9 + 3 * k) += accel[k] * step.B.rightCols<3>();

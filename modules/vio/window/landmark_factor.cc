@@ -206,7 +206,7 @@ void AddElimination(const LandmarkTerms<kRay>& terms,
                     const NormalEquations::Elimination& elimination,
                     const std::vector<FrameColumns>& columns, NormalEquations* out) {
   const auto W_c = terms.W.template topRows<kC>();
-  out->H.topLeftCorner<kC, kC>() += W_c * elimination.gain.leftCols<kC>();
+  out->H.topLeftCorner<kC, kC>() += W_c.lazyProduct(elimination.gain.leftCols<kC>());
   out->g.head<kC>() += W_c * elimination.offset;
   for (size_t j = 0; j < columns.size(); ++j) {
     const auto W_j = terms.W.template middleRows<kRay>(terms.Row(j));

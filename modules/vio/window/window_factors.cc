@@ -33,8 +33,9 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
 
 }  // namespace
 
-// Columns: frame i; pose and velocity of frame j; IMU intrinsics. The biases' own rows, whose
-// information is diagonal, are added apart.
+// Columns: IMU intrinsics; frame i; pose and velocity of frame j: in the order of the window, as
+// only the upper triangle is asked for. The biases' own rows, whose information is diagonal, are
+// added apart.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
   constexpr int kMotion = 9;  // rows; and columns of j
   constexpr int kColumns = kFrameSize + kMotion + kImuIntrinsicsSize;
@@ -42,24 +43,29 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   const InertialResidual residual =
       ComputeInertialResidual(At(factor.span, state.imu_intrinsics), from, state.frames[to].imu);
   Eigen::Matrix<double, kMotion, kColumns> J;
-  J << residual.J_from.topRows<kMotion>(), residual.J_to.topLeftCorner<kMotion, kMotion>(),
-      ImuIntrinsicsJacobian(factor.span, state.imu_intrinsics, from.gyro_bias, residual.r.head<3>())
-          .topRows<kMotion>();
+  J << ImuIntrinsicsJacobian(factor.span, state.imu_intrinsics, from.gyro_bias,
+                             residual.r.head<3>())
+           .topRows<kMotion>(),
+      residual.J_from.topRows<kMotion>(), residual.J_to.topLeftCorner<kMotion, kMotion>();
   const Eigen::Matrix<double, kColumns, kMotion> JtL =
       J.transpose() * factor.information.topLeftCorner<kMotion, kMotion>();
-  const Eigen::Matrix<double, kColumns, kColumns> A = JtL * J;
+  Eigen::Matrix<double, kColumns, kColumns> A = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  A.triangularView<Eigen::Upper>() = JtL * J;
   const Eigen::Matrix<double, kColumns, 1> b = JtL * residual.r.head<kMotion>();
   struct Part {
     int at, begin, size;
   };
-  const Part parts[] = {{state.Offset(to - 1), 0, kFrameSize},
-                        {state.Offset(to), kFrameSize, kMotion},
-                        {kImuIntrinsics, kFrameSize + kMotion, kImuIntrinsicsSize}};
-  for (const Part& row : parts) {
-    out->g.segment(row.at, row.size) += b.segment(row.begin, row.size);
-    for (const Part& column : parts) {
+  const Part parts[] = {{kImuIntrinsics, 0, kImuIntrinsicsSize},
+                        {state.Offset(to - 1), kImuIntrinsicsSize, kFrameSize},
+                        {state.Offset(to), kImuIntrinsicsSize + kFrameSize, kMotion}};
+  for (const Part& column : parts) {
+    out->g.segment(column.at, column.size) += b.segment(column.begin, column.size);
+    for (const Part& row : parts) {
       out->H.block(row.at, column.at, row.size, column.size) +=
           A.block(row.begin, column.begin, row.size, column.size);
+      if (&row == &column) {
+        break;
+      }
     }
   }
   const Vector6d walk = factor.information.diagonal().tail<6>();
@@ -68,7 +74,6 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   out->H.diagonal().segment<6>(at_i) += walk;
   out->H.diagonal().segment<6>(at_j) += walk;
   out->H.block<6, 6>(at_i, at_j).diagonal() -= walk;
-  out->H.block<6, 6>(at_j, at_i).diagonal() -= walk;
   out->g.segment<6>(at_i) -= pull;
   out->g.segment<6>(at_j) += pull;
   out->cost += 0.5 * residual.r.dot(factor.information * residual.r);

@@ -8,7 +8,7 @@
 
 namespace pangea::vio {
 
-// The inertial measurement between frames to - 1 and to.
+// The inertial measurement between frames to - 1 and to. In H the upper triangle.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out);
 // The velocity of a stationary frame is zero.
 inline constexpr double kStationaryVelocitySigma = 0.02;  // m/s
