@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/least_squares/levenberg_marquardt.h"
+#include "vio/window/nine_columns.h"
 
 namespace pangea::vio {
 namespace {
@@ -12,27 +13,27 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr int kMotionSize = kFrameSize - kPoseSize;  // velocity and biases
-using MotionMatrix = Eigen::Matrix<double, kMotionSize, kMotionSize>;
+static_assert(kMotionSize == NineColumns::ColsAtCompileTime);
 
 // The columns of one frame's velocity and biases in the Cholesky factor.
 struct MotionColumns {
   int at = 0;  // first row in the window
-  Eigen::LLT<MotionMatrix> own;
-  MotionMatrix next = MotionMatrix::Zero();                    // the next older frame's rows
-  Eigen::Matrix<double, Eigen::Dynamic, kMotionSize> of_rest;  // as many rows of it as are met
+  Eigen::LLT<Matrix9d> own;
+  Matrix9d next = Matrix9d::Zero();  // the next older frame's rows
+  NineColumns of_rest;               // as many rows of it as are met
 };
 
 struct CholeskyFactor {
   std::vector<MotionColumns> motions;
   std::vector<int> rest;
-  Eigen::LLT<MatrixXd> of_rest;
+  MatrixXd of_rest;  // the lower triangle
 };
 
 // Nothing when H is not positive definite.
 std::optional<CholeskyFactor> Factorise(const WindowState& state, const MatrixXd& H) {
   CholeskyFactor factor;
   factor.rest = RowsOfPoses(state);
-  MatrixXd rest = H(factor.rest, factor.rest);
+  factor.of_rest = H(factor.rest, factor.rest);
   int met = kSharedSize + state.frames.back().size() - kMotionSize;  // rows of the rest
   const MotionColumns* last = nullptr;
   factor.motions.reserve(state.frames.size());
@@ -41,32 +42,26 @@ std::optional<CholeskyFactor> Factorise(const WindowState& state, const MatrixXd
     met += older ? older->size() - (older->pose_only ? 0 : kMotionSize) : 0;
     MotionColumns& columns = factor.motions.emplace_back();
     columns.at = state.Offset(i) + kPoseSize;
-    MotionMatrix own = H.block<kMotionSize, kMotionSize>(columns.at, columns.at);
+    Matrix9d own = H.block<kMotionSize, kMotionSize>(columns.at, columns.at);
     columns.of_rest = H.middleCols<kMotionSize>(columns.at)(
         std::vector<int>(factor.rest.begin(), factor.rest.begin() + met), Eigen::all);
     if (last) {
-      own.noalias() -= last->next * last->next.transpose();
-      columns.of_rest.topRows(last->of_rest.rows()).noalias() -=
-          last->of_rest * last->next.transpose();
+      own.noalias() -= last->next.lazyProduct(last->next.transpose());
+      SubtractProduct(last->of_rest, last->next, &columns.of_rest);
     }
     columns.own.compute(own);
     if (columns.own.info() != Eigen::Success) {
       return std::nullopt;
     }
-    const auto upper = columns.own.matrixU();
-    upper.solveInPlace<Eigen::OnTheRight>(columns.of_rest);
+    SolveOnTheRight(columns.own.matrixLLT(), columns.of_rest);
     if (older && !older->pose_only) {
       columns.next = H.block<kMotionSize, kMotionSize>(state.Offset(i - 1) + kPoseSize, columns.at);
-      upper.solveInPlace<Eigen::OnTheRight>(columns.next);
+      columns.own.matrixU().solveInPlace<Eigen::OnTheRight>(columns.next);
     }
-    for (int c = 0; c < met; ++c) {  // the lower triangle
-      rest.col(c).segment(c, met - c).noalias() -=
-          columns.of_rest.middleRows(c, met - c).lazyProduct(columns.of_rest.row(c).transpose());
-    }
+    SubtractSquare(columns.of_rest, factor.of_rest);
     last = &columns;
   }
-  factor.of_rest.compute(rest);
-  return factor.of_rest.info() == Eigen::Success ? std::optional(std::move(factor)) : std::nullopt;
+  return FactoriseInPlace(&factor.of_rest) ? std::optional(std::move(factor)) : std::nullopt;
 }
 
 MatrixXd Solve(const CholeskyFactor& factor, const MatrixXd& b) {
@@ -82,7 +77,9 @@ MatrixXd Solve(const CholeskyFactor& factor, const MatrixXd& b) {
       x.middleRows<kMotionSize>(factor.motions[i + 1].at).noalias() -= columns.next * own;
     }
   }
-  factor.of_rest.solveInPlace(rest);
+  const auto of_rest = factor.of_rest.triangularView<Eigen::Lower>();
+  of_rest.solveInPlace(rest);
+  of_rest.transpose().solveInPlace(rest);
   for (size_t i = n; i-- > 0;) {
     const MotionColumns& columns = factor.motions[i];
     auto own = x.middleRows<kMotionSize>(columns.at);
