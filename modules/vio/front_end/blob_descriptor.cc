@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <numbers>
 #include <numeric>
 #include <random>
+
+#include "core/vector_clones.h"
 
 namespace pangea::vio {
 namespace {
@@ -80,6 +83,43 @@ std::vector<WindowSample> GaussianWindow(int half_side, float sigma) {
   return window;
 }
 
+// Of an image at equal steps along a row, whose middle is `across` from the centre. The rim goes on
+// outside.
+PANGEA_VECTOR_CLONES
+void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
+                    const Eigen::Vector2f& along, const Eigen::Vector2f& across,
+                    std::span<float> out) {
+  constexpr size_t kMost = 32;
+  std::array<float, kMost> a, b;
+  std::array<int, kMost> offset;
+  std::array<float, 2 * kMost> upper, lower;  // each pixel and its right neighbour
+  const auto count = std::min(out.size(), kMost);
+  const float first = -0.5F * static_cast<float>(count - 1);
+  const float right = static_cast<float>(level.cols) - 1.001F,
+              bottom = static_cast<float>(level.rows) - 1.001F;
+  const auto step = static_cast<int>(level.step1());
+  for (size_t i = 0; i < count; ++i) {
+    const float from_centre = first + static_cast<float>(static_cast<int>(i));
+    const float x =
+        std::min(std::max(centre.x() + from_centre * along.x() + across.x(), 0.F), right);
+    const float y =
+        std::min(std::max(centre.y() + from_centre * along.y() + across.y(), 0.F), bottom);
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    a[i] = x - static_cast<float>(column);
+    b[i] = y - static_cast<float>(row);
+    offset[i] = row * step + column;
+  }
+  const auto* pixels = level.ptr<float>();
+  for (size_t i = 0; i < count; ++i) {
+    std::memcpy(&upper[2 * i], pixels + offset[i], 2 * sizeof(float));
+    std::memcpy(&lower[2 * i], pixels + offset[i] + step, 2 * sizeof(float));
+  }
+  for (size_t i = 0; i < count; ++i) {
+    out[i] = (1 - b[i]) * ((1 - a[i]) * upper[2 * i] + a[i] * upper[2 * i + 1]) +
+             b[i] * ((1 - a[i]) * lower[2 * i] + a[i] * lower[2 * i + 1]);
+  }
+}
+
 // Gradients around a blob on a square grid that is rotated by `direction`, in its frame.
 class GradientPatch {
  public:
@@ -92,14 +132,11 @@ class GradientPatch {
     const Eigen::Vector2f across(-along.y(), along.x());
     const Eigen::Vector2f centre = Eigen::Vector2f(blob.pixel.x, blob.pixel.y) / width;
     const cv::Mat& level = space.Level(blob);
-    values_.reserve(static_cast<size_t>(side_) * side_);
+    values_.resize(static_cast<size_t>(side_) * side_);
     const float first = -0.5F * static_cast<float>(side_ - 1);
     for (int row = 0; row < side_; ++row) {
-      for (int column = 0; column < side_; ++column) {
-        values_.push_back(Interpolated(level, centre +
-                                                  (first + static_cast<float>(column)) * along +
-                                                  (first + static_cast<float>(row)) * across));
-      }
+      InterpolateRow(level, centre, along, (first + static_cast<float>(row)) * across,
+                     {&values_[static_cast<size_t>(row) * side_], static_cast<size_t>(side_)});
     }
   }
 
@@ -116,17 +153,6 @@ class GradientPatch {
   }
 
  private:
-  // The rim goes on outside.
-  static float Interpolated(const cv::Mat& level, const Eigen::Vector2f& at) {
-    const float x = std::clamp(at.x(), 0.F, static_cast<float>(level.cols) - 1.001F);
-    const float y = std::clamp(at.y(), 0.F, static_cast<float>(level.rows) - 1.001F);
-    const int column = static_cast<int>(x), row = static_cast<int>(y);
-    const float a = x - static_cast<float>(column), b = y - static_cast<float>(row);
-    const float* upper = level.ptr<float>(row) + column;
-    const float* lower = level.ptr<float>(row + 1) + column;
-    return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
-  }
-
   int side_ = 0;
   std::vector<float> values_;
 };

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
+#include <span>
+
+#include "core/vector_clones.h"
 
 namespace pangea::vio {
 namespace {
@@ -42,7 +45,18 @@ void LookUp(const int16_t* pairs, const uint8_t* grey, int count, int16_t* out) 
   }
 }
 
+// Two tables, the values of a grey value one beside the other.
+PANGEA_VECTOR_CLONES
+void Interleave(std::span<const int16_t> first, std::span<const int16_t> second,
+                std::span<int16_t> out) {
+  for (size_t grey = 0; grey < first.size(); ++grey) {
+    out[2 * grey] = first[grey];
+    out[2 * grey + 1] = second[grey];
+  }
+}
+
 // Of each pixel the sum of its two values by their weights.
+PANGEA_VECTOR_CLONES
 void BlendRow(const std::vector<int16_t>& values, const std::vector<int16_t>& weights,
               uint8_t* out) {
   constexpr int kShift = 14, kHalf = kOne * kOne / 2;
@@ -109,6 +123,7 @@ Equalizer::Table Equalizer::TableOf(const cv::Mat& tile) const {
   return table;
 }
 
+PANGEA_VECTOR_CLONES
 void Equalizer::Blend(const Table& first, const Table& second, int16_t weight,
                       std::array<int16_t, kGreys>* out) {
   for (int grey = 0; grey < kGreys; ++grey) {
@@ -145,10 +160,7 @@ cv::Mat Equalizer::Apply(const cv::Mat& image) {
         Blend(tables_[rows.first][column], tables_[rows.second][column], weight, &of_row[column]);
       }
       for (const Strip& strip : columns) {
-        for (int grey = 0; grey < kGreys; ++grey) {
-          pairs[2 * grey] = of_row[strip.first][grey];
-          pairs[2 * grey + 1] = of_row[strip.second][grey];
-        }
+        Interleave(of_row[strip.first], of_row[strip.second], pairs);
         LookUp(pairs.data(), image.ptr<uint8_t>(y) + strip.begin, strip.end - strip.begin,
                &of_pixels[2 * static_cast<size_t>(strip.begin)]);
       }

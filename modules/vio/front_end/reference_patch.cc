@@ -9,6 +9,8 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "core/vector_clones.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -26,6 +28,7 @@ constexpr float kMinContrast = 2.0F;
 // The deformation changes little from image to image: weight of that against the patch's own
 // gradients, whose position columns have this relative to them.
 constexpr float kStiffness = 0.02F;
+constexpr int kPadded = 24;     // a row of the largest patch, in eights
 constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
 
 // At any address: OpenCV's v_lut_pairs reads a short there, which is undefined at odd ones.
@@ -36,8 +39,9 @@ uint16_t PairAt(const uchar* grey) {
 }
 
 // Of eight pixels and their right neighbours, blended by `share` of the neighbour.
-std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
-                                          const float* share) {
+[[gnu::always_inline]] inline std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey,
+                                                                        const int* offset,
+                                                                        const float* share) {
   const cv::v_uint16x8 pairs(PairAt(grey + offset[0]), PairAt(grey + offset[1]),
                              PairAt(grey + offset[2]), PairAt(grey + offset[3]),
                              PairAt(grey + offset[4]), PairAt(grey + offset[5]),
@@ -55,28 +59,28 @@ std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey, const int* offset,
   return blended;
 }
 
-}  // namespace
-
-template <int kSide>
-bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
-                            const Eigen::Matrix2f& a, float* values) {
-  constexpr float kHalf = (kSide - 1) / 2.0F;
-  const float reach_x = kHalf * (std::abs(a(0, 0)) + std::abs(a(0, 1)));
-  const float reach_y = kHalf * (std::abs(a(1, 0)) + std::abs(a(1, 1)));
+// Values at A x + at for the pixels x of a patch of `side` pixels a side, row by row; false if they
+// are not all inside.
+PANGEA_VECTOR_CLONES
+bool Sample(const cv::Mat& image, const Eigen::Vector2f& at, const Eigen::Matrix2f& a, int side,
+            float* values) {
+  const float half_side = static_cast<float>(side - 1) / 2.0F;
+  const float reach_x = half_side * (std::abs(a(0, 0)) + std::abs(a(0, 1)));
+  const float reach_y = half_side * (std::abs(a(1, 0)) + std::abs(a(1, 1)));
   if (!(at.x() - reach_x >= 0 && at.y() - reach_y >= 0 &&
         at.x() + reach_x < static_cast<float>(image.cols - 1) &&
         at.y() + reach_y < static_cast<float>(image.rows - 1))) {
     return false;
   }
   // Row by row, eight pixels at a time; the last of a row is read again for those beyond it.
-  constexpr int kPadded = (kSide + 7) / 8 * 8;
   const auto step = static_cast<int>(image.step);
   std::array<int, kPadded> offset;
   std::array<float, kPadded> fx, fy, grey;
-  for (int v = 0; v < kSide; ++v) {
-    const Eigen::Vector2f p0 = at + a * Eigen::Vector2f(-kHalf, static_cast<float>(v) - kHalf);
+  for (int v = 0; v < side; ++v) {
+    const Eigen::Vector2f p0 =
+        at + a * Eigen::Vector2f(-half_side, static_cast<float>(v) - half_side);
     for (int u = 0; u < kPadded; ++u) {
-      const auto along = static_cast<float>(std::min(u, kSide - 1));
+      const auto along = static_cast<float>(std::min(u, side - 1));
       const float px = p0.x() + along * a(0, 0);
       const float py = p0.y() + along * a(1, 0);
       const int x = static_cast<int>(px), y = static_cast<int>(py);
@@ -92,10 +96,12 @@ bool ReferencePatch::Sample(const cv::Mat& image, const Eigen::Vector2f& at,
         cv::v_store(&grey[u + 4 * half], top[half] + f * (bottom[half] - top[half]));
       }
     }
-    std::memcpy(values + v * kSide, grey.data(), kSide * sizeof(float));
+    std::memcpy(values + v * side, grey.data(), static_cast<size_t>(side) * sizeof(float));
   }
   return true;
 }
+
+}  // namespace
 
 float ReferencePatch::Normalise(Values* values) {
   values->array() -= values->mean();
@@ -112,9 +118,10 @@ std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
   ReferencePatch patch;
   // A pixel more on each side, for its derivatives.
   constexpr int kSide = kSize + 2;
+  static_assert(kSide <= kPadded);
   using Square = Eigen::Array<float, kSide, kSide, Eigen::RowMajor>;
   Square values;
-  if (!Sample<kSide>(image, pixel, Eigen::Matrix2f::Identity(), values.data())) {
+  if (!Sample(image, pixel, Eigen::Matrix2f::Identity(), kSide, values.data())) {
     return std::nullopt;
   }
   using Inner = Eigen::Array<float, kSize, kSize, Eigen::RowMajor>;
@@ -154,7 +161,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
   Eigen::Vector2f at = guess;
   Values values;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!Sample<kSize>(image, at, a, values.data()) || Normalise(&values) == 0) {
+    if (!Sample(image, at, a, kSize, values.data()) || Normalise(&values) == 0) {
       return std::nullopt;
     }
     const Eigen::Matrix<float, 6, 1> step = gain_ * (jacobian_.transpose() * (values - look_));

@@ -32,11 +32,6 @@ class ReferencePatch {
   using Values = Eigen::Matrix<float, kCount, 1>;
   using Jacobian = Eigen::Matrix<float, kCount, 6>;
 
-  // Values at A x + at for the pixels x of a patch of so many a side, row by row; false if they are
-  // not all inside.
-  template <int kSide>
-  static bool Sample(const cv::Mat& image, const Eigen::Vector2f& at, const Eigen::Matrix2f& a,
-                     float* values);
   // Takes mean and length out; returns the length, 0 if there is nothing but noise.
   static float Normalise(Values* values);
 

@@ -3,8 +3,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "core/vector_clones.h"
 
 namespace pangea::vio {
 namespace {
@@ -112,28 +115,42 @@ std::optional<Blob> Refine(const Layers& differences, int layer, int y, int x) {
 
 // Which pixels of a row surpass their four neighbours: 1 above, -1 below, 0 neither. Without
 // branches, as it is done for every pixel.
+PANGEA_VECTOR_CLONES
 void ComparePixels(const float* above, const float* row, const float* below, int columns,
-                   std::vector<int>* signs) {
+                   int8_t* sign) {
   constexpr float kLeast = 0.5F * kLeastContrast;  // the fit may add to what a pixel has
-  int* sign = signs->data();
   for (int x = kRim_px; x < columns - kRim_px; ++x) {
     const float most = std::max(std::max(row[x - 1], row[x + 1]), std::max(above[x], below[x]));
     const float least = std::min(std::min(row[x - 1], row[x + 1]), std::min(above[x], below[x]));
     const int maximum = static_cast<int>(row[x] >= std::max(most, kLeast));
     const int minimum = static_cast<int>(row[x] <= std::min(least, -kLeast));
-    sign[x] = maximum - minimum;
+    sign[x] = static_cast<int8_t>(maximum - minimum);
   }
+}
+
+// From `x` on the first of them that is not 0, or `end`. Eight at a time, as few are not.
+int NextOf(const std::vector<int8_t>& signs, int x, int end) {
+  for (uint64_t eight = 0; x + 8 <= end; x += 8) {
+    std::memcpy(&eight, &signs[static_cast<size_t>(x)], sizeof(eight));
+    if (eight != 0) {
+      break;
+    }
+  }
+  while (x < end && signs[static_cast<size_t>(x)] == 0) {
+    ++x;
+  }
+  return x;
 }
 
 void FindInLayer(const Layers& differences, int layer, std::vector<Blob>* blobs) {
   const cv::Mat& level = differences[layer];
-  std::vector<int> signs(static_cast<size_t>(level.cols));
+  std::vector<int8_t> signs(static_cast<size_t>(level.cols));
+  const int end = level.cols - kRim_px;
   for (int y = kRim_px; y < level.rows - kRim_px; ++y) {
     ComparePixels(level.ptr<float>(y - 1), level.ptr<float>(y), level.ptr<float>(y + 1), level.cols,
-                  &signs);
-    for (int x = kRim_px; x < level.cols - kRim_px; ++x) {
-      const int sign = signs[static_cast<size_t>(x)];
-      if (sign == 0 || !IsExtremum(differences, layer, y, x, static_cast<float>(sign))) {
+                  signs.data());
+    for (int x = NextOf(signs, kRim_px, end); x < end; x = NextOf(signs, x + 1, end)) {
+      if (!IsExtremum(differences, layer, y, x, signs[static_cast<size_t>(x)])) {
         continue;
       }
       if (const auto blob = Refine(differences, layer, y, x)) {

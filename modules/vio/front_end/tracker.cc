@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
+#include "core/vector_clones.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -254,6 +256,7 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
 
 // Shi and Tomasi's: the smaller eigenvalue of the gradients' second moments, summed over a block
 // around each pixel.
+PANGEA_VECTOR_CLONES
 cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
   // The derivatives of level 0 are a view into a larger image with a border, so that the blocks see
   // the true neighbourhood of the cell.
@@ -262,7 +265,7 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
   gradients.adjustROI(kReach, kReach, kReach, kReach);
   // Sums over the last kCornerBlock_px rows, of each column.
   std::vector<int> xx(gradients.cols, 0), xy(gradients.cols, 0), yy(gradients.cols, 0);
-  const auto add_row = [&](int y, int sign) {
+  const auto add_row = [&](int y, int sign) __attribute__((always_inline)) {
     const auto* gradient = gradients.ptr<int16_t>(y);
     for (int x = 0; x < gradients.cols; ++x) {
       const int dx = gradient[2 * x], dy = gradient[2 * x + 1];
