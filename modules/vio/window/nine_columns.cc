@@ -40,6 +40,18 @@ void SubtractSquare(const NineColumns& A, Eigen::Ref<Eigen::MatrixXd> C) {
 }
 
 PANGEA_VECTOR_CLONES
+void SubtractUpperProduct(const NineColumns& A, const NineColumns& B,
+                          Eigen::Ref<Eigen::MatrixXd> C) {
+  for (Eigen::Index column = 0; column < B.rows(); ++column) {
+    std::array<double, kColumns> weights;
+    for (int k = 0; k < kColumns; ++k) {
+      weights[k] = B(column, k);
+    }
+    SubtractWeighted(A, weights, 0, column + 1, C.data() + column * C.outerStride());
+  }
+}
+
+PANGEA_VECTOR_CLONES
 void SubtractProduct(const NineColumns& A, const Matrix9d& M, NineColumns* C) {
   for (int column = 0; column < kColumns; ++column) {
     std::array<double, kColumns> weights;

@@ -13,6 +13,9 @@ using NineColumns = Eigen::Matrix<double, Eigen::Dynamic, 9>;
 
 // C -= A A^T: the lower triangle of the upper left part that A has rows for.
 void SubtractSquare(const NineColumns& A, Eigen::Ref<Eigen::MatrixXd> C);
+// C -= A B^T: the upper triangle of C.
+void SubtractUpperProduct(const NineColumns& A, const NineColumns& B,
+                          Eigen::Ref<Eigen::MatrixXd> C);
 // C -= A M^T, in the rows of A.
 void SubtractProduct(const NineColumns& A, const Matrix9d& M, NineColumns* C);
 // X of X L^T = B, in place of B.

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "vio/window/landmark_factor.h"
+#include "vio/window/nine_columns.h"
 
 namespace pangea::vio {
 namespace {
@@ -33,25 +34,27 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
 
 }  // namespace
 
-// Columns: IMU intrinsics; frame i; pose and velocity of frame j: in the order of the window, as
-// only the upper triangle is asked for. The biases' own rows, whose information is diagonal, are
-// added apart.
+// Rows of Jt: IMU intrinsics; frame i; pose and velocity of frame j: in the order of the window, as
+// only the upper triangle is asked for. The biases' own residuals, whose information is diagonal,
+// are added apart.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
-  constexpr int kMotion = 9;  // rows; and columns of j
-  constexpr int kColumns = kFrameSize + kMotion + kImuIntrinsicsSize;
+  constexpr int kMotion = 9;  // residuals; and errors of j
+  constexpr int kErrors = kImuIntrinsicsSize + kFrameSize + kMotion;
   const ImuState& from = state.frames[to - 1].imu;
   const InertialResidual residual =
       ComputeInertialResidual(At(factor.span, state.imu_intrinsics), from, state.frames[to].imu);
-  Eigen::Matrix<double, kMotion, kColumns> J;
-  J << ImuIntrinsicsJacobian(factor.span, state.imu_intrinsics, from.gyro_bias,
-                             residual.r.head<3>())
-           .topRows<kMotion>(),
-      residual.J_from.topRows<kMotion>(), residual.J_to.topLeftCorner<kMotion, kMotion>();
-  const Eigen::Matrix<double, kColumns, kMotion> JtL =
-      J.transpose() * factor.information.topLeftCorner<kMotion, kMotion>();
-  Eigen::Matrix<double, kColumns, kColumns> A = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-  A.triangularView<Eigen::Upper>() = JtL * J;
-  const Eigen::Matrix<double, kColumns, 1> b = JtL * residual.r.head<kMotion>();
+  NineColumns Jt(kErrors, kMotion);
+  Jt << ImuIntrinsicsJacobian(factor.span, state.imu_intrinsics, from.gyro_bias,
+                              residual.r.head<3>())
+            .topRows<kMotion>()
+            .transpose(),
+      residual.J_from.topRows<kMotion>().transpose(),
+      residual.J_to.topLeftCorner<kMotion, kMotion>().transpose();
+  NineColumns minus_JtL = NineColumns::Zero(kErrors, kMotion);
+  SubtractProduct(Jt, factor.information.topLeftCorner<kMotion, kMotion>(), &minus_JtL);
+  MatrixXd A = MatrixXd::Zero(kErrors, kErrors);
+  SubtractUpperProduct(minus_JtL, Jt, A);
+  const Eigen::Matrix<double, kErrors, 1> b = -minus_JtL * residual.r.head<kMotion>();
   struct Part {
     int at, begin, size;
   };
