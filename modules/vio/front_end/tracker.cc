@@ -29,6 +29,11 @@ Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
 Eigen::Vector2f ToEigenF(const cv::Point2f& p) { return {p.x, p.y}; }
 
+// Without the root, as it is asked of each pair.
+bool Nearer(const cv::Point2f& a, const cv::Point2f& b, double distance_px) {
+  return (a - b).ddot(a - b) < distance_px * distance_px;
+}
+
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
@@ -243,7 +248,7 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
   std::vector<Feature> kept;
   for (size_t i = 0; i < features_.size(); ++i) {
     const bool merged = std::any_of(kept.begin(), kept.end(), [&](const Feature& other) {
-      return cv::norm(other.pixel - features_[i].pixel) < merge_px;
+      return Nearer(other.pixel, features_[i].pixel, merge_px);
     });
     if (check.inlier[i] && !merged) {
       kept.push_back(std::move(features_[i]));
@@ -371,7 +376,7 @@ void Tracker::AddFeatures() {
     const cv::Point2f pixel(at);
     const auto ray = camera_.Unproject(ToEigen(pixel));
     const bool near = std::any_of(features_.begin(), features_.end(), [&](const Feature& f) {
-      return cv::norm(f.pixel - pixel) < options_.min_distance_px;
+      return Nearer(f.pixel, pixel, options_.min_distance_px);
     });
     if (near || !ray || !Inside(pixel)) {
       continue;
