@@ -82,9 +82,9 @@ def found(roots, suffixes):
 
 
 # At most so many words, as wc counts them: what a reader takes in at one sitting, and what fits a page.
-LONGEST = {"README.md": 900, "bench/README.md": 3000, "docs/decisions/*.md": 420}
+LONGEST = {"README.md": 900, "bench/README.md": 3150, "docs/decisions/*.md": 420}
 ALL_PAGES = ["README.md", "docs/*.md", "docs/decisions/*.md", "bench/README.md", "lcmtypes/README.md", "logs/README.md"]
-MOST_WORDS = 22400
+MOST_WORDS = 22600
 
 
 def words_of(pattern):
