@@ -120,7 +120,7 @@ std::vector<uchar> Tracker::KltNear(std::vector<cv::Point2f> from,
   };
   scale(1.F / (1 << kNearLevel), &from);
   scale(1.F / (1 << kNearLevel), to);
-  const std::vector<uchar> ok = Klt(half(last_pyramid_), half(pyramid_), from, 0, to);
+  std::vector<uchar> ok = Klt(half(last_pyramid_), half(pyramid_), from, 0, to);
   scale(1 << kNearLevel, to);
   return ok;
 }
