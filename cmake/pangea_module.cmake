@@ -8,7 +8,7 @@ endif()
 add_compile_options(-Wall -Wextra -Wpedantic -Werror)
 # popcnt for Hamming distances. Nothing newer: Debian's Ceres and Eigen types must agree on
 # alignment, and the same binary must give the same bytes on every machine; hot loops are compiled
-# for AVX2 besides (core/vector_clones.h).
+# for AVX2 besides (vio/vector_clones.h).
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   add_compile_options(-march=x86-64-v2 -ffp-contract=off)
 endif()

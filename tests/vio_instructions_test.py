@@ -19,7 +19,7 @@ MILLIONS = 3666  # of instructions, 6 s at 20 images a second
 TOLERANCE = 0.05
 COUNTED_WITH = "libopencv_video.so.406"
 SECONDS = 6
-# The same machine code on every processor with AVX2, which core/vector_clones.h uses: without AVX in OpenCV and in the C library.
+# The same machine code on every processor with AVX2, which vio/vector_clones.h uses: without AVX in OpenCV and in the C library.
 PLAIN = {"OPENCV_CPU_DISABLE": "AVX,FP16,AVX2,FMA3,AVX512-COMMON,AVX512-SKX",
          "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable,-ERMS"}
 

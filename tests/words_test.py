@@ -81,14 +81,14 @@ def found(roots, suffixes):
     return sorted(out)
 
 
-# At most so many words, as wc counts them: what a reader takes in at one sitting, and what fits a page.
-LONGEST = {"README.md": 900, "bench/README.md": 3150, "docs/decisions/*.md": 420}
+# At most so many words, a table's lines not counted, or lists would take their place: what a reader takes in at one sitting, and what fits a page.
+LONGEST = {"README.md": 900, "bench/README.md": 2800, "docs/decisions/*.md": 420}
 ALL_PAGES = ["README.md", "docs/*.md", "docs/decisions/*.md", "bench/README.md", "lcmtypes/README.md", "logs/README.md"]
-MOST_WORDS = 22600
+MOST_WORDS = 21200
 
 
 def words_of(pattern):
-    return {str(path.relative_to(ROOT)): len(path.read_text().split()) for path in ROOT.glob(pattern)}
+    return {str(path.relative_to(ROOT)): sum(any(c not in "|-:" for c in word) for word in path.read_text().split()) for path in ROOT.glob(pattern)}
 
 
 class Length(unittest.TestCase):

@@ -46,9 +46,10 @@ Vector2d DistortEquidistant(const Eigen::Vector4d& k, const Vector2d& xy, Matrix
   return s * xy;
 }
 
-Vector2d Distort(const CameraModel& camera, const Vector2d& xy, Matrix2d* J) {
-  return camera.kind == CameraModel::Kind::kRadtan ? DistortRadtan(camera.distortion, xy, J)
-                                                   : DistortEquidistant(camera.distortion, xy, J);
+Vector2d Distort(CameraModel::Kind kind, const Eigen::Vector4d& k, const Vector2d& xy,
+                 Matrix2d* J) {
+  return kind == CameraModel::Kind::kRadtan ? DistortRadtan(k, xy, J)
+                                            : DistortEquidistant(k, xy, J);
 }
 
 // Newton's method from the distorted point; three or four steps inside the image.
@@ -106,7 +107,7 @@ std::optional<Vector2d> CameraModel::Project(const Eigen::Vector3d& p_cam,
   const double inv_z = 1.0 / p_cam.z();
   const Vector2d xy = p_cam.head<2>() * inv_z;
   Matrix2d J_distort;
-  const Vector2d d = Distort(*this, xy, &J_distort);
+  const Vector2d d = Distort(kind, distortion, xy, &J_distort);
   // Where the determinant is not positive the polynomial has folded over: no such light ray.
   if (!(J_distort.determinant() > 0) || J_distort.trace() <= 0) {
     return std::nullopt;
@@ -123,6 +124,16 @@ std::optional<Vector2d> CameraModel::Unproject(const Vector2d& pixel) const {
   const Vector2d target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   return kind == Kind::kRadtan ? UndistortRadtan(distortion, target)
                                : UndistortEquidistant(distortion, target);
+}
+
+// Both models are linear in their coefficients.
+Matrix2d CameraModel::DistortionJacobian(const Vector2d& ray) const {
+  const Vector2d without = Distort(kind, Eigen::Vector4d::Zero(), ray, nullptr);
+  Matrix2d J;
+  for (int i = 0; i < 2; ++i) {
+    J.col(i) = Distort(kind, Eigen::Vector4d::Unit(i), ray, nullptr) - without;
+  }
+  return Eigen::DiagonalMatrix<double, 2>(fx, fy) * J;
 }
 
 bool CameraModel::Contains(const Vector2d& pixel, double border) const {

@@ -36,6 +36,9 @@ struct CameraModel {
   // (x, y) with the ray (x, y, 1) through a pixel; nothing where the model cannot be inverted.
   std::optional<Eigen::Vector2d> Unproject(const Eigen::Vector2d& pixel) const;
 
+  // d(pixel)/d(the first two coefficients of distortion) of a ray.
+  Eigen::Matrix2d DistortionJacobian(const Eigen::Vector2d& ray) const;
+
   // Inside the image with a border, pixels.
   bool Contains(const Eigen::Vector2d& pixel, double border = 0) const;
   // One pixel as an angle at the image centre, radians.

@@ -48,6 +48,20 @@ TEST_P(CameraModelTest, JacobianMatchesCentralDifferences) {
   }
 }
 
+TEST_P(CameraModelTest, DistortionJacobianMatchesCentralDifferences) {
+  const CameraModel& camera = GetParam();
+  for (const Eigen::Vector2d& pixel :
+       {Eigen::Vector2d(30, 40), Eigen::Vector2d(380, 240), Eigen::Vector2d(700, 300)}) {
+    const Eigen::Vector2d ray = camera.Unproject(pixel).value();
+    const Eigen::MatrixXd numeric = NumericJacobian(2, 1e-6, [&](const Eigen::Vector2d& d) {
+      CameraModel other = camera;
+      other.distortion.head<2>() += d;
+      return other.Project({ray.x(), ray.y(), 1}).value();
+    });
+    EXPECT_LT((camera.DistortionJacobian(ray) - numeric).norm(), 1e-5 * (1 + numeric.norm()));
+  }
+}
+
 TEST_P(CameraModelTest, NothingBehindTheCamera) {
   EXPECT_FALSE(GetParam().Project({0.1, 0.1, -1}).has_value());
   EXPECT_FALSE(GetParam().Project({0.1, 0.1, 0}).has_value());

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <random>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {
@@ -83,17 +83,19 @@ std::vector<WindowSample> GaussianWindow(int half_side, float sigma) {
   return window;
 }
 
+constexpr int kMostSide = 32;  // samples in a row of a patch
+constexpr int SideOf(int half_side) { return 2 * half_side + 2; }
+
 // Of an image at equal steps along a row, whose middle is `across` from the centre. The rim goes on
 // outside.
 PANGEA_VECTOR_CLONES
 void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
                     const Eigen::Vector2f& along, const Eigen::Vector2f& across,
                     std::span<float> out) {
-  constexpr size_t kMost = 32;
-  std::array<float, kMost> a, b;
-  std::array<int, kMost> offset;
-  std::array<float, 2 * kMost> upper, lower;  // each pixel and its right neighbour
-  const auto count = std::min(out.size(), kMost);
+  std::array<float, kMostSide> a, b;
+  std::array<int, kMostSide> offset;
+  std::array<float, 2 * kMostSide> upper, lower;  // each pixel and its right neighbour
+  const size_t count = out.size();
   const float first = -0.5F * static_cast<float>(count - 1);
   const float right = static_cast<float>(level.cols) - 1.001F,
               bottom = static_cast<float>(level.rows) - 1.001F;
@@ -124,7 +126,7 @@ void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
 class GradientPatch {
  public:
   GradientPatch(const ScaleSpace& space, const Blob& blob, float direction, int half_side)
-      : side_(2 * half_side + 2) {
+      : side_(SideOf(half_side)) {
     const float width = space.PixelWidth(blob);
     const float step_px = kStep * blob.sigma_px / width;
     const Eigen::Vector2f along =
@@ -167,6 +169,7 @@ float DirectionBin(float gradient_x, float gradient_y, int directions) {
 std::vector<float> DirectionsOf(const ScaleSpace& space, const Blob& blob) {
   constexpr float kSigma = kWindowOfDirection / kStep;  // steps
   constexpr int kHalfSide = static_cast<int>(3 * kSigma);
+  static_assert(SideOf(kHalfSide) <= kMostSide);
   static const std::vector<WindowSample> kWindow = GaussianWindow(kHalfSide, kSigma);
   std::array<float, kDirections> raw{}, smooth{};
   GradientPatch(space, blob, 0, kHalfSide)
@@ -227,6 +230,7 @@ void Normalise(Histogram* histogram) {
 Histogram HistogramOf(const ScaleSpace& space, const Blob& blob, float direction) {
   constexpr float kStepsOfACell = kCellWidth / kStep;
   constexpr int kHalfSide = static_cast<int>((kCells + 1) * kStepsOfACell / 2);
+  static_assert(SideOf(kHalfSide) <= kMostSide);
   constexpr float kSigma = kCells * kStepsOfACell / 2;  // of the window
   constexpr float kMiddle = 0.5F * (kCells - 1);
   static const std::vector<WindowSample> kWindow = GaussianWindow(kHalfSide, kSigma);

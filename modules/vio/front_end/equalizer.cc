@@ -6,7 +6,7 @@
 #include <opencv2/core/hal/intrin.hpp>
 #include <span>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {

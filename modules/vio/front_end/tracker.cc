@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -14,18 +13,8 @@ namespace {
 
 constexpr size_t kMinShared = 15;  // landmarks that tell whether an image stands still
 
-// d(distorted ray)/d(the first two coefficients of distortion), over the ray.
-Eigen::RowVector2d ByRadialCoefficients(const Eigen::Vector2d& ray, CameraModel::Kind kind) {
-  const double r = ray.norm();
-  if (kind == CameraModel::Kind::kRadtan) {
-    return {r * r, r * r * r * r};
-  }
-  const double theta = std::atan(r), cube = theta * theta * theta;
-  return r > 0 ? Eigen::RowVector2d(cube / r, cube * theta * theta / r)
-               : Eigen::RowVector2d::Zero();
-}
-
-// Another camera is as good as another pixel: (pixel - c) e + f (d + ray by distortion) further in.
+// Another camera is as good as another pixel: (pixel - c) e + f d + what the distortion adds,
+// further in.
 Eigen::Matrix<double, 2, kIntrinsicsSize> ByIntrinsics(const Observation& observation,
                                                        const CameraModel& camera) {
   Eigen::Matrix<double, 2, 3> J_pixel;  // d(pixel)/d(ray, 1)
@@ -34,10 +23,10 @@ Eigen::Matrix<double, 2, kIntrinsicsSize> ByIntrinsics(const Observation& observ
   if (!pixel) {
     return Eigen::Matrix<double, 2, kIntrinsicsSize>::Zero();
   }
-  const Eigen::RowVector2d radial = ByRadialCoefficients(observation.ray, camera.kind);
   Eigen::Matrix<double, 2, kIntrinsicsSize> further;
-  further << pixel->x() - camera.cx, camera.fx, 0, camera.fx * ray.x() * radial,
-      pixel->y() - camera.cy, 0, camera.fy, camera.fy * ray.y() * radial;
+  further.leftCols<3>() << pixel->x() - camera.cx, camera.fx, 0, pixel->y() - camera.cy, 0,
+      camera.fy;
+  further.rightCols<2>() = camera.DistortionJacobian(observation.ray);
   return -J_pixel.leftCols<2>().inverse() * further;
 }
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <array>
 
-#include "core/vector_clones.h"
+#include "vio/vector_clones.h"
 
 namespace pangea::vio {
 namespace {
