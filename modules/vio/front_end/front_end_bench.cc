@@ -134,6 +134,7 @@ void Run(const Options& options) {
     counts.push_back(static_cast<double>(frame.observations.size()));
     const Tracker::Statistics& s = tracker.statistics();
     sum.tracked += s.tracked;
+    sum.as_predicted += s.as_predicted;
     sum.lost_klt += s.lost_klt;
     sum.lost_backward += s.lost_backward;
     sum.lost_two_view += s.lost_two_view;
@@ -178,15 +179,15 @@ void Run(const Options& options) {
   const double frames = static_cast<double>(counts.size());
   fmt::print(
       "frames {:.0f}  features median {:.0f} p5 {:.0f}  ms median {:.1f} p95 {:.1f}\n"
-      "per frame: tracked {:.1f} klt-lost {:.2f} backward-lost {:.2f} two-view-lost {:.2f} added "
-      "{:.2f}\n"
+      "per frame: tracked {:.1f} as-predicted {:.1f} klt-lost {:.2f} backward-lost {:.2f} "
+      "two-view-lost {:.2f} added {:.2f}\n"
       "track length: mean {:.1f}, seen by an observation {:.1f}, >= 5 frames {:.2f}\n"
       "residual px (20-view windows): median {:.3f} p68 {:.3f} p90 {:.3f} p95 {:.3f} p99 {:.3f}  "
       "bad tracks {:.4f} of {}\n",
       frames, Percentile(counts, 0.5), Percentile(counts, 0.05), Percentile(milliseconds, 0.5),
-      Percentile(milliseconds, 0.95), sum.tracked / frames, sum.lost_klt / frames,
-      sum.lost_backward / frames, sum.lost_two_view / frames, sum.added / frames,
-      length_sum / static_cast<double>(lengths.size()), weighted / observations,
+      Percentile(milliseconds, 0.95), sum.tracked / frames, sum.as_predicted / frames,
+      sum.lost_klt / frames, sum.lost_backward / frames, sum.lost_two_view / frames,
+      sum.added / frames, length_sum / static_cast<double>(lengths.size()), weighted / observations,
       static_cast<double>(
           std::count_if(lengths.begin(), lengths.end(), [](double l) { return l >= 5; })) /
           static_cast<double>(lengths.size()),

@@ -154,6 +154,7 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
   for (size_t i = 0; i < features_.size(); ++i) {
     if (ok[i] && features_[i].patch) {
       found[i] = features_[i].patch->Find(image, ToEigenF(to[i]));
+      statistics_.as_predicted += found[i].has_value();
     }
   }
   return found;

@@ -83,6 +83,7 @@ class Tracker {
   // Of the newest image: tracks that went on, and why the others ended.
   struct Statistics {
     int tracked = 0;
+    int as_predicted = 0;  // of these: by the cheap search where the last motion leads
     int lost_klt = 0;
     int lost_backward = 0;
     int lost_two_view = 0;

@@ -132,6 +132,20 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
   EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
+// A search that is wrong costs nothing but time: the second search makes up for it.
+TEST(Tracker, AnEvenMotionIsFoundWhereItLeads) {
+  const cv::Mat image = RandomTexture(752, 480, 10);
+  Tracker tracker(PlainCamera(), {});
+  for (int i = 0; i < 3; ++i) {
+    // Some 6 px an image, of which the gyro knows nothing.
+    const Eigen::Quaterniond q_now_first = ExpSo3(i * Eigen::Vector3d(0.008, 0.012, 0));
+    tracker.Track(50'000 * i, RotatedView(image, PlainCamera(), q_now_first),
+                  Eigen::Quaterniond::Identity());
+  }
+  EXPECT_GE(tracker.statistics().as_predicted, 100);
+  EXPECT_GE(tracker.statistics().as_predicted, 0.95 * tracker.statistics().tracked);
+}
+
 TEST(Tracker, RejectsAnUnrelatedImage) {
   const Outcome outcome = TrackOnce(RandomTexture(752, 480, 5), RandomTexture(752, 480, 6),
                                     Eigen::Quaterniond::Identity(), Eigen::Quaterniond::Identity());
