@@ -228,7 +228,7 @@ TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
   Constraint known;
-  known.to = agent_c_.keyframes[9].id;
+  known.to = agent_c_.keyframes[8].id;
   known.kind = PlaceKind::kInter;
   known.accepted = true;
   known.covariance *= 0.02 * 0.02;
@@ -241,6 +241,22 @@ TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   ASSERT_EQ(constraints_.size(), 1u);
   EXPECT_FALSE(constraints_[0].accepted);
   EXPECT_EQ(constraints_[0].reason, kRedundant);
+}
+
+// The first result of its map is still to come: what is redundant may depend on it.
+TEST_F(VerificationProcesses, ACandidateWaitsForThoseThatItRestsOn) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 1, 12);
+  const PlaceMatch early{
+      agent_c_.keyframes[0].id, {MakeTestCandidate(agent_c_, 0, agent_m_, 10, 40, 10)}, {}};
+  PublishMessage(bus_, std::string(channels::kPlaceMatch), ToMessage(early));
+  bus_.Drain();
+  SendMatch(PlaceKind::kInter);
+  EXPECT_TRUE(constraints_.empty());
+  SendKeyframes(agent_c_, 0, 1);
+  ASSERT_EQ(constraints_.size(), 2u);
+  EXPECT_EQ(constraints_[0].to.seq, 0);
+  EXPECT_EQ(constraints_[1].to.seq, 9);
 }
 
 // What nobody has any more is not waited for: the windows end there.
@@ -262,9 +278,8 @@ TEST_F(VerificationProcesses, WhatIsLostIsNotWaitedFor) {
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
 }
 
-// Live: all that came is known, and told as pending, before it is verified; verification results
-// come in the order in which the candidates came, and what comes meanwhile is heard between two of
-// them.
+// Live: all that came is known, and told as pending, before it is verified; a candidate comes after
+// those that it rests on, and what comes meanwhile is heard between two of them.
 TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   const auto room = MakeTestRoom({.seed = 5});
   TestAgentOptions first, second;
@@ -307,7 +322,7 @@ TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   EXPECT_EQ(status.pending, 2);
   while (bus.Handle(0)) {
   }
-  EXPECT_EQ(verified, (std::vector<int32_t>{11, 9, 10}));
+  EXPECT_EQ(verified, (std::vector<int32_t>{9, 10, 11}));
 }
 
 TEST_F(VerificationProcesses, ACornerThatDoesNotExistIsRefused) {

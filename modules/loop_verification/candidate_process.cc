@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "bus/record_status.h"
+#include "core/candidate_order.h"
 #include "core/constraint_id.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
@@ -14,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 2;
+constexpr uint32_t kCheckpointFormat = 3;
 constexpr int64_t kSecond = 1'000'000;
 constexpr char kJournalOwner[] = "agent_handler";
 
@@ -127,9 +128,27 @@ void CandidateProcess::CollectReady() {
   }
 }
 
+// If all rest on others that wait for keyframes, these come first.
+std::deque<CandidateProcess::Ready>::iterator CandidateProcess::NextReady() {
+  PendingQueries pending;
+  for (const auto& [ids, candidate] : waiting_) {
+    pending.Add(ids.first);
+  }
+  for (const auto& [query, candidate] : ready_) {
+    pending.Add(query);
+  }
+  return std::ranges::find_if(ready_, [&](const Ready& ready) {
+    return !pending.Precede(ready.first, ready.second.match);
+  });
+}
+
 bool CandidateProcess::VerifyNext() {
-  const auto [query, candidate] = std::move(ready_.front());
-  ready_.pop_front();
+  const auto next = NextReady();
+  if (next == ready_.end()) {
+    return false;
+  }
+  const auto [query, candidate] = std::move(*next);
+  ready_.erase(next);
   // A verification result of a former run may come after its match.
   if (!verified_.contains(ConstraintId(query, candidate))) {
     const Constraint constraint = verifier_->Verify(query, candidate);

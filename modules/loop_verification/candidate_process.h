@@ -5,12 +5,13 @@
 // asked for (journal_follower.h). Verification results of this run
 // that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
 // everyone else asks; of those that are still to be made nothing is said, they will come. Which
-// candidates are redundant depends on the results before; any other verification result on the
-// keyframes alone, not on when they came.
+// candidates are redundant depends on the results that they rest on (core/candidate_order.h) and
+// wait for; any other verification result on the keyframes alone, not on when they came.
 //
 // A verification result takes long (tens of milliseconds), so live they are made one at a time, in
-// the order in which the candidates became ready, when no message waits: all that came is known,
-// told as pending and answered for, however far behind the verification results are.
+// the order in which the candidates became ready but for what they rest on, when no message waits:
+// all that came is known, told as pending and answered for, however far behind the verification
+// results are.
 //
 // A checkpoint ends before the first match with a candidate that has no result in the journal.
 //
@@ -59,7 +60,9 @@ class CandidateProcess : public Process {
   void OnHave(const Have& have);
   void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();
-  // The first that is ready; whether some are left.
+  using Ready = std::pair<KeyframeId, PlaceCandidate>;  // with its query
+  std::deque<Ready>::iterator NextReady();
+  // Whether there may be another.
   bool VerifyNext();
   void PublishStatus(int64_t now_utime);
   size_t num_pending() const { return waiting_.size() + ready_.size(); }
@@ -69,9 +72,9 @@ class CandidateProcess : public Process {
   std::shared_ptr<JournalRecords> records_;
   std::unique_ptr<LoopVerifier> verifier_;
   JournalFollower journal_;
-  // Which wait for keyframes, by (query, match); and with the query, which wait for their turn.
+  // Which wait for keyframes, by (query, match); and which wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;
-  std::deque<std::pair<KeyframeId, PlaceCandidate>> ready_;
+  std::deque<Ready> ready_;
   std::set<int64_t> verified_;   // constraint ids
   std::deque<Constraint> sent_;  // newest verification results, to repeat
   int64_t next_status_utime_ = 0;

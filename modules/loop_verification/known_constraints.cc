@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/candidate_order.h"
 #include "core/median.h"
 
 namespace pangea {
@@ -27,22 +28,33 @@ std::optional<double> PathBetween(const MapId& map, int32_t a, int32_t b,
 
 void KnownConstraints::Add(const Constraint& constraint) {
   const auto [a, b] = std::minmax(constraint.from, constraint.to);
-  by_maps_[{a.map, b.map}].insert({a.seq, {a.seq, b.seq, WorstSigma(constraint.covariance)}});
+  by_maps_[{a.map, b.map}].insert(
+      {a.seq, {a.seq, b.seq, a == constraint.to, WorstSigma(constraint.covariance)}});
 }
 
-bool KnownConstraints::IsRedundant(const KeyframeId& a, const KeyframeId& b,
+bool KnownConstraints::IsRedundant(const KeyframeId& query, const KeyframeId& match,
                                    const SubmapStore& store) const {
-  const Nearby nearby = NearbyOf(a, b, store);
+  const Nearby nearby = NearbyOf(query, match, store);
   if (nearby.gain_bits >= options_.min_gain_bits) {
     return false;
   }
-  return a.map == b.map ? nearby.count >= options_.min_nearby
-                        : NumBetween(a.map, b.map) >= options_.min_between_maps;
+  return query.map == match.map ? nearby.count >= options_.min_nearby
+                                : std::ssize(KnownTo(query, match)) >= options_.min_between_maps;
 }
 
-int KnownConstraints::NumBetween(const MapId& a, const MapId& b) const {
-  const auto found = by_maps_.find(std::minmax(a, b));
-  return found == by_maps_.end() ? 0 : static_cast<int>(found->second.size());
+std::vector<KnownConstraints::Known> KnownConstraints::KnownTo(const KeyframeId& query,
+                                                               const KeyframeId& match) const {
+  const auto maps = std::minmax(query.map, match.map);
+  std::vector<Known> known_to;
+  if (const auto found = by_maps_.find(maps); found != by_maps_.end()) {
+    for (const auto& [seq_a, known] : found->second) {
+      const KeyframeId a{maps.first, known.seq_a}, b{maps.second, known.seq_b};
+      if (RestsOn(query, match, known.query_is_a ? a : b)) {
+        known_to.push_back(known);
+      }
+    }
+  }
+  return known_to;
 }
 
 void KnownConstraints::Save(ByteWriter* writer) const {
@@ -54,6 +66,7 @@ void KnownConstraints::Save(ByteWriter* writer) const {
     for (const auto& [seq_a, known] : constraints) {
       writer->Put(known.seq_a);
       writer->Put(known.seq_b);
+      writer->Put(known.query_is_a);
       writer->Put(known.sigma_m);
     }
   }
@@ -70,32 +83,30 @@ void KnownConstraints::Restore(ByteReader* reader) {
       Known known;
       reader->Get(&known.seq_a);
       reader->Get(&known.seq_b);
+      reader->Get(&known.query_is_a);
       reader->Get(&known.sigma_m);
       constraints.emplace(known.seq_a, known);
     }
   }
 }
 
-KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& one, const KeyframeId& other,
+KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& query,
+                                                    const KeyframeId& match,
                                                     const SubmapStore& store) const {
-  const auto [a, b] = std::minmax(one, other);
-  const auto found = by_maps_.find({a.map, b.map});
+  const auto [a, b] = std::minmax(query, match);
   std::vector<double> sigmas;
   double known = 0;
-  if (found != by_maps_.end()) {
-    const auto end = found->second.upper_bound(a.seq + kMaxSeqDistance);
-    for (auto it = found->second.lower_bound(a.seq - kMaxSeqDistance); it != end; ++it) {
-      const Known& near = it->second;
-      if (std::abs(near.seq_b - b.seq) > kMaxSeqDistance) {
-        continue;
-      }
-      const auto path_a = PathBetween(a.map, a.seq, near.seq_a, store);
-      const auto path_b = PathBetween(b.map, b.seq, near.seq_b, store);
-      if (path_a && path_b) {
-        const double drift_m = options_.drift_per_m * (*path_a + *path_b);
-        known += 1 / (near.sigma_m * near.sigma_m + drift_m * drift_m);
-        sigmas.push_back(near.sigma_m);
-      }
+  for (const Known& near : KnownTo(query, match)) {
+    if (std::abs(near.seq_a - a.seq) > kMaxSeqDistance ||
+        std::abs(near.seq_b - b.seq) > kMaxSeqDistance) {
+      continue;
+    }
+    const auto path_a = PathBetween(a.map, a.seq, near.seq_a, store);
+    const auto path_b = PathBetween(b.map, b.seq, near.seq_b, store);
+    if (path_a && path_b) {
+      const double drift_m = options_.drift_per_m * (*path_a + *path_b);
+      known += 1 / (near.sigma_m * near.sigma_m + drift_m * drift_m);
+      sigmas.push_back(near.sigma_m);
     }
   }
   if (sigmas.empty()) {

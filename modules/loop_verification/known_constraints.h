@@ -4,6 +4,9 @@
 // be worth its verification: measurement selection by information gain (Ila et al., "Information-
 // based compact pose SLAM", TRO 2010).
 //
+// Only constraints that a candidate rests on count (core/candidate_order.h), so that the answer
+// does not depend on which others are there already.
+//
 // Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
 // the position to sigma^2 + (drift * path)^2; their information adds up as if they were
 // independent, though they share odometry. A constraint of their median sigma would add
@@ -60,16 +63,18 @@ class KnownConstraints {
     double gain_bits = 0;
   };
   // Odometry is `store`'s.
-  Nearby NearbyOf(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
-  bool IsRedundant(const KeyframeId& a, const KeyframeId& b, const SubmapStore& store) const;
+  Nearby NearbyOf(const KeyframeId& query, const KeyframeId& match, const SubmapStore& store) const;
+  bool IsRedundant(const KeyframeId& query, const KeyframeId& match,
+                   const SubmapStore& store) const;
 
  private:
-  int NumBetween(const MapId& a, const MapId& b) const;
-
   struct Known {
     int32_t seq_a = 0, seq_b = 0;
+    bool query_is_a = false;
     double sigma_m = 0;  // of the position, its worst direction
   };
+  // The accepted constraints between the candidate's maps that it rests on.
+  std::vector<Known> KnownTo(const KeyframeId& query, const KeyframeId& match) const;
 
   KnownConstraintOptions options_;
   std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // by seq_a

@@ -42,8 +42,8 @@ class KnownConstraintsTest : public testing::Test {
     AddRow(kB, 80, &store_);
   }
 
-  double GainBits(const KeyframeId& a, const KeyframeId& b) const {
-    return known_.NearbyOf(a, b, store_).gain_bits;
+  double GainBits(const KeyframeId& query, const KeyframeId& match) const {
+    return known_.NearbyOf(query, match, store_).gain_bits;
   }
 
   SubmapStore store_;
@@ -52,50 +52,60 @@ class KnownConstraintsTest : public testing::Test {
 };
 
 TEST_F(KnownConstraintsTest, WhereNothingIsKnownAnythingIsWorthIt) {
-  EXPECT_TRUE(std::isinf(GainBits({kA, 10}, {kB, 10})));
+  EXPECT_TRUE(std::isinf(GainBits({kB, 11}, {kA, 10})));
   known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  EXPECT_TRUE(std::isinf(GainBits({kA, 10}, {kA, 40}))) << "other maps";
-  EXPECT_TRUE(std::isinf(GainBits({kA, 10}, {kB, 60}))) << "too far away";
-  EXPECT_FALSE(known_.IsRedundant({kA, 60}, {kB, 10}, store_));
+  EXPECT_TRUE(std::isinf(GainBits({kA, 40}, {kA, 10}))) << "other maps";
+  EXPECT_TRUE(std::isinf(GainBits({kB, 60}, {kA, 10}))) << "too far away";
+  EXPECT_FALSE(known_.IsRedundant({kB, 11}, {kA, 60}, store_));
 }
 
 TEST_F(KnownConstraintsTest, TheSecondAtOnePlaceBringsHalfABitTheThirdLess) {
-  known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  EXPECT_NEAR(GainBits({kA, 10}, {kB, 10}), 0.5, 1e-9);
-  EXPECT_NEAR(GainBits({kB, 10}, {kA, 10}), 0.5, 1e-9) << "either may be the query";
-  known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  EXPECT_NEAR(GainBits({kA, 10}, {kB, 10}), 0.5 * std::log2(1.5), 1e-9);
-  EXPECT_TRUE(known_.IsRedundant({kA, 10}, {kB, 10}, store_));
+  known_.Add(Accepted({kA, 10}, {kB, 9}, 1e-3));
+  const double drift_m = 0.02 * kStep_m;
+  const double information = 1 / (1e-6 + drift_m * drift_m);
+  EXPECT_NEAR(GainBits({kB, 10}, {kA, 10}), 0.5 * std::log2(1 + 1e6 / information), 1e-9);
+  known_.Add(Accepted({kA, 10}, {kB, 9}, 1e-3));
+  EXPECT_NEAR(GainBits({kB, 10}, {kA, 10}), 0.5 * std::log2(1 + 1e6 / (2 * information)), 1e-9);
 }
 
 TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  // 2 + 1 steps of 0.5 m, 2 % of them.
+  // 1 + 2 steps of 0.5 m, 2 % of them.
   const double drift_m = 0.02 * 1.5;
   const double expected = 0.5 * std::log2(1 + (0.02 * 0.02 + drift_m * drift_m) / (0.02 * 0.02));
-  EXPECT_NEAR(GainBits({kA, 12}, {kB, 9}), expected, 1e-9);
-  EXPECT_TRUE(known_.IsRedundant({kA, 11}, {kB, 11}, store_));
-  EXPECT_FALSE(known_.IsRedundant({kA, 14}, {kB, 14}, store_));
+  EXPECT_NEAR(GainBits({kB, 12}, {kA, 9}), expected, 1e-9);
+  EXPECT_TRUE(known_.IsRedundant({kB, 11}, {kA, 11}, store_));
+  EXPECT_FALSE(known_.IsRedundant({kB, 14}, {kA, 14}, store_));
+}
+
+// Else the answer would depend on which of them is verified first.
+TEST_F(KnownConstraintsTest, OnlyWhatACandidateRestsOnCounts) {
+  known_.Add(Accepted({kA, 10}, {kB, 11}, 0.02));
+  EXPECT_TRUE(std::isinf(GainBits({kB, 10}, {kA, 11})));
+  EXPECT_TRUE(std::isinf(GainBits({kB, 11}, {kA, 11}))) << "of the same query";
+  EXPECT_FALSE(std::isinf(GainBits({kB, 12}, {kA, 11})));
+  EXPECT_TRUE(std::isinf(GainBits({kA, 13}, {kB, 11})));
+  EXPECT_FALSE(std::isinf(GainBits({kA, 13}, {kB, 12}))) << "either may have been the query";
 }
 
 // Whether two maps are one rests on them.
 TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
   KnownConstraints known({.min_between_maps = 2});
   known.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  EXPECT_FALSE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
-  known.Add(Accepted({kA, 10}, {kB, 12}, 0.02));
-  EXPECT_TRUE(known.IsRedundant({kA, 10}, {kB, 11}, store_));
+  EXPECT_FALSE(known.IsRedundant({kB, 11}, {kA, 10}, store_));
+  known.Add(Accepted({kA, 12}, {kB, 10}, 0.02));
+  EXPECT_TRUE(known.IsRedundant({kB, 11}, {kA, 10}, store_));
 }
 
 // A single one moves the map by whatever it is wrong.
 TEST_F(KnownConstraintsTest, TheFirstAtOnePlaceOfAMapAreNeverRedundant) {
   KnownConstraints known({.min_nearby = 3});
   for (int i = 0; i < 3; ++i) {
-    EXPECT_FALSE(known.IsRedundant({kA, 10}, {kA, 50}, store_)) << i;
+    EXPECT_FALSE(known.IsRedundant({kA, 51}, {kA, 11}, store_)) << i;
     known.Add(Accepted({kA, 10}, {kA, 50}, 0.02));
   }
-  EXPECT_TRUE(known.IsRedundant({kA, 11}, {kA, 51}, store_));
-  EXPECT_FALSE(known.IsRedundant({kA, 45}, {kA, 51}, store_)) << "none within reach";
+  EXPECT_TRUE(known.IsRedundant({kA, 51}, {kA, 11}, store_));
+  EXPECT_FALSE(known.IsRedundant({kA, 51}, {kA, 45}, store_)) << "none within reach";
 }
 
 TEST_F(KnownConstraintsTest, AMapThatNoOdometryCrossesIsNotKnown) {
@@ -103,7 +113,7 @@ TEST_F(KnownConstraintsTest, AMapThatNoOdometryCrossesIsNotKnown) {
   cut.id = {kB, 80};
   store_.Add(std::move(cut));
   known_.Add(Accepted({kA, 79}, {kB, 79}, 0.02));
-  EXPECT_TRUE(std::isinf(GainBits({kA, 79}, {kB, 80})));
+  EXPECT_TRUE(std::isinf(GainBits({kB, 80}, {kA, 79})));
 }
 
 }  // namespace
