@@ -77,6 +77,7 @@ class Bridge : public ClusterTest {
 };
 
 TEST_F(Bridge, TwoWorkersShareTheMatchesAndOneIsKilled) {
+  server_->set_num_maps(6);
   TestWorker& first = AddWorker();
   TestWorker& second = AddWorker();
   AddKeyframes(30, 3);
@@ -94,6 +95,26 @@ TEST_F(Bridge, TwoWorkersShareTheMatchesAndOneIsKilled) {
   EXPECT_GE(second.results_of_others().size(), 12u) << "it knows what the map has";
 }
 
+// So the redundant ones are the same however many workers there are.
+TEST_F(Bridge, AMatchWaitsForTheResultsThatItRestsOn) {
+  TestWorker& first = AddWorker();
+  first.set_pauses(true);
+  AddKeyframes(8, 2);
+  ASSERT_TRUE(Until([&] { return first.num_waiting() > 0; }));
+  TestWorker& second = AddWorker();
+  EXPECT_FALSE(Until([&] { return second.num_waiting() > 0; }, 1));
+  EXPECT_EQ(first.num_waiting(), 2u) << "it takes four that do not rest on each other";
+  first.set_pauses(false);
+  ASSERT_TRUE(Until([&] { return first.num_verified() >= 6; }));
+  first.Kill();
+  ASSERT_TRUE(Until([&] { return server_->has_all(); }));
+  EXPECT_GE(second.known_at().size(), 3u);
+  for (const auto& [query, known] : second.known_at()) {
+    EXPECT_GE(known, 2u * static_cast<size_t>(query.seq)) << "it was taken too early";
+  }
+  ExpectEachResultOnce();
+}
+
 TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
   AddKeyframes(4, 3);
   ASSERT_TRUE(Until([&] {
@@ -109,6 +130,7 @@ TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
 }
 
 TEST_F(Bridge, AWorkerAtWorkKeepsItsMatchesHoweverLongItTakes) {
+  server_->set_num_maps(6);
   TestWorker& slow = AddWorker();
   slow.set_pauses(true);
   AddKeyframes(4, 2);
@@ -187,6 +209,7 @@ TEST_F(Bridge, VerifiersAreAnsweredForKeyframesAndNotForMatches) {
 }
 
 TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
+  server_->set_num_maps(6);
   AddWorker();
   AddKeyframes(10, 3);
   ASSERT_TRUE(Until([&] { return server_->published().size() >= 5; }));

@@ -26,6 +26,7 @@ using namespace std::chrono_literals;
 constexpr char kSite[] = "hall";
 constexpr size_t kMaxMatches = 4;
 const MapId kMap{1, 1'700'000'000'000'000};
+const MapId kOther{2, 1'700'000'000'000'000};
 
 std::string FreshJournal(const std::string& path) {
   for (const char* suffix : {"", ".stream"}) {
@@ -134,27 +135,32 @@ void TestServer::SayJournalFile() {
 }
 
 void TestServer::Add(int candidates) {
-  const auto seq = static_cast<int32_t>(keyframes_.size());
+  const auto count = static_cast<int>(keyframes_.size());
+  const KeyframeId query{{kMap.agent_id, kMap.opened_utime + count % num_maps_}, count / num_maps_};
   PlaceMatch match;
-  match.query = {kMap, seq};
+  match.query = query;
   for (int i = 0; i < candidates; ++i) {
-    match.candidates.push_back({{{2, kMap.opened_utime}, seq + i}, KindOf(i), 0.5f, {}});
-    candidates_.insert(ConstraintId(match.query, match.candidates.back()));
+    match.candidates.push_back({{kOther, count + i}, KindOf(i), 0.5f, {}});
+    candidates_.insert(ConstraintId(query, match.candidates.back()));
   }
-  keyframes_.push_back(ToMessage(TestKeyframe(match.query)));
-  matches_.push_back(ToMessage(match));
-  journal_file_->Append(1'700'000'000'000'000 + seq, "KEYFRAME_1",
-                        EncodeMessage(keyframes_.back()));
+  const KeyframeMessage& keyframe = keyframes_[query] = ToMessage(TestKeyframe(query));
+  journal_file_->Append(kMap.opened_utime + count, "KEYFRAME_1", EncodeMessage(keyframe));
   SayJournalFile();
-  node_->Publish("KEYFRAME_1", keyframes_.back());
-  node_->Publish("PLACE_MATCH", matches_.back());
+  node_->Publish("KEYFRAME_1", keyframe);
+  node_->Publish("PLACE_MATCH", matches_[query] = ToMessage(match));
 }
 
 void TestServer::SayHave() {
+  std::map<MapId, int32_t> highest_seq;
+  for (const auto& [id, keyframe] : keyframes_) {
+    highest_seq[id.map] = id.seq;
+  }
   have_t have{};
-  have.num_maps = 1;
-  have.maps = {ToMessage(kMap)};
-  have.highest_seq = {static_cast<int32_t>(keyframes_.size()) - 1};
+  have.num_maps = static_cast<int32_t>(highest_seq.size());
+  for (const auto& [map, seq] : highest_seq) {
+    have.maps.push_back(ToMessage(map));
+    have.highest_seq.push_back(seq);
+  }
   node_->Publish("HAVE", have);
 }
 
@@ -169,12 +175,12 @@ void TestServer::AskForResults(int32_t seq) {
 }
 
 void TestServer::OnResendRequest(const ResendRequest& request) {
-  const auto at = [&](const auto& list, auto seq) { return list.at(static_cast<size_t>(seq)); };
   for (int32_t seq = request.range.from_seq; seq <= request.range.to_seq; ++seq) {
+    const KeyframeId id{request.range.map, seq};
     if (request.channel == "PLACE_MATCH") {
-      Retransmit(*node_, request.requester, request.channel, at(matches_, seq));
+      Retransmit(*node_, request.requester, request.channel, matches_.at(id));
     } else if (request.channel == "KEYFRAME_1") {
-      Retransmit(*node_, request.requester, request.channel, at(keyframes_, seq));
+      Retransmit(*node_, request.requester, request.channel, keyframes_.at(id));
     }
   }
   for (const auto& [id, result] : journal_) {
@@ -193,9 +199,10 @@ void TestServer::Round(int64_t now_utime) {
 
 TestWorker::TestWorker(const NatsAccess& access)
     : node_(bus_, "fusion"), streams_(access, kSite), bridge_(bus_, streams_, kMaxMatches) {
-  node_.Subscribe<KeyframeMessage>(
-      "KEYFRAME_1",
-      [this](const std::string&, const KeyframeMessage& m) { keyframes_.insert(m.id.seq); });
+  node_.Subscribe<KeyframeMessage>("KEYFRAME_1",
+                                   [this](const std::string&, const KeyframeMessage& m) {
+                                     keyframes_.insert(*Parse(m.id).value);
+                                   });
   node_.Listen<place_match_t>("PLACE_MATCH", std::bind_front(&TestWorker::TakeMatch, this));
   node_.Listen<verdict_request_t>("VERDICT_REQUEST", [this](const VerificationRequest& request) {
     for (const auto& [seq, id] : request.names.results) {
@@ -218,7 +225,7 @@ TestWorker::TestWorker(const NatsAccess& access)
 }
 
 void TestWorker::TakeMatch(const PlaceMatch& match) {
-  if (!taken_.insert(match.query).second) {
+  if (!known_at_.emplace(match.query, made_.size() + results_of_others_.size()).second) {
     return;
   }
   for (const PlaceCandidate& candidate : match.candidates) {

@@ -50,16 +50,18 @@ class NatsServer {
   std::unique_ptr<Program> program_;
 };
 
-// agent_handler and place_recognition: one agent's map, a match a keyframe.
+// agent_handler and place_recognition: one agent's maps, a match a keyframe.
 class TestServer {
  public:
   // The journal is a new file there, no other test program's.
   TestServer(const NatsAccess& access, const std::string& journal_path);
 
+  // Keyframes come from so many maps by turns; the matches of one rest on each other. At first one.
+  void set_num_maps(int num_maps) { num_maps_ = num_maps; }
   // The next keyframe, and its match with this many candidates.
   void Add(int candidates);
   void SayHave();
-  // agent_handler asks for all results of this keyframe.
+  // agent_handler asks for all results of this keyframe of the first map.
   void AskForResults(int32_t seq);
   // The bridge is killed, and begins anew with what the journal has.
   void RestartBridge(const std::string& site = "hall");
@@ -94,8 +96,9 @@ class TestServer {
   std::unique_ptr<Node> node_;  // agent_handler's
   std::unique_ptr<SiteLease> lease_;
   std::unique_ptr<CoreBridge> bridge_;
-  std::vector<KeyframeMessage> keyframes_;
-  std::vector<place_match_t> matches_;
+  int num_maps_ = 1;
+  std::map<KeyframeId, KeyframeMessage> keyframes_;
+  std::map<KeyframeId, place_match_t> matches_;
   std::map<int64_t, constraint_t> journal_;
   std::set<int64_t> candidates_;
   std::map<int64_t, int> published_;
@@ -117,9 +120,11 @@ class TestWorker {
 
   int num_verified() const { return static_cast<int>(made_.size()); }
   size_t num_waiting() const { return to_verify_.size(); }
-  const std::set<int32_t>& keyframes() const { return keyframes_; }
+  const std::set<KeyframeId>& keyframes() const { return keyframes_; }
   const std::vector<int32_t>& retransmitted() const { return retransmitted_; }
   const std::set<int64_t>& results_of_others() const { return results_of_others_; }
+  // How many results it knew when it took the match of this query.
+  const std::map<KeyframeId, size_t>& known_at() const { return known_at_; }
 
  private:
   void TakeMatch(const PlaceMatch& match);
@@ -129,10 +134,10 @@ class TestWorker {
   Node node_;  // fusion's
   SiteStreams streams_;
   WorkerBridge bridge_;
-  std::set<KeyframeId> taken_;
+  std::map<KeyframeId, size_t> known_at_;
   std::deque<Constraint> to_verify_;
   std::map<int64_t, Constraint> made_;
-  std::set<int32_t> keyframes_;
+  std::set<KeyframeId> keyframes_;
   std::vector<int32_t> retransmitted_;
   std::set<int64_t> results_of_others_;
   bool pauses_ = false;

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <nats/nats.h>
 
+#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
+#include <sstream>
 #include <stdexcept>
 
 namespace pangea {
@@ -85,6 +87,24 @@ std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
 bool MayChange(natsStatus status, jsErrCode error) {
   return status == NATS_TIMEOUT || error == JSClusterNotAvailErr || error == JSClusterNoPeersErr ||
          error == JSInsufficientResourcesErr;
+}
+
+// A claim has when its message was stored, in nanoseconds:
+// $JS.ACK[.domain.account].stream.consumer.deliveries.sequence.sequence.when.pending[.token].
+int64_t StoredUtime(const std::string& claim) {
+  constexpr size_t kWhen = 7, kWhenBehindDomain = 9, kWithDomain = 11;
+  std::vector<std::string> tokens;
+  std::istringstream stream(claim);
+  for (std::string token; std::getline(stream, token, '.');) {
+    tokens.push_back(token);
+  }
+  const size_t when = tokens.size() < kWithDomain ? kWhen : kWhenBehindDomain;
+  int64_t nanoseconds = 0;
+  if (when < tokens.size()) {
+    const std::string& text = tokens[when];
+    std::from_chars(text.data(), text.data() + text.size(), nanoseconds);
+  }
+  return nanoseconds / kNanosecondsPerMicrosecond;
 }
 
 }  // namespace
@@ -296,6 +316,29 @@ std::optional<NatsClient::Message> NatsClient::Next(const std::string& stream, u
   return impl_->Get(stream, &which);
 }
 
+std::optional<std::vector<std::string>> NatsClient::Subjects(const std::string& stream,
+                                                             const std::string& subjects) {
+  if (!connected()) {
+    return std::nullopt;
+  }
+  jsOptions options{};
+  jsOptions_Init(&options);
+  options.Wait = kTimeout_ms;
+  options.Stream.Info.SubjectsFilter = subjects.c_str();
+  jsStreamInfo* got = nullptr;
+  const natsStatus status =
+      js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), &options, nullptr);
+  const Owned<jsStreamInfo> info(got);
+  if (status != NATS_OK) {
+    return std::nullopt;
+  }
+  std::vector<std::string> found;
+  for (int i = 0; info->State.Subjects != nullptr && i < info->State.Subjects->Count; ++i) {
+    found.emplace_back(info->State.Subjects->List[i].Subject);
+  }
+  return found;
+}
+
 // libnats' own fetch leaves its request with NATS when it has waited in vain, and what answers that
 // is nobody's until it is delivered again. This one is answered at once.
 std::optional<NatsClient::Taken> NatsClient::Take(const std::string& stream,
@@ -312,7 +355,8 @@ std::optional<NatsClient::Taken> NatsClient::Take(const std::string& stream,
   if (status != NATS_OK || IsStatus(got) || natsMsg_GetReply(got) == nullptr) {
     return std::nullopt;
   }
-  return Taken{natsMsg_GetReply(got), DataOf(got)};
+  const std::string claim = natsMsg_GetReply(got);
+  return Taken{claim, StoredUtime(claim), DataOf(got)};
 }
 
 bool NatsClient::Acknowledge(const std::string& claim) {
@@ -328,8 +372,10 @@ bool NatsClient::Acknowledge(const std::string& claim) {
 
 void NatsClient::StillWorking(const std::string& claim) { impl_->Say(claim, "+WPI"); }
 
-void NatsClient::GiveBack(const std::string& claim) {
-  impl_->Say(claim, "-NAK");
+void NatsClient::GiveBack(const std::string& claim, int64_t delay_us) {
+  const std::string nak =
+      fmt::format(R"(-NAK {{"delay": {}}})", kNanosecondsPerMicrosecond * delay_us);
+  impl_->Say(claim, nak.c_str());
   natsConnection_FlushTimeout(impl_->connection.get(), kTimeout_ms);
 }
 

@@ -63,19 +63,25 @@ class NatsClient {
   std::optional<Message> Next(const std::string& stream, uint64_t sequence,
                               const std::string& subjects);
 
+  // Of all its messages whose subject is among `subjects`. Nothing: NATS does not answer.
+  std::optional<std::vector<std::string>> Subjects(const std::string& stream,
+                                                   const std::string& subjects);
+
   // The sequence of its newest message, 0 before the first, from who decides on what is stored
   // next. Nothing: there is no such stream, or nobody decides now.
   std::optional<uint64_t> LastSequence(const std::string& stream);
 
   struct Taken {
     std::string claim;
+    int64_t stored_utime = 0;  // NATS' clock; 0: not known
     std::vector<uint8_t> data;
   };
   std::optional<Taken> Take(const std::string& stream, const std::string& consumer);
   // Done, and out of the queue. False when NATS does not answer.
   bool Acknowledge(const std::string& claim);
   void StillWorking(const std::string& claim);
-  void GiveBack(const std::string& claim);
+  // Nobody is given it for so long.
+  void GiveBack(const std::string& claim, int64_t delay_us = 0);
 
   struct Queue {
     uint64_t waiting = 0;

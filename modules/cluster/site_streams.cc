@@ -146,6 +146,10 @@ std::optional<SiteStreams::Message> SiteStreams::FindKeyframe(const KeyframeId& 
   return nats_.Find(Stream(kJournal), Subject(kJournal, KeyframeTokens(id)));
 }
 
+std::optional<SiteStreams::Message> SiteStreams::FindMatch(const KeyframeId& query) {
+  return nats_.Find(Stream(kMatch), Subject(kMatch, query));
+}
+
 std::optional<SiteStreams::Message> SiteStreams::FindResult(const KeyframeId& query,
                                                             int64_t constraint_id) {
   return nats_.Find(Stream(kResult), fmt::format("{}.{}", Subject(kResult, query), constraint_id));
@@ -173,6 +177,18 @@ SiteStreams::Reader SiteStreams::ResultsOf(const MapId& map) {
 
 std::optional<SiteStreams::Taken> SiteStreams::TakeMatch() {
   return nats_.Take(Stream(kMatch), kWorkers);
+}
+
+std::optional<std::vector<KeyframeId>> SiteStreams::PendingMatchesOf(const MapId& map) {
+  const auto subjects = nats_.Subjects(Stream(kMatch), Subject(kMatch, Tokens(map) + ".*"));
+  if (!subjects) {
+    return std::nullopt;
+  }
+  std::vector<KeyframeId> pending;
+  for (const std::string& subject : *subjects) {
+    pending.push_back({map, std::stoi(subject.substr(subject.rfind('.') + 1))});
+  }
+  return pending;
 }
 
 std::optional<SiteStreams::Queue> SiteStreams::LookAtQueue() {

@@ -64,6 +64,7 @@ class SiteStreams {
   };
   std::optional<JournalEvent> EventAt(uint64_t sequence);
   std::optional<uint64_t> JournalEnd() { return nats_.LastSequence(Stream("journal")); }
+  std::optional<uint64_t> ResultsEnd() { return nats_.LastSequence(Stream("result")); }
 
   // Who the core is: the newest record, and the sequence that the next one is put behind.
   std::optional<uint64_t> LeaseSequence() { return nats_.LastSequence(Stream("lease")); }
@@ -73,6 +74,7 @@ class SiteStreams {
   // Nothing: it is not there, or NATS does not answer.
   using Message = NatsClient::Message;
   std::optional<Message> FindKeyframe(const KeyframeId& id);
+  std::optional<Message> FindMatch(const KeyframeId& query);
   std::optional<Message> FindResult(const KeyframeId& query, int64_t constraint_id);
 
   // Follows a stream, or a part of it, from its beginning.
@@ -80,6 +82,8 @@ class SiteStreams {
    public:
     // Nothing: no more is there now, or NATS does not answer.
     std::optional<Message> Next();
+    // Whether it has had the stream's message of this sequence.
+    bool HasHad(uint64_t sequence) const { return next_ > sequence; }
 
    private:
     friend class SiteStreams;
@@ -100,7 +104,10 @@ class SiteStreams {
   std::optional<Taken> TakeMatch();
   bool Acknowledge(const std::string& claim) { return nats_.Acknowledge(claim); }
   void StillWorking(const std::string& claim) { nats_.StillWorking(claim); }
-  void GiveBack(const std::string& claim) { nats_.GiveBack(claim); }
+  void GiveBack(const std::string& claim, int64_t delay_us = 0) { nats_.GiveBack(claim, delay_us); }
+  // Queries of this map whose match is in the queue, or taken and not acknowledged. Nothing: NATS
+  // does not answer.
+  std::optional<std::vector<KeyframeId>> PendingMatchesOf(const MapId& map);
   std::optional<Queue> LookAtQueue();
 
   void PublishHave(Bytes data);

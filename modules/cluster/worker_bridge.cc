@@ -16,6 +16,10 @@ namespace {
 
 constexpr int64_t kWorkerSecond_us = 1'000'000;
 constexpr int64_t kRoundInterval_us = 20'000;
+// A match waits for the results that it rests on: looks again so soon, and for so long at most;
+// matches of a worker that died come after 5 s. Who is further behind is to catch up.
+constexpr int64_t kWait_us = 50'000;
+constexpr int64_t kMaxWait_us = 15'000'000;
 constexpr char kHandler[] = "agent_handler";
 
 // Who verifies candidates of this kind, and is to know the results on them.
@@ -30,6 +34,7 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
       as_handler_(bus, kHandler),
       streams_(streams),
       max_matches_(max_matches),
+      pending_(streams),
       keyframes_(streams.Keyframes()),
       results_(streams.Results()) {
   streams_.ListenToHave();
@@ -171,6 +176,18 @@ void WorkerBridge::PassResults() {
   }
 }
 
+// Whether our verifiers know all results that the match's candidates rest on. A match that is no
+// longer pending has all its results in the stream, so that is looked at after.
+bool WorkerBridge::KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime) {
+  if (!pending_.LetPass(match, now_utime)) {
+    return false;
+  }
+  // A node of NATS that lags behind may have fewer than there are.
+  const auto end = streams_.ResultsEnd();
+  PassResults();
+  return end && results_.HasHad(*end);
+}
+
 void WorkerBridge::TakeMatches(int64_t now_utime) {
   while (outstanding_.size() < max_matches_) {
     const auto taken = streams_.TakeMatch();
@@ -178,11 +195,14 @@ void WorkerBridge::TakeMatches(int64_t now_utime) {
       return;
     }
     auto match = ParseMessage<place_match_t>(taken->data);
-    if (match.value) {
-      TakeMatch(*std::move(match.value), taken->claim, now_utime);
-    } else {
+    if (!match.value) {
       node_.Refuse("match in the queue: " + match.refused);
       done_.push_back(taken->claim);
+    } else if (now_utime > taken->stored_utime + kMaxWait_us ||
+               KnowsWhatItRestsOn(*match.value, now_utime)) {
+      TakeMatch(*std::move(match.value), taken->claim, now_utime);
+    } else {
+      return streams_.GiveBack(taken->claim, kWait_us);
     }
   }
 }

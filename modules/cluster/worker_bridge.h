@@ -4,8 +4,9 @@
 // pangea-inter-map-ba, to which it is agent_handler. Keyframes of the site's stream and HAVE go
 // onto the bus; it takes at most `max_matches` matches at a time from the queue, publishes them,
 // stores the results, and acknowledges a match once all its results are stored. Results of other
-// workers are passed on to the verifiers as those of former runs are, so that they know what the
-// map has.
+// workers are passed on to the verifiers as those of former runs are. A match goes back into the
+// queue while results that its candidates rest on (core/candidate_order.h) are still to come, for
+// 15 s at most: so the map is the same however many workers there are.
 //   bus: CONSTRAINT, OPTIONS_*, RESEND_REQUEST, AGAIN_agent_handler in;
 //        KEYFRAME_*, PLACE_MATCH, HAVE, VERDICT_REQUEST, AGAIN_<process>, STATUS_bridge out
 //
@@ -24,6 +25,7 @@
 #include "bus/node.h"
 #include "bus/process.h"
 #include "cluster/outstanding_matches.h"
+#include "cluster/pending_matches.h"
 #include "cluster/site_streams.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
@@ -61,6 +63,7 @@ class WorkerBridge : public Process {
   void PassHave();
   void PassResults();
   void StoreResults();
+  bool KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime);
   void TakeMatches(int64_t now_utime);
   void TakeMatch(PlaceMatch match, const std::string& claim, int64_t now_utime);
   void NoteStored(int64_t constraint_id);
@@ -76,6 +79,7 @@ class WorkerBridge : public Process {
   SiteStreams& streams_;
   const size_t max_matches_;
   OutstandingMatches outstanding_;
+  PendingMatches pending_;
   SiteStreams::Reader keyframes_;
   SiteStreams::Reader results_;
   std::map<int64_t, SiteStreams::Entry> to_store_;  // results by constraint id
