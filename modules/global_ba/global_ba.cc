@@ -1,6 +1,7 @@
 #include "global_ba/global_ba.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -30,6 +31,34 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
     match = corner;
   }
   return corners;
+}
+
+// A whole adjustment that moved keyframes by more than this (root mean square) is made once more
+// from where it ended: which landmarks it has rests on the poses that it begins with, and these are
+// others for who has adjusted the group before.
+constexpr double kSettled_m = 1e-3;
+constexpr int kMaxPasses = 3;
+
+// A group's poses after its adjustment; what was left out keeps its place relative to the keyframe
+// before it.
+StatePoses PosesAfter(const AdjustedGroup& adjusted, const StatePoses& before) {
+  StatePoses after;
+  Rigid3 T_after_before;
+  for (const auto& [id, T_map_body] : before) {
+    if (const ImuState* imu = adjusted.Find(id)) {
+      T_after_before = imu->T_odom_body * T_map_body.Inverse();
+    }
+    after[id] = T_after_before * T_map_body;
+  }
+  return after;
+}
+
+double RmsMove(const StatePoses& before, const StatePoses& after) {
+  double sum = 0;
+  for (const auto& [id, T_map_body] : before) {
+    sum += (after.at(id).t - T_map_body.t).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(before.size()));
 }
 
 // Largest move of a keyframe that was adjusted before.
@@ -182,20 +211,34 @@ std::optional<MapState> GlobalBa::Advance() {
     }
     return std::nullopt;
   }
-  if (work_->problem->Advance()) {
+  if (work_->problem->Advance() || BeginAgain()) {
     return std::nullopt;
   }
   return Finish();
 }
 
 void GlobalBa::Begin(StatePointer state) {
-  const StatePoses poses = PosesOf(*state);
   work_ = std::make_unique<Work>();
+  const StatePoses& poses = work_->begin = PosesOf(*state);
   work_->local = IsLocal(*state, poses);
   work_->new_pairs = TakeNewPairs(*state, poses);
   work_->state = std::move(state);
   work_->problem = work_->local ? Local(poses) : Whole(*work_->state, poses);
   ++counters_.begun;
+}
+
+bool GlobalBa::BeginAgain() {
+  if (work_->local || ++work_->passes == kMaxPasses) {
+    return false;
+  }
+  const StatePoses after =
+      PosesAfter(AfterAdjustment(work_->problem->world(), work_->begin, nullptr), work_->begin);
+  const bool again = RmsMove(work_->begin, after) > kSettled_m;
+  if (again) {
+    work_->begin = after;
+    work_->problem = Whole(*work_->state, after);
+  }
+  return again;
 }
 
 std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const StatePoses& poses) {

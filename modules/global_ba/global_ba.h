@@ -108,6 +108,8 @@ class GlobalBa {
     StatePointer state;
     std::vector<KeyframePair> new_pairs;
     bool local = false;
+    int passes = 0;    // that have ended
+    StatePoses begin;  // where this one began
     std::unique_ptr<BaProblem> problem;
   };
   static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
@@ -117,6 +119,7 @@ class GlobalBa {
   StatePointer NextDue() const;
   bool IsLocal(const MapState& state, const StatePoses& poses) const;
   void Begin(StatePointer state);
+  bool BeginAgain();
   // Matched pairs of the group that no refinement has.
   std::vector<KeyframePair> TakeNewPairs(const MapState& state, const StatePoses& poses);
   std::unique_ptr<BaProblem> Whole(const MapState& state, const StatePoses& poses);

@@ -55,6 +55,21 @@ TEST(GlobalBa, RefinesAGroup) {
   EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth), 0.2 * before);
 }
 
+// Who has adjusted before begins elsewhere, and finds other landmarks there at first.
+TEST(GlobalBa, WhereItBeginsDoesNotMatter) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const BaTestWorld world = MakeBaTestWorld({.seed = seed});
+    BaTestMessages messages = MessagesOf(world);
+    const auto from_odometry = Server(messages).Finish();
+    ASSERT_TRUE(from_odometry);
+    messages.state.keyframes = from_odometry->keyframes;
+    const auto from_adjusted = Server(messages).Finish();
+    ASSERT_TRUE(from_adjusted);
+    EXPECT_LT(WorstError(Moved(world.start, *from_odometry), Moved(world.start, *from_adjusted)),
+              1e-4);
+  }
+}
+
 TEST(GlobalBa, TheOrderOfMessagesDoesNotMatter) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto in_order = Server(messages).Finish();
