@@ -4,6 +4,14 @@
 
 namespace pangea {
 
+const std::array<double, kNumOctaves> kOctaveScales = [] {
+  std::array<double, kNumOctaves> scales{};
+  for (int octave = 0; octave < kNumOctaves; ++octave) {
+    scales[octave] = std::pow(kOctaveScale, octave);
+  }
+  return scales;
+}();
+
 double UnknownScaleSigma(const std::vector<double>& scale_sigmas) {
   return scale_sigmas.empty() ? 0 : UnknownScaleSigma(Median(scale_sigmas));
 }

@@ -2,6 +2,7 @@
 
 // A keyframe as every module past the border sees it: bounded, finite, undistortion still to come.
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -36,9 +37,15 @@ struct Corner {
   int32_t landmark_id = kNoLandmark;  // unique in its map, the same in every keyframe that saw it
 };
 
+// Powers of kOctaveScale: of the octaves that a message may have.
+inline constexpr int kNumOctaves = 16;
+extern const std::array<double, kNumOctaves> kOctaveScales;
+
 // Of a corner's pixel: grows with each octave (keyframe_t).
 inline double CornerSigma(const Corner& corner, double sigma_on_octave_0) {
-  return sigma_on_octave_0 * std::pow(kOctaveScale, corner.octave);
+  const bool known = corner.octave >= 0 && corner.octave < kNumOctaves;
+  return sigma_on_octave_0 *
+         (known ? kOctaveScales[corner.octave] : std::pow(kOctaveScale, corner.octave));
 }
 
 struct MapPoint {

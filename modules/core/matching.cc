@@ -1,6 +1,7 @@
 #include "core/matching.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "core/nearest_corner.h"
 
@@ -9,14 +10,110 @@ namespace {
 
 constexpr double kCellPx = 32.0;
 
+[[gnu::always_inline]] inline void HammingDistances(const uint64_t* const* words,
+                                                    const Descriptor& descriptor, size_t count,
+                                                    uint64_t* distances) {
+  const uint64_t *w0 = words[0], *w1 = words[1], *w2 = words[2], *w3 = words[3];
+  const uint64_t d0 = descriptor[0], d1 = descriptor[1], d2 = descriptor[2], d3 = descriptor[3];
+  for (size_t i = 0; i < count; ++i) {
+    distances[i] = std::popcount(w0[i] ^ d0) + std::popcount(w1[i] ^ d1) +
+                   std::popcount(w2[i] ^ d2) + std::popcount(w3[i] ^ d3);
+  }
+}
+
+// With a processor's vector of population counts it takes a quarter of the time.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+[[gnu::target("avx512vpopcntdq,avx512vl")]] void VectorHammingDistances(
+    const uint64_t* const* words, const Descriptor& descriptor, size_t count, uint64_t* distances) {
+  HammingDistances(words, descriptor, count, distances);
+}
+[[gnu::target("avx512vpopcntdq,avx512vl")]] uint64_t VectorLeast(
+    const std::vector<uint64_t>& values) {
+  uint64_t least = ~uint64_t{0};
+  for (const uint64_t value : values) {
+    least = std::min(least, value);
+  }
+  return least;
+}
+const bool kHasVectors =
+    __builtin_cpu_supports("avx512vpopcntdq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
+#else
+constexpr auto VectorHammingDistances = HammingDistances;
+constexpr uint64_t VectorLeast(const std::vector<uint64_t>&) { return 0; }
+constexpr bool kHasVectors = false;
+#endif
+
 }  // namespace
+
+DescriptorList::DescriptorList(const std::vector<Corner>& corners) {
+  for (size_t w = 0; w < words_.size(); ++w) {
+    words_[w].reserve(corners.size());
+    for (const Corner& corner : corners) {
+      words_[w].push_back(corner.descriptor[w]);
+    }
+  }
+}
+
+void DescriptorList::Distances(const Descriptor& descriptor,
+                               std::vector<uint64_t>* distances) const {
+  static_assert(std::tuple_size_v<Descriptor> == 4);
+  const uint64_t* const words[] = {words_[0].data(), words_[1].data(), words_[2].data(),
+                                   words_[3].data()};
+  (kHasVectors ? VectorHammingDistances : HammingDistances)(words, descriptor, distances->size(),
+                                                            distances->data());
+}
+
+std::vector<CornerMatch> PairsWithin(const std::vector<Corner>& a, const std::vector<Corner>& b,
+                                     int max_distance) {
+  const DescriptorList descriptors(b);
+  std::vector<uint64_t> distances(b.size());
+  std::vector<CornerMatch> pairs;
+  for (size_t i = 0; i < a.size(); ++i) {
+    descriptors.Distances(a[i].descriptor, &distances);
+    if (kHasVectors && VectorLeast(distances) > static_cast<uint64_t>(max_distance)) {
+      continue;  // most have none
+    }
+    for (size_t j = 0; j < b.size(); ++j) {
+      if (distances[j] <= static_cast<uint64_t>(max_distance)) {
+        pairs.push_back({static_cast<int>(i), static_cast<int>(j), static_cast<int>(distances[j])});
+      }
+    }
+  }
+  return pairs;
+}
+
+std::vector<CornerMatch> MutualNearest(const std::vector<CornerMatch>& pairs,
+                                       const std::vector<Corner>& b,
+                                       const MatchingOptions& options) {
+  std::vector<CornerMatch> nearest_to_b(b.size(), {-1, -1, kNoDistance});
+  std::vector<CornerMatch> matches;
+  std::vector<int> candidates, distance_of(b.size());
+  for (auto begin = pairs.begin(); begin != pairs.end();) {
+    const int a = begin->a;
+    candidates.clear();
+    auto end = begin;
+    for (; end != pairs.end() && end->a == a; ++end) {
+      candidates.push_back(end->b);
+      distance_of[end->b] = end->distance;
+      if (end->distance < nearest_to_b[end->b].distance) {
+        nearest_to_b[end->b] = *end;
+      }
+    }
+    const NearestCorner nearest = FindNearest(
+        b, candidates, [&](int j) { return distance_of[j]; }, options.max_distance,
+        options.other_corner_px);
+    if (nearest.index >= 0 && nearest.PassesRatio(options.max_ratio)) {
+      matches.push_back({a, nearest.index, nearest.distance});
+    }
+    begin = end;
+  }
+  std::erase_if(matches, [&](const CornerMatch& m) { return nearest_to_b[m.b].a != m.a; });
+  return matches;
+}
 
 std::vector<CornerMatch> MatchCorners(const std::vector<Corner>& a, const std::vector<Corner>& b,
                                       const MatchingOptions& options) {
-  const auto distance_of = [&](int i, int j) {
-    return HammingDistance(a[i].descriptor, b[j].descriptor);
-  };
-  return MutualNearest(a.size(), b, distance_of, options);
+  return MutualNearest(PairsWithin(a, b, RivalDistance(options)), b, options);
 }
 
 CornerGrid::CornerGrid(const std::vector<Corner>& corners) : corners_(&corners) {

@@ -5,7 +5,11 @@
 // distances are settled by the lower index.
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "core/keyframe.h"
@@ -34,6 +38,33 @@ struct CornerMatch {
   int b = 0;  // index into the second
   int distance = 0;
 };
+
+// From a match no rival further away than this can take the ratio test.
+inline int RivalDistance(const MatchingOptions& options) {
+  return std::min(kDescriptorBits, static_cast<int>(options.max_distance / options.max_ratio) + 1);
+}
+
+// Descriptors word by word, so that one is compared with many at a time.
+class DescriptorList {
+ public:
+  explicit DescriptorList(const std::vector<Corner>& corners);
+
+  // Of each the Hamming distance to `descriptor`. `distances` has their number.
+  void Distances(const Descriptor& descriptor, std::vector<uint64_t>* distances) const;
+
+ private:
+  std::array<std::vector<uint64_t>, std::tuple_size_v<Descriptor>> words_;
+};
+
+// All pairs of corners no further apart than that, in the order of a, then of b.
+std::vector<CornerMatch> PairsWithin(const std::vector<Corner>& a, const std::vector<Corner>& b,
+                                     int max_distance);
+
+// Those of `pairs`, which are in that order, that are each other's nearest and pass distance and
+// ratio. They must be there up to RivalDistance.
+std::vector<CornerMatch> MutualNearest(const std::vector<CornerMatch>& pairs,
+                                       const std::vector<Corner>& b,
+                                       const MatchingOptions& options);
 
 // Mutual nearest neighbours that pass the ratio test, in the order of a.
 std::vector<CornerMatch> MatchCorners(const std::vector<Corner>& a, const std::vector<Corner>& b,

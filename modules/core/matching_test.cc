@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
+#include <vector>
 
 #include "core/testing/test_descriptors.h"
 
@@ -67,6 +69,26 @@ TEST(MatchCorners, RatioTestRefusesATwinElsewhereButNotTheSameCornerOnAnotherOct
   const Corner elsewhere = MakeCorner(400, 50, FlipBits(descriptor, 50, 22));
   EXPECT_EQ(MatchCorners(a, {best, same_place}, {}).size(), 1u);
   EXPECT_TRUE(MatchCorners(a, {best, elsewhere}, {}).empty());
+}
+
+TEST(PairsWithin, AreAllPairsUpToTheDistance) {
+  Rng rng(3);
+  const std::vector<Corner> a = RandomCorners(23, rng);
+  const std::vector<Corner> b = RandomCorners(41, rng);
+  constexpr int kDistance = kDescriptorBits / 2;  // of random ones about half are nearer
+  std::vector<std::array<int, 3>> expected, found;
+  for (int i = 0; i < static_cast<int>(a.size()); ++i) {
+    for (int j = 0; j < static_cast<int>(b.size()); ++j) {
+      if (const int d = HammingDistance(a[i].descriptor, b[j].descriptor); d <= kDistance) {
+        expected.push_back({i, j, d});
+      }
+    }
+  }
+  for (const CornerMatch& pair : PairsWithin(a, b, kDistance)) {
+    found.push_back({pair.a, pair.b, pair.distance});
+  }
+  EXPECT_EQ(found, expected);
+  EXPECT_GT(found.size(), 100u);
 }
 
 TEST(MatchCorners, OnlyTheMutualNearestOfTwoRivalsStays) {

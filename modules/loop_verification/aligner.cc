@@ -36,8 +36,8 @@ void ShowMatches(const Verification& v, LoopVerificationReport* report) {
 }  // namespace
 
 Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
-                          const LoopVerificationGate& gate, LoopVerificationReport* report) const {
-  Verification verification(options_, keyframes, candidate, gate);
+                          const LoopVerificationGate& gate, LoopVerificationReport* report) {
+  Verification verification(options_, keyframes, candidate, gate, &windows_);
   verification.guess_tilt_sigma =
       std::sqrt(TiltVariance(verification.windows, options_.guess_tilt_floor));
   Constraint constraint;

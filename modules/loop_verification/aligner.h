@@ -5,11 +5,12 @@
 //
 // In: the windows of keyframes up to the match (m) and up to the query (c), and the candidate's
 // matched corners. Out: a Constraint between the two bodies, accepted with its covariance or
-// refused with the reason. The same input gives the same verification result.
+// refused with the reason. The same input gives the same verification result. Not thread safe.
 
 #include <algorithm>
 
 #include "loop_verification/steps/steps.h"
+#include "loop_verification/window_cache.h"
 
 namespace pangea {
 
@@ -24,11 +25,11 @@ class Aligner {
 
   // num_keyframes() up to the match and to the query, or fewer where their map begins.
   Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
-                   const LoopVerificationGate& gate,
-                   LoopVerificationReport* report = nullptr) const;
+                   const LoopVerificationGate& gate, LoopVerificationReport* report = nullptr);
 
  private:
   LoopVerificationOptions options_;
+  WindowCache windows_;
 };
 
 }  // namespace pangea

@@ -29,7 +29,11 @@ struct Neighbour {
   const KeyframeView* view = nullptr;
   Rigid3 T_cam_host;
   double sigma_m = 0, sigma_rad = 0;  // of the odometry between the two
-  std::vector<int> corners;           // that are no landmark yet
+  // Of those that are no landmark yet: index, ray, and its sigma.
+  std::vector<int> corners;
+  std::vector<float> x, y;
+  std::vector<double> sigmas;
+  double largest_sigma = 0;
 };
 
 // The host's corner as a neighbour sees it.
@@ -72,8 +76,9 @@ class Triangulation {
 
   std::vector<Sight> Sights(int corner) const {
     std::vector<Sight> sights;
+    const double sigma = RaySigma(host_, corner);
     for (const Neighbour& neighbour : neighbours_) {
-      if (const auto sight = Find(corner, neighbour)) {
+      if (const auto sight = Find(corner, sigma, neighbour)) {
         sights.push_back(*sight);
       }
     }
@@ -135,7 +140,12 @@ class Triangulation {
     neighbour.sigma_rad = std::sqrt(error.var_rad);
     for (int i = 0; i < static_cast<int>(landmark_of_corner.size()); ++i) {
       if (landmark_of_corner[i] < 0 && view.has_ray(i)) {
+        const Eigen::Vector3d ray = Ray(view, i);
         neighbour.corners.push_back(i);
+        neighbour.x.push_back(static_cast<float>(ray.x()));
+        neighbour.y.push_back(static_cast<float>(ray.y()));
+        neighbour.sigmas.push_back(RaySigma(view, i));
+        neighbour.largest_sigma = std::max(neighbour.largest_sigma, neighbour.sigmas.back());
       }
     }
     if (neighbour.T_cam_host.t.norm() > kLeastBaseline_m) {
@@ -143,23 +153,45 @@ class Triangulation {
     }
   }
 
-  double Sigma(int host_corner, const Neighbour& neighbour, int corner) const {
-    return std::hypot(RaySigma(host_, host_corner), RaySigma(*neighbour.view, corner),
-                      neighbour.sigma_rad);
+  // Positions in the neighbour's lists, ascending, of corners near the epipolar line. A
+  // single-precision distance throws out most.
+  static std::vector<int> NearLine(const Eigen::Vector3d& line, double host_sigma,
+                                   const Neighbour& neighbour) {
+    constexpr double kSlack = 1.01, kSinglePrecision = 1e-5;
+    const double norm = line.head<2>().norm();
+    const auto reach = static_cast<float>(
+        kSlack * kMaxLineSigmas * norm *
+            std::hypot(host_sigma, neighbour.largest_sigma, neighbour.sigma_rad) +
+        kSinglePrecision * line.norm());
+    const Eigen::Vector3f a = line.cast<float>();
+    const size_t n = neighbour.corners.size();
+    std::vector<float> distances(n);
+    for (size_t k = 0; k < n; ++k) {
+      distances[k] = std::abs(a.x() * neighbour.x[k] + a.y() * neighbour.y[k] + a.z());
+    }
+    std::vector<int> near;
+    for (size_t k = 0; k < n; ++k) {
+      if (distances[k] > reach) {
+        continue;
+      }
+      const double distance = std::abs(line.dot(Ray(*neighbour.view, neighbour.corners[k]))) / norm;
+      if (distance <
+          kMaxLineSigmas * std::hypot(host_sigma, neighbour.sigmas[k], neighbour.sigma_rad)) {
+        near.push_back(static_cast<int>(k));
+      }
+    }
+    return near;
   }
 
   // The nearest descriptor near the epipolar line, if no other there is as near.
-  std::optional<Sight> Find(int host_corner, const Neighbour& neighbour) const {
+  std::optional<Sight> Find(int host_corner, double host_sigma, const Neighbour& neighbour) const {
     const Eigen::Vector3d line =
         neighbour.T_cam_host.t.cross(neighbour.T_cam_host.q * Ray(host_, host_corner));
-    const double norm = line.head<2>().norm();
-    std::vector<int> near;
-    for (const int i : neighbour.corners) {
-      const double distance = std::abs(line.dot(Ray(*neighbour.view, i))) / norm;
-      if (distance < kMaxLineSigmas * Sigma(host_corner, neighbour, i)) {
-        near.push_back(i);
-      }
+    std::vector<int> near = NearLine(line, host_sigma, neighbour);
+    if (near.empty()) {
+      return std::nullopt;
     }
+    std::ranges::transform(near, near.begin(), [&](int k) { return neighbour.corners[k]; });
     const std::vector<Corner>& corners = neighbour.view->keyframe().corners;
     const Descriptor& descriptor = host_.keyframe().corners[host_corner].descriptor;
     const NearestCorner nearest = FindNearest(
@@ -168,8 +200,9 @@ class Triangulation {
     if (nearest.index < 0 || !nearest.PassesRatio(options_.max_ratio)) {
       return std::nullopt;
     }
-    return Sight{&neighbour, nearest.index, Sigma(host_corner, neighbour, nearest.index),
-                 RaySigma(*neighbour.view, nearest.index)};
+    const double sigma = RaySigma(*neighbour.view, nearest.index);
+    return Sight{&neighbour, nearest.index, std::hypot(host_sigma, sigma, neighbour.sigma_rad),
+                 sigma};
   }
 
   // In sigmas, and its derivative by the inverse depth.

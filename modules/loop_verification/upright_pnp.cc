@@ -27,18 +27,25 @@ struct Problem {
   const Eigen::Vector3d& origin_c;
   const Eigen::Vector3d& origin_m;
   double max_chi2;
+  std::vector<Eigen::Matrix3d> R_cam_w = {};  // by observation
 
-  // A truncated quadratic (MSAC). A ray pair constrains one dimension of two: half a vote.
-  double Score(const Rigid3& T_m_c, const std::vector<double>& extra_var) const {
+  // A truncated quadratic (MSAC). A ray pair constrains one dimension of two: half a vote. Or any
+  // score up to `best`, once more than that is out of reach.
+  double Score(const Rigid3& T_m_c, const std::vector<double>& extra_var, double best) const {
+    constexpr double kRounding = 1e-6;
+    const Eigen::Matrix3d R_m_c = T_m_c.R();
     double score = 0;
-    for (size_t i = 0; i < observations.size(); ++i) {
-      score += std::max(0.0, 1 - Chi2(observations[i], T_m_c, extra_var[i]) / max_chi2);
+    auto reach = static_cast<double>(observations.size()) +
+                 0.5 * static_cast<double>(ray_pairs.size()) + kRounding;
+    for (size_t i = 0; i < observations.size() && score + reach > best; ++i, reach -= 1) {
+      const auto residual = Residual(observations[i], T_m_c, R_m_c, R_cam_w[i]);
+      score += std::max(0.0, 1 - Chi2(residual, extra_var[i]) / max_chi2);
     }
     const Eigen::Vector3d baseline = T_m_c * origin_c - origin_m;
-    for (const RayPair& pair : ray_pairs) {
-      score += 0.5 * std::max(0.0, 1 - EpipolarChi2(pair, T_m_c, baseline) / max_chi2);
+    for (size_t i = 0; i < ray_pairs.size() && score + reach > best; ++i, reach -= 0.5) {
+      score += 0.5 * std::max(0.0, 1 - EpipolarChi2(ray_pairs[i], T_m_c, baseline) / max_chi2);
     }
-    return score;
+    return score + reach > best ? score : best;
   }
 
   std::vector<int> Inliers(const Rigid3& T_m_c, const std::vector<double>& extra_var) const {
@@ -114,7 +121,7 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
                                                 const Eigen::Vector3d& origin_c,
                                                 const Eigen::Vector3d& origin_m, double tilt_sigma,
                                                 uint64_t seed, const UprightPnpOptions& options) {
-  const Problem problem{observations, ray_pairs, origin_c, origin_m, options.max_chi2};
+  Problem problem{observations, ray_pairs, origin_c, origin_m, options.max_chi2};
   std::vector<std::vector<int>> samples(2);  // by direction
   std::vector<double> tilt_var(observations.size());
   const std::vector<double> no_tilt(observations.size(), 0.0);
@@ -123,6 +130,7 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
         static_cast<int>(i));
     const double tilt_sigmas = tilt_sigma * SigmaPerRadian(observations[i]);
     tilt_var[i] = tilt_sigmas * tilt_sigmas;
+    problem.R_cam_w.push_back(observations[i].T_cam_w.R());
   }
 
   std::mt19937_64 random(seed);
@@ -137,7 +145,7 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
     const size_t i = random() % sample.size();
     const size_t j = (i + 1 + random() % (sample.size() - 1)) % sample.size();
     for (const Rigid3& T_m_c : Hypotheses(observations[sample[i]], observations[sample[j]])) {
-      const double score = problem.Score(T_m_c, tilt_var);
+      const double score = problem.Score(T_m_c, tilt_var, best_score);
       if (score > best_score) {
         best_score = score;
         best = T_m_c;

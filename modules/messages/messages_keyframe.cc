@@ -96,7 +96,7 @@ std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
     if (!keyframe->camera.Contains(corner.pixel.cast<double>(), -1.0)) {
       return "corner outside the image";
     }
-    if (corner.octave < 0 || corner.octave > 15) {
+    if (corner.octave < 0 || corner.octave >= kNumOctaves) {
       return "octave out of range";
     }
     std::memcpy(corner.descriptor.data(), m.descriptors.data() + i * sizeof(Descriptor),

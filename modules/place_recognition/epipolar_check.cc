@@ -35,9 +35,37 @@ Normal MakeNormal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return {{constant + cosine, 2 * sine, constant - cosine}};
 }
 
+// Coefficients from x^0 up, and as many as are used.
+struct Polynomial {
+  static constexpr int kMaxDegree = 4;
+  std::array<double, kMaxDegree + 1> coefficients{};
+  int degree = 0;
+
+  double At(double x) const {
+    double value = 0;
+    for (int i = degree; i >= 0; --i) {
+      value = value * x + coefficients[i];
+    }
+    return value;
+  }
+  Polynomial Derivative() const {
+    Polynomial derivative{.degree = degree - 1};
+    for (int i = 1; i <= degree; ++i) {
+      derivative.coefficients[i - 1] = static_cast<double>(i) * coefficients[i];
+    }
+    return derivative;
+  }
+};
+
+// Ascending.
+struct Roots {
+  std::array<double, Polynomial::kMaxDegree> x{};
+  int count = 0;
+};
+
 // det[n1 n2 n3] (1 + x^2)^3 has degree 6 and, as at x = i all three normals are perpendicular to
-// (1, i, 0), the factor 1 + x^2; what is left is a quartic. Coefficients from x^0 up.
-std::vector<double> YawPolynomial(const std::array<Normal, kSampleSize>& normals) {
+// (1, i, 0), the factor 1 + x^2; what is left is a quartic.
+Polynomial YawPolynomial(const std::array<Normal, kSampleSize>& normals) {
   std::array<Eigen::Vector3d, 5> cross;
   cross.fill(Eigen::Vector3d::Zero());
   for (int i = 0; i < 3; ++i) {
@@ -51,31 +79,23 @@ std::vector<double> YawPolynomial(const std::array<Normal, kSampleSize>& normals
       sextic[i + j] += cross[i].dot(normals[2].power[j]);
     }
   }
-  std::vector<double> quartic(5);
+  Polynomial quartic{.degree = 4};
   for (int i = 4; i >= 0; --i) {
-    quartic[i] = sextic[i + 2] - (i + 2 <= 4 ? quartic[i + 2] : 0.0);
+    quartic.coefficients[i] = sextic[i + 2] - (i + 2 <= 4 ? quartic.coefficients[i + 2] : 0.0);
   }
   return quartic;
 }
 
-double Evaluate(const std::vector<double>& polynomial, double x) {
-  double value = 0;
-  for (size_t i = polynomial.size(); i-- > 0;) {
-    value = value * x + polynomial[i];
-  }
-  return value;
-}
-
 // The root between two places of opposite sign: Newton's method, kept inside by bisection.
-double RootBetween(const std::vector<double>& polynomial, const std::vector<double>& derivative,
-                   double low, double high) {
+double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, double low,
+                   double high) {
   constexpr int kMaxSteps = 60;
-  const bool low_negative = Evaluate(polynomial, low) < 0;
+  const bool low_negative = polynomial.At(low) < 0;
   double x = 0.5 * (low + high);
   for (int i = 0; i < kMaxSteps; ++i) {
-    const double value = Evaluate(polynomial, x);
+    const double value = polynomial.At(x);
     ((value < 0) == low_negative ? low : high) = x;
-    double next = x - value / Evaluate(derivative, x);
+    double next = x - value / derivative.At(x);
     if (!(next > low && next < high)) {
       next = 0.5 * (low + high);
     }
@@ -88,24 +108,19 @@ double RootBetween(const std::vector<double>& polynomial, const std::vector<doub
   return x;
 }
 
-// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees), each between two roots of
-// the derivative.
-std::vector<double> RealRoots(const std::vector<double>& polynomial) {
+Roots RealRoots(const Polynomial& polynomial) {
   constexpr double kLargestRoot = 1e3;
-  if (polynomial.size() < 2) {
-    return {};
+  Roots roots;
+  if (polynomial.degree < 1) {
+    return roots;
   }
-  std::vector<double> derivative;
-  for (size_t i = 1; i < polynomial.size(); ++i) {
-    derivative.push_back(static_cast<double>(i) * polynomial[i]);
-  }
-  std::vector<double> borders = RealRoots(derivative);
-  borders.push_back(kLargestRoot);
-  std::vector<double> roots;
+  const Polynomial derivative = polynomial.Derivative();
+  const Roots borders = RealRoots(derivative);
   double low = -kLargestRoot;
-  for (const double border : borders) {
-    if ((Evaluate(polynomial, low) < 0) != (Evaluate(polynomial, border) < 0)) {
-      roots.push_back(RootBetween(polynomial, derivative, low, border));
+  for (int i = 0; i <= borders.count; ++i) {
+    const double border = i < borders.count ? borders.x[i] : kLargestRoot;
+    if ((polynomial.At(low) < 0) != (polynomial.At(border) < 0)) {
+      roots.x[roots.count++] = RootBetween(polynomial, derivative, low, border);
     }
     low = border;
   }
@@ -141,6 +156,16 @@ std::vector<int> Inliers(const EpipolarModel& model, const Pairs& pairs, double 
     }
   }
   return inliers;
+}
+
+// How many, as long as they may still be more than `most`.
+size_t CountInliers(const EpipolarModel& model, const Pairs& pairs, double max_residual,
+                    size_t most) {
+  size_t count = 0;
+  for (size_t i = 0; i < pairs.size() && count + (pairs.size() - i) > most; ++i) {
+    count += model.Residual(pairs[i].first, pairs[i].second) <= max_residual ? 1 : 0;
+  }
+  return count;
 }
 
 // On the Sampson residuals of `inliers`.
@@ -203,12 +228,14 @@ int IterationsNeeded(double inlier_ratio, const EpipolarOptions& options) {
   return static_cast<int>(std::min<double>(options.max_iterations, std::ceil(needed)));
 }
 
-std::vector<int> DrawSample(int n, std::mt19937_64& rng) {
-  std::vector<int> sample;
-  while (sample.size() < kSampleSize) {
+using Sample = std::array<int, kSampleSize>;
+
+Sample DrawSample(int n, std::mt19937_64& rng) {
+  Sample sample{};
+  for (auto end = sample.begin(); end != sample.end();) {
     const int i = static_cast<int>(rng() % static_cast<uint64_t>(n));
-    if (std::find(sample.begin(), sample.end(), i) == sample.end()) {
-      sample.push_back(i);
+    if (std::find(sample.begin(), end, i) == end) {
+      *end++ = i;
     }
   }
   return sample;
@@ -230,13 +257,15 @@ double EpipolarModel::Residual(const CornerRay& a, const CornerRay& b) const {
   return std::abs(b_cross_t.dot(w)) / std::sqrt(SampsonVariance(w, a.sigma, b, t_b_a));
 }
 
-std::vector<EpipolarModel> SolveThreePairs(const Pairs& pairs, const std::vector<int>& sample) {
+std::vector<EpipolarModel> SolveThreePairs(const Pairs& pairs, const std::array<int, 3>& sample) {
   std::array<Normal, kSampleSize> normals;
   for (int i = 0; i < kSampleSize; ++i) {
     normals[i] = MakeNormal(pairs[sample[i]].first.direction, pairs[sample[i]].second.direction);
   }
   std::vector<EpipolarModel> models;
-  for (const double x : RealRoots(YawPolynomial(normals))) {
+  const Roots roots = RealRoots(YawPolynomial(normals));
+  for (int i = 0; i < roots.count; ++i) {
+    const double x = roots.x[i];
     const Eigen::Vector3d t = Translation(normals, x);
     models.push_back({YawRotation(2 * std::atan(x)), t});
     models.push_back({YawRotation(2 * std::atan(x)), -t});
@@ -262,7 +291,7 @@ EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed, const EpipolarOp
   int iterations = options.max_iterations;
   for (int i = 0; i < iterations; ++i) {
     for (const EpipolarModel& model : SolveThreePairs(pairs, DrawSample(n, rng))) {
-      const size_t count = Inliers(model, pairs, generous).size();
+      const size_t count = CountInliers(model, pairs, generous, most);
       if (count <= most) {
         continue;
       }

@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -70,7 +71,7 @@ struct EpipolarResult {
 
 // All models that fit three pairs exactly; exposed for its test.
 std::vector<EpipolarModel> SolveThreePairs(
-    const std::vector<std::pair<CornerRay, CornerRay>>& pairs, const std::vector<int>& sample);
+    const std::vector<std::pair<CornerRay, CornerRay>>& pairs, const std::array<int, 3>& sample);
 
 // The same pairs and the same seed give the same result.
 EpipolarResult CheckEpipolar(const std::vector<std::pair<CornerRay, CornerRay>>& pairs,

@@ -18,11 +18,10 @@ struct CornersAndRays {
 };
 
 // Mutual nearest neighbours among the pairs within `max_residual` of the model (which takes a to
-// b), as (corner of a, corner of b), in the order of a.
-std::vector<std::pair<int, int>> MatchAlongEpipolarLines(const CornersAndRays& a,
-                                                         const CornersAndRays& b,
-                                                         const EpipolarModel& model,
-                                                         double max_residual,
-                                                         const MatchingOptions& options);
+// b), as (corner of a, corner of b), in the order of a. `pairs`: PairsWithin RivalDistance at
+// least.
+std::vector<std::pair<int, int>> MatchAlongEpipolarLines(
+    std::vector<CornerMatch> pairs, const CornersAndRays& a, const CornersAndRays& b,
+    const EpipolarModel& model, double max_residual, const MatchingOptions& options);
 
 }  // namespace pangea

@@ -243,7 +243,8 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
     return std::nullopt;
   }
   const RecognisedKeyframe& other = *stored;
-  const TwoViewResult views = CheckTwoViews(query, other, options_.matching, options_.epipolar);
+  TwoViewResult views = CheckTwoViews(query, other, options_.matching, options_.epipolar,
+                                      RivalDistance(options_.guided_matching));
   if (!views.epipolar) {
     ++counters_.rejected_matching;
     match->rejected.push_back(
@@ -265,8 +266,8 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
   candidate.kind = Kind(query.id.map, other.id.map);
   candidate.score = place.score;
   candidate.corner_matches = MatchAlongEpipolarLines(
-      {query.corners, query.rays}, {other.corners, other.rays}, epipolar.model,
-      options_.epipolar.max_residual, options_.guided_matching);
+      std::move(views.pairs), {query.corners, query.rays}, {other.corners, other.rays},
+      epipolar.model, options_.epipolar.max_residual, options_.guided_matching);
   return candidate;
 }
 

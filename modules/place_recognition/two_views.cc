@@ -1,5 +1,6 @@
 #include "place_recognition/two_views.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -22,12 +23,15 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 }  // namespace
 
 TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
-                            const MatchingOptions& matching, const EpipolarOptions& epipolar) {
-  std::vector<CornerMatch> matches = MatchCorners(query.corners, other.corners, matching);
+                            const MatchingOptions& matching, const EpipolarOptions& epipolar,
+                            int pairs_up_to) {
+  TwoViewResult result;
+  result.pairs =
+      PairsWithin(query.corners, other.corners, std::max(pairs_up_to, RivalDistance(matching)));
+  std::vector<CornerMatch> matches = MutualNearest(result.pairs, other.corners, matching);
   std::erase_if(matches, [&](const CornerMatch& m) {
     return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;
   });
-  TwoViewResult result;
   result.num_matches = static_cast<int>(matches.size());
   if (result.num_matches >= epipolar.min_inliers) {
     result.epipolar = CheckEpipolar(RayPairs(query.rays, other.rays, matches),

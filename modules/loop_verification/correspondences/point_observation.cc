@@ -28,12 +28,16 @@ PointObservation MakeObservation(const WindowPair& windows, const PointMatch& ma
 
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
                                          Eigen::Matrix<double, 2, 6>* J) {
+  return Residual(observation, T_m_c, T_m_c.R(), observation.T_cam_w.R(), J);
+}
+
+std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
+                                         const Eigen::Matrix3d& R, const Eigen::Matrix3d& R_cam_w,
+                                         Eigen::Matrix<double, 2, 6>* J) {
   const bool forward = observation.direction == Direction::kForward;
-  const Eigen::Matrix3d R = T_m_c.R();
   // The point in the observing window: y = X^-1 p or X p.
   const Eigen::Vector3d y = forward ? Eigen::Vector3d(R.transpose() * (observation.p_w - T_m_c.t))
                                     : Eigen::Vector3d(R * observation.p_w + T_m_c.t);
-  const Eigen::Matrix3d R_cam_w = observation.T_cam_w.R();
   const Eigen::Vector3d p_cam = R_cam_w * y + observation.T_cam_w.t;
   if (p_cam.z() < kMinDepth) {
     return std::nullopt;
@@ -59,8 +63,7 @@ std::optional<WhitenedResidual> Residual(const PointObservation& observation, co
                           J_y * (R_observer_holder * observation.depth_sigma_w)};
 }
 
-double Chi2(const PointObservation& observation, const Rigid3& T_m_c, double extra_var) {
-  const auto residual = Residual(observation, T_m_c);
+double Chi2(const std::optional<WhitenedResidual>& residual, double extra_var) {
   if (!residual) {
     return std::numeric_limits<double>::infinity();
   }

@@ -40,9 +40,18 @@ struct WhitenedResidual {
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
                                          Eigen::Matrix<double, 2, 6>* J = nullptr);
 
+// The same with the rotations at hand: of T_m_c and of the observation's T_cam_w.
+std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
+                                         const Eigen::Matrix3d& R_m_c,
+                                         const Eigen::Matrix3d& R_cam_w,
+                                         Eigen::Matrix<double, 2, 6>* J = nullptr);
+
 // Squared Mahalanobis distance under the pixel noise, `extra_var` more of it (in sigma^2), and the
 // depth's uncertainty; infinite behind the camera.
-double Chi2(const PointObservation& observation, const Rigid3& T_m_c, double extra_var = 0);
+double Chi2(const std::optional<WhitenedResidual>& residual, double extra_var = 0);
+inline double Chi2(const PointObservation& observation, const Rigid3& T_m_c, double extra_var = 0) {
+  return Chi2(Residual(observation, T_m_c), extra_var);
+}
 
 struct PoseEstimate {
   Rigid3 T_m_c;

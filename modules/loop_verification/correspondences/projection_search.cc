@@ -3,9 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 
+#include "core/matching.h"
 #include "core/nearest_corner.h"
 
 namespace pangea {
@@ -178,24 +180,32 @@ std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction d
   const Window& holder = windows.Holder(direction);
   const Window& observer = windows.Observer(direction);
   const int frame = observer.newest();
-  const Keyframe& keyframe = observer.keyframe(frame);
-  std::vector<int> corners;
-  for (size_t i = 0; i < keyframe.corners.size(); ++i) {
-    if (observer.frames[frame]->has_ray(static_cast<int>(i))) {
-      corners.push_back(static_cast<int>(i));
-    }
-  }
+  const KeyframeView& view = *observer.frames[frame];
+  const std::vector<Corner>& corners = view.keyframe().corners;
+  const DescriptorList descriptors(corners);
+  const auto rival_distance =
+      static_cast<uint64_t>(RivalDistance({.max_distance = max_hamming, .max_ratio = max_ratio}));
+  std::vector<uint64_t> distances(corners.size()), nearest_view(corners.size());
+  std::vector<int> rivals;
   std::vector<PointMatch> matches;
   for (size_t l = 0; l < holder.landmarks.size(); ++l) {
     // The newest view of it stands for all: M times the comparisons gain little here.
-    WindowLandmark newest = holder.landmarks[l];
-    std::erase_if(newest.observations, [last = newest.observations.back().frame](
-                                           const CornerRef& ref) { return ref.frame != last; });
-    const auto distance_of = [&](int i) {
-      return LandmarkDistance(holder, newest, keyframe.corners[i].descriptor);
-    };
-    const NearestCorner nearest =
-        FindNearest(keyframe.corners, corners, distance_of, max_hamming, kSamePx);
+    const std::vector<CornerRef>& seen = holder.landmarks[l].observations;
+    std::ranges::fill(distances, kNoDistance);
+    for (auto ref = seen.rbegin(); ref != seen.rend() && ref->frame == seen.back().frame; ++ref) {
+      descriptors.Distances(holder.corner(*ref).descriptor, &nearest_view);
+      std::ranges::transform(distances, nearest_view, distances.begin(),
+                             [](uint64_t a, uint64_t b) { return std::min(a, b); });
+    }
+    rivals.clear();
+    for (size_t i = 0; i < corners.size(); ++i) {
+      if (distances[i] <= rival_distance && view.has_ray(static_cast<int>(i))) {
+        rivals.push_back(static_cast<int>(i));
+      }
+    }
+    const NearestCorner nearest = FindNearest(
+        corners, rivals, [&](int i) { return static_cast<int>(distances[i]); }, max_hamming,
+        kSamePx);
     if (nearest.index >= 0 && nearest.distance < max_ratio * nearest.second) {
       matches.push_back({direction, static_cast<int>(l), {frame, nearest.index}, nearest.distance});
     }

@@ -21,14 +21,17 @@ double LoopVerificationReport::Measured(std::string_view option) const {
 }
 
 Verification::Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
-                           const PlaceCandidate& candidate, const LoopVerificationGate& gate)
+                           const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+                           WindowCache* window_cache)
     : options(options),
       keyframes(keyframes),
       candidate(candidate),
       gate(gate),
-      windows{MakeWindow(Last(keyframes.m, options.window.num_keyframes), options.window,
-                         keyframes.after_m),
-              MakeWindow(Last(keyframes.c, options.window.num_keyframes), options.window)} {}
+      window_cache(*window_cache),
+      windows{window_cache->Make(Last(keyframes.m, options.window.num_keyframes), options.window,
+                                 keyframes.after_m),
+              window_cache->Make(Last(keyframes.c, options.window.num_keyframes), options.window)} {
+}
 
 bool Verification::AtLeast(std::string_view option, double value, double limit) {
   report.measured.push_back({step, option, value, true, limit});

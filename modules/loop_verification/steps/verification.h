@@ -14,6 +14,7 @@
 #include "loop_verification/joint_ba/joint_ba.h"
 #include "loop_verification/upright_pnp.h"
 #include "loop_verification/window.h"
+#include "loop_verification/window_cache.h"
 
 namespace pangea {
 
@@ -67,12 +68,14 @@ struct CandidateKeyframes {
 
 struct Verification {
   Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
-               const PlaceCandidate& candidate, const LoopVerificationGate& gate);
+               const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+               WindowCache* window_cache);
 
   const CommonStepOptions& options;
   const CandidateKeyframes& keyframes;
   const PlaceCandidate& candidate;
   const LoopVerificationGate& gate;
+  WindowCache& window_cache;
   WindowPair windows;
   double guess_tilt_sigma = 0;  // radians, of roll and pitch between the windows
 
