@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 namespace pangea {
@@ -17,30 +18,47 @@ double PositionTrace(const Matrix6d& covariance) {
 }  // namespace
 
 template <typename Visit>
-void InformationShare::ForEachBlock(Eigen::Index size, const Visit& visit) const {
+void InformationShare::ForEachBlock(const MatrixXd& H, const std::vector<int>& columns,
+                                    Eigen::Index size, const Visit& visit) {
+  // All but the last are of six, and of a size that the compiler knows.
+  const size_t last = columns.size() - 1;
   for (size_t a = 0; a < columns.size(); ++a) {
     for (size_t b = 0; b < columns.size(); ++b) {
-      if (columns[a] < size && columns[b] < size) {
-        visit(H.block(6 * static_cast<Eigen::Index>(a), 6 * static_cast<Eigen::Index>(b),
-                      BlockSize(a), BlockSize(b)),
-              columns[a], columns[b]);
+      const auto row = static_cast<Eigen::Index>(6 * a), column = static_cast<Eigen::Index>(6 * b);
+      if (columns[a] >= size || columns[b] >= size) {
+        continue;
+      }
+      if (a < last && b < last) {
+        visit(H.block<6, 6>(row, column), columns[a], columns[b]);
+      } else if (a < last) {
+        visit(H.block<6, 1>(row, column), columns[a], columns[b]);
+      } else if (b < last) {
+        visit(H.block<1, 6>(row, column), columns[a], columns[b]);
+      } else {
+        visit(H.block<1, 1>(row, column), columns[a], columns[b]);
       }
     }
   }
 }
 
-void InformationShare::AddTo(double factor, MatrixXd* whole) const {
-  ForEachBlock(whole->cols(), [&](const auto& block, int row, int column) {
+void InformationShare::Add(const MatrixXd& H, const std::vector<int>& columns, double factor,
+                           MatrixXd* whole) {
+  ForEachBlock(H, columns, whole->cols(), [&](const auto& block, int row, int column) {
+    using Block = std::decay_t<decltype(block)>;
     if (row >= column) {
-      whole->block(row, column, block.rows(), block.cols()) += factor * block;
+      whole->block<Block::RowsAtCompileTime, Block::ColsAtCompileTime>(row, column) +=
+          factor * block;
     }
   });
 }
 
 double InformationShare::Dot(const MatrixXd& whole) const {
   double sum = 0;
-  ForEachBlock(whole.cols(), [&](const auto& block, int row, int column) {
-    sum += whole.block(row, column, block.rows(), block.cols()).cwiseProduct(block).sum();
+  ForEachBlock(H, columns, whole.cols(), [&](const auto& block, int row, int column) {
+    using Block = std::decay_t<decltype(block)>;
+    sum += whole.block<Block::RowsAtCompileTime, Block::ColsAtCompileTime>(row, column)
+               .cwiseProduct(block)
+               .sum();
   });
   return sum;
 }

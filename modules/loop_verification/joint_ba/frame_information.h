@@ -19,15 +19,17 @@ struct InformationShare {
   std::vector<int> columns;
 
   // factor * H into the lower triangle of the whole.
-  void AddTo(double factor, Eigen::MatrixXd* whole) const;
+  void AddTo(double factor, Eigen::MatrixXd* whole) const { Add(H, columns, factor, whole); }
+  static void Add(const Eigen::MatrixXd& H, const std::vector<int>& columns, double factor,
+                  Eigen::MatrixXd* whole);
   // The sum of products of its entries with those of a symmetric matrix of the whole's size.
   double Dot(const Eigen::MatrixXd& whole) const;
 
  private:
-  int BlockSize(size_t block) const { return block + 1 < columns.size() ? 6 : 1; }
   // visit(block of H, row, column): with rows and columns of the whole.
   template <typename Visit>
-  void ForEachBlock(Eigen::Index size, const Visit& visit) const;
+  static void ForEachBlock(const Eigen::MatrixXd& H, const std::vector<int>& columns,
+                           Eigen::Index size, const Visit& visit);
 };
 
 // Points that are one landmark.

@@ -50,6 +50,33 @@ Matrix36 Moved(const Vector3d& p_w, const PosedCamera& camera) {
   return A;
 }
 
+using Matrix3N = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Y = L^-1 Y. By rows: Eigen's solver is made for larger matrices, as is its product below.
+void SolveLowerInPlace(const Matrix3d& L, Matrix3N* Y) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < i; ++j) {
+      Y->row(i) -= L(i, j) * Y->row(j);
+    }
+    Y->row(i) *= 1 / L(i, i);
+  }
+}
+
+// H - Y^T Y, from H's lower triangle.
+void SubtractSquare(const Matrix3N& Y, Eigen::MatrixXd* H) {
+  const Eigen::Index n = Y.cols();
+  const double *y0 = Y.data(), *y1 = y0 + n, *y2 = y1 + n;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    double* const column = H->data() + j * n;
+    for (Eigen::Index i = j; i < n; ++i) {
+      column[i] -= y0[i] * y0[j] + y1[i] * y1[j] + y2[i] * y2[j];
+    }
+    for (Eigen::Index i = 0; i < j; ++i) {
+      column[i] = (*H)(j, i);
+    }
+  }
+}
+
 }  // namespace
 
 double RobustLoss::Cost(double squared_residual) const {
@@ -132,7 +159,8 @@ EliminatedPoint Eliminate(const HostedPoint& hosted, const Vector3d& point,
   EliminatedPoint out;
   out.H.setZero(scale + 1, scale + 1);
   out.g.setZero(scale + 1);
-  Eigen::Matrix<double, 3, Eigen::Dynamic> W(3, scale + 1);
+  auto& W = out.Y;  // of the point by e, until the point is eliminated
+  W.setZero(3, scale + 1);
   Matrix3d N = Matrix3d::Zero();  // sum of J^T J, by p_w
   Vector3d n = Vector3d::Zero();
   for (size_t i = 0; i < hosted.seen.size(); ++i) {
@@ -172,10 +200,9 @@ EliminatedPoint Eliminate(const HostedPoint& hosted, const Vector3d& point,
 
   V.diagonal() *= 1 + damping;
   out.L = V.llt().matrixL();
-  out.Y = out.L.triangularView<Eigen::Lower>().solve(W);
+  SolveLowerInPlace(out.L, &out.Y);
   out.d = out.L.triangularView<Eigen::Lower>().solve(g_point);
-  out.H.triangularView<Eigen::Lower>() -= out.Y.transpose() * out.Y;
-  out.H.triangularView<Eigen::StrictlyUpper>() = out.H.transpose();
+  SubtractSquare(out.Y, &out.H);
   out.g -= out.Y.transpose() * out.d;
   return out;
 }

@@ -73,7 +73,7 @@ struct EliminatedPoint {
   Eigen::VectorXd g;
   Eigen::Matrix3d L;  // V = L L^T, damped
   Eigen::Vector3d d;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> Y;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> Y;
 
   Eigen::Vector3d Step(const Eigen::VectorXd& e) const;
 };

@@ -194,11 +194,12 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
     out.H(ScaleColumn(side), ScaleColumn(side)) += information;
     out.g[ScaleColumn(side)] += information * state.log_scale[side];
   }
-  const auto add = [&out](const InformationShare& share, const Eigen::VectorXd& g) {
-    share.AddTo(1, &out.H);
-    for (size_t block = 0; block < share.columns.size(); ++block) {
-      const int size = block + 1 < share.columns.size() ? 6 : 1;
-      out.g.segment(share.columns[block], size) += g.segment(static_cast<int>(6 * block), size);
+  const auto add = [&out](const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                          const std::vector<int>& columns) {
+    InformationShare::Add(H, columns, 1, &out.H);
+    for (size_t block = 0; block < columns.size(); ++block) {
+      const int size = block + 1 < columns.size() ? 6 : 1;
+      out.g.segment(columns[block], size) += g.segment(static_cast<int>(6 * block), size);
     }
   };
   for (const Edge& edge : edges_) {
@@ -207,15 +208,15 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
                                               state.log_scale[edge.side], &jacobians);
     Eigen::Matrix<double, 6, 13> J;
     J << jacobians.from, jacobians.to, jacobians.scale;
-    add({J.transpose() * J, {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)}},
-        J.transpose() * r);
+    add(J.transpose() * J, J.transpose() * r,
+        {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)});
   }
   const std::vector<PosedCamera> cameras = Cameras(state);
   out.points.reserve(points_.size());
   for (size_t p = 0; p < points_.size(); ++p) {
     const double kappa = state.log_scale[points_[p].side];
     out.points.push_back(Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping));
-    add({out.points.back().H, ColumnsOf(points_[p])}, out.points.back().g);
+    add(out.points.back().H, out.points.back().g, ColumnsOf(points_[p]));
   }
   out.H.conservativeResize(n, n);
   out.g.conservativeResize(n);
