@@ -62,7 +62,8 @@ int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   }
   if (size() % kPackEvery == 0) {
     PostingLists& postings = tables_[size() / kPackEvery % kTables].postings;
-    if (postings.num_waiting() > std::max(kNumWords, postings.num_packed() / kPackShare)) {
+    if (postings.num_waiting() >
+        std::max(kNumWords / kWordsAPosting, postings.num_packed() / kPackShare)) {
       postings.Pack();
     }
   }
@@ -84,34 +85,45 @@ bool DescriptorIndex::Restore(ByteReader* reader) {
 }
 
 template <typename Visit>
-void DescriptorIndex::Probe(const Descriptor& descriptor, size_t phase, Visit visit) const {
-  for (const Table& table : tables_) {
-    const uint32_t signature = table.Signature(descriptor);
-    table.postings.Sample(table.Word(descriptor), kMaxPostingsPerWord, phase,
+void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) const {
+  // The lists lie far apart in memory: they are fetched some words ahead.
+  constexpr size_t kBeginAhead = 24, kListsAhead = 12;
+  std::vector<uint32_t> words(kTables * corners.size());
+  for (size_t i = 0; i < words.size(); ++i) {
+    words[i] = tables_[i % kTables].Word(corners[i / kTables].descriptor);
+  }
+  for (size_t i = 0; i < words.size(); ++i) {
+    if (const size_t ahead = i + kBeginAhead; ahead < words.size()) {
+      tables_[ahead % kTables].postings.PrefetchBegin(words[ahead]);
+    }
+    if (const size_t ahead = i + kListsAhead; ahead < words.size()) {
+      tables_[ahead % kTables].postings.PrefetchLists(words[ahead]);
+    }
+    const Table& table = tables_[i % kTables];
+    const size_t corner = i / kTables;
+    const uint32_t signature = table.Signature(corners[corner].descriptor);
+    // Which corner it is rotates the sample.
+    table.postings.Sample(words[i], kMaxPostingsPerWord, corner,
                           [&](int32_t keyframe, uint32_t posted) {
-                            visit(keyframe, std::popcount(posted ^ signature));
+                            visit(corner, keyframe, std::popcount(posted ^ signature));
                           });
   }
 }
 
 std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) const {
-  std::vector<float> votes(size(), 0.0f);
-  std::vector<int> last_voter(size(), -1);
-  std::vector<int32_t> met;
-  const double most = std::log(1.0 + size());
-  for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
-    met.clear();
-    Probe(corners[i].descriptor, i, [&](int32_t keyframe, int distance) {
-      if (last_voter[keyframe] != i && distance <= kMaxSignatureDistance) {
-        last_voter[keyframe] = i;
-        met.push_back(keyframe);
-      }
-    });
-    if (met.empty()) {
-      continue;
+  std::vector<std::vector<int32_t>> met(corners.size());
+  std::vector<size_t> last_voter(size(), corners.size());
+  Probe(corners, [&](size_t corner, int32_t keyframe, int distance) {
+    if (last_voter[keyframe] != corner && distance <= kMaxSignatureDistance) {
+      last_voter[keyframe] = corner;
+      met[corner].push_back(keyframe);
     }
-    const double weight = std::log((1.0 + size()) / static_cast<double>(met.size()));
-    for (const int32_t keyframe : met) {
+  });
+  std::vector<float> votes(size(), 0.0f);
+  const double most = std::log(1.0 + size());
+  for (const std::vector<int32_t>& keyframes : met) {
+    const double weight = std::log((1.0 + size()) / static_cast<double>(keyframes.size()));
+    for (const int32_t keyframe : keyframes) {
       votes[keyframe] += static_cast<float>(weight);
     }
   }
@@ -123,9 +135,7 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
 
 int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
   int64_t count = 0;
-  for (size_t i = 0; i < corners.size(); ++i) {
-    Probe(corners[i].descriptor, i, [&](int32_t, int) { ++count; });
-  }
+  Probe(corners, [&](size_t, int32_t, int) { ++count; });
   return count;
 }
 

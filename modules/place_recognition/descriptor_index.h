@@ -51,9 +51,11 @@ class DescriptorIndex {
   // about this many: bounds its time without forgetting the place.
   static constexpr size_t kMaxPostingsPerWord = 128;
   // After so many keyframes it is one table's turn, next time the next one's. It is packed if one
-  // posting a word waits, and this share of what is packed, so that the work of n keyframes does
-  // not grow with n squared. Not more waits, since each that does is far from the next in memory.
-  static constexpr int kPackEvery = 20;
+  // posting waits for so many words, and this share of what is packed, so that the work of n
+  // keyframes does not grow with n squared. Not more waits, since each that does is far from the
+  // next in memory.
+  static constexpr int kPackEvery = 10;
+  static constexpr size_t kWordsAPosting = 8;
   static constexpr size_t kPackShare = 32;
 
   struct Table {
@@ -64,10 +66,10 @@ class DescriptorIndex {
     uint32_t Word(const Descriptor& descriptor) const;
     uint32_t Signature(const Descriptor& descriptor) const;
   };
-  // Calls visit(keyframe, distance of signatures) for each posting a corner meets; `phase` rotates
-  // the sample.
+  // Calls visit(corner, keyframe, distance of signatures) for each posting a corner meets, corner
+  // by corner.
   template <typename Visit>
-  void Probe(const Descriptor& descriptor, size_t phase, Visit visit) const;
+  void Probe(const std::vector<Corner>& corners, Visit visit) const;
 
   std::array<Table, kTables> tables_;
   std::vector<int> num_corners_;  // of each keyframe

@@ -108,22 +108,53 @@ double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, d
   return x;
 }
 
-Roots RealRoots(const Polynomial& polynomial) {
-  constexpr double kLargestRoot = 1e3;
+// Those in [-1, 1], each between two roots of the derivative.
+Roots RootsWithinOne(const Polynomial& polynomial) {
   Roots roots;
   if (polynomial.degree < 1) {
     return roots;
   }
   const Polynomial derivative = polynomial.Derivative();
-  const Roots borders = RealRoots(derivative);
-  double low = -kLargestRoot;
+  const Roots borders = RootsWithinOne(derivative);
+  double low = -1;
+  bool low_negative = polynomial.At(low) < 0;
   for (int i = 0; i <= borders.count; ++i) {
-    const double border = i < borders.count ? borders.x[i] : kLargestRoot;
-    if ((polynomial.At(low) < 0) != (polynomial.At(border) < 0)) {
+    const double border = i < borders.count ? borders.x[i] : 1;
+    const bool border_negative = polynomial.At(border) < 0;
+    if (low_negative != border_negative) {
       roots.x[roots.count++] = RootBetween(polynomial, derivative, low, border);
     }
     low = border;
+    low_negative = border_negative;
   }
+  return roots;
+}
+
+// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees). Those beyond 1 are the
+// inverse roots of the reversed polynomial: no search begins far from its root.
+Roots RealRoots(const Polynomial& polynomial) {
+  constexpr double kLargestRoot = 1e3;
+  Polynomial reversed = polynomial;
+  std::reverse(reversed.coefficients.begin(),
+               reversed.coefficients.begin() + polynomial.degree + 1);
+  const Roots inverse = RootsWithinOne(reversed);
+  const Roots inner = RootsWithinOne(polynomial);
+  Roots roots;
+  const auto take = [&roots](double x) {
+    if (std::abs(x) <= kLargestRoot && roots.count < Polynomial::kMaxDegree) {
+      roots.x[roots.count++] = x;
+    }
+  };
+  const auto take_inverse = [&](bool negative) {
+    for (int i = inverse.count - 1; i >= 0; --i) {
+      if ((inverse.x[i] < 0) == negative) {
+        take(1 / inverse.x[i]);
+      }
+    }
+  };
+  take_inverse(true);
+  std::for_each_n(inner.x.begin(), inner.count, take);
+  take_inverse(false);
   return roots;
 }
 

@@ -33,6 +33,19 @@ class PostingLists {
   size_t num_packed() const { return num_packed_; }
   size_t num_waiting() const { return waiting_.size(); }
 
+  // What Sample will read of the word, so that the processor has it: first where its lists begin,
+  // some words later the lists.
+  void PrefetchBegin(uint32_t word) const {
+    __builtin_prefetch(&begin_[word]);
+    __builtin_prefetch(&newest_[word]);
+  }
+  void PrefetchLists(uint32_t word) const {
+    __builtin_prefetch(packed_.data() + begin_[word]);
+    if (newest_[word] != kNone) {
+      __builtin_prefetch(&waiting_[newest_[word]]);
+    }
+  }
+
   // Calls visit(keyframe, signature), in any order, for the word's postings; of those that have
   // more than `most`, for an even sample of about this many, which `phase` rotates.
   template <typename Visit>
