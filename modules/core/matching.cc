@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <span>
 
 #include "core/nearest_corner.h"
 
@@ -27,8 +28,7 @@ constexpr double kCellPx = 32.0;
     const uint64_t* const* words, const Descriptor& descriptor, size_t count, uint64_t* distances) {
   HammingDistances(words, descriptor, count, distances);
 }
-[[gnu::target("avx512vpopcntdq,avx512vl")]] uint64_t VectorLeast(
-    const std::vector<uint64_t>& values) {
+[[gnu::target("avx512vpopcntdq,avx512vl")]] uint64_t VectorLeast(std::span<const uint64_t> values) {
   uint64_t least = ~uint64_t{0};
   for (const uint64_t value : values) {
     least = std::min(least, value);
@@ -39,7 +39,7 @@ const bool kHasVectors =
     __builtin_cpu_supports("avx512vpopcntdq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
 #else
 constexpr auto VectorHammingDistances = HammingDistances;
-constexpr uint64_t VectorLeast(const std::vector<uint64_t>&) { return 0; }
+constexpr uint64_t VectorLeast(std::span<const uint64_t>) { return 0; }
 constexpr bool kHasVectors = false;
 #endif
 
@@ -65,17 +65,23 @@ void DescriptorList::Distances(const Descriptor& descriptor,
 
 std::vector<CornerMatch> PairsWithin(const std::vector<Corner>& a, const std::vector<Corner>& b,
                                      int max_distance) {
+  constexpr size_t kBatch = 64;
   const DescriptorList descriptors(b);
   std::vector<uint64_t> distances(b.size());
   std::vector<CornerMatch> pairs;
+  const auto up_to = static_cast<uint64_t>(max_distance);
   for (size_t i = 0; i < a.size(); ++i) {
     descriptors.Distances(a[i].descriptor, &distances);
-    if (kHasVectors && VectorLeast(distances) > static_cast<uint64_t>(max_distance)) {
-      continue;  // most have none
-    }
-    for (size_t j = 0; j < b.size(); ++j) {
-      if (distances[j] <= static_cast<uint64_t>(max_distance)) {
-        pairs.push_back({static_cast<int>(i), static_cast<int>(j), static_cast<int>(distances[j])});
+    for (size_t begin = 0; begin < b.size(); begin += kBatch) {
+      const auto batch = std::span(distances).subspan(begin, std::min(kBatch, b.size() - begin));
+      if (kHasVectors && VectorLeast(batch) > up_to) {
+        continue;  // most have none
+      }
+      for (size_t j = begin; j < begin + batch.size(); ++j) {
+        if (distances[j] <= up_to) {
+          pairs.push_back(
+              {static_cast<int>(i), static_cast<int>(j), static_cast<int>(distances[j])});
+        }
       }
     }
   }
