@@ -146,9 +146,9 @@ Vector3d EliminatedPoint::Step(const Eigen::VectorXd& e) const {
   return -L.transpose().triangularView<Eigen::Upper>().solve(d + Y * e);
 }
 
-EliminatedPoint Eliminate(const HostedPoint& hosted, const Vector3d& point,
-                          const std::vector<PosedCamera>& cameras, double kappa,
-                          const RobustLoss& loss, double damping) {
+void Eliminate(const HostedPoint& hosted, const Vector3d& point,
+               const std::vector<PosedCamera>& cameras, double kappa, const RobustLoss& loss,
+               double damping, EliminatedPoint* eliminated) {
   const auto scale = static_cast<Eigen::Index>(6 * (1 + hosted.seen.size()));
   const PosedCamera& host = cameras[hosted.host];
   const Vector3d p_w = InWorld(point, host);
@@ -156,7 +156,7 @@ EliminatedPoint Eliminate(const HostedPoint& hosted, const Vector3d& point,
   M << host.R_w_cam.leftCols<2>() / point.z(), -(p_w - host.p_w_cam) / point.z();
   const Matrix36 A_host = Moved(p_w, host);
 
-  EliminatedPoint out;
+  EliminatedPoint& out = *eliminated;
   out.H.setZero(scale + 1, scale + 1);
   out.g.setZero(scale + 1);
   auto& W = out.Y;  // of the point by e, until the point is eliminated
@@ -204,7 +204,6 @@ EliminatedPoint Eliminate(const HostedPoint& hosted, const Vector3d& point,
   out.d = out.L.triangularView<Eigen::Lower>().solve(g_point);
   SubtractSquare(out.Y, &out.H);
   out.g -= out.Y.transpose() * out.d;
-  return out;
 }
 
 }  // namespace pangea

@@ -80,8 +80,8 @@ struct EliminatedPoint {
 
 // At a state in which no point is behind a camera that sees it. `damping`: Levenberg-Marquardt's,
 // of the point.
-EliminatedPoint Eliminate(const HostedPoint& hosted, const Eigen::Vector3d& point,
-                          const std::vector<PosedCamera>& cameras, double kappa,
-                          const RobustLoss& loss, double damping);
+void Eliminate(const HostedPoint& hosted, const Eigen::Vector3d& point,
+               const std::vector<PosedCamera>& cameras, double kappa, const RobustLoss& loss,
+               double damping, EliminatedPoint* eliminated);
 
 }  // namespace pangea

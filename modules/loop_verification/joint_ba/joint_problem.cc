@@ -76,6 +76,11 @@ bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vect
       AddMatch(matches[i], i, mutual[i] ? std::sqrt(0.5) : 1.0);
     }
   }
+  columns_.clear();
+  for (const HostedPoint& point : points_) {
+    columns_.push_back(ColumnsOf(point));
+  }
+  eliminated_.resize(points_.size());
   if (!std::isfinite(Cost(state_, loss))) {
     return false;
   }
@@ -88,8 +93,8 @@ bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vect
       [](const JointState&, const JointEquations& equations) {
         return SolveScaled(equations.H, equations.g);
       },
-      [&](const JointEquations& equations, const Eigen::VectorXd& step, JointState* state) {
-        Move(equations, step, state);
+      [&](const JointEquations&, const Eigen::VectorXd& step, JointState* state) {
+        Move(step, state);
       },
       [&](const JointState& state) { return Cost(state, loss); }, &state_);
   for (const int side : {kSideM, kSideC}) {
@@ -182,7 +187,7 @@ std::vector<int> JointProblem::ColumnsOf(const HostedPoint& point) const {
 }
 
 JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss& loss,
-                                       double damping) const {
+                                       double damping) {
   const int n = num_columns();
   JointEquations out;
   // The held frame's columns are cut off at the end.
@@ -212,19 +217,17 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
         {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)});
   }
   const std::vector<PosedCamera> cameras = Cameras(state);
-  out.points.reserve(points_.size());
   for (size_t p = 0; p < points_.size(); ++p) {
     const double kappa = state.log_scale[points_[p].side];
-    out.points.push_back(Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping));
-    add(out.points.back().H, out.points.back().g, ColumnsOf(points_[p]));
+    Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping, &eliminated_[p]);
+    add(eliminated_[p].H, eliminated_[p].g, columns_[p]);
   }
   out.H.conservativeResize(n, n);
   out.g.conservativeResize(n);
   return out;
 }
 
-void JointProblem::Move(const JointEquations& equations, const Eigen::VectorXd& step,
-                        JointState* state) const {
+void JointProblem::Move(const Eigen::VectorXd& step, JointState* state) const {
   for (int f = 0; f + 1 < num_frames(); ++f) {
     state->T_w_body[f] = state->T_w_body[f].Plus(step.segment<6>(PoseColumn(f)));
   }
@@ -232,7 +235,7 @@ void JointProblem::Move(const JointEquations& equations, const Eigen::VectorXd& 
     state->log_scale[side] += step[ScaleColumn(side)];
   }
   for (size_t p = 0; p < points_.size(); ++p) {
-    const std::vector<int> columns = ColumnsOf(points_[p]);
+    const std::vector<int>& columns = columns_[p];
     Eigen::VectorXd e = Eigen::VectorXd::Zero(static_cast<int>(6 * (columns.size() - 1)) + 1);
     for (size_t block = 0; block < columns.size(); ++block) {
       const int size = block + 1 < columns.size() ? 6 : 1;
@@ -240,7 +243,7 @@ void JointProblem::Move(const JointEquations& equations, const Eigen::VectorXd& 
         e.segment(static_cast<int>(6 * block), size) = step.segment(columns[block], size);
       }
     }
-    state->points[p] += equations.points[p].Step(e);
+    state->points[p] += eliminated_[p].Step(e);
   }
 }
 
@@ -262,7 +265,7 @@ void JointProblem::Classify(std::vector<bool>* inlier, double* chi2_sum) const {
 }
 
 std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
-    const std::vector<PointMatch>& matches, const std::vector<bool>& use) const {
+    const std::vector<PointMatch>& matches, const std::vector<bool>& use) {
   JointEquations equations = Linearise(state_, {RobustLoss::Kind::kNone}, 0);
   const auto all = CovarianceOfFirst(equations.H);
   if (!all) {
@@ -270,7 +273,7 @@ std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
   }
   std::vector<InformationShare> shares;
   for (size_t p = 0; p < points_.size(); ++p) {
-    shares.push_back({std::move(equations.points[p].H), ColumnsOf(points_[p])});
+    shares.push_back({std::move(eliminated_[p].H), columns_[p]});
   }
   const std::vector<JoinedPoints> landmarks = Landmarks(matches, use);
   const auto without_one = CovarianceWithoutOne(equations.H, shares, landmarks);

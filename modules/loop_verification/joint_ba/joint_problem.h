@@ -44,7 +44,6 @@ struct JointEquations {
   double cost = 0;
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  std::vector<EliminatedPoint> points;
 };
 
 class JointProblem {
@@ -74,7 +73,7 @@ class JointProblem {
     std::optional<Matrix6d> of_sure;  // nothing when they do not fix it
   };
   std::optional<Marginals> MarginalsOfNewestC(const std::vector<PointMatch>& matches,
-                                              const std::vector<bool>& use) const;
+                                              const std::vector<bool>& use);
 
   // The last problem's pieces, for tests against another solver.
   struct Edge {
@@ -87,7 +86,7 @@ class JointProblem {
   const std::vector<Rigid3>& T_body_cam() const { return T_body_cam_; }
   double ScaleSigma(int side) const;
   double Cost(const JointState& state, const RobustLoss& loss) const;
-  JointEquations Linearise(const JointState& state, const RobustLoss& loss, double damping) const;
+  JointEquations Linearise(const JointState& state, const RobustLoss& loss, double damping);
 
  private:
   int num_frames() const { return static_cast<int>(T_body_cam_.size()); }
@@ -99,7 +98,8 @@ class JointProblem {
 
   std::vector<PosedCamera> Cameras(const JointState& state) const;
   std::vector<int> ColumnsOf(const HostedPoint& point) const;
-  void Move(const JointEquations& equations, const Eigen::VectorXd& step, JointState* state) const;
+  // By the last linearisation's points.
+  void Move(const Eigen::VectorXd& step, JointState* state) const;
 
   void AddMatch(const PointMatch& match, size_t index, double share);
   std::vector<bool> MutualMatches(const std::vector<PointMatch>& matches,
@@ -122,7 +122,9 @@ class JointProblem {
   // By side and landmark: where the last solve left it, and its index in points_ or -1.
   std::array<std::vector<Eigen::Vector3d>, 2> solved_;
   std::array<std::vector<int>, 2> index_;
-  std::vector<HostedPoint> points_;  // those that matches use
+  std::vector<HostedPoint> points_;          // those that matches use
+  std::vector<std::vector<int>> columns_;    // of each
+  std::vector<EliminatedPoint> eliminated_;  // each, in the last linearisation
   JointState state_;
 };
 

@@ -117,7 +117,9 @@ class HostedPointTest : public testing::Test {
     for (int frame = 0; frame < 3; ++frame) {
       cameras.emplace_back(T_w_body_[frame], T_body_cam_[frame]);
     }
-    return Eliminate(hosted_, point_, cameras, kKappa, loss, damping);
+    EliminatedPoint eliminated;
+    Eliminate(hosted_, point_, cameras, kKappa, loss, damping, &eliminated);
+    return eliminated;
   }
 
   static constexpr double kKappa = 0.05;
