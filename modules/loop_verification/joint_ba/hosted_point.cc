@@ -1,6 +1,7 @@
 #include "loop_verification/joint_ba/hosted_point.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -11,7 +12,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
 constexpr double kMinDepth = 0.02;  // metres; a step that brings a point nearer is refused
 constexpr double kMinInverseDepth = 1e-4;
@@ -43,38 +43,34 @@ std::optional<WhitenedSighting> Project(const HostedPoint::Sighting& sighting, c
   return projection;
 }
 
-// How a point in the world moves with an error of a body's pose on which it hangs.
-Matrix36 Moved(const Vector3d& p_w, const PosedCamera& camera) {
-  Matrix36 A;
-  A << Matrix3d::Identity(), -Hat(p_w - camera.p_w_body);
-  return A;
+// X [v]x
+Matrix3d TimesHat(const Matrix3d& X, const Vector3d& v) {
+  Matrix3d result;
+  result << v.z() * X.col(1) - v.y() * X.col(2), v.x() * X.col(2) - v.z() * X.col(0),
+      v.y() * X.col(0) - v.x() * X.col(1);
+  return result;
 }
 
-using Matrix3N = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
-
-// Y = L^-1 Y. By rows: Eigen's solver is made for larger matrices, as is its product below.
-void SolveLowerInPlace(const Matrix3d& L, Matrix3N* Y) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < i; ++j) {
-      Y->row(i) -= L(i, j) * Y->row(j);
-    }
-    Y->row(i) *= 1 / L(i, i);
-  }
+// [v]x X
+Matrix3d HatTimes(const Vector3d& v, const Matrix3d& X) {
+  Matrix3d result;
+  result << v.cross(X.col(0)), v.cross(X.col(1)), v.cross(X.col(2));
+  return result;
 }
 
-// H - Y^T Y, from H's lower triangle.
-void SubtractSquare(const Matrix3N& Y, Eigen::MatrixXd* H) {
-  const Eigen::Index n = Y.cols();
-  const double *y0 = Y.data(), *y1 = y0 + n, *y2 = y1 + n;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    double* const column = H->data() + j * n;
-    for (Eigen::Index i = j; i < n; ++i) {
-      column[i] -= y0[i] * y0[j] + y1[i] * y1[j] + y2[i] * y2[j];
-    }
-    for (Eigen::Index i = 0; i < j; ++i) {
-      column[i] = (*H)(j, i);
-    }
-  }
+// A_a^T C A_b with A = [I, -[arm]x].
+Matrix6d Block(const Vector3d& arm_a, const Matrix3d& C, const Vector3d& arm_b) {
+  const Matrix3d C_b = TimesHat(C, arm_b);
+  Matrix6d block;
+  block << C, -C_b, HatTimes(arm_a, C), -HatTimes(arm_a, C_b);
+  return block;
+}
+
+// A^T v
+Vector6d Moment(const Vector3d& arm, const Vector3d& v) {
+  Vector6d moment;
+  moment << v, arm.cross(v);
+  return moment;
 }
 
 }  // namespace
@@ -142,50 +138,93 @@ double HostedPoint::Cost(const Vector3d& point, const std::vector<PosedCamera>& 
   return cost;
 }
 
-Vector3d EliminatedPoint::Step(const Eigen::VectorXd& e) const {
-  return -L.transpose().triangularView<Eigen::Upper>().solve(d + Y * e);
+Matrix3d EliminatedPoint::Coupling(size_t a, size_t b) const {
+  Matrix3d C = -(poses[a].U.transpose() * poses[b].U);
+  if (a == b) {
+    C += poses[a].N;
+  } else if (a == 0 || b == 0) {
+    C -= poses[std::max(a, b)].N;  // the host moves the point where a sighting moves its camera
+  }
+  return C;
+}
+
+void EliminatedPoint::AddTo(const std::vector<int>& columns, Eigen::MatrixXd* H,
+                            Eigen::VectorXd* g) const {
+  const int scale = columns.back();
+  for (size_t a = 0; a < poses.size(); ++a) {
+    if (columns[a] >= H->cols()) {
+      continue;
+    }
+    for (size_t b = 0; b < poses.size(); ++b) {
+      if (columns[b] <= columns[a]) {
+        H->block<6, 6>(columns[a], columns[b]) += Block(poses[a].arm, Coupling(a, b), poses[b].arm);
+      }
+    }
+    const Vector6d with_scale = -Moment(poses[a].arm, poses[a].U.transpose() * u_scale);
+    if (columns[a] > scale) {
+      H->block<6, 1>(columns[a], scale) += with_scale;
+    } else {
+      H->block<1, 6>(scale, columns[a]) += with_scale.transpose();
+    }
+    g->segment<6>(columns[a]) += Moment(poses[a].arm, poses[a].g - poses[a].U.transpose() * d);
+  }
+  (*H)(scale, scale) += h_scale - u_scale.squaredNorm();
+  (*g)[scale] += g_scale - u_scale.dot(d);
+}
+
+Eigen::MatrixXd EliminatedPoint::Information() const {
+  std::vector<int> columns;
+  for (size_t i = 0; i <= poses.size(); ++i) {
+    columns.push_back(static_cast<int>(6 * i));
+  }
+  const Eigen::Index size = columns.back() + 1;
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(size);
+  AddTo(columns, &H, &g);
+  H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
+  return H;
+}
+
+Vector3d EliminatedPoint::Step(const std::vector<int>& columns, const Eigen::VectorXd& step) const {
+  Vector3d moved = d + u_scale * step[columns.back()];
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (columns[i] < step.size()) {
+      const Vector3d rotation = step.segment<3>(columns[i] + 3);
+      moved += poses[i].U * (step.segment<3>(columns[i]) - poses[i].arm.cross(rotation));
+    }
+  }
+  return -L.transpose().triangularView<Eigen::Upper>().solve(moved);
 }
 
 void Eliminate(const HostedPoint& hosted, const Vector3d& point,
                const std::vector<PosedCamera>& cameras, double kappa, const RobustLoss& loss,
                double damping, EliminatedPoint* eliminated) {
-  const auto scale = static_cast<Eigen::Index>(6 * (1 + hosted.seen.size()));
   const PosedCamera& host = cameras[hosted.host];
   const Vector3d p_w = InWorld(point, host);
   Matrix3d M;  // of p_w by the point
   M << host.R_w_cam.leftCols<2>() / point.z(), -(p_w - host.p_w_cam) / point.z();
-  const Matrix36 A_host = Moved(p_w, host);
 
   EliminatedPoint& out = *eliminated;
-  out.H.setZero(scale + 1, scale + 1);
-  out.g.setZero(scale + 1);
-  auto& W = out.Y;  // of the point by e, until the point is eliminated
-  W.setZero(3, scale + 1);
-  Matrix3d N = Matrix3d::Zero();  // sum of J^T J, by p_w
-  Vector3d n = Vector3d::Zero();
+  out.poses.resize(1 + hosted.seen.size());
+  EliminatedPoint::Pose& of_host = out.poses[0];
+  of_host.arm = p_w - host.p_w_body;
+  of_host.N.setZero();  // sum of J^T J, by p_w
+  of_host.g.setZero();
   for (size_t i = 0; i < hosted.seen.size(); ++i) {
     const HostedPoint::Sighting& sighting = hosted.seen[i];
     const PosedCamera& camera = cameras[sighting.frame];
     const WhitenedSighting projection = *Project(sighting, p_w, camera, true);
     const double weight = loss.Weight(projection.r.squaredNorm());
-    const Matrix3d N_i = weight * projection.J.transpose() * projection.J;
-    const Vector3d n_i = weight * projection.J.transpose() * projection.r;
-    const Matrix36 A = Moved(p_w, camera);
-    const Matrix36 NA = N_i * A;
-    const auto at = static_cast<Eigen::Index>(6 * (1 + i));
-    out.H.block<6, 6>(at, at) = A.transpose() * NA;
-    out.H.block<6, 6>(at, 0) = -(NA.transpose() * A_host);
-    out.g.segment<6>(at) = -A.transpose() * n_i;
-    W.middleCols<6>(at) = -M.transpose() * NA;
-    N += N_i;
-    n += n_i;
+    EliminatedPoint::Pose& pose = out.poses[1 + i];
+    pose.arm = p_w - camera.p_w_body;
+    pose.N = weight * projection.J.transpose() * projection.J;
+    pose.g = -weight * projection.J.transpose() * projection.r;
+    of_host.N += pose.N;
+    of_host.g -= pose.g;
   }
-  out.H.topLeftCorner<6, 6>() = A_host.transpose() * N * A_host;
-  out.g.head<6>() = A_host.transpose() * n;
-  W.leftCols<6>() = M.transpose() * N * A_host;
 
-  Matrix3d V = M.transpose() * N * M;
-  Vector3d g_point = M.transpose() * n;
+  Matrix3d V = M.transpose() * of_host.N * M;
+  Vector3d g_point = M.transpose() * of_host.g;
   V.topLeftCorner<2, 2>() += hosted.sqrt_info.transpose() * hosted.sqrt_info;
   g_point.head<2>() +=
       hosted.sqrt_info.transpose() * (hosted.sqrt_info * (point.head<2>() - hosted.ray));
@@ -194,16 +233,19 @@ void Eliminate(const HostedPoint& hosted, const Vector3d& point,
   const double depth = hosted.DepthResidual(point, kappa);
   V(2, 2) += inverse_sigma * inverse_sigma;
   g_point.z() += inverse_sigma * depth;
-  W.col(scale) = Vector3d(0, 0, inverse_sigma * by_scale);
-  out.H(scale, scale) = by_scale * by_scale;
-  out.g[scale] = by_scale * depth;
-
   V.diagonal() *= 1 + damping;
+
   out.L = V.llt().matrixL();
-  SolveLowerInPlace(out.L, &out.Y);
-  out.d = out.L.triangularView<Eigen::Lower>().solve(g_point);
-  SubtractSquare(out.Y, &out.H);
-  out.g -= out.Y.transpose() * out.d;
+  const auto L = out.L.triangularView<Eigen::Lower>();
+  out.d = L.solve(g_point);
+  const Matrix3d L_inverse_M = L.solve(Matrix3d(M.transpose()));
+  of_host.U = L_inverse_M * of_host.N;
+  for (size_t i = 1; i < out.poses.size(); ++i) {
+    out.poses[i].U = -(L_inverse_M * out.poses[i].N);
+  }
+  out.u_scale = L.solve(Vector3d(0, 0, inverse_sigma * by_scale));
+  out.h_scale = by_scale * by_scale;
+  out.g_scale = by_scale * depth;
 }
 
 }  // namespace pangea

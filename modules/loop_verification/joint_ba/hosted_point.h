@@ -67,15 +67,32 @@ struct HostedPoint {
 
 // What is left of a point's residuals once it is eliminated: 1/2 e^T H e + g^T e, with e the errors
 // of the frames' poses that it touches (its host's, then those of its sightings, six each) and of
-// kappa. Its own step is -L^-T (d + Y e).
+// kappa. A pose moves the point's place in the world by A = [I, -[arm]x] times its error; so H is
+// of blocks A^T C A, with C of 3x3.
 struct EliminatedPoint {
-  Eigen::MatrixXd H;  // symmetric
-  Eigen::VectorXd g;
-  Eigen::Matrix3d L;  // V = L L^T, damped
+  struct Pose {
+    Eigen::Vector3d arm;  // from the body to the point, in the world
+    Eigen::Matrix3d N;    // information of its sightings on the point's place
+    Eigen::Matrix3d U;    // L^-1 times the point's information that goes with it
+    Eigen::Vector3d g;    // before the point is eliminated
+  };
+  std::vector<Pose> poses;
+  Eigen::Vector3d u_scale;
+  double h_scale = 0, g_scale = 0;
+  Eigen::Matrix3d L;  // V = L L^T, damped: V is of the point itself
   Eigen::Vector3d d;
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> Y;
 
-  Eigen::Vector3d Step(const Eigen::VectorXd& e) const;
+  // Into the lower triangle of H and into g, where `columns` has each pose and at last kappa; those
+  // behind their last are left out.
+  void AddTo(const std::vector<int>& columns, Eigen::MatrixXd* H, Eigen::VectorXd* g) const;
+  // All of H, one pose after the other.
+  Eigen::MatrixXd Information() const;
+  // The point's own step for the step of all columns.
+  Eigen::Vector3d Step(const std::vector<int>& columns, const Eigen::VectorXd& step) const;
+
+ private:
+  // Of H's block of two poses, C.
+  Eigen::Matrix3d Coupling(size_t a, size_t b) const;
 };
 
 // At a state in which no point is behind a camera that sees it. `damping`: Levenberg-Marquardt's,

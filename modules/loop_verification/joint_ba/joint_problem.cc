@@ -1,6 +1,7 @@
 #include "loop_verification/joint_ba/joint_problem.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <set>
@@ -18,6 +19,20 @@ Matrix6d Floored(const Matrix6d& covariance) {
   floored.diagonal().head<3>().array() += kTranslation_m * kTranslation_m;
   floored.diagonal().tail<3>().array() += kRotation_rad * kRotation_rad;
   return floored;
+}
+
+using EdgeJacobian = Eigen::Matrix<double, 6, 13>;
+
+void AddEdge(const EdgeJacobian& J, const Vector6d& r, const std::array<int, 3>& columns,
+             JointEquations* equations) {
+  InformationShare::Add(J.transpose() * J, {columns.begin(), columns.end()}, 1, &equations->H);
+  const Eigen::VectorXd g = J.transpose() * r;
+  for (size_t block = 0; block < columns.size(); ++block) {
+    if (columns[block] < equations->g.size()) {
+      const int size = block + 1 < columns.size() ? 6 : 1;
+      equations->g.segment(columns[block], size) += g.segment(static_cast<int>(6 * block), size);
+    }
+  }
 }
 
 }  // namespace
@@ -190,40 +205,29 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
                                        double damping) {
   const int n = num_columns();
   JointEquations out;
-  // The held frame's columns are cut off at the end.
-  out.H.setZero(n + 6, n + 6);
-  out.g.setZero(n + 6);
+  // Without the held frame's columns, which are behind all others.
+  out.H.setZero(n, n);
+  out.g.setZero(n);
   out.cost = Cost(state, loss);
   for (const int side : {kSideM, kSideC}) {
     const double information = 1 / (ScaleSigma(side) * ScaleSigma(side));
     out.H(ScaleColumn(side), ScaleColumn(side)) += information;
     out.g[ScaleColumn(side)] += information * state.log_scale[side];
   }
-  const auto add = [&out](const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
-                          const std::vector<int>& columns) {
-    InformationShare::Add(H, columns, 1, &out.H);
-    for (size_t block = 0; block < columns.size(); ++block) {
-      const int size = block + 1 < columns.size() ? 6 : 1;
-      out.g.segment(columns[block], size) += g.segment(static_cast<int>(6 * block), size);
-    }
-  };
   for (const Edge& edge : edges_) {
     EdgeResidual::Jacobians jacobians;
     const Vector6d r = edge.residual.Evaluate(state.T_w_body[edge.from], state.T_w_body[edge.to],
                                               state.log_scale[edge.side], &jacobians);
-    Eigen::Matrix<double, 6, 13> J;
+    EdgeJacobian J;
     J << jacobians.from, jacobians.to, jacobians.scale;
-    add(J.transpose() * J, J.transpose() * r,
-        {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)});
+    AddEdge(J, r, {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)}, &out);
   }
   const std::vector<PosedCamera> cameras = Cameras(state);
   for (size_t p = 0; p < points_.size(); ++p) {
     const double kappa = state.log_scale[points_[p].side];
     Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping, &eliminated_[p]);
-    add(eliminated_[p].H, eliminated_[p].g, columns_[p]);
+    eliminated_[p].AddTo(columns_[p], &out.H, &out.g);
   }
-  out.H.conservativeResize(n, n);
-  out.g.conservativeResize(n);
   return out;
 }
 
@@ -235,15 +239,7 @@ void JointProblem::Move(const Eigen::VectorXd& step, JointState* state) const {
     state->log_scale[side] += step[ScaleColumn(side)];
   }
   for (size_t p = 0; p < points_.size(); ++p) {
-    const std::vector<int>& columns = columns_[p];
-    Eigen::VectorXd e = Eigen::VectorXd::Zero(static_cast<int>(6 * (columns.size() - 1)) + 1);
-    for (size_t block = 0; block < columns.size(); ++block) {
-      const int size = block + 1 < columns.size() ? 6 : 1;
-      if (columns[block] < step.size()) {
-        e.segment(static_cast<int>(6 * block), size) = step.segment(columns[block], size);
-      }
-    }
-    state->points[p] += eliminated_[p].Step(e);
+    state->points[p] += eliminated_[p].Step(columns_[p], step);
   }
 }
 
@@ -273,7 +269,7 @@ std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
   }
   std::vector<InformationShare> shares;
   for (size_t p = 0; p < points_.size(); ++p) {
-    shares.push_back({std::move(eliminated_[p].H), columns_[p]});
+    shares.push_back({eliminated_[p].Information(), columns_[p]});
   }
   const std::vector<JoinedPoints> landmarks = Landmarks(matches, use);
   const auto without_one = CovarianceWithoutOne(equations.H, shares, landmarks);
