@@ -185,24 +185,27 @@ std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction d
   const DescriptorList descriptors(corners);
   const auto rival_distance =
       static_cast<uint64_t>(RivalDistance({.max_distance = max_hamming, .max_ratio = max_ratio}));
-  std::vector<uint64_t> distances(corners.size()), nearest_view(corners.size());
-  std::vector<int> rivals;
+  std::vector<uint64_t> distances(corners.size()), of_octave(corners.size());
+  std::vector<int> near(corners.size()), rivals;
   std::vector<PointMatch> matches;
   for (size_t l = 0; l < holder.landmarks.size(); ++l) {
     // The newest view of it stands for all: M times the comparisons gain little here.
     const std::vector<CornerRef>& seen = holder.landmarks[l].observations;
-    std::ranges::fill(distances, kNoDistance);
-    for (auto ref = seen.rbegin(); ref != seen.rend() && ref->frame == seen.back().frame; ++ref) {
-      descriptors.Distances(holder.corner(*ref).descriptor, &nearest_view);
-      std::ranges::transform(distances, nearest_view, distances.begin(),
+    descriptors.Distances(holder.corner(seen.back()).descriptor, &distances);
+    for (auto ref = seen.rbegin() + 1; ref != seen.rend() && ref->frame == seen.back().frame;
+         ++ref) {
+      descriptors.Distances(holder.corner(*ref).descriptor, &of_octave);
+      std::ranges::transform(distances, of_octave, distances.begin(),
                              [](uint64_t a, uint64_t b) { return std::min(a, b); });
     }
-    rivals.clear();
+    // Without a branch for each: hardly any is near.
+    size_t num_near = 0;
     for (size_t i = 0; i < corners.size(); ++i) {
-      if (distances[i] <= rival_distance && view.has_ray(static_cast<int>(i))) {
-        rivals.push_back(static_cast<int>(i));
-      }
+      near[num_near] = static_cast<int>(i);
+      num_near += distances[i] <= rival_distance ? 1 : 0;
     }
+    rivals.assign(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(num_near));
+    std::erase_if(rivals, [&view](int i) { return !view.has_ray(i); });
     const NearestCorner nearest = FindNearest(
         corners, rivals, [&](int i) { return static_cast<int>(distances[i]); }, max_hamming,
         kSamePx);
