@@ -92,7 +92,7 @@ struct BaOptions {
   double edge_weight = 0.5;              // w above; the IMU factor beside an edge has the rest
   double edge_scale_sigma = 0.01;        // share by which all edges of a map may be too long
   double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
-  int iterations_a_piece = 2;
+  int iterations_a_piece = 4;
   int max_iterations = 10;  // of each of the two rounds
   double function_tolerance = 5e-4;
 
