@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "loop_verification/loop_verification_test_world.h"
+#include "loop_verification/window_cache.h"
 
 namespace pangea {
 namespace {
@@ -94,6 +96,27 @@ TEST_F(MatchedCorners, AnOdometryThatDoesNotKnowItsWayGivesNoDepth) {
   options.edge_sigma_m = 0.05;
   Walk(options);
   EXPECT_TRUE(MakeWindowUpTo(kNewest, 5).landmarks.empty());
+}
+
+TEST_F(MatchedCorners, AKeptWindowIsThatOfItsKeyframes) {
+  Walk({});
+  const auto sums = [](const Window& window) {
+    double depths = 0;
+    for (const WindowLandmark& landmark : window.landmarks) {
+      depths += landmark.inverse_depth;
+    }
+    return std::pair(window.landmarks.size(), depths);
+  };
+  WindowCache cache;
+  for (int round = 0; round < 2; ++round) {
+    for (const int seq : {kNewest, kNewest + 1}) {
+      const KeyframeId& id = agent_.keyframes[seq].id;
+      const KeyframeWindow frames = store_.WindowUpTo(id, 5);
+      for (const KeyframeWindow& after : {KeyframeWindow{}, store_.WindowBehind(id, 4)}) {
+        EXPECT_EQ(sums(cache.Make(frames, {}, after)), sums(MakeWindow(frames, {}, after)));
+      }
+    }
+  }
 }
 
 }  // namespace
