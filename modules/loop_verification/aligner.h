@@ -20,7 +20,8 @@ class Aligner {
 
   // Keyframes a verification result depends on: that many up to each of the two.
   int num_keyframes() const {
-    return std::max(options_.window.num_keyframes, options_.visibility_keyframes);
+    return std::max({options_.window.num_keyframes, options_.window.max_keyframes,
+                     options_.visibility_keyframes});
   }
 
   // num_keyframes() up to the match and to the query, or fewer where their map begins.

@@ -1,9 +1,12 @@
 #include "loop_verification/window.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
+#include "core/median.h"
 #include "loop_verification/matched_corners.h"
 
 namespace pangea {
@@ -16,7 +19,33 @@ struct Estimate {
   double relative() const { return sigma / inverse_depth; }
 };
 
+// Metres; nothing without map points.
+std::optional<double> MedianDepth(const Keyframe& keyframe) {
+  std::vector<double> depths;
+  for (const MapPoint& point : keyframe.points) {
+    depths.push_back(1.0 / static_cast<double>(point.inverse_depth));
+  }
+  return depths.empty() ? std::nullopt : std::optional(Median(std::move(depths)));
+}
+
 }  // namespace
+
+KeyframeWindow LastOfWindow(const KeyframeWindow& frames, const WindowOptions& options) {
+  const KeyframeView& newest = *frames.back();
+  const std::optional<double> depth_m = MedianDepth(newest.keyframe());
+  double baseline_m = 0;
+  size_t count = 0;
+  for (auto view = frames.rbegin(); view != frames.rend(); ++view) {
+    const bool wide = depth_m && baseline_m >= options.min_baseline * *depth_m;
+    if (static_cast<int>(count) >=
+        (wide ? options.num_keyframes : std::max(options.num_keyframes, options.max_keyframes))) {
+      break;
+    }
+    ++count;
+    baseline_m = std::max(baseline_m, ((*view)->T_odom_cam().t - newest.T_odom_cam().t).norm());
+  }
+  return {frames.end() - static_cast<std::ptrdiff_t>(count), frames.end()};
+}
 
 WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,
                                   double inverse_depth, double inverse_depth_sigma) {

@@ -31,14 +31,22 @@ struct TriangulationOptions {
 };
 
 struct WindowOptions {
-  int num_keyframes = 5;  // M: the keyframe and M - 1 before it
+  int num_keyframes = 5;  // M, at least: the keyframe and M - 1 before it
+  // Of a camera that turns more than it moves, as many more as it takes to see depths.
+  int max_keyframes = 10;
+  double min_baseline = 0.25;  // of the median depth
   // Inverse depths less certain than this share of themselves are no map points.
   double max_relative_depth_sigma = 0.4;
   TriangulationOptions triangulation;
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("num_keyframes", &num_keyframes, {1, 50}, "", "the keyframe and those before it");
+    archive.Add("num_keyframes", &num_keyframes, {1, 50}, "",
+                "the keyframe and those before it, at least");
+    archive.Add("max_keyframes", &max_keyframes, {1, 50}, "",
+                "where the camera moved too little for depths");
+    archive.Add("min_baseline", &min_baseline, {0, 10}, "",
+                "share of the median depth that the camera moved, for no more keyframes");
     archive.Add("max_relative_depth_sigma", &max_relative_depth_sigma, {0.01, 2}, "",
                 "share of itself by which the inverse depth of a map point may be uncertain");
     archive.Section("triangulation", &triangulation, "of corners that no track gave a depth");
@@ -76,6 +84,9 @@ struct Window {
     return keyframe(ref.frame).corners[ref.corner];
   }
 };
+
+// Of keyframes up to one, the last that make its window.
+KeyframeWindow LastOfWindow(const KeyframeWindow& frames, const WindowOptions& options);
 
 // Without its observations.
 WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,

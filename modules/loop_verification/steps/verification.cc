@@ -5,14 +5,6 @@
 #include <cmath>
 
 namespace pangea {
-namespace {
-
-KeyframeWindow Last(const KeyframeWindow& frames, int count) {
-  const auto n = std::min(frames.size(), static_cast<size_t>(count));
-  return {frames.end() - static_cast<std::ptrdiff_t>(n), frames.end()};
-}
-
-}  // namespace
 
 double LoopVerificationReport::Measured(std::string_view option) const {
   const auto last = std::find_if(measured.rbegin(), measured.rend(),
@@ -28,10 +20,9 @@ Verification::Verification(const CommonStepOptions& options, const CandidateKeyf
       candidate(candidate),
       gate(gate),
       window_cache(*window_cache),
-      windows{window_cache->Make(Last(keyframes.m, options.window.num_keyframes), options.window,
+      windows{window_cache->Make(LastOfWindow(keyframes.m, options.window), options.window,
                                  keyframes.after_m),
-              window_cache->Make(Last(keyframes.c, options.window.num_keyframes), options.window)} {
-}
+              window_cache->Make(LastOfWindow(keyframes.c, options.window), options.window)} {}
 
 bool Verification::AtLeast(std::string_view option, double value, double limit) {
   report.measured.push_back({step, option, value, true, limit});
