@@ -115,6 +115,16 @@ TEST_F(Bridge, AMatchWaitsForTheResultsThatItRestsOn) {
   ExpectEachResultOnce();
 }
 
+TEST_F(Bridge, ABacklogWaitsForNoResults) {
+  TestWorker& first = AddWorker();
+  first.set_pauses(true);
+  AddKeyframes(8, 2);  // the first may take four
+  ASSERT_TRUE(Until([&] { return first.num_waiting() > 0; }));
+  AddWorker();
+  ahead_us_ += 20'000'000;
+  EXPECT_TRUE(Until([&] { return workers_.back()->num_verified() > 0; }));
+}
+
 TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
   AddKeyframes(4, 3);
   ASSERT_TRUE(Until([&] {

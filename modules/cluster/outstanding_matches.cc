@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/constraint_id.h"
+#include "core/candidates/constraint_id.h"
 
 namespace pangea {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/constraint_id.h"
+#include "core/candidates/constraint_id.h"
 
 namespace pangea {
 namespace {

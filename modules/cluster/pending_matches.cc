@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "bus/parse_message.h"
-#include "core/candidate_order.h"
-#include "core/constraint_id.h"
+#include "core/candidates/candidate_order.h"
+#include "core/candidates/constraint_id.h"
 #include "messages/messages.h"
 
 namespace pangea {

@@ -1,6 +1,7 @@
 #pragma once
 
-// Which of the queue's matches others still have to wait for (core/candidate_order.h). One thread.
+// Which of the queue's matches others still have to wait for (core/candidates/candidate_order.h).
+// One thread.
 
 #include <cstdint>
 #include <optional>

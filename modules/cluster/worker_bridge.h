@@ -5,8 +5,8 @@
 // onto the bus; it takes at most `max_matches` matches at a time from the queue, publishes them,
 // stores the results, and acknowledges a match once all its results are stored. Results of other
 // workers are passed on to the verifiers as those of former runs are. A match goes back into the
-// queue while results that its candidates rest on (core/candidate_order.h) are still to come, for
-// 15 s at most: so the map is the same however many workers there are.
+// queue while results that its candidates rest on (core/candidates/candidate_order.h) are still to
+// come, for 15 s at most: so the map is the same however many workers there are.
 //   bus: CONSTRAINT, OPTIONS_*, RESEND_REQUEST, AGAIN_agent_handler in;
 //        KEYFRAME_*, PLACE_MATCH, HAVE, VERDICT_REQUEST, AGAIN_<process>, STATUS_bridge out
 //

@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "bus/record_status.h"
-#include "core/candidate_order.h"
-#include "core/constraint_id.h"
+#include "core/candidates/candidate_order.h"
+#include "core/candidates/constraint_id.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"

@@ -5,8 +5,9 @@
 // asked for (journal_follower.h). Verification results of this run
 // that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
 // everyone else asks; of those that are still to be made nothing is said, they will come. Which
-// candidates are redundant depends on the results that they rest on (core/candidate_order.h) and
-// wait for; any other verification result on the keyframes alone, not on when they came.
+// candidates are redundant depends on the results that they rest on
+// (core/candidates/candidate_order.h) and wait for; any other verification result on the keyframes
+// alone, not on when they came.
 //
 // A verification result takes long (tens of milliseconds), so live they are made one at a time, in
 // the order in which the candidates became ready but for what they rest on, when no message waits:

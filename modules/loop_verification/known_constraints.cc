@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-#include "core/candidate_order.h"
+#include "core/candidates/candidate_order.h"
 #include "core/median.h"
 
 namespace pangea {

@@ -4,8 +4,8 @@
 // be worth its verification: measurement selection by information gain (Ila et al., "Information-
 // based compact pose SLAM", TRO 2010).
 //
-// Only constraints that a candidate rests on count (core/candidate_order.h), so that the answer
-// does not depend on which others are there already.
+// Only constraints that a candidate rests on count (core/candidates/candidate_order.h), so that the
+// answer does not depend on which others are there already.
 //
 // Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
 // the position to sigma^2 + (drift * path)^2; their information adds up as if they were

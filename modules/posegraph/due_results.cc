@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "bus/retransmission/timeouts.h"
-#include "core/constraint_id.h"
+#include "core/candidates/constraint_id.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {

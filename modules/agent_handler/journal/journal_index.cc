@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/constraint_id.h"
+#include "core/candidates/constraint_id.h"
 
 namespace pangea {
 

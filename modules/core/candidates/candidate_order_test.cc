@@ -1,4 +1,4 @@
-#include "core/candidate_order.h"
+#include "core/candidates/candidate_order.h"
 
 #include <gtest/gtest.h>
 
