@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
@@ -36,6 +37,12 @@ constexpr double kMaxSpeed = 50;     // m/s
 constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
+// With a rough calibration, what nobody measured bends accelerations slowly, like a bias that
+// moves. A start, which tells tilt from bias by little rotation, would claim far too much; so for a
+// while the accelerometer's random walk counts this many times (docs/decisions/imu.md).
+constexpr int64_t kSettling_us = 2'000'000;
+constexpr double kSettlingWalk = 10;
+
 constexpr int kMaxIterations = 4;
 // A start has no solution of the image before: where it knows little, four end half way.
 constexpr int kStartIterations = 20;
@@ -50,6 +57,7 @@ struct Estimator::Impl {
         camera(c),
         noise(WithUsualWalks(n)),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
+        is_rough(IsRough(c, o.calibration)),
         initialiser(c, noise, o.pixel_sigma, o.accel_bias_sigma, o.stationary),
         imu_samples(noise),
         stationary_detector(c, ray_sigma, o.stationary),
@@ -90,8 +98,10 @@ struct Estimator::Impl {
   CameraModel camera;
   ImuNoise noise;
   double ray_sigma;
+  bool is_rough;  // the calibration
   Initialiser initialiser;
   bool started = false;
+  int64_t settled_imu_utime = std::numeric_limits<int64_t>::max();
   WindowProblem problem;
   TrackHistory history;
   LandmarkStore landmarks;
@@ -128,13 +138,18 @@ void Estimator::Impl::Start(const InitialState& initial) {
     Newest().is_window_keyframe = true;
   }
   started = true;
+  settled_imu_utime = Newest().imu_utime + kSettling_us;
 }
 
 ImuFactor Estimator::Impl::MakeImuFactor(const WindowFrame& from, int64_t to_imu_utime) const {
   ImuFactor factor;
   factor.span = imu_samples.Integrate(from.imu_utime, to_imu_utime, problem.state.imu_intrinsics,
                                       from.imu.gyro_bias, from.imu.accel_bias);
-  factor.information = InertialInformation(factor.span.measured, noise);
+  factor.noise = noise;
+  if (is_rough && to_imu_utime < settled_imu_utime) {
+    factor.noise.accel_random_walk *= kSettlingWalk;
+  }
+  factor.information = InertialInformation(factor.span.measured, factor.noise);
   return factor;
 }
 
@@ -197,7 +212,7 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
 std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   problem.landmarks = landmarks.Gather(problem.state, history);
   Optimise(problem, max_iterations);
-  if (AllowForUnmodelledAcceleration(noise, &problem)) {
+  if (AllowForUnmodelledAcceleration(&problem)) {
     Optimise(problem, max_iterations);
   }
   publisher.NoteContradicted(problem);

@@ -22,7 +22,7 @@ ImuState AsTheImagesHaveIt(const WindowFrame& frame) {
 
 }  // namespace
 
-bool AllowForUnmodelledAcceleration(const ImuNoise& noise, WindowProblem* problem) {
+bool AllowForUnmodelledAcceleration(WindowProblem* problem) {
   bool changed = false;
   const WindowState& state = problem->state;
   for (int to = 1; to <= state.Newest(); ++to) {
@@ -34,14 +34,15 @@ bool AllowForUnmodelledAcceleration(const ImuNoise& noise, WindowProblem* proble
     const auto r = ComputeInertialResidual(measured, AsTheImagesHaveIt(state.frames[to - 1]),
                                            AsTheImagesHaveIt(state.frames[to]))
                        .r;
-    const auto information =
-        factor.contradicted ? InertialInformation(factor.span.measured, noise) : factor.information;
+    const auto information = factor.contradicted
+                                 ? InertialInformation(factor.span.measured, factor.noise)
+                                 : factor.information;
     const bool contradicted = r.dot(information * r) > kContradiction;
     if (contradicted != factor.contradicted) {
       factor.contradicted = contradicted;
-      factor.information = contradicted
-                               ? InertialInformation(factor.span.measured, noise, kAccelSigma)
-                               : information;
+      factor.information =
+          contradicted ? InertialInformation(factor.span.measured, factor.noise, kAccelSigma)
+                       : information;
       changed = true;
     }
   }

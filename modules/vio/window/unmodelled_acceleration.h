@@ -4,12 +4,11 @@
 // starts and stops. An IMU factor that contradicts the images by more than noise can is then taken
 // with an acceleration that nothing else tells of, and the odometry is that in the cabin.
 
-#include "core/imu/imu.h"
 #include "vio/window/window_problem.h"
 
 namespace pangea::vio {
 
 // Looks at the IMU factors of an optimised window. Whether one changed: then optimise it again.
-bool AllowForUnmodelledAcceleration(const ImuNoise& noise, WindowProblem* problem);
+bool AllowForUnmodelledAcceleration(WindowProblem* problem);
 
 }  // namespace pangea::vio

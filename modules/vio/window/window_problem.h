@@ -24,6 +24,7 @@ struct Landmark {
 
 struct ImuFactor {
   ScaledPreintegration span;
+  ImuNoise noise;             // that `information` counts, unless contradicted
   bool contradicted = false;  // by the images (unmodelled_acceleration.h)
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };

@@ -9,6 +9,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
+constexpr double kRoughDistortion = 0.001;
 constexpr double kIntervalShareSigma = 0.3;  // between stamps of the begin and of the end, +-1/2
 constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
 
@@ -53,6 +54,10 @@ Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
 }
 
 }  // namespace
+
+bool IsRough(const CameraModel& camera, const CalibrationSigmas& given) {
+  return DistortionSigma(camera, given) > kRoughDistortion;
+}
 
 WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
                        const CameraModel& camera, const CalibrationSigmas& given,

@@ -11,6 +11,9 @@
 
 namespace pangea::vio {
 
+// Whether nobody measured the lens to what a tenth of a pixel needs: then nobody measured the IMU.
+bool IsRough(const CameraModel& camera, const CalibrationSigmas& given);
+
 // A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
 // frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
 WindowPrior MovingStartPrior(const WindowState& start, const CameraModel& camera,

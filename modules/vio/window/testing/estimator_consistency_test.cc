@@ -152,5 +152,22 @@ TEST(EstimatorConsistency, RowsThatAccelerateAreBelievedNoMore) {
   edges.ExpectHonest("edges with rows that accelerate");
 }
 
+// A phone of which nobody measured anything: an unknown lens, and an IMU that is six times as wrong
+// as it is said to be.
+TEST(EstimatorConsistency, AStartWithARoughCalibrationIsBelievedNoMore) {
+  VioTestWorldOptions options;
+  options.imu_noise = ImuNoise{};
+  options.imu_intrinsics_sigmas = 6;
+  options.unknown_distortion = 0.07;
+  NeesOfRides tilt;
+  for (const Ride& ride : ShortRides(20, options)) {
+    ASSERT_FALSE(ride.finished.empty()) << "seed " << ride.world.options().seed;
+    const FinishedKeyframe& first = ride.finished.front();
+    const auto e = ErrorOf(first, TruthOf(ride).front());
+    tilt.Add(e.segment<2>(kTheta), first.covariance.block<2, 2>(kTheta, kTheta));
+  }
+  tilt.ExpectHonest("a rough start's tilt");
+}
+
 }  // namespace
 }  // namespace pangea::vio

@@ -80,7 +80,11 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   true_intrinsics_.distortion[0] += options.unknown_distortion;
   true_intrinsics_.fx *= longer;
   true_intrinsics_.fy *= longer;
-  true_imu_intrinsics_ = RandomImuIntrinsics(options.imu_noise, options.seed + 1000);
+  ImuNoise intrinsics_noise = options.imu_noise;
+  intrinsics_noise.gyro_scale_sigma *= options.imu_intrinsics_sigmas;
+  intrinsics_noise.accel_scale_sigma *= options.imu_intrinsics_sigmas;
+  intrinsics_noise.axes_sigma *= options.imu_intrinsics_sigmas;
+  true_imu_intrinsics_ = RandomImuIntrinsics(intrinsics_noise, options.seed + 1000);
   phase_ = RandomVector(rng_, 2);
   gyro_bias_ = RandomVector(rng_, 0.02);
   accel_bias_ = RandomVector(rng_, 0.05);

@@ -67,6 +67,8 @@ struct VioTestWorldOptions {
   double centre_sigma = 0;               // of the focal length
   // The lens's first coefficient, given as 0. Else the estimator knows that the lens has none.
   double unknown_distortion = 0;
+  // Errors of the IMU's scale factors and axes, in what the noise says they are.
+  double imu_intrinsics_sigmas = 1;
 };
 
 class VioTestWorld {
