@@ -30,6 +30,13 @@ foreach(package qrencode sodium zstd)
     IMPORTED_LOCATION ${${package}_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${${package}_INCLUDE_DIR})
 endforeach()
 
+# Of SuiteSparse only CHOLMOD.
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(suitesparse::cholmod UNKNOWN IMPORTED)
+set_target_properties(suitesparse::cholmod PROPERTIES
+  IMPORTED_LOCATION ${CHOLMOD_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE_DIR})
+
 # OpenCV's config sets plain include directories; as a SYSTEM target its headers stay quiet.
 add_library(pangea_opencv INTERFACE IMPORTED)
 target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})

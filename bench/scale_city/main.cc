@@ -14,6 +14,7 @@
 
 #include "bench/scale_city/city.h"
 #include "bench/scale_city/cores.h"
+#include "bus/process.h"
 #include "eval/metrics.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -178,9 +179,13 @@ int main(int argc, char** argv) {
   app.add_option("--whole-keyframes", arguments.global_ba.local.keyframes,
                  "of the largest group that global_ba always adjusts as a whole")
       ->capture_default_str();
+  app.add_option("--neighbours", arguments.global_ba.local.max_neighbours,
+                 "that global_ba moves beside what is new in a larger one")
+      ->capture_default_str();
   app.add_flag("--recognition-alone", arguments.recognition_alone, "the other cores get nothing");
   app.add_option("--journal", arguments.journal, "the city as a journal, to be made");
   CLI11_PARSE(app, argc, argv);
+  pangea::UseOneThread();
   try {
     fmt::print("{}\n", pangea::bench::Bench(arguments).Run().dump());
     return 0;

@@ -6,9 +6,6 @@
 namespace pangea {
 namespace {
 
-constexpr double kMinDepth_m = 0.05;
-constexpr double kBehind = 20;  // sigmas
-
 template <int kRows, int kColumns>
 using RowMajor = Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>;
 
@@ -43,67 +40,9 @@ void PoseToBlock(const Rigid3& pose, double* block) {
   t = pose.t;
 }
 
-bool RigidManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  PoseToBlock(PoseFromBlock(x).Plus(Eigen::Map<const Vector6d>(delta)), x_plus_delta);
-  return true;
-}
-
-bool RigidManifold::PlusJacobian(const double*, double* jacobian) const {
-  Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>>(jacobian).setIdentity();
-  return true;
-}
-
-bool RigidManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  Eigen::Map<Vector6d> difference(y_minus_x);
-  difference = PoseFromBlock(y).Minus(PoseFromBlock(x));
-  return true;
-}
-
-bool RigidManifold::MinusJacobian(const double*, double* jacobian) const {
-  Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>>(jacobian).setIdentity();
-  return true;
-}
-
 ImuState StateFromBlocks(const double* pose, const double* motion) {
   return {PoseFromBlock(pose), Eigen::Vector3d::Map(motion), Eigen::Vector3d::Map(motion + 3),
           Eigen::Vector3d::Map(motion + 6)};
-}
-
-bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals,
-                              double** jacobians) const {
-  const Rigid3 T_map_body = PoseFromBlock(parameters[0]);
-  const Rigid3 T_body_cam = PoseFromBlock(parameters[2]);
-  const Eigen::Vector3d arm_map = Eigen::Vector3d::Map(parameters[1]) - T_map_body.t;
-  const Eigen::Matrix3d R_body_map = T_map_body.R().transpose();
-  const Eigen::Matrix3d R_cam_body = T_body_cam.R().transpose();
-  const Eigen::Vector3d arm_body = R_body_map * arm_map - T_body_cam.t;
-  const Eigen::Vector3d p_cam = R_cam_body * arm_body;
-  Eigen::Map<Eigen::Vector2d> r(residuals);
-  const bool in_front = p_cam.z() > kMinDepth_m;
-  const double inverse_z = in_front ? 1 / p_cam.z() : 0;
-  const Eigen::Vector2d seen = p_cam.head<2>() * inverse_z;
-  if (in_front) {
-    r = sqrt_info_ * (seen - ray_);
-  } else {
-    r.setConstant(kBehind);
-  }
-  if (jacobians == nullptr) {
-    return true;
-  }
-  Eigen::Matrix<double, 2, 3> J_project;
-  J_project << inverse_z, 0, -seen.x() * inverse_z, 0, inverse_z, -seen.y() * inverse_z;
-  const Eigen::Matrix<double, 2, 3> J_body = sqrt_info_ * J_project * R_cam_body;
-  const Eigen::Matrix<double, 2, 3> J_map = J_body * R_body_map;
-  if (jacobians[0] != nullptr) {
-    AsMatrix<2, 7>(jacobians[0]) << -J_map, J_map * Hat(arm_map), Eigen::Vector2d::Zero();
-  }
-  if (jacobians[1] != nullptr) {
-    AsMatrix<2, 3>(jacobians[1]) = J_map;
-  }
-  if (jacobians[2] != nullptr) {
-    AsMatrix<2, 7>(jacobians[2]) << -J_body, J_body * Hat(arm_body), Eigen::Vector2d::Zero();
-  }
-  return true;
 }
 
 PreintegrationFactor::PreintegrationFactor(const Preintegration& measured, const ImuNoise& noise)

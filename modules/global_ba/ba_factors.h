@@ -1,14 +1,13 @@
 #pragma once
 
-// Residuals of the global bundle adjustment, with analytic Jacobians.
+// Residuals of the global bundle adjustment between its blocks, with analytic Jacobians; those of
+// landmarks are in solver/eliminated_landmarks.h.
 //
 // Blocks: a pose T_map_body is 7 doubles (quaternion x y z w, translation) with the project's
 // tangent (dp, dtheta) in the left frame; a motion is 9: velocity in the map frame (m/s), gyro bias
-// (rad/s), accelerometer bias (m/s^2); a landmark is its position in the map frame (metres).
-// RigidManifold's PlusJacobian is [I6; 0], so a factor writes its derivative by the tangent into
-// the first six columns and zero into the seventh.
+// (rad/s), accelerometer bias (m/s^2). A factor writes its derivative by a pose's tangent into the
+// first six columns and zero into the seventh.
 
-#include <ceres/manifold.h>
 #include <ceres/sized_cost_function.h>
 
 #include "core/imu/imu_factor.h"
@@ -21,33 +20,7 @@ using MotionBlock = Eigen::Matrix<double, 9, 1>;
 Rigid3 PoseFromBlock(const double* block);
 void PoseToBlock(const Rigid3& pose, double* block);
 
-class RigidManifold : public ceres::Manifold {
- public:
-  int AmbientSize() const override { return 7; }
-  int TangentSize() const override { return 6; }
-  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
-  bool PlusJacobian(const double* x, double* jacobian) const override;
-  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
-  bool MinusJacobian(const double* x, double* jacobian) const override;
-};
-
 ImuState StateFromBlocks(const double* pose, const double* motion);
-
-// A landmark in a camera: r = S (pi(T_cam_body T_map_body^-1 p) - ray). Blocks: pose, landmark,
-// T_body_cam (7, as a pose).
-// Behind the camera there is no ray: the residual of an outlier, without a slope, so that one point
-// does not hold up all others.
-class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
- public:
-  LandmarkFactor(const Eigen::Vector2d& ray, const Eigen::Matrix2d& sqrt_info)
-      : ray_(ray), sqrt_info_(sqrt_info) {}
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override;
-
- private:
-  Eigen::Vector2d ray_;
-  Eigen::Matrix2d sqrt_info_;
-};
 
 // The preintegrated motion between two keyframes, and biases that wander
 // (core/imu/imu_factor.h). Blocks: pose and motion of the first, pose and motion of the

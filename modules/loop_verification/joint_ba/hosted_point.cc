@@ -75,31 +75,6 @@ Vector6d Moment(const Vector3d& arm, const Vector3d& v) {
 
 }  // namespace
 
-double RobustLoss::Cost(double squared_residual) const {
-  const double b = scale * scale;
-  switch (kind) {
-    case Kind::kHuber:
-      return squared_residual <= b ? 0.5 * squared_residual
-                                   : scale * std::sqrt(squared_residual) - 0.5 * b;
-    case Kind::kCauchy:
-      return 0.5 * b * std::log1p(squared_residual / b);
-    default:
-      return 0.5 * squared_residual;
-  }
-}
-
-double RobustLoss::Weight(double squared_residual) const {
-  const double b = scale * scale;
-  switch (kind) {
-    case Kind::kHuber:
-      return squared_residual <= b ? 1 : scale / std::sqrt(squared_residual);
-    case Kind::kCauchy:
-      return 1 / (1 + squared_residual / b);
-    default:
-      return 1;
-  }
-}
-
 PosedCamera::PosedCamera(const Rigid3& T_w_body, const Rigid3& T_body_cam)
     : p_w_body(T_w_body.t),
       p_w_cam(T_w_body * T_body_cam.t),

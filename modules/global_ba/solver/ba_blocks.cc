@@ -1,0 +1,73 @@
+#include "global_ba/solver/ba_blocks.h"
+
+#include "global_ba/ba_factors.h"
+
+namespace pangea {
+namespace {
+
+constexpr int kPoseSize = 7, kPoseTangentSize = 6, kMotionSize = 9;
+
+}  // namespace
+
+BaBlocks::BaBlocks(const BaWorld& world)
+    : num_keyframes_(static_cast<int>(world.keyframes.size())),
+      num_cameras_(static_cast<int>(world.cameras.size())) {
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    PoseToBlock(keyframe.imu.T_odom_body, Add(kPoseSize, kPoseTangentSize, keyframe.held));
+  }
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    Eigen::Map<MotionBlock>(Add(kMotionSize, kMotionSize, keyframe.held))
+        << keyframe.imu.v_odom_body,
+        keyframe.imu.gyro_bias, keyframe.imu.accel_bias;
+  }
+  for (const BaCamera& camera : world.cameras) {
+    PoseToBlock(camera.T_body_cam, Add(kPoseSize, kPoseTangentSize, camera.held));
+  }
+  for (const BaCamera& camera : world.cameras) {
+    *Add(1, 1, camera.held) = camera.held ? camera.edge_log_scale : 0;
+  }
+}
+
+double* BaBlocks::Add(int size, int tangent_size, bool held) {
+  const auto first = static_cast<int>(values_.size());
+  blocks_.push_back({first, size, tangent_size, held ? kHeld : num_variables_++});
+  values_.resize(values_.size() + size);
+  return &values_[first];
+}
+
+std::vector<int> BaBlocks::VariableSizes() const {
+  std::vector<int> sizes;
+  for (const Block& block : blocks_) {
+    if (block.variable != kHeld) {
+      sizes.push_back(block.tangent_size);
+    }
+  }
+  return sizes;
+}
+
+void BaBlocks::Move(const Eigen::VectorXd& step, const BlockEquations& equations) {
+  for (const Block& block : blocks_) {
+    if (block.variable == kHeld) {
+      continue;
+    }
+    const auto moved = step.segment(equations.ColumnOf(block.variable), block.tangent_size);
+    double* const values = &values_[block.first];
+    if (block.size == kPoseSize) {
+      PoseToBlock(PoseFromBlock(values).Plus(moved), values);
+    } else {
+      Eigen::Map<Eigen::VectorXd>(values, block.size) += moved;
+    }
+  }
+}
+
+void BaBlocks::ReadBack(BaWorld* world) const {
+  for (int i = 0; i < num_keyframes_; ++i) {
+    world->keyframes[i].imu = StateFromBlocks((*this)[Pose(i)], (*this)[Motion(i)]);
+  }
+  for (int i = 0; i < num_cameras_; ++i) {
+    world->cameras[i].T_body_cam = PoseFromBlock((*this)[Camera(i)]);
+    world->cameras[i].edge_log_scale = *(*this)[EdgeLogScale(i)];
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,56 @@
+#pragma once
+
+// Levenberg-Marquardt on a bundle adjustment's world: landmarks are eliminated
+// (eliminated_landmarks.h), the rest is one sparse Cholesky (least_squares/block_equations.h).
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/least_squares/robust_loss.h"
+#include "global_ba/ba_options.h"
+#include "global_ba/solver/ba_blocks.h"
+#include "global_ba/solver/block_factors.h"
+#include "global_ba/solver/eliminated_landmarks.h"
+#include "least_squares/block_equations.h"
+
+namespace pangea {
+
+class BaSolver {
+ public:
+  BaSolver(const BaWorld& world, const BaOptions& options, const RobustLoss& loss);
+
+  enum class Outcome { kGoesOn, kConverged, kStuck };
+  // Stuck: no step makes it better, though one was promised.
+  Outcome Iterate();
+
+  double cost() const { return cost_; }
+  // Of an observation, whitened.
+  Eigen::Vector2d Residual(const BaObservation& seen) const;
+  void ReadBack(BaWorld* world) const;
+
+ private:
+  using View = EliminatedLandmarks::View;
+  struct State {
+    BaBlocks blocks;
+    std::vector<Eigen::Vector3d> landmarks;
+  };
+
+  std::vector<View> Views(const State& state) const;
+  double CostOf(const State& state) const;
+  // A step from the state and what it promises of the cost; nothing if there is none.
+  std::optional<std::pair<State, double>> Step();
+
+  RobustLoss loss_;
+  double tolerance_ = 0;  // relative decrease of the cost at which it has converged
+  double damping_ = 0;
+  std::vector<int> camera_of_;  // of each keyframe
+  State state_;
+  BlockFactors factors_;
+  std::unique_ptr<EliminatedLandmarks> landmarks_;
+  std::unique_ptr<BlockEquations> equations_;
+  double cost_ = 0;
+};
+
+}  // namespace pangea

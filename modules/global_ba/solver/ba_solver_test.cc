@@ -1,0 +1,84 @@
+#include "global_ba/solver/ba_solver.h"
+
+#include <gtest/gtest.h>
+
+#include "global_ba/ba_test_world.h"
+#include "global_ba/solver/ba_reference.h"
+
+namespace pangea {
+namespace {
+
+constexpr double kLossScale = 2;
+
+double SolveOwn(BaWorld* world) {
+  BaOptions options;
+  options.function_tolerance = 1e-13;
+  BaSolver solver(*world, options, {.kind = RobustLoss::Kind::kHuber, .scale = kLossScale});
+  for (int i = 0; i < 200 && solver.Iterate() == BaSolver::Outcome::kGoesOn; ++i) {
+  }
+  solver.ReadBack(world);
+  return solver.cost();
+}
+
+// Where keyframes are held nothing is left free, and the minimum is one point.
+BaWorld HeldWorld(uint64_t seed, bool cameras_held) {
+  BaWorld world = MakeBaTestWorld({.seed = seed,
+                                   .landmarks = 60,
+                                   .outlier_share = 0.02,
+                                   .edge_sigma_m = 0.002,
+                                   .edge_scale_error = 0.01})
+                      .start;
+  for (BaKeyframe& keyframe : world.keyframes) {
+    keyframe.held = keyframe.id.seq % 10 < 2;
+  }
+  for (BaCamera& camera : world.cameras) {
+    camera.held = cameras_held;
+    camera.edge_log_scale = cameras_held ? 0.005 : 0;
+  }
+  return world;
+}
+
+TEST(BaSolver, FindsTheMinimumOfCeres) {
+  for (const bool cameras_held : {false, true}) {
+    for (uint64_t seed = 1; seed <= 3; ++seed) {
+      BaWorld own = HeldWorld(seed, cameras_held), reference = own;
+      const double expected =
+          SolveByCeres(BaOptions{}, new ceres::HuberLoss(kLossScale), &reference);
+      EXPECT_NEAR(SolveOwn(&own) / expected, 1, 1e-7);
+      for (size_t i = 0; i < own.keyframes.size(); ++i) {
+        const ImuState &a = own.keyframes[i].imu, &b = reference.keyframes[i].imu;
+        EXPECT_LT((a.T_odom_body.Minus(b.T_odom_body)).norm(), 1e-5);
+        EXPECT_LT((a.v_odom_body - b.v_odom_body).norm(), 1e-4);
+        EXPECT_LT((a.accel_bias - b.accel_bias).norm(), 1e-4);
+      }
+      for (size_t i = 0; i < own.cameras.size(); ++i) {
+        EXPECT_NEAR(own.cameras[i].edge_log_scale, reference.cameras[i].edge_log_scale, 1e-5);
+        EXPECT_LT(own.cameras[i].T_body_cam.Minus(reference.cameras[i].T_body_cam).norm(), 1e-5);
+      }
+    }
+  }
+}
+
+// With all keyframes and cameras held each landmark is alone.
+TEST(BaSolver, MovesLandmarksWhereAllElseIsHeld) {
+  BaWorld own = HeldWorld(1, true);
+  for (BaKeyframe& keyframe : own.keyframes) {
+    keyframe.held = true;
+  }
+  BaWorld reference = own;
+  const double expected = SolveByCeres(BaOptions{}, new ceres::HuberLoss(kLossScale), &reference);
+  EXPECT_NEAR(SolveOwn(&own) / expected, 1, 1e-7);
+}
+
+TEST(BaSolver, ALandmarkBehindAllItsCamerasStays) {
+  BaWorld world = HeldWorld(1, true);
+  const int landmark = world.observations.front().landmark;
+  world.landmarks[landmark] = {0, 0, 1e4};
+  BaSolver solver(world, BaOptions{}, {.kind = RobustLoss::Kind::kHuber, .scale = kLossScale});
+  EXPECT_NE(solver.Iterate(), BaSolver::Outcome::kStuck);
+  solver.ReadBack(&world);
+  EXPECT_TRUE(world.landmarks[landmark].allFinite());
+}
+
+}  // namespace
+}  // namespace pangea

@@ -1,0 +1,205 @@
+#include "global_ba/solver/eliminated_landmarks.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace pangea {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
+
+constexpr double kMinDepth_m = 0.05;
+constexpr double kBehind = 20;  // sigmas
+// So that a landmark that is behind all its cameras stays where it is.
+constexpr double kLeastInformation = 1e-9;  // 1/m^2
+
+struct Linearised {
+  Vector2d r;
+  Matrix23 J = Matrix23::Zero();  // by the landmark
+};
+
+Linearised Project(const BaObservation& seen, const EliminatedLandmarks::View& view,
+                   const Vector3d& point, bool with_jacobian) {
+  const Vector3d p_cam = view.R_cam_map * (point - view.p_map_cam);
+  Linearised projection;
+  if (!(p_cam.z() > kMinDepth_m)) {
+    projection.r.setConstant(kBehind);
+    return projection;
+  }
+  const double inverse_z = 1 / p_cam.z();
+  const Vector2d xy = p_cam.head<2>() * inverse_z;
+  projection.r = seen.sqrt_info * (xy - seen.ray);
+  if (with_jacobian) {
+    Matrix23 J_project;
+    J_project << inverse_z, 0, -xy.x() * inverse_z, 0, inverse_z, -xy.y() * inverse_z;
+    projection.J = seen.sqrt_info * J_project * view.R_cam_map;
+  }
+  return projection;
+}
+
+// J [v]x
+Matrix23 TimesHat(const Matrix23& J, const Vector3d& v) {
+  Matrix23 result;
+  result << v.z() * J.col(1) - v.y() * J.col(2), v.x() * J.col(2) - v.z() * J.col(0),
+      v.y() * J.col(0) - v.x() * J.col(1);
+  return result;
+}
+
+int MemberOf(const std::vector<int>& clique, int variable) {
+  return static_cast<int>(std::ranges::lower_bound(clique, variable) - clique.begin());
+}
+
+}  // namespace
+
+EliminatedLandmarks::View::View(const Rigid3& T_map_body, const Rigid3& T_body_cam)
+    : p_map_body(T_map_body.t),
+      p_map_cam(T_map_body * T_body_cam.t),
+      R_map_body(T_map_body.R()),
+      R_cam_map((T_map_body.q * T_body_cam.q).conjugate()) {}
+
+EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
+                                         const std::vector<int>& pose_variables,
+                                         const std::vector<int>& camera_variables)
+    : cliques_(world.landmarks.size()), own_(world.landmarks.size()) {
+  for (const BaObservation& seen : world.observations) {
+    sightings_.push_back({seen});
+  }
+  std::ranges::stable_sort(sightings_, {}, [](const Sighting& s) { return s.seen.landmark; });
+  const auto body_of = [&](const Sighting& s) { return pose_variables[s.seen.keyframe]; };
+  const auto camera_of = [&](const Sighting& s) {
+    return camera_variables[world.keyframes[s.seen.keyframe].camera];
+  };
+  size_t next = 0, num_ties = 0;
+  for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
+    first_sighting_.push_back(next);
+    std::vector<int>& clique = cliques_[landmark];
+    for (; next < sightings_.size() && sightings_[next].seen.landmark == static_cast<int>(landmark);
+         ++next) {
+      for (const int variable : {body_of(sightings_[next]), camera_of(sightings_[next])}) {
+        if (variable != kHeld) {
+          clique.push_back(variable);
+        }
+      }
+    }
+    std::ranges::sort(clique);
+    const auto repeats = std::ranges::unique(clique);
+    clique.erase(repeats.begin(), repeats.end());
+    for (size_t i = first_sighting_.back(); i < next; ++i) {
+      const int body = body_of(sightings_[i]), camera = camera_of(sightings_[i]);
+      sightings_[i].body = body == kHeld ? kHeld : MemberOf(clique, body);
+      sightings_[i].camera = camera == kHeld ? kHeld : MemberOf(clique, camera);
+    }
+    first_tie_.push_back(num_ties);
+    num_ties += clique.size();
+  }
+  first_sighting_.push_back(next);
+  ties_.resize(num_ties);
+}
+
+Vector2d EliminatedLandmarks::Residual(const BaObservation& seen, const View& view,
+                                       const Vector3d& landmark) {
+  return Project(seen, view, landmark, false).r;
+}
+
+double EliminatedLandmarks::Cost(const std::vector<View>& views,
+                                 const std::vector<Vector3d>& landmarks,
+                                 const RobustLoss& loss) const {
+  double cost = 0;
+  for (const Sighting& sighting : sightings_) {
+    const BaObservation& seen = sighting.seen;
+    cost += loss.Cost(Residual(seen, views[seen.keyframe], landmarks[seen.landmark]).squaredNorm());
+  }
+  return cost;
+}
+
+void EliminatedLandmarks::AddTo(const std::vector<View>& views,
+                                const std::vector<Vector3d>& landmarks, const RobustLoss& loss,
+                                BlockEquations* equations) {
+  for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
+    Gather(landmark, views, landmarks[landmark], loss, equations);
+  }
+}
+
+double EliminatedLandmarks::Eliminate(double damping, BlockEquations* equations) {
+  double promise = 0;
+  for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
+    EliminateOne(landmark, damping, equations);
+    promise += 0.5 * own_[landmark].d.squaredNorm();
+  }
+  return promise;
+}
+
+void EliminatedLandmarks::Gather(size_t landmark, const std::vector<View>& views,
+                                 const Vector3d& point, const RobustLoss& loss,
+                                 BlockEquations* equations) {
+  const std::vector<int>& clique = cliques_[landmark];
+  Tie* const ties = ties_.data() + first_tie_[landmark];
+  std::fill_n(ties, clique.size(), Tie::Zero());
+  Matrix3d information = Matrix3d::Identity() * kLeastInformation;
+  Vector3d gradient = Vector3d::Zero();
+  for (size_t i = first_sighting_[landmark]; i < first_sighting_[landmark + 1]; ++i) {
+    const Sighting& sighting = sightings_[i];
+    const View& view = views[sighting.seen.keyframe];
+    const Linearised projection = Project(sighting.seen, view, point, true);
+    const double sqrt_weight = std::sqrt(loss.Weight(projection.r.squaredNorm()));
+    const Matrix23 J = sqrt_weight * projection.J;
+    const Vector2d r = sqrt_weight * projection.r;
+    information += J.transpose() * J;
+    gradient += J.transpose() * r;
+    const auto tie = [&](int member, const Matrix26& J_variable) {
+      equations->Add(landmark, member, member, J_variable.transpose() * J_variable);
+      equations->g().segment<6>(equations->ColumnOf(clique[member])) += J_variable.transpose() * r;
+      ties[member] += J.transpose() * J_variable;
+    };
+    Matrix26 J_body, J_camera;
+    if (sighting.body != kHeld) {
+      J_body << -J, TimesHat(J, point - view.p_map_body);
+      tie(sighting.body, J_body);
+    }
+    if (sighting.camera != kHeld) {
+      J_camera << -J * view.R_map_body, TimesHat(J, point - view.p_map_cam) * view.R_map_body;
+      tie(sighting.camera, J_camera);
+    }
+    if (sighting.body != kHeld && sighting.camera != kHeld) {
+      equations->Add(landmark, sighting.camera, sighting.body, J_camera.transpose() * J_body);
+    }
+  }
+  own_[landmark] = {information, gradient};
+}
+
+void EliminatedLandmarks::EliminateOne(size_t landmark, double damping, BlockEquations* equations) {
+  const std::vector<int>& clique = cliques_[landmark];
+  Tie* const ties = ties_.data() + first_tie_[landmark];
+  Own& own = own_[landmark];
+  own.L.diagonal() *= 1 + damping;
+  own.L = own.L.llt().matrixL();
+  const auto L = own.L.triangularView<Eigen::Lower>();
+  L.solveInPlace(own.d);
+  for (size_t a = 0; a < clique.size(); ++a) {
+    L.solveInPlace(ties[a]);
+    for (size_t b = 0; b <= a; ++b) {
+      equations->Add(landmark, a, b, -(ties[a].transpose() * ties[b]));
+    }
+    equations->g().segment<6>(equations->ColumnOf(clique[a])) -= ties[a].transpose() * own.d;
+  }
+}
+
+void EliminatedLandmarks::Move(const Eigen::VectorXd& step, const BlockEquations& equations,
+                               std::vector<Vector3d>* landmarks) const {
+  for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
+    Vector3d moved = own_[landmark].d;
+    for (size_t member = 0; member < cliques_[landmark].size(); ++member) {
+      moved += ties_[first_tie_[landmark] + member] *
+               step.segment<6>(equations.ColumnOf(cliques_[landmark][member]));
+    }
+    own_[landmark].L.transpose().triangularView<Eigen::Upper>().solveInPlace(moved);
+    (*landmarks)[landmark] -= moved;
+  }
+}
+
+}  // namespace pangea

@@ -1,0 +1,133 @@
+#include "least_squares/block_equations.h"
+
+#include <Eigen/CholmodSupport>
+#include <algorithm>
+
+namespace pangea {
+namespace {
+
+// A variable's place in a clique.
+struct Use {
+  size_t clique = 0, member = 0;
+};
+
+std::vector<std::vector<Use>> UsesOf(size_t num_variables,
+                                     const std::vector<std::vector<int>>& cliques) {
+  std::vector<std::vector<Use>> uses(num_variables);
+  for (size_t clique = 0; clique < cliques.size(); ++clique) {
+    for (size_t member = 0; member < cliques[clique].size(); ++member) {
+      uses[cliques[clique][member]].push_back({clique, member});
+    }
+  }
+  return uses;
+}
+
+// A variable, and those behind it that are in a clique with it, ascending. `last_seen_by`: of each
+// variable, whose this last found it beside.
+std::vector<int> BesideAndBehind(int variable, const std::vector<Use>& uses,
+                                 const std::vector<std::vector<int>>& cliques,
+                                 std::vector<int>* last_seen_by) {
+  std::vector<int> beside{variable};
+  for (const auto& [clique, member] : uses) {
+    for (size_t a = member + 1; a < cliques[clique].size(); ++a) {
+      if (const int other = cliques[clique][a]; (*last_seen_by)[other] != variable) {
+        (*last_seen_by)[other] = variable;
+        beside.push_back(other);
+      }
+    }
+  }
+  std::ranges::sort(beside);
+  return beside;
+}
+
+}  // namespace
+
+struct BlockEquations::Factor {
+  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> cholesky;
+};
+
+BlockEquations::BlockEquations(const std::vector<int>& sizes,
+                               const std::vector<std::vector<int>>& cliques)
+    : first_column_{0}, factor_(std::make_unique<Factor>()) {
+  for (const int size : sizes) {
+    first_column_.push_back(first_column_.back() + size);
+  }
+  g_.setZero(first_column_.back());
+  FindPlaces(cliques);
+  cholmod_common& cholmod = factor_->cholesky.cholmod();
+  cholmod.print = 0;
+  cholmod.nmethods = 1;
+  cholmod.method[0].ordering = CHOLMOD_AMD;
+  if (num_columns() > 0) {
+    factor_->cholesky.analyzePattern(H_);
+  }
+}
+
+BlockEquations::~BlockEquations() = default;
+
+void BlockEquations::FindPlaces(const std::vector<std::vector<int>>& cliques) {
+  size_t num_places = 0;
+  for (const std::vector<int>& clique : cliques) {
+    first_place_.push_back(num_places);
+    num_places += clique.size() * (clique.size() + 1) / 2;
+  }
+  places_.resize(num_places);
+  const int num_variables = static_cast<int>(first_column_.size()) - 1;
+  const std::vector<std::vector<Use>> uses = UsesOf(num_variables, cliques);
+  std::vector<int> column_begin{0}, rows;
+  std::vector<int> last_seen_by(num_variables, -1), offset(num_variables);
+  for (int variable = 0; variable < num_variables; ++variable) {
+    std::vector<int> rows_of_one;
+    for (const int other : BesideAndBehind(variable, uses[variable], cliques, &last_seen_by)) {
+      offset[other] = static_cast<int>(rows_of_one.size());
+      for (int row = first_column_[other]; row < first_column_[other + 1]; ++row) {
+        rows_of_one.push_back(row);
+      }
+    }
+    const auto stride = static_cast<int>(rows_of_one.size());
+    for (const auto& [clique, member] : uses[variable]) {
+      for (size_t a = member; a < cliques[clique].size(); ++a) {
+        places_[first_place_[clique] + a * (a + 1) / 2 + member] = {
+            column_begin.back() + offset[cliques[clique][a]], stride};
+      }
+    }
+    for (int column = first_column_[variable]; column < first_column_[variable + 1]; ++column) {
+      rows.insert(rows.end(), rows_of_one.begin(), rows_of_one.end());
+      column_begin.push_back(static_cast<int>(rows.size()));
+    }
+  }
+  H_.resize(num_columns(), num_columns());
+  H_.resizeNonZeros(static_cast<Eigen::Index>(rows.size()));
+  std::ranges::copy(column_begin, H_.outerIndexPtr());
+  std::ranges::copy(rows, H_.innerIndexPtr());
+  SetZero();
+}
+
+void BlockEquations::SetZero() {
+  H_.coeffs().setZero();
+  g_.setZero();
+}
+
+void BlockEquations::Damp(double share) {
+  for (size_t variable = 0; variable + 1 < first_column_.size(); ++variable) {
+    // A variable's own rows are the first of its columns.
+    for (int column = first_column_[variable]; column < first_column_[variable + 1]; ++column) {
+      const int row = column - first_column_[variable];
+      H_.valuePtr()[H_.outerIndexPtr()[column] + row] *= 1 + share;
+    }
+  }
+}
+
+std::optional<Eigen::VectorXd> BlockEquations::Solve() {
+  if (num_columns() == 0) {
+    return Eigen::VectorXd();
+  }
+  factor_->cholesky.factorize(H_);
+  if (factor_->cholesky.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  Eigen::VectorXd x = factor_->cholesky.solve(-g_);
+  return x.allFinite() ? std::make_optional(std::move(x)) : std::nullopt;
+}
+
+}  // namespace pangea

@@ -1,0 +1,97 @@
+#include "least_squares/block_equations.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <random>
+
+namespace pangea {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+const std::vector<int> kSizes{6, 9, 1, 6, 3, 9};
+const std::vector<std::vector<int>> kCliques{{0, 1, 3}, {2, 4}, {1, 2, 5}, {5}, {0, 4}, {}};
+
+MatrixXd Random(int rows, int columns, std::mt19937_64* rng) {
+  std::normal_distribution<double> normal(0, 1);
+  return MatrixXd::NullaryExpr(rows, columns, [&] { return normal(*rng); });
+}
+
+// Residuals of each clique, into the equations and into dense ones.
+struct Both {
+  BlockEquations sparse{kSizes, kCliques};
+  MatrixXd H;
+  VectorXd g;
+
+  void Fill(uint64_t seed) {
+    std::mt19937_64 rng(seed);
+    sparse.SetZero();
+    H = MatrixXd::Zero(sparse.num_columns(), sparse.num_columns());
+    g = VectorXd::Zero(sparse.num_columns());
+    for (size_t clique = 0; clique < kCliques.size(); ++clique) {
+      AddClique(clique, &rng);
+    }
+  }
+
+  void AddClique(size_t clique, std::mt19937_64* rng) {
+    const std::vector<int>& members = kCliques[clique];
+    const VectorXd r = Random(20, 1, rng);
+    std::vector<MatrixXd> J;
+    for (const int variable : members) {
+      J.push_back(Random(20, kSizes[variable], rng));
+    }
+    for (size_t a = 0; a < members.size(); ++a) {
+      const int row = sparse.ColumnOf(members[a]), rows = kSizes[members[a]];
+      sparse.g().segment(row, rows) += J[a].transpose() * r;
+      g.segment(row, rows) += J[a].transpose() * r;
+      for (size_t b = 0; b < members.size(); ++b) {
+        const MatrixXd block = J[a].transpose() * J[b];
+        H.block(row, sparse.ColumnOf(members[b]), rows, block.cols()) += block;
+        if (b <= a) {
+          sparse.Add(clique, a, b, block);
+        }
+      }
+    }
+  }
+};
+
+TEST(BlockEquations, SolvesAsDenseOnesDo) {
+  Both both;
+  EXPECT_EQ(both.sparse.num_columns(), 34);
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    both.Fill(seed);
+    const auto x = both.sparse.Solve();
+    ASSERT_TRUE(x);
+    EXPECT_LT((*x + both.H.llt().solve(both.g)).norm(), 1e-10 * x->norm());
+  }
+}
+
+TEST(BlockEquations, DampsTheDiagonal) {
+  Both both;
+  both.Fill(4);
+  both.sparse.Damp(0.5);
+  both.H.diagonal() *= 1.5;
+  const auto x = both.sparse.Solve();
+  ASSERT_TRUE(x);
+  EXPECT_LT((*x + both.H.llt().solve(both.g)).norm(), 1e-10 * x->norm());
+}
+
+TEST(BlockEquations, HasNoSolutionWhereAVariableIsFree) {
+  BlockEquations equations({2, 2}, {{0}, {1}});
+  equations.Add(0, 0, 0, Eigen::Matrix2d::Identity());
+  EXPECT_FALSE(equations.Solve());
+  equations.Add(1, 0, 0, Eigen::Matrix2d::Identity());
+  EXPECT_TRUE(equations.Solve());
+}
+
+TEST(BlockEquations, NoVariablesHaveASolution) {
+  BlockEquations equations({}, {{}, {}});
+  const auto x = equations.Solve();
+  ASSERT_TRUE(x);
+  EXPECT_EQ(x->size(), 0);
+}
+
+}  // namespace
+}  // namespace pangea
