@@ -16,7 +16,7 @@ namespace pangea {
 
 struct LocalOptions {
   int keyframes = 500;        // of a group of which a part is adjusted
-  int max_neighbours = 300;   // that move beside what is new
+  int max_neighbours = 100;   // that move beside what is new
   double whole_growth = 1.5;  // of a group, since it was adjusted as a whole
   double max_shift_m = 0.05;  // of what was adjusted before
 
