@@ -109,11 +109,13 @@ void BlockEquations::SetZero() {
 }
 
 void BlockEquations::Damp(double share) {
+  constexpr double kLeast = 1e-6;  // of what nothing is known
   for (size_t variable = 0; variable + 1 < first_column_.size(); ++variable) {
     // A variable's own rows are the first of its columns.
     for (int column = first_column_[variable]; column < first_column_[variable + 1]; ++column) {
       const int row = column - first_column_[variable];
-      H_.valuePtr()[H_.outerIndexPtr()[column] + row] *= 1 + share;
+      double& value = H_.valuePtr()[H_.outerIndexPtr()[column] + row];
+      value += share * std::max(kLeast, value);
     }
   }
 }

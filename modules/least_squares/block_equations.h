@@ -33,13 +33,17 @@ class BlockEquations {
   // lower triangle counts.
   template <typename Block>
   void Add(size_t clique, size_t a, size_t b, const Eigen::MatrixBase<Block>& block) {
-    constexpr int kRows = Block::RowsAtCompileTime, kColumns = Block::ColsAtCompileTime;
+    constexpr int kColumns = Block::ColsAtCompileTime;
+    // A matrix of one row would be stored by rows.
+    constexpr int kRows =
+        Block::RowsAtCompileTime == 1 && kColumns != 1 ? Eigen::Dynamic : Block::RowsAtCompileTime;
     const Place& place = places_[first_place_[clique] + a * (a + 1) / 2 + b];
     Eigen::Map<Eigen::Matrix<double, kRows, kColumns>, 0, Eigen::OuterStride<>>(
         H_.valuePtr() + place.value, block.rows(), block.cols(),
         Eigen::OuterStride<>(place.stride)) += block;
   }
-  // All of g.
+  // Its lower triangle counts.
+  const Eigen::SparseMatrix<double>& H() const { return H_; }
   Eigen::VectorXd& g() { return g_; }
   const Eigen::VectorXd& g() const { return g_; }
 

@@ -78,6 +78,20 @@ TEST(BlockEquations, DampsTheDiagonal) {
   EXPECT_LT((*x + both.H.llt().solve(both.g)).norm(), 1e-10 * x->norm());
 }
 
+// Eigen stores a matrix of one row by rows.
+TEST(BlockEquations, TakesABlockOfOneRow) {
+  BlockEquations equations({2, 1}, {{0, 1}});
+  equations.Add(0, 0, 0, Eigen::Matrix2d::Identity());
+  equations.Add(0, 1, 0, Eigen::RowVector2d(0.5, -0.25));
+  equations.Add(0, 1, 1, Eigen::Matrix<double, 1, 1>(1));
+  equations.g() << 1, 2, 3;
+  Eigen::Matrix3d H;
+  H << 1, 0, 0.5, 0, 1, -0.25, 0.5, -0.25, 1;
+  const auto x = equations.Solve();
+  ASSERT_TRUE(x);
+  EXPECT_LT((*x + H.llt().solve(equations.g())).norm(), 1e-12);
+}
+
 TEST(BlockEquations, HasNoSolutionWhereAVariableIsFree) {
   BlockEquations equations({2, 2}, {{0}, {1}});
   equations.Add(0, 0, 0, Eigen::Matrix2d::Identity());
