@@ -87,8 +87,7 @@ EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
       }
     }
     std::ranges::sort(clique);
-    const auto repeats = std::ranges::unique(clique);
-    clique.erase(repeats.begin(), repeats.end());
+    clique.erase(std::unique(clique.begin(), clique.end()), clique.end());
     for (size_t i = first_sighting_.back(); i < next; ++i) {
       const int body = body_of(sightings_[i]), camera = camera_of(sightings_[i]);
       sightings_[i].body = body == kHeld ? kHeld : MemberOf(clique, body);
