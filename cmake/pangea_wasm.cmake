@@ -6,7 +6,10 @@ if(NOT EXISTS ${PANGEA_WASM_LIBRARIES}/complete)
 endif()
 # -msse2: Eigen has no WebAssembly vectors, and the compiler translates SSE2. -fgnuc-version: Eigen has x86 assembler, which is an
 # error here, where 10 * major + minor of GCC's version is below 63, and elsewhere where major is 6 or more. 5.13 is neither.
-add_compile_options(-msimd128 -msse2 -fgnuc-version=5.13 -fwasm-exceptions -ffp-contract=off)
+# Whoever has vectors has -mnontrapping-fptoint and -msign-ext, each an instruction in place of several. Interleaved: or the
+# compiler reads and writes pairs lane by lane.
+add_compile_options(-msimd128 -msse2 -mnontrapping-fptoint -msign-ext -fgnuc-version=5.13 -fwasm-exceptions -ffp-contract=off
+  "SHELL:-mllvm -enable-interleaved-mem-accesses=true")
 add_link_options(-msimd128 -fwasm-exceptions)
 
 # Of /usr/include these alone: the rest is of another machine.
