@@ -319,7 +319,7 @@ TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedResults) {
   EXPECT_GT(accepted.report.found.size(), 10U);
   EXPECT_THAT(
       ToText(accepted),
-      testing::ContainsRegex("halves of the view +max_halves_chi2 +[0-9.e-]+ +at most +16.8\n"));
+      testing::ContainsRegex("halves of the view +max_halves_chi2 +[0-9.e-]+ +at most +22.5\n"));
   WriteExplanationPng(accepted, {}, Path("picture.png"));
   EXPECT_GT(fs::file_size(Path("picture.png")), 10000U);
   EXPECT_THROW(Explain(kSample, 42), std::runtime_error);

@@ -345,4 +345,18 @@ std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const
   return out;
 }
 
+LinearStart Scaled(LinearStart start, double scale) {
+  start.v0 *= scale;
+  for (Rigid3& T : start.T_first_body) {
+    T.t *= scale;
+  }
+  for (Vector3d& v : start.v_first_body) {
+    v *= scale;
+  }
+  for (auto& [id, p] : start.p_first) {
+    p *= scale;
+  }
+  return start;
+}
+
 }  // namespace pangea::vio

@@ -3,8 +3,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "core/imu/preintegration.h"
 #include "vio/initialization/initial_solution.h"
@@ -18,6 +20,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kInlierSigmas = 4.0;
+constexpr double kOutlierCost = 6;  // Huber's of such a ray (start_problem.cc)
+constexpr std::array<double, 2> kOtherScales = {0.4, 2.5};
 constexpr double kMaxDistance = 200;  // m, of a point: beyond it the start's baseline says nothing
 // A point straight ahead may be anywhere along its ray, and one such leaves all unknowns without a
 // covariance. So each is held to the closed-form solution, by this many times its distance.
@@ -118,11 +122,11 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   AddImuFactors(frames, noise, &problem);
   const int rays = AddPoints(frames, q_odom_first, start, &problem);
   RefinedStart out;
-  int before_camera = 0;
+  int counted = 0;
   for (const StartPoint& point : problem.points) {
-    before_camera += static_cast<int>(point.rays.size());
+    counted += static_cast<int>(point.rays.size());
   }
-  out.inlier_share = rays > 0 ? static_cast<double>(before_camera) / rays : 0;
+  out.inlier_share = rays > 0 ? static_cast<double>(counted) / rays : 0;
   if (out.inlier_share < kMinInlierShare) {
     return out;  // what is behind the cameras stays there: nothing to be gained by refining
   }
@@ -135,6 +139,7 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   }
   SumUpRays(problem, rays, &out);
   out.states = problem.states;
+  out.cost = problem.Cost() + kOutlierCost * (rays - counted);
   for (ImuState& state : out.states) {
     state.T_odom_body.t -= problem.states.back().T_odom_body.t;
   }
@@ -143,6 +148,16 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
       Eigen::SelfAdjointEigenSolver<Matrix3d>(Matrix3d(covariance->bottomRightCorner<3, 3>()))
           .eigenvalues()[2]);
   return out;
+}
+
+RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first) {
+  RefinedStart best = std::move(first);
+  for (const double scale : kOtherScales) {
+    if (auto other = refine(Scaled(start, scale)); other && other->cost < best.cost) {
+      best = std::move(*other);
+    }
+  }
+  return best;
 }
 
 }  // namespace pangea::vio

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -43,6 +45,9 @@ struct LinearStart {
 std::optional<LinearStart> SolveLinear(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                        const ImuNoise& noise, const Eigen::Vector3d& gyro_bias);
 
+// The same in other units of length.
+LinearStart Scaled(LinearStart start, double scale);
+
 // Refined by bundle adjustment; poses are in a gravity-aligned frame with its origin in the last
 // body.
 struct RefinedStart {
@@ -51,6 +56,8 @@ struct RefinedStart {
   double tilt_sigma = 0;         // rad
   double rms_sigma = 0;          // reprojection residual of the inliers, in sigmas
   double inlier_share = 0;
+  // At the minimum; a ray whose point is not before the camera counts as an outlier.
+  double cost = std::numeric_limits<double>::infinity();
 };
 // A start is good for nothing when fewer of the rays fit. When fewer are even before the camera in
 // the closed-form solution, Refine tells that share and nothing else.
@@ -59,5 +66,11 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
                                    const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
                                    const LinearStart& start, double ray_sigma,
                                    double accel_bias_sigma);
+
+// The closed form knows no accelerometer bias. Of a body that hardly moves the bias makes it up to
+// several times too large or too small, and the refinement then ends in a minimum of its own. So
+// this refines from other scales too; the lowest cost counts. `first`: from the start itself.
+using RefineFrom = std::function<std::optional<RefinedStart>(const LinearStart&)>;
+RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first);
 
 }  // namespace pangea::vio

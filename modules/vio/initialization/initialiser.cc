@@ -212,6 +212,35 @@ InitialResult Initialiser::TryMoving() {
   return TryMoving(StartFrames());
 }
 
+// Nothing when the start is good.
+std::optional<InitialResult> Initialiser::Refusal(
+    const std::optional<RefinedStart>& refined) const {
+  if (!refined) {
+    return InitialResult{std::nullopt, "the start-up bundle adjustment did not converge"};
+  }
+  if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
+    return InitialResult{
+        std::nullopt,
+        fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
+                    100 * refined->inlier_share, refined->rms_sigma),
+        true};
+  }
+  // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
+  // certain, if certainty were asked for in metres per second.
+  const double speed = refined->states.back().v_odom_body.norm();
+  const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
+  if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {
+    return InitialResult{
+        std::nullopt,
+        fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
+                    refined->velocity_sigma, refined->tilt_sigma * 57.3)};
+  }
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * accel_bias_sigma_) {
+    return InitialResult{std::nullopt, "the start needs an implausible accelerometer bias"};
+  }
+  return std::nullopt;
+}
+
 InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) const {
   const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
   if (!gyro_bias) {
@@ -222,29 +251,17 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
     return {std::nullopt, "the motion does not determine velocity and gravity yet"};
   }
   const ImuNoise noise = MeasuredNoise(noise_, samples_);
-  const auto refined = Refine(frames, camera_.T_body_cam, noise, *gyro_bias, *linear,
-                              pixel_sigma_ * camera_.PixelAngle(), accel_bias_sigma_);
-  if (!refined) {
-    return {std::nullopt, "the start-up bundle adjustment did not converge"};
+  const auto refine = [&](const LinearStart& start) {
+    return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start,
+                  pixel_sigma_ * camera_.PixelAngle(), accel_bias_sigma_);
+  };
+  std::optional<RefinedStart> refined = refine(*linear);
+  if (auto refusal = Refusal(refined)) {
+    return *refusal;
   }
-  if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
-    return {std::nullopt,
-            fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
-                        100 * refined->inlier_share, refined->rms_sigma),
-            true};
-  }
-  // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
-  // certain, if certainty were asked for in metres per second.
-  const double speed = refined->states.back().v_odom_body.norm();
-  const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
-  if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {
-    return {
-        std::nullopt,
-        fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
-                    refined->velocity_sigma, refined->tilt_sigma * 57.3)};
-  }
-  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * accel_bias_sigma_) {
-    return {std::nullopt, "the start needs an implausible accelerometer bias"};
+  refined = BestOfScales(refine, *linear, *refined);
+  if (auto refusal = Refusal(refined)) {
+    return *refusal;
   }
   InitialState state;
   state.time_offset_change_s = time_offset_change_s_;

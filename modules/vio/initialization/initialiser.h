@@ -59,6 +59,7 @@ class Initialiser {
   std::optional<InitialState> TryStationary() const;
   InitialResult TryMoving();
   InitialResult TryMoving(const std::vector<StartFrame>& frames) const;
+  std::optional<InitialResult> Refusal(const std::optional<RefinedStart>& refined) const;
   std::vector<StartFrame> StartFrames() const;
 
   CameraModel camera_;

@@ -154,21 +154,6 @@ TEST(StartProblem, CovarianceIsThatOfTheNewestFrame) {
 // What the closed form mostly gets wrong.
 constexpr double kAccelBiasSigma = 0.15;
 
-LinearStart Scaled(const LinearStart& start, double scale) {
-  LinearStart scaled = start;
-  scaled.v0 *= scale;
-  for (Rigid3& T : scaled.T_first_body) {
-    T.t *= scale;
-  }
-  for (Vector3d& v : scaled.v_first_body) {
-    v *= scale;
-  }
-  for (auto& [id, p] : scaled.p_first) {
-    p *= scale;
-  }
-  return scaled;
-}
-
 TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
   const StartWorld world = Record(Lively, 0, kRaySigma);
   const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
@@ -241,6 +226,35 @@ TEST(Refine, ALargeAccelerometerBiasIsFoundWhereItIsExpected) {
     return refined ? (refined->states.back().accel_bias - bias).norm() : 1e9;
   };
   EXPECT_LT(error(1), 0.5 * error(kAccelBiasSigma));
+}
+
+Rigid3 Gentle(double t) {
+  const Rigid3 T = Lively(t);
+  return {T.q, 0.1 * T.t};
+}
+
+// With a large bias and little motion the closed form is several times too large.
+TEST(Refine, AMinimumOfAnotherScaleIsNotTaken) {
+  StartWorld world = Record(Gentle, 0, kRaySigma);
+  for (StartFrame& frame : world.frames) {
+    for (ImuSample& sample : frame.imu) {
+      sample.accel += Vector3d(0.3, -0.3, 0.2);
+    }
+  }
+  const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  const LinearStart too_large = Scaled(*start, 2.5);
+  const auto refine = [&](const LinearStart& from) {
+    return Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, from, kRaySigma,
+                  kAccelBiasSigma);
+  };
+  const auto first = refine(too_large);
+  ASSERT_TRUE(first);
+  const double truth = VelocityAt(Gentle, 3).norm();
+  std::cout << first->states.back().v_odom_body.norm() << " of " << truth << " m/s\n";
+  EXPECT_GT(first->states.back().v_odom_body.norm(), 3 * truth);
+  const RefinedStart best = BestOfScales(refine, too_large, *first);
+  EXPECT_NEAR(best.states.back().v_odom_body.norm(), truth, 4 * best.velocity_sigma);
 }
 
 }  // namespace
