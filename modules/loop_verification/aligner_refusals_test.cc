@@ -203,7 +203,7 @@ TEST(AlignerTest, RefusesHalvesThatDisagree) {
   for (Keyframe& keyframe : off.keyframes) {
     for (Corner& corner : keyframe.corners) {
       const bool left = corner.pixel.x() < 0.5F * static_cast<float>(keyframe.camera.width);
-      corner.pixel.y() += left ? 3.0F : -3.0F;
+      corner.pixel.y() += left ? 3.5F : -3.5F;
     }
   }
   const PlaceCandidate candidate = MakeTestCandidate(c, 9, m, 10, 40, 0);
