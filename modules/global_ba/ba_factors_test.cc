@@ -5,6 +5,7 @@
 #include <random>
 
 #include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
 #include "global_ba/ba_test_world.h"
 
 namespace pangea {
@@ -29,15 +30,9 @@ struct Blocks {
   }
 };
 
-Rigid3 RandomPose(std::mt19937_64& rng) {
-  std::normal_distribution<double> normal(0, 1);
-  const auto vector = [&] { return Vector3d(normal(rng), normal(rng), normal(rng)); };
-  return {ExpSo3(vector()), 3 * vector()};
-}
-
 TEST(CameraPriorFactor, DerivativesMatchDifferences) {
   std::mt19937_64 rng(2);
-  const Rigid3 prior = RandomPose(rng);
+  const Rigid3 prior = RandomPose(rng, 1, 3);
   Vector6d off;
   off << 0.1, -0.2, 0.3, 0.4, -0.3, 0.2;
   const Rigid3 at = prior.Plus(off);

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_random.h"
 
 namespace pangea {
 namespace {
@@ -14,12 +15,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kSampleStep_s = 0.005;
-
-Vector3d RandomVector(std::mt19937_64& rng, double sigma) {
-  std::normal_distribution<double> normal(0, 1);
-  const double x = normal(rng), y = normal(rng), z = normal(rng);
-  return sigma * Vector3d(x, y, z);
-}
 
 // A lively round about the cloud, the camera towards its middle.
 class Flight {

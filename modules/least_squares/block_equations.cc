@@ -24,9 +24,9 @@ std::vector<std::vector<Use>> UsesOf(size_t num_variables,
 
 // A variable, and those behind it that are in a clique with it, ascending. `last_seen_by`: of each
 // variable, whose this last found it beside.
-std::vector<int> BesideAndBehind(int variable, const std::vector<Use>& uses,
-                                 const std::vector<std::vector<int>>& cliques,
-                                 std::vector<int>* last_seen_by) {
+std::vector<int> NeighboursBehind(int variable, const std::vector<Use>& uses,
+                                  const std::vector<std::vector<int>>& cliques,
+                                  std::vector<int>* last_seen_by) {
   std::vector<int> beside{variable};
   for (const auto& [clique, member] : uses) {
     for (size_t a = member + 1; a < cliques[clique].size(); ++a) {
@@ -78,7 +78,7 @@ void BlockEquations::FindPlaces(const std::vector<std::vector<int>>& cliques) {
   std::vector<int> last_seen_by(num_variables, -1), offset(num_variables);
   for (int variable = 0; variable < num_variables; ++variable) {
     std::vector<int> rows_of_one;
-    for (const int other : BesideAndBehind(variable, uses[variable], cliques, &last_seen_by)) {
+    for (const int other : NeighboursBehind(variable, uses[variable], cliques, &last_seen_by)) {
       offset[other] = static_cast<int>(rows_of_one.size());
       for (int row = first_column_[other]; row < first_column_[other + 1]; ++row) {
         rows_of_one.push_back(row);

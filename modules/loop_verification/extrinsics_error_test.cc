@@ -5,15 +5,10 @@
 #include <random>
 
 #include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
 
 namespace pangea {
 namespace {
-
-Rigid3 RandomPose(std::mt19937_64& rng) {
-  std::normal_distribution<double> normal(0, 1);
-  const auto vector = [&] { return Eigen::Vector3d(normal(rng), normal(rng), normal(rng)); };
-  return {ExpSo3(vector()), vector()};
-}
 
 Matrix6d RandomCovariance(std::mt19937_64& rng) {
   std::normal_distribution<double> normal(0, 0.01);
@@ -31,11 +26,11 @@ TEST(ExtrinsicsCovariance, IsThatOfTheBodiesWhileTheCamerasStay) {
     Keyframe m, c;
     m.id.map = {1, 1};
     c.id.map = {trial % 2 == 0 ? 2 : 1, 2};
-    m.camera.T_body_cam = RandomPose(rng);
-    c.camera.T_body_cam = RandomPose(rng);
+    m.camera.T_body_cam = RandomPose(rng, 1, 1);
+    c.camera.T_body_cam = RandomPose(rng, 1, 1);
     m.T_body_cam_covariance = RandomCovariance(rng);
     c.T_body_cam_covariance = RandomCovariance(rng);
-    const Rigid3 T_m_c = RandomPose(rng);
+    const Rigid3 T_m_c = RandomPose(rng, 1, 1);
     const Rigid3 T_cam_cam = m.camera.T_body_cam.Inverse() * T_m_c * c.camera.T_body_cam;
     const Eigen::MatrixXd J = NumericJacobian(12, 1e-6, [&](const Eigen::VectorXd& offset) {
       const Rigid3 moved = m.camera.T_body_cam.Plus(offset.head<6>()) * T_cam_cam *

@@ -3,7 +3,9 @@
 #include <Eigen/Core>
 #include <random>
 
-namespace pangea::vio {
+#include "core/rigid3.h"
+
+namespace pangea {
 
 inline Eigen::Vector3d RandomVector(std::mt19937_64& rng, double sigma) {
   std::normal_distribution<double> normal(0, sigma);
@@ -11,4 +13,9 @@ inline Eigen::Vector3d RandomVector(std::mt19937_64& rng, double sigma) {
   return {x, y, z};
 }
 
-}  // namespace pangea::vio
+inline Rigid3 RandomPose(std::mt19937_64& rng, double sigma_rad, double sigma_m) {
+  const Eigen::Vector3d rotation = RandomVector(rng, sigma_rad);
+  return {ExpSo3(rotation), RandomVector(rng, sigma_m)};
+}
+
+}  // namespace pangea

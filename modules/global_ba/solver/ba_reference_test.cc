@@ -5,6 +5,7 @@
 #include <random>
 
 #include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
 #include "global_ba/ba_factors.h"
 
 namespace pangea {
@@ -14,16 +15,10 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-Rigid3 RandomPose(std::mt19937_64& rng) {
-  std::normal_distribution<double> normal(0, 1);
-  const auto vector = [&] { return Vector3d(normal(rng), normal(rng), normal(rng)); };
-  return {ExpSo3(vector()), 3 * vector()};
-}
-
 TEST(LandmarkFactor, DerivativesMatchDifferences) {
   std::mt19937_64 rng(1);
   for (int trial = 0; trial < 20; ++trial) {
-    const Rigid3 T_map_body = RandomPose(rng), T_body_cam = RandomPose(rng);
+    const Rigid3 T_map_body = RandomPose(rng, 1, 3), T_body_cam = RandomPose(rng, 1, 3);
     const Vector3d p_cam(0.4, -0.3, 2.5 + 0.1 * trial);
     const Vector3d point = T_map_body * (T_body_cam * p_cam);
     Eigen::Matrix2d sqrt_info;

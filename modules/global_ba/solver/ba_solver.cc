@@ -56,31 +56,33 @@ std::optional<std::pair<BaSolver::State, double>> BaSolver::Step() {
   landmarks_->AddTo(Views(state_), state_.landmarks, loss_, equations_.get());
   factors_.AddTo(state_.blocks, equations_.get());
   equations_->Damp(damping_);
-  double promise = landmarks_->Eliminate(damping_, equations_.get());
+  double predicted_decrease = landmarks_->Eliminate(damping_, equations_.get());
   const std::optional<Eigen::VectorXd> step = equations_->Solve();
   if (!step) {
     return std::nullopt;
   }
-  promise -= 0.5 * equations_->g().dot(*step);
+  predicted_decrease -= 0.5 * equations_->g().dot(*step);
   State moved = state_;
   moved.blocks.Move(*step, *equations_);
   landmarks_->Move(*step, *equations_, &moved.landmarks);
-  return std::make_pair(std::move(moved), promise);
+  return std::make_pair(std::move(moved), predicted_decrease);
 }
 
 BaSolver::Outcome BaSolver::Iterate() {
   for (int attempt = 0; attempt < kMaxRetries; ++attempt) {
     if (auto step = Step()) {
-      auto& [moved, promise] = *step;
+      auto& [moved, predicted_decrease] = *step;
       const double before = cost_, cost = CostOf(moved);
       if (cost <= before) {
         state_ = std::move(moved);
         cost_ = cost;
         damping_ /= 3;
+        // Damped or not: to go on until an undamped step is small costs a fifth more, for nothing.
         const double least = tolerance_ * before;
-        return promise < least || before - cost < least ? Outcome::kConverged : Outcome::kGoesOn;
+        return predicted_decrease < least || before - cost < least ? Outcome::kConverged
+                                                                   : Outcome::kGoesOn;
       }
-      if (promise < 1e-12 * before) {
+      if (predicted_decrease < 1e-12 * before) {
         return Outcome::kConverged;
       }
     }

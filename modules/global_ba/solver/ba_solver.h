@@ -22,7 +22,7 @@ class BaSolver {
   BaSolver(const BaWorld& world, const BaOptions& options, const RobustLoss& loss);
 
   enum class Outcome { kGoesOn, kConverged, kStuck };
-  // Stuck: no step makes it better, though one was promised.
+  // Stuck: no step makes it better, though one should.
   Outcome Iterate();
 
   double cost() const { return cost_; }
@@ -39,7 +39,7 @@ class BaSolver {
 
   std::vector<View> Views(const State& state) const;
   double CostOf(const State& state) const;
-  // A step from the state and what it promises of the cost; nothing if there is none.
+  // A step from the state and by how much it should lower the cost; nothing if there is none.
   std::optional<std::pair<State, double>> Step();
 
   RobustLoss loss_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/rigid3.h"
+
 namespace pangea {
 namespace {
 
@@ -42,14 +44,6 @@ Linearised Project(const BaObservation& seen, const EliminatedLandmarks::View& v
   return projection;
 }
 
-// J [v]x
-Matrix23 TimesHat(const Matrix23& J, const Vector3d& v) {
-  Matrix23 result;
-  result << v.z() * J.col(1) - v.y() * J.col(2), v.x() * J.col(2) - v.z() * J.col(0),
-      v.y() * J.col(0) - v.x() * J.col(1);
-  return result;
-}
-
 int MemberOf(const std::vector<int>& clique, int variable) {
   return static_cast<int>(std::ranges::lower_bound(clique, variable) - clique.begin());
 }
@@ -65,22 +59,23 @@ EliminatedLandmarks::View::View(const Rigid3& T_map_body, const Rigid3& T_body_c
 EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
                                          const std::vector<int>& pose_variables,
                                          const std::vector<int>& camera_variables)
-    : cliques_(world.landmarks.size()), own_(world.landmarks.size()) {
+    : cliques_(world.landmarks.size()), landmark_blocks_(world.landmarks.size()) {
   for (const BaObservation& seen : world.observations) {
-    sightings_.push_back({seen});
+    observations_.push_back({seen});
   }
-  std::ranges::stable_sort(sightings_, {}, [](const Sighting& s) { return s.seen.landmark; });
-  const auto body_of = [&](const Sighting& s) { return pose_variables[s.seen.keyframe]; };
-  const auto camera_of = [&](const Sighting& s) {
+  std::ranges::stable_sort(observations_, {}, [](const Observation& s) { return s.seen.landmark; });
+  const auto body_of = [&](const Observation& s) { return pose_variables[s.seen.keyframe]; };
+  const auto camera_of = [&](const Observation& s) {
     return camera_variables[world.keyframes[s.seen.keyframe].camera];
   };
-  size_t next = 0, num_ties = 0;
+  size_t next = 0, num_cross_blocks = 0;
   for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
-    first_sighting_.push_back(next);
+    first_observation_.push_back(next);
     std::vector<int>& clique = cliques_[landmark];
-    for (; next < sightings_.size() && sightings_[next].seen.landmark == static_cast<int>(landmark);
+    for (; next < observations_.size() &&
+           observations_[next].seen.landmark == static_cast<int>(landmark);
          ++next) {
-      for (const int variable : {body_of(sightings_[next]), camera_of(sightings_[next])}) {
+      for (const int variable : {body_of(observations_[next]), camera_of(observations_[next])}) {
         if (variable != kHeld) {
           clique.push_back(variable);
         }
@@ -88,16 +83,16 @@ EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
     }
     std::ranges::sort(clique);
     clique.erase(std::unique(clique.begin(), clique.end()), clique.end());
-    for (size_t i = first_sighting_.back(); i < next; ++i) {
-      const int body = body_of(sightings_[i]), camera = camera_of(sightings_[i]);
-      sightings_[i].body = body == kHeld ? kHeld : MemberOf(clique, body);
-      sightings_[i].camera = camera == kHeld ? kHeld : MemberOf(clique, camera);
+    for (size_t i = first_observation_.back(); i < next; ++i) {
+      const int body = body_of(observations_[i]), camera = camera_of(observations_[i]);
+      observations_[i].body = body == kHeld ? kHeld : MemberOf(clique, body);
+      observations_[i].camera = camera == kHeld ? kHeld : MemberOf(clique, camera);
     }
-    first_tie_.push_back(num_ties);
-    num_ties += clique.size();
+    first_cross_block_.push_back(num_cross_blocks);
+    num_cross_blocks += clique.size();
   }
-  first_sighting_.push_back(next);
-  ties_.resize(num_ties);
+  first_observation_.push_back(next);
+  cross_blocks_.resize(num_cross_blocks);
 }
 
 Vector2d EliminatedLandmarks::Residual(const BaObservation& seen, const View& view,
@@ -109,8 +104,8 @@ double EliminatedLandmarks::Cost(const std::vector<View>& views,
                                  const std::vector<Vector3d>& landmarks,
                                  const RobustLoss& loss) const {
   double cost = 0;
-  for (const Sighting& sighting : sightings_) {
-    const BaObservation& seen = sighting.seen;
+  for (const Observation& observation : observations_) {
+    const BaObservation& seen = observation.seen;
     cost += loss.Cost(Residual(seen, views[seen.keyframe], landmarks[seen.landmark]).squaredNorm());
   }
   return cost;
@@ -125,78 +120,79 @@ void EliminatedLandmarks::AddTo(const std::vector<View>& views,
 }
 
 double EliminatedLandmarks::Eliminate(double damping, BlockEquations* equations) {
-  double promise = 0;
+  double predicted_decrease = 0;
   for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
     EliminateOne(landmark, damping, equations);
-    promise += 0.5 * own_[landmark].d.squaredNorm();
+    predicted_decrease += 0.5 * landmark_blocks_[landmark].d.squaredNorm();
   }
-  return promise;
+  return predicted_decrease;
 }
 
 void EliminatedLandmarks::Gather(size_t landmark, const std::vector<View>& views,
                                  const Vector3d& point, const RobustLoss& loss,
                                  BlockEquations* equations) {
   const std::vector<int>& clique = cliques_[landmark];
-  Tie* const ties = ties_.data() + first_tie_[landmark];
-  std::fill_n(ties, clique.size(), Tie::Zero());
+  CrossBlock* const cross_blocks = cross_blocks_.data() + first_cross_block_[landmark];
+  std::fill_n(cross_blocks, clique.size(), CrossBlock::Zero());
   Matrix3d information = Matrix3d::Identity() * kLeastInformation;
   Vector3d gradient = Vector3d::Zero();
-  for (size_t i = first_sighting_[landmark]; i < first_sighting_[landmark + 1]; ++i) {
-    const Sighting& sighting = sightings_[i];
-    const View& view = views[sighting.seen.keyframe];
-    const Linearised projection = Project(sighting.seen, view, point, true);
+  for (size_t i = first_observation_[landmark]; i < first_observation_[landmark + 1]; ++i) {
+    const Observation& observation = observations_[i];
+    const View& view = views[observation.seen.keyframe];
+    const Linearised projection = Project(observation.seen, view, point, true);
     const double sqrt_weight = std::sqrt(loss.Weight(projection.r.squaredNorm()));
     const Matrix23 J = sqrt_weight * projection.J;
     const Vector2d r = sqrt_weight * projection.r;
     information += J.transpose() * J;
     gradient += J.transpose() * r;
-    const auto tie = [&](int member, const Matrix26& J_variable) {
+    const auto add = [&](int member, const Matrix26& J_variable) {
       equations->Add(landmark, member, member, J_variable.transpose() * J_variable);
       equations->g().segment<6>(equations->ColumnOf(clique[member])) += J_variable.transpose() * r;
-      ties[member] += J.transpose() * J_variable;
+      cross_blocks[member] += J.transpose() * J_variable;
     };
     Matrix26 J_body, J_camera;
-    if (sighting.body != kHeld) {
-      J_body << -J, TimesHat(J, point - view.p_map_body);
-      tie(sighting.body, J_body);
+    if (observation.body != kHeld) {
+      J_body << -J, J * Hat(point - view.p_map_body);
+      add(observation.body, J_body);
     }
-    if (sighting.camera != kHeld) {
-      J_camera << -J * view.R_map_body, TimesHat(J, point - view.p_map_cam) * view.R_map_body;
-      tie(sighting.camera, J_camera);
+    if (observation.camera != kHeld) {
+      J_camera << -J * view.R_map_body, J * Hat(point - view.p_map_cam) * view.R_map_body;
+      add(observation.camera, J_camera);
     }
-    if (sighting.body != kHeld && sighting.camera != kHeld) {
-      equations->Add(landmark, sighting.camera, sighting.body, J_camera.transpose() * J_body);
+    if (observation.body != kHeld && observation.camera != kHeld) {
+      equations->Add(landmark, observation.camera, observation.body, J_camera.transpose() * J_body);
     }
   }
-  own_[landmark] = {information, gradient};
+  landmark_blocks_[landmark] = {information, gradient};
 }
 
 void EliminatedLandmarks::EliminateOne(size_t landmark, double damping, BlockEquations* equations) {
   const std::vector<int>& clique = cliques_[landmark];
-  Tie* const ties = ties_.data() + first_tie_[landmark];
-  Own& own = own_[landmark];
-  own.L.diagonal() *= 1 + damping;
-  own.L = own.L.llt().matrixL();
-  const auto L = own.L.triangularView<Eigen::Lower>();
-  L.solveInPlace(own.d);
+  CrossBlock* const cross_blocks = cross_blocks_.data() + first_cross_block_[landmark];
+  LandmarkBlock& block = landmark_blocks_[landmark];
+  block.L.diagonal() *= 1 + damping;
+  block.L = block.L.llt().matrixL();
+  const auto L = block.L.triangularView<Eigen::Lower>();
+  L.solveInPlace(block.d);
   for (size_t a = 0; a < clique.size(); ++a) {
-    L.solveInPlace(ties[a]);
+    L.solveInPlace(cross_blocks[a]);
     for (size_t b = 0; b <= a; ++b) {
-      equations->Add(landmark, a, b, -(ties[a].transpose() * ties[b]));
+      equations->Add(landmark, a, b, -(cross_blocks[a].transpose() * cross_blocks[b]));
     }
-    equations->g().segment<6>(equations->ColumnOf(clique[a])) -= ties[a].transpose() * own.d;
+    equations->g().segment<6>(equations->ColumnOf(clique[a])) -=
+        cross_blocks[a].transpose() * block.d;
   }
 }
 
 void EliminatedLandmarks::Move(const Eigen::VectorXd& step, const BlockEquations& equations,
                                std::vector<Vector3d>* landmarks) const {
   for (size_t landmark = 0; landmark < cliques_.size(); ++landmark) {
-    Vector3d moved = own_[landmark].d;
+    Vector3d moved = landmark_blocks_[landmark].d;
     for (size_t member = 0; member < cliques_[landmark].size(); ++member) {
-      moved += ties_[first_tie_[landmark] + member] *
+      moved += cross_blocks_[first_cross_block_[landmark] + member] *
                step.segment<6>(equations.ColumnOf(cliques_[landmark][member]));
     }
-    own_[landmark].L.transpose().triangularView<Eigen::Upper>().solveInPlace(moved);
+    landmark_blocks_[landmark].L.transpose().triangularView<Eigen::Upper>().solveInPlace(moved);
     (*landmarks)[landmark] -= moved;
   }
 }

@@ -37,7 +37,7 @@ class EliminatedLandmarks {
   EliminatedLandmarks(const BaWorld& world, const std::vector<int>& pose_variables,
                       const std::vector<int>& camera_variables);
 
-  // What each landmark ties together.
+  // Of each landmark the variables that see it.
   const std::vector<std::vector<int>>& cliques() const { return cliques_; }
 
   // Whitened.
@@ -51,7 +51,8 @@ class EliminatedLandmarks {
   void AddTo(const std::vector<View>& views, const std::vector<Eigen::Vector3d>& landmarks,
              const RobustLoss& loss, BlockEquations* equations);
   // Then takes from the equations what the landmarks need for themselves. `damping`:
-  // Levenberg-Marquardt's. Returns what the landmarks' own steps promise of the cost.
+  // Levenberg-Marquardt's. Returns by how much their own
+  // steps should lower the cost.
   double Eliminate(double damping, BlockEquations* equations);
   // Their own steps for the step of all variables, by the last elimination.
   void Move(const Eigen::VectorXd& step, const BlockEquations& equations,
@@ -59,27 +60,27 @@ class EliminatedLandmarks {
 
  private:
   static constexpr int kHeld = -1;
-  struct Sighting {
+  struct Observation {
     BaObservation seen;
     int body = kHeld, camera = kHeld;  // members of the landmark's clique
   };
   // L L^T is the landmark's own information; L^-1 times its gradient.
-  struct Own {
+  struct LandmarkBlock {
     Eigen::Matrix3d L;
     Eigen::Vector3d d;
   };
-  using Tie = Eigen::Matrix<double, 3, 6>;  // L^-1 times its information with a variable
+  using CrossBlock = Eigen::Matrix<double, 3, 6>;  // L^-1 times its information with a variable
 
   void Gather(size_t landmark, const std::vector<View>& views, const Eigen::Vector3d& point,
               const RobustLoss& loss, BlockEquations* equations);
   void EliminateOne(size_t landmark, double damping, BlockEquations* equations);
 
-  std::vector<Sighting> sightings_;     // landmark by landmark
-  std::vector<size_t> first_sighting_;  // of each landmark; and their number
+  std::vector<Observation> observations_;  // landmark by landmark
+  std::vector<size_t> first_observation_;  // of each landmark; and their number
   std::vector<std::vector<int>> cliques_;
-  std::vector<size_t> first_tie_;  // of each landmark
-  std::vector<Tie> ties_;          // of each member of each clique
-  std::vector<Own> own_;
+  std::vector<size_t> first_cross_block_;  // of each landmark
+  std::vector<CrossBlock> cross_blocks_;   // of each member of each clique
+  std::vector<LandmarkBlock> landmark_blocks_;
 };
 
 }  // namespace pangea

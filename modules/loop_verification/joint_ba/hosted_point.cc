@@ -20,25 +20,26 @@ Vector3d InWorld(const Vector3d& point, const PosedCamera& host) {
   return host.R_w_cam * (Vector3d(point.x(), point.y(), 1.0) / point.z()) + host.p_w_cam;
 }
 
-struct WhitenedSighting {
+struct WhitenedObservation {
   Vector2d r;
   Matrix23 J;  // by the point's place in the world
 };
 
-std::optional<WhitenedSighting> Project(const HostedPoint::Sighting& sighting, const Vector3d& p_w,
-                                        const PosedCamera& camera, bool with_jacobian) {
+std::optional<WhitenedObservation> Project(const HostedPoint::Observation& observation,
+                                           const Vector3d& p_w, const PosedCamera& camera,
+                                           bool with_jacobian) {
   const Vector3d p_cam = camera.R_w_cam.transpose() * (p_w - camera.p_w_cam);
   if (p_cam.z() < kMinDepth) {
     return std::nullopt;
   }
   const double inv_z = 1.0 / p_cam.z();
   const Vector2d xy = p_cam.head<2>() * inv_z;
-  WhitenedSighting projection;
-  projection.r = sighting.sqrt_info * (xy - sighting.ray);
+  WhitenedObservation projection;
+  projection.r = observation.sqrt_info * (xy - observation.ray);
   if (with_jacobian) {
     Matrix23 J_project;
     J_project << inv_z, 0, -xy.x() * inv_z, 0, inv_z, -xy.y() * inv_z;
-    projection.J = sighting.sqrt_info * J_project * camera.R_w_cam.transpose();
+    projection.J = observation.sqrt_info * J_project * camera.R_w_cam.transpose();
   }
   return projection;
 }
@@ -80,13 +81,13 @@ PosedCamera::PosedCamera(const Rigid3& T_w_body, const Rigid3& T_body_cam)
       p_w_cam(T_w_body * T_body_cam.t),
       R_w_cam((T_w_body.q * T_body_cam.q)) {}
 
-std::optional<Vector2d> HostedPoint::Residual(const Sighting& sighting, const Vector3d& point,
+std::optional<Vector2d> HostedPoint::Residual(const Observation& observation, const Vector3d& point,
                                               const std::vector<PosedCamera>& cameras) const {
   if (!(point.z() > kMinInverseDepth)) {
     return std::nullopt;
   }
   const auto projection =
-      Project(sighting, InWorld(point, cameras[host]), cameras[sighting.frame], false);
+      Project(observation, InWorld(point, cameras[host]), cameras[observation.frame], false);
   return projection ? std::make_optional(projection->r) : std::nullopt;
 }
 
@@ -103,8 +104,8 @@ double HostedPoint::Cost(const Vector3d& point, const std::vector<PosedCamera>& 
   const double depth = DepthResidual(point, kappa);
   double cost = 0.5 * ((sqrt_info * (point.head<2>() - ray)).squaredNorm() + depth * depth);
   const Vector3d p_w = InWorld(point, cameras[host]);
-  for (const Sighting& sighting : seen) {
-    const auto projection = Project(sighting, p_w, cameras[sighting.frame], false);
+  for (const Observation& observation : seen) {
+    const auto projection = Project(observation, p_w, cameras[observation.frame], false);
     if (!projection) {
       return kBehind;
     }
@@ -118,7 +119,7 @@ Matrix3d EliminatedPoint::Coupling(size_t a, size_t b) const {
   if (a == b) {
     C += poses[a].N;
   } else if (a == 0 || b == 0) {
-    C -= poses[std::max(a, b)].N;  // the host moves the point where a sighting moves its camera
+    C -= poses[std::max(a, b)].N;  // the host moves the point where a observation moves its camera
   }
   return C;
 }
@@ -186,9 +187,9 @@ void Eliminate(const HostedPoint& hosted, const Vector3d& point,
   of_host.N.setZero();  // sum of J^T J, by p_w
   of_host.g.setZero();
   for (size_t i = 0; i < hosted.seen.size(); ++i) {
-    const HostedPoint::Sighting& sighting = hosted.seen[i];
-    const PosedCamera& camera = cameras[sighting.frame];
-    const WhitenedSighting projection = *Project(sighting, p_w, camera, true);
+    const HostedPoint::Observation& observation = hosted.seen[i];
+    const PosedCamera& camera = cameras[observation.frame];
+    const WhitenedObservation projection = *Project(observation, p_w, camera, true);
     const double weight = loss.Weight(projection.r.squaredNorm());
     EliminatedPoint::Pose& pose = out.poses[1 + i];
     pose.arm = p_w - camera.p_w_body;

@@ -29,7 +29,7 @@ struct PosedCamera {
 };
 
 struct HostedPoint {
-  struct Sighting {
+  struct Observation {
     int frame = 0;
     Eigen::Vector2d ray = Eigen::Vector2d::Zero();
     Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();  // times the root of `share`
@@ -44,10 +44,11 @@ struct HostedPoint {
   Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();
   double inverse_depth = 0;
   double inverse_depth_sigma = 0;
-  std::vector<Sighting> seen;  // by others than the host
+  std::vector<Observation> seen;  // by others than the host
 
-  // Of one sighting, whitened; nothing behind the camera.
-  std::optional<Eigen::Vector2d> Residual(const Sighting& sighting, const Eigen::Vector3d& point,
+  // Of one observation, whitened; nothing behind the camera.
+  std::optional<Eigen::Vector2d> Residual(const Observation& observation,
+                                          const Eigen::Vector3d& point,
                                           const std::vector<PosedCamera>& cameras) const;
   // Of the depth against its prior, sigmas.
   double DepthResidual(const Eigen::Vector3d& point, double kappa) const;
@@ -57,13 +58,13 @@ struct HostedPoint {
 };
 
 // What is left of a point's residuals once it is eliminated: 1/2 e^T H e + g^T e, with e the errors
-// of the frames' poses that it touches (its host's, then those of its sightings, six each) and of
-// kappa. A pose moves the point's place in the world by A = [I, -[arm]x] times its error; so H is
-// of blocks A^T C A, with C of 3x3.
+// of the frames' poses that it touches (its host's, then those of its observations, six each) and
+// of kappa. A pose moves the point's place in the world by A = [I, -[arm]x] times its error; so H
+// is of blocks A^T C A, with C of 3x3.
 struct EliminatedPoint {
   struct Pose {
     Eigen::Vector3d arm;  // from the body to the point, in the world
-    Eigen::Matrix3d N;    // information of its sightings on the point's place
+    Eigen::Matrix3d N;    // information of its observations on the point's place
     Eigen::Matrix3d U;    // L^-1 times the point's information that goes with it
     Eigen::Vector3d g;    // before the point is eliminated
   };

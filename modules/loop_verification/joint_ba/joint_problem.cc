@@ -194,8 +194,8 @@ double JointProblem::Cost(const JointState& state, const RobustLoss& loss) const
 
 std::vector<int> JointProblem::ColumnsOf(const HostedPoint& point) const {
   std::vector<int> columns = {PoseColumn(point.host)};
-  for (const HostedPoint::Sighting& sighting : point.seen) {
-    columns.push_back(PoseColumn(sighting.frame));
+  for (const HostedPoint::Observation& observation : point.seen) {
+    columns.push_back(PoseColumn(observation.frame));
   }
   columns.push_back(ScaleColumn(point.side));
   return columns;
@@ -249,12 +249,12 @@ void JointProblem::Classify(std::vector<bool>* inlier, double* chi2_sum) const {
   for (size_t p = 0; p < points_.size(); ++p) {
     const HostedPoint& point = points_[p];
     const double depth = point.DepthResidual(state_.points[p], state_.log_scale[point.side]);
-    for (const HostedPoint::Sighting& sighting : point.seen) {
-      const auto r = point.Residual(sighting, state_.points[p], cameras);
-      const double chi2 = r ? r->squaredNorm() / (sighting.share * sighting.share) : 0;
+    for (const HostedPoint::Observation& observation : point.seen) {
+      const auto r = point.Residual(observation, state_.points[p], cameras);
+      const double chi2 = r ? r->squaredNorm() / (observation.share * observation.share) : 0;
       const bool is_inlier =
           r && chi2 < options_.max_chi2 && depth * depth < options_.max_depth_chi2;
-      (*inlier)[sighting.match] = is_inlier;
+      (*inlier)[observation.match] = is_inlier;
       *chi2_sum += is_inlier ? chi2 : 0;
     }
   }

@@ -94,7 +94,7 @@ class Reference {
           r[2] = (at[2] - std::exp(-kappa[0]) * hosted.inverse_depth) / hosted.inverse_depth_sigma;
         },
         nullptr, point, &log_scale_[hosted.side]);
-    for (const HostedPoint::Sighting& seen : hosted.seen) {
+    for (const HostedPoint::Observation& seen : hosted.seen) {
       ceres::LossFunction* loss = nullptr;
       if (kind != RobustLoss::Kind::kNone) {
         loss = kind == RobustLoss::Kind::kHuber

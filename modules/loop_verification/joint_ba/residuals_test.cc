@@ -66,8 +66,8 @@ TEST(EdgeResidual, IsWhitenedByItsCovariance) {
   EXPECT_NEAR(residual.squaredNorm(), xi.dot(covariance.inverse() * xi), 1e-6);
 }
 
-// A host and two cameras that see its point, and the errors of all: the host's, the sightings', the
-// log scale's and the point's own.
+// A host and two cameras that see its point, and the errors of all: the host's, the observations',
+// the log scale's and the point's own.
 class HostedPointTest : public testing::Test {
  protected:
   static constexpr int kErrors = 18 + 1 + 3;
