@@ -219,11 +219,10 @@ std::optional<InitialResult> Initialiser::Refusal(
     return InitialResult{std::nullopt, "the start-up bundle adjustment did not converge"};
   }
   if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
-    return InitialResult{
-        std::nullopt,
-        fmt::format("the start does not explain the images: {:.0f} % inliers, {:.1f} sigma",
-                    100 * refined->inlier_share, refined->rms_sigma),
-        true};
+    const std::string found = refined->inlier_share < kMinInlierShare
+                                  ? fmt::format("{:.0f} % inliers", 100 * refined->inlier_share)
+                                  : fmt::format("{:.1f} sigma", refined->rms_sigma);
+    return InitialResult{std::nullopt, "the start does not explain the images: " + found, true};
   }
   // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
   // certain, if certainty were asked for in metres per second.
