@@ -55,6 +55,13 @@ void AddImuFactors(std::span<const StartFrame> frames, const ImuNoise& noise,
   }
 }
 
+void AddStamps(std::span<const StartFrame> frames, StartProblem* problem) {
+  for (size_t k = 0; k < frames.size(); ++k) {
+    const ImuSample& at_stamp = k == 0 ? frames[1].imu.front() : frames[k].imu.back();
+    problem->stamps.push_back({at_stamp.gyro - problem->expected_gyro_bias, 0});
+  }
+}
+
 // A ray counts where its point is before the camera. Returns how many rays there are, counted or
 // not.
 int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_first,
@@ -110,16 +117,17 @@ void SumUpRays(const StartProblem& problem, int rays, RefinedStart* out) {
 
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Vector3d& gyro_bias,
-                                   const LinearStart& start, double ray_sigma,
-                                   double accel_bias_sigma) {
+                                   const LinearStart& start, const StartSigmas& sigmas) {
   StartProblem problem;
   problem.T_body_cam = T_body_cam;
-  problem.ray_sigma = ray_sigma;
+  problem.ray_sigma = sigmas.ray;
   problem.expected_gyro_bias = gyro_bias;
-  problem.accel_bias_sigma = accel_bias_sigma;
+  problem.accel_bias_sigma = sigmas.accel_bias;
+  problem.stamp_sigma_s = sigmas.stamp_s;
   const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
   AddStates(q_odom_first, start, &problem);
   AddImuFactors(frames, noise, &problem);
+  AddStamps(frames, &problem);
   const int rays = AddPoints(frames, q_odom_first, start, &problem);
   RefinedStart out;
   int counted = 0;
@@ -139,6 +147,9 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   }
   SumUpRays(problem, rays, &out);
   out.states = problem.states;
+  for (const StartStamp& stamp : problem.stamps) {
+    out.stamp_errors_s.push_back(stamp.error_s);
+  }
   out.cost = problem.Cost() + kOutlierCost * (rays - counted);
   for (ImuState& state : out.states) {
     state.T_odom_body.t -= problem.states.back().T_odom_body.t;

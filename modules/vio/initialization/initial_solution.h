@@ -51,10 +51,11 @@ LinearStart Scaled(LinearStart start, double scale);
 // Refined by bundle adjustment; poses are in a gravity-aligned frame with its origin in the last
 // body.
 struct RefinedStart {
-  std::vector<ImuState> states;  // of every frame, with one pair of biases
-  double velocity_sigma = 0;     // m/s, of the last one's, in its least certain direction
-  double tilt_sigma = 0;         // rad
-  double rms_sigma = 0;          // reprojection residual of the inliers, in sigmas
+  std::vector<ImuState> states;        // at every frame's stamp, with one pair of biases
+  std::vector<double> stamp_errors_s;  // the image was taken this much after its stamp
+  double velocity_sigma = 0;           // m/s, of the last one's, in its least certain direction
+  double tilt_sigma = 0;               // rad
+  double rms_sigma = 0;                // reprojection residual of the inliers, in sigmas
   double inlier_share = 0;
   // At the minimum; a ray whose point is not before the camera counts as an outlier.
   double cost = std::numeric_limits<double>::infinity();
@@ -62,10 +63,14 @@ struct RefinedStart {
 // A start is good for nothing when fewer of the rays fit. When fewer are even before the camera in
 // the closed-form solution, Refine tells that share and nothing else.
 inline constexpr double kMinInlierShare = 0.8;
+struct StartSigmas {
+  double ray = 0;
+  double accel_bias = 0.15;  // m/s^2, about zero
+  double stamp_s = 0;        // of an image's stamp; 0: exact
+};
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
-                                   const LinearStart& start, double ray_sigma,
-                                   double accel_bias_sigma);
+                                   const LinearStart& start, const StartSigmas& sigmas);
 
 // The closed form knows no accelerometer bias. Of a body that hardly moves the bias makes it up to
 // several times too large or too small, and the refinement then ends in a minimum of its own. So

@@ -101,7 +101,9 @@ Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, doubl
       accel_bias_sigma_(accel_bias_sigma),
       stationary_(stationary) {}
 
-InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
+InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
+                                    double stamp_sigma_s) {
+  stamp_sigma_s_ = stamp_sigma_s;
   samples_.insert(samples_.end(), imu.begin(), imu.end());
   if (samples_.empty() || samples_.back().utime < frame.utime) {
     return {std::nullopt, "no inertial samples up to the image's time"};
@@ -166,7 +168,7 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   ImuState imu;
   imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
   imu.gyro_bias = moments.gyro_mean;
-  state.frames.push_back({frames_.back(), imu});
+  state.frames.push_back({frames_.back(), imu, 0});
   // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
   // the bias.
   Eigen::Matrix<double, 15, 1> sigma;
@@ -252,7 +254,9 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   const ImuNoise noise = MeasuredNoise(noise_, samples_);
   const auto refine = [&](const LinearStart& start) {
     return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start,
-                  pixel_sigma_ * camera_.PixelAngle(), accel_bias_sigma_);
+                  {.ray = pixel_sigma_ * camera_.PixelAngle(),
+                   .accel_bias = accel_bias_sigma_,
+                   .stamp_s = stamp_sigma_s_});
   };
   std::optional<RefinedStart> refined = refine(*linear);
   if (auto refusal = Refusal(refined)) {
@@ -265,7 +269,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   InitialState state;
   state.time_offset_change_s = time_offset_change_s_;
   for (size_t i = 0; i < frames_.size(); ++i) {
-    state.frames.push_back({frames_[i], refined->states[i]});
+    state.frames.push_back({frames_[i], refined->states[i], refined->stamp_errors_s[i]});
   }
   return {state, ""};
 }

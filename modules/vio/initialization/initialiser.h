@@ -28,8 +28,9 @@ namespace pangea::vio {
 struct InitialState {
   // The frames the start was found from, oldest first, the newest last; one if it was stationary.
   struct Frame {
-    TrackedFrame tracked;  // its utime is the IMU's
-    ImuState imu;
+    TrackedFrame tracked;      // its utime is the IMU's
+    ImuState imu;              // at this time
+    double stamp_error_s = 0;  // the image was taken this much after it
   };
   std::vector<Frame> frames;
   bool stationary = false;
@@ -51,8 +52,9 @@ class Initialiser {
               double accel_bias_sigma, const StationaryOptions& stationary);
 
   // Frames in time order, with the samples since the previous frame (the last one at or after the
-  // frame).
-  InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
+  // frame). `stamp_sigma_s`: of the frames' stamps, as known by now; 0: they are exact.
+  InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
+                         double stamp_sigma_s);
 
  private:
   InitialResult Try();
@@ -69,6 +71,7 @@ class Initialiser {
   StationaryOptions stationary_;
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
+  double stamp_sigma_s_ = 0;
   double time_offset_change_s_ = 0;
   std::string why_not_ = "collecting images";  // at the newest try
 };

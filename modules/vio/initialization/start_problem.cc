@@ -2,11 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include "core/least_squares/levenberg_marquardt.h"
 
@@ -45,7 +45,7 @@ struct RayTerm {
 
 // The point in the camera of a frame.
 Vector3d InCamera(const StartProblem& problem, int frame, const Vector3d& p_odom) {
-  const Rigid3& T = problem.states[frame].T_odom_body;
+  const Rigid3 T = problem.ImagePose(frame);
   return problem.T_body_cam.Inverse() * (T.q.conjugate() * (p_odom - T.t));
 }
 
@@ -71,11 +71,9 @@ RayTerm LineariseRay(const StartProblem& problem, const StartRay& seen, const Ve
   J << inv, 0, -y.x() * inv * inv, 0, inv, -y.y() * inv * inv;
   RayTerm term;
   term.r = (y.head<2>() * inv - seen.ray) / problem.ray_sigma;
-  term.J_point = J *
-                 (problem.states[seen.frame].T_odom_body.q * problem.T_body_cam.q)
-                     .conjugate()
-                     .toRotationMatrix() /
-                 problem.ray_sigma;
+  term.J_point =
+      J * (problem.ImagePose(seen.frame).q * problem.T_body_cam.q).conjugate().toRotationMatrix() /
+      problem.ray_sigma;
   term.J_pose << term.J_point * Hat(p_odom), -term.J_point;
   const double root = std::sqrt(HuberWeight(term.r.norm()));
   term.r *= root;
@@ -131,8 +129,7 @@ void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* po
     return false;
   };
   improve(offered);
-  const Vector3d centre =
-      problem.states[point->rays.front().frame].T_odom_body * problem.T_body_cam.t;
+  const Vector3d centre = problem.ImagePose(point->rays.front().frame) * problem.T_body_cam.t;
   for (int iteration = 0; iteration < kPointIterations && std::isfinite(cost); ++iteration) {
     const double prior = 1 / (point->expected_sigma * point->expected_sigma);
     Matrix3d V = prior * Matrix3d::Identity();
@@ -154,34 +151,91 @@ void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* po
   }
 }
 
+// What a stamp's error, growing, does to (dtheta, xi_p, xi_v) at the stamp while the image stays.
+Eigen::Matrix<double, 9, 1> ByStampError(const ImuState& state, const StartStamp& stamp) {
+  const Vector3d omega = state.T_odom_body.q * stamp.omega_body;
+  const Vector3d& v = state.v_odom_body;
+  Eigen::Matrix<double, 9, 1> change;
+  change << -omega, omega.cross(state.T_odom_body.t) - v, omega.cross(v);
+  return change;
+}
+
+// By a frame's (dtheta, xi_p, xi_v, e), from those by its pose and velocity at the stamp.
+using FrameJacobian = Eigen::Matrix<double, 9, kPoseSize + 4>;
+FrameJacobian ByFrame(const Eigen::Matrix<double, 9, 9>& J_stamp, const ImuState& state,
+                      const StartStamp& stamp) {
+  FrameJacobian J;
+  J << J_stamp, J_stamp * ByStampError(state, stamp);
+  J.middleCols<3>(kVelocity) -= stamp.error_s * J_stamp.middleCols<3>(kPosition);
+  return J;
+}
+
+// Columns of its (dtheta, xi_p, xi_v, e).
+std::vector<int> FrameColumns(const StartProblem& problem, int frame) {
+  std::vector<int> columns(kPoseSize + 3);
+  std::iota(columns.begin(), columns.begin() + kPoseSize, problem.PoseColumn(frame));
+  std::iota(columns.begin() + kPoseSize, columns.end(), problem.VelocityColumn(frame));
+  if (problem.stamps_jitter()) {
+    columns.push_back(problem.StampColumn(frame));
+  }
+  return columns;
+}
+
 void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
   const StartImuFactor& factor = problem.imu_factors[from];
-  const InertialResidual residual =
-      ComputeInertialResidual(factor.measured, problem.states[from], problem.states[from + 1]);
-  constexpr int kColumns = 24;
-  Eigen::Matrix<double, 9, kColumns> J;
-  J << residual.J_from.block<9, 6>(0, kGyroBias), residual.J_from.block<9, kPoseSize>(0, kTheta),
-      residual.J_to.block<9, kPoseSize>(0, kTheta), residual.J_from.block<9, 3>(0, kVelocity),
-      residual.J_to.block<9, 3>(0, kVelocity);
-  std::array<int, kColumns> columns{};
-  std::iota(columns.begin(), columns.begin() + 6, 0);
-  std::iota(columns.begin() + 6, columns.begin() + 18, problem.PoseColumn(from));
-  std::iota(columns.begin() + 18, columns.end(), problem.VelocityColumn(from));
-  const Eigen::Matrix<double, kColumns, 9> JtL = J.transpose() * factor.information;
+  const ImuState &from_state = problem.states[from], &to_state = problem.states[from + 1];
+  const InertialResidual residual = ComputeInertialResidual(factor.measured, from_state, to_state);
+  std::vector<int> columns = {0, 1, 2, 3, 4, 5};
+  const std::vector<int> from_columns = FrameColumns(problem, from),
+                         to_columns = FrameColumns(problem, from + 1);
+  columns.insert(columns.end(), from_columns.begin(), from_columns.end());
+  columns.insert(columns.end(), to_columns.begin(), to_columns.end());
+  const auto a_frame = static_cast<Eigen::Index>(from_columns.size());
+  MatrixXd J(9, columns.size());
+  J << residual.J_from.block<9, 6>(0, kGyroBias),
+      ByFrame(residual.J_from.block<9, 9>(0, 0), from_state, problem.stamps[from])
+          .leftCols(a_frame),
+      ByFrame(residual.J_to.block<9, 9>(0, 0), to_state, problem.stamps[from + 1])
+          .leftCols(a_frame);
+  const MatrixXd JtL = J.transpose() * factor.information;
   out->H(columns, columns) += JtL * J;
   out->g(columns) += JtL * residual.r.head<9>();
 }
 
+// What is known of the stamps' errors beforehand: nothing but their size.
+void AddStamps(const StartProblem& problem, Equations* out) {
+  if (!problem.stamps_jitter()) {
+    return;
+  }
+  const double information = 1 / (problem.stamp_sigma_s * problem.stamp_sigma_s);
+  for (int i = 0; i < problem.num_frames(); ++i) {
+    const int at = problem.StampColumn(i);
+    out->H(at, at) += information;
+    out->g[at] += information * problem.stamps[i].error_s;
+  }
+}
+
 }  // namespace
+
+Rigid3 StartProblem::ImagePose(int frame) const {
+  const Rigid3& T = states[frame].T_odom_body;
+  const auto& [omega_body, error_s] = stamps[frame];
+  return error_s == 0 ? T
+                      : Rigid3(T.q * ExpSo3(error_s * omega_body),
+                               T.t + error_s * states[frame].v_odom_body);
+}
 
 double StartProblem::Cost() const {
   double cost = 0.5 * (states[0].gyro_bias - expected_gyro_bias).squaredNorm() /
                     (kGyroBiasSigma * kGyroBiasSigma) +
                 0.5 * states[0].accel_bias.squaredNorm() / (accel_bias_sigma * accel_bias_sigma);
-  for (size_t i = 0; i < imu_factors.size(); ++i) {
+  for (int i = 0; i + 1 < num_frames(); ++i) {
     const Eigen::Matrix<double, 9, 1> r =
         ComputeInertialResidual(imu_factors[i].measured, states[i], states[i + 1]).r.head<9>();
     cost += 0.5 * r.dot(imu_factors[i].information * r);
+  }
+  for (size_t i = 0; stamps_jitter() && i < stamps.size(); ++i) {
+    cost += 0.5 * std::pow(stamps[i].error_s / stamp_sigma_s, 2);
   }
   for (const StartPoint& point : points) {
     cost += PointCost(*this, point, point.p_odom);
@@ -206,6 +260,7 @@ Equations StartProblem::Linearise(double damping) const {
   for (int i = 0; i < static_cast<int>(imu_factors.size()); ++i) {
     AddImuFactor(*this, i, &out);
   }
+  AddStamps(*this, &out);
   for (const StartPoint& point : points) {
     out.eliminations.push_back(AddPoint(*this, point, damping, &out));
   }
@@ -213,13 +268,20 @@ Equations StartProblem::Linearise(double damping) const {
 }
 
 void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
-  for (int i = 0; i < static_cast<int>(states.size()); ++i) {
+  for (int i = 0; i < num_frames(); ++i) {
     ImuState& state = states[i];
-    const Eigen::Quaterniond rotation = ExpSo3(step.segment<3>(PoseColumn(i) + kTheta));
+    Eigen::Matrix<double, 9, 1> at_stamp;
+    at_stamp << step.segment<kPoseSize>(PoseColumn(i)), step.segment<3>(VelocityColumn(i));
+    if (stamps_jitter()) {
+      const double error_step_s = step[StampColumn(i)];
+      at_stamp.segment<3>(kPosition) -= stamps[i].error_s * at_stamp.segment<3>(kVelocity);
+      at_stamp += ByStampError(state, stamps[i]) * error_step_s;
+      stamps[i].error_s += error_step_s;
+    }
+    const Eigen::Quaterniond rotation = ExpSo3(at_stamp.head<3>());
     state.T_odom_body.q = (rotation * state.T_odom_body.q).normalized();
-    state.T_odom_body.t =
-        rotation * state.T_odom_body.t + step.segment<3>(PoseColumn(i) + kPosition);
-    state.v_odom_body = rotation * state.v_odom_body + step.segment<3>(VelocityColumn(i));
+    state.T_odom_body.t = rotation * state.T_odom_body.t + at_stamp.segment<3>(kPosition);
+    state.v_odom_body = rotation * state.v_odom_body + at_stamp.segment<3>(kVelocity);
     state.gyro_bias += step.head<3>();
     state.accel_bias += step.segment<3>(3);
   }
@@ -255,12 +317,15 @@ std::optional<Matrix6d> StartProblem::NewestCovariance() const {
   if (llt.info() != Eigen::Success) {
     return std::nullopt;
   }
-  const int newest = static_cast<int>(states.size()) - 1;
+  const int newest = num_frames() - 1;
   // The newest (dtheta, dv), dv = xi_v + dtheta x v, by the error.
   MatrixXd J = MatrixXd::Zero(size(), 6);
   J.block<3, 3>(PoseColumn(newest) + kTheta, 0).setIdentity();
   J.block<3, 3>(PoseColumn(newest) + kTheta, 3) = Hat(states[newest].v_odom_body);
   J.block<3, 3>(VelocityColumn(newest), 3).setIdentity();
+  if (stamps_jitter()) {
+    J.row(StampColumn(newest)).head<3>() = ByStampError(states[newest], stamps[newest]).head<3>();
+  }
   const MatrixXd half = llt.matrixL().solve(scale.asDiagonal() * J);
   const Matrix6d covariance = half.transpose() * half;
   return covariance.allFinite() ? std::optional(covariance) : std::nullopt;

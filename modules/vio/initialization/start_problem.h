@@ -9,6 +9,11 @@
 // not step straight; so after each step of the frames every point settles where its rays want it
 // ("embedded point iterations": Jeong et al., CVPR 2010). A handful of steps does. Errors of frames
 // are right-invariant (window_state.h).
+//
+// Where stamps jitter, the error e of each is an unknown: the image was taken where the body came
+// to within e of the stamp, (R Exp(e w), p + e v). Errors of a frame's pose are those where the
+// image was taken, so that points know nothing of stamps; but what steps straight is the pose at
+// the stamp, to which inertial measurements hold the frames far more tightly than rays do.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -34,6 +39,11 @@ struct StartPoint {
   std::vector<StartRay> rays;                          // frames in order
 };
 
+struct StartStamp {
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rad/s, at the stamp
+  double error_s = 0;                                    // the image was taken this much after it
+};
+
 struct StartImuFactor {
   Preintegration measured;
   Eigen::Matrix<double, 9, 9> information;  // order (rotation, velocity, position)
@@ -43,19 +53,25 @@ class StartProblem {
  public:
   Rigid3 T_body_cam;
   double ray_sigma = 0;
-  std::vector<ImuState> states;             // all with one pair of biases
+  std::vector<ImuState> states;             // at the stamps; all with one pair of biases
+  std::vector<StartStamp> stamps;           // of each frame
+  double stamp_sigma_s = 0;                 // 0: stamps are exact, their errors no unknowns
   std::vector<StartImuFactor> imu_factors;  // imu_factors[i]: from frame i to frame i + 1
   std::vector<StartPoint> points;
   Eigen::Vector3d expected_gyro_bias = Eigen::Vector3d::Zero();
   double accel_bias_sigma = 0.15;  // m/s^2, about zero
 
-  // Columns of the error: (gyro bias, accel bias), then each frame's (dtheta, xi_p), then each
-  // frame's xi_v.
-  int size() const { return VelocityColumn(static_cast<int>(states.size())); }
+  // Columns of the error: (gyro bias, accel bias), then each image's (dtheta, xi_p), then each
+  // frame's xi_v, then, where stamps jitter, each stamp's.
+  int size() const { return StampColumn(stamps_jitter() ? num_frames() : 0); }
+  int num_frames() const { return static_cast<int>(states.size()); }
+  bool stamps_jitter() const { return stamp_sigma_s > 0; }
   int PoseColumn(int frame) const { return 6 + kPoseSize * frame; }
-  int VelocityColumn(int frame) const {
-    return PoseColumn(static_cast<int>(states.size())) + 3 * frame;
-  }
+  int VelocityColumn(int frame) const { return PoseColumn(num_frames()) + 3 * frame; }
+  int StampColumn(int frame) const { return VelocityColumn(num_frames()) + frame; }
+
+  // Where the body was when the image was taken.
+  Rigid3 ImagePose(int frame) const;
 
   // A half of the sum of squared residuals, in sigmas (those of rays after Huber, 1964); infinite
   // when a point is behind a camera that saw it.

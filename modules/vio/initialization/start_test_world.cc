@@ -23,10 +23,10 @@ Vector3d VelocityAt(const Path& path, double t) {
   return (path(t + h).t - path(t - h).t) / (2 * h);
 }
 
-StartWorld Record(const Path& path, double late_s, double ray_sigma, double margin_s,
-                  uint64_t seed) {
+StartWorld Record(const Path& path, double late_s, double ray_sigma, double margin_s, uint64_t seed,
+                  double stamp_sigma_s) {
   constexpr double h = 1e-4, kFirst_s = 1, kSpan_s = 2;
-  std::mt19937_64 rng(seed);
+  std::mt19937_64 rng(seed), stamp_rng(seed + 1000);
   StartWorld world;
   for (double t = kFirst_s - margin_s; t <= kFirst_s + kSpan_s + margin_s + 1e-6; t += 0.005) {
     const Rigid3 now = path(t), before = path(t - h), after = path(t + h);
@@ -44,7 +44,8 @@ StartWorld Record(const Path& path, double late_s, double ray_sigma, double marg
   for (int k = 0; k <= 20; ++k) {
     StartFrame frame;
     frame.utime = std::llround(1e6 * (kFirst_s + 0.1 * k));
-    const Rigid3 T_cam_odom = (path(kFirst_s + 0.1 * k + late_s) * kT_body_cam).Inverse();
+    const double image_s = kFirst_s + 0.1 * k + late_s + RandomVector(stamp_rng, stamp_sigma_s).x();
+    const Rigid3 T_cam_odom = (path(image_s) * kT_body_cam).Inverse();
     for (int i = 0; i < 80; ++i) {
       const Vector3d p = T_cam_odom * points[i];
       const Vector3d noise = RandomVector(rng, ray_sigma);

@@ -28,6 +28,6 @@ struct StartWorld {
 // 2 s of images at 10 Hz, from the path's first second on. The samples go on for `margin_s` to
 // either side.
 StartWorld Record(const Path& path, double late_s, double ray_sigma, double margin_s = 0.1,
-                  uint64_t seed = 7);
+                  uint64_t seed = 7, double stamp_sigma_s = 0);
 
 }  // namespace pangea::vio

@@ -135,6 +135,9 @@ void Estimator::Impl::Start(const InitialState& initial) {
     } else {
       Append(tracked.utime, from.imu, MakeImuFactor(Newest(), ImuTime(tracked.utime)));
     }
+    if (Newest().has_stamp_error()) {
+      Newest().stamp_error_s = from.stamp_error_s;
+    }
     Newest().is_window_keyframe = true;
   }
   started = true;
@@ -330,7 +333,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
     imu_samples.Forget(frame.utime - kStartSpan_us);
     TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
     shifted.utime = ImuTime(frame.utime);
-    const InitialResult initial = initialiser.AddFrame(shifted, imu);
+    const InitialResult initial = initialiser.AddFrame(shifted, imu, stamps.sigma_s());
     if (!initial.state) {
       result.reason = initial.reason;
       return result;
