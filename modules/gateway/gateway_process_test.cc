@@ -143,7 +143,7 @@ TEST_F(GatewayProcessTest, KeyframesOfABrowserAreJournalled) {
                               site_.keys().string(), start, AgentHandlerOptions{});
   LocalBus agent_bus, phone_bus;
   UplinkProcess uplink(agent_bus, phone_bus, agent_id, KeyOf(agent_id), UplinkOptions{});
-  TestAgent socket(process_->port(), agent_id, KeyOf(agent_id), identity_.authority_pem);
+  GatewayAgent socket(process_->port(), agent_id, KeyOf(agent_id), identity_.authority_pem);
   phone_bus.Subscribe("LINK_UP_[0-9]+", [&](const std::string&, Bytes data) {
     if (socket.proven()) {
       socket.Send(data);
@@ -188,7 +188,7 @@ TEST_F(GatewayProcessTest, KeyframesOfABrowserAreJournalled) {
 
 TEST_F(GatewayProcessTest, ARevokedAgentIsCutOffWithinASecond) {
   const SecretKey key = NewKey(5);
-  TestAgent anna(process_->port(), 5, key);
+  GatewayAgent anna(process_->port(), 5, key);
   for (int i = 0; i < 10 && !anna.proven(); ++i) {
     Serve(2);
     anna.Received();
@@ -204,7 +204,7 @@ TEST_F(GatewayProcessTest, ARevokedAgentIsCutOffWithinASecond) {
 }
 
 TEST_F(GatewayProcessTest, ARecordingIsKeptUnderTheSite) {
-  TestAgent anna(process_->port(), 5, NewKey(5), identity_.authority_pem, "/recording");
+  GatewayAgent anna(process_->port(), 5, NewKey(5), identity_.authority_pem, "/recording");
   for (int i = 0; i < 10 && !anna.proven(); ++i) {
     Serve(2);
     anna.Received();
@@ -257,7 +257,7 @@ class HostileTest : public GatewayProcessTest {
     return client;
   }
 
-  TestAgent anna_;
+  GatewayAgent anna_;
 };
 
 TEST_F(HostileTest, GarbageInPlaceOfAHandshake) {

@@ -76,7 +76,7 @@ TEST_F(GatewayProgram, FiftyAgentsAtOnceInBoundedMemory) {
   Start();
   const int64_t before_kb = MemoryKb();
 
-  std::vector<std::unique_ptr<TestAgent>> agents;
+  std::vector<std::unique_ptr<GatewayAgent>> agents;
   std::map<int32_t, size_t> down;
   const auto run = [&](auto done) {
     for (int i = 0; i < 1000 && !done(); ++i) {
@@ -89,7 +89,7 @@ TEST_F(GatewayProgram, FiftyAgentsAtOnceInBoundedMemory) {
     }
   };
   for (const auto& [id, key] : keys) {
-    agents.push_back(std::make_unique<TestAgent>(port_, id, key));
+    agents.push_back(std::make_unique<GatewayAgent>(port_, id, key));
   }
   run([&] {
     return std::ranges::all_of(agents, [](const auto& agent) { return agent->proven(); });

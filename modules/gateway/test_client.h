@@ -13,10 +13,10 @@
 
 namespace pangea {
 
-class TestAgent {
+class GatewayAgent {
  public:
-  TestAgent(uint16_t port, int32_t agent_id, const SecretKey& key,
-            const std::string& authority_pem = "", const std::string& path = "/link")
+  GatewayAgent(uint16_t port, int32_t agent_id, const SecretKey& key,
+               const std::string& authority_pem = "", const std::string& path = "/link")
       : client_(port, authority_pem), agent_id_(agent_id), key_(key) {
     client_.Send(web::UpgradeRequest(fmt::format("{}?agent={}", path, agent_id), ""));
   }

@@ -13,7 +13,7 @@ constexpr uint64_t kMaxInt64 = std::numeric_limits<int64_t>::max();
 
 using messages_checks::Refused;
 
-int64_t ReadInt64(ByteReader* reader) { return static_cast<int64_t>(reader->Varint(kMaxInt64)); }
+int64_t ReadInt64(WireReader* reader) { return static_cast<int64_t>(reader->Varint(kMaxInt64)); }
 
 }  // namespace
 
@@ -34,14 +34,14 @@ Parsed<AnchorEdit> ParseAnchorEdit(int32_t agent_id, Bytes body) {
 }
 
 std::vector<uint8_t> EncodeAnchor(int64_t number, Bytes message) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Varint(static_cast<uint64_t>(number));
   writer.Raw(message);
   return writer.Take();
 }
 
 Parsed<LinkAnchor> ParseAnchor(int32_t agent_id, Bytes body) {
-  ByteReader reader(body);
+  WireReader reader(body);
   const int64_t number = ReadInt64(&reader);
   const Bytes rest = reader.Rest();
   anchor_t message{};
@@ -57,7 +57,7 @@ Parsed<LinkAnchor> ParseAnchor(int32_t agent_id, Bytes body) {
 }
 
 std::vector<uint8_t> EncodeAnchorsReceived(const std::vector<int64_t>& numbers) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Varint(numbers.size());
   for (const int64_t number : numbers) {
     writer.Varint(static_cast<uint64_t>(number));
@@ -66,7 +66,7 @@ std::vector<uint8_t> EncodeAnchorsReceived(const std::vector<int64_t>& numbers) 
 }
 
 Parsed<std::vector<int64_t>> ParseAnchorsReceived(Bytes body) {
-  ByteReader reader(body);
+  WireReader reader(body);
   std::vector<int64_t> numbers;
   const uint64_t count = reader.Varint(kMaxAnchorsReceived);
   for (uint64_t i = 0; i < count && reader.ok(); ++i) {
@@ -77,7 +77,7 @@ Parsed<std::vector<int64_t>> ParseAnchorsReceived(Bytes body) {
 }
 
 std::vector<uint8_t> EncodeAnchorEditAnswers(const std::vector<AnchorEditAnswer>& answers) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Varint(answers.size());
   for (const AnchorEditAnswer& answer : answers) {
     writer.Varint(static_cast<uint64_t>(answer.anchor.agent_id));
@@ -89,7 +89,7 @@ std::vector<uint8_t> EncodeAnchorEditAnswers(const std::vector<AnchorEditAnswer>
 }
 
 Parsed<std::vector<AnchorEditAnswer>> ParseAnchorEditAnswers(Bytes body) {
-  ByteReader reader(body);
+  WireReader reader(body);
   std::vector<AnchorEditAnswer> answers;
   const uint64_t count = reader.Varint(kMaxAnchorEditAnswers);
   for (uint64_t i = 0; i < count && reader.ok(); ++i) {

@@ -18,7 +18,7 @@ namespace pangea {
 
 static_assert(std::endian::native == std::endian::little);
 
-class ByteWriter {
+class WireWriter {
  public:
   template <typename T>
   requires std::integral<T> || std::floating_point<T>
@@ -47,9 +47,9 @@ class ByteWriter {
   std::vector<uint8_t> bytes_;
 };
 
-class ByteReader {
+class WireReader {
  public:
-  explicit ByteReader(Bytes bytes) : rest_(bytes) {}
+  explicit WireReader(Bytes bytes) : rest_(bytes) {}
 
   template <typename T>
   requires std::integral<T> || std::floating_point<T> T Fixed() {

@@ -28,7 +28,7 @@ SealNonce NonceOf(int64_t number) {
 // Hellos and welcomes: few, and not numbered in a session; so each has a random nonce.
 std::vector<uint8_t> SealHandshake(const SecretKey& key, LinkKind kind, Bytes body) {
   const SealNonce nonce = RandomNonce();
-  ByteWriter clear;
+  WireWriter clear;
   clear.Fixed(static_cast<uint8_t>(kind));
   clear.Raw(nonce);
   return Seal(key, nonce, clear.Take(), body);
@@ -86,7 +86,7 @@ UplinkSession::UplinkSession(int32_t agent_id, const SecretKey& agent_key)
 std::vector<uint8_t> UplinkSession::Seal(const LinkPacket& packet) {
   if (packet.kind == LinkKind::kHello) {
     last_hello_ = packet.number;
-    ByteWriter body;
+    WireWriter body;
     body.Fixed(run_);
     body.Fixed(handler_run_);
     body.Fixed(packet.number);
@@ -121,7 +121,7 @@ UplinkSession::Opened UplinkSession::OnWelcome(Bytes bytes) {
   if (!body) {
     return {std::nullopt, false, "welcome is forged or damaged"};
   }
-  ByteReader reader(*body);
+  WireReader reader(*body);
   const auto uplink_run = reader.Fixed<uint64_t>();
   const auto handler_run = reader.Fixed<uint64_t>();
   const auto hello = reader.Fixed<int64_t>();
@@ -168,7 +168,7 @@ std::optional<HandlerSession::Hello> HandlerSession::OpenHello(Bytes bytes) cons
     return std::nullopt;
   }
   Hello hello;
-  ByteReader reader(*body);
+  WireReader reader(*body);
   hello.uplink_run = reader.Fixed<uint64_t>();
   hello.handler_run = reader.Fixed<uint64_t>();
   hello.packet.kind = LinkKind::kHello;
@@ -211,7 +211,7 @@ HandlerSession::Opened HandlerSession::OnHello(Bytes bytes) {
 }
 
 std::vector<uint8_t> HandlerSession::Welcome(const Hello& hello) const {
-  ByteWriter body;
+  WireWriter body;
   body.Fixed(hello.uplink_run);
   body.Fixed(next_run_);
   body.Fixed(hello.packet.number);

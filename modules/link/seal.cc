@@ -41,7 +41,7 @@ bool SecretKey::operator==(const SecretKey& other) const {
 
 SecretKey SecretKey::Derive(std::string_view purpose, int32_t agent_id, uint64_t uplink_run,
                             uint64_t handler_run) const {
-  ByteWriter context;
+  WireWriter context;
   context.Text("pangea link 1");
   context.Text(purpose);
   context.Fixed(agent_id);

@@ -26,26 +26,26 @@ bool Printable(const std::string& text) {
                      [](char c) { return static_cast<uint8_t>(c) >= ' ' && c != 0x7F; });
 }
 
-int32_t ReadInt32(ByteReader* reader, uint64_t max = kMaxInt32) {
+int32_t ReadInt32(WireReader* reader, uint64_t max = kMaxInt32) {
   return static_cast<int32_t>(reader->Varint(max));
 }
 
-int64_t ReadInt64(ByteReader* reader) { return static_cast<int64_t>(reader->Varint(kMaxInt64)); }
+int64_t ReadInt64(WireReader* reader) { return static_cast<int64_t>(reader->Varint(kMaxInt64)); }
 
-void Write(const rigid3_t& T, ByteWriter* writer) {
+void Write(const rigid3_t& T, WireWriter* writer) {
   for (const double value : {T.rotation.w, T.rotation.x, T.rotation.y, T.rotation.z,
                              T.translation.x, T.translation.y, T.translation.z}) {
     writer->Fixed(static_cast<float>(value));
   }
 }
 
-void Write(const vector3_t& v, ByteWriter* writer) {
+void Write(const vector3_t& v, WireWriter* writer) {
   for (const double value : {v.x, v.y, v.z}) {
     writer->Fixed(static_cast<float>(value));
   }
 }
 
-vector3_t ReadVector(ByteReader* reader) {
+vector3_t ReadVector(WireReader* reader) {
   vector3_t v{};
   for (double* value : {&v.x, &v.y, &v.z}) {
     *value = reader->Fixed<float>();
@@ -53,7 +53,7 @@ vector3_t ReadVector(ByteReader* reader) {
   return v;
 }
 
-rigid3_t ReadRigid3(ByteReader* reader) {
+rigid3_t ReadRigid3(WireReader* reader) {
   rigid3_t T{};
   for (double* value : {&T.rotation.w, &T.rotation.x, &T.rotation.y, &T.rotation.z}) {
     *value = reader->Fixed<float>();
@@ -77,7 +77,7 @@ Bytes Piece(Bytes message, int payload_bytes, int index) {
 }
 
 std::vector<uint8_t> Encode(const LinkHello& hello) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Text(std::string_view(hello.software).substr(0, kMaxSoftwareName));
   writer.Varint(hello.maps.size());
   for (const LinkMap& map : hello.maps) {
@@ -90,7 +90,7 @@ std::vector<uint8_t> Encode(const LinkHello& hello) {
 }
 
 Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body) {
-  ByteReader reader(body);
+  WireReader reader(body);
   LinkHello hello;
   hello.software = reader.Text(kMaxSoftwareName);
   if (!Printable(hello.software)) {
@@ -113,7 +113,7 @@ Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body) {
 }
 
 std::vector<uint8_t> Encode(const LinkPiece& piece) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Fixed(piece.slot);
   writer.Fixed(piece.seq_low);
   writer.Fixed(static_cast<uint8_t>(piece.index));
@@ -122,7 +122,7 @@ std::vector<uint8_t> Encode(const LinkPiece& piece) {
 }
 
 Parsed<LinkPiece> ParsePiece(const LinkPacket& packet) {
-  ByteReader reader(packet.body);
+  WireReader reader(packet.body);
   LinkPiece piece;
   piece.slot = reader.Fixed<uint8_t>();
   piece.seq_low = reader.Fixed<uint8_t>();
@@ -137,7 +137,7 @@ Parsed<LinkPiece> ParsePiece(const LinkPacket& packet) {
 }
 
 std::vector<uint8_t> EncodePose(const pose_t& pose) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Fixed(pose.utime);
   writer.Fixed(pose.state);
   writer.Text(std::string_view(pose.reason).substr(0, kMaxReason));
@@ -151,7 +151,7 @@ std::vector<uint8_t> EncodePose(const pose_t& pose) {
 }
 
 Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
-  ByteReader reader(body);
+  WireReader reader(body);
   pose_t pose{};
   pose.utime = reader.Fixed<int64_t>();
   pose.state = reader.Fixed<int8_t>();
@@ -193,7 +193,7 @@ Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
 }
 
 std::vector<uint8_t> Encode(const LinkAck& ack) {
-  ByteWriter writer;
+  WireWriter writer;
   writer.Varint(static_cast<uint64_t>(ack.highest_number));
   writer.Varint(static_cast<uint64_t>(ack.cache_bytes));
   writer.Varint(ack.journalled_seq.size());
@@ -217,7 +217,7 @@ std::vector<uint8_t> Encode(const LinkAck& ack) {
 }
 
 Parsed<LinkAck> ParseAck(int32_t agent_id, const LinkPacket& packet) {
-  ByteReader reader(packet.body);
+  WireReader reader(packet.body);
   LinkAck ack;
   ack.number = packet.number;
   ack.highest_number = ReadInt64(&reader);
