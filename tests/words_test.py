@@ -47,8 +47,8 @@ ALLOWED = {
     "modules/report/html/report_svg.cc": [r"\bfigure\b"],
 }
 
-CODE = ["modules", "bench", "tests", "examples", "scripts", "sessions", "cmake", "packaging", "CMakeLists.txt"]
-CODE_SUFFIXES = {"", ".cc", ".h", ".py", ".ts", ".js", ".mjs", ".html", ".css", ".cmake", ".in", ".txt", ".yaml", ".conf", ".service"}
+CODE = ["modules", "bench", "tests", "examples", "scripts", "sessions", "cmake", "packaging", "lcmtypes", "CMakeLists.txt"]
+CODE_SUFFIXES = {"", ".cc", ".h", ".py", ".ts", ".js", ".mjs", ".html", ".css", ".cmake", ".in", ".txt", ".yaml", ".conf", ".service", ".lcm"}
 SKIPPED = re.compile(r"^tests/fuzz/corpus/|^tests/words_test\.py$|node_modules/|package-lock\.json$|/build/|__pycache__")
 
 DOCS = ["README.md", "docs", "modules", "bench", "examples", "lcmtypes", "logs", "sessions", "tests"]

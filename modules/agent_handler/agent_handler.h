@@ -1,8 +1,8 @@
 #pragma once
 
-// The server's side of one agent (paper, IV.A): its communication module (receive cache,
-// acknowledgements), its parser, and the manager of its submaps. Created by the agent's first
-// session; packets come here once they are opened.
+// The server's side of one agent (the paper, section IV.B): its communication module (receive
+// cache, acknowledgements), its parser, and the manager of its submaps. Created by the agent's
+// first session; packets come here once they are opened.
 //
 // A state machine: time goes in (monotonic microseconds); no clock, no bus, no file, one thread.
 

@@ -1,8 +1,8 @@
 #pragma once
 
 // The server's half of the link, for one agent: puts pieces together to keyframes in a bounded
-// receive cache (paper, IV.A: 210 KiB), checks them, hands them over in seq order per map, and says
-// what it has. A state machine: no clock, no bus, one thread.
+// receive cache (section IV.B: 210 KiB), checks them, hands them over in seq order per map, and
+// says what it has. A state machine: no clock, no bus, one thread.
 //
 // A keyframe stays in the cache's account until it is journalled. Full cache: what the uplink sends
 // first, of the newest map the lowest seqs, takes the room of what it sends last; a piece for which

@@ -37,15 +37,15 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
 
 // The main() of a process that keeps keyframes in a scratch file, has a checkpoint and no arguments
 // of its own.
-template <typename SubmapProcess, typename Options>
-int SubmapProcessMain(int argc, char** argv, const std::string& name, const std::string& summary) {
+template <typename ServerProcess, typename Options>
+int ServerProcessMain(int argc, char** argv, const std::string& name, const std::string& summary) {
   Options options;
   ScratchFileOptions scratch;
   CheckpointPlace checkpoint;
   YamlOptions yaml;
   options.Visit(yaml);
   return ProcessMain(argc, argv, {name, summary, yaml, &scratch, &checkpoint}, [&](Bus& bus) {
-    return std::make_unique<SubmapProcess>(bus, options, std::make_shared<ScratchFile>(scratch),
+    return std::make_unique<ServerProcess>(bus, options, std::make_shared<ScratchFile>(scratch),
                                            checkpoint);
   });
 }

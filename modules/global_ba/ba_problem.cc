@@ -10,7 +10,7 @@ constexpr int kMinObservations = 2;
 
 }  // namespace
 
-void DropLonelyLandmarks(BaWorld* world) {
+void DropUnderobservedLandmarks(BaWorld* world) {
   std::vector<int> count(world->landmarks.size(), 0);
   for (const BaObservation& seen : world->observations) {
     ++count[seen.landmark];
@@ -73,7 +73,7 @@ void BaProblem::DropOutliers() {
   std::erase_if(world_.observations, [this](const BaObservation& seen) {
     return solver_->Residual(seen).squaredNorm() > options_.max_chi2;
   });
-  DropLonelyLandmarks(&world_);
+  DropUnderobservedLandmarks(&world_);
 }
 
 }  // namespace pangea

@@ -53,6 +53,6 @@ struct BaWorld {
 };
 
 // Takes out landmarks that fewer than two keyframes see, and what is seen of them.
-void DropLonelyLandmarks(BaWorld* world);
+void DropUnderobservedLandmarks(BaWorld* world);
 
 }  // namespace pangea

@@ -136,7 +136,7 @@ void DropWhatIsHeld(BaWorld* world) {
   }
   std::erase_if(world->observations,
                 [&](const BaObservation& seen) { return !moves[seen.landmark]; });
-  DropLonelyLandmarks(world);
+  DropUnderobservedLandmarks(world);
 }
 
 }  // namespace

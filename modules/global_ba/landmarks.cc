@@ -9,8 +9,6 @@
 #include <tuple>
 #include <utility>
 
-#include "loop_verification/correspondences/point_observation.h"
-
 namespace pangea {
 namespace {
 

@@ -3,7 +3,7 @@
 
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE --> GlobalBaProcess --> REFINEMENT
 int main(int argc, char** argv) {
-  return pangea::SubmapProcessMain<pangea::GlobalBaProcess, pangea::GlobalBaOptions>(
+  return pangea::ServerProcessMain<pangea::GlobalBaProcess, pangea::GlobalBaOptions>(
       argc, argv, "pangea-global-ba",
       "Adjusts all keyframes and landmarks of a group at once while it is quiet");
 }

@@ -57,7 +57,7 @@ class Culling {
         result.observations.push_back(seen);
       }
     }
-    DropLonelyLandmarks(&result);
+    DropUnderobservedLandmarks(&result);
     return result;
   }
 

@@ -5,7 +5,7 @@
 // is bounded.
 //
 // A keyframe's encoded bytes are compressed and cut into pieces, each a packet of its own (paper,
-// IV.A: "we divide the packet ... artificially"; 4 KiB there, one Ethernet frame by default here).
+// IV.B: "we divide the packet ... artificially"; 4 KiB there, one Ethernet frame by default here).
 //   hello: software, count, and of each map: slot, opened_utime, first_seq, correction_revision
 //   piece: slot of the map, low byte of seq, index; the rest is keyframe
 //   pose:  a pose_t in single precision

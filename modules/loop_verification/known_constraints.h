@@ -29,7 +29,7 @@ struct KnownConstraintOptions {
   double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
   double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
   int min_nearby = 10;        // chosen, not measured
-  int min_between_maps = 10;  // chosen, not measured; a fusion takes 3 viewpoints, 6 at one spot
+  int min_between_maps = 10;  // chosen, not measured; a fusion takes 2 to 6 viewpoints
 
   template <typename Archive>
   void Visit(Archive& archive) {

@@ -3,7 +3,7 @@
 
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_* --> MapPointsProcess --> LANDMARKS_k
 int main(int argc, char** argv) {
-  return pangea::SubmapProcessMain<pangea::MapPointsProcess, pangea::MapPointsOptions>(
+  return pangea::ServerProcessMain<pangea::MapPointsProcess, pangea::MapPointsOptions>(
       argc, argv, "pangea-map-points",
       "Sends each agent the landmarks of the fused map that it may see next");
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// The pose graph of all maps (the paper, section IV.D, "optimization of pose graph"; design,
-// section 5): which maps are one, and where every keyframe is.
+// The pose graph of all maps (the paper, section IV.D, "optimization of pose graph";
+// docs/maths.md, sections 3 to 5): which maps are one, and where every keyframe is.
 //
 // In: keyframes of any maps, each map's in ascending seq, and verification results (constraints).
 // Out: after each solve the corrections (T_map_odom of each map) and the group's state. A node is

@@ -35,8 +35,9 @@ struct SenderOptions {
   // Keyframe bytes per packet: by default what fills one Ethernet frame; the paper has 4096.
   int payload_bytes = kFramePayloadBytes;
   double bandwidth_kb_per_s = 4000;  // keyframes' packets, repeats included, at most
-  // Sent, neither arrived nor given up: what the receiver's cache takes (paper, IV.A). A smaller
-  // window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take 200 kB.
+  // Sent, neither arrived nor given up: what the receiver's cache takes (the paper, section IV.B).
+  // A smaller window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take
+  // 200 kB.
   int max_in_flight_bytes = 210 * 1024;
   int64_t max_spool_bytes = 256 << 20;  // in memory; about 9,000 keyframes, an hour's walk
   // Why the options cannot be used, or nothing.

@@ -113,7 +113,7 @@ Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
   Keyframe keyframe;
   keyframe.camera = estimator_->camera();
   keyframe.corners = described_.at(output.utime);
-  TakeOutReadout(output.motion, keyframe);
+  CompensateRollingShutter(output.motion, keyframe);
   return {keyframe.camera, std::move(keyframe.corners), estimator_->Poses()};
 }
 
@@ -154,7 +154,7 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
     keyframe.corners = std::move(node.mapped());
   }
   keyframe.points = Points(finished, keyframe.corners);
-  TakeOutReadout(finished.motion, keyframe);
+  CompensateRollingShutter(finished.motion, keyframe);
   keyframe.group_revision = group_revision_;
   keyframe.scale_sigma =
       std::min(finished.scale_sigma.value_or(scale_sigma_.value_or(0)), kMaxScaleSigma);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Visual-inertial odometry of one agent (the paper, section III-A): images and inertial samples in,
+// Visual-inertial odometry of one agent (the paper, section IV.A): images and inertial samples in,
 // the pose at every image and finished keyframes out.
 //
 // Tracker -> Estimator -> (at a keyframe) Describer. A keyframe comes out once, complete and final,

@@ -15,14 +15,14 @@ Eigen::MatrixXd SolveScaled(const Eigen::MatrixXd& H, const Eigen::MatrixXd& b);
 
 struct LevenbergMarquardtOptions {
   int max_iterations = 0;
-  int max_retries = 0;   // each with ten times the damping
-  double enough = 0;     // an undamped step that promises less of the cost is the last
-  double tolerance = 0;  // rise of the cost, as a share of it, that rounding may make
+  int max_retries = 0;      // each with ten times the damping
+  double min_decrease = 0;  // an undamped step that should lower the cost by less is the last
+  double tolerance = 0;     // rise of the cost, as a share of it, that rounding may make
 };
 
 struct LevenbergMarquardtResult {
   double cost = 0;
-  bool converged = false;  // false: no step made it better, though one was promised
+  bool converged = false;  // false: no step made it better, though one should
 };
 
 // Minimises the cost of `problem` in place.
@@ -46,8 +46,8 @@ LevenbergMarquardtResult LevenbergMarquardt(const LevenbergMarquardtOptions& opt
       result.cost = equations.cost;
       equations.H.diagonal() *= 1 + damping;
       const Eigen::VectorXd step = -solve(*problem, equations);
-      // A damped step promises little because it is short.
-      is_last = damping == 0 && -0.5 * equations.g.dot(step) < options.enough;
+      // A damped step lowers the cost little because it is short.
+      is_last = damping == 0 && -0.5 * equations.g.dot(step) < options.min_decrease;
       auto before = problem->Estimate();
       if (step.allFinite()) {
         retract(equations, step, problem);

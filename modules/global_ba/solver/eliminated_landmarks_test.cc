@@ -18,7 +18,7 @@ class EliminatedLandmarksTest : public ::testing::Test {
       : world_(MakeBaTestWorld({.keyframes = 4, .landmarks = 30, .outlier_share = 0.05}).start),
         num_keyframes_(static_cast<int>(world_.keyframes.size())),
         num_cameras_(static_cast<int>(world_.cameras.size())) {
-    DropLonelyLandmarks(&world_);
+    DropUnderobservedLandmarks(&world_);
   }
 
   static std::vector<int> Numbers(int first, int count) {

@@ -100,8 +100,10 @@ bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vect
     return false;
   }
   // A step that promises less than a fifth of a sigma of one direction is the last.
-  const LevenbergMarquardtOptions options = {
-      .max_iterations = options_.iterations, .max_retries = 6, .enough = 0.02, .tolerance = 1e-6};
+  const LevenbergMarquardtOptions options = {.max_iterations = options_.iterations,
+                                             .max_retries = 6,
+                                             .min_decrease = 0.02,
+                                             .tolerance = 1e-6};
   LevenbergMarquardt(
       options,
       [&](const JointState& state, double damping) { return Linearise(state, loss, damping); },

@@ -4,9 +4,9 @@
 #include <random>
 #include <vector>
 
+#include "core/edge_residual.h"
 #include "core/testing/numeric_jacobian.h"
 #include "loop_verification/correspondences/point_observation.h"
-#include "loop_verification/joint_ba/edge_residual.h"
 #include "loop_verification/joint_ba/hosted_point.h"
 
 namespace pangea {

@@ -188,7 +188,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
   return at;
 }
 
-bool ReferencePatch::IsWornOut() const {
+bool ReferencePatch::NeedsReplacement() const {
   const Eigen::Vector2f stretch = Eigen::JacobiSVD<Eigen::Matrix2f>(a_).singularValues();
   return !(stretch[0] < kMaxStretch && stretch[1] > kMinStretch);
 }

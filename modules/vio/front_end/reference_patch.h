@@ -23,7 +23,7 @@ class ReferencePatch {
   std::optional<Eigen::Vector2f> Find(const cv::Mat& image, const Eigen::Vector2f& guess);
 
   // The deformation has become so strong that what is sampled is not what was taken.
-  bool IsWornOut() const;
+  bool NeedsReplacement() const;
 
  private:
   static constexpr int kSize = 19;  // pixels

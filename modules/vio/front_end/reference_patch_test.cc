@@ -79,7 +79,7 @@ TEST(ReferencePatch, FollowsASlowGrowthUntilItIsWornOut) {
   ASSERT_TRUE(patch);
   int images = 0;
   float stretch = 1;
-  while (!patch->IsWornOut() && images < 60) {
+  while (!patch->NeedsReplacement() && images < 60) {
     stretch *= 1.02F;
     const auto found = patch->Find(Waves(RotateAndStretch(0, stretch), {0, 0}), kAt);
     ASSERT_TRUE(found) << "stretched by " << stretch;

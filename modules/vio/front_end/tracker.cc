@@ -214,7 +214,7 @@ void Tracker::TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_ca
     feature.flow = (pixel - rotated[i]) / dt_s;
     feature.pixel = pixel;
     feature.ray = *ray;
-    if (feature.patch && feature.patch->IsWornOut()) {
+    if (feature.patch && feature.patch->NeedsReplacement()) {
       feature.patch.reset();
     }
   }

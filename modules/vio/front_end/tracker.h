@@ -3,7 +3,7 @@
 // Feature tracks through an image stream: Shi-Tomasi corners on a grid, KLT from where the gyro's
 // rotation and the feature's own motion lead, alignment with how the feature looked at first
 // (reference_patch.h), pyramidal KLT with a forward-backward check for what that does not confirm,
-// two-view outlier rejection on undistorted rays (the paper, section III-A, and VINS-Mono's front
+// two-view outlier rejection on undistorted rays (the paper, section IV.A, and VINS-Mono's front
 // end, which it builds on).
 //
 // In: grey images and the rotation of the camera since the last one. Out: the tracked frame.

@@ -295,7 +295,7 @@ void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
 bool StartProblem::Optimise(int max_iterations) {
   const LevenbergMarquardtOptions options = {.max_iterations = max_iterations,
                                              .max_retries = kMaxRetries,
-                                             .enough = kEnough,
+                                             .min_decrease = kEnough,
                                              .tolerance = 1e-9};
   const auto linearise = [](const StartProblem& problem, double damping) {
     return problem.Linearise(damping);

@@ -55,7 +55,7 @@ double InverseDepthNear(const Eigen::Vector2f& pixel, const std::vector<SeenDept
 
 }  // namespace
 
-void TakeOutReadout(const BodyMotion& motion, Keyframe& keyframe) {
+void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe) {
   const CameraModel& camera = keyframe.camera;
   if (camera.readout_s <= 0 || camera.height < 2) {
     return;

@@ -12,6 +12,6 @@ namespace pangea::vio {
 // Moves corners (map points by their depth, all others by the depths of the map points around
 // them) and the points' depths, by the body's motion from the image's time on.
 // Corners that leave the image stay as they are. Does nothing for a global shutter.
-void TakeOutReadout(const BodyMotion& motion, Keyframe& keyframe);
+void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe);
 
 }  // namespace pangea::vio

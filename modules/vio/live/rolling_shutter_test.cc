@@ -68,7 +68,7 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
     expected.push_back(*still);
     shift = std::max(shift, (*still - *seen).norm());
   }
-  TakeOutReadout(motion, keyframe);
+  CompensateRollingShutter(motion, keyframe);
   ASSERT_GT(shift, 5);  // there was something to take out
   for (size_t i = 0; i < expected.size(); ++i) {
     EXPECT_LT((keyframe.corners[i].pixel.cast<double>() - expected[i]).norm(), 0.01) << i;
@@ -91,7 +91,7 @@ TEST(RollingShutter, CornersWithoutDepthMoveAsTheirNeighboursDo) {
   }
   keyframe.corners.emplace_back().pixel = Eigen::Vector2f(100, 400);
   keyframe.corners.emplace_back().pixel = Eigen::Vector2f(540, 400);
-  TakeOutReadout(motion, keyframe);
+  CompensateRollingShutter(motion, keyframe);
   EXPECT_GT((keyframe.corners[0].pixel - Eigen::Vector2f(100, 400)).norm(), 2);
   EXPECT_LT((keyframe.corners[6].pixel - keyframe.corners[0].pixel).norm(), 1e-3);
   EXPECT_LT((keyframe.corners[7].pixel - keyframe.corners[1].pixel).norm(), 1e-3);
@@ -101,7 +101,7 @@ TEST(RollingShutter, AGlobalShutterIsLeftAlone) {
   Keyframe keyframe;
   keyframe.camera = Phone(0);
   keyframe.corners.emplace_back().pixel = {100, 200};
-  TakeOutReadout({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}, keyframe);
+  CompensateRollingShutter({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}, keyframe);
   EXPECT_EQ(keyframe.corners[0].pixel, Eigen::Vector2f(100, 200));
 }
 

@@ -77,7 +77,7 @@ struct Estimator::Impl {
   void DropNonKeyframe();
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
-  void FoldLandmarks(int frame);
+  void MarginaliseLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
   std::optional<std::string> Implausible() const;
@@ -275,7 +275,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
     Marginalisation what;
     what.keep_pose = state.frames[oldest].utime == published;
     what.drop_kept_pose = state.frames.front().utime != published;
-    FoldLandmarks(oldest);
+    MarginaliseLandmarks(oldest);
     history.RemoveFrame(state.frames[oldest].utime);
     MarginaliseOldest(problem, what);
   }
@@ -286,7 +286,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
 
 // The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
 // that do not fit go without a word.
-void Estimator::Impl::FoldLandmarks(int frame) {
+void Estimator::Impl::MarginaliseLandmarks(int frame) {
   RowViews rows(problem.state);
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
     if (landmark.point.anchor != frame) {

@@ -136,7 +136,7 @@ NormalEquations Linearise(const WindowProblem& problem, double damping) {
 double Optimise(WindowProblem& problem, int max_iterations) {
   const LevenbergMarquardtOptions options = {.max_iterations = max_iterations,
                                              .max_retries = kMaxRetries,
-                                             .enough = kEnough,
+                                             .min_decrease = kEnough,
                                              .tolerance = 1e-6};
   const auto solve = [](const WindowProblem& at, const NormalEquations& equations) -> VectorXd {
     return SolveWindow(at.state, equations.H, equations.g);

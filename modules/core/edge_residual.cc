@@ -1,4 +1,4 @@
-#include "loop_verification/joint_ba/edge_residual.h"
+#include "core/edge_residual.h"
 
 #include <Eigen/Cholesky>
 #include <cmath>
