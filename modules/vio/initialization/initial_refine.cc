@@ -123,6 +123,7 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   problem.ray_sigma = sigmas.ray;
   problem.expected_gyro_bias = gyro_bias;
   problem.accel_bias_sigma = sigmas.accel_bias;
+  problem.time_offset_sigma_s = sigmas.time_offset_s;
   problem.stamp_sigma_s = sigmas.stamp_s;
   const Quaterniond q_odom_first = Quaterniond::FromTwoVectors(-start.gravity, Vector3d::UnitZ());
   AddStates(q_odom_first, start, &problem);
@@ -147,6 +148,7 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   }
   SumUpRays(problem, rays, &out);
   out.states = problem.states;
+  out.time_offset_error_s = problem.time_offset_error_s;
   for (const StartStamp& stamp : problem.stamps) {
     out.stamp_errors_s.push_back(stamp.error_s);
   }

@@ -52,7 +52,8 @@ LinearStart Scaled(LinearStart start, double scale);
 // body.
 struct RefinedStart {
   std::vector<ImuState> states;        // at every frame's stamp, with one pair of biases
-  std::vector<double> stamp_errors_s;  // the image was taken this much after its stamp
+  double time_offset_error_s = 0;      // all images were taken this much after their stamps,
+  std::vector<double> stamp_errors_s;  // and each one this much more
   double velocity_sigma = 0;           // m/s, of the last one's, in its least certain direction
   double tilt_sigma = 0;               // rad
   double rms_sigma = 0;                // reprojection residual of the inliers, in sigmas
@@ -65,8 +66,9 @@ struct RefinedStart {
 inline constexpr double kMinInlierShare = 0.8;
 struct StartSigmas {
   double ray = 0;
-  double accel_bias = 0.15;  // m/s^2, about zero
-  double stamp_s = 0;        // of an image's stamp; 0: exact
+  double accel_bias = 0.15;      // m/s^2, about zero
+  double time_offset_s = 0.005;  // of the clocks
+  double stamp_s = 0;            // of an image's stamp by itself; 0: they do not jitter
 };
 std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                    const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,

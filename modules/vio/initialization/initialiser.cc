@@ -94,16 +94,18 @@ Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
 }  // namespace
 
 Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
-                         double accel_bias_sigma, const StationaryOptions& stationary)
+                         const StartSigmas& sigmas, const StationaryOptions& stationary)
     : camera_(camera),
       noise_(noise),
       pixel_sigma_(pixel_sigma),
-      accel_bias_sigma_(accel_bias_sigma),
-      stationary_(stationary) {}
+      sigmas_(sigmas),
+      stationary_(stationary) {
+  sigmas_.ray = pixel_sigma * camera.PixelAngle();
+}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
                                     double stamp_sigma_s) {
-  stamp_sigma_s_ = stamp_sigma_s;
+  sigmas_.stamp_s = stamp_sigma_s;
   samples_.insert(samples_.end(), imu.begin(), imu.end());
   if (samples_.empty() || samples_.back().utime < frame.utime) {
     return {std::nullopt, "no inertial samples up to the image's time"};
@@ -172,7 +174,7 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
   // the bias.
   Eigen::Matrix<double, 15, 1> sigma;
-  const double bias_sigma = kStationaryBias * accel_bias_sigma_;
+  const double bias_sigma = kStationaryBias * sigmas_.accel_bias;
   sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
       Vector3d::Constant(0.01), Vector3d::Constant(0.002), Vector3d::Constant(bias_sigma);
   state.covariance = sigma.cwiseAbs2().asDiagonal();
@@ -236,7 +238,7 @@ std::optional<InitialResult> Initialiser::Refusal(
         fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
                     refined->velocity_sigma, refined->tilt_sigma * 57.3)};
   }
-  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * accel_bias_sigma_) {
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * sigmas_.accel_bias) {
     return InitialResult{std::nullopt, "the start needs an implausible accelerometer bias"};
   }
   return std::nullopt;
@@ -253,10 +255,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   }
   const ImuNoise noise = MeasuredNoise(noise_, samples_);
   const auto refine = [&](const LinearStart& start) {
-    return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start,
-                  {.ray = pixel_sigma_ * camera_.PixelAngle(),
-                   .accel_bias = accel_bias_sigma_,
-                   .stamp_s = stamp_sigma_s_});
+    return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start, sigmas_);
   };
   std::optional<RefinedStart> refined = refine(*linear);
   if (auto refusal = Refusal(refined)) {
@@ -268,6 +267,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   }
   InitialState state;
   state.time_offset_change_s = time_offset_change_s_;
+  state.time_offset_error_s = refined->time_offset_error_s;
   for (size_t i = 0; i < frames_.size(); ++i) {
     state.frames.push_back({frames_[i], refined->states[i], refined->stamp_errors_s[i]});
   }

@@ -30,13 +30,16 @@ struct InitialState {
   struct Frame {
     TrackedFrame tracked;      // its utime is the IMU's
     ImuState imu;              // at this time
-    double stamp_error_s = 0;  // the image was taken this much after it
+    double stamp_error_s = 0;  // of this image by itself
   };
   std::vector<Frame> frames;
   bool stationary = false;
   // Of the stationary start: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
-  double time_offset_change_s = 0;  // the images were taken this much later than their utime says
+  // The frames' utime is this much later than they were told with, and the images were taken this
+  // much later still.
+  double time_offset_change_s = 0;
+  double time_offset_error_s = 0;
 };
 
 struct InitialResult {
@@ -47,9 +50,9 @@ struct InitialResult {
 
 class Initialiser {
  public:
-  // `accel_bias_sigma`: m/s^2, before anything is known of it.
+  // Of the sigmas, `ray` and `stamp_s` are found here.
   Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
-              double accel_bias_sigma, const StationaryOptions& stationary);
+              const StartSigmas& sigmas, const StationaryOptions& stationary);
 
   // Frames in time order, with the samples since the previous frame (the last one at or after the
   // frame). `stamp_sigma_s`: of the frames' stamps, as known by now; 0: they are exact.
@@ -67,11 +70,10 @@ class Initialiser {
   CameraModel camera_;
   ImuNoise noise_;
   double pixel_sigma_;
-  double accel_bias_sigma_;
+  StartSigmas sigmas_;
   StationaryOptions stationary_;
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
-  double stamp_sigma_s_ = 0;
   double time_offset_change_s_ = 0;
   std::string why_not_ = "collecting images";  // at the newest try
 };

@@ -152,8 +152,9 @@ void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* po
 }
 
 // What a stamp's error, growing, does to (dtheta, xi_p, xi_v) at the stamp while the image stays.
-Eigen::Matrix<double, 9, 1> ByStampError(const ImuState& state, const StartStamp& stamp) {
-  const Vector3d omega = state.T_odom_body.q * stamp.omega_body;
+Eigen::Matrix<double, 9, 1> ByStampError(const StartProblem& problem, int frame) {
+  const ImuState& state = problem.states[frame];
+  const Vector3d omega = state.T_odom_body.q * problem.stamps[frame].omega_body;
   const Vector3d& v = state.v_odom_body;
   Eigen::Matrix<double, 9, 1> change;
   change << -omega, omega.cross(state.T_odom_body.t) - v, omega.cross(v);
@@ -162,11 +163,11 @@ Eigen::Matrix<double, 9, 1> ByStampError(const ImuState& state, const StartStamp
 
 // By a frame's (dtheta, xi_p, xi_v, e), from those by its pose and velocity at the stamp.
 using FrameJacobian = Eigen::Matrix<double, 9, kPoseSize + 4>;
-FrameJacobian ByFrame(const Eigen::Matrix<double, 9, 9>& J_stamp, const ImuState& state,
-                      const StartStamp& stamp) {
+FrameJacobian ByFrame(const StartProblem& problem, int frame,
+                      const Eigen::Matrix<double, 9, 9>& J_stamp) {
   FrameJacobian J;
-  J << J_stamp, J_stamp * ByStampError(state, stamp);
-  J.middleCols<3>(kVelocity) -= stamp.error_s * J_stamp.middleCols<3>(kPosition);
+  J << J_stamp, J_stamp * ByStampError(problem, frame);
+  J.middleCols<3>(kVelocity) -= problem.StampError(frame) * J_stamp.middleCols<3>(kPosition);
   return J;
 }
 
@@ -183,20 +184,19 @@ std::vector<int> FrameColumns(const StartProblem& problem, int frame) {
 
 void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
   const StartImuFactor& factor = problem.imu_factors[from];
-  const ImuState &from_state = problem.states[from], &to_state = problem.states[from + 1];
-  const InertialResidual residual = ComputeInertialResidual(factor.measured, from_state, to_state);
-  std::vector<int> columns = {0, 1, 2, 3, 4, 5};
-  const std::vector<int> from_columns = FrameColumns(problem, from),
-                         to_columns = FrameColumns(problem, from + 1);
-  columns.insert(columns.end(), from_columns.begin(), from_columns.end());
-  columns.insert(columns.end(), to_columns.begin(), to_columns.end());
-  const auto a_frame = static_cast<Eigen::Index>(from_columns.size());
+  const InertialResidual residual =
+      ComputeInertialResidual(factor.measured, problem.states[from], problem.states[from + 1]);
+  const FrameJacobian J_from = ByFrame(problem, from, residual.J_from.block<9, 9>(0, 0));
+  const FrameJacobian J_to = ByFrame(problem, from + 1, residual.J_to.block<9, 9>(0, 0));
+  std::vector<int> columns = {0, 1, 2, 3, 4, 5, StartProblem::kTimeOffsetColumn};
+  const std::vector<int> of_from = FrameColumns(problem, from);
+  const std::vector<int> of_to = FrameColumns(problem, from + 1);
+  columns.insert(columns.end(), of_from.begin(), of_from.end());
+  columns.insert(columns.end(), of_to.begin(), of_to.end());
+  const auto count = static_cast<Eigen::Index>(of_from.size());
   MatrixXd J(9, columns.size());
-  J << residual.J_from.block<9, 6>(0, kGyroBias),
-      ByFrame(residual.J_from.block<9, 9>(0, 0), from_state, problem.stamps[from])
-          .leftCols(a_frame),
-      ByFrame(residual.J_to.block<9, 9>(0, 0), to_state, problem.stamps[from + 1])
-          .leftCols(a_frame);
+  J << residual.J_from.block<9, 6>(0, kGyroBias), J_from.rightCols<1>() + J_to.rightCols<1>(),
+      J_from.leftCols(count), J_to.leftCols(count);
   const MatrixXd JtL = J.transpose() * factor.information;
   out->H(columns, columns) += JtL * J;
   out->g(columns) += JtL * residual.r.head<9>();
@@ -204,14 +204,13 @@ void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
 
 // What is known of the stamps' errors beforehand: nothing but their size.
 void AddStamps(const StartProblem& problem, Equations* out) {
-  if (!problem.stamps_jitter()) {
-    return;
-  }
-  const double information = 1 / (problem.stamp_sigma_s * problem.stamp_sigma_s);
-  for (int i = 0; i < problem.num_frames(); ++i) {
-    const int at = problem.StampColumn(i);
-    out->H(at, at) += information;
-    out->g[at] += information * problem.stamps[i].error_s;
+  const auto add = [out](int column, double error_s, double sigma_s) {
+    out->H(column, column) += 1 / (sigma_s * sigma_s);
+    out->g[column] += error_s / (sigma_s * sigma_s);
+  };
+  add(StartProblem::kTimeOffsetColumn, problem.time_offset_error_s, problem.time_offset_sigma_s);
+  for (int i = 0; problem.stamps_jitter() && i < problem.num_frames(); ++i) {
+    add(problem.StampColumn(i), problem.stamps[i].error_s, problem.stamp_sigma_s);
   }
 }
 
@@ -219,16 +218,16 @@ void AddStamps(const StartProblem& problem, Equations* out) {
 
 Rigid3 StartProblem::ImagePose(int frame) const {
   const Rigid3& T = states[frame].T_odom_body;
-  const auto& [omega_body, error_s] = stamps[frame];
-  return error_s == 0 ? T
-                      : Rigid3(T.q * ExpSo3(error_s * omega_body),
-                               T.t + error_s * states[frame].v_odom_body);
+  const double error_s = StampError(frame);
+  return {T.q * ExpSo3(error_s * stamps[frame].omega_body),
+          T.t + error_s * states[frame].v_odom_body};
 }
 
 double StartProblem::Cost() const {
   double cost = 0.5 * (states[0].gyro_bias - expected_gyro_bias).squaredNorm() /
                     (kGyroBiasSigma * kGyroBiasSigma) +
-                0.5 * states[0].accel_bias.squaredNorm() / (accel_bias_sigma * accel_bias_sigma);
+                0.5 * states[0].accel_bias.squaredNorm() / (accel_bias_sigma * accel_bias_sigma) +
+                0.5 * std::pow(time_offset_error_s / time_offset_sigma_s, 2);
   for (int i = 0; i + 1 < num_frames(); ++i) {
     const Eigen::Matrix<double, 9, 1> r =
         ComputeInertialResidual(imu_factors[i].measured, states[i], states[i + 1]).r.head<9>();
@@ -272,12 +271,10 @@ void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
     ImuState& state = states[i];
     Eigen::Matrix<double, 9, 1> at_stamp;
     at_stamp << step.segment<kPoseSize>(PoseColumn(i)), step.segment<3>(VelocityColumn(i));
-    if (stamps_jitter()) {
-      const double error_step_s = step[StampColumn(i)];
-      at_stamp.segment<3>(kPosition) -= stamps[i].error_s * at_stamp.segment<3>(kVelocity);
-      at_stamp += ByStampError(state, stamps[i]) * error_step_s;
-      stamps[i].error_s += error_step_s;
-    }
+    const double own_step_s = stamps_jitter() ? step[StampColumn(i)] : 0;
+    at_stamp.segment<3>(kPosition) -= StampError(i) * at_stamp.segment<3>(kVelocity);
+    at_stamp += ByStampError(*this, i) * (step[kTimeOffsetColumn] + own_step_s);
+    stamps[i].error_s += own_step_s;
     const Eigen::Quaterniond rotation = ExpSo3(at_stamp.head<3>());
     state.T_odom_body.q = (rotation * state.T_odom_body.q).normalized();
     state.T_odom_body.t = rotation * state.T_odom_body.t + at_stamp.segment<3>(kPosition);
@@ -285,6 +282,7 @@ void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
     state.gyro_bias += step.head<3>();
     state.accel_bias += step.segment<3>(3);
   }
+  time_offset_error_s += step[kTimeOffsetColumn];
   for (size_t i = 0; i < points.size(); ++i) {
     const auto& [first, offset, gain] = equations.eliminations[i];
     Settle(*this, points[i].p_odom + offset + gain * step.segment(PoseColumn(first), gain.cols()),
@@ -323,8 +321,9 @@ std::optional<Matrix6d> StartProblem::NewestCovariance() const {
   J.block<3, 3>(PoseColumn(newest) + kTheta, 0).setIdentity();
   J.block<3, 3>(PoseColumn(newest) + kTheta, 3) = Hat(states[newest].v_odom_body);
   J.block<3, 3>(VelocityColumn(newest), 3).setIdentity();
+  J.row(kTimeOffsetColumn).head<3>() = ByStampError(*this, newest).head<3>();
   if (stamps_jitter()) {
-    J.row(StampColumn(newest)).head<3>() = ByStampError(states[newest], stamps[newest]).head<3>();
+    J.row(StampColumn(newest)).head<3>() = J.row(kTimeOffsetColumn).head<3>();
   }
   const MatrixXd half = llt.matrixL().solve(scale.asDiagonal() * J);
   const Matrix6d covariance = half.transpose() * half;

@@ -10,10 +10,11 @@
 // ("embedded point iterations": Jeong et al., CVPR 2010). A handful of steps does. Errors of frames
 // are right-invariant (window_state.h).
 //
-// Where stamps jitter, the error e of each is an unknown: the image was taken where the body came
-// to within e of the stamp, (R Exp(e w), p + e v). Errors of a frame's pose are those where the
-// image was taken, so that points know nothing of stamps; but what steps straight is the pose at
-// the stamp, to which inertial measurements hold the frames far more tightly than rays do.
+// The error of the clocks' offset is an unknown and, where stamps jitter, that of each stamp. With
+// their sum e the image was taken where the body came to within e of the stamp, (R Exp(e w),
+// p + e v). Errors of a frame's pose are those where the image was taken, so that points know
+// nothing of stamps; but what steps straight is the pose at the stamp, to which inertial
+// measurements hold the frames far more tightly than rays do.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -41,7 +42,7 @@ struct StartPoint {
 
 struct StartStamp {
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rad/s, at the stamp
-  double error_s = 0;                                    // the image was taken this much after it
+  double error_s = 0;                                    // its own, beside the clocks'
 };
 
 struct StartImuFactor {
@@ -53,24 +54,29 @@ class StartProblem {
  public:
   Rigid3 T_body_cam;
   double ray_sigma = 0;
-  std::vector<ImuState> states;             // at the stamps; all with one pair of biases
-  std::vector<StartStamp> stamps;           // of each frame
-  double stamp_sigma_s = 0;                 // 0: stamps are exact, their errors no unknowns
+  std::vector<ImuState> states;    // at the stamps; all with one pair of biases
+  std::vector<StartStamp> stamps;  // of each frame
+  double stamp_sigma_s = 0;        // 0: stamps do not jitter, their errors no unknowns
+  double time_offset_error_s = 0;  // of all stamps
+  double time_offset_sigma_s = 0.005;
   std::vector<StartImuFactor> imu_factors;  // imu_factors[i]: from frame i to frame i + 1
   std::vector<StartPoint> points;
   Eigen::Vector3d expected_gyro_bias = Eigen::Vector3d::Zero();
   double accel_bias_sigma = 0.15;  // m/s^2, about zero
 
-  // Columns of the error: (gyro bias, accel bias), then each image's (dtheta, xi_p), then each
-  // frame's xi_v, then, where stamps jitter, each stamp's.
+  // Columns of the error: (gyro bias, accel bias, time offset), then each image's (dtheta, xi_p),
+  // then each frame's xi_v, then, where stamps jitter, each stamp's.
   int size() const { return StampColumn(stamps_jitter() ? num_frames() : 0); }
   int num_frames() const { return static_cast<int>(states.size()); }
   bool stamps_jitter() const { return stamp_sigma_s > 0; }
-  int PoseColumn(int frame) const { return 6 + kPoseSize * frame; }
+  static constexpr int kTimeOffsetColumn = 6;
+  int PoseColumn(int frame) const { return kTimeOffsetColumn + 1 + kPoseSize * frame; }
   int VelocityColumn(int frame) const { return PoseColumn(num_frames()) + 3 * frame; }
   int StampColumn(int frame) const { return VelocityColumn(num_frames()) + frame; }
 
-  // Where the body was when the image was taken.
+  // The image was taken this much after its stamp.
+  double StampError(int frame) const { return time_offset_error_s + stamps[frame].error_s; }
+  // Where the body was then.
   Rigid3 ImagePose(int frame) const;
 
   // A half of the sum of squared residuals, in sigmas (those of rays after Huber, 1964); infinite

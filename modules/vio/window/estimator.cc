@@ -58,7 +58,10 @@ struct Estimator::Impl {
         noise(WithUsualWalks(n)),
         ray_sigma(o.pixel_sigma * c.PixelAngle()),
         is_rough(IsRough(c, o.calibration)),
-        initialiser(c, noise, o.pixel_sigma, o.accel_bias_sigma, o.stationary),
+        initialiser(
+            c, noise, o.pixel_sigma,
+            {.accel_bias = o.accel_bias_sigma, .time_offset_s = o.calibration.time_offset_s},
+            o.stationary),
         imu_samples(noise),
         stationary_detector(c, ray_sigma, o.stationary),
         stamps(c),
@@ -140,6 +143,7 @@ void Estimator::Impl::Start(const InitialState& initial) {
     }
     Newest().is_window_keyframe = true;
   }
+  problem.state.time_offset_s += initial.time_offset_error_s;
   started = true;
   settled_imu_utime = Newest().imu_utime + kSettling_us;
 }
