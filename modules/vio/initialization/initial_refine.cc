@@ -100,13 +100,10 @@ int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_firs
 void SumUpRays(const StartProblem& problem, int rays, RefinedStart* out) {
   double sum = 0;
   int inliers = 0;
-  for (const StartPoint& point : problem.points) {
-    for (const StartRay& seen : point.rays) {
-      const double error = problem.RayError(point, seen);
-      if (error < kInlierSigmas) {
-        ++inliers;
-        sum += error * error;
-      }
+  for (const double error : problem.RayErrors()) {
+    if (error < kInlierSigmas) {
+      ++inliers;
+      sum += error * error;
     }
   }
   out->inlier_share = rays > 0 ? static_cast<double>(inliers) / rays : 0;

@@ -43,37 +43,51 @@ struct RayTerm {
   Eigen::Matrix<double, 2, 3> J_point;
 };
 
-// The point in the camera of a frame.
-Vector3d InCamera(const StartProblem& problem, int frame, const Vector3d& p_odom) {
-  const Rigid3 T = problem.ImagePose(frame);
-  return problem.T_body_cam.Inverse() * (T.q.conjugate() * (p_odom - T.t));
+// Where the cameras were when their images were taken.
+struct Cameras {
+  struct Camera {
+    Matrix3d R_cam_odom;
+    Vector3d p_odom_cam;
+  };
+  std::vector<Camera> of_frame;
+  double ray_sigma = 0;
+};
+
+Cameras CamerasOf(const StartProblem& problem) {
+  Cameras cameras;
+  cameras.ray_sigma = problem.ray_sigma;
+  for (int i = 0; i < problem.num_frames(); ++i) {
+    const Rigid3 T_odom_cam = problem.ImagePose(i) * problem.T_body_cam;
+    cameras.of_frame.push_back({T_odom_cam.R().transpose(), T_odom_cam.t});
+  }
+  return cameras;
 }
 
-double RayErrorOf(const StartProblem& problem, const StartRay& seen, const Vector3d& p_odom) {
-  const Vector3d y = InCamera(problem, seen.frame, p_odom);
-  return y.z() > kMinStartDepth ? (y.head<2>() / y.z() - seen.ray).norm() / problem.ray_sigma
+double RayError(const Cameras& cameras, const StartRay& seen, const Vector3d& p_odom) {
+  const auto& [R_cam_odom, p_odom_cam] = cameras.of_frame[seen.frame];
+  const Vector3d y = R_cam_odom * (p_odom - p_odom_cam);
+  return y.z() > kMinStartDepth ? (y.head<2>() / y.z() - seen.ray).norm() / cameras.ray_sigma
                                 : std::numeric_limits<double>::infinity();
 }
 
-double PointCost(const StartProblem& problem, const StartPoint& point, const Vector3d& p_odom) {
+double PointCost(const Cameras& cameras, const StartPoint& point, const Vector3d& p_odom) {
   const double sigma = point.expected_sigma;
   double cost = 0.5 * (p_odom - point.expected).squaredNorm() / (sigma * sigma);
   for (const StartRay& seen : point.rays) {
-    cost += HuberCost(RayErrorOf(problem, seen, p_odom));
+    cost += HuberCost(RayError(cameras, seen, p_odom));
   }
   return cost;
 }
 
-RayTerm LineariseRay(const StartProblem& problem, const StartRay& seen, const Vector3d& p_odom) {
-  const Vector3d y = InCamera(problem, seen.frame, p_odom);
+RayTerm LineariseRay(const Cameras& cameras, const StartRay& seen, const Vector3d& p_odom) {
+  const auto& [R_cam_odom, p_odom_cam] = cameras.of_frame[seen.frame];
+  const Vector3d y = R_cam_odom * (p_odom - p_odom_cam);
   const double inv = 1 / y.z();
   Eigen::Matrix<double, 2, 3> J;
   J << inv, 0, -y.x() * inv * inv, 0, inv, -y.y() * inv * inv;
   RayTerm term;
-  term.r = (y.head<2>() * inv - seen.ray) / problem.ray_sigma;
-  term.J_point =
-      J * (problem.ImagePose(seen.frame).q * problem.T_body_cam.q).conjugate().toRotationMatrix() /
-      problem.ray_sigma;
+  term.r = (y.head<2>() * inv - seen.ray) / cameras.ray_sigma;
+  term.J_point = J * R_cam_odom / cameras.ray_sigma;
   term.J_pose << term.J_point * Hat(p_odom), -term.J_point;
   const double root = std::sqrt(HuberWeight(term.r.norm()));
   term.r *= root;
@@ -82,8 +96,8 @@ RayTerm LineariseRay(const StartProblem& problem, const StartRay& seen, const Ve
   return term;
 }
 
-Equations::Elimination AddPoint(const StartProblem& problem, const StartPoint& point,
-                                double damping, Equations* out) {
+Equations::Elimination AddPoint(const StartProblem& problem, const Cameras& cameras,
+                                const StartPoint& point, double damping, Equations* out) {
   const int first = point.rays.front().frame;
   const int columns = kPoseSize * (point.rays.back().frame - first + 1);
   const double prior = 1 / (point.expected_sigma * point.expected_sigma);
@@ -92,7 +106,7 @@ Equations::Elimination AddPoint(const StartProblem& problem, const StartPoint& p
   Eigen::Matrix<double, 3, Eigen::Dynamic> W(3, columns);
   W.setZero();
   for (const StartRay& seen : point.rays) {
-    const RayTerm term = LineariseRay(problem, seen, point.p_odom);
+    const RayTerm term = LineariseRay(cameras, seen, point.p_odom);
     const int at = problem.PoseColumn(seen.frame);
     out->H.block<kPoseSize, kPoseSize>(at, at) += term.J_pose.transpose() * term.J_pose;
     out->g.segment<kPoseSize>(at) += term.J_pose.transpose() * term.r;
@@ -117,10 +131,10 @@ Equations::Elimination AddPoint(const StartProblem& problem, const StartPoint& p
 
 // Moves a point to where its rays want it, from where it is or from `offered`, the better of the
 // two; by inverse depth in the camera that saw it first, in which rays are nearly linear.
-void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* point) {
-  double cost = PointCost(problem, *point, point->p_odom);
+void Settle(const Cameras& cameras, const Vector3d& offered, StartPoint* point) {
+  double cost = PointCost(cameras, *point, point->p_odom);
   const auto improve = [&](const Vector3d& p_odom) {
-    const double new_cost = PointCost(problem, *point, p_odom);
+    const double new_cost = PointCost(cameras, *point, p_odom);
     if (new_cost < cost) {
       cost = new_cost;
       point->p_odom = p_odom;
@@ -129,13 +143,13 @@ void Settle(const StartProblem& problem, const Vector3d& offered, StartPoint* po
     return false;
   };
   improve(offered);
-  const Vector3d centre = problem.ImagePose(point->rays.front().frame) * problem.T_body_cam.t;
+  const Vector3d& centre = cameras.of_frame[point->rays.front().frame].p_odom_cam;
   for (int iteration = 0; iteration < kPointIterations && std::isfinite(cost); ++iteration) {
     const double prior = 1 / (point->expected_sigma * point->expected_sigma);
     Matrix3d V = prior * Matrix3d::Identity();
     Vector3d g = prior * (point->p_odom - point->expected);
     for (const StartRay& seen : point->rays) {
-      const RayTerm term = LineariseRay(problem, seen, point->p_odom);
+      const RayTerm term = LineariseRay(cameras, seen, point->p_odom);
       V += term.J_point.transpose() * term.J_point;
       g += term.J_point.transpose() * term.r;
     }
@@ -236,14 +250,22 @@ double StartProblem::Cost() const {
   for (size_t i = 0; stamps_jitter() && i < stamps.size(); ++i) {
     cost += 0.5 * std::pow(stamps[i].error_s / stamp_sigma_s, 2);
   }
+  const Cameras cameras = CamerasOf(*this);
   for (const StartPoint& point : points) {
-    cost += PointCost(*this, point, point.p_odom);
+    cost += PointCost(cameras, point, point.p_odom);
   }
   return cost;
 }
 
-double StartProblem::RayError(const StartPoint& point, const StartRay& seen) const {
-  return RayErrorOf(*this, seen, point.p_odom);
+std::vector<double> StartProblem::RayErrors() const {
+  const Cameras cameras = CamerasOf(*this);
+  std::vector<double> errors;
+  for (const StartPoint& point : points) {
+    for (const StartRay& seen : point.rays) {
+      errors.push_back(RayError(cameras, seen, point.p_odom));
+    }
+  }
+  return errors;
 }
 
 Equations StartProblem::Linearise(double damping) const {
@@ -260,8 +282,9 @@ Equations StartProblem::Linearise(double damping) const {
     AddImuFactor(*this, i, &out);
   }
   AddStamps(*this, &out);
+  const Cameras cameras = CamerasOf(*this);
   for (const StartPoint& point : points) {
-    out.eliminations.push_back(AddPoint(*this, point, damping, &out));
+    out.eliminations.push_back(AddPoint(*this, cameras, point, damping, &out));
   }
   return out;
 }
@@ -283,9 +306,10 @@ void StartProblem::Retract(const Equations& equations, const VectorXd& step) {
     state.accel_bias += step.segment<3>(3);
   }
   time_offset_error_s += step[kTimeOffsetColumn];
+  const Cameras cameras = CamerasOf(*this);
   for (size_t i = 0; i < points.size(); ++i) {
     const auto& [first, offset, gain] = equations.eliminations[i];
-    Settle(*this, points[i].p_odom + offset + gain * step.segment(PoseColumn(first), gain.cols()),
+    Settle(cameras, points[i].p_odom + offset + gain * step.segment(PoseColumn(first), gain.cols()),
            &points[i]);
   }
 }

@@ -82,7 +82,8 @@ class StartProblem {
   // A half of the sum of squared residuals, in sigmas (those of rays after Huber, 1964); infinite
   // when a point is behind a camera that saw it.
   double Cost() const;
-  double RayError(const StartPoint& point, const StartRay& seen) const;  // sigmas; or infinite
+  // Of every point's rays, in sigmas; or infinite.
+  std::vector<double> RayErrors() const;
   // The cost's derivatives by the error, points eliminated; of H only the lower triangle.
   struct Equations {
     double cost = 0;
