@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <atomic>
 #include <csignal>
 
 #include "bus/retransmission/journal_first.h"
@@ -9,7 +10,9 @@
 namespace pangea {
 namespace {
 
-volatile std::sig_atomic_t stop_signals = 0;
+// A signal interrupts any of the process's threads: the bus's receiver, a test's main.
+std::atomic<int> stop_signals = 0;
+static_assert(std::atomic<int>::is_always_lock_free, "or a signal's handler may not use it");
 
 constexpr int64_t kTickInterval_us = 100'000;
 
@@ -17,7 +20,7 @@ constexpr int64_t kTickInterval_us = 100'000;
 
 void InstallSignalHandlers() {
   struct sigaction action {};
-  action.sa_handler = [](int) { stop_signals = stop_signals + 1; };
+  action.sa_handler = [](int) { ++stop_signals; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   // A file that may not grow (a quota, ulimit -f) is a full disk like any other: an error, no
