@@ -14,6 +14,7 @@ from pathlib import Path
 MAX_WASM_BYTES = 3_000_000
 MAX_HEAP_MB = 64
 MAX_ATE_RATIO = 1.1
+MAX_PREINTEGRATION_OFF = 1e-3
 
 
 def run(*command, expect=0):
@@ -22,10 +23,30 @@ def run(*command, expect=0):
     return done.stdout + done.stderr
 
 
-def seqs(programs, log):
-    """Of the keyframes in a log, as our own decoder reads them."""
+def keyframes(programs, log):
+    """Of a log, as our own decoder reads them."""
     lines = run(programs / "pangea-log", "list", "--json", "--channels", "KEYFRAME_1", log).splitlines()
-    return [json.loads(line)["message"]["keyframe"]["id"]["seq"] for line in lines]
+    return [json.loads(line)["message"]["keyframe"] for line in lines]
+
+
+def rows(numbers, count):
+    width = len(numbers) // count
+    return [numbers[at:at + width] for at in range(0, len(numbers), width)]
+
+
+def off(here, there):
+    """The largest difference of two matrices of nine rows, as a share of its row's largest number."""
+    return max(max(abs(a - b) for a, b in zip(x, y)) / max(map(abs, y)) for x, y in zip(rows(here, 9), rows(there, 9)))
+
+
+def integrates_as_native(wasm, native):
+    """Of one motion both know alike what a bias does to it, and how certain it is."""
+    both = [(a["preintegration"], b["preintegration"]) for a, b in zip(wasm, native) if b["has_preintegration"]]
+    assert len(both) > 5
+    for matrix in ("bias_jacobian", "covariance"):
+        worst = max(off(a[matrix], b[matrix]) for a, b in both)
+        print(f"{matrix}: {worst:.1e} of native's off")
+        assert worst < MAX_PREINTEGRATION_OFF, f"{matrix}: {worst:.1e} of native's off"
 
 
 def ate_m(programs, tum, recording):
@@ -71,15 +92,17 @@ def main(programs, wasm, work):
         "--path-seed", "1", "--seed", "1", "--out", recording)
     agent = wasm / "pangea-agent.mjs"
     common = ["--agent", "1", "--recording", recording, "--rate", "max"]
-    of_native = ["--out-tum", work / "native.tum", "--out-keyframes", work / "native.lcm"]
-    of_wasm = ["--out-tum", work / "wasm.tum", "--out-keyframes", work / "wasm.lcm"]
-    run(programs / "pangea-vio", "--bus", "none", *common, *of_native)
-    said = run("node", agent, *common, *of_wasm)
+    native_files = ["--out-tum", work / "native.tum", "--out-keyframes", work / "native.lcm"]
+    wasm_files = ["--out-tum", work / "wasm.tum", "--out-keyframes", work / "wasm.lcm"]
+    run(programs / "pangea-vio", "--bus", "none", *common, *native_files)
+    said = run("node", agent, *common, *wasm_files)
     print(said)
 
-    expected, found = seqs(programs, work / "native.lcm"), seqs(programs, work / "wasm.lcm")
+    of_native, of_wasm = keyframes(programs, work / "native.lcm"), keyframes(programs, work / "wasm.lcm")
+    expected, found = ([keyframe["utime"] for keyframe in kept] for kept in (of_native, of_wasm))
     assert len(expected) > 10
     assert found == expected, f"keyframes {found}, and pangea-vio's are {expected}"
+    integrates_as_native(of_wasm, of_native)
     native_m, wasm_m = (ate_m(programs, work / tum, recording) for tum in ("native.tum", "wasm.tum"))
     print(f"ATE: native {native_m:.4f} m, wasm {wasm_m:.4f} m")
     assert wasm_m < MAX_ATE_RATIO * native_m, f"ATE {wasm_m} m, and pangea-vio's is {native_m} m"
