@@ -12,6 +12,8 @@ endif()
 add_compile_options(-msimd128 -msse2 -mnontrapping-fptoint -msign-ext -fgnuc-version=5.13 -fwasm-exceptions -ffp-contract=off
   "SHELL:-mllvm -enable-interleaved-mem-accesses=true" "SHELL:-mllvm -no-stack-coloring")
 add_link_options(-msimd128 -fwasm-exceptions)
+# The order of Eigen's sums follows these, and with it the last bit: as on x86-64, so that a phone computes what this machine does.
+add_compile_definitions(EIGEN_DEFAULT_L1_CACHE_SIZE=32768 EIGEN_MAX_STATIC_ALIGN_BYTES=16 EIGEN_ARCH_DEFAULT_NUMBER_OF_REGISTERS=16)
 
 # Of /usr/include these alone: the rest is of another machine.
 set(wasm_headers ${CMAKE_BINARY_DIR}/headers)

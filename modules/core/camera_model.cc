@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "core/elementary.h"
+
 namespace pangea {
 namespace {
 
@@ -34,7 +36,7 @@ Vector2d DistortEquidistant(const Eigen::Vector4d& k, const Vector2d& xy, Matrix
     }
     return xy;
   }
-  const double theta = std::atan(r);
+  const double theta = Atan(r);
   const double t2 = theta * theta;
   const double theta_d = theta * (1 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
   const double s = theta_d / r;
@@ -89,7 +91,7 @@ std::optional<Vector2d> UndistortEquidistant(const Eigen::Vector4d& k, const Vec
     if (std::abs(error) < 1e-13) {
       constexpr double kMaxAngle = 1.56;
       return theta > 0 && theta < kMaxAngle
-                 ? std::make_optional<Vector2d>(target * (std::tan(theta) / theta_d))
+                 ? std::make_optional<Vector2d>(target * (Tan(theta) / theta_d))
                  : std::nullopt;
     }
   }

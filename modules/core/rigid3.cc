@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/elementary.h"
+
 namespace pangea {
 
 Eigen::Matrix3d Hat(const Eigen::Vector3d& v) {
@@ -15,8 +17,9 @@ Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& omega) {
   const double angle2 = omega.squaredNorm();
   // sin(x/2)/x by its series below 1e-4 rad, where the quotient loses digits.
   const double angle = std::sqrt(angle2);
-  const double imag = angle2 < 1e-8 ? 0.5 - angle2 / 48.0 : std::sin(0.5 * angle) / angle;
-  const double real = angle2 < 1e-8 ? 1.0 - angle2 / 8.0 : std::cos(0.5 * angle);
+  const SinCos half = SinCosOf(0.5 * angle);
+  const double imag = angle2 < 1e-8 ? 0.5 - angle2 / 48.0 : half.sin / angle;
+  const double real = angle2 < 1e-8 ? 1.0 - angle2 / 8.0 : half.cos;
   return Eigen::Quaterniond(real, imag * omega.x(), imag * omega.y(), imag * omega.z())
       .normalized();
 }
@@ -28,7 +31,7 @@ Eigen::Vector3d LogSo3(const Eigen::Quaterniond& q) {
   if (n < 1e-10) {
     return 2.0 * v;
   }
-  return 2.0 * std::atan2(n, sign * q.w()) / n * v;
+  return 2.0 * Atan2(n, sign * q.w()) / n * v;
 }
 
 Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& omega) {
@@ -38,8 +41,8 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& omega) {
     return Eigen::Matrix3d::Identity() - 0.5 * W + W * W / 6.0;
   }
   const double a = std::sqrt(a2);
-  return Eigen::Matrix3d::Identity() - (1 - std::cos(a)) / a2 * W +
-         (a - std::sin(a)) / (a2 * a) * W * W;
+  const SinCos of = SinCosOf(a);
+  return Eigen::Matrix3d::Identity() - (1 - of.cos) / a2 * W + (a - of.sin) / (a2 * a) * W * W;
 }
 
 Eigen::Matrix3d RightJacobianInverse(const Eigen::Vector3d& omega) {
@@ -49,16 +52,18 @@ Eigen::Matrix3d RightJacobianInverse(const Eigen::Vector3d& omega) {
     return Eigen::Matrix3d::Identity() + 0.5 * W + W * W / 12.0;
   }
   const double a = std::sqrt(a2);
+  const SinCos of = SinCosOf(a);
   return Eigen::Matrix3d::Identity() + 0.5 * W +
-         (1.0 / a2 - (1 + std::cos(a)) / (2 * a * std::sin(a))) * W * W;
+         (1.0 / a2 - (1 + of.cos) / (2 * a * of.sin)) * W * W;
 }
 
 Eigen::Quaterniond YawRotation(double yaw) {
-  return {std::cos(0.5 * yaw), 0.0, 0.0, std::sin(0.5 * yaw)};
+  const SinCos half = SinCosOf(0.5 * yaw);
+  return {half.cos, 0.0, 0.0, half.sin};
 }
 
 double YawOf(const Eigen::Quaterniond& q) {
-  return std::atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
+  return Atan2(2 * (q.w() * q.z() + q.x() * q.y()), 1 - 2 * (q.y() * q.y() + q.z() * q.z()));
 }
 
 double WrapAngle(double angle) {

@@ -85,7 +85,7 @@ Matrix15d InertialInformation(const Preintegration& measured, const ImuNoise& no
   const double accel_walk = noise.accel_random_walk * noise.accel_random_walk * dt;
   covariance.diagonal().segment<3>(kRowTheta).array() += gyro_walk * dt * dt / 3;
   covariance.diagonal().segment<3>(kRowVelocity).array() += accel_walk * dt * dt / 3;
-  covariance.diagonal().segment<3>(kRowPosition).array() += accel_walk * std::pow(dt, 4) / 20;
+  covariance.diagonal().segment<3>(kRowPosition).array() += accel_walk * (dt * dt * dt * dt) / 20;
   Eigen::Matrix<double, 9, 3> of_accel = Eigen::Matrix<double, 9, 3>::Zero();
   of_accel.middleRows<3>(kRowVelocity).diagonal().setConstant(unmodelled_accel_sigma * dt);
   of_accel.middleRows<3>(kRowPosition)

@@ -13,7 +13,6 @@ from pathlib import Path
 
 MAX_WASM_BYTES = 3_000_000
 MAX_HEAP_MB = 64
-MAX_ATE_RATIO = 1.1
 MAX_PREINTEGRATION_OFF = 1e-3
 
 
@@ -47,12 +46,6 @@ def integrates_as_native(wasm, native):
         worst = max(off(a[matrix], b[matrix]) for a, b in both)
         print(f"{matrix}: {worst:.1e} of native's off")
         assert worst < MAX_PREINTEGRATION_OFF, f"{matrix}: {worst:.1e} of native's off"
-
-
-def ate_m(programs, tum, recording):
-    metrics = json.loads(run(programs / "pangea-eval", "ate", "--json", "-", tum, recording))["SE(3)"]
-    assert metrics["trajectories"][0]["coverage"] > 0.5, metrics
-    return metrics["ate_m"]["rmse"]
 
 
 def numbers(yaml, key):
@@ -103,9 +96,9 @@ def main(programs, wasm, work):
     assert len(expected) > 10
     assert found == expected, f"keyframes {found}, and pangea-vio's are {expected}"
     integrates_as_native(of_wasm, of_native)
-    native_m, wasm_m = (ate_m(programs, work / tum, recording) for tum in ("native.tum", "wasm.tum"))
-    print(f"ATE: native {native_m:.4f} m, wasm {wasm_m:.4f} m")
-    assert wasm_m < MAX_ATE_RATIO * native_m, f"ATE {wasm_m} m, and pangea-vio's is {native_m} m"
+    native, poses = ((work / tum).read_text().splitlines() for tum in ("native.tum", "wasm.tum"))
+    others = [pose for pose, expected in zip(poses, native) if pose != expected]
+    assert poses == native, f"{len(others)} of {len(native)} poses are not pangea-vio's, the first: {others[:1]}"
     heap_mb = float(re.search(r"heap ([\d.]+) MB", said)[1])
     assert heap_mb < MAX_HEAP_MB, heap_mb
     assert (wasm / "pangea_agent.wasm").stat().st_size < MAX_WASM_BYTES

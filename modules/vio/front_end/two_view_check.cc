@@ -42,12 +42,13 @@ Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
                               const std::vector<Eigen::Vector3d>& b, double threshold,
                               int iterations) {
   std::mt19937_64 random(b.size());
-  std::uniform_int_distribution<size_t> pick(0, b.size() - 1);
+  // The standard's distributions differ from library to library.
+  const auto pick = [&] { return static_cast<size_t>(random() % b.size()); };
   Eigen::Vector3d best = Eigen::Vector3d::UnitX();
   double best_score = std::numeric_limits<double>::max();
   for (int k = 0; k < iterations; ++k) {
-    const size_t i = pick(random);
-    const size_t j = pick(random);
+    const size_t i = pick();
+    const size_t j = pick();
     const Eigen::Vector3d t = a_in_b[i].cross(b[i]).cross(a_in_b[j].cross(b[j]));
     const double length = t.norm();
     if (i == j || length < 1e-12) {

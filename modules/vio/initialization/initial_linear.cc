@@ -78,8 +78,7 @@ double EpipolarCost(const RotationPair& pair, const Vector3d& bias_change) {
       M(i, j) = T[i1][j1](i2, j2) - T[i1][j2](i2, j1) - T[i2][j1](i1, j2) + T[i2][j2](i1, j1);
     }
   }
-  Eigen::SelfAdjointEigenSolver<Matrix3d> eigen;
-  eigen.computeDirect(M, Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(M, Eigen::EigenvaluesOnly);
   return std::max(0.0, eigen.eigenvalues()[0]) / static_cast<double>(pair.num_bearings);
 }
 
