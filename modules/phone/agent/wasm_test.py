@@ -93,7 +93,7 @@ def main(programs, wasm, work):
 
     of_native, of_wasm = keyframes(programs, work / "native.lcm"), keyframes(programs, work / "wasm.lcm")
     expected, found = ([keyframe["utime"] for keyframe in kept] for kept in (of_native, of_wasm))
-    assert len(expected) > 10
+    assert len(expected) >= 8
     assert found == expected, f"keyframes {found}, and pangea-vio's are {expected}"
     integrates_as_native(of_wasm, of_native)
     native, poses = ((work / tum).read_text().splitlines() for tum in ("native.tum", "wasm.tum"))
