@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/elementary.h"
+#include "core/numerics/elementary.h"
 
 namespace pangea {
 namespace {

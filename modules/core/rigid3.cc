@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/elementary.h"
+#include "core/numerics/elementary.h"
 
 namespace pangea {
 

@@ -10,8 +10,8 @@
 
 #include <ceres/sized_cost_function.h>
 
-#include "core/edge_residual.h"
 #include "core/imu/imu_factor.h"
+#include "core/least_squares/edge_residual.h"
 
 namespace pangea {
 

@@ -51,8 +51,7 @@ class EliminatedLandmarks {
   void AddTo(const std::vector<View>& views, const std::vector<Eigen::Vector3d>& landmarks,
              const RobustLoss& loss, BlockEquations* equations);
   // Then takes from the equations what the landmarks need for themselves. `damping`:
-  // Levenberg-Marquardt's. Returns by how much their own
-  // steps should lower the cost.
+  // Levenberg-Marquardt's. Returns by how much their own steps should lower the cost.
   double Eliminate(double damping, BlockEquations* equations);
   // Their own steps for the step of all variables, by the last elimination.
   void Move(const Eigen::VectorXd& step, const BlockEquations& equations,

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/edge_residual.h"
+#include "core/least_squares/edge_residual.h"
 #include "loop_verification/joint_ba/frame_information.h"
 #include "loop_verification/joint_ba/hosted_point.h"
 #include "loop_verification/joint_ba/joint_ba.h"

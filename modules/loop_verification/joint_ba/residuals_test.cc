@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "core/edge_residual.h"
+#include "core/least_squares/edge_residual.h"
 #include "core/testing/numeric_jacobian.h"
 #include "loop_verification/correspondences/point_observation.h"
 #include "loop_verification/joint_ba/hosted_point.h"

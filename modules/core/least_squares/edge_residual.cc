@@ -1,4 +1,4 @@
-#include "core/edge_residual.h"
+#include "core/least_squares/edge_residual.h"
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "core/elementary.h"
+#include "core/numerics/elementary.h"
 
 #include <array>
 #include <cmath>
