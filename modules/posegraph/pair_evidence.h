@@ -30,11 +30,11 @@ struct MergeOptions {
   double viewpoint_distance_m = 0.25;
   double viewpoint_angle = 0.15;
   // What the agreeing viewpoints see must not be one spot: an object has a look-alike somewhere.
-  // Agents that only ever looked at one spot need this many viewpoints, and next to no rival:
+  // Agents that only ever looked at one spot need one viewpoint more, and next to no rival:
   // look-alikes standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
-  int min_viewpoints_at_one_spot = 6;
-  int min_strong_viewpoints_at_one_spot = 4;  // as many fewer as elsewhere
+  int min_viewpoints_at_one_spot = 4;
+  int min_strong_viewpoints_at_one_spot = 3;
   double max_rival_share_at_one_spot = 0.25;
   // The largest rival may have this share of the viewpoints.
   double max_rival_share = 0.5;

@@ -60,8 +60,8 @@ int ViewpointsAtOneSpot(int num_inliers) {
 }
 
 TEST(PoseGraph, AtOneSpotMoreViewpointsAreNeededThoughFewerOfStrongOnes) {
-  EXPECT_EQ(ViewpointsAtOneSpot(79), 6);
-  EXPECT_EQ(ViewpointsAtOneSpot(80), 4);
+  EXPECT_EQ(ViewpointsAtOneSpot(79), 4);
+  EXPECT_EQ(ViewpointsAtOneSpot(80), 3);
 }
 
 // Wrong constraints that agree with each other by chance or by a look-alike: too few, or rivalled.
