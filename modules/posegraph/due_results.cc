@@ -11,7 +11,7 @@ namespace pangea {
 void DueResults::Promise(const PlaceMatch& match, int64_t now_utime) {
   for (const PlaceCandidate& candidate : match.candidates) {
     const int64_t promised = ConstraintId(match.query, candidate);
-    if (!came_.contains(promised) && due_.size() < kMax) {
+    if (!received_.contains(promised) && due_.size() < kMax) {
       Watch(promised, match.query, now_utime);
     }
   }
@@ -23,7 +23,7 @@ void DueResults::Watch(int64_t constraint_id, const KeyframeId& query, int64_t n
 }
 
 void DueResults::Save(ByteWriter* writer) const {
-  writer->Put(std::vector<int64_t>(came_.begin(), came_.end()));
+  writer->Put(std::vector<int64_t>(received_.begin(), received_.end()));
   writer->PutCount(due_.size());
   for (const auto& [id, due] : due_) {
     writer->Put(id);
@@ -32,9 +32,9 @@ void DueResults::Save(ByteWriter* writer) const {
 }
 
 void DueResults::Restore(ByteReader* reader, int64_t now_utime) {
-  std::vector<int64_t> came;
-  reader->Get(&came);
-  came_ = {came.begin(), came.end()};
+  std::vector<int64_t> received;
+  reader->Get(&received);
+  received_ = {received.begin(), received.end()};
   for (size_t left = reader->GetCount(1); left > 0; --left) {
     int64_t id = 0;
     KeyframeId query;
@@ -44,9 +44,9 @@ void DueResults::Restore(ByteReader* reader, int64_t now_utime) {
   }
 }
 
-bool DueResults::Take(int64_t constraint_id) {
+bool DueResults::MarkReceived(int64_t constraint_id) {
   due_.erase(constraint_id);
-  return came_.insert(constraint_id).second;
+  return received_.insert(constraint_id).second;
 }
 
 int64_t DueResults::NumToCatchUp(const JournalFollower& journal) const {

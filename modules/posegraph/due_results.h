@@ -18,7 +18,7 @@ class DueResults {
  public:
   void Promise(const PlaceMatch& match, int64_t now_utime);
   // False when it is a repeat.
-  bool Take(int64_t constraint_id);
+  bool MarkReceived(int64_t constraint_id);
   // Looked at once a second.
   void RequestOverdue(Node& node, int64_t now_utime);
 
@@ -42,7 +42,7 @@ class DueResults {
   };
 
   std::map<int64_t, Due> due_;  // by constraint id
-  std::set<int64_t> came_;
+  std::set<int64_t> received_;
   int64_t next_look_utime_ = 0;
 };
 

@@ -74,7 +74,7 @@ void PoseGraphProcess::OnKeyframe(const Keyframe& keyframe) {
 }
 
 void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
-  if (results_.Take(constraint.Id())) {
+  if (results_.MarkReceived(constraint.Id())) {
     ++num_arrived_;
     node_.Count(constraint.accepted ? "results_accepted" : "results_refused");
   } else {

@@ -14,7 +14,7 @@ namespace pangea {
 namespace {
 
 constexpr double kOne = 1;
-constexpr int kSettleRounds = 5;
+constexpr int kSwitchRounds = 5;
 
 // Weight of a residual under the GNC surrogate with control parameter mu (RA-L 2020, eq. 14).
 double GraduatedWeight(double squared_residual, double c2, double mu) {
@@ -162,22 +162,22 @@ void GroupSolver::SolveGraduated() {
     }
     Minimise(options_.max_iterations);
   }
-  Settle(std::vector<bool>(loops_.size(), true));
+  SwitchUntilStable(std::vector<bool>(loops_.size(), true));
 }
 
 void GroupSolver::SolveWarm(const std::vector<bool>& may_go) {
   Minimise(options_.max_iterations);
-  Settle(may_go);
+  SwitchUntilStable(may_go);
 }
 
-void GroupSolver::Settle(const std::vector<bool>& may_go) {
-  for (int round = 0; round < kSettleRounds; ++round) {
+void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
+  for (int round = 0; round < kSwitchRounds; ++round) {
     bool changed = false;
     for (size_t i = 0; i < loops_.size(); ++i) {
       const bool fits = SquaredResidual(loops_[i]) <= options_.loop_chi2;
       const bool on = loop_on(static_cast<int>(i));
-      // A loop that came back stays: two that take turns would never settle.
-      if (fits != on && (!on || (may_go[i] && round < kSettleRounds - 1))) {
+      // A loop that came back stays: two that take turns would never end.
+      if (fits != on && (!on || (may_go[i] && round < kSwitchRounds - 1))) {
         SetWeight(&loops_[i], fits ? 1 : 0);
         changed = true;
       }

@@ -86,7 +86,7 @@ class GroupSolver {
   double SquaredResidual(const Loop& loop) const;
   static void SetWeight(Loop* loop, double weight);
   // Until no loop changes sides; returns whether any did.
-  void Settle(const std::vector<bool>& may_go);
+  void SwitchUntilStable(const std::vector<bool>& may_go);
 
   GroupSolverOptions options_;
   std::deque<std::array<double, 4>> nodes_;
