@@ -125,7 +125,11 @@ std::map<std::string, std::function<Subject()>> Subjects() {
          return taking(
              std::make_shared<Anchors>(AnchorsOptions{}, std::make_shared<ScratchFile>()));
        }},
-      {"posegraph", [=] { return taking(std::make_shared<PoseGraph>(PoseGraphOptions{})); }},
+      {"posegraph",
+       [] {
+         auto core = std::make_shared<PoseGraph>(PoseGraphOptions{});
+         return Subject{[core](const Keyframe& keyframe) { core->AddKeyframe(keyframe); }};
+       }},
       {"global_ba",
        [=] {
          return taking(

@@ -102,9 +102,9 @@ void City::Read(const std::string& log) {
 void City::Solve() {
   PoseGraph graph(PoseGraphOptions{});
   for (const Step& step : recorded_) {
-    graph.Take(step.keyframe);
+    graph.AddKeyframe(step.keyframe);
     for (const Constraint& result : step.results) {
-      graph.Take(result);
+      graph.AddConstraint(result);
     }
   }
   graph.Finish();

@@ -36,16 +36,18 @@ void Cores::Remember(const Step& step) {
   };
   use_.Measure("inter_map_ba", [&] { verifier(inter_map_ba_.get(), PlaceKind::kIntra); });
   use_.Measure("fusion", [&] { verifier(fusion_.get(), PlaceKind::kInter); });
-  const auto all = [&](auto* core) {
-    core->Take(keyframe);
+  use_.Measure("posegraph", [&] {
+    graph_->AddKeyframe(keyframe);
     for (const Constraint& result : step.results) {
-      core->Take(result);
+      graph_->AddConstraint(result);
     }
-  };
-  use_.Measure("posegraph", [&] { all(graph_.get()); });
+  });
   use_.Measure("global_ba", [&] {
     global_ba_->Take(step.match);
-    all(global_ba_.get());
+    global_ba_->Take(keyframe);
+    for (const Constraint& result : step.results) {
+      global_ba_->Take(result);
+    }
   });
   use_.Measure("map_points", [&] { map_points_->Take(keyframe); });
 }
@@ -114,11 +116,11 @@ std::vector<Constraint> Cores::Take(const Keyframe& keyframe) {
   }
   const double begin_ms = CpuMs();
   const PoseGraphUpdate update = use_.Measure("posegraph", [&] {
-    graph_->Take(keyframe);
+    graph_->AddKeyframe(keyframe);
     for (const Constraint& result : results) {
-      graph_->Take(result);
+      graph_->AddConstraint(result);
     }
-    return graph_->Settle();
+    return graph_->Update();
   });
   longest_solve_ms_ = std::max(longest_solve_ms_, CpuMs() - begin_ms);
   Tell(update);
@@ -150,8 +152,8 @@ void Cores::AdjustDue() {
     if (refined) {
       use_.Measure("map_points", [&] { map_points_->TakeRefined(*refined); });
       Tell(use_.Measure("posegraph", [&] {
-        graph_->TakeRefined(*refined);
-        return graph_->Settle();
+        graph_->AddRefinement(*refined);
+        return graph_->Update();
       }));
     }
   }

@@ -82,11 +82,11 @@ Server::Server(const Journal& journal) {
     graph_ = std::make_unique<PoseGraph>(PoseGraphOptions{});
     for (const auto& entries : journal.maps) {
       for (const Journal::Entry& entry : entries) {
-        graph_->Take(entry.keyframe);
+        graph_->AddKeyframe(entry.keyframe);
       }
     }
     for (const auto& [id, constraint] : journal.constraints) {
-      graph_->Take(constraint);
+      graph_->AddConstraint(constraint);
     }
   });
   Finish();
@@ -114,7 +114,7 @@ std::vector<Constraint> Server::Take(const Keyframe& keyframe, Journal* journal)
       use_.Measure("place_recognition", [&] { return recognition_->Add(keyframe); });
   use_.Measure("inter_map_ba", [&] { inter_map_ba_->Add(keyframe); });
   use_.Measure("fusion", [&] { fusion_->Add(keyframe); });
-  use_.Measure("posegraph", [&] { graph_->Take(keyframe); });
+  use_.Measure("posegraph", [&] { graph_->AddKeyframe(keyframe); });
   if (keyframe.id.seq == 0) {
     journal->maps.emplace_back();
   }
@@ -123,9 +123,9 @@ std::vector<Constraint> Server::Take(const Keyframe& keyframe, Journal* journal)
   for (const PlaceCandidate& candidate : match.candidates) {
     results.push_back(Verify(keyframe.id, candidate));
     journal->constraints.try_emplace(results.back().Id(), results.back());
-    use_.Measure("posegraph", [&] { graph_->Take(results.back()); });
+    use_.Measure("posegraph", [&] { graph_->AddConstraint(results.back()); });
   }
-  TellGroups(use_.Measure("posegraph", [&] { return graph_->Settle(); }));
+  TellGroups(use_.Measure("posegraph", [&] { return graph_->Update(); }));
   return results;
 }
 

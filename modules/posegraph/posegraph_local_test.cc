@@ -89,7 +89,7 @@ TEST(LocalSolve, AMapJoinsALargeGroupThatStays) {
     const MapState before = row.graph.States().front();
     ASSERT_EQ(before.maps.size(), 3u);
     for (const Constraint& constraint : row.OfTheLast(true, 40)) {
-      row.graph.AddConstraint(constraint);
+      Add(constraint, &row.graph);
       if (row.graph.counters().groups == 1) {
         break;
       }

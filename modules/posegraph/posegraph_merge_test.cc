@@ -16,7 +16,7 @@ TEST(PoseGraph, OneMatchDoesNotMergeThreeViewpointsDo) {
   AddKeyframes(world, &graph);
   const std::vector<Constraint> constraints = BetweenMaps(MakeConstraints(world, 12, 0));
   ASSERT_GE(constraints.size(), 6u);
-  EXPECT_TRUE(graph.AddConstraint(constraints[0]).states.empty());
+  EXPECT_TRUE(Add(constraints[0], &graph).states.empty());
   EXPECT_EQ(graph.counters().groups, 2);
   AddConstraints(constraints, &graph);
   EXPECT_EQ(graph.counters().groups, 1);
@@ -50,7 +50,7 @@ int ViewpointsAtOneSpot(int num_inliers) {
   int viewpoints = 0;
   for (Constraint& constraint : BetweenMaps(MakeConstraints(world, 20, 0))) {
     constraint.num_inliers = num_inliers;
-    graph.AddConstraint(constraint);
+    Add(constraint, &graph);
     ++viewpoints;
     if (graph.counters().groups == 1) {
       return viewpoints;
@@ -72,7 +72,7 @@ TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   const std::vector<Constraint> wrong = BetweenMaps(MakeConstraints(world, 200, 1.0));
   ASSERT_GT(wrong.size(), 50u);
   for (const Constraint& constraint : wrong) {
-    graph.AddConstraint(constraint);
+    Add(constraint, &graph);
     EXPECT_EQ(graph.counters().groups, 2);
   }
 }
@@ -99,12 +99,12 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
   const size_t stride = pairs.size() / 30;
   const Rigid3 wrong(YawRotation(0.4), {5, 3, 0});
   for (size_t i = 0; i < 6; ++i) {
-    graph.AddConstraint(Shifted(world, pairs[i * stride], wrong));
+    Add(Shifted(world, pairs[i * stride], wrong), &graph);
   }
   EXPECT_EQ(graph.counters().groups, 1);
   bool undone = false;
   for (size_t i = 6; i < 28; ++i) {
-    const PoseGraphUpdate update = graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+    const PoseGraphUpdate update = Add(Shifted(world, pairs[i * stride], {}), &graph);
     if (graph.counters().groups == 2 && !update.corrections.empty()) {
       undone = true;
       // The newer map's agent is told that its odom frame is its own again.
@@ -126,11 +126,11 @@ TEST(PoseGraph, ADerivedConstraintMergesAloneUntilManyContradictIt) {
   derived.kind = PlaceKind::kDerived;
   PoseGraph graph({});
   AddKeyframes(world, &graph);
-  graph.AddConstraint(derived);
+  Add(derived, &graph);
   EXPECT_EQ(graph.counters().groups, 1);
   EXPECT_EQ(graph.counters().in_force, 1);
   for (size_t i = 1; i < 28; ++i) {
-    graph.AddConstraint(Shifted(world, pairs[i * stride], {}));
+    Add(Shifted(world, pairs[i * stride], {}), &graph);
   }
   EXPECT_EQ(graph.counters().groups, 1);
   EXPECT_EQ(graph.counters().switched_off, 1);
@@ -151,10 +151,10 @@ TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
   PoseGraph graph({});
   for (const SyntheticAgent& agent : world.agents) {
     for (const Keyframe& keyframe : agent.keyframes) {
-      graph.Take(keyframe);
+      graph.AddKeyframe(keyframe);
     }
   }
-  graph.Take(derived);
+  graph.AddConstraint(derived);
   const std::vector<uint8_t> bytes = Saved(&graph);
   PoseGraph restored({});
   ByteRecordReader reader(bytes);
@@ -164,7 +164,7 @@ TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
   const std::vector<Constraint> constraints = MakeConstraints(world, 60, 0);
   const auto intra = std::ranges::find(constraints, PlaceKind::kIntra, &Constraint::kind);
   ASSERT_NE(intra, constraints.end());
-  restored.AddConstraint(*intra);
+  Add(*intra, &restored);
   restored.Finish();
   EXPECT_EQ(restored.counters().groups, 1);
   EXPECT_EQ(restored.counters().in_force, 2);
@@ -177,30 +177,30 @@ TEST(PoseGraph, AMapThatCameAfterTheCheckpointJoinsItsSolution) {
   const MapId& late = world.agents[2].map;
   const std::vector<Constraint> constraints = MakeConstraints(world, 120, 0.1);
   PoseGraph before({}), all({});
-  const auto take = [&](PoseGraph* graph, bool of_late) {
+  const auto add = [&](PoseGraph* graph, bool of_late) {
     for (const SyntheticAgent& agent : world.agents) {
       for (const Keyframe& keyframe : agent.keyframes) {
         if ((agent.map == late) == of_late) {
-          graph->Take(keyframe);
+          graph->AddKeyframe(keyframe);
         }
       }
     }
     for (const Constraint& constraint : constraints) {
       if ((constraint.from.map == late || constraint.to.map == late) == of_late) {
-        graph->Take(constraint);
+        graph->AddConstraint(constraint);
       }
     }
   };
-  take(&before, false);
-  take(&all, false);
-  take(&all, true);
+  add(&before, false);
+  add(&all, false);
+  add(&all, true);
   const std::vector<uint8_t> bytes = Saved(&before);
   const MapState solution = before.States().at(0);
   PoseGraph restored({});
   ByteRecordReader reader(bytes);
   ASSERT_TRUE(restored.Restore(&reader));
-  take(&restored, true);
-  const PoseGraphUpdate first = restored.Settle();
+  add(&restored, true);
+  const PoseGraphUpdate first = restored.Update();
   ASSERT_EQ(first.states.size(), 1u);
   EXPECT_EQ(first.states[0].maps.size(), 3u);
   EXPECT_EQ(first.corrections.size(), 3u);

@@ -27,7 +27,7 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                 .matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kAll},
                {.keyframe = std::bind_front(&PoseGraphProcess::OnKeyframe, this),
-                .keyframe_came = [this](const KeyframeId& id) { graph_.NoteMap(id.map); },
+                .keyframe_came = [this](const KeyframeId& id) { graph_.AddMap(id.map); },
                 .match =
                     [this](const PlaceMatch& match) {
                       results_.Promise(match, now_utime_);
@@ -36,7 +36,7 @@ PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
                 .result = std::bind_front(&PoseGraphProcess::OnConstraint, this),
                 .have = std::bind_front(&PoseGraphProcess::OnHave, this),
                 .more_to_catch_up = [this] { return results_.NumToCatchUp(journal_); },
-                .handled = [this] { SettleUnlessMoreWaits(); }},
+                .handled = [this] { UpdateUnlessMoreWaits(); }},
                {.place = checkpoint,
                 .format = kCheckpointFormat,
                 .save = std::bind_front(&PoseGraphProcess::Save, this),
@@ -63,14 +63,14 @@ bool PoseGraphProcess::Restore(ByteReader* reader) {
   }
   results_ = std::move(results);
   num_arrived_ = num_arrived;
-  num_unsettled_ = 1;
+  num_since_update_ = 1;
   return true;
 }
 
 void PoseGraphProcess::OnKeyframe(const Keyframe& keyframe) {
   ++num_arrived_;
-  graph_.Take(keyframe);
-  ++num_unsettled_;
+  graph_.AddKeyframe(keyframe);
+  ++num_since_update_;
 }
 
 void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
@@ -80,39 +80,39 @@ void PoseGraphProcess::OnConstraint(const Constraint& constraint) {
   } else {
     node_.Count("results_repeated");
   }
-  graph_.Take(constraint);
-  ++num_unsettled_;
+  graph_.AddConstraint(constraint);
+  ++num_since_update_;
 }
 
 void PoseGraphProcess::OnRefinement(MapState state, const map_state_t& message) {
   const auto whole = refinements_.Add(message.chunk, message.num_chunks, std::move(state));
   if (whole) {
     node_.Count("refinements");
-    graph_.TakeRefined(*whole);
-    ++num_unsettled_;
-    SettleUnlessMoreWaits();
+    graph_.AddRefinement(*whole);
+    ++num_since_update_;
+    UpdateUnlessMoreWaits();
   }
 }
 
 void PoseGraphProcess::OnHave(const Have& have) {
   for (const auto& [map, highest_seq] : have.highest_seq) {
-    graph_.NoteMap(map);
+    graph_.AddMap(map);
   }
 }
 
 void PoseGraphProcess::OnResendRequest(const ResendRequest& request) {
   if (request.channel == channels::kMapState) {
     graph_.Republish(request.range.map);
-    ++num_unsettled_;
-    SettleUnlessMoreWaits();
+    ++num_since_update_;
+    UpdateUnlessMoreWaits();
   }
 }
 
-void PoseGraphProcess::SettleUnlessMoreWaits() {
-  if (num_unsettled_ > 0 && !journal_.catching_up() &&
-      (num_unsettled_ >= kMaxUnsettled || !node_.bus().MoreWaits())) {
-    num_unsettled_ = 0;
-    Publish(graph_.Settle());
+void PoseGraphProcess::UpdateUnlessMoreWaits() {
+  if (num_since_update_ > 0 && !journal_.catching_up() &&
+      (num_since_update_ >= kMaxWithoutUpdate || !node_.bus().MoreWaits())) {
+    num_since_update_ = 0;
+    Publish(graph_.Update());
   }
 }
 
@@ -128,14 +128,14 @@ void PoseGraphProcess::Publish(const PoseGraphUpdate& update) {
 }
 
 void PoseGraphProcess::Finish() {
-  num_unsettled_ = 0;
+  num_since_update_ = 0;
   Publish(graph_.Finish());
 }
 
 void PoseGraphProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
   journal_.Tick(now_utime);
-  SettleUnlessMoreWaits();
+  UpdateUnlessMoreWaits();
   results_.RequestOverdue(node_, now_utime);
   if (num_arrived_ != num_arrived_at_change_) {
     num_arrived_at_change_ = num_arrived_;
@@ -170,7 +170,7 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   }
   node_.PublishStatus(
       now_utime,
-      counters.parked + static_cast<int64_t>(journal_.parked()) +
+      counters.waiting + static_cast<int64_t>(journal_.parked()) +
           (num_finished_ != num_arrived_ ? 1 : 0),
       counters.maps == 0
           ? "no keyframes yet"

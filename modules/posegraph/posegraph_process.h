@@ -3,7 +3,7 @@
 // KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT in; CORRECTION_k, MAP_STATE, STATUS_posegraph
 // out.
 //
-// Keyframes are taken in seq order, map by map; what is missing is asked for at ticks
+// Keyframes are added in seq order, map by map; what is missing is asked for at ticks
 // (RESEND_REQUEST, VERDICT_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of,
 // verification results that a PLACE_MATCH promised and that did not come in two seconds (then ever
 // more rarely: it may only take its time, and a candidate of a match that the journal does not have
@@ -16,9 +16,9 @@
 // verification result that the journal does not have either is not waited for: fusion may be behind
 // by minutes. Whoever comes late asks for MAP_STATE, and the group is sent again.
 //
-// What already waits on the bus is taken before anything is solved (at most kMaxUnsettled of it): a
-// solve costs the same after one verification result as after ten, and verification results that
-// come faster than solves would make every correction late.
+// What already waits on the bus is added before anything is solved (at most kMaxWithoutUpdate of
+// it): a solve costs the same after one verification result as after ten, and verification results
+// that come faster than solves would make every correction late.
 //
 // Bounds: InOrder's for keyframes, those of due_results.h, the pose graph's own for constraints
 // that wait for keyframes.
@@ -49,7 +49,7 @@ class PoseGraphProcess : public Process {
   const PoseGraph& graph() const { return graph_; }
 
  private:
-  static constexpr int kMaxUnsettled = 100;
+  static constexpr int kMaxWithoutUpdate = 100;
 
   void Save(ByteWriter* writer);
   bool Restore(ByteReader* reader);
@@ -60,7 +60,7 @@ class PoseGraphProcess : public Process {
   void OnHave(const Have& have);
   void OnResendRequest(const ResendRequest& request);
 
-  void SettleUnlessMoreWaits();
+  void UpdateUnlessMoreWaits();
   void Publish(const PoseGraphUpdate& update);
   void PublishStatus(int64_t now_utime);
 
@@ -69,9 +69,9 @@ class PoseGraphProcess : public Process {
   JournalFollower journal_;
   StateChunks refinements_;
   DueResults results_;
-  int64_t now_utime_ = 0;    // of the newest tick
-  int64_t num_arrived_ = 0;  // keyframes, verification results
-  int num_unsettled_ = 0;    // of them: taken since the last solve
+  int64_t now_utime_ = 0;     // of the newest tick
+  int64_t num_arrived_ = 0;   // keyframes, verification results
+  int num_since_update_ = 0;  // messages added since the last update
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish

@@ -155,7 +155,7 @@ TEST(PoseGraphScale, RandomWrongMatchesNeverMergeMapsOfUnknownScale) {
   const std::vector<Constraint> wrong = BetweenMaps(MakeConstraints(world, 200, 1.0));
   ASSERT_GT(wrong.size(), 50u);
   for (const Constraint& constraint : wrong) {
-    graph.AddConstraint(constraint);
+    Add(constraint, &graph);
     EXPECT_EQ(graph.counters().groups, 2);
   }
 }

@@ -24,7 +24,7 @@ TEST(PoseGraph, ALoneMapIsWhereItsOdometrySays) {
   PoseGraph graph({});
   size_t states = 0;
   for (const Keyframe& keyframe : world.agents[0].keyframes) {
-    const PoseGraphUpdate update = graph.AddKeyframe(keyframe);
+    const PoseGraphUpdate update = Add(keyframe, &graph);
     EXPECT_TRUE(update.corrections.empty());
     states += update.states.size();
   }
@@ -140,7 +140,7 @@ TEST(PoseGraph, TheOrderOfArrivalDoesNotChangeTheShape) {
     std::shuffle(constraints.begin(), constraints.end(), Random(order));
     for (size_t a = 0; a < world.agents.size(); ++a) {
       for (const Keyframe& keyframe : world.agents[(a + order) % 3].keyframes) {
-        graph.AddKeyframe(keyframe);
+        Add(keyframe, &graph);
       }
     }
     AddConstraints(constraints, &graph);
@@ -184,10 +184,10 @@ TEST(PoseGraph, ConstraintsWaitForTheirKeyframes) {
   PoseGraph graph({});
   AddConstraints(constraints, &graph);
   AddConstraints(constraints, &graph);
-  EXPECT_EQ(graph.counters().parked, static_cast<int64_t>(constraints.size()));
+  EXPECT_EQ(graph.counters().waiting, static_cast<int64_t>(constraints.size()));
   AddKeyframes(world, &graph);
   graph.Finish();
-  EXPECT_EQ(graph.counters().parked, 0);
+  EXPECT_EQ(graph.counters().waiting, 0);
   EXPECT_EQ(graph.counters().groups, 1);
   EXPECT_EQ(graph.counters().in_force, static_cast<int64_t>(constraints.size()));
 }
@@ -198,7 +198,7 @@ TEST(PoseGraph, BridgesAGapThatNobodyFills) {
   for (const SyntheticAgent& agent : world.agents) {
     for (const Keyframe& keyframe : agent.keyframes) {
       if (keyframe.id.seq < 40 || keyframe.id.seq >= 46) {
-        graph.AddKeyframe(keyframe);
+        Add(keyframe, &graph);
       }
     }
   }
@@ -221,7 +221,7 @@ TEST(PoseGraph, ScopeOfThePaper) {
   AddKeyframes(world, &graph);
   int first_overlap = 1000;
   for (const Constraint& constraint : BetweenMaps(MakeConstraints(world, 60, 0))) {
-    graph.AddConstraint(constraint);
+    Add(constraint, &graph);
     first_overlap = std::min(first_overlap, constraint.from.seq);
   }
   const PoseGraphUpdate update = graph.Finish();

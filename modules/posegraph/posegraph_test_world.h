@@ -44,17 +44,28 @@ inline std::vector<Constraint> BetweenMaps(std::vector<Constraint> constraints) 
   return constraints;
 }
 
+// As each comes, the graph is solved and published.
+inline PoseGraphUpdate Add(const Keyframe& keyframe, PoseGraph* graph) {
+  graph->AddKeyframe(keyframe);
+  return graph->Update();
+}
+
+inline PoseGraphUpdate Add(const Constraint& constraint, PoseGraph* graph) {
+  graph->AddConstraint(constraint);
+  return graph->Update();
+}
+
 inline void AddKeyframes(const SyntheticWorld& world, PoseGraph* graph) {
   for (size_t k = 0; k < world.agents[0].keyframes.size(); ++k) {
     for (const SyntheticAgent& agent : world.agents) {
-      graph->AddKeyframe(agent.keyframes[k]);
+      Add(agent.keyframes[k], graph);
     }
   }
 }
 
 inline void AddConstraints(const std::vector<Constraint>& constraints, PoseGraph* graph) {
   for (const Constraint& constraint : constraints) {
-    graph->AddConstraint(constraint);
+    Add(constraint, graph);
   }
 }
 

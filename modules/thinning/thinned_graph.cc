@@ -56,7 +56,7 @@ void Thinning::JoinEdges(ThinnedMaps* thinned) const {
 Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   PoseGraph graph(options_.posegraph);
   for (const MapId& map : maps_) {
-    graph.NoteMap(map);  // the oldest first, also where none of its keyframes stays
+    graph.AddMap(map);  // the oldest first, also where none of its keyframes stays
   }
   for (const MapId& map : maps_) {
     for (const Keyframe& keyframe : stored_.at(map).keyframes) {
@@ -66,20 +66,20 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
       if (const auto edge = without.edges.find(keyframe.id); edge != without.edges.end()) {
         Keyframe joined = keyframe;
         joined.edge = edge->second.edge;
-        graph.Take(joined);
+        graph.AddKeyframe(joined);
       } else {
-        graph.Take(keyframe);
+        graph.AddKeyframe(keyframe);
       }
     }
   }
   for (const auto& [id, constraint] : constraints_) {
     if (!without.gone.contains(constraint.from) && !without.gone.contains(constraint.to) &&
         (constraint.kind != PlaceKind::kDerived || without.gone.empty())) {
-      graph.Take(constraint);
+      graph.AddConstraint(constraint);
     }
   }
   for (const Constraint& constraint : without.derived) {
-    graph.Take(constraint);
+    graph.AddConstraint(constraint);
   }
   graph.Finish();
   Solution solution;

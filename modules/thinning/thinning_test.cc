@@ -9,7 +9,7 @@
 #include "anchors/odometry_track.h"
 #include "anchors/placement.h"
 #include "core/testing/synthetic_world.h"
-#include "posegraph/refinement.h"
+#include "posegraph/publication/refinement.h"
 
 namespace pangea {
 namespace {
@@ -86,10 +86,10 @@ class ThinningTest : public ::testing::Test {
   std::vector<MapState> States(const ThinnedMaps& thinned) const {
     PoseGraph graph({});
     for (const Keyframe& keyframe : Staying(thinned)) {
-      graph.Take(keyframe);
+      graph.AddKeyframe(keyframe);
     }
     for (const Constraint& constraint : Constraints(thinned)) {
-      graph.Take(constraint);
+      graph.AddConstraint(constraint);
     }
     graph.Finish();
     return graph.States();

@@ -1,4 +1,4 @@
-#include "posegraph/refinement.h"
+#include "posegraph/publication/refinement.h"
 
 #include <algorithm>
 #include <cmath>

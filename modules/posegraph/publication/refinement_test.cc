@@ -1,4 +1,4 @@
-#include "posegraph/refinement.h"
+#include "posegraph/publication/refinement.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 
 #include "core/testing/synthetic_world.h"
 #include "posegraph/posegraph.h"
+#include "posegraph/posegraph_test_world.h"
 
 namespace pangea {
 namespace {
@@ -42,13 +43,13 @@ struct Server {
     world = MakeSyntheticWorld(options);
     for (size_t k = 0; k < world.agents[0].keyframes.size(); ++k) {
       for (const SyntheticAgent& agent : world.agents) {
-        graph.AddKeyframe(agent.keyframes[k]);
+        Add(agent.keyframes[k], &graph);
       }
     }
     std::mt19937_64 rng(11);
     const std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
     for (size_t i = 0; i < pairs.size(); i += 1 + pairs.size() / 40) {
-      graph.AddConstraint(MakeTrueConstraint(world, pairs[i].from, pairs[i].to, {}, rng));
+      Add(MakeTrueConstraint(world, pairs[i].from, pairs[i].to, {}, rng), &graph);
     }
     solved = graph.Finish().states.back();
   }
@@ -83,8 +84,8 @@ TEST(Refinement, IsToldInTheFrameOfTheSolution) {
   ASSERT_EQ(server.solved.maps.size(), 2u);
   const MapState truth = server.Truth();
   ASSERT_GT(Difference(server.solved, truth), 0.005);
-  server.graph.TakeRefined(truth);
-  const PoseGraphUpdate update = server.graph.Settle();
+  server.graph.AddRefinement(truth);
+  const PoseGraphUpdate update = server.graph.Update();
   ASSERT_EQ(update.states.size(), 1u);
   EXPECT_LT(Difference(update.states[0], truth), 1e-9);
   EXPECT_GT(update.states[0].revision, server.solved.revision);
@@ -109,8 +110,8 @@ TEST(Refinement, OtherKeyframesKeepTheirPlaceBehindTheRefinedOneBeforeThem) {
   Server server;
   MapState truth = server.Truth();
   std::erase_if(truth.keyframes, [](const KeyframePose& pose) { return pose.id.seq >= 30; });
-  server.graph.TakeRefined(truth);
-  const MapState told = server.graph.Settle().states.back();
+  server.graph.AddRefinement(truth);
+  const MapState told = server.graph.Update().states.back();
   for (size_t i = 0; i < told.keyframes.size(); ++i) {
     const KeyframeId& id = told.keyframes[i].id;
     if (id.seq < 30) {
@@ -130,32 +131,32 @@ TEST(Refinement, ARepeatOrAnOlderOneChangesNothing) {
   Server server;
   MapState truth = server.Truth();
   truth.revision = 100;
-  server.graph.TakeRefined(truth);
-  EXPECT_EQ(server.graph.Settle().states.size(), 1u);
-  server.graph.TakeRefined(truth);
+  server.graph.AddRefinement(truth);
+  EXPECT_EQ(server.graph.Update().states.size(), 1u);
+  server.graph.AddRefinement(truth);
   MapState older = server.solved;
   older.revision = 99;
-  server.graph.TakeRefined(older);
-  EXPECT_TRUE(server.graph.Settle().states.empty());
+  server.graph.AddRefinement(older);
+  EXPECT_TRUE(server.graph.Update().states.empty());
   EXPECT_LT(Difference(server.graph.States().back(), truth), 1e-9);
 }
 
 // What the graph decides does not depend on when a refinement comes.
 TEST(Refinement, TheSolutionStaysAsItWas) {
   Server with, without;
-  with.graph.TakeRefined(with.Truth());
+  with.graph.AddRefinement(with.Truth());
   std::mt19937_64 rng(3);
   const auto pairs = OverlappingPairs(with.world, 1.5, 25);
   const Constraint more = MakeTrueConstraint(with.world, pairs[1].from, pairs[1].to, {}, rng);
   for (Server* server : {&with, &without}) {
-    server->graph.AddConstraint(more);
+    Add(more, &server->graph);
     server->graph.Finish();
   }
   EXPECT_EQ(with.graph.counters().in_force, without.graph.counters().in_force);
   MapState forget = without.solved;
   forget.revision = 1'000'000;
   forget.keyframes.clear();
-  with.graph.TakeRefined(forget);
+  with.graph.AddRefinement(forget);
   EXPECT_LT(Difference(with.graph.States().back(), without.graph.States().back()), 1e-12);
 }
 
@@ -174,13 +175,13 @@ TEST(Refinement, OfMapsThatAreNotOneGroupIsNotUsed) {
     }
   }
   refined.group = refined.maps.front();
-  graph.TakeRefined(refined);  // of maps that nobody knows yet
+  graph.AddRefinement(refined);  // of maps that nobody knows yet
   for (const SyntheticAgent& agent : world.agents) {
     for (const Keyframe& keyframe : agent.keyframes) {
-      graph.AddKeyframe(keyframe);
+      Add(keyframe, &graph);
     }
   }
-  graph.TakeRefined(refined);
+  graph.AddRefinement(refined);
   for (const MapState& state : graph.States()) {
     for (const KeyframePose& pose : state.keyframes) {
       const auto agent = std::ranges::find(world.agents, pose.id.map, &SyntheticAgent::map);

@@ -1,0 +1,73 @@
+#pragma once
+
+// For tests of the pose graph's parts: maps whose keyframes stand in a row, one metre apart along
+// x, and loops between them.
+
+#include <vector>
+
+#include "core/byte_record.h"
+#include "posegraph/graph/graph_loops.h"
+#include "posegraph/graph/graph_maps.h"
+
+namespace pangea {
+
+inline MapId RowId(int agent) { return {agent, 1000}; }
+
+inline Keyframe InARow(const MapId& map, int seq) {
+  Keyframe keyframe;
+  keyframe.id = {map, seq};
+  keyframe.utime = 1000 * seq;
+  keyframe.T_odom_body.t = {static_cast<double>(seq), 0, 0};
+  if (seq > 0) {
+    keyframe.edge = OdometryEdge{
+        seq - 1, {Eigen::Quaterniond::Identity(), {1, 0, 0}}, 1e-4 * Matrix6d::Identity()};
+  }
+  return keyframe;
+}
+
+// The first is agent 1's.
+inline GraphMaps MakeRows(int num_maps, int num_keyframes) {
+  GraphMaps maps;
+  for (int number = 0; number < num_maps; ++number) {
+    maps.Add(RowId(number + 1));
+    for (int seq = 0; seq < num_keyframes; ++seq) {
+      maps[number].Add(InARow(RowId(number + 1), seq));
+    }
+  }
+  return maps;
+}
+
+// As it is measured where to's odom frame lies in from's at T.
+inline Constraint MakeConstraint(const KeyframeId& from, const KeyframeId& to, const Pose4& T) {
+  Constraint constraint;
+  constraint.from = from;
+  constraint.to = to;
+  constraint.kind = from.map == to.map ? PlaceKind::kIntra : PlaceKind::kInter;
+  constraint.accepted = true;
+  constraint.T_from_to = InARow(from.map, from.seq).T_odom_body.Inverse() * T.ToRigid3() *
+                         InARow(to.map, to.seq).T_odom_body;
+  constraint.covariance = 1e-4 * Matrix6d::Identity();
+  constraint.num_inliers = 60;
+  return constraint;
+}
+
+inline Loop LoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMaps& maps) {
+  return MakeLoop(MakeConstraint({maps[from.map].id, from.node}, {maps[to.map].id, to.node}, T),
+                  from, to, maps);
+}
+
+// Enough alone to merge its maps.
+inline Loop DerivedLoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMaps& maps) {
+  Loop loop = LoopBetween(from, to, T, maps);
+  loop.derived = true;
+  return loop;
+}
+
+template <typename Part>
+std::vector<uint8_t> BytesOf(const Part& part) {
+  ByteRecordWriter writer;
+  part.Save(&writer);
+  return writer.Take();
+}
+
+}  // namespace pangea

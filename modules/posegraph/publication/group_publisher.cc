@@ -1,0 +1,77 @@
+#include "posegraph/publication/group_publisher.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+// At the newest keyframe that is solved.
+Correction CorrectionOf(const GraphMap& map, const RefinedMap& told) {
+  const int newest = std::max(map.newest_solved, 0);
+  const OdometryChain::Node& node = map.chain[newest];
+  Correction correction;
+  correction.map = map.id;
+  correction.seq = node.seq;
+  correction.T_map_odom = (told.Shift(newest) * map.RigidAt(newest)).ToRigid3();
+  constexpr double kLeastVariance = 1e-12;
+  correction.covariance = kLeastVariance * Matrix6d::Identity();
+  correction.covariance.topLeftCorner<3, 3>() += map.covariance.topLeftCorner<3, 3>();
+  correction.covariance.block<3, 1>(0, 5) += map.covariance.topRightCorner<3, 1>();
+  correction.covariance.block<1, 3>(5, 0) += map.covariance.bottomLeftCorner<1, 3>();
+  correction.covariance(5, 5) += map.covariance(3, 3);
+  correction.covariance.block<2, 2>(3, 3) += node.roll_pitch_covariance;
+  return correction;
+}
+
+}  // namespace
+
+MapState GroupPublisher::StateOf(const GraphGroup& group, const GraphMaps& maps,
+                                 const GraphLoops& loops,
+                                 const std::map<int, RefinedMap>& told) const {
+  MapState state;
+  state.group = maps[group.oldest()].id;
+  state.revision = next_revision_;
+  for (const int number : group.maps) {
+    const GraphMap& map = maps[number];
+    state.maps.push_back(map.id);
+    for (size_t i = 0; i < map.chain.size(); ++i) {
+      const OdometryChain::Node& node = map.chain[i];
+      state.keyframes.push_back(
+          {{map.id, node.seq}, node.utime, told.at(number).T_map_body(static_cast<int>(i))});
+    }
+  }
+  for (const Loop* loop : loops.Among(group.maps)) {
+    ++(loop->on ? state.num_constraints : state.num_switched_off);
+  }
+  return state;
+}
+
+MapState GroupPublisher::StateOf(const GraphGroup& group, const GraphMaps& maps,
+                                 const GraphLoops& loops) const {
+  return StateOf(group, maps, loops, refinements_.Refine(group.maps, maps));
+}
+
+void GroupPublisher::Publish(GraphGroup* group, const GraphMaps& maps, const GraphLoops& loops,
+                             PoseGraphUpdate* update) {
+  group->publication.Published();
+  const std::map<int, RefinedMap> told = refinements_.Refine(group->maps, maps);
+  MapState state = StateOf(*group, maps, loops, told);
+  if (state.keyframes.empty()) {
+    return;
+  }
+  ++next_revision_;
+  for (const int number : group->maps) {
+    const GraphMap& map = maps[number];
+    if (map.newest_solved < 0 && !corrected_.contains(number)) {
+      continue;
+    }
+    corrected_.insert(number);
+    Correction& correction = update->corrections.emplace_back(CorrectionOf(map, told.at(number)));
+    correction.group = state.group;
+    correction.revision = state.revision;
+  }
+  update->states.push_back(std::move(state));
+}
+
+}  // namespace pangea

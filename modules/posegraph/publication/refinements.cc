@@ -1,0 +1,60 @@
+#include "posegraph/publication/refinements.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace pangea {
+namespace {
+
+// Lays it on the solution as a whole.
+void Lay(const Refinement& refinement, const GraphMaps& maps, std::map<int, RefinedMap>* told) {
+  std::vector<std::pair<NodeRef, Rigid3>> nodes;
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> positions;
+  for (const auto& [id, pose] : refinement.poses()) {
+    if (const std::optional<NodeRef> node = maps.Find(id)) {
+      nodes.emplace_back(*node, pose);
+      positions.emplace_back(maps[node->map].poses[node->node].p, pose.t);
+    }
+  }
+  if (nodes.empty()) {
+    return;
+  }
+  const Rigid3 T_map_refined = FitYawAndShift(positions).ToRigid3();
+  for (const auto& [node, pose] : nodes) {
+    told->at(node.map).Add(node.node, T_map_refined * pose);
+  }
+}
+
+}  // namespace
+
+bool Refinements::Add(const MapState& refined, const GraphMaps& maps) {
+  const Refinement refinement(refined);
+  const auto known = [&maps](const MapId& map) { return maps.Number(map).has_value(); };
+  const auto shares = [&](const Refinement& held) { return held.SharesMapWith(refinement); };
+  const auto as_new = [&](const Refinement& held) {
+    return shares(held) && held.revision() >= refinement.revision();
+  };
+  if (!std::ranges::all_of(refinement.maps(), known) || std::ranges::any_of(refinements_, as_new)) {
+    return false;
+  }
+  std::erase_if(refinements_, shares);
+  refinements_.push_back(refinement);
+  return true;
+}
+
+std::map<int, RefinedMap> Refinements::Refine(const std::vector<int>& group,
+                                              const GraphMaps& maps) const {
+  std::map<int, RefinedMap> told;
+  for (const int number : group) {
+    told.try_emplace(number, maps[number].chain, maps[number].poses);
+  }
+  for (const Refinement& refinement : refinements_) {
+    const auto here = [&](const MapId& map) { return told.contains(*maps.Number(map)); };
+    if (std::ranges::all_of(refinement.maps(), here)) {
+      Lay(refinement, maps, &told);
+    }
+  }
+  return told;
+}
+
+}  // namespace pangea

@@ -1,0 +1,56 @@
+#include "posegraph/publication/refinements.h"
+
+#include <gtest/gtest.h>
+
+#include "posegraph/graph/test_rows.h"
+
+namespace pangea {
+namespace {
+
+// Of whole rows, each keyframe twice as far along and the whole elsewhere.
+MapState Stretched(const std::vector<int>& agents, int64_t revision) {
+  MapState refined;
+  refined.revision = revision;
+  for (const int agent : agents) {
+    refined.maps.push_back(RowId(agent));
+    for (int seq = 0; seq < 3; ++seq) {
+      Rigid3 pose = InARow(RowId(agent), seq).T_odom_body;
+      pose.t = 2 * pose.t + Eigen::Vector3d(0, 0, 50);
+      refined.keyframes.push_back({{RowId(agent), seq}, 0, pose});
+    }
+  }
+  return refined;
+}
+
+TEST(Refinements, ANewerOneOfTheSameMapsIsUsed) {
+  const GraphMaps maps = MakeRows(2, 3);
+  Refinements refinements;
+  EXPECT_FALSE(refinements.Add(Stretched({1, 3}, 9), maps));  // nobody knows the second map
+  EXPECT_TRUE(refinements.Add(Stretched({1}, 5), maps));
+  EXPECT_FALSE(refinements.Add(Stretched({1}, 5), maps));
+  EXPECT_FALSE(refinements.Add(Stretched({1, 2}, 4), maps));
+  EXPECT_TRUE(refinements.Add(Stretched({2}, 4), maps));
+  EXPECT_TRUE(refinements.Add(Stretched({1, 2}, 6), maps));
+  EXPECT_FALSE(refinements.Add(Stretched({2}, 5), maps));
+}
+
+TEST(Refinements, AreLaidOnTheSolutionWhereTheirMapsAreOneGroup) {
+  const GraphMaps maps = MakeRows(2, 3);
+  Refinements refinements;
+  ASSERT_TRUE(refinements.Add(Stretched({2}, 4), maps));  // of one map, until the next comes
+  ASSERT_TRUE(refinements.Add(Stretched({1, 2}, 5), maps));
+  const auto together = refinements.Refine({0, 1}, maps);
+  for (const int number : {0, 1}) {
+    for (int node = 0; node < 3; ++node) {
+      // About the middle, at x = 1.
+      const Eigen::Vector3d p(2.0 * node - 1, 0, 0);
+      EXPECT_LT((together.at(number).T_map_body(node).t - p).norm(), 1e-9);
+    }
+  }
+  const auto apart = refinements.Refine({1}, maps);
+  ASSERT_EQ(apart.size(), 1u);
+  EXPECT_LT((apart.at(1).T_map_body(2).t - Eigen::Vector3d(2, 0, 0)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace pangea
