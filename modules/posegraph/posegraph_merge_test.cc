@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "posegraph/graph/test_rows.h"
 #include "posegraph/posegraph.h"
 #include "posegraph/posegraph_test_world.h"
 
@@ -214,6 +215,75 @@ TEST(PoseGraph, AMapThatCameAfterTheCheckpointJoinsItsSolution) {
   for (size_t i = 0; i < once.keyframes.size(); ++i) {
     EXPECT_EQ(later.keyframes.at(i).T_map_body.t, once.keyframes[i].T_map_body.t);
   }
+}
+
+// A group of the checkpoint that joins another one moves as a whole.
+TEST(PoseGraph, GroupsThatAreOneAfterTheCheckpointKeepTheirShapes) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(4, 100));
+  const auto is_late = [&](const MapId& map) {
+    return map == world.agents[2].map || map == world.agents[3].map;
+  };
+  PoseGraph before({});
+  for (const SyntheticAgent& agent : world.agents) {
+    for (const Keyframe& keyframe : agent.keyframes) {
+      before.AddKeyframe(keyframe);
+    }
+  }
+  const std::vector<Constraint> constraints = MakeConstraints(world, 200, 0);
+  for (const Constraint& one : constraints) {
+    if (is_late(one.from.map) == is_late(one.to.map)) {
+      before.AddConstraint(one);
+    }
+  }
+  const std::vector<uint8_t> bytes = Saved(&before);
+  ASSERT_EQ(before.counters().groups, 2);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  for (const Constraint& one : constraints) {
+    restored.AddConstraint(one);
+  }
+  const PoseGraphUpdate update = restored.Update();
+  ASSERT_EQ(update.states.size(), 1u);
+  EXPECT_EQ(update.states[0].num_switched_off, 0);
+  EXPECT_LT(JointAte(world, update.states[0]), 0.06);
+}
+
+// Three viewpoints that agree as well as odometry is believed between maps, but not as well as this
+// one's loops show it to be; until other loops show that it drifts more.
+TEST(PoseGraph, AMergeThatTheSolveDoesNotCarryIsUndoneAndTriedAgainAtTheEnd) {
+  constexpr int kNumKeyframes = 23;
+  PoseGraph graph({});
+  for (int seq = 0; seq < kNumKeyframes; ++seq) {
+    graph.AddKeyframe(InARow(RowId(1), seq));
+    graph.AddKeyframe(InARow(RowId(2), seq));
+  }
+  const auto add_within = [&](int length, double off_m, double sigma) {
+    for (const int agent : {1, 2}) {
+      for (int seq = 0; seq + length < kNumKeyframes; ++seq) {
+        Constraint within =
+            MakeConstraint({RowId(agent), seq}, {RowId(agent), seq + length}, {{0, 0, off_m}, 0});
+        within.covariance = sigma * sigma * Matrix6d::Identity();
+        graph.AddConstraint(within);
+      }
+    }
+  };
+  add_within(10, 0, 1);
+  const double off_m[3] = {0, 0.6, 1.2};
+  for (int i = 0; i < 3; ++i) {
+    graph.AddConstraint(
+        MakeConstraint({RowId(1), 10 * i}, {RowId(2), 10 * i}, {{3, 4, off_m[i]}, 0}));
+  }
+  graph.Update();
+  EXPECT_EQ(graph.counters().odometry_scale, 1);
+  EXPECT_EQ(graph.counters().groups, 2);
+  add_within(11, 0.6, 0.15);
+  add_within(12, 0.6, 0.15);
+  graph.Update();
+  EXPECT_EQ(graph.counters().groups, 2);
+  graph.Finish();
+  EXPECT_GT(graph.counters().odometry_scale, 3);
+  EXPECT_EQ(graph.counters().groups, 1);
 }
 
 }  // namespace
