@@ -18,7 +18,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr char kServerPrograms[] =
-    "place-recognition inter-map-ba fusion posegraph global-ba map-points anchors";
+    "place-recognition inter-map-ba fusion posegraph global-ba anchors";
 
 class ReplayOptions : public ::testing::Test {
  protected:
@@ -76,12 +76,12 @@ TEST_F(ReplayOptions, WhatMakesNoSenseIsRefused) {
   const Outcome unknown = Replay(kSample, "none", "--set fusion.alignment.min_inlier=20");
   EXPECT_EQ(unknown.exit_code, 1);
   EXPECT_THAT(unknown.output, HasSubstr("did you mean 'fusion.alignment.min_inliers'?"));
-  const Outcome zero = Replay(
-      kSample, "none", "--options " + Write("fusion:\n  alignment:\n    visibility_stride: 0\n"));
+  const Outcome zero =
+      Replay(kSample, "none", "--options " + Write("fusion:\n  alignment:\n    min_inliers: 0\n"));
   EXPECT_EQ(zero.exit_code, 1);
   EXPECT_THAT(zero.output,
-              HasSubstr("options.yaml:3: key 'fusion.alignment.visibility_stride' must be a whole "
-                        "number from 1 to 1000, not '0'"));
+              HasSubstr("options.yaml:3: key 'fusion.alignment.min_inliers' must be a whole "
+                        "number from 4 to 100000, not '0'"));
   EXPECT_FALSE(fs::exists(folder_ / "none"));
 }
 
@@ -98,13 +98,14 @@ TEST_F(ReplayOptions, EveryProcessPrintsWhatIsInForce) {
   const std::string file = Write("alignment: {min_inliers: 33}\n");
   EXPECT_THAT(RunCommand("pangea-fusion --options " + file + " --print-options").output,
               HasSubstr("  min_inliers: 33  # 4 to 100000: distinct landmarks\n"));
-  EXPECT_THAT(RunCommand("pangea-place-recognition --options " + Write("min_seq_gap: 7\n") +
+  EXPECT_THAT(RunCommand("pangea-place-recognition --options " + Write("max_keyframes: 7\n") +
                          " --print-options")
                   .output,
-              HasSubstr("min_seq_gap: 7"));
+              HasSubstr("max_keyframes: 7"));
   EXPECT_THAT(
-      RunCommand("pangea-vio --options " + Write("max_points: 20\n") + " --print-options").output,
-      HasSubstr("max_points: 20"));
+      RunCommand("pangea-vio --options " + Write("estimator: {window: 9}\n") + " --print-options")
+          .output,
+      HasSubstr("  window: 9  # "));
 }
 
 }  // namespace

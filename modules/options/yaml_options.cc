@@ -28,6 +28,15 @@ std::string PathHint(const std::string& path, const std::string& key, const std:
   return NearestWordHint(key.substr(0, key.find('.')), keys, above);
 }
 
+YAML::Node Load(const std::string& text, const std::string& name) {
+  try {
+    return YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: not YAML: {}", name, error.mark.line + 1, error.msg));
+  }
+}
+
 }  // namespace
 
 YamlOptions::YamlOptions() = default;
@@ -109,14 +118,38 @@ void YamlOptions::Read(const YAML::Node& node, const std::string& file, const st
 }
 
 void YamlOptions::ReadText(const std::string& text, const std::string& name) {
-  YAML::Node node;
-  try {
-    node = YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    throw std::runtime_error(
-        fmt::format("{}:{}: not YAML: {}", name, error.mark.line + 1, error.msg));
-  }
+  Read(Load(text, name), name, "");
+}
+
+std::vector<std::string> YamlOptions::ReadKnown(const std::string& text, const std::string& name) {
+  const YAML::Node node = Load(text, name);
+  std::vector<std::string> unknown;
+  TakeUnknown(node, "", &unknown);
   Read(node, name, "");
+  return unknown;
+}
+
+// Of this node, which changes, and its sections.
+void YamlOptions::TakeUnknown(YAML::Node node, const std::string& path,
+                              std::vector<std::string>* unknown) const {
+  if (!node.IsMap()) {
+    return;
+  }
+  std::vector<std::string> keys;
+  for (const auto& item : node) {
+    if (item.first.IsScalar()) {
+      keys.push_back(item.first.Scalar());
+    }
+  }
+  for (const std::string& key : keys) {
+    const YAML::Node value = node[key];
+    if (const Entry* const entry = Find(key); entry == nullptr) {
+      unknown->push_back(path + key + (value.IsScalar() ? " " + value.Scalar() : ""));
+      node.remove(key);
+    } else if (entry->section) {
+      entry->section->TakeUnknown(value, path + key + ".", unknown);
+    }
+  }
 }
 
 void YamlOptions::ReadFile(const std::string& path) { ReadText(ReadTextFile(path), path); }

@@ -143,6 +143,9 @@ class YamlOptions {
   void ReadFile(const std::string& path);
   // `name` stands for the file in messages.
   void ReadText(const std::string& text, const std::string& name);
+  // Of what another version may have written: leaves out the keys that are not known, and returns
+  // them with their values, "window.size 5".
+  std::vector<std::string> ReadKnown(const std::string& text, const std::string& name);
 
   // One value by its path, "window.num_keyframes"; the text is as in a file. Throws
   // std::runtime_error, and names the nearest path that is known.
@@ -183,6 +186,8 @@ class YamlOptions {
   void AddNumber(const std::string& key, const std::string& of, T low, T high, T* value);
   Entry& NewEntry(const std::string& key);
   void Read(const YAML::Node& node, const std::string& file, const std::string& path);
+  void TakeUnknown(YAML::Node node, const std::string& path,
+                   std::vector<std::string>* unknown) const;
   Entry* Find(const std::string& key) const;
   struct Style {
     int indent = 0;

@@ -318,6 +318,18 @@ TEST(YamlOptions, OneValueIsSetByItsPath) {
   EXPECT_EQ(outer.check.stride, 7);
 }
 
+TEST(YamlOptions, WhatAnotherVersionKnewIsLeftOutAndSaid) {
+  Outer outer;
+  YamlOptions yaml;
+  outer.Visit(yaml);
+  const std::string text = "check: {stride: 5, fate: 2, equalize: false}\nold: {a: 1}\n";
+  EXPECT_THAT(yaml.ReadKnown(text, "old.lcm"), testing::ElementsAre("check.fate 2", "old"));
+  EXPECT_EQ(outer.check.stride, 5);
+  EXPECT_FALSE(outer.check.equalize);
+  EXPECT_THROW(yaml.ReadText(text, "mine.yaml"), std::runtime_error);
+  EXPECT_THROW(yaml.ReadKnown("check: {stride: 0}", "old.lcm"), std::runtime_error);
+}
+
 TEST(YamlOptions, BindingAKeyTwiceIsAProgrammersMistake) {
   YamlOptions yaml;
   bool value = false;

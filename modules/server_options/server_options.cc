@@ -14,18 +14,21 @@
 namespace pangea {
 namespace {
 
-// If it is of a server process that computes. Throws what the text deserves; `options` stays as it
-// was then.
-void Take(const ProcessOptions& message, const std::string& log, ServerOptions* options) {
+// If it is of a server process that computes. Returns what this version does not know. Throws what
+// the text deserves; `options` stays as it was then.
+std::vector<std::string> Take(const ProcessOptions& message, const std::string& log,
+                              ServerOptions* options) {
   ServerOptions taken = *options;
   YamlOptions yaml;
   taken.Visit(yaml);
   YamlOptions* const section = yaml.FindSection(message.process);
   if (section == nullptr) {
-    return;
+    return {};
   }
-  section->ReadText(message.yaml, fmt::format("{}: {}", log, channels::Options(message.process)));
+  std::vector<std::string> unknown = section->ReadKnown(
+      message.yaml, fmt::format("{}: {}", log, channels::Options(message.process)));
   *options = taken;
+  return unknown;
 }
 
 std::map<std::string, ProcessOptions> NewestByProcess(const std::filesystem::path& log,
@@ -65,7 +68,11 @@ LoggedOptions ReadLoggedOptions(const std::vector<std::filesystem::path>& logs,
     for (const auto& [process, message] : NewestByProcess(log, readings)) {
       told.insert(process);
       try {
-        Take(message, log.string(), &logged.options);
+        if (const auto unknown = Take(message, log.string(), &logged.options); !unknown.empty()) {
+          logged.notes.push_back(fmt::format(
+              "options of {}: as in the log, but for what this version does not know: {}", process,
+              fmt::join(unknown, ", ")));
+        }
       } catch (const std::runtime_error& error) {
         logged.notes.push_back(fmt::format(
             "options of {}: defaults, as this version does not read those of the log: {}", process,

@@ -52,8 +52,8 @@ struct LoggedOptions {
 };
 
 // The newest of each process in the logs, a later log before an earlier one. What this version
-// cannot read leaves that process' defaults, and a note. What is lost of a log is noted in
-// `readings` (log_reader.h).
+// does not know is left out, and what it cannot read leaves that process' defaults; each with a
+// note. What is lost of a log is noted in `readings` (log_reader.h).
 LoggedOptions ReadLoggedOptions(const std::vector<std::filesystem::path>& logs,
                                 LogReadings* readings = nullptr);
 

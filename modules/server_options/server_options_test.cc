@@ -74,13 +74,13 @@ TEST(ServerOptions, EveryDefaultIsWithinItsBoundsAndReadsBack) {
 }
 
 TEST(ServerOptions, WhatMakesNoSenseIsRefusedByNameAndRange) {
-  EXPECT_THAT(Complaint({"fusion.alignment.visibility_stride=0"}),
-              HasSubstr("'fusion.alignment.visibility_stride' must be a whole number from 1 to "
-                        "1000, not '0'"));
+  EXPECT_THAT(Complaint({"fusion.alignment.min_inliers=0"}),
+              HasSubstr("'fusion.alignment.min_inliers' must be a whole number from 4 to 100000, "
+                        "not '0'"));
   for (const char* value :
-       {"inter_map_ba.alignment.pnp.iterations=0", "posegraph.solver.gnc_factor=1",
-        "global_ba.ba.iterations_a_piece=0", "map_points.max_landmarks=19",
-        "place_recognition.epipolar.confidence=1", "fusion.alignment.max_sigma_m=.nan"}) {
+       {"inter_map_ba.alignment.ba.iterations=0", "posegraph.solver.gnc_factor=1",
+        "global_ba.ba.max_iterations=0", "anchors.max_near=257",
+        "place_recognition.max_keyframes=0", "fusion.alignment.max_sigma_m=.nan"}) {
     EXPECT_THAT(Complaint({value}), HasSubstr("must be a ")) << value;
   }
 }
@@ -105,15 +105,15 @@ TEST(ServerOptions, ValuesGoOverTheFile) {
   EXPECT_THAT(OtherThanDefault(options), ElementsAre("fusion.alignment.min_found 11 (default 10)",
                                                      "fusion.alignment.min_inliers 30 (default 16)",
                                                      "posegraph.scope paper (default all)"));
-  std::ofstream(file) << "fusion:\n  alignment:\n    visibility_stride: 0\n";
+  std::ofstream(file) << "fusion:\n  alignment:\n    min_inliers: 0\n";
   EXPECT_THAT(Complaint({}, file),
-              AllOf(HasSubstr("server_options.yaml:3"), HasSubstr("visibility_stride")));
+              AllOf(HasSubstr("server_options.yaml:3"), HasSubstr("min_inliers")));
 }
 
 TEST(ServerOptions, TheNewestOfALogIsInForce) {
   LogWithOptions log("newest.lcm");
   log.Say("fusion", "alignment: {min_inliers: 20}");
-  log.Say("vio_1", "max_points: 10");  // no server process
+  log.Say("vio_1", "estimator: {window: 9}");  // no server process
   log.Say("fusion", "alignment: {min_inliers: 25}");
   const LoggedOptions logged = ReadLoggedOptions({log.Close()});
   EXPECT_EQ(logged.options.fusion.alignment.min_inliers, 25);
@@ -124,7 +124,7 @@ TEST(ServerOptions, TheNewestOfALogIsInForce) {
 
 TEST(ServerOptions, WhatAProcessTellsReadsBack) {
   ServerOptions options;
-  options.global_ba.min_keyframes = 44;
+  options.global_ba.local.keyframes = 44;
   options.posegraph.scope = PoseGraphOptions::Scope::kPaper;
   LogWithOptions log("told.lcm");
   for (const auto& [process, text] : TextsByProcess(options)) {
@@ -136,18 +136,27 @@ TEST(ServerOptions, WhatAProcessTellsReadsBack) {
   EXPECT_THAT(logged.notes, IsEmpty());
 }
 
+TEST(ServerOptions, WhatIsNotKnownIsLeftOutAndSaidSo) {
+  LogWithOptions log("other_version.lcm");
+  log.Say("fusion", "alignment: {min_inliers: 20, of_last_year: 1}");
+  const LoggedOptions logged = ReadLoggedOptions({log.Close()});
+  EXPECT_EQ(logged.options.fusion.alignment.min_inliers, 20);
+  ASSERT_EQ(logged.notes.size(), 2U);
+  EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("of_last_year 1")));
+}
+
 TEST(ServerOptions, WhatCannotBeReadIsDefaultAndSaidSo) {
-  LogWithOptions log("newer.lcm");
-  log.Say("fusion", "alignment: {min_inliers: 20, of_next_year: 1}");
+  LogWithOptions log("unreadable.lcm");
+  log.Say("fusion", "alignment: {min_inliers: 20, min_found: many}");
   const LoggedOptions logged = ReadLoggedOptions({log.Close()});
   EXPECT_EQ(logged.options.fusion.alignment.min_inliers, 16);
   ASSERT_EQ(logged.notes.size(), 2U);
-  EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("of_next_year")));
+  EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("min_found")));
 }
 
 TEST(ServerOptions, ALogWithoutAnyIsSaidToBeSo) {
   LogWithOptions log("none.lcm");
-  log.Say("vio_1", "max_points: 10");
+  log.Say("vio_1", "estimator: {window: 9}");
   const LoggedOptions logged = ReadLoggedOptions({log.Close()});
   ASSERT_EQ(logged.notes.size(), 1U);
   EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("the log has none")));

@@ -57,19 +57,19 @@ TEST_F(SessionFileTest, ReadsTheOptionsOfEveryProcess) {
   const SessionScript script = ReadSessionFile(
       Write(agents + ", vio: {estimator: {window: 9}}}\n"
                      "options: {fusion: {alignment: {min_inliers: 20}}, place_recognition: "
-                     "{min_seq_gap: 7}}\n"),
+                     "{max_keyframes: 7}}\n"),
       std::nullopt);
   ASSERT_TRUE(script.agents[0].vio_options);
   EXPECT_EQ(script.agents[0].vio_options->vio.estimator.window, 9);
   EXPECT_EQ(script.options.fusion.alignment.min_inliers, 20);
-  EXPECT_EQ(script.options.place_recognition.min_seq_gap, 7);
+  EXPECT_EQ(script.options.place_recognition.max_keyframes, 7);
   EXPECT_FALSE(ReadSessionFile(Write(agents + "}\n"), std::nullopt).agents[0].vio_options);
-  EXPECT_THAT(ErrorOf(agents + "}\noptions: {fusion: {alignment: {visibility_stride: 0}}}\n"),
-              HasSubstr("two.yaml:3: key 'options.fusion.alignment.visibility_stride' must be a "
-                        "whole number from 1 to 1000, not '0'"));
+  EXPECT_THAT(ErrorOf(agents + "}\noptions: {fusion: {alignment: {min_inliers: 0}}}\n"),
+              HasSubstr("two.yaml:3: key 'options.fusion.alignment.min_inliers' must be a "
+                        "whole number from 4 to 100000, not '0'"));
   EXPECT_THAT(ErrorOf(agents + "}\noptions: {fuson: {}}\n"),
               HasSubstr("did you mean 'options.fusion'?"));
-  EXPECT_THAT(ErrorOf(agents + ", keyframes: one.lcm, vio: {max_points: 10}}\n"),
+  EXPECT_THAT(ErrorOf(agents + ", keyframes: one.lcm, vio: {estimator: {window: 9}}}\n"),
               HasSubstr("leave out 'vio'"));
 }
 
