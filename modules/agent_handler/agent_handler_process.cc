@@ -35,7 +35,7 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
       key_folder_(key_folder),
       options_(options),
       node_(server_bus, "agent_handler"),
-      archive_(node_, journal_path, now_utime, options.archive),
+      archive_(node_, journal_path, now_utime, options.replicated),
       anchors_(node_, archive_) {
   node_.Watch(link_bus);
   ReadKeys();

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   app.add_option("--checkpoints", checkpoints,
                  "folder of the other processes' checkpoints; removed when the journal is damaged, "
                  "as they have what it lost");
-  app.add_flag("--replicated", options.archive.replicated,
+  app.add_flag("--replicated", options.replicated,
                "acknowledges only what pangea-bridge says to be in NATS too");
   pangea::OptionsArguments options_arguments(app);
   pangea::KeygenArguments keygen_arguments;

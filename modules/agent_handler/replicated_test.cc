@@ -12,7 +12,7 @@ namespace {
 class Replicated : public LinkWorld {
  protected:
   void SetUp() override {
-    handler_options.archive.replicated = true;
+    handler_options.replicated = true;
     LinkWorld::SetUp();
     bridge_.Listen<journal_file_t>(channels::kJournalFile, [this](const JournalFile& file) {
       replicated_ = stores_ ? file : replicated_;

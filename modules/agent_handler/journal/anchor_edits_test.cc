@@ -44,7 +44,7 @@ class AnchorEditsTest : public testing::Test {
   void Start() {
     archive.reset();
     node.emplace(bus, "agent_handler");
-    archive.emplace(*node, path, 1'700'000'000'000'000, ArchiveOptions{});
+    archive.emplace(*node, path, 1'700'000'000'000'000);
   }
   void Sync() {
     now += 1'000'000;

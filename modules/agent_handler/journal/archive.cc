@@ -20,6 +20,10 @@
 namespace pangea {
 namespace {
 
+// What arrives within this time shares one write to the disk.
+constexpr int64_t kSyncInterval_us = 20'000;
+// Retransmissions to the server's processes.
+constexpr double kResendBytesPerS = 6e6;
 constexpr double kResendBurst = 64'000;
 constexpr size_t kMaxJournalledBytes = 65'000;
 constexpr size_t kMaxProcesses = 100;
@@ -52,18 +56,16 @@ seq_gap_t ToMessage(const SeqGap& gap) {
 
 }  // namespace
 
-Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
-                 const ArchiveOptions& options)
+Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated)
     : node_(node),
-      options_(options),
       anchor_edits_(node),
-      resend_pacer_(1000 * options.resend_kb_per_s, kResendBurst),
+      resend_pacer_(kResendBytesPerS, kResendBurst),
       now_utime_(now_utime) {
   journal_ = std::make_unique<Journal>(
       journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
         return LoadEvent(channel, data, place);
       });
-  replication_.emplace(options.replicated, journal_->size());
+  replication_.emplace(replicated, journal_->size());
   const JournalMend& mend = journal_->mend();
   node_.Set("journal_bytes_torn", mend.torn_bytes);
   node_.Set("journal_bytes_damaged", mend.damaged_bytes);
@@ -224,7 +226,7 @@ void Archive::Append(const KeyframeId& id, std::vector<uint8_t> bytes) {
 }
 
 void Archive::WriteDue() {
-  if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < options_.sync_interval_us) {
+  if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < kSyncInterval_us) {
     return;
   }
   oldest_unsynced_us_ = now_us_;

@@ -30,19 +30,11 @@
 
 namespace pangea {
 
-struct ArchiveOptions {
-  // What arrives within this time shares one write to the disk.
-  int64_t sync_interval_us = 20'000;
-  double resend_kb_per_s = 6000;
-  // What other hosts do not have too is not acknowledged (replication.h).
-  bool replicated = false;
-};
-
 class Archive {
  public:
-  // Reads the journal; throws if it cannot be used. `now_utime`: wall clock.
-  Archive(Node& node, const std::string& journal_path, int64_t now_utime,
-          const ArchiveOptions& options);
+  // Reads the journal; throws if it cannot be used. `now_utime`: wall clock. `replicated`: what
+  // other hosts do not have too is not acknowledged (replication.h).
+  Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated = false);
 
   // Steady and wall clock, for all that follows.
   void set_now_us(int64_t steady_us) { now_us_ = steady_us; }
@@ -106,7 +98,6 @@ class Archive {
   void OnAnswer(const std::string& channel, Bytes data);
 
   Node& node_;
-  const ArchiveOptions options_;
   JournalIndex index_;
   AnchorEdits anchor_edits_;
   std::unique_ptr<Journal> journal_;
