@@ -4,7 +4,7 @@
 
 namespace pangea {
 
-bool AnchorUpdates::IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime) const {
+bool AnchorUpdates::IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime) {
   const int64_t since_us = now_utime - sent.utime;
   if (state.gone && sent.state.gone) {
     return since_us >= (sent.times_gone < kTimesGone ? kInterval_us : kRepeat_us);
@@ -13,7 +13,8 @@ bool AnchorUpdates::IsDue(const AnchorState& state, const Sent& sent, int64_t no
                         state.edited_by != sent.state.edited_by || state.map != sent.state.map ||
                         state.group != sent.state.group;
   const Vector6d moved = state.T_odom_anchor.Minus(sent.state.T_odom_anchor);
-  const bool has_moved = moved.head<3>().norm() > moved_m_ || moved.tail<3>().norm() > moved_rad_;
+  const bool has_moved =
+      moved.head<3>().norm() > kAnchorMoved_m || moved.tail<3>().norm() > kAnchorMoved_rad;
   return ((is_other || has_moved) && since_us >= kInterval_us) || since_us >= kRepeat_us;
 }
 

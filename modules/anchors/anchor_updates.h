@@ -16,13 +16,15 @@
 
 namespace pangea {
 
+// An anchor that moved by no more has not.
+inline constexpr double kAnchorMoved_m = 0.002;
+inline constexpr double kAnchorMoved_rad = 0.002;
+
 class AnchorUpdates {
  public:
   static constexpr int64_t kInterval_us = 500'000;
   static constexpr int64_t kRepeat_us = 10'000'000;
   static constexpr int kTimesGone = 3;
-
-  AnchorUpdates(double moved_m, double moved_rad) : moved_m_(moved_m), moved_rad_(moved_rad) {}
 
   std::vector<AnchorState> Due(const std::vector<AnchorState>& states, int64_t now_utime);
   // What the listener knows as placed.
@@ -35,10 +37,8 @@ class AnchorUpdates {
     int times_gone = 0;
   };
 
-  bool IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime) const;
+  static bool IsDue(const AnchorState& state, const Sent& sent, int64_t now_utime);
 
-  const double moved_m_;
-  const double moved_rad_;
   std::map<AnchorId, Sent> sent_;
 };
 

@@ -11,6 +11,7 @@
 namespace pangea {
 namespace {
 
+constexpr int kHolds = 8;  // keyframes that hold an anchor, at most
 constexpr size_t kMaxNotPlaced = 100;
 
 // The covariance of a transform whose left frame is rotated.
@@ -45,7 +46,7 @@ std::string Anchors::Take(const AnchorEdit& edit) {
 PlacementResult Anchors::Try(const AnchorEdit& edit) const {
   static const OdometryTrack kNoKeyframes;
   const auto track = tracks_.find(edit.map);
-  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, options_.holds);
+  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, kHolds);
 }
 
 // An anchor that cannot be put somewhere else stays where it is.

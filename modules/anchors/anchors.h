@@ -32,21 +32,14 @@ namespace pangea {
 
 struct AnchorsOptions {
   int max_anchors = 10000;
-  int holds = 8;           // keyframes that hold one
-  double near_m = 50;      // from an agent
-  int max_near = 64;       // sent to one agent
-  double moved_m = 0.002;  // sent again
-  double moved_rad = 0.002;
+  double near_m = 50;  // from an agent
+  int max_near = 64;   // sent to one agent
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("max_anchors", &max_anchors, {1, 1e6}, "", "that are not deleted");
-    archive.Add("holds", &holds, {1, 100}, "", "keyframes that hold an anchor at most");
     archive.Add("near_m", &near_m, {0.1, 1e5}, "m", "from an agent to the anchors it hears of");
     archive.Add("max_near", &max_near, {1, 256}, "", "anchors an agent hears of, the nearest");
-    archive.Add("moved_m", &moved_m, {0, 100}, "m", "by which an anchor moved that is sent again");
-    archive.Add("moved_rad", &moved_rad, {0, 3.15}, "rad",
-                "by which an anchor turned that is sent again");
   }
 };
 

@@ -29,14 +29,12 @@ const MapId kAllMaps{1, 0};
 
 AnchorsProcess::AnchorsProcess(Bus& bus, const AnchorsOptions& options,
                                std::shared_ptr<RecordStore> records)
-    : options_(options),
-      node_(bus, "anchors"),
+    : node_(bus, "anchors"),
       anchors_(options, std::move(records)),
       journal_(node_, {.in_order = true, .gives_up = true, .states = true},
                {.keyframe = [this](const Keyframe& keyframe) { anchors_.Take(keyframe); },
                 .have = [this](const Have&) { have_received_ = true; },
-                .anchor_edit = std::bind_front(&AnchorsProcess::OnEdit, this)}),
-      for_watchers_(options.moved_m, options.moved_rad) {
+                .anchor_edit = std::bind_front(&AnchorsProcess::OnEdit, this)}) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&AnchorsProcess::OnMapState, this));
   node_.Listen<correction_t>(channels::kAllCorrections,
@@ -109,8 +107,7 @@ void AnchorsProcess::PublishDue(int64_t now_utime) {
   for (const MapId& map : anchors_.AgentMaps()) {
     auto known = for_agents_.extract(map);
     AnchorUpdates& updates =
-        known ? for_agents.insert(std::move(known)).position->second
-              : for_agents.try_emplace(map, options_.moved_m, options_.moved_rad).first->second;
+        known ? for_agents.insert(std::move(known)).position->second : for_agents[map];
     for (const AnchorState& state :
          updates.Due(anchors_.ForAgent(map, updates.Told()), now_utime)) {
       node_.Publish(channels::Anchor(map.agent_id), ToMessage(state));

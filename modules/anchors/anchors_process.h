@@ -58,7 +58,6 @@ class AnchorsProcess : public Process {
   void PublishOthers(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
-  const AnchorsOptions options_;
   EditHandler on_edit_taken_;
   Node node_;
   Anchors anchors_;

@@ -35,7 +35,7 @@ class AnchorApi : public web::WebSite {
       : anchors_(anchors),
         max_anchors_(static_cast<size_t>(options.max_anchors)),
         request_(std::move(request)),
-        feed_(anchors, options.moved_m, options.moved_rad) {}
+        feed_(anchors) {}
 
   // Often: repeats, time-outs. `complete`: the anchors are all those of the journal; until then no
   // request is answered with less.

@@ -3,13 +3,15 @@
 #include <set>
 #include <utility>
 
+#include "anchors/anchor_updates.h"
+
 namespace pangea {
 
-bool AnchorFeed::IsOther(const ListedAnchor& a, const ListedAnchor& b) const {
+bool AnchorFeed::IsOther(const ListedAnchor& a, const ListedAnchor& b) {
   const Vector6d moved = a.state.T_odom_anchor.Minus(b.state.T_odom_anchor);
   return a.placed != b.placed || a.state.revision != b.state.revision ||
          a.state.edited_by != b.state.edited_by || a.state.group != b.state.group ||
-         moved.head<3>().norm() > moved_m_ || moved.tail<3>().norm() > moved_rad_;
+         moved.head<3>().norm() > kAnchorMoved_m || moved.tail<3>().norm() > kAnchorMoved_rad;
 }
 
 void AnchorFeed::Set(const AnchorId& id, std::optional<ListedAnchor> newest) {

@@ -21,9 +21,8 @@ class AnchorFeed {
  public:
   static constexpr int64_t kInterval_us = 200'000;
 
-  // An anchor that moved by less than that has not. `anchors` outlives it.
-  AnchorFeed(const Anchors& anchors, double moved_m, double moved_rad)
-      : anchors_(anchors), moved_m_(moved_m), moved_rad_(moved_rad) {}
+  // `anchors` outlives it.
+  explicit AnchorFeed(const Anchors& anchors) : anchors_(anchors) {}
 
   void SetNow(int64_t now_utime) { now_utime_ = now_utime; }
 
@@ -42,12 +41,10 @@ class AnchorFeed {
   };
 
   void Refresh();
-  bool IsOther(const ListedAnchor& a, const ListedAnchor& b) const;
+  static bool IsOther(const ListedAnchor& a, const ListedAnchor& b);
   void Set(const AnchorId& id, std::optional<ListedAnchor> newest);
 
   const Anchors& anchors_;
-  const double moved_m_;
-  const double moved_rad_;
   int64_t now_utime_ = 0;
   int64_t next_utime_ = 0;
   int64_t version_ = 0;

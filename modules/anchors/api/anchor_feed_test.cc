@@ -11,7 +11,7 @@ using nlohmann::json;
 
 class AnchorFeedTest : public testing::Test {
  protected:
-  AnchorFeedTest() : anchors_(AnchorsOptions()), feed_(anchors_, 0.002, 0.002) {
+  AnchorFeedTest() : anchors_(AnchorsOptions()), feed_(anchors_) {
     SyntheticWorldOptions options;
     options.num_keyframes = 10;
     options.num_agents = 1;
