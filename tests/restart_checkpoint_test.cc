@@ -90,6 +90,10 @@ std::unique_ptr<Process> Make(Bus& bus, const CheckpointPlace& checkpoint) {
   return std::make_unique<ProcessType>(bus, Options{}, nullptr, checkpoint);
 }
 
+std::unique_ptr<Process> MakeMapPoints(Bus& bus, const CheckpointPlace& checkpoint) {
+  return std::make_unique<MapPointsProcess>(bus, nullptr, checkpoint);
+}
+
 std::unique_ptr<Process> MakePoseGraph(Bus& bus, const CheckpointPlace& checkpoint) {
   return std::make_unique<PoseGraphProcess>(bus, PoseGraphOptions{}, 1, checkpoint);
 }
@@ -254,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Named{"fusion", Make<FusionProcess, FusionOptions>, "CONSTRAINT"},
                     Named{"inter_map_ba", Make<InterMapBaProcess, InterMapBaOptions>, "CONSTRAINT"},
                     Named{"global_ba", Make<GlobalBaProcess, GlobalBaOptions>, "REFINEMENT"},
-                    Named{"map_points", Make<MapPointsProcess, MapPointsOptions>, "LANDMARKS_1"}),
+                    Named{"map_points", MakeMapPoints, "LANDMARKS_1"}),
     [](const auto& info) { return info.param.name; });
 
 }  // namespace

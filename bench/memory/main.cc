@@ -136,10 +136,7 @@ std::map<std::string, std::function<Subject()>> Subjects() {
              std::make_shared<GlobalBa>(GlobalBaOptions{}, std::make_shared<ScratchFile>()));
        }},
       {"map_points",
-       [=] {
-         return taking(
-             std::make_shared<MapPoints>(MapPointsOptions{}, std::make_shared<ScratchFile>()));
-       }},
+       [=] { return taking(std::make_shared<MapPoints>(std::make_shared<ScratchFile>())); }},
   };
 }
 

@@ -17,7 +17,7 @@ Cores::Cores(bool recognition_alone, const GlobalBaOptions& global_ba)
   fusion_ = std::make_unique<Fusion>(FusionOptions{}, records);
   graph_ = std::make_unique<PoseGraph>(PoseGraphOptions{});
   global_ba_ = std::make_unique<GlobalBa>(global_ba, records);
-  map_points_ = std::make_unique<MapPoints>(MapPointsOptions{}, records);
+  map_points_ = std::make_unique<MapPoints>(records);
 }
 
 void Cores::Remember(const Step& step) {

@@ -4,12 +4,22 @@
 #include <cmath>
 #include <limits>
 
+#include "map_points/track_point.h"
+
 namespace pangea {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double kAhead_s = 0.5;       // how far the agent's motion is led on
+constexpr double kMaxDistance_m = 8;   // from the agent to a source
+constexpr double kMaxAngle_rad = 0.4;  // between the two lines of sight to a landmark
+constexpr double kMaxScale = 1.4;      // of the two distances to it
+constexpr int kOwnRecent = 15;         // newest keyframes of the agent's own map, no sources
+// A landmark is sent again after so many messages to the agent, or when it has moved so far.
+constexpr int kRepeatAfter = 20;
+constexpr double kMoved_m = 0.005;
 constexpr double kMinDepth = 0.3;     // m
 constexpr double kBorder_px = 20;     // the agent's motion is not known to less
 constexpr double kMinSigma = 0.002;   // m; no point is known better
@@ -42,7 +52,7 @@ std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent,
     return std::nullopt;
   }
   Rigid3 T_map_body = agent.T_map_body;
-  T_map_body.t += options_.ahead_s * agent.v_map_body;
+  T_map_body.t += kAhead_s * agent.v_map_body;
   const CameraModel& camera = view->keyframe().camera;
   return Outlook{camera, T_map_body * camera.T_body_cam, newest->first.seq};
 }
@@ -64,8 +74,8 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
     const Vector3d now = p_map - outlook.T_map_cam.t, then = p_map - T_map_cam.t;
     const double scale = now.norm() / then.norm();
     if (pixel && outlook.camera.Contains(*pixel, kBorder_px) &&
-        now.normalized().dot(then.normalized()) > std::cos(options_.max_angle_rad) &&
-        scale < options_.max_scale && scale > 1 / options_.max_scale) {
+        now.normalized().dot(then.normalized()) > std::cos(kMaxAngle_rad) && scale < kMaxScale &&
+        scale > 1 / kMaxScale) {
       source.points.emplace_back(point.corner, *pixel);
     }
   }
@@ -79,8 +89,8 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
   const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
   for (const auto& [id, T_map_body] : group.T_map_body) {
-    const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - options_.own_recent;
-    if (is_recent || (T_map_body.t - outlook.T_map_cam.t).norm() > options_.max_distance_m ||
+    const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - kOwnRecent;
+    if (is_recent || (T_map_body.t - outlook.T_map_cam.t).norm() > kMaxDistance_m ||
         !refined_.contains(id)) {
       continue;
     }
@@ -107,25 +117,21 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
 // One message as it fills.
 class MapPoints::Selection {
  public:
-  Selection(const MapPointsOptions& options, const GroupState& group, const Outlook& outlook,
-            SubmapStore* store, SentPoints* sent_points)
-      : options_(options),
-        group_(group),
-        outlook_(outlook),
-        store_(store),
-        sent_points_(sent_points) {
+  Selection(const GroupState& group, const Outlook& outlook, SubmapStore* store,
+            SentPoints* sent_points)
+      : group_(group), outlook_(outlook), store_(store), sent_points_(sent_points) {
     ++sent_points_->messages;
     std::erase_if(sent_points_->tracks, [&](const auto& track) {
-      return track.second.message + options_.repeat_after < sent_points_->messages;
+      return track.second.message + kRepeatAfter < sent_points_->messages;
     });
   }
 
   void Add(const Source& source) {
-    const int share = (options_.max_landmarks + options_.max_sources - 1) / options_.max_sources;
+    constexpr int kShare = (kMostLandmarks + kMostSources - 1) / kMostSources;
     const auto view = store_->Find(source.id);
     int taken = 0;
     for (const auto& [corner, pixel] : source.points) {
-      if (taken == share || IsFull()) {
+      if (taken == kShare || IsFull()) {
         return;
       }
       auto landmark = Landmark(*view, source, corner, pixel);
@@ -140,12 +146,8 @@ class MapPoints::Selection {
     }
   }
 
-  bool IsFull() const {
-    return static_cast<int>(message_.landmarks.size()) >= options_.max_landmarks;
-  }
-  bool HasAllSources() const {
-    return static_cast<int>(message_.sources.size()) >= options_.max_sources;
-  }
+  bool IsFull() const { return static_cast<int>(message_.landmarks.size()) >= kMostLandmarks; }
+  bool HasAllSources() const { return static_cast<int>(message_.sources.size()) >= kMostSources; }
   MapLandmarks TakeMessage() { return std::move(message_); }
 
  private:
@@ -158,10 +160,10 @@ class MapPoints::Selection {
     if (in_cell >= kPerCell || taken_.contains(track)) {
       return std::nullopt;
     }
-    const auto point = PointOfTrack(group_.T_map_body, view, corner, options_.track, store_);
+    const auto point = PointOfTrack(group_.T_map_body, view, corner, store_);
     const auto sent = sent_points_->tracks.find(track);
     if (!point || (sent != sent_points_->tracks.end() &&
-                   (sent->second.p_map - point->p_map).norm() < options_.moved_m)) {
+                   (sent->second.p_map - point->p_map).norm() < kMoved_m)) {
       return std::nullopt;
     }
     ++in_cell;
@@ -179,7 +181,6 @@ class MapPoints::Selection {
     return landmark;
   }
 
-  const MapPointsOptions& options_;
   const GroupState& group_;
   const Outlook& outlook_;
   SubmapStore* store_;
@@ -196,7 +197,7 @@ std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
     return std::nullopt;
   }
   const std::vector<Source> sources = SourcesFor(agent, *group, *outlook);
-  Selection selection(options_, *group, *outlook, &store_, &sent_points_[agent.map]);
+  Selection selection(*group, *outlook, &store_, &sent_points_[agent.map]);
   for (const Source& source : sources) {
     if (selection.IsFull() || selection.HasAllSources()) {
       break;

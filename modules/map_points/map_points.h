@@ -26,45 +26,13 @@
 #include "core/map_landmarks.h"
 #include "core/server_messages.h"
 #include "core/submap_store.h"
-#include "map_points/track_point.h"
 
 namespace pangea {
 
-// With four sources they fit 1200 bytes (landmarks_t).
+// Of one message. A source is a keyframe they come from; together they fit 1200 bytes
+// (landmarks_t).
+inline constexpr int kMostSources = 4;
 inline constexpr int kMostLandmarks = (1200 - 154) / static_cast<int>(25 + sizeof(Descriptor));
-
-struct MapPointsOptions {
-  int max_landmarks = kMostLandmarks;
-  int max_sources = 4;         // keyframes they come from
-  double ahead_s = 0.5;        // how far the agent's motion is led on
-  double max_distance_m = 8;   // from the agent to a source
-  double max_angle_rad = 0.4;  // between the two lines of sight to a landmark
-  double max_scale = 1.4;      // of the two distances to it
-  int own_recent = 15;         // newest keyframes of the agent's own map, no sources
-  // A landmark is sent again after so many messages to the agent, or when it has moved so far.
-  int repeat_after = 20;
-  double moved_m = 0.005;
-  TrackPointOptions track;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("max_landmarks", &max_landmarks, {1, kMostLandmarks}, "",
-                "in one message of at most 1200 bytes");
-    archive.Add("max_sources", &max_sources, {1, 4}, "", "keyframes they come from");
-    archive.Add("ahead_s", &ahead_s, {0, 10}, "s", "by which the agent's motion is led on");
-    archive.Add("max_distance_m", &max_distance_m, {0.1, 1000}, "m", "from the agent to a source");
-    archive.Add("max_angle_rad", &max_angle_rad, {0.01, 3.15}, "rad",
-                "between the two lines of sight to a landmark");
-    archive.Add("max_scale", &max_scale, {1, 100}, "", "ratio of the two distances to it");
-    archive.Add("own_recent", &own_recent, {0, 100000}, "",
-                "newest keyframes of the agent's own map, no sources");
-    archive.Add("repeat_after", &repeat_after, {1, 100000}, "",
-                "messages after which a landmark is sent again");
-    archive.Add("moved_m", &moved_m, {0, 100}, "m",
-                "by which a landmark has moved that is sent again");
-    archive.Section("track", &track, "a landmark from the rays of its track");
-  }
-};
 
 // What an agent says of itself (POSE_k).
 struct AgentPose {
@@ -76,9 +44,8 @@ struct AgentPose {
 class MapPoints {
  public:
   // `records`: for keyframes.
-  explicit MapPoints(const MapPointsOptions& options,
-                     std::shared_ptr<RecordStore> records = nullptr)
-      : options_(options), store_(kStore, std::move(records)) {}
+  explicit MapPoints(std::shared_ptr<RecordStore> records = nullptr)
+      : store_(kStore, std::move(records)) {}
 
   // Its record of a keyframe.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
@@ -129,7 +96,6 @@ class MapPoints {
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
 
-  MapPointsOptions options_;
   SubmapStore store_;
   GroupStates groups_;
   std::set<KeyframeId> refined_;

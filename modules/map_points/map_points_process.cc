@@ -19,12 +19,11 @@ constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
-MapPointsProcess::MapPointsProcess(Bus& bus, const MapPointsOptions& options,
-                                   const std::shared_ptr<RecordStore>& records,
+MapPointsProcess::MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>& records,
                                    const CheckpointPlace& checkpoint)
     : node_(bus, "map_points"),
       records_(std::make_shared<JournalRecords>(records, MapPoints::RecordOf)),
-      points_(options, records_),
+      points_(records_),
       journal_(node_, {},
                {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }},
                {.place = checkpoint,

@@ -24,9 +24,8 @@ class MapPointsProcess : public Process {
   static constexpr int64_t kInterval_us = 500'000;  // between two messages to one agent
 
   // `records`: for keyframes (core/submap_store.h).
-  MapPointsProcess(Bus& bus, const MapPointsOptions& options,
-                   const std::shared_ptr<RecordStore>& records = nullptr,
-                   const CheckpointPlace& checkpoint = {});
+  explicit MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>& records = nullptr,
+                            const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
 

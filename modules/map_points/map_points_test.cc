@@ -68,7 +68,7 @@ class MapPointsTest : public ::testing::Test {
   }
 
   MapPoints Filled() const {
-    MapPoints points{MapPointsOptions{}};
+    MapPoints points;
     for (const Keyframe& keyframe : keyframes_) {
       points.Take(keyframe);
     }
@@ -89,15 +89,14 @@ class MapPointsTest : public ::testing::Test {
 TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
   MapPoints points = Filled();
   points.TakeRefined(state_);
-  const MapPointsOptions options;
   const auto message = points.Choose(PoseAt(0));
   ASSERT_TRUE(message);
   EXPECT_EQ(message->map, kAgent);
   EXPECT_EQ(message->group, kOld);
   EXPECT_EQ(message->revision, 5);
   EXPECT_GT(message->landmarks.size(), 10u);
-  EXPECT_LE(message->landmarks.size(), static_cast<size_t>(options.max_landmarks));
-  EXPECT_LE(message->sources.size(), static_cast<size_t>(options.max_sources));
+  EXPECT_LE(message->landmarks.size(), static_cast<size_t>(kMostLandmarks));
+  EXPECT_LE(message->sources.size(), static_cast<size_t>(kMostSources));
   const Rigid3 T_cam_map = (PoseAt(0).T_map_body * camera_.T_body_cam).Inverse();
   for (const MapLandmark& landmark : message->landmarks) {
     const auto pixel = camera_.Project(T_cam_map * landmark.p_map);
@@ -148,7 +147,7 @@ TEST_F(MapPointsTest, OnlyAdjustedKeyframesOfTheGroupAreSources) {
 
 TEST_F(MapPointsTest, ProcessAnswersPosesAtMostTwiceASecond) {
   LocalBus bus;
-  MapPointsProcess process(bus, MapPointsOptions{});
+  MapPointsProcess process(bus);
   std::vector<landmarks_t> sent_points;
   bus.Subscribe(channels::Landmarks(kAgent.agent_id), [&](const std::string&, Bytes data) {
     ASSERT_TRUE(DecodeMessage(data, &sent_points.emplace_back()));

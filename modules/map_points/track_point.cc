@@ -12,7 +12,9 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kMinTrackDepth = 0.3;  // m
+constexpr size_t kMinRays = 3;             // of a landmark
+constexpr double kMaxRelativeSigma = 0.1;  // of the distance
+constexpr double kMinTrackDepth = 0.3;     // m
 constexpr int kIterations = 3;
 constexpr double kMaxChi2 = 3;  // a degree of freedom
 
@@ -23,7 +25,7 @@ struct Ray {
 };
 
 std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
-                         double sigma_px, SubmapStore* store) {
+                         SubmapStore* store) {
   const auto pose = poses.find(id);
   const auto view = pose == poses.end() ? nullptr : store->Find(id);
   if (view == nullptr) {
@@ -34,16 +36,16 @@ std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t la
     return std::nullopt;
   }
   return Ray{pose->second * view->keyframe().camera.T_body_cam, view->ray(corners.front()),
-             view->pixel_jacobian(corners.front()) / sigma_px};
+             view->pixel_jacobian(corners.front()) / kTrackPointSigma_px};
 }
 
 // A track is seen in one run of keyframes.
 std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
-                        double sigma_px, SubmapStore* store) {
+                        SubmapStore* store) {
   std::vector<Ray> rays;
   for (const int step : {-1, 1}) {
     for (int32_t seq = step < 0 ? id.seq : id.seq + 1;; seq += step) {
-      const auto ray = RayIn(poses, {id.map, seq}, landmark_id, sigma_px, store);
+      const auto ray = RayIn(poses, {id.map, seq}, landmark_id, store);
       if (!ray) {
         break;
       }
@@ -69,12 +71,11 @@ Vector3d MeetRays(const std::vector<Ray>& rays) {
 }  // namespace
 
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
-                                       int corner, const TrackPointOptions& options,
-                                       SubmapStore* store) {
+                                       int corner, SubmapStore* store) {
   const Keyframe& keyframe = source.keyframe();
   const std::vector<Ray> rays =
-      RaysOf(poses, keyframe.id, keyframe.corners[corner].landmark_id, options.sigma_px, store);
-  if (static_cast<int>(rays.size()) < options.min_rays) {
+      RaysOf(poses, keyframe.id, keyframe.corners[corner].landmark_id, store);
+  if (rays.size() < kMinRays) {
     return std::nullopt;
   }
   Vector3d p = MeetRays(rays);
@@ -104,8 +105,7 @@ std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView
   const double sigma = std::sqrt(point.covariance.trace());
   const double degrees_of_freedom = 2.0 * static_cast<double>(rays.size()) - 3;
   const bool fits = cost < kMaxChi2 * degrees_of_freedom;
-  return fits && sigma < options.max_relative_sigma * distance ? std::make_optional(point)
-                                                               : std::nullopt;
+  return fits && sigma < kMaxRelativeSigma * distance ? std::make_optional(point) : std::nullopt;
 }
 
 }  // namespace pangea

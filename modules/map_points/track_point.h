@@ -12,19 +12,8 @@
 
 namespace pangea {
 
-struct TrackPointOptions {
-  double sigma_px = 1.0;  // of a tracked corner, with what neighbouring poses add
-  int min_rays = 3;
-  double max_relative_sigma = 0.1;  // of the distance
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("sigma_px", &sigma_px, {0.01, 20}, "px",
-                "of a tracked corner, with what neighbouring poses add");
-    archive.Add("min_rays", &min_rays, {2, 1000}, "", "of a landmark");
-    archive.Add("max_relative_sigma", &max_relative_sigma, {0.001, 1}, "", "of the distance");
-  }
-};
+// Of a tracked corner, with what neighbouring poses add; pixels.
+inline constexpr double kTrackPointSigma_px = 1.0;
 
 struct TrackPoint {
   Eigen::Vector3d p_map = Eigen::Vector3d::Zero();
@@ -33,7 +22,6 @@ struct TrackPoint {
 
 // `corner` of `source` must be a landmark's. Nothing when the rays do not say where it is.
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
-                                       int corner, const TrackPointOptions& options,
-                                       SubmapStore* store);
+                                       int corner, SubmapStore* store);
 
 }  // namespace pangea

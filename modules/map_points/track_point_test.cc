@@ -32,13 +32,13 @@ std::optional<TrackPoint> PointSeenWith(const std::vector<Eigen::Vector2d>& offs
     poses[keyframe.id] = T_map_body;
     store.Add(keyframe);
   }
-  return PointOfTrack(poses, *store.Find({kMap, 0}), 0, {}, &store);
+  return PointOfTrack(poses, *store.Find({kMap, 0}), 0, &store);
 }
 
 // Three degrees of freedom: over many points the mean normalised error squared is three.
 TEST(TrackPoint, ErrorsAreWhatTheCovarianceSays) {
   std::mt19937_64 rng(5);
-  std::normal_distribution<double> pixel(0, TrackPointOptions{}.sigma_px);
+  std::normal_distribution<double> pixel(0, kTrackPointSigma_px);
   std::uniform_real_distribution<double> uniform(-1, 1);
   constexpr int kPoints = 400;
   double nees = 0;

@@ -18,7 +18,6 @@
 #include "global_ba/global_ba.h"
 #include "inter_map_ba/inter_map_ba.h"
 #include "log_file/log_reading.h"
-#include "map_points/map_points.h"
 #include "place_recognition/place_recognition.h"
 #include "posegraph/posegraph.h"
 
@@ -30,7 +29,6 @@ struct ServerOptions {
   FusionOptions fusion;
   PoseGraphOptions posegraph;
   GlobalBaOptions global_ba;
-  MapPointsOptions map_points;
   AnchorsOptions anchors;
 
   // A section for each process, by its name on the bus.
@@ -41,7 +39,6 @@ struct ServerOptions {
     archive.Section("fusion", &fusion, "");
     archive.Section("posegraph", &posegraph, "");
     archive.Section("global_ba", &global_ba, "");
-    archive.Section("map_points", &map_points, "");
     archive.Section("anchors", &anchors, "");
   }
 };

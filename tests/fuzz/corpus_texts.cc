@@ -8,9 +8,9 @@
 #include "link/agent_key.h"
 #include "loop_verification/drift_gate.h"
 #include "loop_verification/steps/steps.h"
-#include "map_points/map_points.h"
 #include "options/yaml_options.h"
 #include "posegraph/posegraph.h"
+#include "thinning/thinning.h"
 #include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {
@@ -45,7 +45,7 @@ void OptionFiles(const Corpus& corpus) {
       {"loop_verification", Printed<LoopVerificationOptions>()},
       {"posegraph", Printed<PoseGraphOptions>()},
       {"global_ba", Printed<GlobalBaOptions>()},
-      {"map_points", Printed<MapPointsOptions>()},
+      {"thinning", Printed<ThinningOptions>()},
       {"key", KeyText()},
   };
   for (size_t i = 0; i < seeds.size(); ++i) {

@@ -7,10 +7,10 @@
 #include "global_ba/global_ba.h"
 #include "link/agent_key.h"
 #include "loop_verification/drift_gate.h"
-#include "map_points/map_points.h"
 #include "options/yaml_options.h"
 #include "posegraph/posegraph.h"
 #include "session/session_file/session_file.h"
+#include "thinning/thinning.h"
 #include "vio/vio_file_options.h"
 
 namespace pangea::fuzz {
@@ -54,7 +54,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       fuzz::ReadOptions<LoopVerificationOptions>,
       fuzz::ReadOptions<PoseGraphOptions>,
       fuzz::ReadOptions<GlobalBaOptions>,
-      fuzz::ReadOptions<MapPointsOptions>,
+      fuzz::ReadOptions<ThinningOptions>,
       fuzz::ReadKey,
   };
   if (size > 0) {

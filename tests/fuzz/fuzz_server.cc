@@ -18,7 +18,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   FusionProcess fusion(bus, FusionOptions{});
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
   GlobalBaProcess global_ba(bus, GlobalBaOptions{});
-  MapPointsProcess map_points(bus, MapPointsOptions{});
+  MapPointsProcess map_points(bus);
   AnchorsProcess anchors(bus, AnchorsOptions{});
   int64_t now_us = 1'000'000;
   fuzz::Play({data, size}, fuzz::ServerChannels(), &bus, [&](int64_t wait_us) {

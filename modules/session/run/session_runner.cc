@@ -135,8 +135,11 @@ class Runner {
       if (name != "agent_handler") {
         std::string program = "pangea-" + name;
         std::ranges::replace(program, '_', '-');
-        kept_.Start(name, {SiblingProgram(program), "--bus", buses_.server, "--options",
-                           WriteOptionsText(name, options.at(name))});
+        std::vector<std::string> argv{SiblingProgram(program), "--bus", buses_.server};
+        if (const auto text = options.find(name); text != options.end()) {
+          argv.insert(argv.end(), {"--options", WriteOptionsText(name, text->second)});
+        }
+        kept_.Start(name, argv);
       }
       server_names_.push_back(name);
     }
