@@ -66,7 +66,7 @@ class Stages {
 
   // As place recognition has it: what odometry still connects is no place seen again.
   bool IsRecent(const Known& query, const Known& other) const {
-    return query.id.seq - other.id.seq < options_.min_seq_gap ||
+    return query.id.seq - other.id.seq < PlaceRecognition::kMinSeqGap ||
            std::any_of(query.landmarks.begin(), query.landmarks.end(),
                        [&](int32_t id) { return other.landmarks.contains(id); });
   }
@@ -115,8 +115,7 @@ class Stages {
   }
 
   const std::map<int32_t, Trajectory>& truth_;
-  PlaceRecognitionOptions options_;
-  PlaceRecognition recognition_{options_};
+  PlaceRecognition recognition_{PlaceRecognitionOptions{}};
   // Every candidate on its own: none is redundant.
   static constexpr KnownConstraintOptions kVerifyAll{.min_gain_bits = 0};
   InterMapBa intra_{InterMapBaOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};

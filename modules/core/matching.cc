@@ -9,6 +9,9 @@
 namespace pangea {
 namespace {
 
+// A corner may be described on several octaves: the second best of the ratio test has to be another
+// place of the image, at least this far from the best.
+constexpr double kOtherCorner_px = 5.0;
 constexpr double kCellPx = 32.0;
 
 [[gnu::always_inline]] inline void HammingDistances(const uint64_t* const* words,
@@ -107,7 +110,7 @@ std::vector<CornerMatch> MutualNearest(const std::vector<CornerMatch>& pairs,
     }
     const NearestCorner nearest = FindNearest(
         b, candidates, [&](int j) { return distance_of[j]; }, options.max_distance,
-        options.other_corner_px);
+        kOtherCorner_px);
     if (nearest.index >= 0 && nearest.PassesRatio(options.max_ratio)) {
       matches.push_back({a, nearest.index, nearest.distance});
     }
@@ -174,7 +177,7 @@ std::optional<CornerMatch> CornerGrid::Nearest(const Eigen::Vector2d& pixel, dou
     return HammingDistance(descriptor, (*corners_)[i].descriptor);
   };
   const NearestCorner nearest = FindNearest(*corners_, Within(pixel, radius_px), distance_of,
-                                            options.max_distance, options.other_corner_px);
+                                            options.max_distance, kOtherCorner_px);
   if (nearest.index < 0 || !nearest.PassesRatio(options.max_ratio)) {
     return std::nullopt;
   }

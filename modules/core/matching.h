@@ -17,20 +17,8 @@
 namespace pangea {
 
 struct MatchingOptions {
-  int max_distance = kAlikeHamming;
-  double max_ratio = 0.8;  // best distance / second best; 1 switches the test off
-  // A corner may be described on several octaves: the second best of the ratio test has to be
-  // another place of the image, at least this far (pixels) from the best.
-  double other_corner_px = 5.0;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("max_distance", &max_distance, {0, kDescriptorBits}, "bits",
-                "Hamming distance of a match");
-    archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
-    archive.Add("other_corner_px", &other_corner_px, {0, 1000}, "px",
-                "from the best match to one that counts as second best");
-  }
+  int max_distance = kAlikeHamming;  // bits
+  double max_ratio = 0.8;            // best distance / second best; 1 switches the test off
 };
 
 struct CornerMatch {

@@ -15,6 +15,13 @@ namespace {
 using Pairs = std::vector<std::pair<CornerRay, CornerRay>>;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
+// Gravity's own error between the two odom frames, radians.
+constexpr double kGravitySigma = 0.01;
+// Of RANSAC; the confidence that an outlier-free sample was drawn.
+constexpr int kMaxIterations = 300;
+constexpr double kConfidence = 0.999;
+// log10 of how many sets of unrelated matches would be expected to pass: at most.
+constexpr double kMaxLog10FalseAlarms = -2.0;
 constexpr int kSampleSize = 3;
 constexpr int kRefinedDof = 5;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -200,8 +207,7 @@ size_t CountInliers(const EpipolarModel& model, const Pairs& pairs, double max_r
 }
 
 // On the Sampson residuals of `inliers`.
-void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, double gravity_sigma,
-                EpipolarModel* model) {
+void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, EpipolarModel* model) {
   EpipolarStep step(model->t_b_a, 1);
   const Eigen::Matrix3d R = model->R_b_a.toRotationMatrix();
   for (const int i : inliers) {
@@ -212,20 +218,20 @@ void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, double grav
   // The gravity prior: the part of the rotation that is no yaw.
   const Eigen::Vector3d tilt = LogSo3(YawRotation(-YawOf(model->R_b_a)) * model->R_b_a);
   for (int axis = 0; axis < 2; ++axis) {
-    step.H(axis, axis) += 1.0 / (gravity_sigma * gravity_sigma);
-    step.g[axis] += tilt[axis] / (gravity_sigma * gravity_sigma);
+    step.H(axis, axis) += 1.0 / (kGravitySigma * kGravitySigma);
+    step.g[axis] += tilt[axis] / (kGravitySigma * kGravitySigma);
   }
   step.Apply(&model->R_b_a, &model->t_b_a);
 }
 
 // Local optimisation (Chum et al., DAGM 2003): from a wide inlier set to a narrow one.
-EpipolarModel Refine(const Pairs& pairs, EpipolarModel model, const EpipolarOptions& options) {
+EpipolarModel Refine(const Pairs& pairs, EpipolarModel model) {
   for (const double widen : {3.0, 2.0, 1.5, 1.0, 1.0}) {
-    const std::vector<int> inliers = Inliers(model, pairs, widen * options.max_residual);
+    const std::vector<int> inliers = Inliers(model, pairs, widen * kMaxEpipolarResidual);
     if (static_cast<int>(inliers.size()) < kRefinedDof) {
       break;
     }
-    RefineStep(pairs, inliers, options.gravity_sigma, &model);
+    RefineStep(pairs, inliers, &model);
   }
   return model;
 }
@@ -250,13 +256,13 @@ double Log10BinomialTail(int n, int k, double p) {
                 : static_cast<double>(std::log10(boost::math::ibeta<long double>(k, n - k + 1, p)));
 }
 
-int IterationsNeeded(double inlier_ratio, const EpipolarOptions& options) {
+int IterationsNeeded(double inlier_ratio) {
   const double good_sample = std::pow(inlier_ratio, kSampleSize);
   if (good_sample > 1 - 1e-9) {
     return 1;
   }
-  const double needed = std::log(1 - options.confidence) / std::log1p(-good_sample);
-  return static_cast<int>(std::min<double>(options.max_iterations, std::ceil(needed)));
+  const double needed = std::log(1 - kConfidence) / std::log1p(-good_sample);
+  return static_cast<int>(std::min<double>(kMaxIterations, std::ceil(needed)));
 }
 
 using Sample = std::array<int, kSampleSize>;
@@ -309,17 +315,17 @@ std::vector<EpipolarModel> SolveThreePairs(const Pairs& pairs, const std::array<
   return models;
 }
 
-EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed, const EpipolarOptions& options) {
+EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed) {
   EpipolarResult best;
   const int n = static_cast<int>(pairs.size());
-  if (n < std::max(options.min_inliers, kRefinedDof + 1)) {
+  if (n < std::max(kMinEpipolarInliers, kRefinedDof + 1)) {
     return best;
   }
   std::mt19937_64 rng(seed);
   // A hypothesis still carries gravity's error: counted generously, then refined.
-  const double generous = 2.0 * options.max_residual;
+  const double generous = 2.0 * kMaxEpipolarResidual;
   size_t most = 0;
-  int iterations = options.max_iterations;
+  int iterations = kMaxIterations;
   for (int i = 0; i < iterations; ++i) {
     for (const EpipolarModel& model : SolveThreePairs(pairs, DrawSample(n, rng))) {
       const size_t count = CountInliers(model, pairs, generous, most);
@@ -327,24 +333,24 @@ EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed, const EpipolarOp
         continue;
       }
       most = count;
-      const EpipolarModel refined = Refine(pairs, model, options);
-      std::vector<int> inliers = Inliers(refined, pairs, options.max_residual);
+      const EpipolarModel refined = Refine(pairs, model);
+      std::vector<int> inliers = Inliers(refined, pairs, kMaxEpipolarResidual);
       if (inliers.size() > best.inliers.size()) {
         best.model = refined;
         best.inliers = std::move(inliers);
-        iterations = IterationsNeeded(static_cast<double>(best.inliers.size()) / n, options);
+        iterations = IterationsNeeded(static_cast<double>(best.inliers.size()) / n);
       }
     }
   }
   const int count = static_cast<int>(best.inliers.size());
-  if (count < options.min_inliers) {
+  if (count < kMinEpipolarInliers) {
     return best;
   }
   // The refined model's own degrees of freedom prove nothing.
-  const double chance = ChanceOfInlier(best.model, pairs, options.max_residual);
-  best.log10_false_alarms = std::log10(static_cast<double>(options.max_iterations)) +
+  const double chance = ChanceOfInlier(best.model, pairs, kMaxEpipolarResidual);
+  best.log10_false_alarms = std::log10(static_cast<double>(kMaxIterations)) +
                             Log10BinomialTail(n - kRefinedDof, count - kRefinedDof, chance);
-  best.accepted = best.log10_false_alarms <= options.max_log10_false_alarms;
+  best.accepted = best.log10_false_alarms <= kMaxLog10FalseAlarms;
   return best;
 }
 

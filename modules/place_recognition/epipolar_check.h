@@ -22,29 +22,10 @@
 
 namespace pangea {
 
-struct EpipolarOptions {
-  double max_residual = 3.0;  // in sigmas: pixels at the image centre, on octave 0
-  // Gravity's own error between the two odom frames, radians, 1 sigma.
-  double gravity_sigma = 0.01;
-  int max_iterations = 300;
-  double confidence = 0.999;
-  int min_inliers = 10;
-  // log10 of how many sets of unrelated matches would be expected to pass: at most.
-  double max_log10_false_alarms = -2.0;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("max_residual", &max_residual, {0.1, 100}, "sigmas",
-                "of an inlier: pixels at the image centre, on octave 0");
-    archive.Add("gravity_sigma", &gravity_sigma, {0, 1}, "rad", "between the two odom frames");
-    archive.Add("max_iterations", &max_iterations, {1, 100000}, "", "of RANSAC");
-    archive.Add("confidence", &confidence, {0.5, 0.999999}, "",
-                "of RANSAC: that an outlier-free sample was drawn");
-    archive.Add("min_inliers", &min_inliers, {5, 10000}, "", "of a place that is recognised");
-    archive.Add("max_log10_false_alarms", &max_log10_false_alarms, {-300, 10}, "",
-                "log10 of the expected number of sets of unrelated matches that pass");
-  }
-};
+// Of an inlier, in sigmas: pixels at the image centre, on octave 0.
+inline constexpr double kMaxEpipolarResidual = 3.0;
+// Of a place that is recognised.
+inline constexpr int kMinEpipolarInliers = 10;
 
 // A corner's ray: unit length, in its keyframe's odom (gravity-aligned) axes; sigma in radians.
 struct CornerRay {
@@ -75,6 +56,6 @@ std::vector<EpipolarModel> SolveThreePairs(
 
 // The same pairs and the same seed give the same result.
 EpipolarResult CheckEpipolar(const std::vector<std::pair<CornerRay, CornerRay>>& pairs,
-                             uint64_t seed, const EpipolarOptions& options);
+                             uint64_t seed);
 
 }  // namespace pangea

@@ -4,18 +4,20 @@
 
 namespace pangea {
 
-std::vector<std::pair<int, int>> MatchAlongEpipolarLines(
-    std::vector<CornerMatch> pairs, const CornersAndRays& a, const CornersAndRays& b,
-    const EpipolarModel& model, double max_residual, const MatchingOptions& options) {
+std::vector<std::pair<int, int>> MatchAlongEpipolarLines(std::vector<CornerMatch> pairs,
+                                                         const CornersAndRays& a,
+                                                         const CornersAndRays& b,
+                                                         const EpipolarModel& model) {
   // A rival counts for the ratio test up to the distance at which it could no longer fail it.
-  const int rival_distance = static_cast<int>(options.max_distance / options.max_ratio);
+  const int rival_distance =
+      static_cast<int>(kGuidedMatching.max_distance / kGuidedMatching.max_ratio);
   std::erase_if(pairs, [&](const CornerMatch& pair) {
     return pair.distance > rival_distance || !(a.rays[pair.a].sigma > 0) ||
            !(b.rays[pair.b].sigma > 0) ||
-           !(model.Residual(a.rays[pair.a], b.rays[pair.b]) <= max_residual);
+           !(model.Residual(a.rays[pair.a], b.rays[pair.b]) <= kMaxEpipolarResidual);
   });
   std::vector<std::pair<int, int>> matches;
-  for (const CornerMatch& match : MutualNearest(pairs, b.corners, options)) {
+  for (const CornerMatch& match : MutualNearest(pairs, b.corners, kGuidedMatching)) {
     matches.emplace_back(match.a, match.b);
   }
   return matches;

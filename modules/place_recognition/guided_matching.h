@@ -17,11 +17,15 @@ struct CornersAndRays {
   const std::vector<CornerRay>& rays;
 };
 
-// Mutual nearest neighbours among the pairs within `max_residual` of the model (which takes a to
-// b), as (corner of a, corner of b), in the order of a. `pairs`: PairsWithin RivalDistance at
+// Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
+inline constexpr MatchingOptions kGuidedMatching{.max_distance = kAlikeHamming, .max_ratio = 0.9};
+
+// Mutual nearest neighbours among the pairs within kMaxEpipolarResidual of the model (which takes a
+// to b), as (corner of a, corner of b), in the order of a. `pairs`: PairsWithin RivalDistance at
 // least.
-std::vector<std::pair<int, int>> MatchAlongEpipolarLines(
-    std::vector<CornerMatch> pairs, const CornersAndRays& a, const CornersAndRays& b,
-    const EpipolarModel& model, double max_residual, const MatchingOptions& options);
+std::vector<std::pair<int, int>> MatchAlongEpipolarLines(std::vector<CornerMatch> pairs,
+                                                         const CornersAndRays& a,
+                                                         const CornersAndRays& b,
+                                                         const EpipolarModel& model);
 
 }  // namespace pangea

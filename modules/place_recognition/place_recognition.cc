@@ -14,6 +14,8 @@ namespace {
 
 // Runs of keyframes looked at before they are spread over the maps.
 constexpr size_t kMaxPlaces = 100;
+// A place is a run of 2 * kPlaceHalfWidth + 1 keyframes of one map.
+constexpr int kPlaceHalfWidth = 5;
 
 }  // namespace
 
@@ -39,18 +41,18 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceRepo
       own.push_back({i, scores[i]});
     }
   }
-  Search(query, own, options_.own, &match, report);
-  Search(query, others, options_.others, &match, report);
+  Search(query, own, kOwnMap, &match, report);
+  Search(query, others, kOtherMaps, &match, report);
   RememberPlaces(match);
   Store(query);
   return match;
 }
 
 void PlaceRecognition::Search(const RecognisedKeyframe& query, const std::vector<Place>& hits,
-                              const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
+                              const Limits& limits, PlaceMatch* match,
                               std::vector<PlaceReport>* report) {
-  std::vector<Place> places = Spread(Places(hits), options.places);
-  for (const Place& place : Continued(query.id, hits, options.continued_places)) {
+  std::vector<Place> places = Spread(Places(hits), limits.places);
+  for (const Place& place : Continued(query.id, hits, limits.continued_places)) {
     if (std::none_of(places.begin(), places.end(),
                      [&](const Place& chosen) { return chosen.keyframe == place.keyframe; })) {
       places.push_back(place);
@@ -67,7 +69,7 @@ void PlaceRecognition::Search(const RecognisedKeyframe& query, const std::vector
       report->push_back(seen);
     }
   }
-  Publish(std::move(verified), options.candidates, match);
+  Publish(std::move(verified), limits.candidates, match);
 }
 
 void PlaceRecognition::Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match) {
@@ -144,7 +146,7 @@ void PlaceRecognition::Store(const RecognisedKeyframe& keyframe) {
 }
 
 bool PlaceRecognition::IsRecent(const RecognisedKeyframe& query, int other) const {
-  return std::abs(query.id.seq - stored_.id(other).seq) < options_.min_seq_gap ||
+  return std::abs(query.id.seq - stored_.id(other).seq) < kMinSeqGap ||
          stored_.SharesLandmark(other, query);
 }
 
@@ -164,9 +166,8 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
     heap.pop_back();
     const KeyframeId& id = stored_.id(hit.keyframe);
     std::vector<int32_t>& seqs = taken[id.map];
-    if (std::none_of(seqs.begin(), seqs.end(), [&](int32_t seq) {
-          return std::abs(seq - id.seq) <= 2 * options_.place_half_width;
-        })) {
+    if (std::none_of(seqs.begin(), seqs.end(),
+                     [&](int32_t seq) { return std::abs(seq - id.seq) <= 2 * kPlaceHalfWidth; })) {
       seqs.push_back(id.seq);
       places.push_back(hit);
     }
@@ -215,7 +216,7 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Continued(const KeyframeI
     Place best{-1, 0};
     for (const Place& hit : hits) {
       const KeyframeId& id = stored_.id(hit.keyframe);
-      if (id.map == match.map && std::abs(id.seq - match.seq) <= options_.place_half_width &&
+      if (id.map == match.map && std::abs(id.seq - match.seq) <= kPlaceHalfWidth &&
           hit.score > best.score) {
         best = hit;
       }
@@ -243,8 +244,7 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
     return std::nullopt;
   }
   const RecognisedKeyframe& other = *stored;
-  TwoViewResult views = CheckTwoViews(query, other, options_.matching, options_.epipolar,
-                                      RivalDistance(options_.guided_matching));
+  TwoViewResult views = CheckTwoViews(query, other, RivalDistance(kGuidedMatching));
   if (!views.epipolar) {
     ++counters_.rejected_matching;
     match->rejected.push_back(
@@ -265,9 +265,9 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
   candidate.match = other.id;
   candidate.kind = Kind(query.id.map, other.id.map);
   candidate.score = place.score;
-  candidate.corner_matches = MatchAlongEpipolarLines(
-      std::move(views.pairs), {query.corners, query.rays}, {other.corners, other.rays},
-      epipolar.model, options_.epipolar.max_residual, options_.guided_matching);
+  candidate.corner_matches =
+      MatchAlongEpipolarLines(std::move(views.pairs), {query.corners, query.rays},
+                              {other.corners, other.rays}, epipolar.model);
   return candidate;
 }
 

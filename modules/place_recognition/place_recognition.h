@@ -20,58 +20,21 @@
 #include <vector>
 
 #include "core/keyframe.h"
-#include "core/matching.h"
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
-#include "place_recognition/epipolar_check.h"
 #include "place_recognition/map_groups.h"
 #include "place_recognition/stored_keyframes.h"
 
 namespace pangea {
 
 struct PlaceRecognitionOptions {
-  // Own map: a keyframe is recent while it is this near in seq or still shares a tracked landmark.
-  int min_seq_gap = 20;
-  // A place is a run of 2 * place_half_width + 1 keyframes of one map.
-  int place_half_width = 5;
-  struct Search {
-    int places = 0;            // verified: the best by retrieval
-    int continued_places = 0;  // and those next to where the previous keyframe was recognised
-    int candidates = 0;        // published at most: each costs its consumer a bundle adjustment
-
-    template <typename Archive>
-    void Visit(Archive& archive) {
-      archive.Add("places", &places, {0, 1000}, "", "verified: the best by retrieval");
-      archive.Add("continued_places", &continued_places, {0, 1000}, "",
-                  "and those next to where the previous keyframe was recognised");
-      archive.Add("candidates", &candidates, {0, 200}, "", "published at most");
-    }
-  };
-  Search own{.places = 5, .continued_places = 2, .candidates = 3};
-  Search others{.places = 8, .continued_places = 3, .candidates = 5};
   // Keyframes beyond this many are still recognised but no longer remembered (about 20 kB each).
   int max_keyframes = 100000;
-  // Wider than usual: the epipolar check copes with wrong matches, and measures their chance.
-  MatchingOptions matching{
-      .max_distance = kCandidateHamming, .max_ratio = 0.85, .other_corner_px = 5.0};
-  // Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
-  MatchingOptions guided_matching{
-      .max_distance = kAlikeHamming, .max_ratio = 0.9, .other_corner_px = 5.0};
-  EpipolarOptions epipolar;
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("min_seq_gap", &min_seq_gap, {1, 1000000}, "keyframes",
-                "of the own map that are too recent");
-    archive.Add("place_half_width", &place_half_width, {0, 1000}, "keyframes",
-                "of one place, to either side");
-    archive.Section("own", &own, "in the query's own map");
-    archive.Section("others", &others, "in other maps");
     archive.Add("max_keyframes", &max_keyframes, {1, 1000000}, "",
                 "that are remembered, about 20 kB each");
-    archive.Section("matching", &matching, "descriptors of two keyframes");
-    archive.Section("guided_matching", &guided_matching, "along the epipolar lines");
-    archive.Section("epipolar", &epipolar, "two-view check");
   }
 };
 
@@ -85,6 +48,9 @@ struct PlaceReport {
 
 class PlaceRecognition {
  public:
+  // Own map: a keyframe is recent while it is this near in seq or still shares a tracked landmark.
+  static constexpr int kMinSeqGap = 20;
+
   struct Counters {
     int64_t keyframes = 0;
     int64_t places = 0;          // looked at by descriptor matching
@@ -122,6 +88,13 @@ class PlaceRecognition {
     int keyframe = 0;  // index into stored_
     float score = 0;
   };
+  struct Limits {
+    int places;            // verified: the best by retrieval
+    int continued_places;  // and those next to where the previous keyframe was recognised
+    int candidates;        // published at most: each costs its consumer a bundle adjustment
+  };
+  static constexpr Limits kOwnMap{.places = 5, .continued_places = 2, .candidates = 3};
+  static constexpr Limits kOtherMaps{.places = 8, .continued_places = 3, .candidates = 5};
 
   void Store(const RecognisedKeyframe& keyframe);
   bool IsRecent(const RecognisedKeyframe& query, int other) const;
@@ -133,9 +106,8 @@ class PlaceRecognition {
   std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits,
                                int limit) const;
   // One of the two searches: from keyframes that share descriptors to published candidates.
-  void Search(const RecognisedKeyframe& query, const std::vector<Place>& hits,
-              const PlaceRecognitionOptions::Search& options, PlaceMatch* match,
-              std::vector<PlaceReport>* report);
+  void Search(const RecognisedKeyframe& query, const std::vector<Place>& hits, const Limits& limits,
+              PlaceMatch* match, std::vector<PlaceReport>* report);
   std::optional<PlaceCandidate> Verify(const RecognisedKeyframe& query, const Place& place,
                                        PlaceMatch* match, PlaceReport* report);
   void Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match);

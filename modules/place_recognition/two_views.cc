@@ -7,6 +7,8 @@
 namespace pangea {
 namespace {
 
+// Wider than usual: the epipolar check copes with wrong matches, and measures their chance.
+constexpr MatchingOptions kMatching{.max_distance = kCandidateHamming, .max_ratio = 0.85};
 constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
 
 std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRay>& a,
@@ -23,19 +25,18 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 }  // namespace
 
 TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
-                            const MatchingOptions& matching, const EpipolarOptions& epipolar,
                             int pairs_up_to) {
   TwoViewResult result;
   result.pairs =
-      PairsWithin(query.corners, other.corners, std::max(pairs_up_to, RivalDistance(matching)));
-  std::vector<CornerMatch> matches = MutualNearest(result.pairs, other.corners, matching);
+      PairsWithin(query.corners, other.corners, std::max(pairs_up_to, RivalDistance(kMatching)));
+  std::vector<CornerMatch> matches = MutualNearest(result.pairs, other.corners, kMatching);
   std::erase_if(matches, [&](const CornerMatch& m) {
     return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;
   });
   result.num_matches = static_cast<int>(matches.size());
-  if (result.num_matches >= epipolar.min_inliers) {
+  if (result.num_matches >= kMinEpipolarInliers) {
     result.epipolar = CheckEpipolar(RayPairs(query.rays, other.rays, matches),
-                                    StableHash(query.id, other.id, kSeedSalt), epipolar);
+                                    StableHash(query.id, other.id, kSeedSalt));
   }
   return result;
 }

@@ -22,7 +22,6 @@ struct TwoViewResult {
 
 // `pairs_up_to`: the distance of pairs that the caller wants, beyond what matching takes.
 TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
-                            const MatchingOptions& matching, const EpipolarOptions& epipolar,
                             int pairs_up_to = 0);
 
 }  // namespace pangea

@@ -51,8 +51,7 @@ ThinnedJournal Thin(const std::filesystem::path& journal, const ThinJournal& how
   UseOneThread();
   LogReadings readings;
   const ServerOptions options = ReadLoggedOptions({journal}, &readings).options;
-  Thinning thinning({how.options, options.posegraph, options.place_recognition},
-                    std::make_shared<ScratchFile>());
+  Thinning thinning({how.options, options.posegraph}, std::make_shared<ScratchFile>());
   ReadLog(
       journal, [&thinning](const LogEvent& event) { Take(event, &thinning); }, &readings);
   return ThinnedJournal(thinning.Thin(how.now_utime));

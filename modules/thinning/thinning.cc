@@ -178,10 +178,7 @@ std::set<KeyframeId> Thinning::Gone(const Solution& solution, const std::set<Map
 bool Thinning::LookAlike(int a, int b) {
   const auto view_a = a == kNotStored ? nullptr : recognised_.Find(a);
   const auto view_b = b == kNotStored ? nullptr : recognised_.Find(b);
-  return view_a != nullptr && view_b != nullptr &&
-         CheckTwoViews(*view_a, *view_b, options_.place_recognition.matching,
-                       options_.place_recognition.epipolar)
-             .accepted();
+  return view_a != nullptr && view_b != nullptr && CheckTwoViews(*view_a, *view_b).accepted();
 }
 
 }  // namespace pangea

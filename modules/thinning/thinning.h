@@ -25,7 +25,6 @@
 #include "core/keyframe.h"
 #include "core/record_store.h"
 #include "core/server_messages.h"
-#include "place_recognition/place_recognition.h"
 #include "place_recognition/stored_keyframes.h"
 #include "posegraph/posegraph.h"
 #include "thinning/node_removal.h"
@@ -65,7 +64,6 @@ class Thinning {
   struct Options {
     ThinningOptions thinning;
     PoseGraphOptions posegraph;
-    PlaceRecognitionOptions place_recognition;
   };
 
   // `records`: for the keyframes' corners.

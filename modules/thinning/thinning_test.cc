@@ -38,7 +38,7 @@ class ThinningTest : public ::testing::Test {
   }
 
   Thinning MakeThinning(const ThinningOptions& options = {}) const {
-    Thinning thinning({options, {}, {}}, nullptr);
+    Thinning thinning({options, {}}, nullptr);
     for (size_t visit = 0; visit < world_.agents.size(); ++visit) {
       for (const Keyframe& keyframe : world_.agents[visit].keyframes) {
         thinning.Take(keyframe, static_cast<int64_t>(visit) * kDay_us);
@@ -270,7 +270,7 @@ TEST_F(ThinningTest, EvidenceBetweenMapsThatAreNotFusedStays) {
 }
 
 TEST_F(ThinningTest, WithoutAnythingThereIsNothingToThin) {
-  EXPECT_TRUE(Thinning({{}, {}, {}}, nullptr).Thin(0).gone.empty());
+  EXPECT_TRUE(Thinning({{}, {}}, nullptr).Thin(0).gone.empty());
 }
 
 }  // namespace

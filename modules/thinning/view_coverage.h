@@ -25,7 +25,7 @@ struct CoverageOptions {
   double angle = 0.35;
   int alike_maps = 2;
   int maps = 4;
-  int window = 5;  // a keyframe is verified with those before it (WindowOptions)
+  int window = 5;  // a keyframe is verified with those before it (kWindowKeyframes)
 
   template <typename Archive>
   void Visit(Archive& archive) {
