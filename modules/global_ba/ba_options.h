@@ -10,15 +10,9 @@ struct BaOptions {
   // Of a map's first keyframe, about zero.
   double gyro_bias_sigma = 0.05;   // rad/s
   double accel_bias_sigma = 0.15;  // m/s^2
-  // Of T_body_cam about the odometry's last estimate.
-  double camera_position_sigma = 0.005;  // m
-  double camera_rotation_sigma = 0.005;  // rad
-  double loss_scale = 2.0;               // sigmas
-  double edge_weight = 0.5;              // w above; the IMU factor beside an edge has the rest
-  double edge_scale_sigma = 0.01;        // share by which all edges of a map may be too long
-  double max_chi2 = 9.2;                 // of an inlier: 99 % of 2 degrees of freedom
-  int iterations_a_piece = 4;
-  int max_iterations = 10;  // of each of the two rounds
+  double loss_scale = 2.0;         // sigmas
+  double max_chi2 = 9.2;           // of an inlier: 99 % of 2 degrees of freedom
+  int max_iterations = 10;         // of each of the two rounds
   double function_tolerance = 5e-4;
 
   template <typename Archive>
@@ -31,18 +25,8 @@ struct BaOptions {
                 "of a map's first keyframe, about zero");
     archive.Add("accel_bias_sigma", &accel_bias_sigma, {1e-6, 100}, "m/s^2",
                 "of a map's first keyframe, about zero");
-    archive.Add("camera_position_sigma", &camera_position_sigma, {1e-6, 1}, "m",
-                "of the extrinsics about the odometry's last estimate");
-    archive.Add("camera_rotation_sigma", &camera_rotation_sigma, {1e-6, 1}, "rad",
-                "of the extrinsics about the odometry's last estimate");
-    archive.Add("edge_weight", &edge_weight, {0, 1}, "",
-                "of an odometry edge; the IMU factor beside it has the rest");
-    archive.Add("edge_scale_sigma", &edge_scale_sigma, {1e-6, 1}, "",
-                "share by which all edges of a map may be too long");
     archive.Add("loss_scale", &loss_scale, {0.1, 100}, "sigmas", "of the robust loss");
     archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "", "of an inlier, 2 degrees of freedom");
-    archive.Add("iterations_a_piece", &iterations_a_piece, {1, 1000}, "",
-                "before messages are handled again");
     archive.Add("max_iterations", &max_iterations, {1, 10000}, "", "of each of the two rounds");
     archive.Add("function_tolerance", &function_tolerance, {0, 1}, "",
                 "relative decrease of the cost at which a round ends");

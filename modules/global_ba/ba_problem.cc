@@ -7,6 +7,7 @@ namespace pangea {
 namespace {
 
 constexpr int kMinObservations = 2;
+constexpr int kIterationsAPiece = 4;
 
 }  // namespace
 
@@ -49,7 +50,7 @@ bool BaProblem::Advance() {
     return false;
   }
   auto outcome = BaSolver::Outcome::kGoesOn;
-  for (int i = 0; i < options_.iterations_a_piece && outcome == BaSolver::Outcome::kGoesOn; ++i) {
+  for (int i = 0; i < kIterationsAPiece && outcome == BaSolver::Outcome::kGoesOn; ++i) {
     outcome = iterations_++ < options_.max_iterations ? solver_->Iterate()
                                                       : BaSolver::Outcome::kConverged;
   }

@@ -33,6 +33,7 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
   return corners;
 }
 
+constexpr size_t kMinKeyframes = 10;  // of a group that is adjusted
 // A whole adjustment that moved keyframes by more than this (root mean square) is made once more
 // from where it ended: which landmarks it has rests on the poses that it begins with, and these are
 // others for who has adjusted the group before.
@@ -182,8 +183,7 @@ GlobalBa::StatePointer GlobalBa::NextDue() const {
     const auto is_current = [&, &state = state](const MapId& m) { return states_.at(m) == state; };
     const auto known = refined_.find(state->group);
     if (map == state->group && state->num_constraints > 0 &&
-        static_cast<int>(state->keyframes.size()) >= options_.min_keyframes &&
-        std::ranges::all_of(state->maps, is_current) &&
+        state->keyframes.size() >= kMinKeyframes && std::ranges::all_of(state->maps, is_current) &&
         (known == refined_.end() || known->second.whole_is_due ||
          known->second.basis != BasisOf(*state))) {
       return state;
@@ -264,8 +264,7 @@ std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePos
       AddPlace(pair, &places);
     }
   }
-  return std::make_unique<BaProblem>(MakeGroupWorld(poses, places, options_.world, &store_),
-                                     options_.ba);
+  return std::make_unique<BaProblem>(MakeGroupWorld(poses, places, &store_), options_.ba);
 }
 
 std::unique_ptr<BaProblem> GlobalBa::Local(const StatePoses& poses) {
@@ -282,8 +281,8 @@ std::unique_ptr<BaProblem> GlobalBa::Local(const StatePoses& poses) {
       }
     }
   }
-  return std::make_unique<BaProblem>(
-      MakeLocalWorld(poses, part, adjusted, places, options_.world, &store_), options_.ba);
+  return std::make_unique<BaProblem>(MakeLocalWorld(poses, part, adjusted, places, &store_),
+                                     options_.ba);
 }
 
 void GlobalBa::AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places) {

@@ -36,16 +36,11 @@
 namespace pangea {
 
 struct GlobalBaOptions {
-  GroupWorldOptions world;
   BaOptions ba;
   LocalOptions local;
-  int min_keyframes = 10;  // of a group
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("min_keyframes", &min_keyframes, {2, 1000000}, "", "of a group that is adjusted");
-    archive.Section("landmarks", &world.landmarks, "tracks and matches joined to landmarks");
-    archive.Section("redundancy", &world.redundancy, "keyframes that are left out");
     archive.Section("local", &local, "adjustments of a part of a large group");
     archive.Section("ba", &ba, "bundle adjustment");
   }

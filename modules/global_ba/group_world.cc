@@ -8,6 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "global_ba/landmarks.h"
+#include "global_ba/redundancy.h"
+
 namespace pangea {
 namespace {
 
@@ -86,7 +89,7 @@ class Maker {
     HoldCameras(adjusted, state, part);
   }
 
-  BaWorld Finish(const std::vector<MatchedPlaces>& places, const GroupWorldOptions& options) {
+  BaWorld Finish(const std::vector<MatchedPlaces>& places) {
     SetUnknownScales(scale_sigmas_, &world_);
     std::vector<MatchedKeyframes> matches;
     for (const MatchedPlaces& place : places) {
@@ -97,8 +100,8 @@ class Maker {
         NeedEnds(query->second, match->second);
       }
     }
-    AddLandmarks(matches, options.landmarks, store_, &world_);
-    return WithoutRedundant(world_, cull_, options.redundancy);
+    AddLandmarks(matches, store_, &world_);
+    return WithoutRedundant(world_, cull_);
   }
 
  private:
@@ -142,17 +145,17 @@ void DropWhatIsHeld(BaWorld* world) {
 }  // namespace
 
 BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
-                       const GroupWorldOptions& options, SubmapStore* store) {
+                       SubmapStore* store) {
   Maker maker(store);
   for (const auto& [id, T_map_body] : state) {
     maker.Add(id, T_map_body);
   }
-  return maker.Finish(places, options);
+  return maker.Finish(places);
 }
 
 BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
                        const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
-                       const GroupWorldOptions& options, SubmapStore* store) {
+                       SubmapStore* store) {
   Maker maker(store);
   std::set<KeyframeId> all = part.held;
   all.insert(part.moving.begin(), part.moving.end());
@@ -160,7 +163,7 @@ BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
     maker.Add(id, state.at(id));
   }
   maker.StartFrom(adjusted, state, part);
-  BaWorld world = maker.Finish(places, options);
+  BaWorld world = maker.Finish(places);
   DropWhatIsHeld(&world);
   return world;
 }

@@ -9,9 +9,7 @@
 #include "core/server_messages.h"
 #include "core/submap_store.h"
 #include "global_ba/adjusted_group.h"
-#include "global_ba/landmarks.h"
 #include "global_ba/local_part.h"
-#include "global_ba/redundancy.h"
 
 namespace pangea {
 
@@ -22,19 +20,14 @@ struct MatchedPlaces {
   std::vector<std::pair<int, int>> corners;  // (query's, match's)
 };
 
-struct GroupWorldOptions {
-  LandmarkOptions landmarks;
-  RedundancyOptions redundancy;
-};
-
 // Keyframes of the state that the store does not have, and redundant ones, are left out.
 BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
-                       const GroupWorldOptions& options, SubmapStore* store);
+                       SubmapStore* store);
 
 // The part alone. A map's camera is held if most of its keyframes stay where they are: they know
 // more of it.
 BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
                        const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
-                       const GroupWorldOptions& options, SubmapStore* store);
+                       SubmapStore* store);
 
 }  // namespace pangea

@@ -12,6 +12,8 @@
 namespace pangea {
 namespace {
 
+constexpr double kMinParallax = 0.02;  // radians, between two rays of the track
+
 using TrackId = std::pair<MapId, int32_t>;
 
 struct Track {
@@ -21,8 +23,7 @@ struct Track {
 
 class Builder {
  public:
-  Builder(const LandmarkOptions& options, SubmapStore* store, BaWorld* world)
-      : options_(options), store_(store), world_(world) {
+  Builder(SubmapStore* store, BaWorld* world) : store_(store), world_(world) {
     for (const BaKeyframe& keyframe : world->keyframes) {
       T_map_cam_.push_back(keyframe.imu.T_odom_body * world->cameras[keyframe.camera].T_body_cam);
     }
@@ -39,8 +40,7 @@ class Builder {
       for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
         const int32_t id = keyframe.corners[corner].landmark_id;
         if (id != kNoLandmark && id != last && seen.view->has_ray(corner)) {
-          tracks_[{keyframe.id.map, id}].own.push_back(
-              Observe(seen, corner, options_.track_sigma_px));
+          tracks_[{keyframe.id.map, id}].own.push_back(Observe(seen, corner, kTrackSigma_px));
         }
         last = id;
       }
@@ -115,7 +115,7 @@ class Builder {
     // A corner that several keyframes of one track are matched with is one measurement of it.
     if (track.second != kNoLandmark && known != tracks_.end() &&
         matched_.insert({track, seen.keyframe, corner}).second) {
-      const double sigma = CornerSigma(seen.CornerAt(corner), options_.match_sigma_px);
+      const double sigma = CornerSigma(seen.CornerAt(corner), kMatchSigma_px);
       known->second.matched.push_back(Observe(seen, corner, sigma / share));
     }
   }
@@ -138,7 +138,7 @@ class Builder {
       }
       least_cosine = std::min(least_cosine, first.dot(direction));
     }
-    if (least_cosine > std::cos(options_.min_parallax)) {
+    if (least_cosine > std::cos(kMinParallax)) {
       return std::nullopt;
     }
     const Eigen::Vector3d point = A.ldlt().solve(b);
@@ -151,10 +151,9 @@ class Builder {
     constexpr double kMinDepth_m = 0.1;
     const Eigen::Vector3d p_cam = T_map_cam_[seen.keyframe].Inverse() * point;
     return p_cam.z() > kMinDepth_m &&
-           (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < options_.max_start_sigmas;
+           (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < kMaxStartSigmas;
   }
 
-  const LandmarkOptions& options_;
   SubmapStore* store_;
   BaWorld* world_;
   std::vector<Rigid3> T_map_cam_;
@@ -165,9 +164,9 @@ class Builder {
 
 }  // namespace
 
-void AddLandmarks(const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
-                  SubmapStore* store, BaWorld* world) {
-  Builder builder(options, store, world);
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, SubmapStore* store,
+                  BaWorld* world) {
+  Builder builder(store, world);
   builder.AddTracks();
   for (const MatchedKeyframes& match : matches) {
     builder.AddMatches(match);

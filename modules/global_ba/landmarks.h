@@ -20,22 +20,11 @@
 
 namespace pangea {
 
-struct LandmarkOptions {
-  double track_sigma_px = 0.5;
-  double match_sigma_px = 1.5;   // at octave 0; grows by 1.2 with each octave
-  double min_parallax = 0.02;    // radians between two rays of the track
-  double max_start_sigmas = 10;  // of any ray from where it is at first
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("track_sigma_px", &track_sigma_px, {0.01, 20}, "px", "of a tracked corner");
-    archive.Add("match_sigma_px", &match_sigma_px, {0.01, 20}, "px",
-                "of a matched corner on octave 0");
-    archive.Add("min_parallax", &min_parallax, {0, 3.15}, "rad", "between two rays of the track");
-    archive.Add("max_start_sigmas", &max_start_sigmas, {0.1, 1000}, "",
-                "of any ray from where the landmark is at first");
-  }
-};
+// Of a tracked corner, and of a matched one at octave 0 (it grows by 1.2 with each octave).
+inline constexpr double kTrackSigma_px = 0.5;
+inline constexpr double kMatchSigma_px = 1.5;
+// Of any ray from where its landmark is at first.
+inline constexpr double kMaxStartSigmas = 10;
 
 // Corners of two keyframes of the world that show the same.
 struct MatchedKeyframes {
@@ -45,7 +34,6 @@ struct MatchedKeyframes {
 
 // Adds landmarks and observations to a world that has its keyframes, which `store` has too: one is
 // looked at after the other, not all are held at once.
-void AddLandmarks(const std::vector<MatchedKeyframes>& matches, const LandmarkOptions& options,
-                  SubmapStore* store, BaWorld* world);
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, SubmapStore* store, BaWorld* world);
 
 }  // namespace pangea

@@ -39,7 +39,7 @@ struct Group {
     for (const Keyframe& keyframe : messages.keyframes) {
       store.Add(keyframe);
     }
-    return MakeGroupWorld(PosesOf(messages.state), places, GroupWorldOptions{}, &store);
+    return MakeGroupWorld(PosesOf(messages.state), places, &store);
   }
 
   BaTestWorld truth;
@@ -109,7 +109,6 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
     }
   }
   const BaWorld world = group.World();
-  const LandmarkOptions options;
   int matched = 0;
   double track = 0;
   for (const BaObservation& seen : world.observations) {
@@ -118,7 +117,7 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
     matched += own ? 0 : 1;
   }
   ASSERT_GT(matched, 0);
-  const double ratio = options.track_sigma_px / (options.match_sigma_px * 1.44);
+  const double ratio = kTrackSigma_px / (kMatchSigma_px * 1.44);
   for (const BaObservation& seen : world.observations) {
     if (seen.keyframe >= kKeyframes) {
       EXPECT_NEAR(seen.sqrt_info.norm() / (track * ratio), 1,
@@ -140,8 +139,7 @@ TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
       own[{seen.keyframe, seen.ray.x()}] = seen.sqrt_info.norm();
     }
   }
-  const LandmarkOptions options;
-  const double ratio = std::sqrt(0.5) * options.track_sigma_px / options.match_sigma_px;
+  const double ratio = std::sqrt(0.5) * kTrackSigma_px / kMatchSigma_px;
   for (const BaObservation& seen : world.observations) {
     const auto same_corner = own.find({seen.keyframe, seen.ray.x()});
     if (owner.at(seen.landmark) != seen.keyframe / kKeyframes && same_corner != own.end()) {
@@ -211,8 +209,7 @@ TEST(Landmarks, AWrongMatchIsLeftOut) {
     const Eigen::Vector3d p_cam =
         (keyframe.imu.T_odom_body * world.cameras[keyframe.camera].T_body_cam).Inverse() *
         world.landmarks[seen.landmark];
-    EXPECT_LT((seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm(),
-              LandmarkOptions{}.max_start_sigmas);
+    EXPECT_LT((seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm(), kMaxStartSigmas);
   }
 }
 

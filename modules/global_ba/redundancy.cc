@@ -5,11 +5,14 @@
 namespace pangea {
 namespace {
 
+// A keyframe is redundant if at least this share of its landmarks is seen by so many others.
+constexpr double kRedundantShare = 0.9;
+constexpr int kObservers = 3;
+
 class Culling {
  public:
-  Culling(const BaWorld& world, const RedundancyOptions& options)
-      : options_(options),
-        world_(world),
+  explicit Culling(const BaWorld& world)
+      : world_(world),
         next_(world.keyframes.size(), -1),
         seen_(world.keyframes.size()),
         observers_(world.landmarks.size(), 0),
@@ -69,13 +72,13 @@ class Culling {
     }
     const double gap_s =
         keyframe.preintegration->duration_s + world_.keyframes[next_[i]].preintegration->duration_s;
-    return gap_s <= options_.max_gap_s;
+    return gap_s <= kMaxGap_s;
   }
 
   bool IsSeenByOthers(int i) const {
     const auto enough = std::ranges::count_if(
-        seen_[i], [this](int landmark) { return observers_[landmark] > options_.observers; });
-    return static_cast<double>(enough) >= options_.share * static_cast<double>(seen_[i].size());
+        seen_[i], [this](int landmark) { return observers_[landmark] > kObservers; });
+    return static_cast<double>(enough) >= kRedundantShare * static_cast<double>(seen_[i].size());
   }
 
   void Remove(int i) {
@@ -110,7 +113,6 @@ class Culling {
     }
   }
 
-  const RedundancyOptions& options_;
   BaWorld world_;
   std::vector<int> next_;               // of each keyframe, in its map; -1 for none
   std::vector<std::vector<int>> seen_;  // landmarks of each keyframe
@@ -120,9 +122,8 @@ class Culling {
 
 }  // namespace
 
-BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Cull>& cull,
-                         const RedundancyOptions& options) {
-  Culling culling(world, options);
+BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Cull>& cull) {
+  Culling culling(world);
   culling.Run(cull);
   return culling.Result();
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "global_ba/ba_factors.h"
+#include "global_ba/solver/block_factors.h"
 
 namespace pangea {
 namespace {
@@ -83,14 +84,14 @@ class Reference {
       return;
     }
     problem_.AddResidualBlock(new PreintegrationFactor(*keyframe.preintegration, options_.imu),
-                              Weight(keyframe.edge ? 1 - options_.edge_weight : 1), Pose(previous),
+                              Weight(keyframe.edge ? 1 - kEdgeWeight : 1), Pose(previous),
                               Motion(previous), Pose(i), Motion(i));
     if (const auto& edge = keyframe.edge) {
       const auto metres = keyframe.unknown_scale > 0 ? EdgeResidual::Metres::kOdometry
                                                      : EdgeResidual::Metres::kWorld;
       problem_.AddResidualBlock(
           new EdgeFactor(EdgeResidual(edge->T_previous_this, edge->covariance, metres)),
-          Weight(options_.edge_weight), Pose(previous), Pose(i), &scales_[keyframe.camera]);
+          Weight(kEdgeWeight), Pose(previous), Pose(i), &scales_[keyframe.camera]);
     }
   }
 
@@ -100,11 +101,9 @@ class Reference {
       PoseToBlock(camera.T_body_cam, Camera(i));
       problem_.AddParameterBlock(Camera(i), 7, new RigidManifold);
       problem_.AddResidualBlock(
-          new CameraPriorFactor(camera.T_body_cam, options_.camera_position_sigma,
-                                options_.camera_rotation_sigma),
+          new CameraPriorFactor(camera.T_body_cam, kCameraPositionSigma_m, kCameraRotationSigma),
           nullptr, Camera(i));
-      problem_.AddResidualBlock(new ScalePriorFactor(options_.edge_scale_sigma), nullptr,
-                                &scales_[i]);
+      problem_.AddResidualBlock(new ScalePriorFactor(kEdgeScaleSigma), nullptr, &scales_[i]);
       if (camera.held) {
         scales_[i] = camera.edge_log_scale;
         problem_.SetParameterBlockConstant(Camera(i));

@@ -27,8 +27,8 @@ Parameters ParametersOf(const std::vector<int>& indices, const BaBlocks& blocks)
 
 BlockFactors::BlockFactors(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks) {
   AddInertial(world, options, blocks);
-  AddEdges(world, options, blocks);
-  AddPriors(world, options, blocks);
+  AddEdges(world, blocks);
+  AddPriors(world, blocks);
 }
 
 void BlockFactors::Add(const ceres::CostFunction* cost, double weight, std::vector<int> blocks) {
@@ -43,7 +43,7 @@ void BlockFactors::AddInertial(const BaWorld& world, const BaOptions& options,
     const int previous = keyframe.previous;
     if (previous >= 0 && keyframe.preintegration) {
       Add(new PreintegrationFactor(*keyframe.preintegration, options.imu),
-          keyframe.edge ? 1 - options.edge_weight : 1,
+          keyframe.edge ? 1 - kEdgeWeight : 1,
           {blocks.Pose(previous), blocks.Motion(previous), blocks.Pose(i), blocks.Motion(i)});
     } else {
       Add(new BiasPriorFactor(options.gyro_bias_sigma, options.accel_bias_sigma), 1,
@@ -52,31 +52,28 @@ void BlockFactors::AddInertial(const BaWorld& world, const BaOptions& options,
   }
 }
 
-void BlockFactors::AddEdges(const BaWorld& world, const BaOptions& options,
-                            const BaBlocks& blocks) {
+void BlockFactors::AddEdges(const BaWorld& world, const BaBlocks& blocks) {
   for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
     const BaKeyframe& keyframe = world.keyframes[i];
     if (keyframe.previous >= 0 && keyframe.edge) {
       const auto metres = keyframe.unknown_scale > 0 ? EdgeResidual::Metres::kOdometry
                                                      : EdgeResidual::Metres::kWorld;
       const BaEdge& edge = *keyframe.edge;
-      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, metres)),
-          options.edge_weight,
+      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, metres)), kEdgeWeight,
           {blocks.Pose(keyframe.previous), blocks.Pose(i), blocks.EdgeLogScale(keyframe.camera)});
     }
   }
 }
 
-void BlockFactors::AddPriors(const BaWorld& world, const BaOptions& options,
-                             const BaBlocks& blocks) {
-  std::vector<double> sigmas(world.cameras.size(), options.edge_scale_sigma);
+void BlockFactors::AddPriors(const BaWorld& world, const BaBlocks& blocks) {
+  std::vector<double> sigmas(world.cameras.size(), kEdgeScaleSigma);
   for (const BaKeyframe& keyframe : world.keyframes) {
     sigmas[keyframe.camera] = std::max(sigmas[keyframe.camera], keyframe.unknown_scale);
   }
   for (int i = 0; i < static_cast<int>(world.cameras.size()); ++i) {
     Add(new ScalePriorFactor(sigmas[i]), 1, {blocks.EdgeLogScale(i)});
-    Add(new CameraPriorFactor(world.cameras[i].T_body_cam, options.camera_position_sigma,
-                              options.camera_rotation_sigma),
+    Add(new CameraPriorFactor(world.cameras[i].T_body_cam, kCameraPositionSigma_m,
+                              kCameraRotationSigma),
         1, {blocks.Camera(i)});
   }
 }

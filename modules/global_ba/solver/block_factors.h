@@ -15,6 +15,14 @@
 
 namespace pangea {
 
+// Of T_body_cam about the odometry's last estimate.
+inline constexpr double kCameraPositionSigma_m = 0.005;
+inline constexpr double kCameraRotationSigma = 0.005;  // radians
+// Covariance intersection's w (ba_problem.h); the IMU factor beside an edge has the rest.
+inline constexpr double kEdgeWeight = 0.5;
+// Share by which all edges of a map may be too long.
+inline constexpr double kEdgeScaleSigma = 0.01;
+
 class BlockFactors {
  public:
   BlockFactors(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks);
@@ -36,8 +44,8 @@ class BlockFactors {
 
   void Add(const ceres::CostFunction* cost, double weight, std::vector<int> blocks);
   void AddInertial(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks);
-  void AddEdges(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks);
-  void AddPriors(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks);
+  void AddEdges(const BaWorld& world, const BaBlocks& blocks);
+  void AddPriors(const BaWorld& world, const BaBlocks& blocks);
   static void AddFactor(const Factor& factor, const BaBlocks& blocks, BlockEquations* equations);
 
   std::vector<Factor> factors_;
