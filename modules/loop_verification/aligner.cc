@@ -8,6 +8,9 @@
 namespace pangea {
 namespace {
 
+// Radians, of each odometry, while guessing.
+constexpr double kGuessTiltFloor = 0.006;
+
 void FillIn(const Verification& verification, Constraint* constraint) {
   if (const auto& ba = verification.ba) {
     constraint->T_from_to = ba->T_Km_Kc;
@@ -38,8 +41,7 @@ void ShowMatches(const Verification& v, LoopVerificationReport* report) {
 Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
                           const LoopVerificationGate& gate, LoopVerificationReport* report) {
   Verification verification(options_, keyframes, candidate, gate, &windows_);
-  verification.guess_tilt_sigma =
-      std::sqrt(TiltVariance(verification.windows, options_.guess_tilt_floor));
+  verification.guess_tilt_sigma = std::sqrt(TiltVariance(verification.windows, kGuessTiltFloor));
   Constraint constraint;
   constraint.from = candidate.match;
   constraint.to = keyframes.c.back()->keyframe().id;

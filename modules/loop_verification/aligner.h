@@ -16,15 +16,12 @@ namespace pangea {
 
 class Aligner {
  public:
+  // Keyframes a verification result depends on: that many up to each of the two.
+  static constexpr int kNumKeyframes = std::max(kMaxWindowKeyframes, kVisibilityKeyframes);
+
   explicit Aligner(LoopVerificationOptions options) : options_(options) {}
 
-  // Keyframes a verification result depends on: that many up to each of the two.
-  int num_keyframes() const {
-    return std::max({options_.window.num_keyframes, options_.window.max_keyframes,
-                     options_.visibility_keyframes});
-  }
-
-  // num_keyframes() up to the match and to the query, or fewer where their map begins.
+  // kNumKeyframes up to the match and to the query, or fewer where their map begins.
   Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
                    const LoopVerificationGate& gate, LoopVerificationReport* report = nullptr);
 

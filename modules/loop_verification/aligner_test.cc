@@ -22,7 +22,7 @@ TEST(AlignerTest, ErrorsAreWhatTheCovarianceSays) {
   LoopVerificationOptions options;
   options.ba.systematic_px = 0;  // this world has no such errors
   std::mt19937_64 random(1);
-  std::normal_distribution<double> log_scale(0, options.ba.scale_sigma);
+  std::normal_distribution<double> log_scale(0, kWindowScaleSigma);
   for (int run = 0; run < kRuns; ++run) {
     const auto room = MakeTestRoom({.seed = 100u + run});
     TestAgentOptions walk_m = FirstAgent(run), walk_c = SecondAgent(run);
@@ -84,8 +84,8 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
       store.Add(keyframe);
     }
   }
-  const auto frames_m = store.WindowUpTo(m.keyframes[10].id, options.visibility_keyframes);
-  const auto frames_c = store.WindowUpTo(c.keyframes[9].id, options.visibility_keyframes);
+  const auto frames_m = store.WindowUpTo(m.keyframes[10].id, Aligner::kNumKeyframes);
+  const auto frames_c = store.WindowUpTo(c.keyframes[9].id, Aligner::kNumKeyframes);
   LoopVerificationReport report;
   const Constraint constraint = Aligner(options).Align(
       {frames_m, frames_c, {}}, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);

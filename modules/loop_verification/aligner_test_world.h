@@ -22,8 +22,8 @@ inline Constraint Align(const TestAgent& query_agent, int query, const TestAgent
     }
   }
   return Aligner(options).Align(
-      {store.WindowUpTo(match_agent.keyframes[match].id, options.visibility_keyframes),
-       store.WindowUpTo(query_agent.keyframes[query].id, options.visibility_keyframes),
+      {store.WindowUpTo(match_agent.keyframes[match].id, Aligner::kNumKeyframes),
+       store.WindowUpTo(query_agent.keyframes[query].id, Aligner::kNumKeyframes),
        {}},
       candidate, kNoGate, report);
 }

@@ -12,6 +12,9 @@
 namespace pangea {
 namespace {
 
+// Sigma of the odometry, of its path, as pair_evidence.h believes it.
+constexpr double kDriftPerM = 0.02;
+
 double WorstSigma(const Matrix6d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance.topLeftCorner<3, 3>(),
                                                               Eigen::EigenvaluesOnly);
@@ -104,7 +107,7 @@ KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& query,
     const auto path_a = PathBetween(a.map, a.seq, near.seq_a, store);
     const auto path_b = PathBetween(b.map, b.seq, near.seq_b, store);
     if (path_a && path_b) {
-      const double drift_m = options_.drift_per_m * (*path_a + *path_b);
+      const double drift_m = kDriftPerM * (*path_a + *path_b);
       known += 1 / (near.sigma_m * near.sigma_m + drift_m * drift_m);
       sigmas.push_back(near.sigma_m);
     }

@@ -27,7 +27,6 @@ namespace pangea {
 
 struct KnownConstraintOptions {
   double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
-  double drift_per_m = 0.02;  // sigma of the odometry, of its path, as pair_evidence.h believes it
   int min_nearby = 10;        // chosen, not measured
   int min_between_maps = 10;  // chosen, not measured; a fusion takes 2 to 6 viewpoints
 
@@ -36,8 +35,6 @@ struct KnownConstraintOptions {
     archive.Add("min_gain_bits", &min_gain_bits, {0, 100}, "bit",
                 "that another constraint must bring to each coordinate; 1 halves its sigma; "
                 "0: all are verified");
-    archive.Add("drift_per_m", &drift_per_m, {0, 1}, "",
-                "sigma of the odometry, of its path, between keyframes verified and this one");
     archive.Add("min_nearby", &min_nearby, {0, 1000000}, "",
                 "constraints of one map within reach before another is redundant");
     archive.Add("min_between_maps", &min_between_maps, {0, 1000000}, "",

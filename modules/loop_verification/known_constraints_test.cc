@@ -47,8 +47,7 @@ class KnownConstraintsTest : public testing::Test {
   }
 
   SubmapStore store_;
-  KnownConstraints known_{
-      KnownConstraintOptions{.min_gain_bits = 1, .drift_per_m = 0.02, .min_between_maps = 1}};
+  KnownConstraints known_{KnownConstraintOptions{.min_gain_bits = 1, .min_between_maps = 1}};
 };
 
 TEST_F(KnownConstraintsTest, WhereNothingIsKnownAnythingIsWorthIt) {

@@ -20,8 +20,8 @@ Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& cand
 }
 
 bool LoopVerifier::Ready(const KeyframeId& query, const PlaceCandidate& candidate) const {
-  if (!store_.WindowIsComplete(query, aligner_.num_keyframes()) ||
-      !store_.WindowIsComplete(candidate.match, aligner_.num_keyframes())) {
+  if (!store_.WindowIsComplete(query, Aligner::kNumKeyframes) ||
+      !store_.WindowIsComplete(candidate.match, Aligner::kNumKeyframes)) {
     return false;
   }
   return query.map != candidate.match.map || store_.ChainIsComplete(candidate.match, query);
@@ -61,8 +61,8 @@ Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& c
 Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& candidate,
                                LoopVerificationReport* report) {
   CandidateKeyframes keyframes;
-  keyframes.m = store_.WindowUpTo(candidate.match, aligner_.num_keyframes());
-  keyframes.c = store_.WindowUpTo(query, aligner_.num_keyframes());
+  keyframes.m = store_.WindowUpTo(candidate.match, Aligner::kNumKeyframes);
+  keyframes.c = store_.WindowUpTo(query, Aligner::kNumKeyframes);
   if (keyframes.m.empty() || keyframes.c.empty()) {
     return RefusedConstraint(query, candidate, "a keyframe was lost");
   }

@@ -19,8 +19,9 @@ constexpr double kLeastBaseline_m = 0.02;
 constexpr double kNearest_m = 0.2, kFarthest_m = 60;
 // Verification takes the errors of landmarks as independent; an error that all have in common is a
 // wrong scale.
-constexpr double kMaxOdometrySigma = 0.05;  // a share of the depth
-constexpr size_t kMaxAdded = 250;           // what a verification takes grows with each
+constexpr double kMaxOdometrySigma = 0.05;   // a share of the depth
+constexpr double kMaxNeighbourRatio = 0.85;  // best to second-best distance
+constexpr size_t kMaxAdded = 250;            // what a verification takes grows with each
 constexpr int kNotOfTheWindow = -1;
 
 // Another keyframe that may see the corners of the newest one, the host.
@@ -58,9 +59,7 @@ double RaySigma(const KeyframeView& view, int corner) {
 
 class Triangulation {
  public:
-  Triangulation(const TriangulationOptions& options, const Window& window,
-                const KeyframeWindow& after)
-      : options_(options), host_(*window.frames.back()) {
+  Triangulation(const Window& window, const KeyframeWindow& after) : host_(*window.frames.back()) {
     OdometryError error;
     for (int f = window.newest() - 1; f >= 0; --f) {
       error.Add(*window.keyframe(f + 1).edge);
@@ -196,8 +195,8 @@ class Triangulation {
     const Descriptor& descriptor = host_.keyframe().corners[host_corner].descriptor;
     const NearestCorner nearest = FindNearest(
         corners, near, [&](int i) { return HammingDistance(corners[i].descriptor, descriptor); },
-        options_.max_hamming, kOtherCorner_px);
-    if (nearest.index < 0 || !nearest.PassesRatio(options_.max_ratio)) {
+        kAlikeHamming, kOtherCorner_px);
+    if (nearest.index < 0 || !nearest.PassesRatio(kMaxNeighbourRatio)) {
       return std::nullopt;
     }
     const double sigma = RaySigma(*neighbour.view, nearest.index);
@@ -231,7 +230,6 @@ class Triangulation {
     depth->odometry_sigma = odometry / information;
   }
 
-  const TriangulationOptions& options_;
   const KeyframeView& host_;
   std::vector<Neighbour> neighbours_;
 };
@@ -257,12 +255,12 @@ void AddLandmark(int host_corner, const InverseDepth& depth, const std::vector<S
 
 }  // namespace
 
-void TriangulateMatchedCorners(const TriangulationOptions& options, double max_relative_depth_sigma,
-                               const KeyframeWindow& after, Window* window) {
+void TriangulateMatchedCorners(const TriangulationOptions& options, const KeyframeWindow& after,
+                               Window* window) {
   if (static_cast<int>(window->landmarks.size()) > options.few_landmarks) {
     return;
   }
-  const Triangulation triangulation(options, *window, after);
+  const Triangulation triangulation(*window, after);
   const size_t most = window->landmarks.size() + kMaxAdded;
   const int host = window->newest();
   const int num_corners = static_cast<int>(window->newest_keyframe().corners.size());
@@ -272,7 +270,7 @@ void TriangulateMatchedCorners(const TriangulationOptions& options, double max_r
     }
     const std::vector<Sight> sights = triangulation.Sights(corner);
     const auto depth = triangulation.Solve(corner, sights);
-    if (depth && depth->sigma < max_relative_depth_sigma * depth->value &&
+    if (depth && depth->sigma < kMaxRelativeDepthSigma * depth->value &&
         depth->odometry_sigma < kMaxOdometrySigma * depth->value) {
       AddLandmark(corner, *depth, sights, window);
     }

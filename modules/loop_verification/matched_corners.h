@@ -13,7 +13,7 @@ namespace pangea {
 
 // Nothing is added to a window with more than few_landmarks. `after`: keyframes of the map behind
 // the newest one, ascending.
-void TriangulateMatchedCorners(const TriangulationOptions& options, double max_relative_depth_sigma,
-                               const KeyframeWindow& after, Window* window);
+void TriangulateMatchedCorners(const TriangulationOptions& options, const KeyframeWindow& after,
+                               Window* window);
 
 }  // namespace pangea

@@ -7,6 +7,10 @@
 namespace pangea {
 namespace {
 
+constexpr int kPnpSamples = 300;
+// Of a match, 2 degrees of freedom: 4 sigma, wrong ones lie far outside.
+constexpr double kPnpMaxChi2 = 16.0;
+
 // One pixel sigma in radians for this observation, about: to turn a tilt into pixel sigmas.
 double SigmaPerRadian(const PointObservation& observation) {
   return std::sqrt(std::abs(observation.sqrt_info.determinant()));
@@ -26,7 +30,6 @@ struct Problem {
   const std::vector<RayPair>& ray_pairs;
   const Eigen::Vector3d& origin_c;
   const Eigen::Vector3d& origin_m;
-  double max_chi2;
   std::vector<Eigen::Matrix3d> R_cam_w = {};  // by observation
 
   // A truncated quadratic (MSAC). A ray pair constrains one dimension of two: half a vote. Or any
@@ -39,11 +42,11 @@ struct Problem {
                  0.5 * static_cast<double>(ray_pairs.size()) + kRounding;
     for (size_t i = 0; i < observations.size() && score + reach > best; ++i, reach -= 1) {
       const auto residual = Residual(observations[i], T_m_c, R_m_c, R_cam_w[i]);
-      score += std::max(0.0, 1 - Chi2(residual, extra_var[i]) / max_chi2);
+      score += std::max(0.0, 1 - Chi2(residual, extra_var[i]) / kPnpMaxChi2);
     }
     const Eigen::Vector3d baseline = T_m_c * origin_c - origin_m;
     for (size_t i = 0; i < ray_pairs.size() && score + reach > best; ++i, reach -= 0.5) {
-      score += 0.5 * std::max(0.0, 1 - EpipolarChi2(ray_pairs[i], T_m_c, baseline) / max_chi2);
+      score += 0.5 * std::max(0.0, 1 - EpipolarChi2(ray_pairs[i], T_m_c, baseline) / kPnpMaxChi2);
     }
     return score + reach > best ? score : best;
   }
@@ -51,7 +54,7 @@ struct Problem {
   std::vector<int> Inliers(const Rigid3& T_m_c, const std::vector<double>& extra_var) const {
     std::vector<int> inliers;
     for (size_t i = 0; i < observations.size(); ++i) {
-      if (Chi2(observations[i], T_m_c, extra_var[i]) < max_chi2) {
+      if (Chi2(observations[i], T_m_c, extra_var[i]) < kPnpMaxChi2) {
         inliers.push_back(static_cast<int>(i));
       }
     }
@@ -120,8 +123,8 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
                                                 const std::vector<RayPair>& ray_pairs,
                                                 const Eigen::Vector3d& origin_c,
                                                 const Eigen::Vector3d& origin_m, double tilt_sigma,
-                                                uint64_t seed, const UprightPnpOptions& options) {
-  Problem problem{observations, ray_pairs, origin_c, origin_m, options.max_chi2};
+                                                uint64_t seed) {
+  Problem problem{observations, ray_pairs, origin_c, origin_m};
   std::vector<std::vector<int>> samples(2);  // by direction
   std::vector<double> tilt_var(observations.size());
   const std::vector<double> no_tilt(observations.size(), 0.0);
@@ -136,7 +139,7 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
   std::mt19937_64 random(seed);
   double best_score = 0;
   Rigid3 best;
-  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+  for (int iteration = 0; iteration < kPnpSamples; ++iteration) {
     const std::vector<int>& sample =
         samples[random() % observations.size() < samples[0].size() ? 0 : 1];
     if (sample.size() < 2) {

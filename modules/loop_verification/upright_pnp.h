@@ -28,18 +28,6 @@ struct RayPair {
   double sigma = 0;  // radians, of both together
 };
 
-struct UprightPnpOptions {
-  int iterations = 300;
-  double max_chi2 = 16.0;  // of a match, 2 degrees of freedom: 4 sigma, wrong ones lie far outside
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("iterations", &iterations, {1, 100000}, "", "samples drawn");
-    archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "",
-                "of a match that is an inlier, 2 degrees of freedom");
-  }
-};
-
 struct UprightPnpResult {
   PoseEstimate pose;
   std::vector<int> inliers;  // indices into the observations, ascending
@@ -51,6 +39,6 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
                                                 const std::vector<RayPair>& ray_pairs,
                                                 const Eigen::Vector3d& origin_c,
                                                 const Eigen::Vector3d& origin_m, double tilt_sigma,
-                                                uint64_t seed, const UprightPnpOptions& options);
+                                                uint64_t seed);
 
 }  // namespace pangea

@@ -80,8 +80,8 @@ TEST(UprightPnp, FindsThePoseAmongTwoThirdsOfOutliers) {
   Random random(2);
   for (int run = 0; run < 20; ++run) {
     const Scene scene = MakeScene(30, 20, {0.002, 0}, random);
-    const auto result = SolveUprightPnp(scene.observations, {}, {0.1, 0, 0.05}, {0.1, 0, 0.05},
-                                        0.01, 7, UprightPnpOptions{});
+    const auto result =
+        SolveUprightPnp(scene.observations, {}, {0.1, 0, 0.05}, {0.1, 0, 0.05}, 0.01, 7);
     ASSERT_TRUE(result);
     const Vector6d error = result->pose.T_m_c.Minus(scene.T_m_c);
     EXPECT_LT(error.head<3>().norm(), 0.2);
@@ -95,8 +95,7 @@ TEST(UprightPnp, SameSeedSamePose) {
   Random random(3);
   const Scene scene = MakeScene(20, 10, {0, 0}, random);
   const auto solve = [&scene] {
-    return SolveUprightPnp(scene.observations, {}, {0, 0, 0}, {0, 0, 0}, 0.01, 11,
-                           UprightPnpOptions{});
+    return SolveUprightPnp(scene.observations, {}, {0, 0, 0}, {0, 0, 0}, 0.01, 11);
   };
   const auto first = solve(), second = solve();
   ASSERT_TRUE(first && second);
@@ -156,8 +155,7 @@ TEST(UprightPnp, RaysWithoutADepthVote) {
                        (scene.T_m_c.Inverse() * p_m - origin_c).normalized(), 0.003});
     }
     const auto error = [&](const std::vector<RayPair>& votes) {
-      const auto result = SolveUprightPnp(scene.observations, votes, origin_c, origin_m, 0.005, 7,
-                                          UprightPnpOptions{});
+      const auto result = SolveUprightPnp(scene.observations, votes, origin_c, origin_m, 0.005, 7);
       return result ? result->pose.T_m_c.Minus(scene.T_m_c).norm() : 1e9;
     };
     EXPECT_GT(error({}), 0.3);

@@ -12,6 +12,9 @@
 namespace pangea {
 namespace {
 
+// Share of the median depth that the camera moved, for no more keyframes.
+constexpr double kMinBaseline = 0.25;
+
 struct Estimate {
   CornerRef host;
   double inverse_depth = 0;
@@ -30,15 +33,14 @@ std::optional<double> MedianDepth(const Keyframe& keyframe) {
 
 }  // namespace
 
-KeyframeWindow LastOfWindow(const KeyframeWindow& frames, const WindowOptions& options) {
+KeyframeWindow LastOfWindow(const KeyframeWindow& frames) {
   const KeyframeView& newest = *frames.back();
   const std::optional<double> depth_m = MedianDepth(newest.keyframe());
   double baseline_m = 0;
   size_t count = 0;
   for (auto view = frames.rbegin(); view != frames.rend(); ++view) {
-    const bool wide = depth_m && baseline_m >= options.min_baseline * *depth_m;
-    if (static_cast<int>(count) >=
-        (wide ? options.num_keyframes : std::max(options.num_keyframes, options.max_keyframes))) {
+    const bool wide = depth_m && baseline_m >= kMinBaseline * *depth_m;
+    if (static_cast<int>(count) >= (wide ? kWindowKeyframes : kMaxWindowKeyframes)) {
       break;
     }
     ++count;
@@ -85,7 +87,7 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
                               point.inverse_depth,
                               std::sqrt(static_cast<double>(point.inverse_depth_var))};
       if (!window.frames[f]->has_ray(point.corner) ||
-          estimate.relative() > options.max_relative_depth_sigma) {
+          estimate.relative() > kMaxRelativeDepthSigma) {
         continue;
       }
       const int32_t id = window.corner(estimate.host).landmark_id;
@@ -123,8 +125,7 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
   for (const Estimate& estimate : alone) {
     add(kNoLandmark, estimate);
   }
-  TriangulateMatchedCorners(options.triangulation, options.max_relative_depth_sigma, after,
-                            &window);
+  TriangulateMatchedCorners(options.triangulation, after, &window);
   return window;
 }
 

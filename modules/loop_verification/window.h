@@ -15,40 +15,29 @@
 
 namespace pangea {
 
+// At least: the keyframe and those before it (the paper's M). Of a camera that turns more than it
+// moves, as many more as it takes to see depths.
+inline constexpr int kWindowKeyframes = 5;
+inline constexpr int kMaxWindowKeyframes = 10;
+// Inverse depths less certain than this share of themselves are no map points.
+inline constexpr double kMaxRelativeDepthSigma = 0.4;
+
+// Of corners that no track gave a depth.
 struct TriangulationOptions {
   int few_landmarks = 150;  // of a window; with more, none are added
-  int max_hamming = kAlikeHamming;
-  double max_ratio = 0.85;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("few_landmarks", &few_landmarks, {-1, 100000}, "",
                 "a window with more gets none; -1: no window does");
-    archive.Add("max_hamming", &max_hamming, {0, kDescriptorBits}, "bits",
-                "between descriptors that match");
-    archive.Add("max_ratio", &max_ratio, {0.01, 1}, "", "best to second-best Hamming distance");
   }
 };
 
 struct WindowOptions {
-  int num_keyframes = 5;  // M, at least: the keyframe and M - 1 before it
-  // Of a camera that turns more than it moves, as many more as it takes to see depths.
-  int max_keyframes = 10;
-  double min_baseline = 0.25;  // of the median depth
-  // Inverse depths less certain than this share of themselves are no map points.
-  double max_relative_depth_sigma = 0.4;
   TriangulationOptions triangulation;
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("num_keyframes", &num_keyframes, {1, 50}, "",
-                "the keyframe and those before it, at least");
-    archive.Add("max_keyframes", &max_keyframes, {1, 50}, "",
-                "where the camera moved too little for depths");
-    archive.Add("min_baseline", &min_baseline, {0, 10}, "",
-                "share of the median depth that the camera moved, for no more keyframes");
-    archive.Add("max_relative_depth_sigma", &max_relative_depth_sigma, {0.01, 2}, "",
-                "share of itself by which the inverse depth of a map point may be uncertain");
     archive.Section("triangulation", &triangulation, "of corners that no track gave a depth");
   }
 };
@@ -86,7 +75,7 @@ struct Window {
 };
 
 // Of keyframes up to one, the last that make its window.
-KeyframeWindow LastOfWindow(const KeyframeWindow& frames, const WindowOptions& options);
+KeyframeWindow LastOfWindow(const KeyframeWindow& frames);
 
 // Without its observations.
 WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,

@@ -9,20 +9,10 @@
 namespace pangea {
 namespace {
 
-constexpr int kLast = 19;
-
-WindowOptions FromTo(int num_keyframes, int max_keyframes) {
-  WindowOptions options;
-  options.num_keyframes = num_keyframes;
-  options.max_keyframes = max_keyframes;
-  options.min_baseline = 0.25;
-  return options;
-}
-
 // How many keyframes the window has of an agent that walks this far from one to the next.
-size_t NumFrames(double step_m, const WindowOptions& options, bool with_points = true) {
+size_t NumFrames(double step_m, bool with_points = true, int num_keyframes = 20) {
   TestAgentOptions walk;
-  walk.num_keyframes = kLast + 1;
+  walk.num_keyframes = num_keyframes;
   walk.radius = step_m / walk.step_angle;
   const TestAgent agent = RunTestAgent(MakeTestRoom({}), walk);
   SubmapStore store;
@@ -32,30 +22,23 @@ size_t NumFrames(double step_m, const WindowOptions& options, bool with_points =
     }
     store.Add(std::move(keyframe));
   }
-  const KeyframeWindow all = store.WindowUpTo(agent.keyframes[kLast].id, kLast + 1);
-  const KeyframeWindow window = LastOfWindow(all, options);
+  const KeyframeWindow all = store.WindowUpTo(agent.keyframes.back().id, num_keyframes);
+  const KeyframeWindow window = LastOfWindow(all);
   EXPECT_EQ(window.back(), all.back());
   return window.size();
 }
 
 TEST(WindowTest, GoesBackUntilDepthsAreSeen) {
-  const WindowOptions options = FromTo(5, 10);
-  EXPECT_EQ(NumFrames(0.5, options), 5u);
-  EXPECT_EQ(NumFrames(0.01, options), 10u);
-  const size_t between = NumFrames(0.25, options);
+  EXPECT_EQ(NumFrames(0.5), 5u);
+  EXPECT_EQ(NumFrames(0.01), 10u);
+  const size_t between = NumFrames(0.25);
   EXPECT_GT(between, 5u);
   EXPECT_LT(between, 10u);
 }
 
-TEST(WindowTest, WithoutDepthsGoesBackAsFarAsItMay) {
-  const WindowOptions options = FromTo(5, 10);
-  EXPECT_EQ(NumFrames(0.5, options, false), 10u);
-}
+TEST(WindowTest, WithoutDepthsGoesBackAsFarAsItMay) { EXPECT_EQ(NumFrames(0.5, false), 10u); }
 
-TEST(WindowTest, IsNotLongerThanTheMap) {
-  const WindowOptions options = FromTo(5, 50);
-  EXPECT_EQ(NumFrames(0.001, options), size_t{kLast + 1});
-}
+TEST(WindowTest, IsNotLongerThanTheMap) { EXPECT_EQ(NumFrames(0.001, true, 8), 8u); }
 
 }  // namespace
 }  // namespace pangea

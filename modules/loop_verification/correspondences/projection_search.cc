@@ -13,6 +13,15 @@
 namespace pangea {
 namespace {
 
+constexpr double kMaxRatio =
+    0.9;  // best to second-best distance, corners kSamePx and further apart
+constexpr double kMaxChi2 = 11.8;  // within 3 sigma of the prediction (2 degrees of freedom)
+// Of the search, whatever the prediction claims.
+constexpr double kMinRadiusPx = 4;
+constexpr double kMaxRadiusPx = 40;
+constexpr double kMaxDepth_m = 60;     // the deeper, the worse triangulated
+constexpr double kMaxViewAngle = 0.9;  // radians between the two lines of sight
+constexpr double kMaxScale = 3.5;      // ratio of the two distances
 constexpr double kBorderPx = 12;
 // Two corners this near are one: a tracked and a detected one of the same spot.
 constexpr double kSamePx = 4;
@@ -55,14 +64,13 @@ struct Prediction {
 class ProjectionSearch {
  public:
   ProjectionSearch(const WindowPair& windows, Direction direction, int frame,
-                   const PoseEstimate& pose, const SearchOptions& options)
+                   const PoseEstimate& pose)
       : holder_(windows.Holder(direction)),
         view_(*windows.Observer(direction).frames[frame]),
         T_w_cam_(windows.Observer(direction).T_w_cam[frame]),
         T_observer_holder_(ObserverFromHolder(direction, pose.T_m_c)),
         direction_(direction),
-        pose_(pose),
-        options_(options) {}
+        pose_(pose) {}
 
   std::optional<Prediction> Predict(const WindowLandmark& landmark) const {
     const CameraModel& camera = view_.keyframe().camera;
@@ -70,16 +78,15 @@ class ProjectionSearch {
     const Eigen::Vector3d p_cam = T_w_cam_.Inverse() * y;
     Eigen::Matrix<double, 2, 3> J_project;
     const auto pixel = camera.Project(p_cam, &J_project);
-    if (!pixel || !camera.Contains(*pixel, kBorderPx) || p_cam.z() > options_.max_depth_m) {
+    if (!pixel || !camera.Contains(*pixel, kBorderPx) || p_cam.z() > kMaxDepth_m) {
       return std::nullopt;
     }
     const auto [angle, log_scale] = ViewChange(landmark, y);
-    const double max_log_scale = std::log(options_.max_scale);
-    if (angle > options_.max_view_angle || log_scale > max_log_scale) {
+    const double max_log_scale = std::log(kMaxScale);
+    if (angle > kMaxViewAngle || log_scale > max_log_scale) {
       return std::nullopt;
     }
-    const bool comparable = angle < 0.6 * options_.max_view_angle &&
-                            log_scale < 0.6 * max_log_scale &&
+    const bool comparable = angle < 0.6 * kMaxViewAngle && log_scale < 0.6 * max_log_scale &&
                             camera.Contains(*pixel, 2 * kBorderPx);
     const Eigen::Matrix<double, 2, 3> J_y = J_project * T_w_cam_.R().transpose();
     return Prediction{*pixel, Covariance(landmark, J_y), comparable};
@@ -90,7 +97,7 @@ class ProjectionSearch {
       return LandmarkDistance(holder_, landmark, view_.keyframe().corners[i].descriptor);
     };
     return FindNearest(view_.keyframe().corners, CornersWithin(landmark, prediction), distance_of,
-                       options_.max_hamming, kSamePx);
+                       kPredictedHamming, kSamePx);
   }
 
  private:
@@ -121,17 +128,17 @@ class ProjectionSearch {
 
   std::vector<int> CornersWithin(const WindowLandmark& landmark,
                                  const Prediction& prediction) const {
-    const double host_sigma = CornerSigma(holder_.corner(landmark.host), options_.pixel_sigma);
+    const double host_sigma = CornerSigma(holder_.corner(landmark.host), kCornerSigma_px);
     const double spread = std::sqrt(prediction.covariance.trace() + 2 * host_sigma * host_sigma);
-    std::vector<int> near = view_.grid().Within(
-        prediction.pixel, std::clamp(3 * spread, options_.min_radius_px, options_.max_radius_px));
+    std::vector<int> near =
+        view_.grid().Within(prediction.pixel, std::clamp(3 * spread, kMinRadiusPx, kMaxRadiusPx));
     std::erase_if(near, [&](int i) {
       const Corner& corner = view_.keyframe().corners[i];
-      const double sigma = CornerSigma(corner, options_.pixel_sigma);
+      const double sigma = CornerSigma(corner, kCornerSigma_px);
       Eigen::Matrix2d covariance = prediction.covariance;
       covariance.diagonal().array() += sigma * sigma + host_sigma * host_sigma;
       const Eigen::Vector2d error = corner.pixel.cast<double>() - prediction.pixel;
-      return !view_.has_ray(i) || error.dot(covariance.inverse() * error) > options_.max_chi2;
+      return !view_.has_ray(i) || error.dot(covariance.inverse() * error) > kMaxChi2;
     });
     return near;
   }
@@ -142,14 +149,13 @@ class ProjectionSearch {
   Rigid3 T_observer_holder_;
   Direction direction_;
   const PoseEstimate& pose_;
-  const SearchOptions& options_;
 };
 
 }  // namespace
 
 SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
-                                const PoseEstimate& pose, const SearchOptions& options) {
-  const ProjectionSearch search(windows, direction, frame, pose, options);
+                                const PoseEstimate& pose) {
+  const ProjectionSearch search(windows, direction, frame, pose);
   const std::vector<WindowLandmark>& landmarks = windows.Holder(direction).landmarks;
   SearchResult result;
   std::vector<PointMatch> found;
@@ -160,7 +166,7 @@ SearchResult SearchByProjection(const WindowPair& windows, Direction direction, 
     }
     result.projections.push_back({l, prediction->pixel, false, prediction->comparable});
     const NearestCorner nearest = search.Find(landmarks[l], *prediction);
-    if (nearest.index >= 0 && nearest.distance < options.max_ratio * nearest.second) {
+    if (nearest.index >= 0 && nearest.distance < kMaxRatio * nearest.second) {
       found.push_back({direction, l, {frame, nearest.index}, nearest.distance});
     }
   }

@@ -18,13 +18,15 @@
 
 namespace pangea {
 
+// Share by which a window may be larger than its odometry says.
+inline constexpr double kWindowScaleSigma = 0.01;
+
 struct JointBaOptions {
   double pixel_sigma = 1.0;  // of a corner on octave 0
   // What all corners of a view share and no number of them averages out: calibration, blur, the
   // correlated errors of one odometry's depths. A rotation by so many pixels, and the sideways step
   // that looks the same at the points' median distance.
   double systematic_px = 0.2;
-  double scale_sigma = 0.01;        // share by which a window may be larger than its odometry says
   double max_chi2 = 9.2;            // of an inlier: 99 % of 2 degrees of freedom
   double max_depth_chi2 = 10.8;     // of a point's depth against its prior: 99.9 % of one
   int sure_hamming = kSureHamming;  // a landmark is sure that is so alike in one match
@@ -35,8 +37,6 @@ struct JointBaOptions {
     archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of a corner on octave 0");
     archive.Add("systematic_px", &systematic_px, {0, 20}, "px",
                 "error that all corners of a view share");
-    archive.Add("scale_sigma", &scale_sigma, {0, 1}, "",
-                "share by which a window may be larger than its odometry says");
     archive.Add("max_chi2", &max_chi2, {0.1, 1000}, "", "of an inlier, 2 degrees of freedom");
     archive.Add("max_depth_chi2", &max_depth_chi2, {0.1, 1000}, "",
                 "of a point's depth against its prior, 1 degree of freedom");

@@ -36,8 +36,8 @@ class JointBaTestWindows : public testing::Test {
              agent_c.T_room_body[5] * windows_.c.T_w_body.back().Inverse();
     for (const Direction direction : kBothDirections) {
       for (int frame = 0; frame < 5; ++frame) {
-        const SearchResult found = SearchByProjection(windows_, direction, frame,
-                                                      {T_m_c_, 1e-6 * Matrix6d::Identity()}, {});
+        const SearchResult found =
+            SearchByProjection(windows_, direction, frame, {T_m_c_, 1e-6 * Matrix6d::Identity()});
         matches_.insert(matches_.end(), found.matches.begin(), found.matches.end());
       }
     }

@@ -74,8 +74,8 @@ int JointProblem::Frame(int side, int window_frame) const {
 double JointProblem::ScaleSigma(int side) const {
   const Keyframe& newest = windows_[side]->newest_keyframe();
   const bool of_one_map = newest.id.map == windows_[1 - side]->newest_keyframe().id.map;
-  return of_one_map ? options_.scale_sigma
-                    : std::max(options_.scale_sigma, UnknownScaleSigma(newest.scale_sigma));
+  return of_one_map ? kWindowScaleSigma
+                    : std::max(kWindowScaleSigma, UnknownScaleSigma(newest.scale_sigma));
 }
 
 bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vector<bool>& use,

@@ -67,8 +67,7 @@ std::string Optimise(const InlierOptions& options, Verification* verification) {
   Verification& v = *verification;
   for (const Direction direction : kBothDirections) {
     for (int frame = 0; frame <= v.windows.Observer(direction).newest(); ++frame) {
-      const SearchResult result =
-          SearchByProjection(v.windows, direction, frame, v.pose, v.options.search);
+      const SearchResult result = SearchByProjection(v.windows, direction, frame, v.pose);
       v.matches.insert(v.matches.end(), result.matches.begin(), result.matches.end());
     }
   }

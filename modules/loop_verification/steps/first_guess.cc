@@ -7,11 +7,13 @@
 namespace pangea {
 namespace {
 
-std::vector<PointMatch> FirstMatches(const FirstGuessOptions& options, const Verification& v) {
+constexpr double kFirstMaxRatio = 0.85;  // best to second-best distance, without a prediction
+
+std::vector<PointMatch> FirstMatches(const Verification& v) {
   std::vector<PointMatch> matches = CandidateMatches(v.windows, v.candidate);
   for (const Direction direction : kBothDirections) {
     const std::vector<PointMatch> nearest =
-        MatchByDescriptor(v.windows, direction, options.first_max_hamming, options.first_max_ratio);
+        MatchByDescriptor(v.windows, direction, kAlikeHamming, kFirstMaxRatio);
     matches.insert(matches.end(), nearest.begin(), nearest.end());
   }
   return Distinct(matches);
@@ -24,9 +26,9 @@ Eigen::Vector3d UnitRay(const Window& window, int corner) {
 }
 
 // Radians.
-double CornerAngleSigma(const Window& window, int corner, double pixel_sigma) {
+double CornerAngleSigma(const Window& window, int corner) {
   const Keyframe& keyframe = window.newest_keyframe();
-  return CornerSigma(keyframe.corners[corner], pixel_sigma) * keyframe.camera.PixelAngle();
+  return CornerSigma(keyframe.corners[corner], kCornerSigma_px) * keyframe.camera.PixelAngle();
 }
 
 std::vector<RayPair> RayPairs(const Verification& v) {
@@ -36,8 +38,8 @@ std::vector<RayPair> RayPairs(const Verification& v) {
     if (!c.frames.back()->has_ray(corner_c) || !m.frames.back()->has_ray(corner_m)) {
       continue;
     }
-    const double sigma_c = CornerAngleSigma(c, corner_c, v.options.search.pixel_sigma);
-    const double sigma_m = CornerAngleSigma(m, corner_m, v.options.search.pixel_sigma);
+    const double sigma_c = CornerAngleSigma(c, corner_c);
+    const double sigma_m = CornerAngleSigma(m, corner_m);
     pairs.push_back({UnitRay(m, corner_m), UnitRay(c, corner_c),
                      std::sqrt(sigma_c * sigma_c + sigma_m * sigma_m +
                                v.guess_tilt_sigma * v.guess_tilt_sigma)});
@@ -49,14 +51,14 @@ std::vector<RayPair> RayPairs(const Verification& v) {
 
 std::string GuessPose(const FirstGuessOptions& options, Verification* verification) {
   Verification& v = *verification;
-  v.first_matches = FirstMatches(options, v);
+  v.first_matches = FirstMatches(v);
   if (static_cast<int>(v.first_matches.size()) < options.min_pnp_inliers) {
     return "too few matched points with a depth";
   }
   const auto& [m, c] = v.windows;
   const uint64_t seed = StableHash(m.newest_keyframe().id, c.newest_keyframe().id, 1);
   v.pnp = SolveUprightPnp(v.Observations(v.first_matches), RayPairs(v), c.T_w_cam.back().t,
-                          m.T_w_cam.back().t, v.guess_tilt_sigma, seed, v.options.pnp);
+                          m.T_w_cam.back().t, v.guess_tilt_sigma, seed);
   if (!v.pnp) {
     return "PnP found no pose";
   }

@@ -11,15 +11,12 @@
 namespace pangea {
 
 struct GravityOptions {
-  double guess_tilt_floor = 0.006;  // radians, of each odometry
-  double gravity_floor = 0.005;     // radians, the same at the end
+  double gravity_floor = 0.005;  // radians, of each odometry, at the end
   double max_tilt_chi2 = 9.2;
   double max_tilt = 0.06;  // radians, whatever the odometries say
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("guess_tilt_floor", &guess_tilt_floor, {0, 1}, "rad",
-                "sigma of each gravity, at least, while guessing");
     archive.Add("gravity_floor", &gravity_floor, {0, 1}, "rad",
                 "sigma of each gravity, at least, at the end");
     archive.Add("max_tilt_chi2", &max_tilt_chi2, {0.1, 1000}, "",

@@ -20,9 +20,8 @@ Verification::Verification(const CommonStepOptions& options, const CandidateKeyf
       candidate(candidate),
       gate(gate),
       window_cache(*window_cache),
-      windows{window_cache->Make(LastOfWindow(keyframes.m, options.window), options.window,
-                                 keyframes.after_m),
-              window_cache->Make(LastOfWindow(keyframes.c, options.window), options.window)} {}
+      windows{window_cache->Make(LastOfWindow(keyframes.m), options.window, keyframes.after_m),
+              window_cache->Make(LastOfWindow(keyframes.c), options.window)} {}
 
 bool Verification::AtLeast(std::string_view option, double value, double limit) {
   report.measured.push_back({step, option, value, true, limit});
@@ -38,7 +37,7 @@ std::vector<PointObservation> Verification::Observations(const std::vector<Point
   std::vector<PointObservation> observations;
   observations.reserve(of.size());
   for (const PointMatch& match : of) {
-    observations.push_back(MakeObservation(windows, match, options.search.pixel_sigma));
+    observations.push_back(MakeObservation(windows, match, kCornerSigma_px));
   }
   return observations;
 }

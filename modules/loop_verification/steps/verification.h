@@ -21,15 +21,11 @@ namespace pangea {
 // Of what several steps use.
 struct CommonStepOptions {
   WindowOptions window;
-  UprightPnpOptions pnp;
-  SearchOptions search;
   JointBaOptions ba;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Section("window", &window, "the local windows that are aligned");
-    archive.Section("pnp", &pnp, "upright PnP");
-    archive.Section("search", &search, "projection search");
     archive.Section("ba", &ba, "joint bundle adjustment of both windows");
   }
 };

@@ -7,6 +7,7 @@
 namespace pangea {
 namespace {
 
+constexpr int kVisibilityStride = 3;  // every third keyframe along the way is looked into
 constexpr char kContradicted[] = "the surroundings contradict";
 
 }  // namespace
@@ -73,7 +74,7 @@ std::string CheckVisibility(const VisibilityOptions& options, Verification* veri
     for (const Direction direction : kBothDirections) {
       const Window& observer = v.windows.Observer(direction);
       const SearchResult result =
-          SearchByProjection(v.windows, direction, observer.newest(), v.pose, v.options.search);
+          SearchByProjection(v.windows, direction, observer.newest(), v.pose);
       matches.insert(matches.end(), result.matches.begin(), result.matches.end());
       count.Add(observer.newest_keyframe().camera, result);
     }
@@ -100,9 +101,8 @@ std::string CheckWiderVisibility(const VisibilityOptions& options, Verification*
   VisibilityCount count;
   for (const Direction direction : kBothDirections) {
     const Window& observer = wide.Observer(direction);
-    for (int frame = observer.newest(); frame >= 0; frame -= options.visibility_stride) {
-      count.Add(observer.keyframe(frame).camera,
-                SearchByProjection(wide, direction, frame, pose, v.options.search));
+    for (int frame = observer.newest(); frame >= 0; frame -= kVisibilityStride) {
+      count.Add(observer.keyframe(frame).camera, SearchByProjection(wide, direction, frame, pose));
     }
   }
   return v.AtLeast("min_supported_share", count.supported_share(), options.min_supported_share)

@@ -15,6 +15,9 @@
 
 namespace pangea {
 
+// Up to each of the two; not fewer than the window.
+inline constexpr int kVisibilityKeyframes = 10;
+
 // First in the two keyframes, then along the way to them.
 struct VisibilityOptions {
   int min_found = 10;
@@ -22,8 +25,6 @@ struct VisibilityOptions {
   double min_found_share = 0.08;
   double min_first_supported_share = 0.3;
   double min_supported_share = 0.55;
-  int visibility_keyframes = 10;  // up to each of the two; not fewer than the window
-  int visibility_stride = 3;      // every third of these is looked into
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -36,10 +37,6 @@ struct VisibilityOptions {
                 "of the view, in the two keyframes");
     archive.Add("min_supported_share", &min_supported_share, {0, 1}, "",
                 "of the view, along the way to them");
-    archive.Add("visibility_keyframes", &visibility_keyframes, {1, 1000}, "",
-                "up to each of the two");
-    archive.Add("visibility_stride", &visibility_stride, {1, 1000}, "",
-                "every so many of these is looked into");
   }
 };
 
