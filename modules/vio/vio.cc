@@ -8,6 +8,11 @@
 #include "vio/live/rolling_shutter.h"
 
 namespace pangea::vio {
+namespace {
+
+constexpr size_t kMaxPoints = 150;  // map points of a keyframe, the best known ones
+
+}  // namespace
 
 Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
          const VioOptions& options, OpenMap open_map)
@@ -185,7 +190,7 @@ std::vector<MapPoint> Vio::Points(const FinishedKeyframe& finished,
     return a.inverse_depth_var * b.inverse_depth * b.inverse_depth <
            b.inverse_depth_var * a.inverse_depth * a.inverse_depth;
   });
-  points.resize(std::min(points.size(), static_cast<size_t>(options_.max_points)));
+  points.resize(std::min(points.size(), kMaxPoints));
   return points;
 }
 

@@ -28,15 +28,12 @@ struct VioOptions {
   TrackerOptions tracker;
   DescriberOptions describer;
   EstimatorOptions estimator;
-  int max_points = 150;  // map points of a keyframe, the best known ones
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Section("tracker", &tracker, "features from image to image");
     archive.Section("describer", &describer, "corners and descriptors of a keyframe");
     archive.Section("estimator", &estimator, "the window");
-    archive.Add("max_points", &max_points, {0, 2000}, "",
-                "map points of a keyframe, the best known ones");
   }
 };
 

@@ -20,6 +20,9 @@ static_assert(kDescriptorBits == 256, "what ORB makes");
 constexpr int kPatchRadius = 15;
 constexpr int kBorder = 23;
 constexpr float kPatchSize = 31.F;
+// Grey levels; the low one in cells where the other finds nothing.
+constexpr int kFastThreshold = 20;
+constexpr int kLowFastThreshold = 7;
 // How far, on its octave, a tracked landmark may lie from the corner it is described at.
 constexpr float kSnapRadius = 2.F;
 
@@ -52,7 +55,7 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
       // One level: it takes the corners of a given octave as they are.
       orb_(cv::ORB::create(1, static_cast<float>(kOctaveScale), 1, kPatchRadius, 0, 2)) {
   for (int octave = 0; octave < options_.octaves; ++octave) {
-    scales_.push_back(std::pow(options_.scale_factor, octave));
+    scales_.push_back(std::pow(kOctaveScale, octave));
   }
 }
 
@@ -67,7 +70,7 @@ void Describer::BuildPyramid(const cv::Mat& image) {
                           static_cast<int>(std::lround(image.rows / scales_[octave])));
       cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
     }
-    cv::FAST(pyramid_[octave], strong_[octave], options_.fast_threshold, true);
+    cv::FAST(pyramid_[octave], strong_[octave], kFastThreshold, true);
   }
 }
 
@@ -80,7 +83,7 @@ std::vector<cv::KeyPoint> Describer::WeakCorners(int octave, const cv::Rect& par
                                    part.height + 2 * kReach) &
                           cv::Rect({0, 0}, level.size());
   std::vector<cv::KeyPoint> found;
-  cv::FAST(level(around), found, options_.fast_threshold_low, true);
+  cv::FAST(level(around), found, kLowFastThreshold, true);
   for (cv::KeyPoint& corner : found) {
     corner.pt += cv::Point2f(around.tl());
   }

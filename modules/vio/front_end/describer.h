@@ -24,21 +24,13 @@ struct DescriberOptions {
   int max_corners = kMaxCorners;
   int max_blobs = 240;  // of these
   int octaves = 8;
-  double scale_factor = kOctaveScale;  // between octaves; CornerSigma assumes it
-  int fast_threshold = 20;
-  int fast_threshold_low = 7;  // in cells where the first finds nothing
-  int cell_px = 40;            // on each octave
+  int cell_px = 40;  // on each octave
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("max_corners", &max_corners, {10, kMaxCorners}, "", "of a keyframe");
     archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "", "of these, beside landmarks");
     archive.Add("octaves", &octaves, {1, 16}, "", "of the image pyramid");
-    archive.Add("scale_factor", &scale_factor, {1.1, 1.5}, "",
-                "between octaves; the corners' sigmas assume 1.2");
-    archive.Add("fast_threshold", &fast_threshold, {1, 254}, "grey levels", "of FAST");
-    archive.Add("fast_threshold_low", &fast_threshold_low, {1, 254}, "grey levels",
-                "of FAST in cells where the first finds nothing");
     archive.Add("cell_px", &cell_px, {8, 1000}, "px", "of a cell, on each octave");
   }
 };

@@ -18,6 +18,16 @@ constexpr double kStrongestKept = 0.98;
 // Features may come closer to each other while tracked than they were found, down to this share.
 constexpr double kMergeShare = 0.4;
 
+// Cells of the image that features are spread over.
+constexpr int kGridColumns = 15;
+constexpr int kGridRows = 10;
+constexpr double kBorder_px = 8;  // of the image without features
+// A corner's smaller eigenvalue against the image's strongest one, and the least at all (of a
+// contrast-equalised image, OpenCV's units).
+constexpr double kQuality = 0.01;
+constexpr double kMinEigenvalue = 1e-4;
+constexpr double kObservationSigma_px = 0.5;
+
 // While this share of the features is there, each empty cell is searched in one image of so many.
 constexpr double kEnoughShare = 0.5;
 constexpr int kTurns = 3;
@@ -78,7 +88,7 @@ void Tracker::Prepare(const cv::Mat& image) {
 }
 
 bool Tracker::Inside(const cv::Point2f& pixel) const {
-  return camera_.Contains(ToEigen(pixel), options_.border_px);
+  return camera_.Contains(ToEigen(pixel), kBorder_px);
 }
 
 std::vector<Tracker::Bearing> Tracker::Bearings() const {
@@ -307,8 +317,8 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
 std::vector<std::pair<float, cv::Point>> Tracker::FindCorners(const cv::Rect& cell) const {
   const cv::Mat1f response = CornerResponse(cell);
   // No weaker one will be taken (AddFeatures).
-  const auto least = static_cast<float>(
-      std::max(options_.min_eigenvalue, options_.quality * kStrongestKept * strongest_));
+  const auto least =
+      static_cast<float>(std::max(kMinEigenvalue, kQuality * kStrongestKept * strongest_));
   const int inner = response.cols - 2;
   Eigen::ArrayXf column_max(response.cols), block_max(inner);
   std::vector<std::pair<float, cv::Point>> corners;
@@ -338,27 +348,26 @@ void Tracker::AddFeatures() {
   if (wanted <= 0) {
     return;
   }
-  const int columns = options_.grid_columns;
-  const int rows = options_.grid_rows;
-  std::vector<bool> taken(columns * rows, false);
+  std::vector<bool> taken(kGridColumns * kGridRows, false);
   for (const Feature& feature : features_) {
-    const int column = static_cast<int>(feature.pixel.x) * columns / camera_.width;
-    const int row = static_cast<int>(feature.pixel.y) * rows / camera_.height;
-    taken[row * columns + column] = true;
+    const int column = static_cast<int>(feature.pixel.x) * kGridColumns / camera_.width;
+    const int row = static_cast<int>(feature.pixel.y) * kGridRows / camera_.height;
+    taken[row * kGridColumns + column] = true;
   }
   const bool in_turns =
       static_cast<double>(features_.size()) > kEnoughShare * options_.max_features;
   ++turn_;
   std::vector<std::pair<float, cv::Point>> corners;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      if (taken[row * columns + column] || (in_turns && (row + column + turn_) % kTurns != 0)) {
+  for (int row = 0; row < kGridRows; ++row) {
+    for (int column = 0; column < kGridColumns; ++column) {
+      if (taken[row * kGridColumns + column] ||
+          (in_turns && (row + column + turn_) % kTurns != 0)) {
         continue;
       }
-      const int x0 = column * camera_.width / columns;
-      const int y0 = row * camera_.height / rows;
-      const cv::Rect cell(x0, y0, (column + 1) * camera_.width / columns - x0,
-                          (row + 1) * camera_.height / rows - y0);
+      const int x0 = column * camera_.width / kGridColumns;
+      const int y0 = row * camera_.height / kGridRows;
+      const cv::Rect cell(x0, y0, (column + 1) * camera_.width / kGridColumns - x0,
+                          (row + 1) * camera_.height / kGridRows - y0);
       const auto found = FindCorners(cell);
       corners.insert(corners.end(), found.begin(), found.end());
     }
@@ -371,7 +380,7 @@ void Tracker::AddFeatures() {
   }
   for (const auto& [response, at] : corners) {
     if (static_cast<int>(features_.size()) >= options_.max_features ||
-        response < options_.quality * strongest_) {
+        response < kQuality * strongest_) {
       break;
     }
     const cv::Point2f pixel(at);
@@ -395,7 +404,7 @@ void Tracker::FillFrame(int64_t utime) {
     observation.landmark_id = feature.id;
     observation.pixel = {feature.pixel.x, feature.pixel.y};
     observation.ray = feature.ray;
-    observation.sigma_px = options_.sigma_px;
+    observation.sigma_px = kObservationSigma_px;
     frame_.observations.push_back(observation);
   }
 }

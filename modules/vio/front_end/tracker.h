@@ -27,43 +27,25 @@ namespace pangea::vio {
 
 struct TrackerOptions {
   int max_features = 150;
-  int grid_columns = 15;
-  int grid_rows = 10;
   double min_distance_px = 22;  // between features
   int window_px = 21;           // of the KLT
   int pyramid_levels = 4;
   double max_forward_backward_px = 0.7;
-  double border_px = 8;
-  // A corner's smaller eigenvalue against the image's strongest one, and the least at all (of a
-  // contrast-equalised image, OpenCV's units).
-  double quality = 0.01;
-  double min_eigenvalue = 1e-4;
   bool equalize = true;  // contrast-limited histogram equalisation before everything
   double equalize_clip = 3.0;
-  double sigma_px = 0.5;  // of an observation
   TwoViewOptions two_view;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("max_features", &max_features, {10, 2000}, "", "tracked at once");
-    archive.Add("grid_columns", &grid_columns, {1, 200}, "",
-                "cells of the image that features are spread over");
-    archive.Add("grid_rows", &grid_rows, {1, 200}, "",
-                "cells of the image that features are spread over");
     archive.Add("min_distance_px", &min_distance_px, {1, 1000}, "px", "between features");
     archive.Add("window_px", &window_px, {3, 101}, "px", "of the KLT");
     archive.Add("pyramid_levels", &pyramid_levels, {1, 10}, "",
                 "of the KLT, with the image itself");
     archive.Add("max_forward_backward_px", &max_forward_backward_px, {0.01, 100}, "px",
                 "between a feature and itself tracked back");
-    archive.Add("border_px", &border_px, {0, 1000}, "px", "of the image without features");
-    archive.Add("quality", &quality, {1e-6, 1}, "",
-                "a corner's smaller eigenvalue, of the image's strongest");
-    archive.Add("min_eigenvalue", &min_eigenvalue, {0, 1}, "",
-                "a corner's smaller eigenvalue, OpenCV's units");
     archive.Add("equalize", &equalize, "contrast-limited histogram equalisation before everything");
     archive.Add("equalize_clip", &equalize_clip, {0.1, 100}, "", "its contrast limit");
-    archive.Add("sigma_px", &sigma_px, {0.01, 20}, "px", "of an observation");
     archive.Section("two_view", &two_view, "outliers between two images");
   }
 };

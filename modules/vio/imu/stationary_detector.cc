@@ -17,7 +17,7 @@ double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 bool StationaryDetector::IsQuiet(const ImuBuffer& imu, const Vector3d& gyro_bias) const {
   const SampleMoments moments = MomentsOf(imu.Latest(kSamples));
-  return (moments.gyro_mean - gyro_bias).norm() < options_.gyro_rate &&
+  return (moments.gyro_mean - gyro_bias).norm() < kMaxStationaryRate &&
          moments.accel_variance < options_.accel_sigma * options_.accel_sigma;
 }
 

@@ -160,7 +160,7 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   }
   const SampleMoments moments = MomentsOf(samples);
   const double max_accel = kStationaryAccel * stationary_.accel_sigma;
-  const double max_gyro = kStationaryGyro * stationary_.gyro_rate;
+  const double max_gyro = kStationaryGyro * kMaxStationaryRate;
   if (moments.accel_variance > max_accel * max_accel ||
       moments.gyro_variance > max_gyro * max_gyro) {
     return std::nullopt;

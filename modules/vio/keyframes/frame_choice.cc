@@ -6,7 +6,12 @@
 namespace pangea::vio {
 namespace {
 
+// A frame is a window keyframe, or a keyframe, when less than this share of the last one's tracks
+// is left.
+constexpr double kWindowTrackShare = 0.7;
+constexpr double kKeyframeTrackShare = 0.5;
 constexpr double kStationaryTrackShare = 0.5;
+constexpr double kMinKeyframeInterval_s = 0.2;
 constexpr double kAnyParallax = std::numeric_limits<double>::infinity();
 
 // Whether the newest image has changed enough since another frame of the window.
@@ -38,17 +43,17 @@ bool FrameChoice::IsWorthAPlace(const WindowState& state, const TrackHistory& hi
            HasMoved(state, history, last.utime, kAnyParallax, kStationaryTrackShare);
   }
   return HasMoved(state, history, last.utime, options_.window_parallax_px * pixel_angle_,
-                  options_.window_track_share);
+                  kWindowTrackShare);
 }
 
 void FrameChoice::Choose(const TrackHistory& history, WindowState* state) {
   WindowFrame& newest = state->frames.back();
   const double elapsed_s = 1e-6 * static_cast<double>(newest.utime - last_keyframe_utime_);
   newest.is_keyframe =
-      last_keyframe_utime_ == 0 || elapsed_s >= options_.keyframe_interval_s ||
-      (elapsed_s >= options_.keyframe_min_interval_s && !newest.stationary && newest.is_tracked &&
+      last_keyframe_utime_ == 0 || elapsed_s >= kKeyframeInterval_s ||
+      (elapsed_s >= kMinKeyframeInterval_s && !newest.stationary && newest.is_tracked &&
        HasMoved(*state, history, last_keyframe_utime_, options_.keyframe_parallax_px * pixel_angle_,
-                options_.keyframe_track_share));
+                kKeyframeTrackShare));
   if (newest.is_keyframe) {
     last_keyframe_utime_ = newest.utime;
   }

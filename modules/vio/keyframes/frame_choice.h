@@ -12,6 +12,8 @@
 
 namespace pangea::vio {
 
+inline constexpr double kKeyframeInterval_s = 5;  // between keyframes, at most
+
 class FrameChoice {
  public:
   FrameChoice(const EstimatorOptions& options, const CameraModel& camera)

@@ -266,7 +266,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   WindowState& state = problem.state;
   int due = -1;  // keyframes up to here have waited long enough
   for (int i = 0; i <= state.Newest(); ++i) {
-    due = Seconds(Newest().utime - state.frames[i].utime) > options.keyframe_interval_s ? i : due;
+    due = Seconds(Newest().utime - state.frames[i].utime) > kKeyframeInterval_s ? i : due;
   }
   PublishUpTo(due, finished);
   while (Newest().is_window_keyframe) {

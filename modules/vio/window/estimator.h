@@ -31,17 +31,10 @@ namespace pangea::vio {
 struct EstimatorOptions {
   int window = 12;  // keyframes in the window
   // A frame is a window keyframe when the image has moved this far (rotation taken out) since the
-  // last such frame, or when this share of that one's tracks is left.
+  // last such frame, a keyframe when it has since the last one; or by what frame_choice.h has.
   double window_parallax_px = 15;
-  double window_track_share = 0.7;
-  double pixel_sigma = 0.7;  // of an observation with sigma_px 1, pixels
-  // A keyframe is taken when the image has moved this far (rotation taken out) since the last one,
-  // ...
   double keyframe_parallax_px = 20;
-  // ... or when this share of the last keyframe's tracks is left, or after this long.
-  double keyframe_track_share = 0.5;
-  double keyframe_interval_s = 5;
-  double keyframe_min_interval_s = 0.2;
+  double pixel_sigma = 0.7;        // of an observation with sigma_px 1, pixels
   double accel_bias_sigma = 0.15;  // m/s^2, when it is switched on
   CalibrationSigmas calibration;
   StationaryOptions stationary;
@@ -51,17 +44,9 @@ struct EstimatorOptions {
     archive.Add("window", &window, {4, 100}, "", "keyframes");
     archive.Add("window_parallax_px", &window_parallax_px, {0.1, 1000}, "px",
                 "since the last window keyframe, for another");
-    archive.Add("window_track_share", &window_track_share, {0, 1}, "",
-                "of the last window keyframe's tracks that are left, for another");
     archive.Add("pixel_sigma", &pixel_sigma, {0.01, 20}, "px", "of an observation with sigma_px 1");
     archive.Add("keyframe_parallax_px", &keyframe_parallax_px, {0.1, 1000}, "px",
                 "since the last keyframe, for another");
-    archive.Add("keyframe_track_share", &keyframe_track_share, {0, 1}, "",
-                "of the last keyframe's tracks that are left, for another");
-    archive.Add("keyframe_interval_s", &keyframe_interval_s, {0.01, 1000}, "s",
-                "between keyframes, at most");
-    archive.Add("keyframe_min_interval_s", &keyframe_min_interval_s, {0, 1000}, "s",
-                "between keyframes, at least");
     archive.Add("accel_bias_sigma", &accel_bias_sigma, {0.001, 5}, "m/s^2",
                 "of the accelerometer's bias when it is switched on; a cheap one may have more");
     archive.Section("calibration", &calibration,
