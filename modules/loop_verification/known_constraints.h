@@ -28,7 +28,7 @@ namespace pangea {
 struct KnownConstraintOptions {
   double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
   int min_nearby = 10;        // chosen, not measured
-  int min_between_maps = 10;  // chosen, not measured; a fusion takes 2 to 6 viewpoints
+  int min_between_maps = 10;  // chosen, not measured; a fusion takes 2 to 4 viewpoints
 
   template <typename Archive>
   void Visit(Archive& archive) {
