@@ -31,6 +31,56 @@ std::optional<double> MedianDepth(const Keyframe& keyframe) {
   return depths.empty() ? std::nullopt : std::optional(Median(std::move(depths)));
 }
 
+// By landmark, ascending; points without a landmark stand alone, behind the others. Of a landmark
+// the newest depth, which rests on most observations. (Not the one that claims to be the most
+// certain: sigma over inverse depth favours depths whose error makes them near.)
+std::vector<std::pair<int32_t, Estimate>> DepthsOf(const Window& window) {
+  std::map<int32_t, Estimate> newest;
+  std::vector<std::pair<int32_t, Estimate>> alone;
+  for (int f = 0; f <= window.newest(); ++f) {
+    for (const MapPoint& point : window.keyframe(f).points) {
+      const Estimate estimate{{f, point.corner},
+                              point.inverse_depth,
+                              std::sqrt(static_cast<double>(point.inverse_depth_var))};
+      if (!window.frames[f]->has_ray(point.corner) ||
+          estimate.relative() > kMaxRelativeDepthSigma) {
+        continue;
+      }
+      const int32_t id = window.corner(estimate.host).landmark_id;
+      if (id == kNoLandmark) {
+        alone.emplace_back(id, estimate);
+      } else {
+        newest[id] = estimate;
+      }
+    }
+  }
+  std::vector<std::pair<int32_t, Estimate>> depths(newest.begin(), newest.end());
+  depths.insert(depths.end(), alone.begin(), alone.end());
+  return depths;
+}
+
+// With every corner that is this landmark.
+void AddLandmark(int32_t id, const Estimate& estimate, Window* window) {
+  WindowLandmark landmark =
+      MakeWindowLandmark(*window, id, estimate.host, estimate.inverse_depth, estimate.sigma);
+  const int index = static_cast<int>(window->landmarks.size());
+  for (int f = 0; f <= window->newest(); ++f) {
+    std::vector<int> corners;
+    if (id != kNoLandmark) {
+      corners = window->frames[f]->CornersOfLandmark(id);
+    } else if (f == estimate.host.frame) {
+      corners = {estimate.host.corner};
+    }
+    for (const int corner : corners) {
+      if (window->frames[f]->has_ray(corner)) {
+        landmark.observations.push_back({f, corner});
+        window->landmark_of_corner[f][corner] = index;
+      }
+    }
+  }
+  window->landmarks.push_back(std::move(landmark));
+}
+
 }  // namespace
 
 KeyframeWindow LastOfWindow(const KeyframeWindow& frames) {
@@ -75,55 +125,8 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
     window.T_w_cam.push_back(window.T_w_body.back() * keyframe.camera.T_body_cam);
     window.landmark_of_corner.emplace_back(keyframe.corners.size(), -1);
   }
-
-  // The newest depth of each landmark: it rests on most observations. (Not the one that claims to
-  // be the most certain: sigma over inverse depth favours depths whose error makes them near.)
-  // Points without a landmark stand alone.
-  std::map<int32_t, Estimate> newest;
-  std::vector<Estimate> alone;
-  for (int f = 0; f <= window.newest(); ++f) {
-    for (const MapPoint& point : window.keyframe(f).points) {
-      const Estimate estimate{{f, point.corner},
-                              point.inverse_depth,
-                              std::sqrt(static_cast<double>(point.inverse_depth_var))};
-      if (!window.frames[f]->has_ray(point.corner) ||
-          estimate.relative() > kMaxRelativeDepthSigma) {
-        continue;
-      }
-      const int32_t id = window.corner(estimate.host).landmark_id;
-      if (id == kNoLandmark) {
-        alone.push_back(estimate);
-        continue;
-      }
-      newest[id] = estimate;
-    }
-  }
-
-  const auto add = [&window](int32_t id, const Estimate& estimate) {
-    WindowLandmark landmark =
-        MakeWindowLandmark(window, id, estimate.host, estimate.inverse_depth, estimate.sigma);
-    const int index = static_cast<int>(window.landmarks.size());
-    for (int f = 0; f <= window.newest(); ++f) {
-      std::vector<int> corners;
-      if (id != kNoLandmark) {
-        corners = window.frames[f]->CornersOfLandmark(id);
-      } else if (f == estimate.host.frame) {
-        corners = {estimate.host.corner};
-      }
-      for (const int corner : corners) {
-        if (window.frames[f]->has_ray(corner)) {
-          landmark.observations.push_back({f, corner});
-          window.landmark_of_corner[f][corner] = index;
-        }
-      }
-    }
-    window.landmarks.push_back(std::move(landmark));
-  };
-  for (const auto& [id, estimate] : newest) {
-    add(id, estimate);
-  }
-  for (const Estimate& estimate : alone) {
-    add(kNoLandmark, estimate);
+  for (const auto& [id, estimate] : DepthsOf(window)) {
+    AddLandmark(id, estimate, &window);
   }
   TriangulateMatchedCorners(options.triangulation, after, &window);
   return window;

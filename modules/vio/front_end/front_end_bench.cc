@@ -104,22 +104,34 @@ struct Options {
   TrackerOptions tracker;
 };
 
-void Run(const Options& options) {
-  const EurocRecording recording(options.recording);
+struct Tracked {
+  std::map<int32_t, std::vector<View>> tracks;  // where ground truth is known
+  std::vector<double> milliseconds, counts;     // of each image
+  Tracker::Statistics sum;
+};
+
+void AddTo(Tracker::Statistics* sum, const Tracker::Statistics& image) {
+  sum->tracked += image.tracked;
+  sum->as_predicted += image.as_predicted;
+  sum->lost_klt += image.lost_klt;
+  sum->lost_backward += image.lost_backward;
+  sum->lost_two_view += image.lost_two_view;
+  sum->added += image.added;
+}
+
+Tracked TrackAll(const EurocRecording& recording, const Options& options) {
   const CameraModel& camera = recording.camera();
   Tracker tracker(camera, options.tracker);
   const Eigen::Vector3d bias(options.gyro_bias[0], options.gyro_bias[1], options.gyro_bias[2]);
-  std::map<int32_t, std::vector<View>> tracks;
-  std::vector<double> milliseconds, counts;
-  Tracker::Statistics sum;
+  Tracked all;
   int64_t last = 0;
   for (size_t i = 0; i < recording.images().size(); ++i) {
     const EurocImage& entry = recording.images()[i];
     const double t = 1e-6 * static_cast<double>(entry.utime - recording.images().front().utime);
-    std::string why;
     if (t < options.start || t > options.start + options.duration) {
       continue;
     }
+    std::string why;
     const cv::Mat image = recording.LoadImage(i, &why);
     if (image.empty()) {
       std::cerr << fmt::format("{}\n", why);
@@ -130,15 +142,9 @@ void Run(const Options& options) {
     last = entry.utime;
     const std::clock_t begin = std::clock();
     const TrackedFrame& frame = tracker.Track(entry.utime, image, q);
-    milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
-    counts.push_back(static_cast<double>(frame.observations.size()));
-    const Tracker::Statistics& s = tracker.statistics();
-    sum.tracked += s.tracked;
-    sum.as_predicted += s.as_predicted;
-    sum.lost_klt += s.lost_klt;
-    sum.lost_backward += s.lost_backward;
-    sum.lost_two_view += s.lost_two_view;
-    sum.added += s.added;
+    all.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    all.counts.push_back(static_cast<double>(frame.observations.size()));
+    AddTo(&all.sum, tracker.statistics());
     const auto T_reference_body =
         Interpolate(recording.ground_truth(),
                     entry.utime + static_cast<int64_t>(1e6 * options.time_offset), kMaxGap_us);
@@ -147,53 +153,73 @@ void Run(const Options& options) {
     }
     const Rigid3 T_cam_reference = (*T_reference_body * camera.T_body_cam).Inverse();
     for (const Observation& observation : frame.observations) {
-      tracks[observation.landmark_id].push_back({T_cam_reference, observation.ray});
+      all.tracks[observation.landmark_id].push_back({T_cam_reference, observation.ray});
     }
   }
-  std::vector<double> lengths, residuals, all;
-  int bad_tracks = 0, measured_tracks = 0;
+  return all;
+}
+
+struct TrackErrors {
+  std::vector<double> residuals_px;
+  int bad = 0, measured = 0;
+};
+
+// As the estimator's window does: at most 20 views at a time.
+TrackErrors ErrorsOf(const std::map<int32_t, std::vector<View>>& tracks, double pixel_angle) {
+  constexpr size_t kLeastViews = 5, kMostViews = 20;
+  TrackErrors errors;
   for (const auto& [id, views] : tracks) {
-    lengths.push_back(static_cast<double>(views.size()));
-    if (views.size() < 5) {
-      continue;
-    }
-    // As the estimator's window does: at most 20 views at a time.
-    for (size_t begin = 0; begin + 5 <= views.size(); begin += 20) {
-      const std::vector<View> part(
-          views.begin() + static_cast<ptrdiff_t>(begin),
-          views.begin() + static_cast<ptrdiff_t>(std::min(begin + 20, views.size())));
-      const std::vector<double> r = Residuals(part);
-      ++measured_tracks;
-      bad_tracks += r.empty() || Percentile(r, 0.5) > 2.0 * camera.PixelAngle() ? 1 : 0;
+    for (size_t begin = 0; begin + kLeastViews <= views.size(); begin += kMostViews) {
+      const size_t end = std::min(begin + kMostViews, views.size());
+      const std::vector<double> r = Residuals({views.begin() + static_cast<ptrdiff_t>(begin),
+                                               views.begin() + static_cast<ptrdiff_t>(end)});
+      ++errors.measured;
+      errors.bad += r.empty() || Percentile(r, 0.5) > 2.0 * pixel_angle ? 1 : 0;
       for (const double value : r) {
-        residuals.push_back(value / camera.PixelAngle());
+        errors.residuals_px.push_back(value / pixel_angle);
       }
     }
   }
-  double observations = 0, length_sum = 0, weighted = 0;
-  for (const double length : lengths) {
-    length_sum += length;
-    weighted += length * length;
-  }
-  observations = length_sum;
-  const double frames = static_cast<double>(counts.size());
+  return errors;
+}
+
+void PrintTracking(const Tracked& all) {
+  const double images = static_cast<double>(all.counts.size());
+  const Tracker::Statistics& sum = all.sum;
   fmt::print(
       "frames {:.0f}  features median {:.0f} p5 {:.0f}  ms median {:.1f} p95 {:.1f}\n"
       "per frame: tracked {:.1f} as-predicted {:.1f} klt-lost {:.2f} backward-lost {:.2f} "
-      "two-view-lost {:.2f} added {:.2f}\n"
+      "two-view-lost {:.2f} added {:.2f}\n",
+      images, Percentile(all.counts, 0.5), Percentile(all.counts, 0.05),
+      Percentile(all.milliseconds, 0.5), Percentile(all.milliseconds, 0.95), sum.tracked / images,
+      sum.as_predicted / images, sum.lost_klt / images, sum.lost_backward / images,
+      sum.lost_two_view / images, sum.added / images);
+}
+
+void PrintTracks(const Tracked& all, const TrackErrors& errors) {
+  double observations = 0, squares = 0, long_ones = 0;
+  for (const auto& [id, views] : all.tracks) {
+    const double length = static_cast<double>(views.size());
+    observations += length;
+    squares += length * length;
+    long_ones += length >= 5 ? 1 : 0;
+  }
+  const double tracks = static_cast<double>(all.tracks.size());
+  const std::vector<double>& px = errors.residuals_px;
+  fmt::print(
       "track length: mean {:.1f}, seen by an observation {:.1f}, >= 5 frames {:.2f}\n"
       "residual px (20-view windows): median {:.3f} p68 {:.3f} p90 {:.3f} p95 {:.3f} p99 {:.3f}  "
       "bad tracks {:.4f} of {}\n",
-      frames, Percentile(counts, 0.5), Percentile(counts, 0.05), Percentile(milliseconds, 0.5),
-      Percentile(milliseconds, 0.95), sum.tracked / frames, sum.as_predicted / frames,
-      sum.lost_klt / frames, sum.lost_backward / frames, sum.lost_two_view / frames,
-      sum.added / frames, length_sum / static_cast<double>(lengths.size()), weighted / observations,
-      static_cast<double>(
-          std::count_if(lengths.begin(), lengths.end(), [](double l) { return l >= 5; })) /
-          static_cast<double>(lengths.size()),
-      Percentile(residuals, 0.5), Percentile(residuals, 0.68), Percentile(residuals, 0.9),
-      Percentile(residuals, 0.95), Percentile(residuals, 0.99),
-      static_cast<double>(bad_tracks) / std::max(1, measured_tracks), measured_tracks);
+      observations / tracks, squares / observations, long_ones / tracks, Percentile(px, 0.5),
+      Percentile(px, 0.68), Percentile(px, 0.9), Percentile(px, 0.95), Percentile(px, 0.99),
+      static_cast<double>(errors.bad) / std::max(1, errors.measured), errors.measured);
+}
+
+void Run(const Options& options) {
+  const EurocRecording recording(options.recording);
+  const Tracked all = TrackAll(recording, options);
+  PrintTracking(all);
+  PrintTracks(all, ErrorsOf(all.tracks, recording.camera().PixelAngle()));
 }
 
 }  // namespace

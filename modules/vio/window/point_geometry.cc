@@ -59,6 +59,45 @@ std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const Frame
   return Vector3d(ldlt.solve(b));
 }
 
+// Of one Gauss-Newton step of a point (alpha, beta, rho) seen along `rays`.
+struct PointNormalEquations {
+  Matrix3d A = Matrix3d::Zero();
+  Vector3d b = Vector3d::Zero();
+  double cost = 0;
+};
+
+// Nothing when a camera has the point behind it.
+std::optional<PointNormalEquations> PointEquations(const WindowState& state,
+                                                   std::span<const FrameRay> rays,
+                                                   const std::vector<Rigid3>& T_odom_cam,
+                                                   size_t anchor, const AnchoredPoint& point) {
+  const Matrix3d R_odom_anchor = T_odom_cam[anchor].R();
+  const Vector3d x_odom = R_odom_anchor * point.InCamera() + T_odom_cam[anchor].t;
+  const Matrix3d odom_by_point = R_odom_anchor * PointJacobian(point.ray_rho);
+  PointNormalEquations equations;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const Matrix3d R_cam_odom = T_odom_cam[i].R().transpose();
+    const Vector3d y = R_cam_odom * (x_odom - T_odom_cam[i].t);
+    if (!(y.z() > kMinDepth)) {
+      return std::nullopt;
+    }
+    const Vector2d r = (rays[i].RayBy(state) - y.head<2>() / y.z()) / rays[i].sigma;
+    const Eigen::Matrix<double, 2, 3> J =
+        RayJacobian(y) * R_cam_odom * odom_by_point / rays[i].sigma;
+    equations.A += J.transpose() * J;
+    equations.b += J.transpose() * r;
+    equations.cost += r.squaredNorm();
+  }
+  return equations;
+}
+
+bool HasDepth(const Triangulated& point) {
+  const double rho = point.point.ray_rho.z();
+  const double sigma_rho = std::sqrt(point.covariance(2, 2));
+  return 1 / rho <= kMaxDepth && 1 / rho >= kMinDepth &&
+         (sigma_rho < kMaxRelativeSigma * rho || sigma_rho < kMaxInverseDepthSigma);
+}
+
 }  // namespace
 
 const RowView& RowViews::At(int frame, double row_s) {
@@ -171,29 +210,15 @@ std::optional<Triangulated> Triangulate(const WindowState& state, std::span<cons
   out.point.anchor = rays[anchor].frame;
   out.point.anchor_row_s = rays[anchor].row_s;
   out.point.ray_rho = {p_anchor.x() / p_anchor.z(), p_anchor.y() / p_anchor.z(), 1 / p_anchor.z()};
-  const Matrix3d R_odom_anchor = T_odom_cam[anchor].R();
   double cost = 0, last_cost = 1e300;
   for (int iteration = 0; iteration < 10; ++iteration) {
-    Matrix3d A = Matrix3d::Zero();
-    Vector3d b = Vector3d::Zero();
-    cost = 0;
-    const Vector3d x_odom = R_odom_anchor * out.point.InCamera() + T_odom_cam[anchor].t;
-    const Matrix3d odom_by_point = R_odom_anchor * PointJacobian(out.point.ray_rho);
-    for (size_t i = 0; i < rays.size(); ++i) {
-      const Matrix3d R_cam_odom = T_odom_cam[i].R().transpose();
-      const Vector3d y = R_cam_odom * (x_odom - T_odom_cam[i].t);
-      if (!(y.z() > kMinDepth)) {
-        return std::nullopt;
-      }
-      const Vector2d r = (rays[i].RayBy(state) - y.head<2>() / y.z()) / rays[i].sigma;
-      const Eigen::Matrix<double, 2, 3> J =
-          RayJacobian(y) * R_cam_odom * odom_by_point / rays[i].sigma;
-      A += J.transpose() * J;
-      b += J.transpose() * r;
-      cost += r.squaredNorm();
+    const auto equations = PointEquations(state, rays, T_odom_cam, anchor, out.point);
+    if (!equations) {
+      return std::nullopt;
     }
-    const Eigen::LDLT<Matrix3d> ldlt(A);
-    const Vector3d step = ldlt.solve(b);
+    cost = equations->cost;
+    const Eigen::LDLT<Matrix3d> ldlt(equations->A);
+    const Vector3d step = ldlt.solve(equations->b);
     if (!step.allFinite()) {
       return std::nullopt;
     }
@@ -207,10 +232,7 @@ std::optional<Triangulated> Triangulate(const WindowState& state, std::span<cons
     }
     last_cost = cost;
   }
-  const double rho = out.point.ray_rho.z();
-  const double sigma_rho = std::sqrt(out.covariance(2, 2));
-  if (1 / rho > kMaxDepth || 1 / rho < kMinDepth ||
-      !(sigma_rho < kMaxRelativeSigma * rho || sigma_rho < kMaxInverseDepthSigma)) {
+  if (!HasDepth(out)) {
     return std::nullopt;
   }
   out.rms = std::sqrt(cost / (2.0 * static_cast<double>(rays.size())));
