@@ -73,7 +73,7 @@ export function check(what, good, saw = "") {
 }
 
 // Waits until `condition` holds in the page; `what` it is about.
-export async function becomes(page, what, condition, argument, timeout = 15000) {
+export async function becomes(page, what, condition, argument, timeout = 60_000) {
   try {
     await page.waitForFunction(condition, argument, { timeout });
     check(what, true);
