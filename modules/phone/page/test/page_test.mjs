@@ -255,11 +255,12 @@ async function testXr(browser, url) {
     window.xrSource = () => ({ ...lens, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
   }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
   await page.locator("#start").click();
-  await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5, undefined, 60_000);
+  await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5);
   const { cameraYaml, edges } = await told(page);
   check("its camera too, smaller", /resolution: \[480, 640\]/.test(cameraYaml) && /intrinsics: \[500\.000, 500\.000, 239\.500, 319\.500\]/.test(cameraYaml));
   const expected = { top: 200, bottom: 100, left: 200, right: 150 };
   check("the image is upright and exact", Object.entries(expected).every(([side, grey]) => Math.abs(edges[side] - grey) <= 1), JSON.stringify(edges));
+  await becomes(page, "an anchor and somebody else are drawn", () => pangea.stage.drawn?.anchors.length > 0 && pangea.stage.drawn.others.length > 0);
   const [T, pixel, other] = await page.evaluate(() => [pangea.walk.pose.T_odom_body, pangea.stage.drawn.anchors[0].pixel, pangea.stage.drawn.others[0].pixel]);
   check("with its pose, z up", Math.hypot(T[0], T[1], T[2] - 1.5) < 1e-6, String(T));
   check("an anchor and somebody else are where they belong", Math.hypot(pixel[0] - 239.5, pixel[1] - 319.5) < 0.1 && Math.hypot(other[0] - 364.5, other[1] - 319.5) < 0.1, `${pixel}, ${other}`);
