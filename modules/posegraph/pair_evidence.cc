@@ -214,11 +214,10 @@ bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoin
   const int count = static_cast<int>(viewpoints.size());
   if (std::ranges::any_of(agreeing_, [&](int k) { return candidates_[k].derived; })) {
     return rival_viewpoints <=
-           options_.max_rival_share * std::max(count, options_.min_viewpoints_at_one_spot);
+           options_.max_rival_share * std::max(count, options_.min_viewpoints + 1);
   }
   if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
-    return (count >= options_.min_viewpoints_at_one_spot ||
-            strong >= options_.min_strong_viewpoints_at_one_spot) &&
+    return (count > options_.min_viewpoints || strong > options_.min_strong_viewpoints) &&
            rival_viewpoints <= options_.max_rival_share_at_one_spot * count;
   }
   return (count >= options_.min_viewpoints || strong >= options_.min_strong_viewpoints) &&

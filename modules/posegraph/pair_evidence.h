@@ -33,8 +33,6 @@ struct MergeOptions {
   // Agents that only ever looked at one spot need one viewpoint more, and next to no rival:
   // look-alikes standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
-  int min_viewpoints_at_one_spot = 4;
-  int min_strong_viewpoints_at_one_spot = 3;
   double max_rival_share_at_one_spot = 0.25;
   // The largest rival may have this share of the viewpoints.
   double max_rival_share = 0.5;
@@ -56,10 +54,6 @@ struct MergeOptions {
                 "by which a keyframe is another viewpoint");
     archive.Add("min_scene_extent_m", &min_scene_extent_m, {0, 1000}, "m",
                 "of what the agreeing viewpoints see; less is one spot");
-    archive.Add("min_viewpoints_at_one_spot", &min_viewpoints_at_one_spot, {1, 1000}, "",
-                "that must agree where all see one spot");
-    archive.Add("min_strong_viewpoints_at_one_spot", &min_strong_viewpoints_at_one_spot, {1, 1000},
-                "", "that are enough there, if each is strong");
     archive.Add("max_rival_share_at_one_spot", &max_rival_share_at_one_spot, {0, 1}, "",
                 "of the viewpoints, where all see one spot");
     archive.Add("max_rival_share", &max_rival_share, {0, 1}, "", "of the viewpoints");

@@ -26,8 +26,8 @@ struct GraphMap {
   double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)
   int newest_solved = -1;
   Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom
-  int solved_with =
-      0;  // the oldest map of the group that it was last solved in; not in a checkpoint
+  // The oldest map of the group that it was last solved in; not in a checkpoint.
+  int solved_with = 0;
 
   // Placed by odometry after the newest solution. False for a repeat and what is out of order.
   bool Add(const Keyframe& keyframe);
