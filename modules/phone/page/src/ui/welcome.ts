@@ -1,0 +1,54 @@
+// Before a walk: who the visitor is, or joins as.
+
+import { byId } from "../dom";
+import { codeIn, forgetMembership, join, storedMembership } from "../link/join";
+import type { Membership } from "../messages";
+import { forgetCalibrations, storedCalibrations } from "../sensors/calibration";
+
+const codeField = () => byId<HTMLInputElement>("code");
+
+export class Welcome {
+  membership: Membership | undefined = storedMembership();
+
+  constructor() {
+    byId("forget").onclick = () => {
+      forgetMembership();
+      this.membership = undefined;
+      this.show();
+    };
+    byId("recalibrate").onclick = () => {
+      forgetCalibrations();
+      this.show();
+    };
+    this.show();
+  }
+
+  // Joins, where an invite code was given.
+  async admit(): Promise<Membership | undefined> {
+    const code = codeField().value.trim();
+    if (code !== "") {
+      this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+      // The code works once: a page that is loaded again must not offer it.
+      history.replaceState(null, "", location.pathname);
+      codeField().value = "";
+    }
+    return this.membership;
+  }
+
+  show() {
+    const code = codeIn(location.hash);
+    if (code) codeField().value = code;
+    const member = code ? undefined : this.membership;
+    byId("name_row").hidden = byId("code_row").hidden = member !== undefined;
+    byId("forget").hidden = !this.membership;
+    byId("recalibrate").hidden = storedCalibrations() === 0;
+    byId("invitation").textContent = member
+      ? `You are ${member.name || `agent ${member.agent}`}${member.site ? ` at ${member.site}` : ""}.`
+      : code ? "You are invited." : "With an invite code you join others. Without one, the phone tracks by itself.";
+    byId("welcome").hidden = false;
+  }
+
+  hide() {
+    byId("welcome").hidden = true;
+  }
+}

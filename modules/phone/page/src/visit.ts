@@ -1,0 +1,182 @@
+// One visit: an unknown camera is calibrated, then an agent walks, with the phone's sensors, the device's own odometry, or a recording.
+
+import type { AgentPose } from "./agent/phone_agent";
+import { CalibrationWalk } from "./calibration/calibration_walk";
+import type { Membership } from "./messages";
+import { isCalibrated, openRecording, withCamera } from "./recording/euroc";
+import type { CalibratedRecording, Recording } from "./recording/euroc";
+import type { Files } from "./recording/files";
+import { roughCalibration, storeCalibration, storedCalibration } from "./sensors/calibration";
+import type { CameraKind } from "./sensors/calibration";
+import { Camera } from "./sensors/camera";
+import { askForMotion } from "./sensors/motion";
+import { parseCamera } from "./view/camera_model";
+import type { Stage } from "./view/stage";
+import { Walk } from "./walk";
+import type { WalkEvents } from "./walk";
+import { XrOdometry } from "./xr/xr_odometry";
+
+export interface VisitEvents {
+  onEnter(): void; // a camera's image is shown from now on
+  onLeave(): void;
+  onPose(pose: AgentPose): void;
+  onNotice(text: string): void;
+}
+
+export interface VisitOptions {
+  ownOdometry: boolean; // even where the device has one
+  realTime: boolean; // of recordings
+}
+
+export class Visit {
+  walk?: Walk;
+  calibration?: CalibrationWalk;
+  skipCalibration?: () => void; // where the visitor may go on without
+  isLive = false;
+  playedShare = 0; // of a recording
+  private camera?: CameraKind; // the newest live one
+  private xr?: XrOdometry;
+  private xrFails = false;
+  private readonly hasXr: Promise<boolean>;
+  private endCalibration = (_cameraYaml: string | undefined) => {};
+  private readonly walkEvents: WalkEvents;
+
+  // `admit`: joins with the invite code, where one was given.
+  constructor(
+    private readonly stage: Stage,
+    private readonly admit: () => Promise<Membership | undefined>,
+    private readonly events: VisitEvents,
+    private readonly options: VisitOptions,
+  ) {
+    this.hasXr = options.ownOdometry ? Promise.resolve(false) : XrOdometry.isSupported();
+    const { onPose, onNotice } = events;
+    this.walkEvents = { onPose, onNotice, onFailure: (text) => (this.leave(), onNotice(text)) };
+  }
+
+  get usesXr(): boolean {
+    return this.xr !== undefined;
+  }
+
+  // Within a tap.
+  async startLive() {
+    this.endCalibration(undefined);
+    if (!this.xrFails && (await this.hasXr) && (await this.startXr())) return;
+    await askForMotion(); // first: iOS asks within the tap only
+    const membership = await this.begin(true);
+    const sensor = await Camera.open();
+    this.camera = sensor.kind;
+    await keepAwake();
+    const cameraYaml = storedCalibration(this.camera) ?? (await this.calibrateLive(sensor, this.camera));
+    if (!cameraYaml) return;
+    this.walk = Walk.live(sensor, cameraYaml, membership, this.stage, this.walkEvents);
+    this.events.onEnter();
+  }
+
+  async startRecorded(files: Files) {
+    const recording = await openRecording(files);
+    this.endCalibration(undefined);
+    const membership = await this.begin(false);
+    const calibrated = isCalibrated(recording) ? recording : await this.calibrateRecording(recording);
+    if (!calibrated) return;
+    const onProgress = (share: number) => (this.playedShare = share);
+    this.walk = Walk.play(calibrated, this.options.realTime, membership, this.stage, this.walkEvents, onProgress);
+    this.events.onEnter();
+  }
+
+  leave() {
+    this.endCalibration(undefined);
+    this.walk?.stop();
+    const device = this.xr;
+    this.xr = undefined;
+    device?.stop();
+    this.stage.clear();
+    this.events.onLeave();
+  }
+
+  // The tab is hidden, or seen again.
+  onVisibility(isHidden: boolean) {
+    if (!this.walk || !this.isLive) return;
+    if (isHidden) this.walk.endMap();
+    else void keepAwake();
+  }
+
+  // A sensor.yaml of this phone's camera, as pangea-calibrate writes it.
+  keepCalibration(yaml: string) {
+    const { camera } = this;
+    if (!camera) throw new Error("Start once, so that the camera is known; then drop its sensor.yaml again.");
+    const { width, height } = parseCamera(yaml, "sensor.yaml");
+    if (width !== camera.width || height !== camera.height) {
+      throw new Error(`sensor.yaml: field 'resolution' is ${width} x ${height}, the camera gives ${camera.width} x ${camera.height}`);
+    }
+    storeCalibration(camera, yaml);
+  }
+
+  private async begin(isLive: boolean): Promise<Membership | undefined> {
+    const membership = await this.admit();
+    await this.walk?.close();
+    this.walk = undefined;
+    this.isLive = isLive;
+    return membership;
+  }
+
+  // False: our odometry takes its place, for instance where a browser gives no images.
+  private async startXr(): Promise<boolean> {
+    try {
+      this.xr = await XrOdometry.open(this.stage.overlay.renderer, document.body);
+    } catch (error) {
+      console.info(`WebXR: ${error}`);
+      return false;
+    }
+    const device = this.xr;
+    device.onEnd = () => {
+      if (!device.hasCamera) this.xrFails = true;
+      if (this.xr !== device) return;
+      this.leave();
+      if (this.xrFails) this.events.onNotice("AR gives no camera images here. Start again: the page tracks by itself then.");
+    };
+    const membership = await this.admit();
+    await keepAwake();
+    this.isLive = true;
+    device.onCamera = async (cameraYaml) => {
+      await this.walk?.close();
+      if (this.xr !== device) return;
+      this.walk = Walk.xr(device, cameraYaml, membership, this.stage, this.walkEvents);
+      this.events.onEnter();
+    };
+    device.start();
+    this.events.onEnter();
+    return true;
+  }
+
+  private async calibrateLive(sensor: Camera, kind: CameraKind): Promise<string | undefined> {
+    const rough = roughCalibration(kind);
+    const run = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), this.stage);
+    const cameraYaml = await this.calibrate(run, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
+    if (!cameraYaml) sensor.stop();
+    else if (cameraYaml !== rough) storeCalibration(kind, cameraYaml);
+    return cameraYaml;
+  }
+
+  private async calibrateRecording(recording: Recording): Promise<CalibratedRecording | undefined> {
+    const cameraYaml = await this.calibrate(await CalibrationWalk.ofRecording(recording, this.stage));
+    return cameraYaml === undefined ? undefined : withCamera(recording, cameraYaml, "the calibration");
+  }
+
+  // Nothing: it was ended without. `otherwise`: what the visitor may go on with at once.
+  private async calibrate(run: CalibrationWalk, otherwise?: string): Promise<string | undefined> {
+    this.calibration = run;
+    this.skipCalibration = otherwise === undefined ? undefined : () => this.endCalibration(otherwise);
+    this.events.onEnter();
+    const ended = new Promise<string | undefined>((done) => (this.endCalibration = done));
+    try {
+      return await Promise.race([run.done, ended]);
+    } finally {
+      run.stop();
+      this.calibration = this.skipCalibration = undefined;
+    }
+  }
+}
+
+async function keepAwake() {
+  await navigator.wakeLock?.request("screen").catch(() => {});
+}
