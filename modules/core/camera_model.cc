@@ -150,9 +150,13 @@ std::optional<std::string> CameraModel::Invalid() const {
   if (!(fx > 1 && fx < 1e5 && fy > 1 && fy < 1e5)) {
     return "focal lengths must be between 1 and 1e5 pixels";
   }
-  if (!(std::abs(cx) < 1e5 && std::abs(cy) < 1e5) || !distortion.allFinite() ||
-      distortion.cwiseAbs().maxCoeff() > 1e3) {
-    return "principal point or distortion out of range";
+  // A cropped image's may lie outside, by an image at most.
+  if (!(cx > -width && cx < 2 * width && cy > -height && cy < 2 * height)) {
+    return fmt::format("the principal point ({:.4g}, {:.4g}) is far outside of {} x {} pixels", cx,
+                       cy, width, height);
+  }
+  if (!distortion.allFinite() || distortion.cwiseAbs().maxCoeff() > 1e3) {
+    return "the distortion coefficients must be finite, and at most 1000";
   }
   if (!T_body_cam.t.allFinite() || !(std::abs(T_body_cam.q.norm() - 1) < 1e-6)) {
     return "T_body_cam must be a finite rigid transform";
@@ -161,8 +165,11 @@ std::optional<std::string> CameraModel::Invalid() const {
     return fmt::format("the camera is {:.3g} m from the body; at most {} are plausible",
                        T_body_cam.t.norm(), kMaxLever_m);
   }
-  if (!(std::abs(time_offset_s) < 10) || !(readout_s >= 0 && readout_s < 1)) {
-    return "time offset or read-out out of range";
+  if (!(std::abs(time_offset_s) < 10)) {
+    return fmt::format("the time offset must be below 10 s, not {:.4g}", time_offset_s);
+  }
+  if (!(readout_s >= 0 && readout_s < 1)) {
+    return fmt::format("the read-out must be 0 to 1 s, not {:.4g}", readout_s);
   }
   return std::nullopt;
 }

@@ -28,20 +28,26 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-std::string NearestWordHint(const std::string& word, const std::vector<std::string>& known,
-                            const std::string& prefix) {
+std::optional<std::string> NearestWord(const std::string& word,
+                                       const std::vector<std::string>& known) {
   const auto nearest = std::min_element(known.begin(), known.end(),
                                         [&word](const std::string& a, const std::string& b) {
                                           return EditDistance(a, word) < EditDistance(b, word);
                                         });
-  if (nearest == known.end()) {
+  // Half of a short word, or two slips of a long one, may be wrong.
+  const bool is_near = nearest != known.end() &&
+                       EditDistance(*nearest, word) <= std::max<size_t>(2, word.size() / 2);
+  return is_near ? std::optional(*nearest) : std::nullopt;
+}
+
+std::string NearestWordHint(const std::string& word, const std::vector<std::string>& known,
+                            const std::string& prefix) {
+  if (known.empty()) {
     return "; none is known here";
   }
-  // Half of a short word, or two slips of a long one, may be wrong.
-  if (EditDistance(*nearest, word) <= std::max<size_t>(2, word.size() / 2)) {
-    return fmt::format("; did you mean '{}{}'?", prefix, *nearest);
-  }
-  return fmt::format("; known are {}", fmt::join(known, ", "));
+  const auto nearest = NearestWord(word, known);
+  return nearest ? fmt::format("; did you mean '{}{}'?", prefix, *nearest)
+                 : fmt::format("; known are {}", fmt::join(known, ", "));
 }
 
 }  // namespace pangea

@@ -13,6 +13,7 @@
 #include "files/text_file.h"
 #include "recording/euroc_calibration.h"
 #include "recording/grey_image.h"
+#include "recording/sensor_file.h"
 
 namespace pangea {
 namespace {
@@ -147,6 +148,25 @@ void Append(const RowComplaints& complaints, std::vector<std::string>* warnings)
   }
 }
 
+void Append(const std::vector<std::string>& more, std::vector<std::string>* warnings) {
+  warnings->insert(warnings->end(), more.begin(), more.end());
+}
+
+// Nanoseconds they must be: images of other units stand within a thousandth of a second.
+void CheckUnitOfStamps(const std::vector<EurocImage>& images, const std::string& csv) {
+  constexpr int64_t kShortest_us = 1000;
+  constexpr size_t kEnough = 10;
+  std::vector<int64_t> periods;
+  for (size_t i = 1; i < images.size(); ++i) {
+    periods.push_back(images[i].utime - images[i - 1].utime);
+  }
+  if (periods.size() >= kEnough && Median(periods) < kShortest_us) {
+    throw std::runtime_error(
+        fmt::format("{}: its images are {} us apart (median): are the stamps nanoseconds?", csv,
+                    Median(periods)));
+  }
+}
+
 Trajectory ReadGroundTruthIn(const std::string& mav0, const Rigid3& T_s_body,
                              std::vector<std::string>* warnings) {
   for (const char* sensor : {"state_groundtruth_estimate0", "mocap0"}) {
@@ -191,12 +211,14 @@ EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folde
 void EurocRecording::ReadCamera() {
   const std::string file = EurocCalibrationFile(mav0_, "cam0");
   camera_ = ReadEurocCamera(file);
+  Append(UnreadFields(file, "cam0"), &warnings_);
   calibration_sigmas_ = ReadEurocCalibrationSigmas(file);
 }
 
 Rigid3 EurocRecording::ReadImuCalibration() {
-  const EurocImuCalibration calibration =
-      ReadEurocImuCalibration(EurocCalibrationFile(mav0_, "imu0"));
+  const std::string file = EurocCalibrationFile(mav0_, "imu0");
+  const EurocImuCalibration calibration = ReadEurocImuCalibration(file);
+  Append(UnreadFields(file, "imu0"), &warnings_);
   imu_noise_ = calibration.noise;
   return calibration.T_s_body;
 }
@@ -233,6 +255,7 @@ void EurocRecording::ReadImages() {
             : fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
   }
   DropFarStamps(&images_, csv, &warnings_);
+  CheckUnitOfStamps(images_, csv);
   Warn(SortByTime(&images_), csv, &warnings_);
   NameGaps(images_, 3.5, csv, &warnings_);
 }
@@ -251,10 +274,16 @@ void EurocRecording::ReadImu() {
     for (size_t i = 0; good && i < 6; ++i) {
       good = ParseNumber(row.fields[i + 1], &v[i]);
     }
-    if (good) {
-      imu_.push_back({UtimeFromNs(ns), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
-    } else {
+    if (!good) {
       complaints.Add(row.line, fmt::format("not '{}'", expected));
+      continue;
+    }
+    const ImuSample sample{UtimeFromNs(ns), {v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+    if (IsPlausible(sample)) {
+      imu_.push_back(sample);
+    } else {
+      complaints.Add(row.line, fmt::format("above {} rad/s or {} m/s^2, which no sensor shows",
+                                           kMostGyro, kMostAccel));
     }
   }
   complaints.ThrowIfTooMany(num_rows, expected);

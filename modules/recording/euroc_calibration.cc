@@ -1,37 +1,22 @@
 #include "recording/euroc_calibration.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "files/text_file.h"
+#include "recording/sensor_file.h"
 
 namespace pangea {
 namespace {
 
 [[noreturn]] void Throw(const std::string& file, const std::string& what) {
   throw std::runtime_error(fmt::format("{}: {}", file, what));
-}
-
-// `path` stands for the text in messages.
-YAML::Node Load(std::string text, const std::string& path) {
-  if (text.starts_with("%YAML:")) {  // OpenCV's spelling of the directive is not YAML
-    text.erase(0, text.find('\n'));
-  }
-  try {
-    YAML::Node node = YAML::Load(text);
-    if (!node.IsMap()) {
-      Throw(path, "holds no keys");
-    }
-    return node;
-  } catch (const YAML::Exception& error) {
-    Throw(path, fmt::format("line {}: not YAML: {}", error.mark.line + 1, error.msg));
-  }
 }
 
 double Number(const YAML::Node& node, const std::string& file, const std::string& key) {
@@ -45,7 +30,10 @@ double Number(const YAML::Node& node, const std::string& file, const std::string
 std::vector<double> Numbers(const YAML::Node& root, const std::string& file, const std::string& key,
                             size_t count) {
   const YAML::Node node = root[key];
-  if (!node || !node.IsSequence() || node.size() != count) {
+  if (!node) {
+    Throw(file, fmt::format("field '{}', a list of {} numbers, is missing", key, count));
+  }
+  if (!node.IsSequence() || node.size() != count) {
     Throw(file, fmt::format("field '{}' must be a list of {} numbers", key, count));
   }
   std::vector<double> values;
@@ -53,12 +41,6 @@ std::vector<double> Numbers(const YAML::Node& root, const std::string& file, con
     values.push_back(Number(item, file, key));
   }
   return values;
-}
-
-// Kalibr's files hold several sensors, each below its name; EuRoC's are of one.
-YAML::Node SensorIn(const YAML::Node& root, const char* sensor) {
-  const YAML::Node node = root[sensor];
-  return node && node.IsMap() ? node : root;
 }
 
 // Row by row: of EuRoC's `data`, or of Kalibr's list of rows.
@@ -116,7 +98,10 @@ Rigid3 CameraExtrinsics(const YAML::Node& root, const std::string& file) {
 
 CameraModel::Kind Distortion(const YAML::Node& root, const std::string& file) {
   const YAML::Node node = root["distortion_model"];
-  const std::string name = node && node.IsScalar() ? node.Scalar() : "";
+  if (!node) {
+    Throw(file, "field 'distortion_model' is missing; known: radial-tangential, equidistant");
+  }
+  const std::string name = node.IsScalar() ? node.Scalar() : "";
   if (name == "radial-tangential" || name == "radtan" || name == "plumb_bob") {
     return CameraModel::Kind::kRadtan;
   }
@@ -190,7 +175,7 @@ std::string EurocCalibrationFile(const std::string& mav0, const std::string& sen
   }
   Throw(euroc, fmt::format("there is no such file. Kalibr's {} serves under that name, and "
                            "pangea-calibrate makes one from the recording",
-                           is_camera ? "camchain.yaml" : "imu.yaml"));
+                           is_camera ? "camchain-imucam.yaml" : "imu.yaml"));
 }
 
 CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
@@ -198,7 +183,7 @@ CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
 }
 
 CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml) {
-  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "cam0");
+  const YAML::Node root = LoadSensorFile(text, sensor_yaml, "cam0");
   const YAML::Node model = root["camera_model"];
   if (model && (!model.IsScalar() || model.Scalar() != "pinhole")) {
     Throw(sensor_yaml,
@@ -209,8 +194,10 @@ CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_
   camera.kind = Distortion(root, sensor_yaml);
   const std::vector<double> size = Numbers(root, sensor_yaml, "resolution", 2);
   for (const double pixels : size) {
-    if (!(pixels >= 1 && pixels <= 1e6)) {
-      Throw(sensor_yaml, fmt::format("field 'resolution' is out of range: {} pixels", pixels));
+    if (!(pixels >= 1 && pixels <= 1e6 && pixels == std::floor(pixels))) {
+      Throw(
+          sensor_yaml,
+          fmt::format("field 'resolution' must be whole pixels, at most 1000000, not {}", pixels));
     }
   }
   camera.width = static_cast<int>(size[0]);
@@ -237,8 +224,9 @@ std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& s
 
 std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
                                                              const std::string& sensor_yaml) {
-  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "cam0");
-  // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0).
+  const YAML::Node root = LoadSensorFile(text, sensor_yaml, "cam0");
+  // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0),
+  // as a share of `unit`.
   const auto read = [&](const char* key, size_t size, size_t first, size_t count, double unit,
                         double* sigma) {
     if (!root[key]) {
@@ -246,11 +234,16 @@ std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& 
     }
     const std::vector<double> values = size > 0 ? Numbers(root, sensor_yaml, key, size)
                                                 : std::vector{Number(root[key], sensor_yaml, key)};
-    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
-    *sigma = *std::max_element(begin, begin + static_cast<std::ptrdiff_t>(count)) / unit;
-    if (!(*sigma > 0 && *sigma < 1)) {
-      Throw(sensor_yaml,
-            fmt::format("field '{}' must be above 0 and plausible, not {}", key, *sigma * unit));
+    *sigma = 0;
+    for (size_t i = first; i < first + count; ++i) {
+      if (!(values[i] >= 0 && values[i] < unit)) {
+        Throw(sensor_yaml, fmt::format("field '{}' must be 0 or above, and below {:.4g}, not {}",
+                                       key, unit, values[i]));
+      }
+      *sigma = std::max(*sigma, values[i] / unit);
+    }
+    if (*sigma == 0) {
+      Throw(sensor_yaml, fmt::format("field '{}' must be above 0: nothing is known exactly", key));
     }
     return true;
   };
@@ -271,27 +264,29 @@ EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
 
 EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
                                              const std::string& sensor_yaml) {
-  const YAML::Node root = SensorIn(Load(text, sensor_yaml), "imu0");
+  const YAML::Node root = LoadSensorFile(text, sensor_yaml, "imu0");
   EurocImuCalibration calibration;
   const bool is_kalibr = !root["rate_hz"] && root["update_rate"];  // whose first IMU is the body
   if (!is_kalibr) {
     calibration.T_s_body = Transform(root, sensor_yaml, "T_BS");
   }
   ImuNoise& noise = calibration.noise;
-  const std::pair<const char*, double*> fields[] = {
-      {"gyroscope_noise_density", &noise.gyro_noise_density},
-      {"gyroscope_random_walk", &noise.gyro_random_walk},
-      {"accelerometer_noise_density", &noise.accel_noise_density},
-      {"accelerometer_random_walk", &noise.accel_random_walk},
-      {is_kalibr ? "update_rate" : "rate_hz", &noise.rate_hz}};
-  for (const auto& [key, value] : fields) {
+  // In SI units; beyond the bounds the unit is another one.
+  const std::tuple<const char*, double*, double> fields[] = {
+      {"gyroscope_noise_density", &noise.gyro_noise_density, 10},
+      {"gyroscope_random_walk", &noise.gyro_random_walk, 10},
+      {"accelerometer_noise_density", &noise.accel_noise_density, 100},
+      {"accelerometer_random_walk", &noise.accel_random_walk, 100},
+      {is_kalibr ? "update_rate" : "rate_hz", &noise.rate_hz, 1e5}};
+  for (const auto& [key, value, most] : fields) {
     const YAML::Node node = root[key];
     if (!node) {
       Throw(sensor_yaml, fmt::format("field '{}' is missing", key));
     }
     *value = Number(node, sensor_yaml, key);
-    if (!(*value > 0)) {
-      Throw(sensor_yaml, fmt::format("field '{}' must be above 0, not {}", key, *value));
+    if (!(*value > 0 && *value <= most)) {
+      Throw(sensor_yaml,
+            fmt::format("field '{}' must be above 0 and at most {}, not {}", key, most, *value));
     }
   }
   for (const auto& [key, value] : {std::pair("gyroscope_scale_sigma", &noise.gyro_scale_sigma),
@@ -309,7 +304,7 @@ Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
   if (!Exists(sensor_yaml)) {
     return {};
   }
-  const YAML::Node root = Load(ReadTextFile(sensor_yaml), sensor_yaml);
+  const YAML::Node root = LoadSensorFile(ReadTextFile(sensor_yaml), sensor_yaml, "");
   return root["T_BS"] ? Transform(root, sensor_yaml, "T_BS") : Rigid3();
 }
 

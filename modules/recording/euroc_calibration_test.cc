@@ -80,12 +80,40 @@ TEST(EurocCalibration, WhatALensModelLacksIsSaid) {
               HasSubstr("field 'T_cam_imu' must be a 4x4 matrix"));
 }
 
+TEST(EurocCalibration, ASensorOfAnotherNameIsNoCamera) {
+  const std::string cam1 = "cam1:\n" + kCamchain.substr(kCamchain.find('\n') + 1);
+  EXPECT_THAT(
+      Complaint([&] { ParseEurocCamera(cam1.substr(0, cam1.rfind("cam1:")), "camchain.yaml"); }),
+      HasSubstr("no sensor 'cam0' in it; it has cam1: rename"));
+}
+
+TEST(EurocCalibration, AFieldGivenTwiceOrNotAtAllIsNamed) {
+  const auto camera = [](const std::string& text) {
+    return Complaint([&] { ParseEurocCamera(text, "cam0/sensor.yaml"); });
+  };
+  std::string text = kCamchain;
+  EXPECT_THAT(camera(text.insert(text.find("  resolution"), "  intrinsics: [1, 1, 1, 1]\n")),
+              HasSubstr("field 'intrinsics' is given twice"));
+  text = kCamchain;
+  text.replace(text.find("intrinsics"), 10, "intrinsic");
+  EXPECT_THAT(camera(text), HasSubstr("field 'intrinsics', a list of 4 numbers, is missing"));
+  text = kCamchain;
+  text.replace(text.find("254.9"), 5, "5000");
+  EXPECT_THAT(camera(text), HasSubstr("the principal point (5000, 256.8) is far outside"));
+  text = kNoise;
+  text.replace(text.find("0.00016"), 7, "1e6");
+  EXPECT_THAT(
+      Complaint([&] { ParseEurocImuCalibration(text, "imu.yaml"); }),
+      HasSubstr("field 'gyroscope_noise_density' must be above 0 and at most 10, not 1000000"));
+}
+
 TEST(EurocCalibration, IsFoundBesideTheFolderAsInTumVi) {
   const std::string root = ::testing::TempDir() + "pangea_tum_vi";
   fs::remove_all(root);
   fs::create_directories(root + "/mav0/cam0");
-  EXPECT_THAT(Complaint([&] { EurocCalibrationFile(root + "/mav0", "cam0"); }),
-              HasSubstr("mav0/cam0/sensor.yaml: there is no such file. Kalibr's camchain.yaml"));
+  EXPECT_THAT(
+      Complaint([&] { EurocCalibrationFile(root + "/mav0", "cam0"); }),
+      HasSubstr("mav0/cam0/sensor.yaml: there is no such file. Kalibr's camchain-imucam.yaml"));
   fs::create_directories(root + "/dso");
   std::ofstream(root + "/dso/camchain.yaml") << kCamchain;
   EXPECT_EQ(ReadEurocCamera(EurocCalibrationFile(root + "/mav0", "cam0")).width, 512);

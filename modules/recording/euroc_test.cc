@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 
 namespace pangea {
@@ -170,7 +171,12 @@ TEST_F(EurocTest, HowWellTheCalibrationIsKnown) {
   EXPECT_EQ(sigmas->distortion, 0.02);
   EXPECT_EQ(sigmas->position_m, CalibrationSigmas{}.position_m);  // not given
   Write("cam0/sensor.yaml", camera + "time_offset_sigma: -0.001\n");
-  EXPECT_THAT(Complaint(), HasSubstr("'time_offset_sigma' must be above 0"));
+  EXPECT_THAT(Complaint(), HasSubstr("'time_offset_sigma' must be 0 or above"));
+  Write("cam0/sensor.yaml", camera + "rotation_sigma: [-1, 0.01, 0.01]\n");
+  EXPECT_THAT(Complaint(), HasSubstr("'rotation_sigma' must be 0 or above, and below 1, not -1"));
+  Write("cam0/sensor.yaml", camera + "translation_sigma: 0\n");
+  EXPECT_THAT(Complaint(),
+              HasSubstr("'translation_sigma' must be above 0: nothing is known exactly"));
 }
 
 TEST_F(EurocTest, MissingPartsAreNamed) {
@@ -225,6 +231,55 @@ TEST_F(EurocTest, CalibrationMistakesNameTheField) {
   imu.replace(imu.find("data: [1,0"), 10, "data: [2,0");
   Write("imu0/sensor.yaml", imu);
   EXPECT_THAT(Complaint(), HasSubstr("the rotation in 'T_BS' is not one"));
+}
+
+TEST_F(EurocTest, FieldsThatAreNotReadAreNamed) {
+  Write("cam0/sensor.yaml", Text("cam0/sensor.yaml") +
+                                "comment: mine\nrate_hz: 20\nreadout_s: 0.01\n" +
+                                "time_ofset_s: 0.04\nexposure: 3\n");
+  Write("imu0/sensor.yaml", Text("imu0/sensor.yaml") + "axes_sgima: 0.01\n");
+  EXPECT_THAT(
+      EurocRecording(root_).warnings(),
+      ElementsAre(HasSubstr("cam0/sensor.yaml: field 'time_ofset_s' is not known, and not read; "
+                            "did you mean 'time_offset_s'?"),
+                  AllOf(HasSubstr("field 'exposure'"), Not(HasSubstr("did you mean"))),
+                  HasSubstr("did you mean 'axes_sigma'?")));
+  WriteCamera("radial-tangential", "32, 24");
+  Write("imu0/sensor.yaml",
+        Text("imu0/sensor.yaml").substr(0, Text("imu0/sensor.yaml").find("axes")));
+  Write("cam0/sensor.yaml",
+        Text("cam0/sensor.yaml") + "time_offset_s: 0\ntimeshift_cam_imu: 0.01\n");
+  EXPECT_THAT(EurocRecording(root_).warnings(),
+              ElementsAre(HasSubstr("only the first is read; keep one")));
+}
+
+TEST_F(EurocTest, StampsInMicrosecondsAreNamed) {
+  for (const char* file : {"cam0/data.csv", "imu0/data.csv"}) {
+    std::string text;
+    std::istringstream lines(Text(file));
+    for (std::string line; std::getline(lines, line);) {
+      text += (line.front() == '#' ? line : line.substr(0, 16) + line.substr(19)) + "\n";
+    }
+    Write(file, text);
+  }
+  for (int i = 10; i < 13; ++i) {  // enough to tell
+    const std::string name = fmt::format("{}.png", kStart);
+    Write("cam0/data.csv",
+          Text("cam0/data.csv") + fmt::format("{},{}\n", kStart / 1000 + i * 50000, name));
+  }
+  EXPECT_THAT(Complaint(),
+              HasSubstr("cam0/data.csv: its images are 50 us apart (median): are the stamps "
+                        "nanoseconds?"));
+}
+
+TEST_F(EurocTest, WhatNoSensorShowsIsDropped) {
+  Write("imu0/data.csv",
+        Text("imu0/data.csv") + fmt::format("{},1e30,0,0,0,0,9.81\n", kStart + 905000000));
+  const EurocRecording recording(root_);
+  EXPECT_THAT(
+      recording.warnings(),
+      ElementsAre(HasSubstr("imu0/data.csv:202: above 100 rad/s or 500 m/s^2, which no sensor "
+                            "shows; row dropped")));
 }
 
 TEST_F(EurocTest, UnsortedAndDoubledImagesAreSortedAndDropped) {
@@ -340,7 +395,8 @@ TEST_F(EurocTest, LeversAreMetres) {
   }
   EXPECT_THAT(Complaint(), HasSubstr("mav0: the camera is 12 m from the body; at most 10 are"));
   WriteCamera("radtan", "1e30, 24");
-  EXPECT_THAT(Complaint(), HasSubstr("'resolution' is out of range: 1e+30 pixels"));
+  EXPECT_THAT(Complaint(),
+              HasSubstr("'resolution' must be whole pixels, at most 1000000, not 1e+30"));
 }
 
 TEST_F(EurocTest, TruncatedImuCsvLosesOnlyItsLastRow) {

@@ -17,6 +17,14 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 };
 
+// Any more is a broken sensor or another unit, not a phone in a hand.
+inline constexpr double kMostGyro = 100;   // rad/s
+inline constexpr double kMostAccel = 500;  // m/s^2
+inline bool IsPlausible(const ImuSample& sample) {
+  return sample.gyro.allFinite() && sample.accel.allFinite() && sample.gyro.norm() <= kMostGyro &&
+         sample.accel.norm() <= kMostAccel;
+}
+
 struct ImuNoise {
   double gyro_noise_density = 1.6968e-4;   // rad/s/sqrt(Hz)
   double gyro_random_walk = 1.9393e-5;     // rad/s^2/sqrt(Hz)

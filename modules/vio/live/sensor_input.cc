@@ -3,17 +3,8 @@
 #include <algorithm>
 
 namespace pangea::vio {
-namespace {
-
-// Any of these is a broken sensor, not a phone in a hand.
-constexpr double kMaxGyro = 100;   // rad/s
-constexpr double kMaxAccel = 500;  // m/s^2
-
-}  // namespace
-
 void SensorInput::AddImu(const ImuSample& sample) {
-  if (!sample.gyro.allFinite() || !sample.accel.allFinite() || sample.gyro.norm() > kMaxGyro ||
-      sample.accel.norm() > kMaxAccel) {
+  if (!IsPlausible(sample)) {
     process_.node().Refuse("imu: not finite or absurd");
     return;
   }
