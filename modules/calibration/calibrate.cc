@@ -328,7 +328,7 @@ Result Calibrate(const Input& input) {
   result.coverage = RoughCoverage(input, pairs);
   if (result.coverage.seconds < kMinSeconds) {
     result.refused = fmt::format(
-        "points could be followed for {:.0f} s, at least {:.0f} are needed: record longer, with "
+        "points could be followed for {:.1f} s, at least {:.0f} are needed: record longer, with "
         "more light or more to see",
         result.coverage.seconds, kMinSeconds);
     return result;

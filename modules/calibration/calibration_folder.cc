@@ -66,29 +66,53 @@ void LinkEntries(const fs::path& from, const fs::path& to) {
   }
 }
 
-}  // namespace
-
-void WriteSensorYaml(const std::string& out, const Result& result, const ImuNoise& noise) {
-  const fs::path mav0 = fs::path(out) / "mav0";
+void WriteSensorYaml(const fs::path& folder, const Result& result, const ImuNoise& noise) {
+  const fs::path mav0 = folder / "mav0";
   const double rate_hz = result.image_rate_hz > 0 ? result.image_rate_hz : 30;
   WriteTextFile((mav0 / "cam0/sensor.yaml").string(), CameraYaml(result, rate_hz));
   WriteTextFile((mav0 / "imu0/sensor.yaml").string(), ImuYaml(result, noise));
 }
 
-void MakeFolder(const std::string& recording, const std::string& out) {
-  if (fs::exists(out)) {
-    throw std::runtime_error(fmt::format("{}: exists already; give another --out", out));
+}  // namespace
+
+CalibrationFolder::CalibrationFolder(const std::string& recording, const std::string& out)
+    : out_((fs::path(out) / "").parent_path().string()), part_(out_ + ".part") {
+  if (fs::exists(out_)) {
+    throw std::runtime_error(fmt::format("{}: exists already; give another --out", out_));
   }
-  const fs::path from = Mav0Of(recording), to = fs::path(out) / "mav0";
+  const fs::path from = Mav0Of(recording), to = fs::path(part_) / "mav0";
+  recording_mav0_ = from.string();
   const cv::Size size = SizeOfImages(from);
   const ImuNoise noise = NoiseOf(from);
+  fs::remove_all(part_);  // of a run that was killed
   LinkEntries(from, to);
   LinkEntries(from / "cam0", to / "cam0");
   LinkEntries(from / "imu0", to / "imu0");
   Result nothing_known;
   nothing_known.sigma.setConstant(0.1);  // what is written must be readable
   nothing_known.parameters.camera = GuessedCamera(size.width, size.height);
-  WriteSensorYaml(out, nothing_known, noise);
+  WriteSensorYaml(part_, nothing_known, noise);
+}
+
+CalibrationFolder::~CalibrationFolder() {
+  std::error_code error;
+  fs::remove_all(part_, error);
+}
+
+std::string CalibrationFolder::AboutTheRecording(std::string text) const {
+  const std::string copy = part_ + "/mav0";
+  for (size_t at = 0; (at = text.find(copy, at)) != std::string::npos;
+       at += recording_mav0_.size()) {
+    text.replace(at, copy.size(), recording_mav0_);
+  }
+  return text;
+}
+
+void CalibrationFolder::Finish(const Result& result, const ImuNoise& noise,
+                               const std::string& summary) {
+  WriteSensorYaml(part_, result, noise);
+  WriteTextFile((fs::path(part_) / "calibration.txt").string(), summary);
+  fs::rename(part_, out_);
 }
 
 }  // namespace pangea::calibration

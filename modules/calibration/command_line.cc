@@ -11,7 +11,7 @@
 #include "calibration/parameters.h"
 #include "calibration/recording_tracks.h"
 #include "calibration/summary.h"
-#include "files/text_file.h"
+#include "options/command_line.h"
 
 namespace pangea::calibration {
 namespace {
@@ -37,9 +37,9 @@ void AddOptions(CLI::App& app, Arguments& a) {
       ->delimiter(',')
       ->expected(3)
       ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
-  app.add_option("--start", a.part.start_s, "seconds to skip")->check(CLI::NonNegativeNumber);
+  app.add_option("--start", a.part.start_s, "seconds to skip")->check(NotNegative());
   app.add_option("--duration", a.part.duration_s, "seconds to use")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
 }
 
@@ -56,17 +56,23 @@ Eigen::Quaterniond RotationOf(const std::vector<std::string>& axes) {
   return Eigen::Quaterniond(R);
 }
 
+EurocRecording Open(const CalibrationFolder& folder) try {
+  EurocRecording recording(folder.part());
+  for (const std::string& warning : recording.warnings()) {
+    std::cerr << fmt::format("pangea-calibrate: {}\n", folder.AboutTheRecording(warning));
+  }
+  return recording;
+} catch (const std::runtime_error& error) {
+  throw std::runtime_error(folder.AboutTheRecording(error.what()));
+}
+
 int Run(const Arguments& a) {
   std::optional<Eigen::Quaterniond> q_body_cam;
   if (!a.camera_axes.empty()) {
     q_body_cam = RotationOf(a.camera_axes);
   }
-  MakeFolder(a.recording, a.out);
-  const EurocRecording recording(a.out);
-  for (const std::string& warning : recording.warnings()) {
-    std::cerr << fmt::format("pangea-calibrate: {}\n", warning);
-  }
-  Input input = TracksOf(recording, a.part, q_body_cam);
+  CalibrationFolder folder(a.recording, a.out);
+  Input input = TracksOf(Open(folder), a.part, q_body_cam);
   input.check_rotation = true;
   if (a.field_of_view_deg > 0) {
     input.field_of_view = kDegree * a.field_of_view_deg;
@@ -75,12 +81,10 @@ int Run(const Arguments& a) {
   const std::string summary = Summary(input, result);
   std::cout << summary;
   if (!result.refused.empty()) {
-    std::filesystem::remove_all(std::filesystem::path(a.out) / "mav0");
-  } else {
-    WriteSensorYaml(a.out, result, input.imu_noise);
+    return kRefused;
   }
-  WriteTextFile((std::filesystem::path(a.out) / "calibration.txt").string(), summary);
-  return result.refused.empty() ? 0 : kRefused;
+  folder.Finish(result, input.imu_noise, summary);
+  return OutputIsWritten("pangea-calibrate") ? 0 : 1;
 }
 
 }  // namespace

@@ -93,22 +93,36 @@ TEST_F(Program, TheTimeOffsetIsAsUncertainAsTheExposureMakesIt) {
 
 TEST_F(Program, RecordingWithoutCalibrationIsLinkedAndOpens) {
   MakeRecording();
-  MakeFolder(Path("in"), Path("out"));
-  const EurocRecording recording(Path("out"));
+  const CalibrationFolder folder(Path("in"), Path("out/"));
+  const EurocRecording recording(folder.part());
   EXPECT_EQ(recording.images().size(), 3U);
   EXPECT_EQ(recording.camera().width, 64);
-  EXPECT_TRUE(fs::is_symlink(folder_ / "out/mav0/cam0/data"));
+  EXPECT_TRUE(fs::is_symlink(folder_ / "out.part/mav0/cam0/data"));
   EXPECT_FALSE(fs::exists(folder_ / "in/mav0/cam0/sensor.yaml"));
-  EXPECT_THROW(MakeFolder(Path("in"), Path("out")), std::runtime_error);
+  EXPECT_EQ(folder.AboutTheRecording(folder.part() + "/mav0/cam0: no"), Path("in/mav0/cam0: no"));
   const Input input = TracksOf(recording, {}, std::nullopt);
   EXPECT_EQ(input.frames.size(), 3U);
   EXPECT_THAT(Calibrate(input).refused, HasSubstr("record longer"));
 }
 
+TEST_F(Program, OnlyACalibratedFolderIsThereInTheEnd) {
+  MakeRecording();
+  { const CalibrationFolder refused(Path("in"), Path("out")); }
+  EXPECT_FALSE(fs::exists(Path("out")));
+  EXPECT_FALSE(fs::exists(Path("out.part")));
+  fs::create_directories(Path("out.part/mav0/of_a_killed_run"));
+  CalibrationFolder(Path("in"), Path("out")).Finish(Some(), {}, "known");
+  EXPECT_FALSE(fs::exists(Path("out.part")));
+  EXPECT_FALSE(fs::exists(Path("out/mav0/of_a_killed_run")));
+  EXPECT_EQ(ReadTextFile(Path("out/calibration.txt")), "known");
+  EXPECT_DOUBLE_EQ(ReadEurocCamera(Path("out/mav0/cam0/sensor.yaml")).fx,
+                   Some().parameters.camera.fx);
+}
+
 TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {
   const auto complaint = [&](const std::string& from, const std::string& to) -> std::string {
     try {
-      MakeFolder(Path(from), Path(to));
+      const CalibrationFolder folder(Path(from), Path(to));
     } catch (const std::exception& error) {
       return error.what();
     }
