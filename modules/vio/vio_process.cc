@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cmath>
 #include <functional>
 #include <iostream>
 #include <stdexcept>
+#include <system_error>
 
 #include "messages/channels.h"
 #include "messages/messages.h"
@@ -59,10 +61,7 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
     keyframe_log_.emplace(options_.out_keyframes);
   }
   if (!options_.out_tum.empty()) {
-    tum_.open(options_.out_tum);
-    if (!tum_) {
-      throw std::runtime_error(fmt::format("cannot write {}", options_.out_tum));
-    }
+    OpenTum(options_.out_tum);
   }
 }
 
@@ -186,17 +185,40 @@ void VioProcess::WriteTum(const VioOutput& output) {
   if (tum_map_ != output.map) {
     tum_map_ = output.map;
     if (++tum_files_ > 1) {
-      tum_.close();
-      tum_.open(fmt::format("{}.{}", options_.out_tum, tum_files_));
+      OpenTum(fmt::format("{}.{}", options_.out_tum, tum_files_));
     }
   }
   tum_ << ToTum({{output.utime, output.T_odom_body}}) << std::flush;
+  if (!tum_) {
+    ThrowTumFailed();
+  }
+}
+
+void VioProcess::OpenTum(const std::string& file) {
+  tum_file_ = file;
+  tum_ = std::ofstream(file);
+  if (!tum_) {
+    ThrowTumFailed();
+  }
+}
+
+void VioProcess::ThrowTumFailed() const {
+  throw std::runtime_error(
+      fmt::format("{}: cannot be written: {}", tum_file_, std::generic_category().message(errno)));
 }
 
 std::string VioProcess::Totals() const {
-  return fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} map{}",
-                     options_.agent_id, num_poses_, num_images_, num_keyframes_,
-                     vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
+  std::string text = fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} map{}",
+                                 options_.agent_id, num_poses_, num_images_, num_keyframes_,
+                                 vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
+  if (tum_files_ > 1) {
+    text += fmt::format("; the last of {} TUM files is {}", tum_files_, tum_file_);
+  }
+  if (num_dropped_ > 0) {
+    text += fmt::format("; {} more images were dropped, as this machine is too slow for real time",
+                        num_dropped_);
+  }
+  return text;
 }
 
 std::optional<std::string> VioProcess::NoPoseYet() const {

@@ -59,7 +59,8 @@ class VioProcess : public Process {
             const std::optional<CalibrationSigmas>& sigmas = std::nullopt);
   bool open() const { return vio_.has_value(); }
 
-  // As Vio::AddImage and Vio::AddTracks.
+  // As Vio::AddImage and Vio::AddTracks; throw std::runtime_error when an output file is no longer
+  // written.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
   // How far the odometry is behind its sensors, and how many images were dropped for it since the
@@ -91,6 +92,8 @@ class VioProcess : public Process {
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
   void WriteTum(const VioOutput& output);
+  void OpenTum(const std::string& file);
+  [[noreturn]] void ThrowTumFailed() const;
   std::string Summary() const;
   std::string LagText() const;
   void TellLag(int64_t now_utime);
@@ -116,6 +119,7 @@ class VioProcess : public Process {
   int64_t num_dropped_told_ = 0;
   int64_t next_lag_told_utime_ = 0;
   std::ofstream tum_;
+  std::string tum_file_;
   std::optional<MapId> tum_map_;
   int tum_files_ = 0;
   std::optional<LogFileWriter> keyframe_log_;

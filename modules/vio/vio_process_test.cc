@@ -297,6 +297,9 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
               ::testing::MatchesRegex(fmt::format(
                   "agent 7: [0-9]+ of [0-9]+ images have a pose; {} keyframes in 2 maps",
                   keyframes_.size())));
+  process.NoteLag(2'000'000, 5);
+  EXPECT_THAT(process.Totals(), ::testing::EndsWith("; 5 more images were dropped, as this machine "
+                                                    "is too slow for real time"));
   int32_t expected = 0;
   for (const Keyframe& keyframe : keyframes_) {
     if (keyframe.id.map.opened_utime == kMapUtime + 1) {
@@ -306,6 +309,16 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
   }
   EXPECT_GT(expected, 3);
 }
+
+TEST_F(VioProcessTest, AFullDiskEndsIt) {
+  options_.out_tum = "/dev/full";
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  EXPECT_THAT([&] { Play(process, 0, 6); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  "/dev/full: cannot be written: No space left on device"));
+}
+
 TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
   VioProcess process(bus_, options_, 0);
   EXPECT_EQ(process.NoPoseYet(), "no image came to the odometry");
