@@ -107,6 +107,25 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
 }
 
+// What is printed may be what was asked for.
+TEST(Output, AFullDiskIsSaid) {
+  const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
+  for (const std::string& command : {"pangea-log info " + log, "pangea-log list --json " + log}) {
+    const Outcome outcome = RunCommand(command + " >/dev/full");
+    EXPECT_EQ(outcome.exit_code, 1) << command;
+    EXPECT_THAT(outcome.output, HasSubstr("pangea-log: the output cannot be written")) << command;
+  }
+}
+
+TEST(Numbers, AreFinite) {
+  for (const char* command : {"vio --start nan", "vio --duration 0", "sim --static-start -5",
+                              "calibrate --duration inf", "log list --from nan"}) {
+    const Outcome outcome = RunCommand(fmt::format("pangea-{}", command));
+    EXPECT_GT(outcome.exit_code, 100) << command;
+    EXPECT_THAT(outcome.output, HasSubstr("is no finite number")) << command;
+  }
+}
+
 // So that `explain` and a replay find images and ground truth.
 TEST(Log, WhatIsMadeOfALogKeepsItsRecordings) {
   const fs::path folder = FreshFolder("log_recordings");

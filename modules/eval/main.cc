@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "eval/command_line.h"
+#include "options/command_line.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Errors of trajectories against ground truth");
@@ -17,5 +18,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "pangea-eval: {}\n", error.what());
     return 1;
   }
-  return 0;
+  return pangea::OutputIsWritten("pangea-eval") ? 0 : 1;
 }

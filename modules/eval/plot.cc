@@ -14,6 +14,9 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
+
+#include "files/text_file.h"
 
 extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leaves it to the user
 
@@ -185,6 +188,12 @@ std::string AgentColour(size_t index) {
   return kColours[index % kColours.size()];
 }
 
-void WritePng(const Plot& plot, const std::string& path) { RunGnuplot(Script(plot, path), path); }
+// Of a full disk gnuplot says nothing.
+void WritePng(const Plot& plot, const std::string& path) {
+  RunGnuplot(Script(plot, path), path);
+  if (!ReadTextFile(path).ends_with(std::string_view("IEND\xae\x42\x60\x82"))) {
+    throw std::runtime_error(fmt::format("{}: the picture is cut off; is the disk full?", path));
+  }
+}
 
 }  // namespace pangea

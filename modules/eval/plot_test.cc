@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -88,6 +90,19 @@ TEST_F(PlotTest, FailuresAreReportedWithTheMend) {
     EXPECT_THAT(error.what(), HasSubstr("install gnuplot-nox"));
   }
   setenv("PATH", path.c_str(), 1);
+}
+
+// As on a full disk, of which gnuplot says nothing.
+TEST_F(PlotTest, APictureThatIsCutOffIsNone) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{4600, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_THAT([&] { WritePng(Circle(), path_); },
+              ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("the picture is cut off")));
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, SIG_DFL);
 }
 
 TEST_F(PlotTest, SevenAgentsHaveSevenColours) {

@@ -117,9 +117,11 @@ CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Argument
 
 void AddCutOptions(CLI::App& command, Arguments* arguments) {
   command.add_option("--from", arguments->cut.from_s, "Seconds since the first event")
+      ->check(NotNegative())
       ->capture_default_str();
-  command.add_option("--to", arguments->cut.to_s,
-                     "Seconds since the first event (default: the end)");
+  command
+      .add_option("--to", arguments->cut.to_s, "Seconds since the first event (default: the end)")
+      ->check(Positive());
   command
       .add_option("--channels", arguments->cut.channels, "Regular expression for the whole name")
       ->capture_default_str();

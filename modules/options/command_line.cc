@@ -2,10 +2,25 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 
 namespace pangea {
+namespace {
+
+CLI::Validator NumberThat(bool (*is_good)(double), const std::string& words) {
+  return {[=](std::string& text) -> std::string {
+            double value = 0;
+            const bool good =
+                CLI::detail::lexical_cast(text, value) && std::isfinite(value) && is_good(value);
+            return good ? "" : fmt::format("'{}' is no finite number {}", text, words);
+          },
+          words};
+}
+
+}  // namespace
 
 int RunSubcommand(CLI::App& app, int argc, char** argv) {
   try {
@@ -16,7 +31,23 @@ int RunSubcommand(CLI::App& app, int argc, char** argv) {
     std::cerr << fmt::format("{}: {}\n", app.get_name(), error.what());
     return 1;
   }
-  return 0;
+  return OutputIsWritten(app.get_name()) ? 0 : 1;
+}
+
+bool OutputIsWritten(const std::string& program) {
+  if (std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
+    return true;
+  }
+  std::cerr << fmt::format("{}: the output cannot be written (disk full?)\n", program);
+  return false;
+}
+
+CLI::Validator Positive() {
+  return NumberThat([](double value) { return value > 0; }, "above 0");
+}
+
+CLI::Validator NotNegative() {
+  return NumberThat([](double value) { return value >= 0; }, "0 or above");
 }
 
 }  // namespace pangea

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
 
 namespace pangea {
 
@@ -8,5 +9,13 @@ namespace pangea {
 // becomes one line on stderr, behind the program's name. The exit code: 0, 1, or CLI11's (above
 // 100).
 int RunSubcommand(CLI::App& app, int argc, char** argv);
+
+// Whether all that was printed is written, as a full disk does not let it; else a line on stderr,
+// behind the program's name.
+bool OutputIsWritten(const std::string& program);
+
+// For an option's check(): finite, and above 0; or not below. CLI11's own let nan pass.
+CLI::Validator Positive();
+CLI::Validator NotNegative();
 
 }  // namespace pangea

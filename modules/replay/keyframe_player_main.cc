@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "options/command_line.h"
 #include "replay/keyframe_player.h"
 
 int main(int argc, char** argv) {
@@ -25,7 +26,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
-      ->check(CLI::PositiveNumber);
+      ->check(pangea::Positive());
   app.footer(
       "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
       "in "

@@ -14,6 +14,7 @@
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/recording_arguments.h"
+#include "options/command_line.h"
 #include "replay/replay.h"
 #include "report/compare.h"
 #include "report/session_record.h"
@@ -337,13 +338,13 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
   replay
       ->add_option("--until", arguments->until_s,
                    "Only the first so many seconds of the log (default: all of it)")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   replay
       ->add_option("--from-checkpoint", arguments->checkpoint_s,
                    "The matches and verification results of the first so many seconds are taken "
                    "from the log, "
                    "not made again")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   replay
       ->add_option("--only", arguments->only,
                    "These processes alone (a,b,...), fed with what the others said in the log, and "

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "files/progress.h"
+#include "options/command_line.h"
 #include "sim/render/frame_cache.h"
 
 namespace pangea::sim {
@@ -67,15 +68,16 @@ void CommandLine::AddPath(CLI::App& app) {
   app.add_option("--static-start", options_.generated.static_start_s,
                  "seconds a generated path stands still first")
       ->capture_default_str()
+      ->check(NotNegative())
       ->excludes(path)
       ->group(group);
   app.add_option("--start", options_.start_s, "seconds of the path to leave out")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->group(group);
   app.add_option("--duration", options_.duration_s,
                  "seconds to record; default: a file's whole path, or 60")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->group(group);
   app.add_option("--knot-spacing", knot_spacing_s_,
                  "seconds between the spline's knots on positions (half of it: on rotations); "

@@ -13,6 +13,7 @@
 
 #include "bus/process.h"
 #include "bus/status_log.h"
+#include "options/command_line.h"
 #include "options/options_arguments.h"
 #include "recording/euroc.h"
 #include "vio/live/live_input.h"
@@ -47,11 +48,11 @@ void AddArguments(CLI::App& app, Arguments& a) {
   app.add_option("--recording", a.recording, "folder in EuRoC's format: plays it");
   app.add_flag("--live", a.live, "images and samples from IMU_k, IMAGE_k, CAMERA_k");
   app.add_option("--start", a.playback.start_s, "seconds of the recording to skip")
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
   app.add_option("--duration", a.playback.duration_s, "seconds of the recording to play")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   app.add_option("--delay", a.playback.delay_s, "seconds to wait before the first image")
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
   app.add_option("--rate", a.rate, "1, 2, ... times real time, or max")->capture_default_str();
   app.add_option("--tracks", a.playback.tracks_csv,
                  "exact tracks (stamp_ns, landmark_id, u, v) instead of the tracker's");
