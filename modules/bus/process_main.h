@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 
 #include "bus/process.h"
 #include "bus/retransmission/journal_follower.h"
@@ -35,9 +36,15 @@ using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory);
 
+// Of a process that lets one choose nothing.
+struct NoOptions {
+  template <typename Archive>
+  void Visit(Archive& /*archive*/) {}
+};
+
 // The main() of a process that keeps keyframes in a scratch file, has a checkpoint and no arguments
 // of its own.
-template <typename ServerProcess, typename Options>
+template <typename ServerProcess, typename Options = NoOptions>
 int ServerProcessMain(int argc, char** argv, const std::string& name, const std::string& summary) {
   Options options;
   ScratchFileOptions scratch;
@@ -45,8 +52,12 @@ int ServerProcessMain(int argc, char** argv, const std::string& name, const std:
   YamlOptions yaml;
   options.Visit(yaml);
   return ProcessMain(argc, argv, {name, summary, yaml, &scratch, &checkpoint}, [&](Bus& bus) {
-    return std::make_unique<ServerProcess>(bus, options, std::make_shared<ScratchFile>(scratch),
-                                           checkpoint);
+    const auto records = std::make_shared<ScratchFile>(scratch);
+    if constexpr (std::is_same_v<Options, NoOptions>) {
+      return std::make_unique<ServerProcess>(bus, records, checkpoint);
+    } else {
+      return std::make_unique<ServerProcess>(bus, options, records, checkpoint);
+    }
   });
 }
 
