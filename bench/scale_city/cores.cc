@@ -75,12 +75,8 @@ void Cores::Tell(const PoseGraphUpdate& update) {
     T_map_odom_[correction.map] = correction.T_map_odom;
   }
   for (const MapState& state : update.states) {
-    const auto shared = std::make_shared<const MapState>(state);
-    for (const MapId& map : state.maps) {
-      states_[map] = shared;
-    }
-    use_.Measure("place_recognition",
-                 [&] { recognition_->SetGroup(state.group, state.revision, state.maps); });
+    states_.Take(state);
+    use_.Measure("place_recognition", [&] { recognition_->Take(state); });
     use_.Measure("map_points", [&] { map_points_->Take(state); });
     // Groups as the city had them were adjusted long ago.
     if (started_) {
@@ -157,11 +153,6 @@ void Cores::AdjustDue() {
       }));
     }
   }
-}
-
-const MapState* Cores::StateOf(const MapId& map) const {
-  const auto state = states_.find(map);
-  return state == states_.end() ? nullptr : state->second.get();
 }
 
 }  // namespace pangea::bench

@@ -10,6 +10,7 @@
 
 #include "bench/scale_city/city.h"
 #include "bench/use_by_process.h"
+#include "core/group_states.h"
 #include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
 #include "inter_map_ba/inter_map_ba.h"
@@ -37,7 +38,7 @@ class Cores {
   void Quiet();
 
   // The newest state of the map's group; null before there is any.
-  const MapState* StateOf(const MapId& map) const;
+  const MapState* StateOf(const MapId& map) const { return states_.Find(map); }
   std::map<std::string, Use> TakeUse() { return use_.Take(); }
   // CPU of the pose graph's longest work on a keyframe since it was last asked.
   double TakeLongestSolve_ms() { return std::exchange(longest_solve_ms_, 0); }
@@ -56,7 +57,7 @@ class Cores {
   std::unique_ptr<PoseGraph> graph_;
   std::unique_ptr<GlobalBa> global_ba_;
   std::unique_ptr<MapPoints> map_points_;
-  std::map<MapId, std::shared_ptr<const MapState>> states_;
+  GroupStates<MapState> states_;
   std::map<MapId, Rigid3> T_map_odom_;
   bool started_ = false;
   double longest_solve_ms_ = 0;

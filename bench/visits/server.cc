@@ -98,7 +98,7 @@ void Server::Finish() {
 
 void Server::TellGroups(const PoseGraphUpdate& update) {
   for (const MapState& state : update.states) {
-    recognition_->SetGroup(state.group, state.revision, state.maps);
+    recognition_->Take(state);
   }
 }
 

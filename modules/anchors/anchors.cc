@@ -68,7 +68,7 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
 
 void Anchors::Take(const MapState& state) {
   positions_.reset();
-  groups_.Take(state);
+  groups_.Take(PosedGroup(state));
 }
 
 void Anchors::Take(const Correction& correction) {
@@ -91,7 +91,7 @@ std::vector<MapId> Anchors::AgentMaps() const {
 }
 
 Rigid3 Anchors::T_map_odom(const MapId& map) const {
-  const GroupState* const group = groups_.Find(map);
+  const PosedGroup* const group = groups_.Find(map);
   const auto track = tracks_.find(map);
   if (group == nullptr || track == tracks_.end()) {
     return {};
@@ -115,7 +115,7 @@ std::optional<Rigid3> Anchors::T_body_cam(const MapId& map) const {
 
 // A keyframe that the group's state does not have yet lies on the odometry behind those it has.
 Rigid3 Anchors::T_map_body(const MapId& map, int32_t seq) const {
-  if (const GroupState* const group = groups_.Find(map)) {
+  if (const PosedGroup* const group = groups_.Find(map)) {
     const auto found = group->T_map_body.find({map, seq});
     if (found != group->T_map_body.end()) {
       return found->second;
@@ -155,7 +155,7 @@ const std::map<AnchorId, Anchors::InGroup>& Anchors::Positions() const {
 }
 
 bool Anchors::SameGroup(const MapId& a, const MapId& b) const {
-  const GroupState *const group_a = groups_.Find(a), *const group_b = groups_.Find(b);
+  const PosedGroup *const group_a = groups_.Find(a), *const group_b = groups_.Find(b);
   return a == b || (group_a != nullptr && group_b != nullptr && group_a->id == group_b->id);
 }
 
@@ -252,7 +252,7 @@ std::optional<AnchorState> Anchors::InItsGroup(const AnchorId& id) const {
 }
 
 std::pair<MapId, int64_t> Anchors::GroupAndRevision(const MapId& map) const {
-  const GroupState* const group = groups_.Find(map);
+  const PosedGroup* const group = groups_.Find(map);
   return group == nullptr ? std::pair(map, int64_t{0}) : std::pair(group->id, group->revision);
 }
 

@@ -119,7 +119,7 @@ class Anchors {
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;
   std::map<MapId, std::set<AnchorId>> waiting_;  // for a keyframe of this map
-  GroupStates groups_;
+  GroupStates<PosedGroup> groups_;
   std::map<MapId, Correction> corrections_;
   std::vector<std::string> not_placed_;
   // Since the last change; nothing: to be computed.

@@ -4,20 +4,12 @@
 
 namespace pangea {
 
-StatePoses PosesOf(const MapState& state) {
-  StatePoses poses;
-  for (const KeyframePose& pose : state.keyframes) {
-    poses[pose.id] = pose.T_map_body;
-  }
-  return poses;
-}
-
 const ImuState* AdjustedGroup::Find(const KeyframeId& id) const {
   const auto known = keyframes.find(id);
   return known != keyframes.end() && known->second ? &*known->second : nullptr;
 }
 
-bool AdjustedGroup::IsShapeOf(const StatePoses& state) const {
+bool AdjustedGroup::IsShapeOf(const MapPoses& state) const {
   constexpr double kSame_m = 1e-4;
   const Eigen::Vector3d* p_before = nullptr;
   const Eigen::Vector3d* p_state_before = nullptr;
@@ -46,7 +38,7 @@ ImuState MovedTo(const Rigid3& T_map_body, const ImuState& adjusted) {
   return {T_map_body, rotation * adjusted.v_odom_body, adjusted.gyro_bias, adjusted.accel_bias};
 }
 
-AdjustedGroup AfterAdjustment(const BaWorld& world, const StatePoses& state,
+AdjustedGroup AfterAdjustment(const BaWorld& world, const MapPoses& state,
                               const AdjustedGroup* before) {
   AdjustedGroup after;
   if (before != nullptr) {

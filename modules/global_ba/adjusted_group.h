@@ -5,14 +5,10 @@
 #include <map>
 #include <optional>
 
-#include "core/server_messages.h"
+#include "core/group_states.h"
 #include "global_ba/ba_problem.h"
 
 namespace pangea {
-
-// Where a group's state has its keyframes.
-using StatePoses = std::map<KeyframeId, Rigid3>;
-StatePoses PosesOf(const MapState& state);
 
 struct AdjustedGroup {
   // Those it knew; nothing for one that was left out. In a map frame of its own.
@@ -23,7 +19,7 @@ struct AdjustedGroup {
   // Null for one that was left out or is not known.
   const ImuState* Find(const KeyframeId& id) const;
   // Whether a state has its shape: the same steps from keyframe to keyframe.
-  bool IsShapeOf(const StatePoses& state) const;
+  bool IsShapeOf(const MapPoses& state) const;
 };
 
 // The same motion where a state, which has the shape of the adjustment, has the keyframe.
@@ -31,7 +27,7 @@ ImuState MovedTo(const Rigid3& T_map_body, const ImuState& adjusted);
 
 // After the adjustment of a world, of a group as `state` has it. `before`: the last one's, for what
 // the world does not have or holds; null if the world is all of the group.
-AdjustedGroup AfterAdjustment(const BaWorld& world, const StatePoses& state,
+AdjustedGroup AfterAdjustment(const BaWorld& world, const MapPoses& state,
                               const AdjustedGroup* before);
 
 }  // namespace pangea

@@ -42,8 +42,8 @@ constexpr int kMaxPasses = 3;
 
 // A group's poses after its adjustment; what was left out keeps its place relative to the keyframe
 // before it.
-StatePoses PosesAfter(const AdjustedGroup& adjusted, const StatePoses& before) {
-  StatePoses after;
+MapPoses PosesAfter(const AdjustedGroup& adjusted, const MapPoses& before) {
+  MapPoses after;
   Rigid3 T_after_before;
   for (const auto& [id, T_map_body] : before) {
     if (const ImuState* imu = adjusted.Find(id)) {
@@ -54,7 +54,7 @@ StatePoses PosesAfter(const AdjustedGroup& adjusted, const StatePoses& before) {
   return after;
 }
 
-double RmsMove(const StatePoses& before, const StatePoses& after) {
+double RmsMove(const MapPoses& before, const MapPoses& after) {
   double sum = 0;
   for (const auto& [id, T_map_body] : before) {
     sum += (after.at(id).t - T_map_body.t).squaredNorm();
@@ -63,7 +63,7 @@ double RmsMove(const StatePoses& before, const StatePoses& after) {
 }
 
 // Largest move of a keyframe that was adjusted before.
-double LargestShift(const BaWorld& world, const AdjustedGroup& before, const StatePoses& poses) {
+double LargestShift(const BaWorld& world, const AdjustedGroup& before, const MapPoses& poses) {
   double largest = 0;
   for (const BaKeyframe& keyframe : world.keyframes) {
     if (before.Find(keyframe.id) != nullptr) {
@@ -149,19 +149,13 @@ void GlobalBa::Take(const Constraint& constraint) {
 
 void GlobalBa::Take(MapState state) {
   std::ranges::sort(state.maps);
-  const auto shared = std::make_shared<const MapState>(std::move(state));
-  for (const MapId& map : shared->maps) {
-    StatePointer& current = states_[map];
-    if (current == nullptr || current->revision < shared->revision) {
-      current = shared;
-    }
-  }
-  const auto refined = refined_.find(shared->group);
-  if (refined != refined_.end() && refined->second.basis == BasisOf(*shared) &&
-      !refined->second.adjusted.IsShapeOf(PosesOf(*shared))) {
+  const StatePointer taken = states_.Take(std::move(state));
+  const auto refined = refined_.find(taken->group);
+  if (refined != refined_.end() && refined->second.basis == BasisOf(*taken) &&
+      !refined->second.adjusted.IsShapeOf(PosesOf(*taken))) {
     refined_.erase(refined);
   }
-  if (work_ != nullptr && BasisOf(*states_[work_->state->group]) != BasisOf(*work_->state)) {
+  if (work_ != nullptr && BasisOf(*states_.Find(work_->state->group)) != BasisOf(*work_->state)) {
     DropIfAbout(work_->state->group);
   }
 }
@@ -179,11 +173,10 @@ GlobalBa::Basis GlobalBa::BasisOf(const MapState& state) {
 }
 
 GlobalBa::StatePointer GlobalBa::NextDue() const {
-  for (const auto& [map, state] : states_) {
-    const auto is_current = [&, &state = state](const MapId& m) { return states_.at(m) == state; };
+  for (const auto& [map, state] : states_.by_map()) {
     const auto known = refined_.find(state->group);
     if (map == state->group && state->num_constraints > 0 &&
-        state->keyframes.size() >= kMinKeyframes && std::ranges::all_of(state->maps, is_current) &&
+        state->keyframes.size() >= kMinKeyframes && states_.IsCurrent(*state) &&
         (known == refined_.end() || known->second.whole_is_due ||
          known->second.basis != BasisOf(*state))) {
       return state;
@@ -192,7 +185,7 @@ GlobalBa::StatePointer GlobalBa::NextDue() const {
   return nullptr;
 }
 
-bool GlobalBa::IsLocal(const MapState& state, const StatePoses& poses) const {
+bool GlobalBa::IsLocal(const MapState& state, const MapPoses& poses) const {
   const auto known = refined_.find(state.group);
   if (known == refined_.end()) {
     return false;
@@ -219,7 +212,7 @@ std::optional<MapState> GlobalBa::Advance() {
 
 void GlobalBa::Begin(StatePointer state) {
   work_ = std::make_unique<Work>();
-  const StatePoses& poses = work_->begin = PosesOf(*state);
+  const MapPoses& poses = work_->begin = PosesOf(*state);
   work_->local = IsLocal(*state, poses);
   work_->new_pairs = TakeNewPairs(*state, poses);
   work_->state = std::move(state);
@@ -231,7 +224,7 @@ bool GlobalBa::BeginAgain() {
   if (work_->local || ++work_->passes == kMaxPasses) {
     return false;
   }
-  const StatePoses after =
+  const MapPoses after =
       PosesAfter(AfterAdjustment(work_->problem->world(), work_->begin, nullptr), work_->begin);
   const bool again = RmsMove(work_->begin, after) > kSettled_m;
   if (again) {
@@ -241,7 +234,7 @@ bool GlobalBa::BeginAgain() {
   return again;
 }
 
-std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const StatePoses& poses) {
+std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const MapPoses& poses) {
   std::vector<KeyframePair> taken;
   for (const MapId& map : state.maps) {
     for (auto pair = new_pairs_.lower_bound({{map, 0}, {}});
@@ -257,7 +250,7 @@ std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const St
   return taken;
 }
 
-std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePoses& poses) {
+std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const MapPoses& poses) {
   std::vector<MatchedPlaces> places;
   for (const MapId& map : state.maps) {
     for (const KeyframePair& pair : pairs_.OfMap(map)) {
@@ -267,7 +260,7 @@ std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const StatePos
   return std::make_unique<BaProblem>(MakeGroupWorld(poses, places, &store_), options_.ba);
 }
 
-std::unique_ptr<BaProblem> GlobalBa::Local(const StatePoses& poses) {
+std::unique_ptr<BaProblem> GlobalBa::Local(const MapPoses& poses) {
   const AdjustedGroup& adjusted = refined_.at(work_->state->group).adjusted;
   const LocalPart part = ChooseLocalPart(poses, adjusted, pairs_, work_->new_pairs,
                                          options_.local.max_neighbours, &store_);
@@ -298,7 +291,7 @@ MapState GlobalBa::Finish() {
   const std::unique_ptr<Work> work = std::exchange(work_, nullptr);
   const BaWorld& world = work->problem->world();
   MapState refined = *work->state;
-  const StatePoses poses = PosesOf(refined);
+  const MapPoses poses = PosesOf(refined);
   for (const MapId& map : refined.maps) {
     if (map != refined.group) {
       refined_.erase(map);

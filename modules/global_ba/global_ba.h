@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/group_states.h"
 #include "core/record_store.h"
 #include "core/server_messages.h"
 #include "core/submap_store.h"
@@ -84,7 +85,7 @@ class GlobalBa {
   const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
-  using StatePointer = std::shared_ptr<const MapState>;
+  using StatePointer = GroupStates<MapState>::Pointer;
 
   // What a refinement rests on.
   struct Basis {
@@ -103,8 +104,8 @@ class GlobalBa {
     StatePointer state;
     std::vector<KeyframePair> new_pairs;
     bool local = false;
-    int passes = 0;    // that have ended
-    StatePoses begin;  // where this one began
+    int passes = 0;  // that have ended
+    MapPoses begin;  // where this one began
     std::unique_ptr<BaProblem> problem;
   };
   static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
@@ -112,13 +113,13 @@ class GlobalBa {
   static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond is not used
 
   StatePointer NextDue() const;
-  bool IsLocal(const MapState& state, const StatePoses& poses) const;
+  bool IsLocal(const MapState& state, const MapPoses& poses) const;
   void Begin(StatePointer state);
   bool BeginAgain();
   // Matched pairs of the group that no refinement has.
-  std::vector<KeyframePair> TakeNewPairs(const MapState& state, const StatePoses& poses);
-  std::unique_ptr<BaProblem> Whole(const MapState& state, const StatePoses& poses);
-  std::unique_ptr<BaProblem> Local(const StatePoses& poses);
+  std::vector<KeyframePair> TakeNewPairs(const MapState& state, const MapPoses& poses);
+  std::unique_ptr<BaProblem> Whole(const MapState& state, const MapPoses& poses);
+  std::unique_ptr<BaProblem> Local(const MapPoses& poses);
   void AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places);
   void DropIfAbout(const MapId& map);
   MapState Finish();
@@ -128,9 +129,9 @@ class GlobalBa {
   SubmapStore store_;
   std::map<KeyframePair, Record> matched_;  // corners, by place recognition
   MatchedPairs pairs_;
-  std::set<KeyframePair> new_pairs_;      // not in the refinement of a group that has both ends
-  std::map<MapId, StatePointer> states_;  // newest of each map; those of one group share it
-  std::map<MapId, Refined> refined_;      // by group
+  std::set<KeyframePair> new_pairs_;  // not in the refinement of a group that has both ends
+  GroupStates<MapState> states_;
+  std::map<MapId, Refined> refined_;  // by group
   std::unique_ptr<Work> work_;
   Counters counters_;
 };

@@ -75,7 +75,7 @@ class Maker {
   }
 
   // Begins where the adjustment before left it, which also left out what was redundant.
-  void StartFrom(const AdjustedGroup& adjusted, const StatePoses& state, const LocalPart& part) {
+  void StartFrom(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
     for (size_t i = 0; i < world_.keyframes.size(); ++i) {
       BaKeyframe& keyframe = world_.keyframes[i];
       keyframe.held = !part.moving.contains(keyframe.id);
@@ -111,7 +111,7 @@ class Maker {
     }
   }
 
-  void HoldCameras(const AdjustedGroup& adjusted, const StatePoses& state, const LocalPart& part) {
+  void HoldCameras(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
     for (const BaKeyframe& keyframe : world_.keyframes) {
       const MapId& map = keyframe.id.map;
       const auto known = adjusted.cameras.find(map);
@@ -144,7 +144,7 @@ void DropWhatIsHeld(BaWorld* world) {
 
 }  // namespace
 
-BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
+BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPlaces>& places,
                        SubmapStore* store) {
   Maker maker(store);
   for (const auto& [id, T_map_body] : state) {
@@ -153,9 +153,8 @@ BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>
   return maker.Finish(places);
 }
 
-BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
-                       const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
-                       SubmapStore* store) {
+BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
+                       const std::vector<MatchedPlaces>& places, SubmapStore* store) {
   Maker maker(store);
   std::set<KeyframeId> all = part.held;
   all.insert(part.moving.begin(), part.moving.end());

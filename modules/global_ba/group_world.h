@@ -21,13 +21,12 @@ struct MatchedPlaces {
 };
 
 // Keyframes of the state that the store does not have, and redundant ones, are left out.
-BaWorld MakeGroupWorld(const StatePoses& state, const std::vector<MatchedPlaces>& places,
+BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPlaces>& places,
                        SubmapStore* store);
 
 // The part alone. A map's camera is held if most of its keyframes stay where they are: they know
 // more of it.
-BaWorld MakeLocalWorld(const StatePoses& state, const LocalPart& part,
-                       const AdjustedGroup& adjusted, const std::vector<MatchedPlaces>& places,
-                       SubmapStore* store);
+BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
+                       const std::vector<MatchedPlaces>& places, SubmapStore* store);
 
 }  // namespace pangea

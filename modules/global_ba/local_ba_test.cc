@@ -118,7 +118,7 @@ class Server {
 
   GlobalBa ba_;
   int64_t revision_ = 0;
-  StatePoses told_;
+  MapPoses told_;
   MapState first_;
 };
 
@@ -129,7 +129,7 @@ BaTestMessages Messages() { return MessagesOf(Corridor()); }
 
 // Largest error of a keyframe of the third agent, seen from the first.
 double ErrorOfNew(const MapState& refined, const BaWorld& truth) {
-  StatePoses found = PosesOf(refined);
+  MapPoses found = PosesOf(refined);
   double largest = 0;
   for (const BaKeyframe& keyframe : truth.keyframes) {
     if (keyframe.id.map.agent_id == 3 && found.contains(keyframe.id)) {
@@ -143,7 +143,7 @@ double ErrorOfNew(const MapState& refined, const BaWorld& truth) {
 }
 
 double LargestDifference(const MapState& a, const MapState& b) {
-  const StatePoses poses_a = PosesOf(a), poses_b = PosesOf(b);
+  const MapPoses poses_a = PosesOf(a), poses_b = PosesOf(b);
   const Rigid3 T_a_b = poses_a.begin()->second * poses_b.begin()->second.Inverse();
   double largest = 0;
   for (const auto& [id, pose] : poses_a) {
@@ -169,7 +169,7 @@ TEST(LocalBa, APartIsAsGoodAsTheWhole) {
 TEST(LocalBa, TheRestStaysAndTheRimDoesNotJump) {
   Server server(kLocal);
   const MapState after = server.FinishBoth(Messages());
-  const StatePoses before = PosesOf(server.first());
+  const MapPoses before = PosesOf(server.first());
   int stayed = 0;
   const KeyframePose* previous = nullptr;
   for (const KeyframePose& pose : after.keyframes) {
@@ -193,7 +193,7 @@ TEST(LocalBa, AtMostSoManyNeighboursMove) {
   options.max_neighbours = 5;
   Server server(options);
   const MapState after = server.FinishBoth(Messages());
-  const StatePoses before = PosesOf(server.first());
+  const MapPoses before = PosesOf(server.first());
   const auto moved = std::ranges::count_if(after.keyframes, [&](const KeyframePose& pose) {
     return OfFirstTwo(pose.id) && pose.T_map_body.t != before.at(pose.id).t;
   });
@@ -215,7 +215,7 @@ TEST(LocalBa, WhatWasLeftOutStaysOut) {
   std::erase_if(messages.constraints, [](const Constraint& c) { return c.to.seq % 5 != 0; });
   const MapState after = server.FinishBoth(messages);
   ASSERT_EQ(server.counters().finished_local, 1);
-  const StatePoses before = PosesOf(server.first()), now = PosesOf(after);
+  const MapPoses before = PosesOf(server.first()), now = PosesOf(after);
   EXPECT_LT(before.size(), 2 * kKeyframes);
   for (const KeyframePose& pose : after.keyframes) {
     EXPECT_TRUE(!OfFirstTwo(pose.id) || before.contains(pose.id) || pose.id.seq < kNew);
@@ -289,10 +289,10 @@ TEST(LocalBa, ALateResultMovesItsEnds) {
   first.constraints.pop_back();
   Server server(kLocal);
   server.Take(first);
-  const StatePoses before = PosesOf(server.Finish());
+  const MapPoses before = PosesOf(server.Finish());
   ++late.state.num_constraints;
   server.Take(late);
-  const StatePoses after = PosesOf(server.Finish());
+  const MapPoses after = PosesOf(server.Finish());
   EXPECT_EQ(server.counters().finished_local, 1);
   const Constraint& result = late.constraints.back();
   EXPECT_NE(before.at(result.to).t, after.at(result.to).t);

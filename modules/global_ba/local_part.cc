@@ -9,7 +9,7 @@ namespace {
 
 class Chooser {
  public:
-  Chooser(const StatePoses& state, const AdjustedGroup& adjusted, const MatchedPairs& pairs,
+  Chooser(const MapPoses& state, const AdjustedGroup& adjusted, const MatchedPairs& pairs,
           SubmapStore* store)
       : state_(state), adjusted_(adjusted), pairs_(pairs), store_(store) {}
 
@@ -150,7 +150,7 @@ class Chooser {
     return landmarks;
   }
 
-  const StatePoses& state_;
+  const MapPoses& state_;
   const AdjustedGroup& adjusted_;
   const MatchedPairs& pairs_;
   SubmapStore* store_;
@@ -161,7 +161,7 @@ class Chooser {
 
 }  // namespace
 
-LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted,
+LocalPart ChooseLocalPart(const MapPoses& state, const AdjustedGroup& adjusted,
                           const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
                           int max_neighbours, SubmapStore* store) {
   return Chooser(state, adjusted, pairs, store).Choose(new_pairs, max_neighbours);

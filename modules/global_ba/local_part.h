@@ -38,7 +38,7 @@ struct LocalPart {
   std::set<KeyframeId> held;  // and those between that the adjustment before left out
 };
 
-LocalPart ChooseLocalPart(const StatePoses& state, const AdjustedGroup& adjusted,
+LocalPart ChooseLocalPart(const MapPoses& state, const AdjustedGroup& adjusted,
                           const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
                           int max_neighbours, SubmapStore* store);
 

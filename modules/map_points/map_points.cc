@@ -31,7 +31,7 @@ constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
 
 }  // namespace
 
-void MapPoints::Take(const MapState& state) { groups_.Take(state); }
+void MapPoints::Take(const MapState& state) { groups_.Take(PosedGroup(state)); }
 
 void MapPoints::TakeRefined(const MapState& refined) {
   for (const KeyframePose& pose : refined.keyframes) {
@@ -42,7 +42,7 @@ void MapPoints::TakeRefined(const MapState& refined) {
 }
 
 std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent,
-                                                       const GroupState& group) {
+                                                       const PosedGroup& group) {
   auto newest = group.T_map_body.upper_bound({agent.map, std::numeric_limits<int32_t>::max()});
   if (newest == group.T_map_body.begin() || (--newest)->first.map != agent.map) {
     return std::nullopt;
@@ -84,7 +84,7 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
 
 // Those that saw most of it first.
 std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
-                                                     const GroupState& group,
+                                                     const PosedGroup& group,
                                                      const Outlook& outlook) {
   const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
@@ -117,7 +117,7 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
 // One message as it fills.
 class MapPoints::Selection {
  public:
-  Selection(const GroupState& group, const Outlook& outlook, SubmapStore* store,
+  Selection(const PosedGroup& group, const Outlook& outlook, SubmapStore* store,
             SentPoints* sent_points)
       : group_(group), outlook_(outlook), store_(store), sent_points_(sent_points) {
     ++sent_points_->messages;
@@ -181,7 +181,7 @@ class MapPoints::Selection {
     return landmark;
   }
 
-  const GroupState& group_;
+  const PosedGroup& group_;
   const Outlook& outlook_;
   SubmapStore* store_;
   SentPoints* sent_points_;
@@ -191,7 +191,7 @@ class MapPoints::Selection {
 };
 
 std::optional<MapLandmarks> MapPoints::Choose(const AgentPose& agent) {
-  const GroupState* const group = groups_.Find(agent.map);
+  const PosedGroup* const group = groups_.Find(agent.map);
   const auto outlook = group == nullptr ? std::nullopt : OutlookOf(agent, *group);
   if (!outlook) {
     return std::nullopt;

@@ -91,13 +91,13 @@ class MapPoints {
   };
   class Selection;
 
-  std::optional<Outlook> OutlookOf(const AgentPose& agent, const GroupState& group);
-  std::vector<Source> SourcesFor(const AgentPose& agent, const GroupState& group,
+  std::optional<Outlook> OutlookOf(const AgentPose& agent, const PosedGroup& group);
+  std::vector<Source> SourcesFor(const AgentPose& agent, const PosedGroup& group,
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
 
   SubmapStore store_;
-  GroupStates groups_;
+  GroupStates<PosedGroup> groups_;
   std::set<KeyframeId> refined_;
   std::map<MapId, SentPoints> sent_points_;
 };

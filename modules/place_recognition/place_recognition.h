@@ -19,10 +19,10 @@
 #include <string>
 #include <vector>
 
+#include "core/group_states.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
-#include "place_recognition/map_groups.h"
 #include "place_recognition/stored_keyframes.h"
 
 namespace pangea {
@@ -75,10 +75,8 @@ class PlaceRecognition {
   void Save(ByteWriter* writer);
   bool Restore(ByteReader* reader);
 
-  // The maps of one group (a MAP_STATE).
-  void SetGroup(const MapId& group, int64_t revision, const std::vector<MapId>& maps) {
-    groups_.Set(group, revision, maps);
-  }
+  // Which maps are one group. The highest revision wins, map by map.
+  void Take(const MapState& state) { groups_.Take({state.revision, state.maps}); }
 
   const Counters& counters() const { return counters_; }
   const RecordCounters& store_counters() const { return stored_.counters(); }
@@ -92,6 +90,10 @@ class PlaceRecognition {
     int places;            // verified: the best by retrieval
     int continued_places;  // and those next to where the previous keyframe was recognised
     int candidates;        // published at most: each costs its consumer a bundle adjustment
+  };
+  struct GroupMaps {
+    int64_t revision = 0;
+    std::vector<MapId> maps;
   };
   static constexpr Limits kOwnMap{.places = 5, .continued_places = 2, .candidates = 3};
   static constexpr Limits kOtherMaps{.places = 8, .continued_places = 3, .candidates = 5};
@@ -118,7 +120,7 @@ class PlaceRecognition {
   DescriptorIndex index_;
   StoredKeyframes stored_;                                 // numbered as in index_
   std::map<MapId, std::vector<KeyframeId>> last_matches_;  // of each map's newest keyframe
-  MapGroups groups_;
+  GroupStates<GroupMaps> groups_;
   Counters counters_;
 };
 

@@ -122,7 +122,7 @@ bool PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
 
 void PlaceRecognitionProcess::OnMapState(const MapState& state) {
   journal_.NoteStates(state.maps);
-  recognition_.SetGroup(state.group, state.revision, state.maps);
+  recognition_.Take(state);
   ReleaseHeldIfCaughtUp();
 }
 

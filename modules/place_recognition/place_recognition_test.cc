@@ -27,6 +27,14 @@ Keyframe OnTheRound(test::TestWorld& world, const MapId& map, int seq, const Rig
 
 double YawApart(int a, int b) { return std::abs(WrapAngle(kStepYaw * (a - b))); }
 
+MapState StateOf(int64_t revision, const std::vector<MapId>& maps) {
+  MapState state;
+  state.group = maps.front();
+  state.revision = revision;
+  state.maps = maps;
+  return state;
+}
+
 bool SameMatch(const PlaceMatch& a, const PlaceMatch& b) {
   if (a.query != b.query || a.rejected != b.rejected ||
       a.candidates.size() != b.candidates.size()) {
@@ -142,20 +150,20 @@ TEST(PlaceRecognition, AFusedMapsOwnLoopsAreInterUntilItIsTakenOut) {
     return recognition.Add(world.See({kMapA, 40}, {0.2, 0, 1.5}, 0)).candidates.at(0).kind;
   };
   EXPECT_EQ(kind_after([](PlaceRecognition&) {}), PlaceKind::kIntra);
-  EXPECT_EQ(kind_after([](PlaceRecognition& r) { r.SetGroup(kMapA, 1, {kMapA}); }),
+  EXPECT_EQ(kind_after([](PlaceRecognition& r) { r.Take(StateOf(1, {kMapA})); }),
             PlaceKind::kIntra);
   EXPECT_EQ(kind_after([](PlaceRecognition& r) {
-              r.SetGroup(kMapB, 1, {kMapA, kMapB});
+              r.Take(StateOf(1, {kMapA, kMapB}));
             }),
             PlaceKind::kInter);
   EXPECT_EQ(kind_after([](PlaceRecognition& r) {
-              r.SetGroup(kMapB, 1, {kMapA, kMapB});
-              r.SetGroup(kMapB, 2, {kMapB});
+              r.Take(StateOf(1, {kMapA, kMapB}));
+              r.Take(StateOf(2, {kMapB}));
             }),
             PlaceKind::kIntra);
   EXPECT_EQ(kind_after([](PlaceRecognition& r) {  // an old message repeated
-              r.SetGroup(kMapB, 2, {kMapA, kMapB});
-              r.SetGroup(kMapA, 1, {kMapA});
+              r.Take(StateOf(2, {kMapA, kMapB}));
+              r.Take(StateOf(1, {kMapA}));
             }),
             PlaceKind::kInter);
 }
