@@ -1,6 +1,5 @@
 #include "global_ba/landmarks.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +7,9 @@
 #include <set>
 #include <tuple>
 #include <utility>
+#include <vector>
+
+#include "core/triangulation.h"
 
 namespace pangea {
 namespace {
@@ -122,29 +124,20 @@ class Builder {
 
   // The point nearest to all rays; nothing when they are too parallel or it does not fit the track.
   std::optional<Eigen::Vector3d> Triangulate(const std::vector<BaObservation>& seen) const {
-    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    std::vector<LineOfSight> lines;
     double least_cosine = 1;
-    for (size_t i = 0; i < seen.size(); ++i) {
-      const Rigid3& T_map_cam = T_map_cam_[seen[i].keyframe];
-      const Eigen::Vector3d direction = T_map_cam.q * seen[i].ray.homogeneous().normalized();
-      const Eigen::Matrix3d across =
-          Eigen::Matrix3d::Identity() - direction * direction.transpose();
-      A += across;
-      b += across * T_map_cam.t;
-      if (i == 0) {
-        first = direction;
-      }
-      least_cosine = std::min(least_cosine, first.dot(direction));
+    for (const BaObservation& s : seen) {
+      const Rigid3& T_map_cam = T_map_cam_[s.keyframe];
+      lines.push_back({T_map_cam.t, T_map_cam.q * s.ray.homogeneous().normalized()});
+      least_cosine = std::min(least_cosine, lines.front().direction.dot(lines.back().direction));
     }
     if (least_cosine > std::cos(kMinParallax)) {
       return std::nullopt;
     }
-    const Eigen::Vector3d point = A.ldlt().solve(b);
-    const bool fits = std::all_of(seen.begin(), seen.end(),
-                                  [&](const BaObservation& s) { return Fits(s, point); });
-    return fits ? std::make_optional(point) : std::nullopt;
+    const auto point = TriangulateMidpoint(lines);
+    const bool fits = point && std::all_of(seen.begin(), seen.end(),
+                                           [&](const BaObservation& s) { return Fits(s, *point); });
+    return fits ? point : std::nullopt;
   }
 
   bool Fits(const BaObservation& seen, const Eigen::Vector3d& point) const {

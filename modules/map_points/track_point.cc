@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/triangulation.h"
+
 namespace pangea {
 namespace {
 
@@ -55,17 +57,13 @@ std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t lan
   return rays;
 }
 
-// Nearest to all rays.
-Vector3d MeetRays(const std::vector<Ray>& rays) {
-  Matrix3d A = Matrix3d::Zero();
-  Vector3d b = Vector3d::Zero();
+// In the map frame.
+std::vector<LineOfSight> LinesOfSight(const std::vector<Ray>& rays) {
+  std::vector<LineOfSight> lines;
   for (const Ray& ray : rays) {
-    const Vector3d d = ray.T_map_cam.q * ray.ray.homogeneous().normalized();
-    const Matrix3d across = Matrix3d::Identity() - d * d.transpose();
-    A += across;
-    b += across * ray.T_map_cam.t;
+    lines.push_back({ray.T_map_cam.t, ray.T_map_cam.q * ray.ray.homogeneous().normalized()});
   }
-  return A.ldlt().solve(b);
+  return lines;
 }
 
 }  // namespace
@@ -78,7 +76,11 @@ std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView
   if (rays.size() < kMinRays) {
     return std::nullopt;
   }
-  Vector3d p = MeetRays(rays);
+  const auto start = TriangulateMidpoint(LinesOfSight(rays));
+  if (!start) {
+    return std::nullopt;
+  }
+  Vector3d p = *start;
   Matrix3d information;
   double cost = 0;
   for (int iteration = 0; iteration < kIterations; ++iteration) {

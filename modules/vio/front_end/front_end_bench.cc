@@ -10,6 +10,7 @@
 #include <iostream>
 #include <map>
 
+#include "core/triangulation.h"
 #include "recording/euroc.h"
 #include "vio/front_end/tracker.h"
 
@@ -35,16 +36,18 @@ double Percentile(std::vector<double> values, double share) {
 // The point nearest to all rays, refined on the image plane with robust weights; residuals in
 // units of the plane z = 1.
 std::vector<double> Residuals(const std::vector<View>& views) {
-  Eigen::Matrix3d h = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  std::vector<LineOfSight> lines;
   for (const View& view : views) {
     const Rigid3 T_reference_cam = view.T_cam_reference.Inverse();
-    const Eigen::Vector3d d = (T_reference_cam.q * view.ray.homogeneous()).normalized();
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-    h += across;
-    g += across * T_reference_cam.t;
+    lines.push_back({T_reference_cam.t, (T_reference_cam.q * view.ray.homogeneous()).normalized()});
   }
-  Eigen::Vector3d p = h.ldlt().solve(g);
+  const auto start = TriangulateMidpoint(lines);
+  if (!start) {
+    return {};
+  }
+  Eigen::Vector3d p = *start;
+  Eigen::Matrix3d h;
+  Eigen::Vector3d g;
   for (int iteration = 0; iteration < 10; ++iteration) {
     h.setZero();
     g.setZero();

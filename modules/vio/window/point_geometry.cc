@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/triangulation.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -41,22 +43,16 @@ Rigid3 CameraPose(const WindowState& state, const FrameRay& seen) {
   return BodyPose(state, seen) * state.T_body_cam;
 }
 
-// Where the rays meet, linear: minimises the distance to all of them. In odom.
-std::optional<Vector3d> MeetRays(const WindowState& state, std::span<const FrameRay> rays,
-                                 const std::vector<Rigid3>& T_odom_cam) {
-  Matrix3d A = Matrix3d::Zero();
-  Vector3d b = Vector3d::Zero();
+// In odom.
+std::vector<LineOfSight> LinesOfSight(const WindowState& state, std::span<const FrameRay> rays,
+                                      const std::vector<Rigid3>& T_odom_cam) {
+  std::vector<LineOfSight> lines;
+  lines.reserve(rays.size());
   for (size_t i = 0; i < rays.size(); ++i) {
-    const Vector3d d = (T_odom_cam[i].q * rays[i].RayBy(state).homogeneous()).normalized();
-    const Matrix3d across = Matrix3d::Identity() - d * d.transpose();
-    A += across;
-    b += across * T_odom_cam[i].t;
+    lines.push_back(
+        {T_odom_cam[i].t, (T_odom_cam[i].q * rays[i].RayBy(state).homogeneous()).normalized()});
   }
-  const Eigen::LDLT<Matrix3d> ldlt(A);
-  if (ldlt.info() != Eigen::Success || ldlt.vectorD().minCoeff() < 1e-9) {
-    return std::nullopt;
-  }
-  return Vector3d(ldlt.solve(b));
+  return lines;
 }
 
 // Of one Gauss-Newton step of a point (alpha, beta, rho) seen along `rays`.
@@ -198,7 +194,7 @@ std::optional<Triangulated> Triangulate(const WindowState& state, std::span<cons
   for (const FrameRay& seen : rays) {
     T_odom_cam.push_back(CameraPose(state, seen));
   }
-  const auto p_odom = MeetRays(state, rays, T_odom_cam);
+  const auto p_odom = TriangulateMidpoint(LinesOfSight(state, rays, T_odom_cam));
   if (!p_odom) {
     return std::nullopt;
   }

@@ -1,0 +1,26 @@
+#include "core/triangulation.h"
+
+#include <Eigen/Cholesky>
+
+namespace pangea {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+std::optional<Vector3d> TriangulateMidpoint(std::span<const LineOfSight> lines) {
+  constexpr double kLeastPivot = 1e-9;  // below it all directions are the same to 1e-5 radians
+  Matrix3d A = Matrix3d::Zero();
+  Vector3d b = Vector3d::Zero();
+  for (const auto& [origin, direction] : lines) {
+    const Matrix3d across = Matrix3d::Identity() - direction * direction.transpose();
+    A += across;
+    b += across * origin;
+  }
+  const Eigen::LDLT<Matrix3d> ldlt(A);
+  if (ldlt.info() != Eigen::Success || ldlt.vectorD().minCoeff() < kLeastPivot) {
+    return std::nullopt;
+  }
+  return Vector3d(ldlt.solve(b));
+}
+
+}  // namespace pangea
