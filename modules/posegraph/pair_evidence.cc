@@ -16,18 +16,33 @@ constexpr size_t kMaxCandidates = 600;
 constexpr size_t kMaxSeeds = 10;
 constexpr size_t kMaxCompared = 40;
 
+// Viewpoints that must agree: constraints that differ by a keyframe elsewhere, in either map. Fewer
+// are enough if each has so many inliers.
+constexpr int kMinViewpoints = 3;
+constexpr int kMinStrongViewpoints = 2;
+constexpr int kStrongInliers = 80;
+// A keyframe is elsewhere by this distance or this rotation of the view.
+constexpr double kViewpointDistance_m = 0.25;
+constexpr double kViewpointAngle_rad = 0.15;
+// Of the viewpoints, that the largest rival may have.
+constexpr double kMaxRivalShare = 0.5;
+constexpr double kMaxRivalShareAtOneSpot = 0.25;
+// Odometry that claims less drift than this is not believed while maps are compared (it is no
+// weight of the solve): standard deviations per metre of path.
+constexpr double kMinDrift_per_m = 0.02;
+constexpr double kMinYawDrift_rad_per_m = 0.001;
+
 Matrix4d RotateAxes(const Matrix4d& covariance, double yaw) {
   Matrix4d R = Matrix4d::Identity();
   R.topLeftCorner<3, 3>() = YawRotation(yaw).toRotationMatrix();
   return R * covariance * R.transpose();
 }
 
-bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l,
-               const MergeOptions& options) {
+bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l) {
   const Eigen::Vector3d view_k = (k.scene_odom - k.T_odom_body.t).normalized();
   const Eigen::Vector3d view_l = (l.scene_odom - l.T_odom_body.t).normalized();
-  return (k.T_odom_body.t - l.T_odom_body.t).norm() > options.viewpoint_distance_m ||
-         view_k.dot(view_l) < std::cos(options.viewpoint_angle);
+  return (k.T_odom_body.t - l.T_odom_body.t).norm() > kViewpointDistance_m ||
+         view_k.dot(view_l) < std::cos(kViewpointAngle_rad);
 }
 
 // Of a position `from_l` away from node l, in a map whose keyframes k and l may doubt its scale.
@@ -39,18 +54,22 @@ Eigen::Matrix3d ScaleCovariance(const OdometryChain::Node& k, const OdometryChai
 
 }  // namespace
 
-Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point,
-                         const MergeOptions& options) {
+Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point) {
   const double path = chain.PathBetween(i, j);
-  const double sigma_m = options.min_drift_per_m * path;
-  const double sigma_yaw = options.min_yaw_drift_per_m * path;
+  const double sigma_m = kMinDrift_per_m * path;
+  const double sigma_yaw = kMinYawDrift_rad_per_m * path;
   Matrix4d least = Matrix4d::Identity() * sigma_m * sigma_m;
   least(3, 3) = sigma_yaw * sigma_yaw;
   return chain.DriftBetween(i, j, point) + CovarianceAt(least, point - chain[j].T_odom_body.t);
 }
 
 PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candidate& l,
-                                               const MergeOptions& drift) const {
+                                               Drift drift) const {
+  const auto drift_between = [&](const OdometryChain& chain, int i, int j,
+                                 const Eigen::Vector3d& point) {
+    return drift == Drift::kBelievable ? BelievableDrift(chain, i, j, point)
+                                       : chain.DriftBetween(i, j, point);
+  };
   // Where l and the odometry of both maps put k's keyframe of map b, in the odom axes of a.
   const Eigen::Vector3d& p_b = (*b_)[k.node_b].T_odom_body.t;
   const Eigen::Vector3d p_a = l.T_odom_a_odom_b * p_b;
@@ -62,16 +81,15 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
   innovation.measurement.topLeftCorner<3, 3>() +=
       ScaleCovariance((*a_)[k.node_a], (*a_)[l.node_a], from_k - (*a_)[l.node_a].T_odom_body.t) +
       ScaleCovariance((*b_)[k.node_b], (*b_)[l.node_b], p_a - to_l);
-  innovation.odometry =
-      BelievableDrift(*a_, k.node_a, l.node_a, p_a, drift) +
-      RotateAxes(BelievableDrift(*b_, l.node_b, k.node_b, p_b, drift), l.relative.yaw);
+  innovation.odometry = drift_between(*a_, k.node_a, l.node_a, p_a) +
+                        RotateAxes(drift_between(*b_, l.node_b, k.node_b, p_b), l.relative.yaw);
   return innovation;
 }
 
 bool PairEvidence::Agree(const Candidate& k, const Candidate& l) const {
-  const Innovation innovation = Compare(k, l, options_);
+  const Innovation innovation = Compare(k, l);
   const Matrix4d covariance = innovation.measurement + innovation.odometry;
-  return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= options_.agree_chi2;
+  return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= kMaxLoopChi2;
 }
 
 bool PairEvidence::AgreeAt(int k, int l) const {
@@ -173,8 +191,7 @@ std::vector<int> PairEvidence::LargestAgreeing(std::vector<int> among) const {
 }
 
 bool PairEvidence::DifferentViewpoint(const Candidate& k, const Candidate& l) const {
-  return Elsewhere((*a_)[k.node_a], (*a_)[l.node_a], options_) ||
-         Elsewhere((*b_)[k.node_b], (*b_)[l.node_b], options_);
+  return Elsewhere((*a_)[k.node_a], (*a_)[l.node_a]) || Elsewhere((*b_)[k.node_b], (*b_)[l.node_b]);
 }
 
 std::vector<int> PairEvidence::Viewpoints(const std::vector<int>& candidates) const {
@@ -210,18 +227,17 @@ double PairEvidence::SceneExtent(const std::vector<int>& candidates) const {
 
 bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoints) const {
   const auto strong = std::ranges::count_if(
-      viewpoints, [&](int k) { return candidates_[k].num_inliers >= options_.strong_inliers; });
+      viewpoints, [&](int k) { return candidates_[k].num_inliers >= kStrongInliers; });
   const int count = static_cast<int>(viewpoints.size());
   if (std::ranges::any_of(agreeing_, [&](int k) { return candidates_[k].derived; })) {
-    return rival_viewpoints <=
-           options_.max_rival_share * std::max(count, options_.min_viewpoints + 1);
+    return rival_viewpoints <= kMaxRivalShare * std::max(count, kMinViewpoints + 1);
   }
   if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
-    return (count > options_.min_viewpoints || strong > options_.min_strong_viewpoints) &&
-           rival_viewpoints <= options_.max_rival_share_at_one_spot * count;
+    return (count > kMinViewpoints || strong > kMinStrongViewpoints) &&
+           rival_viewpoints <= kMaxRivalShareAtOneSpot * count;
   }
-  return (count >= options_.min_viewpoints || strong >= options_.min_strong_viewpoints) &&
-         rival_viewpoints <= options_.max_rival_share * count;
+  return (count >= kMinViewpoints || strong >= kMinStrongViewpoints) &&
+         rival_viewpoints <= kMaxRivalShare * count;
 }
 
 int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
@@ -233,7 +249,7 @@ int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
     double sum = 0;
     for (size_t j = 0; j < agreeing.size(); j += stride) {
       const int k = agreeing[j];
-      const Innovation innovation = Compare(candidates_[k], candidates_[l], options_);
+      const Innovation innovation = Compare(candidates_[k], candidates_[l]);
       const Matrix4d covariance = innovation.measurement + innovation.odometry;
       // A likelihood, not a distance alone: a vague member is far from none.
       sum += innovation.error.dot(covariance.ldlt().solve(innovation.error)) +
@@ -256,7 +272,7 @@ Pose4 PairEvidence::Alignment() const {
     Vector4d g = Vector4d::Zero();
     for (const int k : agreeing_) {
       const Candidate& candidate = candidates_[k];
-      const Innovation innovation = Compare(candidate, best, options_);
+      const Innovation innovation = Compare(candidate, best);
       const Matrix4d information = (innovation.measurement + innovation.odometry).inverse();
       const Eigen::Vector3d& p_b = (*b_)[candidate.node_b].T_odom_body.t;
       Vector4d error;
@@ -298,8 +314,6 @@ void PairEvidence::Decide() {
 }
 
 std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {
-  MergeOptions as_claimed = options_;
-  as_claimed.min_drift_per_m = as_claimed.min_yaw_drift_per_m = 0;
   std::vector<int> along = agreeing_;
   std::ranges::sort(along, {}, [this](int k) {
     const Candidate& candidate = candidates_[k];
@@ -308,7 +322,8 @@ std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {
   std::vector<Innovation> innovations;
   const size_t half = along.size() / 2;
   for (size_t i = 0; i < half; ++i) {
-    innovations.push_back(Compare(candidates_[along[i]], candidates_[along[i + half]], as_claimed));
+    innovations.push_back(
+        Compare(candidates_[along[i]], candidates_[along[i + half]], Drift::kAsClaimed));
   }
   return innovations;
 }

@@ -21,55 +21,21 @@
 namespace pangea {
 
 struct MergeOptions {
-  // Viewpoints that must agree: constraints that differ by a keyframe elsewhere, in either map.
-  int min_viewpoints = 3;
-  // So few are enough if each has this many inliers.
-  int min_strong_viewpoints = 2;
-  int strong_inliers = 80;
-  // A keyframe is elsewhere by this distance or this rotation of the view.
-  double viewpoint_distance_m = 0.25;
-  double viewpoint_angle = 0.15;
   // What the agreeing viewpoints see must not be one spot: an object has a look-alike somewhere.
   // Agents that only ever looked at one spot need one viewpoint more, and next to no rival:
   // look-alikes standing elsewhere would each be one.
   double min_scene_extent_m = 1.5;
-  double max_rival_share_at_one_spot = 0.25;
-  // The largest rival may have this share of the viewpoints.
-  double max_rival_share = 0.5;
-  double agree_chi2 = 18.47;  // chi-squared(4): 0.999
-  // Odometry that claims less drift than this is not believed while maps are compared (it is no
-  // weight of the solve): standard deviations per metre of path.
-  double min_drift_per_m = 0.02;
-  double min_yaw_drift_per_m = 0.001;
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("min_viewpoints", &min_viewpoints, {1, 1000}, "", "that must agree");
-    archive.Add("min_strong_viewpoints", &min_strong_viewpoints, {1, 1000}, "",
-                "that are enough, if each is strong");
-    archive.Add("strong_inliers", &strong_inliers, {4, 100000}, "", "of a strong viewpoint");
-    archive.Add("viewpoint_distance_m", &viewpoint_distance_m, {0, 1000}, "m",
-                "by which a keyframe is another viewpoint");
-    archive.Add("viewpoint_angle", &viewpoint_angle, {0, 3.15}, "rad",
-                "by which a keyframe is another viewpoint");
     archive.Add("min_scene_extent_m", &min_scene_extent_m, {0, 1000}, "m",
                 "of what the agreeing viewpoints see; less is one spot");
-    archive.Add("max_rival_share_at_one_spot", &max_rival_share_at_one_spot, {0, 1}, "",
-                "of the viewpoints, where all see one spot");
-    archive.Add("max_rival_share", &max_rival_share, {0, 1}, "", "of the viewpoints");
-    archive.Add("agree_chi2", &agree_chi2, {0.1, 1000}, "",
-                "of two constraints that agree, 4 degrees of freedom");
-    archive.Add("min_drift_per_m", &min_drift_per_m, {0, 1}, "",
-                "sigma of the odometry, of its path, while maps are compared");
-    archive.Add("min_yaw_drift_per_m", &min_yaw_drift_per_m, {0, 1}, "rad/m",
-                "sigma of the odometry's yaw, while maps are compared");
   }
 };
 
-// Covariance of the odometry between two nodes of a map, at a point, with the options' least drift
-// added.
-Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point,
-                         const MergeOptions& options);
+// Covariance of the odometry between two nodes of a map, at a point, with the least drift added
+// that is believed while maps are compared.
+Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point);
 
 class PairEvidence {
  public:
@@ -115,7 +81,10 @@ class PairEvidence {
     std::vector<bool> agrees;  // with each candidate before it
   };
 
-  Innovation Compare(const Candidate& k, const Candidate& l, const MergeOptions& drift) const;
+  // What the odometry is believed to drift.
+  enum class Drift : uint8_t { kAsClaimed, kBelievable };
+  Innovation Compare(const Candidate& k, const Candidate& l,
+                     Drift drift = Drift::kBelievable) const;
   bool Agree(const Candidate& k, const Candidate& l) const;
   bool AgreeAt(int k, int l) const;
   // Greedy largest set of mutually agreeing candidates among `among`.

@@ -24,7 +24,7 @@ void PoseGraph::AddKeyframe(const Keyframe& keyframe) {
   }
   GraphGroup& group = groups_.Of(number);
   group.solve.AddKeyframe();
-  group.publication.AddKeyframe(maps_.NumKeyframes(group.maps), options_);
+  group.publication.AddKeyframe(maps_.NumKeyframes(group.maps));
   constraints_.KeyframeCame(
       keyframe.id, [this](const Constraint& constraint) { return UseConstraint(constraint); });
 }
@@ -71,7 +71,7 @@ bool PoseGraph::WholeIsDue(const GraphGroup& group) const {
 
 bool PoseGraph::SolveIsDue(const GraphGroup& group, bool from_the_beginning) const {
   return group.solve.NewMapsWait() ||
-         group.solve.LoopsWaitLongEnough(maps_.NumKeyframes(group.maps), options_) ||
+         group.solve.LoopsWaitLongEnough(maps_.NumKeyframes(group.maps)) ||
          (from_the_beginning && (group.solve.waiting_loops > 0 || WholeIsDue(group)));
 }
 

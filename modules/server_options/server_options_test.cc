@@ -78,7 +78,7 @@ TEST(ServerOptions, WhatMakesNoSenseIsRefusedByNameAndRange) {
               HasSubstr("'fusion.alignment.min_inliers' must be a whole number from 4 to 100000, "
                         "not '0'"));
   for (const char* value :
-       {"inter_map_ba.alignment.ba.iterations=0", "posegraph.solver.gnc_factor=1",
+       {"inter_map_ba.alignment.ba.iterations=0", "posegraph.local_keyframes=0",
         "global_ba.ba.max_iterations=0", "anchors.max_near=257",
         "place_recognition.max_keyframes=0", "fusion.alignment.max_sigma_m=.nan"}) {
     EXPECT_THAT(Complaint({value}), HasSubstr("must be a ")) << value;

@@ -16,11 +16,13 @@ void SolveSchedule::Solved() {
   changed.clear();
 }
 
-bool SolveSchedule::LoopsWaitLongEnough(size_t num_keyframes,
-                                        const PoseGraphOptions& options) const {
-  const int enough = 1 + static_cast<int>(num_keyframes) / options.keyframes_per_waiting_loop;
+bool SolveSchedule::LoopsWaitLongEnough(size_t num_keyframes) const {
+  // A group solves after each loop; a larger one, which takes longer, waits for one more loop per
+  // so many keyframes.
+  constexpr int kKeyframesPerLoop = 300;
+  const int enough = 1 + static_cast<int>(num_keyframes) / kKeyframesPerLoop;
   return waiting_loops >= enough ||
-         (waiting_loops > 0 && keyframes_waiting >= options.max_keyframes_waiting);
+         (waiting_loops > 0 && keyframes_waiting >= kMaxKeyframesWaiting);
 }
 
 bool SolveSchedule::WholeIsDue(size_t num_keyframes, int64_t num_loops,
@@ -32,11 +34,11 @@ bool SolveSchedule::WholeIsDue(size_t num_keyframes, int64_t num_loops,
   return kShare * (num_loops - whole_loops) >= num_loops;
 }
 
-void PublicationSchedule::AddKeyframe(size_t num_keyframes, const PoseGraphOptions& options) {
+void PublicationSchedule::AddKeyframe(size_t num_keyframes) {
   constexpr size_t kShare = 50;
   unpublished = true;
   ++keyframes;
-  if (keyframes >= std::max<int>(options.state_every, static_cast<int>(num_keyframes / kShare))) {
+  if (keyframes >= std::max(kMinKeyframes, static_cast<int>(num_keyframes / kShare))) {
     now = true;
   }
 }

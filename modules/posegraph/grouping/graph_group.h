@@ -14,6 +14,8 @@ namespace pangea {
 
 // Decides by counts alone: of loops, keyframes and maps since the last solve.
 struct SolveSchedule {
+  static constexpr int kMaxKeyframesWaiting = 10;  // since the first waiting loop
+
   bool regrouped = true;      // the group has other maps than at the last solve
   bool stale = false;         // loops since the last solve from the beginning
   int waiting_loops = 0;      // since the last solve
@@ -28,17 +30,19 @@ struct SolveSchedule {
 
   // Maps came or went, and no solve knows them together.
   bool NewMapsWait() const { return regrouped && stale; }
-  bool LoopsWaitLongEnough(size_t num_keyframes, const PoseGraphOptions& options) const;
+  bool LoopsWaitLongEnough(size_t num_keyframes) const;
   // Whether the group is solved from the beginning once nothing more comes.
   bool WholeIsDue(size_t num_keyframes, int64_t num_loops, const PoseGraphOptions& options) const;
 };
 
 struct PublicationSchedule {
+  static constexpr int kMinKeyframes = 10;  // new ones, and 2 % of the group
+
   bool unpublished = true;  // something is new
   bool now = false;         // it is to be published with the next update
   int keyframes = 0;        // since it was published
 
-  void AddKeyframe(size_t num_keyframes, const PoseGraphOptions& options);
+  void AddKeyframe(size_t num_keyframes);
   void Request() { unpublished = now = true; }
   void Published() {
     unpublished = now = false;

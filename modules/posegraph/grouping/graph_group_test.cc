@@ -15,29 +15,27 @@ Loop LoopOf(int from, int to) {
 }
 
 TEST(SolveSchedule, ALargerGroupWaitsForMoreLoops) {
-  const PoseGraphOptions options;  // one more each 300 keyframes
   SolveSchedule schedule;
-  EXPECT_FALSE(schedule.LoopsWaitLongEnough(100, options));
+  EXPECT_FALSE(schedule.LoopsWaitLongEnough(100));
   schedule.AddLoop(LoopOf(2, 5));
-  EXPECT_TRUE(schedule.LoopsWaitLongEnough(100, options));
-  EXPECT_FALSE(schedule.LoopsWaitLongEnough(300, options));
+  EXPECT_TRUE(schedule.LoopsWaitLongEnough(100));
+  EXPECT_FALSE(schedule.LoopsWaitLongEnough(300));
   schedule.AddLoop(LoopOf(2, 2));
-  EXPECT_TRUE(schedule.LoopsWaitLongEnough(300, options));
+  EXPECT_TRUE(schedule.LoopsWaitLongEnough(300));
   EXPECT_EQ(schedule.changed, (std::set<int>{2, 5}));
 }
 
 TEST(SolveSchedule, LoopsWaitForSoManyKeyframesAtMost) {
-  const PoseGraphOptions options;
   SolveSchedule schedule;
   schedule.AddKeyframe();  // nothing waits yet
   schedule.AddLoop(LoopOf(0, 0));
-  for (int i = 0; i < options.max_keyframes_waiting; ++i) {
-    EXPECT_FALSE(schedule.LoopsWaitLongEnough(1000, options)) << i;
+  for (int i = 0; i < SolveSchedule::kMaxKeyframesWaiting; ++i) {
+    EXPECT_FALSE(schedule.LoopsWaitLongEnough(1000)) << i;
     schedule.AddKeyframe();
   }
-  EXPECT_TRUE(schedule.LoopsWaitLongEnough(1000, options));
+  EXPECT_TRUE(schedule.LoopsWaitLongEnough(1000));
   schedule.Solved();
-  EXPECT_FALSE(schedule.LoopsWaitLongEnough(0, options));
+  EXPECT_FALSE(schedule.LoopsWaitLongEnough(0));
   EXPECT_TRUE(schedule.changed.empty());
 }
 
@@ -64,14 +62,13 @@ TEST(SolveSchedule, ALargeGroupIsSolvedWholeWhenItHasGrownByATenth) {
 }
 
 TEST(PublicationSchedule, NowAfterSoManyKeyframesAndTwoPercent) {
-  const PoseGraphOptions options;
   for (const int num_keyframes : {1, 1000}) {
     PublicationSchedule schedule;
     schedule.Published();
-    const int enough = num_keyframes == 1 ? options.state_every : 20;
+    const int enough = num_keyframes == 1 ? PublicationSchedule::kMinKeyframes : 20;
     for (int i = 0; i < enough; ++i) {
       EXPECT_FALSE(schedule.now);
-      schedule.AddKeyframe(num_keyframes, options);
+      schedule.AddKeyframe(num_keyframes);
       EXPECT_TRUE(schedule.unpublished);
     }
     EXPECT_TRUE(schedule.now);

@@ -93,7 +93,7 @@ void GroupOptimizer::ResetLoops(const GraphGroup& group, const std::vector<Loop*
     agreeing.insert(ids.begin(), ids.end());
   }
   for (Loop* loop : loops) {
-    loop->on = loop->intra() ? FitsOdometry(*loop, maps_[loop->from.map].chain, options_.merge)
+    loop->on = loop->intra() ? FitsOdometry(*loop, maps_[loop->from.map].chain)
                              : agreeing.contains(loop->id);
   }
 }
@@ -101,7 +101,7 @@ void GroupOptimizer::ResetLoops(const GraphGroup& group, const std::vector<Loop*
 double GroupOptimizer::OdometryVarianceOf(const GraphGroup& group,
                                           const std::vector<Loop*>& loops) const {
   return OdometryVariance(
-      Innovations({loops.begin(), loops.end()}, pairs_.Among(group.maps), maps_, options_.merge));
+      Innovations({loops.begin(), loops.end()}, pairs_.Among(group.maps), maps_));
 }
 
 void GroupOptimizer::NoteSolved(GraphGroup* group) const {

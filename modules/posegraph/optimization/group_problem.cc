@@ -12,8 +12,7 @@ GroupProblem::GroupProblem(const GraphGroup& group, std::vector<Loop*> loops,
       odometry_variance_(group.odometry_variance),
       loops_(std::move(loops)),
       fixed_maps_(std::move(fixed_maps)),
-      maps_(*maps),
-      solver_(options.solver) {
+      maps_(*maps) {
   FindSolvedMaps(options.scope == PoseGraphOptions::Scope::kAll);
   AddMaps();
   AddLoops();

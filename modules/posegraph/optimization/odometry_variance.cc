@@ -30,22 +30,21 @@ Vector4d ErrorOf(const Loop& loop, const OdometryChain& chain) {
 
 }  // namespace
 
-bool FitsOdometry(const Loop& loop, const OdometryChain& chain, const MergeOptions& options) {
+bool FitsOdometry(const Loop& loop, const OdometryChain& chain) {
   const Vector4d error = ErrorOf(loop, chain);
   const Matrix4d covariance =
-      loop.relative.covariance + BelievableDrift(chain, loop.from.node, loop.to.node,
-                                                 chain[loop.to.node].T_odom_body.t, options);
-  return error.dot(covariance.ldlt().solve(error)) <= options.agree_chi2;
+      loop.relative.covariance +
+      BelievableDrift(chain, loop.from.node, loop.to.node, chain[loop.to.node].T_odom_body.t);
+  return error.dot(covariance.ldlt().solve(error)) <= kMaxLoopChi2;
 }
 
 std::vector<PairEvidence::Innovation> Innovations(const std::vector<const Loop*>& loops,
                                                   const std::vector<const MapPair*>& pairs,
-                                                  const GraphMaps& maps,
-                                                  const MergeOptions& options) {
+                                                  const GraphMaps& maps) {
   std::vector<PairEvidence::Innovation> innovations;
   for (const Loop* loop : loops) {
     const OdometryChain& chain = maps[loop->from.map].chain;
-    if (loop->intra() && FitsOdometry(*loop, chain, options)) {
+    if (loop->intra() && FitsOdometry(*loop, chain)) {
       innovations.push_back(
           {ErrorOf(*loop, chain), loop->relative.covariance,
            chain.DriftBetween(loop->from.node, loop->to.node, chain[loop->to.node].T_odom_body.t)});

@@ -14,13 +14,12 @@
 namespace pangea {
 
 // Whether a loop within a map agrees with its odometry.
-bool FitsOdometry(const Loop& loop, const OdometryChain& chain, const MergeOptions& options);
+bool FitsOdometry(const Loop& loop, const OdometryChain& chain);
 
 // What loops within maps that fit the odometry, and merges, say of it; evenly some, if many.
 std::vector<PairEvidence::Innovation> Innovations(const std::vector<const Loop*>& loops,
                                                   const std::vector<const MapPair*>& pairs,
-                                                  const GraphMaps& maps,
-                                                  const MergeOptions& options);
+                                                  const GraphMaps& maps);
 
 // Of covariances; 1 without innovations.
 double OdometryVariance(const std::vector<PairEvidence::Innovation>& innovations);

@@ -31,7 +31,7 @@ TEST(OdometryVariance, IsNeverBelowOne) {
 TEST(FitsOdometry, ALoopThatTheDriftExplains) {
   const GraphMaps maps = MakeRows(1, 12);
   const auto fits = [&](double off_m) {
-    return FitsOdometry(LoopBetween({0, 0}, {0, 10}, {{0, 0, off_m}, 0}, maps), maps[0].chain, {});
+    return FitsOdometry(LoopBetween({0, 0}, {0, 10}, {{0, 0, off_m}, 0}, maps), maps[0].chain);
   };
   EXPECT_TRUE(fits(0));
   EXPECT_TRUE(fits(0.3));  // at least 2 % of 10 m
@@ -45,7 +45,7 @@ TEST(Innovations, OfLoopsWithinMapsThatFitAndOfMerges) {
   const Loop wrong = LoopBetween({0, 1}, {0, 11}, {{0, 0, 2}, 0}, maps);
   const Loop between = LoopBetween({0, 0}, {1, 0}, {}, maps);
   pairs.Add(between, maps);
-  const auto alone = Innovations({&fits, &wrong, &between}, pairs.All(), maps, {});
+  const auto alone = Innovations({&fits, &wrong, &between}, pairs.All(), maps);
   ASSERT_EQ(alone.size(), 1u);
   EXPECT_NEAR(alone[0].error.norm(), 0.1, 1e-9);
   EXPECT_GT(alone[0].odometry(0, 0), 9e-4);  // ten edges
@@ -54,14 +54,14 @@ TEST(Innovations, OfLoopsWithinMapsThatFitAndOfMerges) {
     pairs.Add(LoopBetween({0, node}, {1, node}, {}, maps), maps);
   }
   ASSERT_TRUE(pairs.All()[0]->merged());
-  EXPECT_GT(Innovations({&fits}, pairs.All(), maps, {}).size(), 1u);
+  EXPECT_GT(Innovations({&fits}, pairs.All(), maps).size(), 1u);
 }
 
 TEST(Innovations, AreEvenlySomeOfMany) {
   const GraphMaps maps = MakeRows(1, 12);
   const Loop loop = LoopBetween({0, 0}, {0, 10}, {}, maps);
-  EXPECT_EQ(Innovations(std::vector<const Loop*>(150, &loop), {}, maps, {}).size(), 150u);
-  EXPECT_EQ(Innovations(std::vector<const Loop*>(500, &loop), {}, maps, {}).size(), 167u);
+  EXPECT_EQ(Innovations(std::vector<const Loop*>(150, &loop), {}, maps).size(), 150u);
+  EXPECT_EQ(Innovations(std::vector<const Loop*>(500, &loop), {}, maps).size(), 167u);
 }
 
 }  // namespace

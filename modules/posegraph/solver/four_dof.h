@@ -18,6 +18,10 @@ namespace pangea {
 using Vector4d = Eigen::Vector4d;
 using Matrix4d = Eigen::Matrix4d;
 
+// Squared Mahalanobis distance at which a loop is in force, and at which two agree: of four degrees
+// of freedom, 0.999.
+inline constexpr double kMaxLoopChi2 = 18.47;
+
 // p = Rz(yaw) * (point in the odom axes) + p. For a keyframe, p is p_map_body; for a whole map it
 // is the origin of odom, and the pose is T_map_odom.
 struct Pose4 {

@@ -15,6 +15,10 @@ namespace {
 
 constexpr double kOne = 1;
 constexpr int kSwitchRounds = 5;
+constexpr int kMaxIterations = 30;  // of a solve
+// Of GNC, each step: its control parameter grows by this factor.
+constexpr double kGncFactor = 2.0;
+constexpr int kMaxGncSteps = 25;
 
 // Weight of a residual under the GNC surrogate with control parameter mu (RA-L 2020, eq. 14).
 double GraduatedWeight(double squared_residual, double c2, double mu) {
@@ -60,8 +64,7 @@ Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int 
 
 }  // namespace
 
-GroupSolver::GroupSolver(const GroupSolverOptions& options)
-    : options_(options), problem_(std::make_unique<ceres::Problem>()) {}
+GroupSolver::GroupSolver() : problem_(std::make_unique<ceres::Problem>()) {}
 
 GroupSolver::~GroupSolver() = default;
 
@@ -138,15 +141,15 @@ void GroupSolver::Minimise(int max_iterations) {
 
 void GroupSolver::SolveGraduated() {
   constexpr int kIterationsPerStep = 4;
-  const double c2 = options_.loop_chi2;
-  Minimise(options_.max_iterations);
+  const double c2 = kMaxLoopChi2;
+  Minimise(kMaxIterations);
   double worst = 0;
   for (const Loop& loop : loops_) {
     worst = std::max(worst, loop.weight * SquaredResidual(loop));
   }
   if (worst > c2) {
     double mu = c2 / (2 * worst - c2);
-    for (int step = 0; step < options_.gnc_steps; ++step, mu *= options_.gnc_factor) {
+    for (int step = 0; step < kMaxGncSteps; ++step, mu *= kGncFactor) {
       bool decided = true;
       for (Loop& loop : loops_) {
         SetWeight(&loop, GraduatedWeight(SquaredResidual(loop), c2, mu));
@@ -160,13 +163,13 @@ void GroupSolver::SolveGraduated() {
     for (Loop& loop : loops_) {
       SetWeight(&loop, loop.weight > 0.5 ? 1 : 0);
     }
-    Minimise(options_.max_iterations);
+    Minimise(kMaxIterations);
   }
   SwitchUntilStable(std::vector<bool>(loops_.size(), true));
 }
 
 void GroupSolver::SolveWarm(const std::vector<bool>& may_go) {
-  Minimise(options_.max_iterations);
+  Minimise(kMaxIterations);
   SwitchUntilStable(may_go);
 }
 
@@ -174,7 +177,7 @@ void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
   for (int round = 0; round < kSwitchRounds; ++round) {
     bool changed = false;
     for (size_t i = 0; i < loops_.size(); ++i) {
-      const bool fits = SquaredResidual(loops_[i]) <= options_.loop_chi2;
+      const bool fits = SquaredResidual(loops_[i]) <= kMaxLoopChi2;
       const bool on = loop_on(static_cast<int>(i));
       // A loop that came back stays: two that take turns would never end.
       if (fits != on && (!on || (may_go[i] && round < kSwitchRounds - 1))) {
@@ -185,7 +188,7 @@ void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
     if (!changed) {
       return;
     }
-    Minimise(options_.max_iterations);
+    Minimise(kMaxIterations);
   }
 }
 

@@ -21,28 +21,9 @@ class Problem;
 
 namespace pangea {
 
-struct GroupSolverOptions {
-  // chi-squared(4): 0.999
-  double loop_chi2 = 18.47;
-  // GNC: its control parameter grows by this factor each step, at most so many steps.
-  double gnc_factor = 2.0;
-  int gnc_steps = 25;
-  int max_iterations = 30;
-
-  template <typename Archive>
-  void Visit(Archive& archive) {
-    archive.Add("loop_chi2", &loop_chi2, {0.1, 1000}, "",
-                "of a constraint in force, 4 degrees of freedom");
-    archive.Add("gnc_factor", &gnc_factor, {1.01, 100}, "",
-                "by which the control parameter of GNC grows each step");
-    archive.Add("gnc_steps", &gnc_steps, {1, 1000}, "", "at most");
-    archive.Add("max_iterations", &max_iterations, {1, 10000}, "", "of a solve");
-  }
-};
-
 class GroupSolver {
  public:
-  explicit GroupSolver(const GroupSolverOptions& options);
+  GroupSolver();
   ~GroupSolver();
   GroupSolver(const GroupSolver&) = delete;
   GroupSolver& operator=(const GroupSolver&) = delete;
@@ -88,7 +69,6 @@ class GroupSolver {
   // Until no loop changes sides; returns whether any did.
   void SwitchUntilStable(const std::vector<bool>& may_go);
 
-  GroupSolverOptions options_;
   std::deque<std::array<double, 4>> nodes_;
   std::vector<bool> fixed_;
   std::deque<double> scales_;

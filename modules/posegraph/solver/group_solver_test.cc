@@ -14,7 +14,7 @@ TEST(GroupSolver, MarginalsOfAClosedChain) {
   root(3, 0) = -0.2;
   Relative4 same_place;
   same_place.covariance = 1e-2 * root * root.transpose();
-  GroupSolver solver(GroupSolverOptions{});
+  GroupSolver solver;
   std::vector<int> nodes;
   for (int i = 0; i <= kLast; ++i) {
     nodes.push_back(solver.AddNode(Pose4{Eigen::Vector3d::Zero(), 0}, i == 0));

@@ -25,6 +25,9 @@ constexpr int kFastThreshold = 20;
 constexpr int kLowFastThreshold = 7;
 // How far, on its octave, a tracked landmark may lie from the corner it is described at.
 constexpr float kSnapRadius = 2.F;
+// From a keyframe to one 3.6 times as far away (kOctaveScale to the seventh).
+constexpr int kOctaves = 8;
+constexpr int kCell_px = 40;  // that corners are spread over, on each octave
 
 // Half width of each row of the disc, the same in both directions so that rotating the patch
 // rotates the centroid.
@@ -54,7 +57,7 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
       options_(options),
       // One level: it takes the corners of a given octave as they are.
       orb_(cv::ORB::create(1, static_cast<float>(kOctaveScale), 1, kPatchRadius, 0, 2)) {
-  for (int octave = 0; octave < options_.octaves; ++octave) {
+  for (int octave = 0; octave < kOctaves; ++octave) {
     scales_.push_back(std::pow(kOctaveScale, octave));
   }
 }
@@ -95,19 +98,18 @@ std::vector<cv::KeyPoint> Describer::WeakCorners(int octave, const cv::Rect& par
 std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted) const {
   const cv::Mat& level = pyramid_[octave];
   const cv::Rect inside(kBorder, kBorder, level.cols - 2 * kBorder, level.rows - 2 * kBorder);
-  const int cell_px = options_.cell_px;
-  const int columns = (level.cols + cell_px - 1) / cell_px;
-  const int rows = (level.rows + cell_px - 1) / cell_px;
+  const int columns = (level.cols + kCell_px - 1) / kCell_px;
+  const int rows = (level.rows + kCell_px - 1) / kCell_px;
   std::vector<cv::KeyPoint> corners = strong_[octave];
   // A cell with strong corners keeps only those.
   std::vector<bool> has_strong(static_cast<size_t>(columns) * rows, false);
   for (const cv::KeyPoint& corner : corners) {
-    has_strong[static_cast<size_t>(corner.pt.y) / cell_px * columns +
-               static_cast<size_t>(corner.pt.x) / cell_px] = true;
+    has_strong[static_cast<size_t>(corner.pt.y) / kCell_px * columns +
+               static_cast<size_t>(corner.pt.x) / kCell_px] = true;
   }
   for (int cell = 0; cell < columns * rows; ++cell) {
     const cv::Rect part =
-        cv::Rect(cell % columns * cell_px, cell / columns * cell_px, cell_px, cell_px) & inside;
+        cv::Rect(cell % columns * kCell_px, cell / columns * kCell_px, kCell_px, kCell_px) & inside;
     if (!has_strong[cell] && !part.empty()) {
       const std::vector<cv::KeyPoint> weak = WeakCorners(octave, part);
       corners.insert(corners.end(), weak.begin(), weak.end());
@@ -128,7 +130,7 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
     return std::pair(a.level_pixel.y, a.level_pixel.x) <
            std::pair(b.level_pixel.y, b.level_pixel.x);
   });
-  return SpreadOver(std::move(candidates), &Candidate::level_pixel, cell_px, level.cols,
+  return SpreadOver(std::move(candidates), &Candidate::level_pixel, kCell_px, level.cols,
                     static_cast<size_t>(wanted));
 }
 
@@ -282,11 +284,11 @@ std::vector<Describer::Candidate> Describer::FindCorners(int wanted) const {
 std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
   BuildPyramid(image);
   std::vector<Candidate> candidates = PlaceLandmarks(frame);
-  candidates.resize(std::min(candidates.size(), static_cast<size_t>(options_.max_corners)));
+  candidates.resize(std::min(candidates.size(), size_t{kMaxCorners}));
   const auto num_landmarks = static_cast<std::ptrdiff_t>(candidates.size());
-  const int left = options_.max_corners - static_cast<int>(num_landmarks);
+  const int left = kMaxCorners - static_cast<int>(num_landmarks);
   const std::vector<Corner> blobs =
-      DescribeBlobs(image, std::min(options_.max_blobs, left), options_.cell_px);
+      DescribeBlobs(image, std::min(options_.max_blobs, left), kCell_px);
   const size_t num_others = static_cast<size_t>(left) - blobs.size();
   const std::vector<Candidate> others = FindCorners(static_cast<int>(num_others));
   candidates.insert(

@@ -21,17 +21,12 @@
 namespace pangea::vio {
 
 struct DescriberOptions {
-  int max_corners = kMaxCorners;
-  int max_blobs = 240;  // of these
-  int octaves = 8;
-  int cell_px = 40;  // on each octave
+  int max_blobs = 240;  // of a keyframe's kMaxCorners
 
   template <typename Archive>
   void Visit(Archive& archive) {
-    archive.Add("max_corners", &max_corners, {10, kMaxCorners}, "", "of a keyframe");
-    archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "", "of these, beside landmarks");
-    archive.Add("octaves", &octaves, {1, 16}, "", "of the image pyramid");
-    archive.Add("cell_px", &cell_px, {8, 1000}, "px", "of a cell, on each octave");
+    archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "",
+                "of a keyframe's corners, beside landmarks");
   }
 };
 

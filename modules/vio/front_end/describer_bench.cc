@@ -51,17 +51,15 @@ int Consistent(const CameraModel& camera, const View& a, const View& b,
   TwoViewOptions options;
   options.inlier_px = 3;
   options.rotation_sigma = 0.03;
-  options.iterations = 300;
   const Eigen::Quaterniond q_b_a = b.T_reference_cam.q.conjugate() * a.T_reference_cam.q;
   return CheckTwoView(rays_a, rays_b, q_b_a, camera.PixelAngle(), options).num_inliers;
 }
 
-void Run(const std::string& folder, double step_s, bool landmarks,
-         const DescriberOptions& options) {
+void Run(const std::string& folder, double step_s, bool landmarks) {
   const EurocRecording recording(folder);
   const CameraModel& camera = recording.camera();
   Tracker tracker(camera, {});
-  Describer describer(camera, options);
+  Describer describer(camera, {});
   std::vector<View> views;
   double milliseconds = 0, corners = 0;
   for (size_t i = 0; i < recording.images().size(); ++i) {
@@ -127,18 +125,14 @@ int main(int argc, char** argv) {
   std::string recording;
   double step_s = 0.4;
   bool landmarks = true;
-  pangea::vio::DescriberOptions options;
   CLI::App app("Measures keyframe descriptions against ground truth", "pangea-vio-describer-bench");
   app.add_option("recording", recording)->required();
   app.add_option("--step", step_s, "seconds between views");
   app.add_option("--landmarks", landmarks, "0: no tracked landmarks, corners only");
-  app.add_option("--corners", options.max_corners);
-  app.add_option("--octaves", options.octaves);
-  app.add_option("--cell", options.cell_px);
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);
   try {
-    pangea::vio::Run(recording, step_s, landmarks, options);
+    pangea::vio::Run(recording, step_s, landmarks);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

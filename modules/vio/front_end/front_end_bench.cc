@@ -236,13 +236,8 @@ int main(int argc, char** argv) {
   app.add_option("--duration", options.duration, "seconds");
   app.add_option("--gyro-bias", options.gyro_bias)->expected(3);
   app.add_option("--time-offset", options.time_offset, "seconds");
-  app.add_option("--window", options.tracker.window_px);
-  app.add_option("--levels", options.tracker.pyramid_levels);
   app.add_option("--features", options.tracker.max_features);
   app.add_option("--distance", options.tracker.min_distance_px);
-  app.add_option("--backward", options.tracker.max_forward_backward_px);
-  app.add_option("--equalize", options.tracker.equalize);
-  app.add_option("--clip", options.tracker.equalize_clip);
   app.add_option("--inlier", options.tracker.two_view.inlier_px);
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);

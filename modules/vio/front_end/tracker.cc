@@ -32,8 +32,14 @@ constexpr double kObservationSigma_px = 0.5;
 constexpr double kEnoughShare = 0.5;
 constexpr int kTurns = 3;
 
+constexpr int kKltWindow_px = 21;
+constexpr int kKltLevels = 4;  // with the image itself
 constexpr int kKltIterations = 20;
 constexpr double kKltConverged_px = 0.03;
+// Between a feature and itself tracked back.
+constexpr double kMaxForwardBackward_px = 0.7;
+// Contrast limit of the histogram equalisation: dark corners of a room have features too.
+constexpr double kEqualizerClip = 3.0;
 
 Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -47,7 +53,7 @@ bool Nearer(const cv::Point2f& a, const cv::Point2f& b, double distance_px) {
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
-    : camera_(camera), options_(options), equalizer_(options.equalize_clip) {}
+    : camera_(camera), options_(options), equalizer_(kEqualizerClip) {}
 
 void Tracker::Reset() {
   features_.clear();
@@ -81,10 +87,10 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
 
 void Tracker::Prepare(const cv::Mat& image) {
   std::swap(pyramid_, last_pyramid_);
-  const cv::Mat prepared = options_.equalize ? equalizer_.Apply(image) : image;
+  const cv::Mat equalized = equalizer_.Apply(image);
   pyramid_.clear();
-  cv::buildOpticalFlowPyramid(prepared, pyramid_, cv::Size(options_.window_px, options_.window_px),
-                              options_.pyramid_levels - 1, true);
+  cv::buildOpticalFlowPyramid(equalized, pyramid_, cv::Size(kKltWindow_px, kKltWindow_px),
+                              kKltLevels - 1, true);
 }
 
 bool Tracker::Inside(const cv::Point2f& pixel) const {
@@ -105,7 +111,7 @@ std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_p
   std::vector<uchar> ok;
   if (!from.empty()) {
     cv::calcOpticalFlowPyrLK(from_pyramid, to_pyramid, from, *to, ok, cv::noArray(),
-                             cv::Size(options_.window_px, options_.window_px), coarsest_level,
+                             cv::Size(kKltWindow_px, kKltWindow_px), coarsest_level,
                              cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
                                               kKltIterations, kKltConverged_px),
                              cv::OPTFLOW_USE_INITIAL_FLOW);
@@ -182,8 +188,7 @@ void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& r
       to.push_back(rotated[i]);
     }
   }
-  const std::vector<uchar> forward_ok =
-      Klt(last_pyramid_, pyramid_, from, options_.pyramid_levels - 1, &to);
+  const std::vector<uchar> forward_ok = Klt(last_pyramid_, pyramid_, from, kKltLevels - 1, &to);
   // Back from the result with the start as the guess: only the finest levels have work to do.
   std::vector<cv::Point2f> back = from;
   const std::vector<uchar> backward_ok = Klt(pyramid_, last_pyramid_, to, kNearLevel, &back);
@@ -191,7 +196,7 @@ void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& r
     Feature& feature = features_[which[k]];
     if (!forward_ok[k]) {
       ++statistics_.lost_klt;
-    } else if (!backward_ok[k] || cv::norm(back[k] - from[k]) > options_.max_forward_backward_px) {
+    } else if (!backward_ok[k] || cv::norm(back[k] - from[k]) > kMaxForwardBackward_px) {
       ++statistics_.lost_backward;
     } else {
       const Eigen::Vector2f pixel = ToEigenF(to[k]);

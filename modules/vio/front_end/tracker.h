@@ -28,24 +28,12 @@ namespace pangea::vio {
 struct TrackerOptions {
   int max_features = 150;
   double min_distance_px = 22;  // between features
-  int window_px = 21;           // of the KLT
-  int pyramid_levels = 4;
-  double max_forward_backward_px = 0.7;
-  bool equalize = true;  // contrast-limited histogram equalisation before everything
-  double equalize_clip = 3.0;
   TwoViewOptions two_view;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("max_features", &max_features, {10, 2000}, "", "tracked at once");
     archive.Add("min_distance_px", &min_distance_px, {1, 1000}, "px", "between features");
-    archive.Add("window_px", &window_px, {3, 101}, "px", "of the KLT");
-    archive.Add("pyramid_levels", &pyramid_levels, {1, 10}, "",
-                "of the KLT, with the image itself");
-    archive.Add("max_forward_backward_px", &max_forward_backward_px, {0.01, 100}, "px",
-                "between a feature and itself tracked back");
-    archive.Add("equalize", &equalize, "contrast-limited histogram equalisation before everything");
-    archive.Add("equalize_clip", &equalize_clip, {0.1, 100}, "", "its contrast limit");
     archive.Section("two_view", &two_view, "outliers between two images");
   }
 };

@@ -14,6 +14,7 @@ namespace {
 constexpr double kHypothesisSlack = 3.0;
 constexpr double kFitSlack[] = {3.0, 1.5, 1.0, 1.0};
 constexpr size_t kMinTracks = 6;
+constexpr int kHypotheses = 60;  // of two tracks: at 40 % outliers one in three is of inliers
 
 struct Tracks {
   std::vector<Eigen::Vector3d> a;  // unit
@@ -39,14 +40,13 @@ double Score(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen
 }
 
 Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
-                              const std::vector<Eigen::Vector3d>& b, double threshold,
-                              int iterations) {
+                              const std::vector<Eigen::Vector3d>& b, double threshold) {
   std::mt19937_64 random(b.size());
   // The standard's distributions differ from library to library.
   const auto pick = [&] { return static_cast<size_t>(random() % b.size()); };
   Eigen::Vector3d best = Eigen::Vector3d::UnitX();
   double best_score = std::numeric_limits<double>::max();
-  for (int k = 0; k < iterations; ++k) {
+  for (int k = 0; k < kHypotheses; ++k) {
     const size_t i = pick();
     const size_t j = pick();
     const Eigen::Vector3d t = a_in_b[i].cross(b[i]).cross(a_in_b[j].cross(b[j]));
@@ -137,8 +137,8 @@ TwoViewResult CheckTwoView(const std::vector<Eigen::Vector2d>& rays_a,
     tracks.b.push_back(rays_b[i].homogeneous().normalized());
   }
   const double threshold = options.inlier_px * pixel_angle;
-  Eigen::Vector3d t = BestDirection(Rotate(q_b_a, tracks.a), tracks.b, kHypothesisSlack * threshold,
-                                    options.iterations);
+  Eigen::Vector3d t =
+      BestDirection(Rotate(q_b_a, tracks.a), tracks.b, kHypothesisSlack * threshold);
   for (const double slack : kFitSlack) {
     FitStep(tracks, slack * threshold, options.rotation_sigma, 0.3 * pixel_angle, q_b_a,
             &result.q_b_a, &t);

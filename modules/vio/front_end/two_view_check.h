@@ -18,14 +18,12 @@ namespace pangea::vio {
 struct TwoViewOptions {
   double inlier_px = 1.2;        // distance to the epipolar line
   double rotation_sigma = 4e-3;  // radians, the gyro's error between the two images
-  int iterations = 60;           // hypotheses
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("inlier_px", &inlier_px, {0.05, 100}, "px", "distance to the epipolar line");
     archive.Add("rotation_sigma", &rotation_sigma, {1e-6, 1}, "rad",
                 "of the gyro between the two images");
-    archive.Add("iterations", &iterations, {1, 100000}, "", "hypotheses");
   }
 };
 
