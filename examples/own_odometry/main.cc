@@ -41,7 +41,7 @@ void Play(const Arguments& arguments) {
                                   recording.camera(), WallUtime, WallUtime());
   std::optional<PlaybackPace> pace;
   if (bus) {
-    pace.emplace(&*bus, process, process.outlet());
+    pace.emplace(&*bus, process, process.publisher());
   }
   std::optional<LogFileWriter> log;  // for `keyframes:` in a session file, and for a replay
   if (!arguments.out_keyframes.empty()) {

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "agent_handler/link_test_world.h"
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "messages/testing/test_keyframes.h"
 
 namespace pangea {
@@ -21,7 +21,7 @@ class MissedMaps : public testing::Test {
   void Publish(int map, int32_t from_seq, int32_t to_seq) {
     for (int32_t seq = from_seq; seq <= to_seq; ++seq) {
       const KeyframeId id{{1, 1000 * map}, seq};
-      outlet.Publish(id, EncodeTestKeyframe(id));
+      publisher.Publish(id, EncodeTestKeyframe(id));
       ++published;
     }
     bus.Drain();
@@ -48,7 +48,7 @@ class MissedMaps : public testing::Test {
   std::vector<std::unique_ptr<SwitchedBus>> buses;
   std::vector<std::unique_ptr<UplinkProcess>> uplinks;
   Node node{bus, "vio_1"};
-  KeyframeOutlet outlet{node, 1, 200, 0};
+  ReliableKeyframePublisher publisher{node, 1, 200, 0};
   size_t published = 0;
   int64_t now = 1'000'000;
 };

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "link/wire.h"
 
 namespace pangea {

@@ -36,7 +36,7 @@ void Anchors::Take(const Keyframe& keyframe) {
 }
 
 std::string Anchors::Take(const AnchorEdit& edit) {
-  std::string refused = book_.Take(edit);
+  std::string refused = registry_.Take(edit);
   if (refused.empty() && edit.placement != AnchorEdit::Placement::kSame) {
     PlaceOrWait(edit.anchor);
   }
@@ -51,7 +51,7 @@ PlacementResult Anchors::Try(const AnchorEdit& edit) const {
 
 // An anchor that cannot be put somewhere else stays where it is.
 void Anchors::PlaceOrWait(const AnchorId& id) {
-  const AnchorEdit& edit = *book_.entries().at(id).place;
+  const AnchorEdit& edit = *registry_.entries().at(id).place;
   PlacementResult result = Try(edit);
   if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
     placements_[id] = std::move(*placement);
@@ -160,7 +160,7 @@ bool Anchors::SameGroup(const MapId& a, const MapId& b) const {
 }
 
 AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
-  const AnchorEntry& entry = book_.entries().at(id);
+  const AnchorEntry& entry = registry_.entries().at(id);
   AnchorState state;
   state.anchor = id;
   state.revision = entry.revision;
@@ -177,7 +177,7 @@ AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
 std::vector<AnchorId> Anchors::DeletedOf(const MapId& map) const {
   std::vector<AnchorId> deleted;
   for (const auto& [id, placement] : placements_) {
-    if (book_.entries().at(id).deleted && SameGroup(map, placement.map)) {
+    if (registry_.entries().at(id).deleted && SameGroup(map, placement.map)) {
       deleted.push_back(id);
     }
   }
@@ -200,7 +200,7 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
   std::vector<std::pair<double, AnchorId>> near;
   for (const auto& [id, position] : Positions()) {
     const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm();
-    if (away_m <= options_.near_m && !book_.entries().at(id).deleted &&
+    if (away_m <= options_.near_m && !registry_.entries().at(id).deleted &&
         SameGroup(map, placements_.at(id).map)) {
       near.emplace_back(away_m, id);
     }
@@ -283,8 +283,9 @@ RecordCounters Anchors::store_counters() const {
 }
 
 size_t Anchors::num_placed() const {
-  return static_cast<size_t>(std::ranges::count_if(
-      placements_, [this](const auto& item) { return !book_.entries().at(item.first).deleted; }));
+  return static_cast<size_t>(std::ranges::count_if(placements_, [this](const auto& item) {
+    return !registry_.entries().at(item.first).deleted;
+  }));
 }
 
 }  // namespace pangea

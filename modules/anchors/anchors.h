@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 #include "anchors/odometry_track.h"
 #include "anchors/placement.h"
 #include "core/anchor.h"
@@ -49,7 +49,7 @@ class Anchors {
   explicit Anchors(const AnchorsOptions& options, std::shared_ptr<RecordStore> records = nullptr)
       : options_(options),
         records_(std::move(records)),
-        book_(static_cast<size_t>(options.max_anchors)) {}
+        registry_(static_cast<size_t>(options.max_anchors)) {}
 
   void Take(const Keyframe& keyframe);
   // Why it is refused, or an empty string.
@@ -68,7 +68,7 @@ class Anchors {
   std::vector<AnchorState> All() const;
 
   // What all edits together say, also of anchors that are not placed.
-  const AnchorBook& book() const { return book_; }
+  const AnchorRegistry& registry() const { return registry_; }
   // One in its group's frame; nothing for one that is not placed.
   std::optional<AnchorState> InItsGroup(const AnchorId& id) const;
   // The group that a map belongs to, and its revision; the map itself and 0 while it is alone.
@@ -88,7 +88,7 @@ class Anchors {
   // Where an edit would put its anchor, as far as the maps have come.
   PlacementResult Try(const AnchorEdit& edit) const;
 
-  size_t num_anchors() const { return book_.entries().size() - book_.num_deleted(); }
+  size_t num_anchors() const { return registry_.entries().size() - registry_.num_deleted(); }
   size_t num_placed() const;
   RecordCounters store_counters() const;
   const RecordStore* records() const { return records_.get(); }
@@ -115,7 +115,7 @@ class Anchors {
 
   const AnchorsOptions options_;
   const std::shared_ptr<RecordStore> records_;
-  AnchorBook book_;
+  AnchorRegistry registry_;
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;
   std::map<MapId, std::set<AnchorId>> waiting_;  // for a keyframe of this map

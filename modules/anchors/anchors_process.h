@@ -20,8 +20,8 @@
 #include "anchors/other_agents.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_follower.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "messages/state_chunks.h"
 #include "pangea/again_t.hpp"
 #include "pangea/map_state_t.hpp"
@@ -63,7 +63,7 @@ class AnchorsProcess : public Process {
   Anchors anchors_;
   JournalFollower journal_;
   StateChunks states_;
-  InOrder<AnchorEdit> edits_;  // one stream
+  ReorderBuffer<AnchorEdit> edits_;  // one stream
   AnchorUpdates for_watchers_;
   std::map<MapId, AnchorUpdates> for_agents_;  // the newest map of each
   OtherAgents other_agents_;

@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "bus/node.h"
-#include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_first.h"
 #include "bus/retransmission/missing.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "bus/retransmission/timeouts.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
@@ -218,9 +218,9 @@ TEST(DecodeMessage, HugeAndNegativeCountsNeitherAllocateNorReadBeyondTheEnd) {
   EXPECT_LT(PeakMemory_kB() - before, 100'000);
 }
 
-TEST(InOrder, ReordersDropsRepeatsAndNamesGaps) {
+TEST(ReorderBuffer, ReordersDropsRepeatsAndNamesGaps) {
   const MapId map{1, 10};
-  InOrder<int> stream;
+  ReorderBuffer<int> stream;
   EXPECT_THAT(stream.Add(map, 1, 101), testing::IsEmpty());
   EXPECT_THAT(stream.Add(map, 3, 103), testing::IsEmpty());
   ASSERT_EQ(stream.Gaps().size(), 1u);
@@ -305,9 +305,9 @@ TEST(RequestAllRetransmissions, AsksForEachOnce) {
                                            testing::Pair(1000, 1000)));
 }
 
-TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
+TEST(ReorderBuffer, GoesOnAfterAGapNobodyCanFill) {
   const MapId map{1, 10};
-  InOrder<int> stream;
+  ReorderBuffer<int> stream;
   stream.Add(map, 0, 100);
   stream.Add(map, 4, 104);
   EXPECT_THAT(stream.Skip({map, 2, 3}), testing::IsEmpty()) << "1 may still come";
@@ -316,34 +316,34 @@ TEST(InOrder, GoesOnAfterAGapNobodyCanFill) {
   EXPECT_TRUE(stream.Gaps().empty());
 }
 
-TEST(InOrder, AGapOfOneIsPassed) {
+TEST(ReorderBuffer, AGapOfOneIsPassed) {
   const MapId map{1, 10};
-  InOrder<int> stream;
+  ReorderBuffer<int> stream;
   stream.Add(map, 1, 101);
   EXPECT_THAT(stream.Skip({map, 0, 0}), testing::ElementsAre(101));
 }
 
-TEST(InOrder, WhatAGapPassesIsDropped) {
+TEST(ReorderBuffer, WhatAGapPassesIsDropped) {
   const MapId map{1, 10};
-  InOrder<int> stream;
+  ReorderBuffer<int> stream;
   stream.Add(map, 2, 102);
   stream.Add(map, 5, 105);
   EXPECT_THAT(stream.Skip({map, 0, 4}), testing::ElementsAre(105));
-  EXPECT_EQ(stream.parked(), 0u);
+  EXPECT_EQ(stream.num_buffered(), 0u);
 }
 
-TEST(InOrder, ParksAThousandAndTakesTheNextOneAlways) {
+TEST(ReorderBuffer, BuffersAThousandAndTakesTheNextOneAlways) {
   const MapId map{1, 10};
-  InOrder<int> stream;
-  const auto parks = static_cast<int32_t>(InOrder<int>::kMaxParked);
-  for (int32_t seq = 1; seq <= parks + 500; ++seq) {
+  ReorderBuffer<int> stream;
+  const auto capacity = static_cast<int32_t>(ReorderBuffer<int>::kMaxBuffered);
+  for (int32_t seq = 1; seq <= capacity + 500; ++seq) {
     EXPECT_THAT(stream.Add(map, seq, seq), testing::IsEmpty());
   }
-  EXPECT_EQ(stream.parked(), InOrder<int>::kMaxParked);
-  EXPECT_EQ(stream.Add(map, 0, 0).size(), InOrder<int>::kMaxParked + 1);
+  EXPECT_EQ(stream.num_buffered(), ReorderBuffer<int>::kMaxBuffered);
+  EXPECT_EQ(stream.Add(map, 0, 0).size(), ReorderBuffer<int>::kMaxBuffered + 1);
   ASSERT_EQ(stream.Gaps().size(), 1u);
-  EXPECT_EQ(stream.Gaps()[0].from_seq, parks + 1);  // dropped, and known to exist
-  EXPECT_EQ(stream.Gaps()[0].to_seq, parks + 500);
+  EXPECT_EQ(stream.Gaps()[0].from_seq, capacity + 1);  // dropped, and known to exist
+  EXPECT_EQ(stream.Gaps()[0].to_seq, capacity + 500);
 }
 
 TEST(JournalFirstBus, DeliversHaveBeforeWhatCameBeforeIt) {

@@ -45,19 +45,20 @@ class WallClockTest : public ::testing::TestWithParam<time_t> {
 
 class Ticking : public Process {
  public:
-  explicit Ticking(Bus& bus) : node_(bus, "ticking"), outlet_(node_, 1, /*kept=*/1, WallUtime()) {}
+  explicit Ticking(Bus& bus)
+      : node_(bus, "ticking"), publisher_(node_, 1, /*kept=*/1, WallUtime()) {}
   void Tick(int64_t now_utime) override {
     ++ticks;
     newest_utime = now_utime;
   }
-  const KeyframeOutlet& outlet() const { return outlet_; }
+  const ReliableKeyframePublisher& publisher() const { return publisher_; }
 
   int ticks = 0;
   int64_t newest_utime = 0;
 
  private:
   Node node_;
-  KeyframeOutlet outlet_;
+  ReliableKeyframePublisher publisher_;
 };
 
 TEST_P(WallClockTest, IsTheWallClockAtTheStartAndNeverSteps) {
@@ -74,7 +75,7 @@ TEST_P(WallClockTest, IsTheWallClockAtTheStartAndNeverSteps) {
 TEST_P(WallClockTest, PlaybackTicksOnAtItsPace) {
   LocalBus local;
   Ticking process(local);
-  PlaybackPace pace(nullptr, process, process.outlet());
+  PlaybackPace pace(nullptr, process, process.publisher());
   const int64_t begin = SteadyMicros();
   while (SteadyMicros() < begin + 1'000'000) {
     stepped_s = SteadyMicros() < begin + 300'000 ? 0 : GetParam();

@@ -120,9 +120,9 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   EXPECT_EQ(core.JournalEnd(), 1u);
   EXPECT_EQ(core.LeaseSequence(), 0u);
   EXPECT_EQ(core.Store(core.EntryOf(match)), SiteStreams::Stored::kNew);
-  const auto taken = worker.TakeMatch();
-  ASSERT_TRUE(taken.has_value());
-  EXPECT_TRUE(worker.Acknowledge(taken->claim));
+  const auto delivery = worker.FetchMatch();
+  ASSERT_TRUE(delivery.has_value());
+  EXPECT_TRUE(worker.Acknowledge(delivery->ack_subject));
 }
 
 }  // namespace

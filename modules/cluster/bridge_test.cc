@@ -61,8 +61,8 @@ class Bridge : public ClusterTest {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   bool QueueIsEmpty() {
-    const auto queue = server_->streams().LookAtQueue();
-    return queue && queue->waiting == 0 && queue->taken == 0;
+    const auto queue = server_->streams().MatchQueueState();
+    return queue && queue->waiting == 0 && queue->unacknowledged == 0;
   }
   void ExpectEachResultOnce() {
     EXPECT_EQ(server_->published().size(), server_->candidates().size());
@@ -128,7 +128,7 @@ TEST_F(Bridge, ABacklogWaitsForNoResults) {
 TEST_F(Bridge, AWorkerThatEndsGivesItsMatchesBackAtOnce) {
   AddKeyframes(4, 3);
   ASSERT_TRUE(Until([&] {
-    const auto queue = server_->streams().LookAtQueue();
+    const auto queue = server_->streams().MatchQueueState();
     return queue && queue->waiting == 4;
   }));
   TestWorker& first = AddWorker();

@@ -97,7 +97,7 @@ void TestServer::StartBridge(const std::string& site) {
   streams_ = std::make_unique<SiteStreams>(access_, site);
   streams_->Make(0, kTestAckWait_us);
   lease_ = std::make_unique<SiteLease>(*streams_, "first");
-  if (!lease_->TryTake(WallUtime())) {
+  if (!lease_->TryAcquire(WallUtime())) {
     throw std::runtime_error(lease_->seen_holder() + " has the site");
   }
   bus_ = std::make_unique<LocalBus>();

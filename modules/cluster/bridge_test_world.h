@@ -65,7 +65,7 @@ class TestServer {
   void AskForResults(int32_t seq);
   // The bridge is killed, and begins anew with what the journal has.
   void RestartBridge(const std::string& site = "hall");
-  // Throws Deposed once another has the site.
+  // Throws LeaseLost once another has the site.
   void Round(int64_t now_utime);
   // Of the bus alone: what a bridge does that has not looked at its lease yet.
   void Drain() { bus_->Drain(); }

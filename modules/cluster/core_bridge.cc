@@ -171,7 +171,7 @@ void CoreBridge::BetweenMessages(int64_t now_utime) {
 
 void CoreBridge::Tick(int64_t now_utime) {
   if (!lease_.Renew(now_utime)) {
-    throw Deposed(fmt::format("another core has the site: {}", lease_.seen_holder()));
+    throw LeaseLost(fmt::format("another core has the site: {}", lease_.seen_holder()));
   }
   journal_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
@@ -184,18 +184,18 @@ void CoreBridge::PublishStatus(int64_t now_utime) {
   const auto to_store = static_cast<int64_t>(to_store_.size());
   node_.Set("bytes_to_replicate", shipper_.bytes_to_ship());
   node_.Set("events_too_large", shipper_.num_too_large());
-  const auto queue = streams_.LookAtQueue();
+  const auto queue = streams_.MatchQueueState();
   if (!queue) {
     return node_.PublishStatus(now_utime, to_store + 1,
                                fmt::format("NATS DOES NOT ANSWER; {} messages wait", to_store));
   }
   const auto waiting = static_cast<int64_t>(queue->waiting);
   node_.Set("matches_waiting", waiting);
-  node_.Set("matches_taken", queue->taken);
+  node_.Set("matches_taken", queue->unacknowledged);
   node_.PublishStatus(
-      now_utime, to_store + waiting + queue->taken,
+      now_utime, to_store + waiting + queue->unacknowledged,
       fmt::format("core: {} matches wait for a worker, {} are with workers; {} messages to store",
-                  waiting, queue->taken, to_store));
+                  waiting, queue->unacknowledged, to_store));
 }
 
 }  // namespace pangea

@@ -10,7 +10,7 @@
 //               JOURNAL_REPLICATED, CONSTRAINT, OPTIONS_*, AGAIN_agent_handler, RESEND_REQUEST,
 //               STATUS_bridge out
 //
-// It is there while it holds the site's lease; when another core has begun it ends by Deposed.
+// It is there while it holds the site's lease; when another core has begun it ends by LeaseLost.
 //
 // At a start the journal says which matches and results are to be stored. While NATS does not
 // answer these wait, at most kMaxUnstored messages; beyond that the process ends with an error, and
@@ -34,7 +34,7 @@ namespace pangea {
 
 class CoreBridge : public Process {
  public:
-  // The lease is held. Throws Deposed, and std::runtime_error when NATS does not answer.
+  // The lease is held. Throws LeaseLost, and std::runtime_error when NATS does not answer.
   CoreBridge(Bus& bus, SiteStreams& streams, SiteLease& lease);
 
   void Tick(int64_t now_utime) override;

@@ -96,7 +96,8 @@ bool JournalShipper::FindNext(std::optional<SiteStreams::JournalEvent>* event) {
       return false;
     }
     if ((*event)->term > term_) {
-      throw Deposed(fmt::format("another core has begun: term {} after {}", (*event)->term, term_));
+      throw LeaseLost(
+          fmt::format("another core has begun: term {} after {}", (*event)->term, term_));
     }
     if ((*event)->term == 0) {
       return true;

@@ -33,7 +33,7 @@ struct JournalCursor {
 };
 
 // Another core has begun.
-struct Deposed : std::runtime_error {
+struct LeaseLost : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
@@ -52,7 +52,7 @@ class JournalShipper {
 
   // So much is on the disk; the first call says which file.
   void OnJournalFile(const JournalFile& file);
-  // The next events. Throws Deposed, and std::runtime_error when the stream has others.
+  // The next events. Throws LeaseLost, and std::runtime_error when the stream has others.
   void Ship();
 
   // So much of the file is in the stream; nothing: it is not known whether the file has all that

@@ -16,7 +16,7 @@ namespace {
 constexpr int64_t kReconnectWait_ms = 500;
 constexpr int64_t kPing_ms = 2000;  // a host that is gone says nothing
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
-constexpr int64_t kMaxTaken = 100'000;  // NATS' own default would stop a large cluster
+constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
 constexpr char kUtimeHeader[] = "Pangea-Utime";
 constexpr char kExpectedOfStream[] = "Nats-Expected-Last-Sequence";
 constexpr char kExpectedOfSubject[] = "Nats-Expected-Last-Subject-Sequence";
@@ -89,12 +89,12 @@ bool MayChange(natsStatus status, jsErrCode error) {
          error == JSInsufficientResourcesErr;
 }
 
-// A claim has when its message was stored, in nanoseconds:
+// The subject of acks has when its message was stored, in nanoseconds:
 // $JS.ACK[.domain.account].stream.consumer.deliveries.sequence.sequence.when.pending[.token].
-int64_t StoredUtime(const std::string& claim) {
+int64_t StoredUtime(const std::string& ack_subject) {
   constexpr size_t kWhen = 7, kWhenBehindDomain = 9, kWithDomain = 11;
   std::vector<std::string> tokens;
-  std::istringstream stream(claim);
+  std::istringstream stream(ack_subject);
   for (std::string token; std::getline(stream, token, '.');) {
     tokens.push_back(token);
   }
@@ -185,8 +185,8 @@ struct NatsClient::Impl {
     return Message{natsMsg_GetSubject(got), natsMsg_GetSequence(got), UtimeOf(got), DataOf(got)};
   }
 
-  void Say(const std::string& claim, const char* what) const {
-    natsConnection_PublishString(connection.get(), claim.c_str(), what);
+  void Reply(const std::string& ack_subject, const char* what) const {
+    natsConnection_PublishString(connection.get(), ack_subject.c_str(), what);
   }
 };
 
@@ -250,7 +250,7 @@ void NatsClient::MakeQueue(const std::string& stream, const std::string& consume
   config.Durable = consumer.c_str();
   config.AckPolicy = js_AckExplicit;
   config.AckWait = kNanosecondsPerMicrosecond * ack_wait_us;
-  config.MaxAckPending = kMaxTaken;
+  config.MaxAckPending = kMaxUnacknowledged;
   impl_->Make(fmt::format("queue {} of stream {}", consumer, stream), [&](jsErrCode* error) {
     return js_AddConsumer(nullptr, impl_->context.get(), stream.c_str(), &config, nullptr, error);
   });
@@ -341,8 +341,8 @@ std::optional<std::vector<std::string>> NatsClient::Subjects(const std::string& 
 
 // libnats' own fetch leaves its request with NATS when it has waited in vain, and what answers that
 // is nobody's until it is delivered again. This one is answered at once.
-std::optional<NatsClient::Taken> NatsClient::Take(const std::string& stream,
-                                                  const std::string& consumer) {
+std::optional<NatsClient::Delivery> NatsClient::Fetch(const std::string& stream,
+                                                      const std::string& consumer) {
   if (!connected()) {
     return std::nullopt;
   }
@@ -355,32 +355,32 @@ std::optional<NatsClient::Taken> NatsClient::Take(const std::string& stream,
   if (status != NATS_OK || IsStatus(got) || natsMsg_GetReply(got) == nullptr) {
     return std::nullopt;
   }
-  const std::string claim = natsMsg_GetReply(got);
-  return Taken{claim, StoredUtime(claim), DataOf(got)};
+  const std::string ack_subject = natsMsg_GetReply(got);
+  return Delivery{ack_subject, StoredUtime(ack_subject), DataOf(got)};
 }
 
-bool NatsClient::Acknowledge(const std::string& claim) {
+bool NatsClient::Acknowledge(const std::string& ack_subject) {
   if (!connected()) {
     return false;
   }
   natsMsg* got = nullptr;
   const natsStatus status = natsConnection_RequestString(&got, impl_->connection.get(),
-                                                         claim.c_str(), "+ACK", kTimeout_ms);
+                                                         ack_subject.c_str(), "+ACK", kTimeout_ms);
   const Owned<natsMsg> message(got);
   return status == NATS_OK;
 }
 
-void NatsClient::StillWorking(const std::string& claim) { impl_->Say(claim, "+WPI"); }
+void NatsClient::InProgress(const std::string& ack_subject) { impl_->Reply(ack_subject, "+WPI"); }
 
-void NatsClient::GiveBack(const std::string& claim, int64_t delay_us) {
+void NatsClient::Nak(const std::string& ack_subject, int64_t delay_us) {
   const std::string nak =
       fmt::format(R"(-NAK {{"delay": {}}})", kNanosecondsPerMicrosecond * delay_us);
-  impl_->Say(claim, nak.c_str());
+  impl_->Reply(ack_subject, nak.c_str());
   natsConnection_FlushTimeout(impl_->connection.get(), kTimeout_ms);
 }
 
-std::optional<NatsClient::Queue> NatsClient::LookAt(const std::string& stream,
-                                                    const std::string& consumer) {
+std::optional<NatsClient::QueueState> NatsClient::StateOf(const std::string& stream,
+                                                          const std::string& consumer) {
   if (!connected()) {
     return std::nullopt;
   }
@@ -391,7 +391,7 @@ std::optional<NatsClient::Queue> NatsClient::LookAt(const std::string& stream,
   if (status != NATS_OK) {
     return std::nullopt;
   }
-  return Queue{got->NumPending, got->NumAckPending};
+  return QueueState{got->NumPending, got->NumAckPending};
 }
 
 void NatsClient::Publish(const std::string& subject, Bytes data) {

@@ -35,7 +35,7 @@ class NatsClient {
   // `replicas` 0: as it is, or 1.
   void MakeStream(const std::string& stream, const std::string& subjects, Retention retention,
                   int replicas);
-  // Whoever takes a message and says nothing of it for `ack_wait_us` has lost it to another.
+  // Whoever fetches a message and says nothing of it for `ack_wait_us` has lost it to another.
   void MakeQueue(const std::string& stream, const std::string& consumer, int64_t ack_wait_us);
 
   // Stores a message if that is still so; else it is kOtherwise.
@@ -71,23 +71,23 @@ class NatsClient {
   // next. Nothing: there is no such stream, or nobody decides now.
   std::optional<uint64_t> LastSequence(const std::string& stream);
 
-  struct Taken {
-    std::string claim;
+  struct Delivery {
+    std::string ack_subject;   // where NATS is told what became of it
     int64_t stored_utime = 0;  // NATS' clock; 0: not known
     std::vector<uint8_t> data;
   };
-  std::optional<Taken> Take(const std::string& stream, const std::string& consumer);
+  std::optional<Delivery> Fetch(const std::string& stream, const std::string& consumer);
   // Done, and out of the queue. False when NATS does not answer.
-  bool Acknowledge(const std::string& claim);
-  void StillWorking(const std::string& claim);
-  // Nobody is given it for so long.
-  void GiveBack(const std::string& claim, int64_t delay_us = 0);
+  bool Acknowledge(const std::string& ack_subject);
+  void InProgress(const std::string& ack_subject);
+  // Nobody gets it for so long; then another may.
+  void Nak(const std::string& ack_subject, int64_t delay_us = 0);
 
-  struct Queue {
+  struct QueueState {
     uint64_t waiting = 0;
-    int64_t taken = 0;  // and not acknowledged
+    int64_t unacknowledged = 0;  // delivered
   };
-  std::optional<Queue> LookAt(const std::string& stream, const std::string& consumer);
+  std::optional<QueueState> StateOf(const std::string& stream, const std::string& consumer);
 
   // Best effort, to who listens now; one subject is listened to.
   void Publish(const std::string& subject, Bytes data);

@@ -14,13 +14,13 @@ constexpr int64_t kMaxAsk_us = 60'000'000;
 
 }  // namespace
 
-void OutstandingMatches::Add(PlaceMatch match, std::string claim, int64_t now_us) {
+void OutstandingMatches::Add(PlaceMatch match, std::string ack_subject, int64_t now_us) {
   const KeyframeId query = match.query;
   for (const PlaceCandidate& candidate : match.candidates) {
     lacking_.emplace(ConstraintId(query, candidate), query);
   }
-  matches_.insert_or_assign(
-      query, Outstanding{std::move(match), std::move(claim), now_us + kFirstAsk_us, kFirstAsk_us});
+  matches_.insert_or_assign(query, Outstanding{std::move(match), std::move(ack_subject),
+                                               now_us + kFirstAsk_us, kFirstAsk_us});
 }
 
 std::optional<std::string> OutstandingMatches::NoteStored(int64_t constraint_id) {
@@ -37,9 +37,9 @@ std::optional<std::string> OutstandingMatches::NoteStored(int64_t constraint_id)
   if (!match.candidates.empty()) {
     return std::nullopt;
   }
-  std::string claim = std::move(outstanding->second.claim);
+  std::string ack_subject = std::move(outstanding->second.ack_subject);
   matches_.erase(outstanding);
-  return claim;
+  return ack_subject;
 }
 
 std::vector<PlaceMatch> OutstandingMatches::Overdue(int64_t now_us) {
@@ -54,12 +54,12 @@ std::vector<PlaceMatch> OutstandingMatches::Overdue(int64_t now_us) {
   return overdue;
 }
 
-std::vector<std::string> OutstandingMatches::Claims() const {
-  std::vector<std::string> claims;
+std::vector<std::string> OutstandingMatches::AckSubjects() const {
+  std::vector<std::string> ack_subjects;
   for (const auto& [query, outstanding] : matches_) {
-    claims.push_back(outstanding.claim);
+    ack_subjects.push_back(outstanding.ack_subject);
   }
-  return claims;
+  return ack_subjects;
 }
 
 }  // namespace pangea

@@ -17,10 +17,11 @@ namespace pangea {
 class OutstandingMatches {
  public:
   // A match of which at least one candidate lacks its result; candidates that have one are left
-  // out of it. `claim` is what the queue knows it by. The same match again: the newer claim counts.
-  void Add(PlaceMatch match, std::string claim, int64_t now_us);
+  // out of it. `ack_subject` is where the queue is told of it. The same match again: the newer
+  // one counts.
+  void Add(PlaceMatch match, std::string ack_subject, int64_t now_us);
 
-  // A result is stored. The claim of its match if that lacks nothing any more; then it is
+  // A result is stored. Its match's ack_subject if that lacks nothing any more; then it is
   // forgotten.
   std::optional<std::string> NoteStored(int64_t constraint_id);
 
@@ -28,7 +29,7 @@ class OutstandingMatches {
   std::vector<PlaceMatch> Overdue(int64_t now_us);
 
   bool Lacks(int64_t constraint_id) const { return lacking_.contains(constraint_id); }
-  std::vector<std::string> Claims() const;
+  std::vector<std::string> AckSubjects() const;
   size_t size() const { return matches_.size(); }
   // Results.
   size_t num_lacking() const { return lacking_.size(); }
@@ -36,7 +37,7 @@ class OutstandingMatches {
  private:
   struct Outstanding {
     PlaceMatch match;  // with the candidates that lack their result
-    std::string claim;
+    std::string ack_subject;
     int64_t next_ask_us = 0;
     int64_t wait_us = 0;
   };

@@ -31,16 +31,16 @@ int64_t Id(const PlaceMatch& match, size_t candidate) {
 TEST(OutstandingMatches, AMatchIsDoneWithTheLastOfItsResults) {
   OutstandingMatches outstanding;
   const PlaceMatch first = Match(10, 2), second = Match(11, 1);
-  outstanding.Add(first, "claim 10", 0);
-  outstanding.Add(second, "claim 11", 0);
+  outstanding.Add(first, "ack 10", 0);
+  outstanding.Add(second, "ack 11", 0);
   EXPECT_EQ(outstanding.num_lacking(), 3u);
   EXPECT_FALSE(outstanding.NoteStored(Id(first, 1)));
   EXPECT_FALSE(outstanding.NoteStored(Id(first, 1))) << "a double";
   EXPECT_FALSE(outstanding.NoteStored(Id(Match(12, 1), 0))) << "another worker's";
   EXPECT_TRUE(outstanding.Lacks(Id(first, 0)));
   EXPECT_FALSE(outstanding.Lacks(Id(first, 1)));
-  EXPECT_EQ(outstanding.NoteStored(Id(first, 0)), "claim 10");
-  EXPECT_THAT(outstanding.Claims(), ElementsAre("claim 11"));
+  EXPECT_EQ(outstanding.NoteStored(Id(first, 0)), "ack 10");
+  EXPECT_THAT(outstanding.AckSubjects(), ElementsAre("ack 11"));
   EXPECT_EQ(outstanding.size(), 1u);
   EXPECT_EQ(outstanding.num_lacking(), 1u);
 }
@@ -48,7 +48,7 @@ TEST(OutstandingMatches, AMatchIsDoneWithTheLastOfItsResults) {
 TEST(OutstandingMatches, WhatLacksIsOverdueEverMoreRarely) {
   OutstandingMatches outstanding;
   const PlaceMatch match = Match(10, 3);
-  outstanding.Add(match, "claim", 0);
+  outstanding.Add(match, "ack", 0);
   outstanding.NoteStored(Id(match, 1));
   EXPECT_THAT(outstanding.Overdue(2 * kSecond_us), IsEmpty());
   const auto overdue = outstanding.Overdue(3 * kSecond_us);
@@ -64,15 +64,15 @@ TEST(OutstandingMatches, WhatLacksIsOverdueEverMoreRarely) {
   EXPECT_LE(times, 14) << "once a minute in the end";
 }
 
-// When it was given to this worker again, as its claim had been silent for too long.
-TEST(OutstandingMatches, TheSameMatchAgainHasTheNewerClaim) {
+// When it was given to this worker again, as nothing had been said of it for too long.
+TEST(OutstandingMatches, TheSameMatchAgainHasTheNewerAckSubject) {
   OutstandingMatches outstanding;
   const PlaceMatch match = Match(10, 1);
   outstanding.Add(match, "old", 0);
   outstanding.Add(match, "new", kSecond_us);
   EXPECT_EQ(outstanding.size(), 1u);
   EXPECT_EQ(outstanding.NoteStored(Id(match, 0)), "new");
-  EXPECT_THAT(outstanding.Claims(), IsEmpty());
+  EXPECT_THAT(outstanding.AckSubjects(), IsEmpty());
 }
 
 }  // namespace

@@ -61,17 +61,17 @@ int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) 
   streams.Make(arguments.replicas);
   SiteLease lease(streams, arguments.holder);
   const auto said = [&] { return fmt::format("{} has the site", lease.seen_holder()); };
-  if (!lease.TryTake(WallUtime()) && !waits) {
+  if (!lease.TryAcquire(WallUtime()) && !waits) {
     throw std::runtime_error(said());
   }
-  if (lease.term() == 0 && !Wait([&] { return lease.TryTake(WallUtime()); }, said)) {
+  if (lease.term() == 0 && !Wait([&] { return lease.TryAcquire(WallUtime()); }, said)) {
     return 0;
   }
   LcmBus bus(arguments.bus);
   JournalFirstBus journal_first(bus, WallUtime());
   CoreBridge core(journal_first, streams, lease);
   const int code = RunProcess(bus, core, &journal_first);
-  lease.GiveBack();
+  lease.Release();
   return code;
 }
 

@@ -22,7 +22,7 @@ bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_ut
   return true;
 }
 
-bool SiteLease::TryTake(int64_t now_utime) {
+bool SiteLease::TryAcquire(int64_t now_utime) {
   const auto newest = streams_.LeaseSequence();
   if (newest != seen_) {
     seen_ = newest;
@@ -57,6 +57,6 @@ bool SiteLease::Renew(int64_t now_utime) {
   return true;
 }
 
-void SiteLease::GiveBack() { streams_.StoreLease(kNobody, sequence_); }
+void SiteLease::Release() { streams_.StoreLease(kNobody, sequence_); }
 
 }  // namespace pangea

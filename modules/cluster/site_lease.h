@@ -29,11 +29,11 @@ class SiteLease {
   SiteLease(SiteStreams& streams, std::string holder);
 
   // At about 10 Hz until it is ours; whether it is.
-  bool TryTake(int64_t now_utime);
+  bool TryAcquire(int64_t now_utime);
   // At about 10 Hz while it is ours; false once another has it.
   bool Renew(int64_t now_utime);
   // Another need not wait.
-  void GiveBack();
+  void Release();
 
   // With which it was taken.
   uint64_t term() const { return term_; }

@@ -175,8 +175,8 @@ SiteStreams::Reader SiteStreams::ResultsOf(const MapId& map) {
   return {nats_, Stream(kResult), Subject(kResult, Tokens(map) + ".>")};
 }
 
-std::optional<SiteStreams::Taken> SiteStreams::TakeMatch() {
-  return nats_.Take(Stream(kMatch), kWorkers);
+std::optional<SiteStreams::Delivery> SiteStreams::FetchMatch() {
+  return nats_.Fetch(Stream(kMatch), kWorkers);
 }
 
 std::optional<std::vector<KeyframeId>> SiteStreams::PendingMatchesOf(const MapId& map) {
@@ -191,8 +191,8 @@ std::optional<std::vector<KeyframeId>> SiteStreams::PendingMatchesOf(const MapId
   return pending;
 }
 
-std::optional<SiteStreams::Queue> SiteStreams::LookAtQueue() {
-  return nats_.LookAt(Stream(kMatch), kWorkers);
+std::optional<SiteStreams::QueueState> SiteStreams::MatchQueueState() {
+  return nats_.StateOf(Stream(kMatch), kWorkers);
 }
 
 void SiteStreams::PublishHave(Bytes data) { nats_.Publish(HaveSubject(), data); }

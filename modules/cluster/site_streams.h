@@ -99,16 +99,18 @@ class SiteStreams {
   Reader ResultsOf(const MapId& map);
 
   // Of the queue of matches (nats_client.h).
-  using Taken = NatsClient::Taken;
-  using Queue = NatsClient::Queue;
-  std::optional<Taken> TakeMatch();
-  bool Acknowledge(const std::string& claim) { return nats_.Acknowledge(claim); }
-  void StillWorking(const std::string& claim) { nats_.StillWorking(claim); }
-  void GiveBack(const std::string& claim, int64_t delay_us = 0) { nats_.GiveBack(claim, delay_us); }
+  using Delivery = NatsClient::Delivery;
+  using QueueState = NatsClient::QueueState;
+  std::optional<Delivery> FetchMatch();
+  bool Acknowledge(const std::string& ack_subject) { return nats_.Acknowledge(ack_subject); }
+  void InProgress(const std::string& ack_subject) { nats_.InProgress(ack_subject); }
+  void Nak(const std::string& ack_subject, int64_t delay_us = 0) {
+    nats_.Nak(ack_subject, delay_us);
+  }
   // Queries of this map whose match is in the queue, or taken and not acknowledged. Nothing: NATS
   // does not answer.
   std::optional<std::vector<KeyframeId>> PendingMatchesOf(const MapId& map);
-  std::optional<Queue> LookAtQueue();
+  std::optional<QueueState> MatchQueueState();
 
   void PublishHave(Bytes data);
   void ListenToHave();

@@ -11,7 +11,7 @@ Standby::Standby(const std::filesystem::path& journal, SiteStreams& streams,
 // Before the term is stored the former core may still write.
 bool Standby::Step(int64_t now_utime) {
   const bool more = copy_.Follow();
-  if (begin_ == 0 && !more && lease_.TryTake(now_utime)) {
+  if (begin_ == 0 && !more && lease_.TryAcquire(now_utime)) {
     begin_ = StoreTerm(streams_, lease_.term());
     copy_.Follow();
   }

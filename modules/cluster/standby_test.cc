@@ -99,7 +99,7 @@ TEST_F(StandbyTest, ABridgeOnTheCopyGoesOnWhereTheFormerCoreEnded) {
   ASSERT_TRUE(TakesOverWithin(*standby, 5'000'000));
   standby.reset();
   SiteLease lease(*streams_, "second");
-  ASSERT_TRUE(lease.TryTake(now_));
+  ASSERT_TRUE(lease.TryAcquire(now_));
   LocalBus bus;
   Node node(bus, "agent_handler");
   int64_t replicated_bytes = -1;
@@ -136,10 +136,10 @@ TEST_F(StandbyTest, AFormerCoreStoresNothingMore) {
   ASSERT_TRUE(TakesOverWithin(standby, 5'000'000));
   const auto end = streams_->JournalEnd();
   server_->Add(0);
-  EXPECT_THROW(server_->Drain(), Deposed);
+  EXPECT_THROW(server_->Drain(), LeaseLost);
   EXPECT_FALSE(server_->all_replicated()) << "it acknowledges nothing";
   EXPECT_EQ(streams_->JournalEnd(), end);
-  EXPECT_THROW(server_->Round(now_ + 1'000'000), Deposed);
+  EXPECT_THROW(server_->Round(now_ + 1'000'000), LeaseLost);
 }
 
 // It was cut off from NATS, and wrote what it told nobody was kept.
@@ -148,7 +148,7 @@ TEST_F(StandbyTest, AFormerCoresJournalBecomesTheSitesAgain) {
   Standby standby(copy_, *streams_, "second");
   ASSERT_TRUE(TakesOverWithin(standby, 5'000'000));
   server_->Add(0);
-  EXPECT_THROW(server_->Drain(), Deposed);
+  EXPECT_THROW(server_->Drain(), LeaseLost);
   const std::string journal = server_->journal_path();
   server_.reset();
   ASSERT_THAT(EventsOf(journal), SizeIs(4));
@@ -201,15 +201,15 @@ TEST_F(StandbyTest, ALeaseThatWasGivenBackIsFreeAtOnceAndOneOfTheSameHolderIsIts
   SiteStreams other(nats_->access(), "lab");
   other.Make();
   SiteLease first(other, "first");
-  ASSERT_TRUE(first.TryTake(now_));
+  ASSERT_TRUE(first.TryAcquire(now_));
   SiteLease second(other, "second");
-  EXPECT_FALSE(second.TryTake(now_));
+  EXPECT_FALSE(second.TryAcquire(now_));
   EXPECT_EQ(second.seen_holder(), "first");
   SiteLease again(other, "first");
-  EXPECT_TRUE(again.TryTake(now_)) << "started again";
+  EXPECT_TRUE(again.TryAcquire(now_)) << "started again";
   EXPECT_GT(again.term(), first.term());
-  again.GiveBack();
-  EXPECT_TRUE(second.TryTake(now_ + 100'000));
+  again.Release();
+  EXPECT_TRUE(second.TryAcquire(now_ + 100'000));
   EXPECT_FALSE(again.Renew(now_ + 1'000'000));
 }
 

@@ -52,8 +52,8 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
 }
 
 WorkerBridge::~WorkerBridge() {
-  for (const std::string& claim : outstanding_.Claims()) {
-    streams_.GiveBack(claim);
+  for (const std::string& ack_subject : outstanding_.AckSubjects()) {
+    streams_.Nak(ack_subject);
   }
 }
 
@@ -85,8 +85,8 @@ void WorkerBridge::StoreResults() {
 }
 
 void WorkerBridge::NoteStored(int64_t constraint_id) {
-  if (auto claim = outstanding_.NoteStored(constraint_id)) {
-    done_.push_back(*std::move(claim));
+  if (auto ack_subject = outstanding_.NoteStored(constraint_id)) {
+    done_.push_back(*std::move(ack_subject));
   }
 }
 
@@ -190,34 +190,34 @@ bool WorkerBridge::KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime
 
 void WorkerBridge::TakeMatches(int64_t now_utime) {
   while (outstanding_.size() < max_matches_) {
-    const auto taken = streams_.TakeMatch();
-    if (!taken) {
+    const auto delivery = streams_.FetchMatch();
+    if (!delivery) {
       return;
     }
-    auto match = ParseMessage<place_match_t>(taken->data);
+    auto match = ParseMessage<place_match_t>(delivery->data);
     if (!match.value) {
       node_.Refuse("match in the queue: " + match.refused);
-      done_.push_back(taken->claim);
-    } else if (now_utime > taken->stored_utime + kMaxWait_us ||
+      done_.push_back(delivery->ack_subject);
+    } else if (now_utime > delivery->stored_utime + kMaxWait_us ||
                KnowsWhatItRestsOn(*match.value, now_utime)) {
-      TakeMatch(*std::move(match.value), taken->claim, now_utime);
+      TakeMatch(*std::move(match.value), delivery->ack_subject, now_utime);
     } else {
-      return streams_.GiveBack(taken->claim, kWait_us);
+      return streams_.Nak(delivery->ack_subject, kWait_us);
     }
   }
 }
 
 // What a worker that died has stored is not made again.
-void WorkerBridge::TakeMatch(PlaceMatch match, const std::string& claim, int64_t now_utime) {
+void WorkerBridge::TakeMatch(PlaceMatch match, const std::string& ack_subject, int64_t now_utime) {
   std::erase_if(match.candidates, [&](const PlaceCandidate& candidate) {
     return streams_.FindResult(match.query, ConstraintId(match.query, candidate)).has_value();
   });
   if (match.candidates.empty()) {
-    return done_.push_back(claim);
+    return done_.push_back(ack_subject);
   }
   node_.Publish(std::string(channels::kPlaceMatch), ToMessage(match));
   node_.Count("matches");
-  outstanding_.Add(std::move(match), claim, now_utime);
+  outstanding_.Add(std::move(match), ack_subject, now_utime);
 }
 
 void WorkerBridge::AskForOverdue(int64_t now_utime) {
@@ -246,7 +246,8 @@ void WorkerBridge::BetweenMessages(int64_t now_utime) {
   PassHave();
   PassResults();
   StoreResults();
-  std::erase_if(done_, [this](const std::string& claim) { return streams_.Acknowledge(claim); });
+  std::erase_if(
+      done_, [this](const std::string& ack_subject) { return streams_.Acknowledge(ack_subject); });
   if (has_keyframes_) {
     TakeMatches(now_utime);
   }
@@ -257,8 +258,8 @@ void WorkerBridge::Tick(int64_t now_utime) {
   AskForOverdue(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kWorkerSecond_us;
-    for (const std::string& claim : outstanding_.Claims()) {
-      streams_.StillWorking(claim);
+    for (const std::string& ack_subject : outstanding_.AckSubjects()) {
+      streams_.InProgress(ack_subject);
     }
     PublishStatus(now_utime);
   }

@@ -65,7 +65,7 @@ class WorkerBridge : public Process {
   void StoreResults();
   bool KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime);
   void TakeMatches(int64_t now_utime);
-  void TakeMatch(PlaceMatch match, const std::string& claim, int64_t now_utime);
+  void TakeMatch(PlaceMatch match, const std::string& ack_subject, int64_t now_utime);
   void NoteStored(int64_t constraint_id);
   void AnswerRequests();
   // Whether there is more to answer.
@@ -83,7 +83,7 @@ class WorkerBridge : public Process {
   SiteStreams::Reader keyframes_;
   SiteStreams::Reader results_;
   std::map<int64_t, SiteStreams::Entry> to_store_;  // results by constraint id
-  std::vector<std::string> done_;                   // claims to acknowledge
+  std::vector<std::string> done_;                   // acks that NATS has not yet
   std::deque<Request> requests_;
   bool has_keyframes_ = false;  // all that the stream had
   int64_t next_round_utime_ = 0;

@@ -23,7 +23,7 @@ ExternalOdometryProcess::ExternalOdometryProcess(Bus& bus, int32_t agent_id,
       camera_(camera),
       open_map_(std::move(open_map)),
       node_(bus, fmt::format("external_odometry_{}", agent_id)),
-      outlet_(node_, agent_id, kKeptKeyframes, now_utime) {
+      publisher_(node_, agent_id, kKeptKeyframes, now_utime) {
   node_.Listen<correction_t>(channels::Correction(agent_id), [this](const Correction& correction) {
     node_.Count("corrections", shown_.Correct(correction) ? 1 : 0);
   });
@@ -67,7 +67,7 @@ std::optional<Keyframe> ExternalOdometryProcess::AddImage(
   std::optional<Keyframe> keyframe = maker_->Add(utime, image, *T_odom_body);
   Publish(now, /*tracking=*/true);
   if (keyframe) {
-    outlet_.Publish(keyframe->id, EncodeMessage(ToMessage(*keyframe)));
+    publisher_.Publish(keyframe->id, EncodeMessage(ToMessage(*keyframe)));
   }
   return keyframe;
 }
@@ -89,10 +89,10 @@ void ExternalOdometryProcess::Publish(const Step& now, bool tracking) {
 }
 
 void ExternalOdometryProcess::Tick(int64_t now_utime) {
-  outlet_.Tick(now_utime);
+  publisher_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
-    node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "poses of another odometry");
+    node_.PublishStatus(now_utime, publisher_.Unacknowledged(), "poses of another odometry");
   }
 }
 

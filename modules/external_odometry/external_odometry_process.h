@@ -2,7 +2,8 @@
 
 // An odometry that is not ours as an agent on a bus: images and the poses it has for them in.
 //   POSE_k at every image, KEYFRAME_k once each, STATUS_external_odometry_k at 1 Hz out;
-//   CORRECTION_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in keyframe_outlet.h
+//   CORRECTION_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
+//   reliable_keyframe_publisher.h
 //
 // Such an odometry may find itself again elsewhere after it was lost, or correct itself by a jump.
 // Neither is motion: a new map begins.
@@ -14,7 +15,7 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "external_odometry/keyframe_maker.h"
 #include "vio/live/shown_pose.h"
 
@@ -44,7 +45,7 @@ class ExternalOdometryProcess : public Process {
 
   void Tick(int64_t now_utime) override;
 
-  const KeyframeOutlet& outlet() const { return outlet_; }
+  const ReliableKeyframePublisher& publisher() const { return publisher_; }
   Node& node() { return node_; }
 
  private:
@@ -60,7 +61,7 @@ class ExternalOdometryProcess : public Process {
   const CameraModel camera_;
   const std::function<int64_t()> open_map_;
   Node node_;
-  KeyframeOutlet outlet_;
+  ReliableKeyframePublisher publisher_;
   vio::ShownPose shown_;
   MapId map_;
   std::optional<KeyframeMaker> maker_;  // of this map; none: the next pose opens one

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 #include "bus/parse_message.h"
 #include "log_file/log_event.h"
 #include "log_file/log_reader.h"
@@ -26,7 +26,7 @@ class Collector {
     if (event.channel == channels::kAnchorEdit) {
       ++logged_.num_edits;
       Take<anchor_edit_t>(event.data, [this](const AnchorEdit& edit) {
-        logged_.num_refused += book_.Take(edit).empty() ? 0 : 1;
+        logged_.num_refused += registry_.Take(edit).empty() ? 0 : 1;
       });
     } else if (event.channel == channels::kAnchor) {
       ++logged_.num_states;
@@ -36,7 +36,7 @@ class Collector {
   }
 
   LoggedAnchors Finish() {
-    for (const auto& [id, entry] : book_.entries()) {
+    for (const auto& [id, entry] : registry_.entries()) {
       logged_.anchors[id] = {entry.revision, entry.edited_by, entry.deleted, entry.name,
                              entry.payload,  std::nullopt,    entry.place};
     }
@@ -67,7 +67,7 @@ class Collector {
   }
 
   LoggedAnchors logged_;
-  AnchorBook book_{std::numeric_limits<size_t>::max()};  // a file is as bounded as its size
+  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};  // a file is as bounded as its size
   std::map<AnchorId, AnchorState> states_;
 };
 

@@ -154,7 +154,7 @@ void PlaceRecognitionProcess::PublishStatus(int64_t now_utime) {
   node_.Set("rejected_matching", counters.rejected_matching);
   node_.Set("rejected_epipolar", counters.rejected_epipolar);
   node_.Set("rejected_surplus", counters.rejected_surplus);
-  const auto waiting = static_cast<int64_t>(journal_.parked() + held_.size());
+  const auto waiting = static_cast<int64_t>(journal_.num_buffered() + held_.size());
   node_.PublishStatus(
       now_utime, waiting,
       fmt::format("{} keyframes, {} candidates in own maps, {} in others{}", counters.keyframes,

@@ -170,7 +170,7 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
   }
   node_.PublishStatus(
       now_utime,
-      counters.waiting + static_cast<int64_t>(journal_.parked()) +
+      counters.waiting + static_cast<int64_t>(journal_.num_buffered()) +
           (num_finished_ != num_arrived_ ? 1 : 0),
       counters.maps == 0
           ? "no keyframes yet"

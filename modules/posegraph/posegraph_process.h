@@ -20,8 +20,8 @@
 // it): a solve costs the same after one verification result as after ten, and verification results
 // that come faster than solves would make every correction late.
 //
-// Bounds: InOrder's for keyframes, those of due_results.h, the pose graph's own for constraints
-// that wait for keyframes.
+// Bounds: ReorderBuffer's for keyframes, those of due_results.h, the pose graph's own for
+// constraints that wait for keyframes.
 
 #include <string>
 

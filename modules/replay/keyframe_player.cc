@@ -19,7 +19,7 @@ KeyframePlayer::KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
     : options_(options),
       keyframes_(std::move(keyframes)),
       node_(bus, fmt::format("keyframes_{}", options.agent_id)),
-      outlet_(node_, options.agent_id, keyframes_.size(), now_utime) {}
+      publisher_(node_, options.agent_id, keyframes_.size(), now_utime) {}
 
 std::optional<int64_t> KeyframePlayer::next_us() const {
   if (next_ == keyframes_.size()) {
@@ -33,14 +33,14 @@ std::optional<int64_t> KeyframePlayer::next_us() const {
 
 void KeyframePlayer::PlayNext() {
   const LoggedKeyframe& keyframe = keyframes_[next_++];
-  outlet_.Publish(keyframe.id, keyframe.data);
+  publisher_.Publish(keyframe.id, keyframe.data);
 }
 
 void KeyframePlayer::Tick(int64_t now_utime) {
-  outlet_.Tick(now_utime);
+  publisher_.Tick(now_utime);
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
-    node_.PublishStatus(now_utime, outlet_.Unacknowledged(),
+    node_.PublishStatus(now_utime, publisher_.Unacknowledged(),
                         fmt::format("agent {}: stored keyframe {} of {}", options_.agent_id, next_,
                                     keyframes_.size()));
   }
@@ -48,7 +48,7 @@ void KeyframePlayer::Tick(int64_t now_utime) {
 
 void KeyframePlayer::PublishFinished(int64_t now_utime) {
   node_.Set("finished", 1);
-  node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "finished");
+  node_.PublishStatus(now_utime, publisher_.Unacknowledged(), "finished");
 }
 
 void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
@@ -58,7 +58,7 @@ void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
   int64_t played = 0;
   const int64_t all = std::ssize(keyframes);
   KeyframePlayer player(bus, options, std::move(keyframes), begin);
-  PlaybackPace pace(&bus, player, player.outlet());
+  PlaybackPace pace(&bus, player, player.publisher());
   for (auto next = player.next_us(); next && !StopRequested(); next = player.next_us()) {
     if (options.rate > 0) {
       pace.WaitUntil(begin + std::llround(static_cast<double>(*next) / options.rate));

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bus/process.h"
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "replay/keyframe_log.h"
 
 namespace pangea::session {
@@ -34,13 +34,13 @@ class KeyframePlayer : public Process {
   // Everything is said: the last status, with the counter finished = 1.
   void PublishFinished(int64_t now_utime);
 
-  const KeyframeOutlet& outlet() const { return outlet_; }
+  const ReliableKeyframePublisher& publisher() const { return publisher_; }
 
  private:
   KeyframePlayerOptions options_;
   std::vector<LoggedKeyframe> keyframes_;
   Node node_;
-  KeyframeOutlet outlet_;
+  ReliableKeyframePublisher publisher_;
   size_t next_ = 0;
   int64_t next_status_utime_ = 0;
 };

@@ -53,7 +53,7 @@ TEST_F(KeyframePlayerTest, PlaysInTheKeyframesOwnTime) {
   EXPECT_EQ(player.next_us(), 500'000);
   PlayAll(&player);
   EXPECT_THAT(played_, testing::ElementsAre(0, 1, 2));
-  EXPECT_EQ(player.outlet().Unacknowledged(), 3);
+  EXPECT_EQ(player.publisher().Unacknowledged(), 3);
 }
 
 TEST_F(KeyframePlayerTest, StopsAfterTheDuration) {
@@ -82,7 +82,7 @@ TEST_F(KeyframePlayerTest, AnswersForWhatItHasPlayed) {
   have.highest_seq = {0};
   PublishMessage(bus_, std::string(channels::kHave), have);
   bus_.Drain();
-  EXPECT_EQ(player.outlet().Unacknowledged(), 1);
+  EXPECT_EQ(player.publisher().Unacknowledged(), 1);
 }
 
 }  // namespace

@@ -61,6 +61,13 @@ class LogWithOptions {
   int64_t utime_ = 0;
 };
 
+// Of a log in which one process says this.
+LoggedOptions ReadLogOf(const std::string& process, const std::string& yaml) {
+  LogWithOptions log("one_process.lcm");
+  log.Say(process, yaml);
+  return ReadLoggedOptions({log.Close()});
+}
+
 TEST(ServerOptions, EveryDefaultIsWithinItsBoundsAndReadsBack) {
   ServerOptions options;
   options.fusion.alignment.min_inliers = 21;
@@ -136,28 +143,22 @@ TEST(ServerOptions, WhatAProcessTellsReadsBack) {
   EXPECT_THAT(logged.notes, IsEmpty());
 }
 
-TEST(ServerOptions, WhatIsNotKnownIsLeftOutAndSaidSo) {
-  LogWithOptions log("other_version.lcm");
-  log.Say("fusion", "alignment: {min_inliers: 20, of_last_year: 1}");
-  const LoggedOptions logged = ReadLoggedOptions({log.Close()});
+TEST(ServerOptions, UnknownKeysOfALogAreLeftOutAndNamed) {
+  const LoggedOptions logged = ReadLogOf("fusion", "alignment: {min_inliers: 20, of_last_year: 1}");
   EXPECT_EQ(logged.options.fusion.alignment.min_inliers, 20);
   ASSERT_EQ(logged.notes.size(), 2U);
   EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("of_last_year 1")));
 }
 
-TEST(ServerOptions, WhatCannotBeReadIsDefaultAndSaidSo) {
-  LogWithOptions log("unreadable.lcm");
-  log.Say("fusion", "alignment: {min_inliers: 20, min_found: many}");
-  const LoggedOptions logged = ReadLoggedOptions({log.Close()});
+TEST(ServerOptions, UnreadableOptionsOfALogAreDefaultsWithANote) {
+  const LoggedOptions logged = ReadLogOf("fusion", "alignment: {min_inliers: 20, min_found: many}");
   EXPECT_EQ(logged.options.fusion.alignment.min_inliers, 16);
   ASSERT_EQ(logged.notes.size(), 2U);
   EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("min_found")));
 }
 
-TEST(ServerOptions, ALogWithoutAnyIsSaidToBeSo) {
-  LogWithOptions log("none.lcm");
-  log.Say("vio_1", "estimator: {window: 9}");
-  const LoggedOptions logged = ReadLoggedOptions({log.Close()});
+TEST(ServerOptions, ALogWithoutAnyGivesDefaultsWithANote) {
+  const LoggedOptions logged = ReadLogOf("vio_1", "estimator: {window: 9}");
   ASSERT_EQ(logged.notes.size(), 1U);
   EXPECT_THAT(logged.notes.front(), AllOf(HasSubstr("fusion"), HasSubstr("the log has none")));
 }

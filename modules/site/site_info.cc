@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 #include "checkpoint/checkpoint_file.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -50,7 +50,7 @@ class Counter {
     }
   }
   int64_t anchors() const {
-    return static_cast<int64_t>(book_.entries().size() - book_.num_deleted());
+    return static_cast<int64_t>(registry_.entries().size() - registry_.num_deleted());
   }
 
  private:
@@ -72,13 +72,13 @@ class Counter {
     anchor_edit_t message{};
     if (DecodeMessage(data, &message)) {
       if (const auto edit = Parse(message).value) {
-        book_.Take(*edit);
+        registry_.Take(*edit);
       }
     }
   }
 
   SiteInfo* info_;
-  AnchorBook book_{std::numeric_limits<size_t>::max()};
+  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};
 };
 
 std::string Megabytes(int64_t bytes) {

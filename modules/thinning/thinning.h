@@ -21,7 +21,7 @@
 #include <set>
 #include <vector>
 
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 #include "core/keyframe.h"
 #include "core/record_store.h"
 #include "core/server_messages.h"
@@ -111,7 +111,7 @@ class Thinning {
   std::vector<MapId> maps_;  // in the order they came: the oldest first
   std::map<MapId, StoredMap> stored_;
   std::map<int64_t, Constraint> constraints_;  // by id
-  AnchorBook anchors_;
+  AnchorRegistry anchors_;
 };
 
 }  // namespace pangea

@@ -8,7 +8,7 @@ namespace pangea {
 namespace {
 
 // A gap is never longer: processes believe an edge that leads over so many keyframes
-// (InOrder::kMaxParked).
+// (ReorderBuffer::kMaxBuffered).
 constexpr int kMaxGap = 500;
 
 // How far two views' cameras are apart, 1 at the edge of what is one viewpoint.

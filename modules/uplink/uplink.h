@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "uplink/sender.h"
 
 namespace pangea {

@@ -58,7 +58,7 @@ std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraM
 Playback::Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
                    const PlaybackOptions& options)
     : process_(process),
-      pace_(bus, process, process.outlet()),
+      pace_(bus, process, process.publisher()),
       recording_(recording),
       options_(options) {
   if (!options_.tracks_csv.empty()) {

@@ -51,7 +51,7 @@ int8_t ToMessage(EstimatorState state) {
 VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime)
     : options_(options),
       node_(bus, fmt::format("vio_{}", options.agent_id)),
-      outlet_(node_, options.agent_id, kKeptKeyframes, now_utime),
+      publisher_(node_, options.agent_id, kKeptKeyframes, now_utime),
       announcer_(bus, node_.name(), options.told_options) {
   node_.Listen<correction_t>(channels::Correction(options_.agent_id),
                              std::bind_front(&VioProcess::OnCorrection, this));
@@ -175,7 +175,7 @@ void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
   if (keyframe_log_) {
     keyframe_log_->Write(keyframe.utime, channels::Keyframe(options_.agent_id), bytes);
   }
-  outlet_.Publish(keyframe.id, std::move(bytes));
+  publisher_.Publish(keyframe.id, std::move(bytes));
 }
 
 void VioProcess::WriteTum(const VioOutput& output) {
@@ -255,17 +255,17 @@ void VioProcess::Flush() {
 
 void VioProcess::PublishFinished(int64_t now_utime) {
   node_.Set("finished", 1);
-  node_.PublishStatus(now_utime, outlet_.Unacknowledged(), "finished");
+  node_.PublishStatus(now_utime, publisher_.Unacknowledged(), "finished");
 }
 
 void VioProcess::Tick(int64_t now_utime) {
-  outlet_.Tick(now_utime);
+  publisher_.Tick(now_utime);
   if (!options_.told_options.empty()) {
     announcer_.Tick(now_utime);
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kStatusInterval_us;
-    node_.PublishStatus(now_utime, outlet_.Unacknowledged(), Summary());
+    node_.PublishStatus(now_utime, publisher_.Unacknowledged(), Summary());
   }
   TellLag(now_utime);
 }

@@ -5,7 +5,7 @@
 //
 //   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz, OPTIONS_vio_k out;
 //   CORRECTION_k, LANDMARKS_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
-//   keyframe_outlet.h, for the newest kKeptKeyframes.
+//   reliable_keyframe_publisher.h, for the newest kKeptKeyframes.
 
 #include <cstdint>
 #include <fstream>
@@ -18,7 +18,7 @@
 #include "bus/node.h"
 #include "bus/options_announcer.h"
 #include "bus/process.h"
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "log_file/log_writer.h"
 #include "vio/live/map_localization.h"
 #include "vio/live/shown_pose.h"
@@ -80,7 +80,7 @@ class VioProcess : public Process {
   void Tick(int64_t now_utime) override;
 
   int64_t ImuTimeOf(int64_t image_utime) const { return vio_->ImuTimeOf(image_utime); }
-  const KeyframeOutlet& outlet() const { return outlet_; }
+  const ReliableKeyframePublisher& publisher() const { return publisher_; }
   Node& node() { return node_; }
 
  private:
@@ -100,7 +100,7 @@ class VioProcess : public Process {
 
   VioProcessOptions options_;
   Node node_;
-  KeyframeOutlet outlet_;
+  ReliableKeyframePublisher publisher_;
   std::optional<Vio> vio_;
   ShownPose shown_;
   MapLocalization localization_;

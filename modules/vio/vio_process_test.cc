@@ -233,8 +233,8 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   process.Flush();
   bus_.Drain();
   ASSERT_GE(keyframes_.size(), 4u);
-  EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
-  EXPECT_FALSE(process.outlet().uplink_ever_seen());
+  EXPECT_EQ(process.publisher().Unacknowledged(), static_cast<int64_t>(keyframes_.size()));
+  EXPECT_FALSE(process.publisher().uplink_ever_seen());
   have_t have{};
   have.num_maps = 1;
   have.maps.push_back(ToMessage(keyframes_[0].id.map));
@@ -250,8 +250,8 @@ TEST_F(VioProcessTest, AnswersResendRequestsAndCountsAcknowledgements) {
   request.requester = "no such/name";
   PublishMessage(bus_, "RESEND_REQUEST", request);
   bus_.Drain();
-  EXPECT_EQ(process.outlet().Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
-  EXPECT_TRUE(process.outlet().uplink_ever_seen());
+  EXPECT_EQ(process.publisher().Unacknowledged(), static_cast<int64_t>(keyframes_.size()) - 2);
+  EXPECT_TRUE(process.publisher().uplink_ever_seen());
   ASSERT_EQ(again_.size(), 2u);
   KeyframeMessage keyframe{};
   ASSERT_TRUE(DecodeMessage(again_[0].data, &keyframe));

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 

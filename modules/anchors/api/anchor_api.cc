@@ -147,7 +147,7 @@ void AnchorApi::AnswerAnchors(const web::WebRequest& request, const std::string&
 
 void AnchorApi::AnswerAnchor(const web::WebRequest& request, const Path& path, const Reply& reply) {
   const auto id = ParseAnchorId(path[2], path[3]);
-  const auto& entries = anchors_.book().entries();
+  const auto& entries = anchors_.registry().entries();
   if (!id || !entries.contains(*id)) {
     return reply(Error(404, "there is no such anchor"));
   }
@@ -335,7 +335,7 @@ BadField AnchorApi::SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const
 // The time, and never twice, whatever the clock does.
 AnchorId AnchorApi::NewId() {
   AnchorId id{0, std::max(now_utime_, newest_created_utime_ + 1)};
-  while (anchors_.book().entries().contains(id)) {
+  while (anchors_.registry().entries().contains(id)) {
     ++id.created_utime;
   }
   newest_created_utime_ = id.created_utime;

@@ -27,7 +27,7 @@ json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 std::vector<ListedAnchor> ListAnchors(const Anchors& anchors) {
   std::vector<ListedAnchor> listed;
-  for (const auto& [id, entry] : anchors.book().entries()) {
+  for (const auto& [id, entry] : anchors.registry().entries()) {
     if (!entry.deleted) {
       listed.push_back(Listed(anchors, id, entry));
     }
@@ -36,8 +36,8 @@ std::vector<ListedAnchor> ListAnchors(const Anchors& anchors) {
 }
 
 std::optional<ListedAnchor> FindAnchor(const Anchors& anchors, const AnchorId& id) {
-  const auto entry = anchors.book().entries().find(id);
-  if (entry == anchors.book().entries().end() || entry->second.deleted) {
+  const auto entry = anchors.registry().entries().find(id);
+  if (entry == anchors.registry().entries().end() || entry->second.deleted) {
     return std::nullopt;
   }
   return Listed(anchors, id, entry->second);

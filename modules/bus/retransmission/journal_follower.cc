@@ -66,7 +66,8 @@ void JournalFollower::AddInOrder(Keyframe keyframe) {
 
 void JournalFollower::Lose(const SeqGap& gap) {
   const int32_t from_seq = std::max(gap.from_seq, keyframes_.next(gap.map));
-  const bool credible = gap.to_seq - from_seq < static_cast<int32_t>(InOrder<Item>::kMaxParked);
+  const bool credible =
+      gap.to_seq - from_seq < static_cast<int32_t>(ReorderBuffer<Item>::kMaxBuffered);
   for (int32_t seq = from_seq; credible && seq <= gap.to_seq; ++seq) {
     HandOn(keyframes_.Add(gap.map, seq, std::nullopt));
   }

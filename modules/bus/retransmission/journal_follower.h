@@ -26,7 +26,7 @@
 // that the journal had of a map when this process knew nothing of it; for these not for longer than
 // kCatchUpSilence_us without progress.
 // When it first is not, the status says so: counter `ready_utime`, wall clock.
-// Bounds: InOrder's. One thread; lives as long as its node.
+// Bounds: ReorderBuffer's. One thread; lives as long as its node.
 
 #include <cstdint>
 #include <filesystem>
@@ -40,10 +40,10 @@
 
 #include "bus/node.h"
 #include "bus/retransmission/gap_requests.h"
-#include "bus/retransmission/in_order.h"
 #include "bus/retransmission/journal_reader.h"
 #include "bus/retransmission/journal_records.h"
 #include "bus/retransmission/missing.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "checkpoint/checkpoint_file.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
@@ -122,7 +122,7 @@ class JournalFollower {
   // Up to what seq the journal had the map, in a catch-up.
   std::optional<int32_t> Goal(const MapId& map) const;
   // Keyframes that wait for those before them.
-  size_t parked() const { return keyframes_.parked(); }
+  size_t num_buffered() const { return keyframes_.num_buffered(); }
 
  private:
   struct Waiting {
@@ -169,7 +169,7 @@ class JournalFollower {
   const Handlers handlers_;
   const JournalCheckpoint checkpoint_;
   const std::shared_ptr<JournalRecords> records_;
-  InOrder<Item> keyframes_;
+  ReorderBuffer<Item> keyframes_;
   GapRequests keyframe_requests_;
   MissingMessages matches_;
   MissingStates states_;

@@ -73,7 +73,7 @@ bool JournalFollower::RestoreFollower(ByteReader* reader) {
       stream->Restore(map, next, waiting);
     }
   };
-  InOrder<Item> keyframes;
+  ReorderBuffer<Item> keyframes;
   MissingMessages matches;
   restore(&keyframes);
   restore(&matches);

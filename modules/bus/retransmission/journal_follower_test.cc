@@ -284,7 +284,7 @@ TEST(JournalFollower, AnAbsurdEdgeFillsNoMemory) {
   follower.Send(0);
   follower.Send(900'000, 0);
   EXPECT_THAT(follower.seqs, ElementsAre(0));
-  EXPECT_EQ(follower.journal.parked(), 1u);
+  EXPECT_EQ(follower.journal.num_buffered(), 1u);
 }
 
 }  // namespace

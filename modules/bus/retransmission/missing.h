@@ -10,7 +10,7 @@
 
 #include "bus/node.h"
 #include "bus/retransmission/gap_requests.h"
-#include "bus/retransmission/in_order.h"
+#include "bus/retransmission/reorder_buffer.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "pangea/again_t.hpp"
@@ -63,7 +63,7 @@ class MissingMessages {
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;
   }
-  const InOrder<std::monostate>& stream() const { return stream_; }
+  const ReorderBuffer<std::monostate>& stream() const { return stream_; }
   void Restore(const MapId& map, int32_t next, const std::vector<int32_t>& waiting) {
     stream_.Restore(map, next, waiting);
   }
@@ -71,7 +71,7 @@ class MissingMessages {
   std::vector<SeqGap> Due(int64_t now_utime) { return requests_.Due(stream_.Gaps(), now_utime); }
 
  private:
-  InOrder<std::monostate> stream_;
+  ReorderBuffer<std::monostate> stream_;
   GapRequests requests_;
 };
 

@@ -35,14 +35,14 @@ void PlaybackPace::WaitUntil(int64_t wall_utime) {
 }
 
 void PlaybackPace::WaitForAcknowledgements() {
-  int64_t unacknowledged = outlet_.Unacknowledged();
+  int64_t unacknowledged = publisher_.Unacknowledged();
   int64_t progress_utime = WallUtime();
-  while (bus_ != nullptr && !StopRequested() && outlet_.Unacknowledged() > kMaxAhead &&
-         WallUtime() - outlet_.uplink_seen_utime() < kUplinkSilence_us &&
+  while (bus_ != nullptr && !StopRequested() && publisher_.Unacknowledged() > kMaxAhead &&
+         WallUtime() - publisher_.uplink_seen_utime() < kUplinkSilence_us &&
          WallUtime() - progress_utime < kNoProgress_us) {
     Serve(50);
-    if (outlet_.Unacknowledged() < unacknowledged) {
-      unacknowledged = outlet_.Unacknowledged();
+    if (publisher_.Unacknowledged() < unacknowledged) {
+      unacknowledged = publisher_.Unacknowledged();
       progress_utime = WallUtime();
     }
   }
@@ -50,8 +50,8 @@ void PlaybackPace::WaitForAcknowledgements() {
 
 void PlaybackPace::WaitAtTheEnd() {
   const int64_t begin = WallUtime();
-  while (bus_ != nullptr && outlet_.Unacknowledged() > 0 && !StopRequested() &&
-         WallUtime() - begin < (outlet_.uplink_ever_seen() ? kLastWait_us : kLastWaitAlone_us)) {
+  while (bus_ != nullptr && publisher_.Unacknowledged() > 0 && !StopRequested() &&
+         WallUtime() - begin < (publisher_.uplink_ever_seen() ? kLastWait_us : kLastWaitAlone_us)) {
     Serve(50);
   }
 }

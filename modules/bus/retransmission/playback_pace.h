@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "bus/process.h"
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 
 namespace pangea {
 
@@ -19,8 +19,8 @@ class PlaybackPace {
   static constexpr int64_t kNoProgress_us = 20'000'000;
 
   // `bus` may be null: nothing to listen to.
-  PlaybackPace(LcmBus* bus, Process& process, const KeyframeOutlet& outlet)
-      : bus_(bus), process_(process), outlet_(outlet) {}
+  PlaybackPace(LcmBus* bus, Process& process, const ReliableKeyframePublisher& publisher)
+      : bus_(bus), process_(process), publisher_(publisher) {}
 
   // Handles what has arrived, waiting for the first message at most `timeout_ms`.
   void Serve(int timeout_ms);
@@ -33,7 +33,7 @@ class PlaybackPace {
  private:
   LcmBus* bus_;
   Process& process_;
-  const KeyframeOutlet& outlet_;
+  const ReliableKeyframePublisher& publisher_;
   int64_t next_tick_utime_ = 0;
 };
 

@@ -64,8 +64,9 @@ struct RefinedStart {
 // A start is good for nothing when fewer of the rays fit. When fewer are even before the camera in
 // the closed-form solution, Refine tells that share and nothing else.
 inline constexpr double kMinInlierShare = 0.8;
+// What a start does not know, standard deviations.
 struct StartSigmas {
-  double ray = 0;
+  double ray = 0;                // of an observation, on the plane z = 1
   double accel_bias = 0.15;      // m/s^2, about zero
   double time_offset_s = 0.005;  // of the clocks
   double stamp_s = 0;            // of an image's stamp by itself; 0: they do not jitter

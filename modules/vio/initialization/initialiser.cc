@@ -99,9 +99,7 @@ Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, doubl
       noise_(noise),
       pixel_sigma_(pixel_sigma),
       sigmas_(sigmas),
-      stationary_(stationary) {
-  sigmas_.ray = pixel_sigma * camera.PixelAngle();
-}
+      stationary_(stationary) {}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
                                     double stamp_sigma_s) {

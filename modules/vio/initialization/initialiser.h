@@ -50,7 +50,7 @@ struct InitialResult {
 
 class Initialiser {
  public:
-  // Of the sigmas, `ray` and `stamp_s` are found here.
+  // `pixel_sigma`: of an observation, pixels. Of `sigmas`, AddFrame says `stamp_s` anew.
   Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
               const StartSigmas& sigmas, const StationaryOptions& stationary);
 

@@ -1,4 +1,4 @@
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@ Order OrderOf(const AnchorEdit& edit) { return {edit.revision, edit.agent_id}; }
 
 }  // namespace
 
-std::string AnchorBook::Take(const AnchorEdit& edit) {
+std::string AnchorRegistry::Take(const AnchorEdit& edit) {
   if (!Allowed(edit)) {
     return "anchor edit: the editor's key does not allow it";
   }

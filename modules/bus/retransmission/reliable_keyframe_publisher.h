@@ -19,12 +19,12 @@
 
 namespace pangea {
 
-class KeyframeOutlet {
+class ReliableKeyframePublisher {
  public:
   static constexpr int kMaxAnswers = 30;  // keyframes per request: the rest by another request
 
   // `now_utime`: wall clock.
-  KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime);
+  ReliableKeyframePublisher(Node& node, int32_t agent_id, size_t kept, int64_t now_utime);
 
   // An encoded keyframe_t of this agent.
   void Publish(const KeyframeId& id, std::vector<uint8_t> bytes);

@@ -1,4 +1,4 @@
-#include "bus/retransmission/keyframe_outlet.h"
+#include "bus/retransmission/reliable_keyframe_publisher.h"
 
 #include <algorithm>
 #include <functional>
@@ -9,14 +9,15 @@
 #include "pangea/again_t.hpp"
 
 namespace pangea {
-KeyframeOutlet::KeyframeOutlet(Node& node, int32_t agent_id, size_t kept, int64_t now_utime)
+ReliableKeyframePublisher::ReliableKeyframePublisher(Node& node, int32_t agent_id, size_t kept,
+                                                     int64_t now_utime)
     : node_(node), agent_id_(agent_id), max_kept_(kept), uplink_seen_utime_(now_utime) {
-  node_.Listen<have_t>(channels::kHave, std::bind_front(&KeyframeOutlet::OnHave, this));
-  node_.Listen<resend_request_t>(channels::kResendRequest,
-                                 std::bind_front(&KeyframeOutlet::OnResendRequest, this));
+  node_.Listen<have_t>(channels::kHave, std::bind_front(&ReliableKeyframePublisher::OnHave, this));
+  node_.Listen<resend_request_t>(
+      channels::kResendRequest, std::bind_front(&ReliableKeyframePublisher::OnResendRequest, this));
 }
 
-void KeyframeOutlet::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
+void ReliableKeyframePublisher::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
   node_.bus().Publish(channels::Keyframe(agent_id_), bytes);
   node_.Count("keyframes");
   node_.Count("keyframe_bytes", static_cast<int64_t>(bytes.size()));
@@ -27,14 +28,14 @@ void KeyframeOutlet::Publish(const KeyframeId& id, std::vector<uint8_t> bytes) {
   }
 }
 
-void KeyframeOutlet::Tick(int64_t now_utime) {
+void ReliableKeyframePublisher::Tick(int64_t now_utime) {
   if (uplink_seen_) {
     uplink_seen_utime_ = now_utime;
     uplink_seen_ = false;
   }
 }
 
-int64_t KeyframeOutlet::Unacknowledged() const {
+int64_t ReliableKeyframePublisher::Unacknowledged() const {
   int64_t count = 0;
   for (const auto& [map, published] : published_) {
     const auto it = acknowledged_.find(map);
@@ -43,7 +44,7 @@ int64_t KeyframeOutlet::Unacknowledged() const {
   return count;
 }
 
-void KeyframeOutlet::OnHave(const Have& have) {
+void ReliableKeyframePublisher::OnHave(const Have& have) {
   uplink_seen_ = true;
   uplink_ever_seen_ = true;
   for (const auto& [map, highest_seq] : have.highest_seq) {
@@ -54,7 +55,7 @@ void KeyframeOutlet::OnHave(const Have& have) {
   }
 }
 
-void KeyframeOutlet::OnResendRequest(const ResendRequest& request) {
+void ReliableKeyframePublisher::OnResendRequest(const ResendRequest& request) {
   if (request.channel != channels::Keyframe(agent_id_)) {
     return;
   }
@@ -82,7 +83,7 @@ void KeyframeOutlet::OnResendRequest(const ResendRequest& request) {
   }
 }
 
-void KeyframeOutlet::Answer(const std::string& requester, const KeptKeyframe& keyframe) {
+void ReliableKeyframePublisher::Answer(const std::string& requester, const KeptKeyframe& keyframe) {
   again_t again{};
   again.channel = channels::Keyframe(agent_id_);
   again.data = keyframe.bytes;

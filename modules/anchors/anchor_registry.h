@@ -25,9 +25,9 @@ struct AnchorEntry {
   std::optional<AnchorEdit> place;  // the newest that says where it is
 };
 
-class AnchorBook {
+class AnchorRegistry {
  public:
-  explicit AnchorBook(size_t max_anchors) : max_anchors_(max_anchors) {}
+  explicit AnchorRegistry(size_t max_anchors) : max_anchors_(max_anchors) {}
 
   // Why it is refused, or an empty string.
   std::string Take(const AnchorEdit& edit);

@@ -1,4 +1,4 @@
-#include "anchors/anchor_book.h"
+#include "anchors/anchor_registry.h"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ AnchorEdit Edit(int64_t revision, int32_t agent_id, const std::string& name, Pla
   return edit;
 }
 
-TEST(AnchorBook, TheOrderOfArrivalDoesNotMatter) {
+TEST(AnchorRegistry, TheOrderOfArrivalDoesNotMatter) {
   AnchorEdit refused = Edit(9, 3, "no", Placement::kKeyframe);
   refused.right = AnchorRight::kEditOwn;  // of another's
   const std::vector<AnchorEdit> edits = {Edit(1, 1, "made", Placement::kKeyframe),
@@ -38,12 +38,12 @@ TEST(AnchorBook, TheOrderOfArrivalDoesNotMatter) {
   std::vector<size_t> order(edits.size());
   std::iota(order.begin(), order.end(), 0);
   do {
-    AnchorBook book(10);
+    AnchorRegistry registry(10);
     for (const size_t i : order) {
-      book.Take(edits[i]);
-      book.Take(edits[i]);  // repeats are harmless
+      registry.Take(edits[i]);
+      registry.Take(edits[i]);  // repeats are harmless
     }
-    const AnchorEntry& entry = book.entries().at(kId);
+    const AnchorEntry& entry = registry.entries().at(kId);
     ASSERT_EQ(entry.name, "renamed at once");
     ASSERT_EQ(entry.revision, 3);
     ASSERT_EQ(entry.edited_by, 2);
@@ -52,23 +52,23 @@ TEST(AnchorBook, TheOrderOfArrivalDoesNotMatter) {
   } while (std::ranges::next_permutation(order).found);
 }
 
-TEST(AnchorBook, WhatIsDeletedStaysDeleted) {
-  AnchorBook book(1);
-  EXPECT_EQ(book.Take(Edit(1, 1, "a", Placement::kKeyframe)), "");
+TEST(AnchorRegistry, WhatIsDeletedStaysDeleted) {
+  AnchorRegistry registry(1);
+  EXPECT_EQ(registry.Take(Edit(1, 1, "a", Placement::kKeyframe)), "");
   AnchorEdit deleted = Edit(2, 1, "a", Placement::kSame);
   deleted.deleted = true;
-  EXPECT_EQ(book.Take(deleted), "");
-  EXPECT_EQ(book.Take(Edit(3, 1, "late", Placement::kKeyframe)), "");
-  EXPECT_TRUE(book.entries().at(kId).deleted);
-  EXPECT_EQ(book.num_deleted(), 1u);
+  EXPECT_EQ(registry.Take(deleted), "");
+  EXPECT_EQ(registry.Take(Edit(3, 1, "late", Placement::kKeyframe)), "");
+  EXPECT_TRUE(registry.entries().at(kId).deleted);
+  EXPECT_EQ(registry.num_deleted(), 1u);
 }
 
-TEST(AnchorBook, RightsOfTheKey) {
+TEST(AnchorRegistry, RightsOfTheKey) {
   const auto refused = [](AnchorRight right, int32_t editor) {
-    AnchorBook book(10);
+    AnchorRegistry registry(10);
     AnchorEdit edit = Edit(1, editor, "a", Placement::kKeyframe);
     edit.right = right;
-    return !book.Take(edit).empty();
+    return !registry.Take(edit).empty();
   };
   EXPECT_FALSE(refused(AnchorRight::kEditAll, 2));
   EXPECT_FALSE(refused(AnchorRight::kEditOwn, 1));
@@ -77,16 +77,16 @@ TEST(AnchorBook, RightsOfTheKey) {
   EXPECT_TRUE(refused(AnchorRight::kUnknown, 1));
 }
 
-TEST(AnchorBook, IsBoundedByThoseThatAreNotDeleted) {
-  AnchorBook book(1);
-  EXPECT_EQ(book.Take(Edit(1, 1, "a", Placement::kKeyframe)), "");
+TEST(AnchorRegistry, IsBoundedByThoseThatAreNotDeleted) {
+  AnchorRegistry registry(1);
+  EXPECT_EQ(registry.Take(Edit(1, 1, "a", Placement::kKeyframe)), "");
   AnchorEdit other = Edit(1, 1, "b", Placement::kKeyframe);
   other.anchor.created_utime = 200;
-  EXPECT_NE(book.Take(other), "");
+  EXPECT_NE(registry.Take(other), "");
   AnchorEdit deleted = Edit(2, 1, "a", Placement::kSame);
   deleted.deleted = true;
-  EXPECT_EQ(book.Take(deleted), "");
-  EXPECT_EQ(book.Take(other), "");
+  EXPECT_EQ(registry.Take(deleted), "");
+  EXPECT_EQ(registry.Take(other), "");
 }
 
 }  // namespace

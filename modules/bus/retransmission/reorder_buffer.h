@@ -1,8 +1,8 @@
 #pragma once
 
 // Puts one numbered stream per map back in order, drops repeats, and knows what is missing.
-// Bounded: at most kMaxParked items wait per map; beyond that the newest are dropped (they will be
-// asked for again).
+// Bounded: at most kMaxBuffered items wait per map; beyond that the newest are dropped (they will
+// be asked for again).
 
 #include <algorithm>
 #include <cstdint>
@@ -14,22 +14,22 @@
 namespace pangea {
 
 template <typename T>
-class InOrder {
+class ReorderBuffer {
  public:
-  static constexpr size_t kMaxParked = 1000;
+  static constexpr size_t kMaxBuffered = 1000;
 
   // The items that are now in order (empty for a repeat or an item after a gap).
   std::vector<T> Add(const MapId& map, int32_t seq, T item) {
     Stream& stream = streams_[map];
     std::vector<T> ready;
-    if (seq < stream.next || stream.parked.contains(seq)) {
+    if (seq < stream.next || stream.buffered.contains(seq)) {
       return ready;
     }
-    if (stream.parked.size() >= kMaxParked && seq != stream.next) {
+    if (stream.buffered.size() >= kMaxBuffered && seq != stream.next) {
       stream.highest = std::max(stream.highest, seq);
       return ready;
     }
-    stream.parked.emplace(seq, std::move(item));
+    stream.buffered.emplace(seq, std::move(item));
     stream.highest = std::max(stream.highest, seq);
     TakeReady(&stream, &ready);
     return ready;
@@ -42,7 +42,7 @@ class InOrder {
     std::vector<T> ready;
     if (gap.from_seq <= stream.next && stream.next <= gap.to_seq) {
       stream.next = gap.to_seq + 1;
-      stream.parked.erase(stream.parked.begin(), stream.parked.lower_bound(stream.next));
+      stream.buffered.erase(stream.buffered.begin(), stream.buffered.lower_bound(stream.next));
       TakeReady(&stream, &ready);
     }
     return ready;
@@ -60,7 +60,7 @@ class InOrder {
     for (const auto& [map, stream] : streams_) {
       if (stream.next <= stream.highest) {
         const int32_t end =
-            stream.parked.empty() ? stream.highest : stream.parked.begin()->first - 1;
+            stream.buffered.empty() ? stream.highest : stream.buffered.begin()->first - 1;
         gaps.push_back({map, stream.next, end});
       }
     }
@@ -70,16 +70,16 @@ class InOrder {
   // Whether it came already, or nobody has it any more.
   bool Has(const MapId& map, int32_t seq) const {
     const auto it = streams_.find(map);
-    return it != streams_.end() && (seq < it->second.next || it->second.parked.contains(seq));
+    return it != streams_.end() && (seq < it->second.next || it->second.buffered.contains(seq));
   }
   int32_t next(const MapId& map) const {
     const auto it = streams_.find(map);
     return it == streams_.end() ? 0 : it->second.next;
   }
-  size_t parked() const {
+  size_t num_buffered() const {
     size_t count = 0;
     for (const auto& [map, stream] : streams_) {
-      count += stream.parked.size();
+      count += stream.buffered.size();
     }
     return count;
   }
@@ -89,7 +89,7 @@ class InOrder {
   void VisitStreams(Visit visit) const {
     for (const auto& [map, stream] : streams_) {
       std::vector<int32_t> waiting;
-      for (const auto& [seq, item] : stream.parked) {
+      for (const auto& [seq, item] : stream.buffered) {
         waiting.push_back(seq);
       }
       visit(map, stream.next, waiting);
@@ -101,7 +101,7 @@ class InOrder {
     stream.next = next;
     stream.highest = waiting.empty() ? next - 1 : waiting.back();
     for (const int32_t seq : waiting) {
-      stream.parked.emplace(seq, T{});
+      stream.buffered.emplace(seq, T{});
     }
   }
 
@@ -109,11 +109,12 @@ class InOrder {
   struct Stream {
     int32_t next = 0;
     int32_t highest = -1;
-    std::map<int32_t, T> parked;
+    std::map<int32_t, T> buffered;
   };
   static void TakeReady(Stream* stream, std::vector<T>* ready) {
-    for (auto it = stream->parked.begin(); it != stream->parked.end() && it->first == stream->next;
-         it = stream->parked.erase(it)) {
+    for (auto it = stream->buffered.begin();
+         it != stream->buffered.end() && it->first == stream->next;
+         it = stream->buffered.erase(it)) {
       ready->push_back(std::move(it->second));
       ++stream->next;
     }
