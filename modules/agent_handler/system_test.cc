@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <random>
 #include <set>
 
@@ -31,7 +33,8 @@ using Clock = std::chrono::steady_clock;
 struct Agent {
   static constexpr int kMaxAhead = 30;
 
-  Agent(int32_t agent_id, const std::string& url) : id(agent_id), map{id, 1000}, bus(url) {
+  Agent(int32_t agent_id, const std::string& bus_url)
+      : id(agent_id), map{id, 1000}, url(bus_url), bus(url) {
     bus.Subscribe(std::string(channels::kHave), [this](const std::string&, Bytes data) {
       have_t have{};
       uplink_listens = true;
@@ -58,6 +61,7 @@ struct Agent {
   }
   int32_t id;
   MapId map;
+  std::string url;
   LcmBus bus;
   int32_t published = 0;
   int32_t acknowledged = -1;
@@ -71,93 +75,117 @@ std::unique_ptr<Program> StartRelay(int port) {
                                "lcm.lcm.TCPService", std::to_string(port)});
 }
 
-// Over multicast, or through a relay that is killed too.
-class LinkSystem : public testing::TestWithParam<bool> {};
-
-TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
-  constexpr int kKeyframes = 150;
-  std::random_device device;  // only for the addresses, which must not meet another run's
-  const int relay_port = GetParam() ? static_cast<int>(20000 + device() % 12000) : 0;
-  const std::string link =
-      relay_port != 0 ? fmt::format("tcpq://127.0.0.1:{}", relay_port) : OwnBusUrl();
-  const std::string server = OwnBusUrl();
-  const std::string agent_urls[] = {OwnBusUrl(), OwnBusUrl()};
-  const std::string journal = testing::TempDir() + fmt::format("pangea_system_{}.lcm", getpid());
-  std::filesystem::remove(journal);
-  const std::filesystem::path keys = testing::TempDir() + fmt::format("pangea_system_{}", getpid());
-  std::filesystem::create_directories(keys);
-  for (const int agent_id : {1, 2}) {
-    MakeKeyFile(keys / KeyFileName(agent_id), agent_id);
-  }
-  const std::string bin = std::string(PANGEA_BINARY_DIR) + "/bin/";
-
-  const auto start_handler = [&] {
-    return std::make_unique<Program>(
-        std::vector<std::string>{bin + "pangea-agent-handler", "--link", link, "--server", server,
-                                 "--journal", journal, "--keys", keys.string()});
-  };
-  auto relay = relay_port != 0 ? StartRelay(relay_port) : nullptr;
-  auto handler = start_handler();
-  const auto start_uplink = [&](int i) {
-    return std::make_unique<Program>(std::vector<std::string>{
-        bin + "pangea-uplink", "--agent", std::to_string(i + 1), "--key",
-        (keys / KeyFileName(i + 1)).string(), "--bus", agent_urls[i], "--link", link});
-  };
-  std::vector<std::unique_ptr<Program>> uplinks;
-  std::vector<std::unique_ptr<Agent>> agents;
-  for (int i = 0; i < 2; ++i) {
-    agents.push_back(std::make_unique<Agent>(i + 1, agent_urls[i]));
-    uplinks.push_back(start_uplink(i));
-  }
-  LcmBus server_bus(server);
-  std::set<std::string> seen;
-  server_bus.Subscribe("(KEYFRAME_1|KEYFRAME_2)", [&](const std::string&, Bytes data) {
-    seen.emplace(data.begin(), data.end());
-  });
-
-  bool handler_killed = false, uplink_killed = false, relay_killed = relay_port == 0;
-  const auto begin = Clock::now();
-  const auto deadline = begin + std::chrono::seconds(20);
-  const auto done = [&] {
-    return agents[0]->acknowledged == kKeyframes - 1 && agents[1]->acknowledged == kKeyframes - 1;
-  };
-  while (!done() && Clock::now() < deadline) {
-    for (auto& agent : agents) {
-      agent->PublishUpTo(kKeyframes);
+// The handler, two agents with their uplinks, and what somebody on the server's bus sees.
+class LinkedAgents {
+ public:
+  explicit LinkedAgents(bool with_relay) : relay_port_(with_relay ? 20000 + Random() % 12000 : 0) {
+    std::filesystem::remove(journal_);
+    std::filesystem::create_directories(keys_);
+    for (const int agent_id : {1, 2}) {
+      MakeKeyFile(KeyOf(agent_id), agent_id);
     }
-    server_bus.Handle(1);
-    for (auto& agent : agents) {
-      while (agent->bus.Handle(0)) {
+    if (with_relay) {
+      relay_ = StartRelay(relay_port_);
+    }
+    handler_ = StartHandler();
+    for (const int agent_id : {1, 2}) {
+      agents_.push_back(std::make_unique<Agent>(agent_id, OwnBusUrl()));
+      uplinks_.push_back(StartUplink(agent_id));
+    }
+    server_bus_.Subscribe("(KEYFRAME_1|KEYFRAME_2)", [this](const std::string&, Bytes data) {
+      seen_.emplace(data.begin(), data.end());
+    });
+  }
+  ~LinkedAgents() {
+    std::filesystem::remove(journal_);
+    std::filesystem::remove_all(keys_);
+  }
+
+  // Keyframes of each agent up to `count`; kills each process once on the way.
+  void Run(int32_t count) {
+    const auto deadline = Clock::now() + std::chrono::seconds(20);
+    while (Acknowledged() < count && Clock::now() < deadline) {
+      for (auto& agent : agents_) {
+        agent->PublishUpTo(count);
       }
+      server_bus_.Handle(1);
+      for (auto& agent : agents_) {
+        while (agent->bus.Handle(0)) {
+        }
+      }
+      KillDue();
     }
-    if (!relay_killed && agents[0]->acknowledged > 90) {
-      relay->End(SIGKILL);
-      relay = StartRelay(relay_port);
-      relay_killed = true;
-    }
-    if (!handler_killed && agents[0]->acknowledged > 30) {
-      handler->End(SIGKILL);
-      handler = start_handler();
-      handler_killed = true;
-    }
-    if (!uplink_killed && agents[1]->acknowledged > 60) {
-      uplinks[1]->End(SIGKILL);
-      uplinks[1] = start_uplink(1);
-      uplink_killed = true;
+    while (server_bus_.Handle(100)) {
     }
   }
-  const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  EXPECT_TRUE(done()) << agents[0]->acknowledged << " and " << agents[1]->acknowledged;
-  while (server_bus.Handle(100)) {
+  void End() {
+    for (auto& uplink : uplinks_) {
+      EXPECT_EQ(uplink->End(SIGTERM), 0);
+    }
+    EXPECT_EQ(handler_->End(SIGTERM), 0);
   }
-  RecordProperty("seconds", std::to_string(seconds));
 
-  for (auto& uplink : uplinks) {
-    EXPECT_EQ(uplink->End(SIGTERM), 0);
+  // Of the agent that has fewest.
+  int32_t Acknowledged() const {
+    return 1 + std::min(agents_[0]->acknowledged, agents_[1]->acknowledged);
   }
-  EXPECT_EQ(handler->End(SIGTERM), 0);
+  size_t num_seen() const { return seen_.size(); }
+  const std::string& journal() const { return journal_; }
+
+ private:
+  // Only for addresses, which must not meet another run's.
+  static int Random() { return static_cast<int>(std::random_device()() % 1'000'000); }
+
+  std::string KeyOf(int agent_id) const { return (keys_ / KeyFileName(agent_id)).string(); }
+  std::unique_ptr<Program> StartHandler() const {
+    return std::make_unique<Program>(
+        std::vector<std::string>{bin_ + "pangea-agent-handler", "--link", link_, "--server",
+                                 server_, "--journal", journal_, "--keys", keys_.string()});
+  }
+  std::unique_ptr<Program> StartUplink(int agent_id) const {
+    return std::make_unique<Program>(std::vector<std::string>{
+        bin_ + "pangea-uplink", "--agent", std::to_string(agent_id), "--key", KeyOf(agent_id),
+        "--bus", agents_[agent_id - 1]->url, "--link", link_});
+  }
+  void KillDue() {
+    if (relay_ && !relay_killed_ && agents_[0]->acknowledged > 90) {
+      relay_->End(SIGKILL);
+      relay_ = StartRelay(relay_port_);
+      relay_killed_ = true;
+    }
+    if (!handler_killed_ && agents_[0]->acknowledged > 30) {
+      handler_->End(SIGKILL);
+      handler_ = StartHandler();
+      handler_killed_ = true;
+    }
+    if (!uplink_killed_ && agents_[1]->acknowledged > 60) {
+      uplinks_[1]->End(SIGKILL);
+      uplinks_[1] = StartUplink(2);
+      uplink_killed_ = true;
+    }
+  }
+
+  const std::string bin_ = std::string(PANGEA_BINARY_DIR) + "/bin/";
+  const std::string journal_ = testing::TempDir() + fmt::format("pangea_system_{}.lcm", getpid());
+  const std::filesystem::path keys_ =
+      testing::TempDir() + fmt::format("pangea_system_{}", getpid());
+  const int relay_port_;
+  const std::string link_ =
+      relay_port_ != 0 ? fmt::format("tcpq://127.0.0.1:{}", relay_port_) : OwnBusUrl();
+  const std::string server_ = OwnBusUrl();
+  std::unique_ptr<Program> relay_;
+  std::unique_ptr<Program> handler_;
+  std::vector<std::unique_ptr<Agent>> agents_;
+  std::vector<std::unique_ptr<Program>> uplinks_;
+  LcmBus server_bus_{server_};
+  std::set<std::string> seen_;
+  bool handler_killed_ = false, uplink_killed_ = false, relay_killed_ = false;
+};
+
+// How many events of each channel; keyframes must be in order.
+std::map<std::string, int32_t> CountInJournal(const std::string& path) {
   std::map<std::string, int32_t> next;
-  const Journal read(journal, [&](const std::string& channel, Bytes data, const JournalPlace&) {
+  const Journal read(path, [&](const std::string& channel, Bytes data, const JournalPlace&) {
     if (channel == channels::Options("agent_handler")) {
       ++next[channel];
       return true;
@@ -167,13 +195,26 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
     EXPECT_EQ(keyframe.id.seq, next[channel]++) << channel;
     return true;
   });
-  EXPECT_EQ(next["KEYFRAME_1"], kKeyframes);
-  EXPECT_EQ(next["KEYFRAME_2"], kKeyframes);
-  EXPECT_EQ(next["OPTIONS_agent_handler"], 1) << "both starts had the same";
+  return next;
+}
+
+// Over multicast, or through a relay that is killed too.
+class LinkSystem : public testing::TestWithParam<bool> {};
+
+TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
+  constexpr int kKeyframes = 150;
+  LinkedAgents system(GetParam());
+  system.Run(kKeyframes);
+  EXPECT_EQ(system.Acknowledged(), kKeyframes);
+  system.End();
+  const std::map<std::string, int32_t> in_journal = CountInJournal(system.journal());
+  const std::map<std::string, int32_t> expected = {
+      {"KEYFRAME_1", kKeyframes},
+      {"KEYFRAME_2", kKeyframes},
+      {"OPTIONS_agent_handler", 1}};  // both starts had the same
+  EXPECT_EQ(in_journal, expected);
   // What was journalled but not yet published when the handler was killed is served, not seen.
-  EXPECT_GE(seen.size(), 2u * kKeyframes - 32);
-  std::filesystem::remove(journal);
-  std::filesystem::remove_all(keys);
+  EXPECT_GE(system.num_seen(), 2u * kKeyframes - 32);
 }
 
 INSTANTIATE_TEST_SUITE_P(Buses, LinkSystem, testing::Bool());

@@ -136,32 +136,62 @@ Outcome Parsable(Bytes data) {
   });
 }
 
+Outcome FromKeyframe(Bytes data) {
+  return Decoded<KeyframeMessage>(data, [](const KeyframeMessage& message) -> Outcome {
+    const Parsed<Keyframe> keyframe = Parse(message);
+    return keyframe.value ? Outcome{Shown(*keyframe.value), ""}
+                          : Outcome{std::nullopt, keyframe.refused};
+  });
+}
+
+Outcome FromPoseOf(int32_t agent_id, Bytes data) {
+  Outcome outcome = Decoded<pose_t>(data, FromPose);
+  if (outcome.event) {
+    std::get<ShownPose>(*outcome.event).agent_id = agent_id;
+  }
+  return outcome;
+}
+
 }  // namespace
+
+Outcome SceneEvents::FromImage(int32_t agent_id, Bytes data) {
+  return Decoded<image_t>(data, [this, agent_id](const image_t& message) -> Outcome {
+    std::string refused;
+    auto whole = images_.Add(agent_id, message, &refused);
+    return whole ? Outcome{std::make_shared<const ShownImage>(std::move(*whole)), ""}
+                 : Outcome{std::nullopt, refused};
+  });
+}
+
+Outcome SceneEvents::FromMapState(Bytes data) {
+  return Decoded<map_state_t>(data, [this](const map_state_t& message) -> Outcome {
+    Parsed<MapState> chunk = pangea::Parse(message);
+    if (!chunk.value) {
+      return {std::nullopt, chunk.refused};
+    }
+    auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(*chunk.value));
+    return whole ? Outcome{std::move(*whole), ""} : Outcome{};
+  });
+}
+
+// A message sent again to whoever missed it is as good as the first.
+Outcome SceneEvents::FromRetransmission(Bytes data) {
+  return Decoded<again_t>(data, [this](const again_t& message) {
+    const bool nested = message.channel.starts_with(channels::kAgainPrefix);
+    return nested ? Outcome{std::nullopt, "again: within another"}
+                  : Parse(message.channel, {message.data.data(), message.data.size()});
+  });
+}
 
 Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
   if (channels::AgentOf(channel, channels::kKeyframePrefix) > 0) {
-    return Decoded<KeyframeMessage>(data, [](const KeyframeMessage& message) -> Outcome {
-      const Parsed<Keyframe> keyframe = pangea::Parse(message);
-      return keyframe.value ? Outcome{Shown(*keyframe.value), ""}
-                            : Outcome{std::nullopt, keyframe.refused};
-    });
+    return FromKeyframe(data);
   }
   if (const int32_t agent_id = channels::AgentOf(channel, channels::kPosePrefix); agent_id > 0) {
-    return Decoded<pose_t>(data, [agent_id](const pose_t& message) {
-      Outcome outcome = FromPose(message);
-      if (outcome.event) {
-        std::get<ShownPose>(*outcome.event).agent_id = agent_id;
-      }
-      return outcome;
-    });
+    return FromPoseOf(agent_id, data);
   }
   if (const int32_t agent_id = channels::AgentOf(channel, channels::kImagePrefix); agent_id > 0) {
-    return Decoded<image_t>(data, [this, agent_id](const image_t& message) -> Outcome {
-      std::string refused;
-      auto whole = images_.Add(agent_id, message, &refused);
-      return whole ? Outcome{std::make_shared<const ShownImage>(std::move(*whole)), ""}
-                   : Outcome{std::nullopt, refused};
-    });
+    return FromImage(agent_id, data);
   }
   if (channels::AgentOf(channel, channels::kCorrectionPrefix) > 0) {
     return Parsable<correction_t>(data);
@@ -173,25 +203,13 @@ Outcome SceneEvents::Parse(const std::string& channel, Bytes data) {
     return Parsable<anchor_t>(data);
   }
   if (channel == channels::kMapState) {
-    return Decoded<map_state_t>(data, [this](const map_state_t& message) -> Outcome {
-      Parsed<MapState> chunk = pangea::Parse(message);
-      if (!chunk.value) {
-        return {std::nullopt, chunk.refused};
-      }
-      auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(*chunk.value));
-      return whole ? Outcome{std::move(*whole), ""} : Outcome{};
-    });
+    return FromMapState(data);
   }
   if (channel.starts_with(channels::kStatusPrefix)) {
     return Decoded<status_t>(data, FromStatus);
   }
   if (channel.starts_with(channels::kAgainPrefix)) {
-    // A message sent again to whoever missed it is as good as the first.
-    return Decoded<again_t>(data, [this](const again_t& message) {
-      const bool nested = message.channel.starts_with(channels::kAgainPrefix);
-      return nested ? Outcome{std::nullopt, "again: within another"}
-                    : Parse(message.channel, {message.data.data(), message.data.size()});
-    });
+    return FromRetransmission(data);
   }
   return {};
 }

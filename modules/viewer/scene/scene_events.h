@@ -29,6 +29,10 @@ class SceneEvents {
   Outcome Parse(const std::string& channel, Bytes data);
 
  private:
+  Outcome FromImage(int32_t agent_id, Bytes data);
+  Outcome FromMapState(Bytes data);
+  Outcome FromRetransmission(Bytes data);
+
   StateChunks chunks_;
   ImageParts images_;
 };

@@ -55,19 +55,24 @@ int Consistent(const CameraModel& camera, const View& a, const View& b,
   return CheckTwoView(rays_a, rays_b, q_b_a, camera.PixelAngle(), options).num_inliers;
 }
 
-void Run(const std::string& folder, double step_s, bool landmarks) {
-  const EurocRecording recording(folder);
+struct Views {
+  std::vector<View> views;
+  double milliseconds = 0;
+  double corners = 0;
+};
+
+// One each `step_s` seconds, where the truth is known.
+Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks) {
   const CameraModel& camera = recording.camera();
   Tracker tracker(camera, {});
   Describer describer(camera, {});
-  std::vector<View> views;
-  double milliseconds = 0, corners = 0;
+  Views all;
   for (size_t i = 0; i < recording.images().size(); ++i) {
     const EurocImage& entry = recording.images()[i];
     const double t = 1e-6 * static_cast<double>(entry.utime - recording.images().front().utime);
     std::string why;
     const auto T = Interpolate(recording.ground_truth(), entry.utime, kMaxGap_us);
-    if ((!views.empty() && t < views.back().time_s + step_s) || !T) {
+    if ((!all.views.empty() && t < all.views.back().time_s + step_s) || !T) {
       continue;
     }
     const cv::Mat image = recording.LoadImage(i, &why);
@@ -79,29 +84,42 @@ void Run(const std::string& folder, double step_s, bool landmarks) {
     tracker.Reset();
     const TrackedFrame& frame = tracker.Track(entry.utime, image, Eigen::Quaterniond::Identity());
     const std::clock_t begin = std::clock();
-    views.push_back(
+    all.views.push_back(
         {t, *T * camera.T_body_cam, describer.Describe(image, landmarks ? frame : TrackedFrame{})});
-    milliseconds += 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-    corners += static_cast<double>(views.back().corners.size());
+    all.milliseconds += 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    all.corners += static_cast<double>(all.views.back().corners.size());
   }
+  return all;
+}
+
+struct Tallies {
   Tally near, revisit, unlike;
+
+  // Where two views count; null: nowhere.
+  Tally* Of(const View& a, const View& b) {
+    const double dt = b.time_s - a.time_s;
+    const Rigid3 T_a_b = a.T_reference_cam.Inverse() * b.T_reference_cam;
+    const double angle = T_a_b.q.angularDistance(Eigen::Quaterniond::Identity());
+    if (T_a_b.t.norm() < 0.05) {
+      return nullptr;  // the epipolar line says nothing
+    }
+    if (dt < 1.3) {
+      return &near;
+    }
+    if (dt > 8 && angle < 0.5 && T_a_b.t.norm() < 1.5) {
+      return &revisit;
+    }
+    return angle > 1.8 ? &unlike : nullptr;
+  }
+};
+
+Tallies MatchAll(const CameraModel& camera, const std::vector<View>& views) {
+  constexpr int kMaxPairs = 300;
+  Tallies tallies;
   for (size_t i = 0; i < views.size(); ++i) {
     for (size_t j = i + 1; j < views.size(); ++j) {
-      const double dt = views[j].time_s - views[i].time_s;
-      const Rigid3 T_i_j = views[i].T_reference_cam.Inverse() * views[j].T_reference_cam;
-      const double angle = T_i_j.q.angularDistance(Eigen::Quaterniond::Identity());
-      Tally* tally = nullptr;
-      if (T_i_j.t.norm() < 0.05) {
-        continue;  // the epipolar line says nothing
-      }
-      if (dt < 1.3) {
-        tally = &near;
-      } else if (dt > 8 && angle < 0.5 && T_i_j.t.norm() < 1.5) {
-        tally = &revisit;
-      } else if (angle > 1.8) {
-        tally = &unlike;
-      }
-      if (tally == nullptr || tally->pairs > 300) {
+      Tally* const tally = tallies.Of(views[i], views[j]);
+      if (tally == nullptr || tally->pairs > kMaxPairs) {
         continue;
       }
       ++tally->pairs;
@@ -110,12 +128,19 @@ void Run(const std::string& folder, double step_s, bool landmarks) {
       tally->correct += Consistent(camera, views[i], views[j], matches);
     }
   }
+  return tallies;
+}
+
+void Run(const std::string& folder, double step_s, bool landmarks) {
+  const EurocRecording recording(folder);
+  const auto [views, milliseconds, corners] = DescribeAll(recording, step_s, landmarks);
   const auto n = static_cast<double>(views.size());
   fmt::print("{} views, {:.0f} corners each, {:.1f} ms each\n", views.size(), corners / n,
              milliseconds / n);
-  near.Print("0.3 .. 1.3 s apart");
-  revisit.Print("a later visit within 1.5 m and 29 degrees");
-  unlike.Print("another direction (over 103 degrees)");
+  const Tallies tallies = MatchAll(recording.camera(), views);
+  tallies.near.Print("0.3 .. 1.3 s apart");
+  tallies.revisit.Print("a later visit within 1.5 m and 29 degrees");
+  tallies.unlike.Print("another direction (over 103 degrees)");
 }
 
 }  // namespace

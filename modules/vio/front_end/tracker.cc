@@ -319,14 +319,14 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
   return response;
 }
 
-std::vector<std::pair<float, cv::Point>> Tracker::FindCorners(const cv::Rect& cell) const {
+std::vector<Tracker::RatedCorner> Tracker::FindCorners(const cv::Rect& cell) const {
   const cv::Mat1f response = CornerResponse(cell);
   // No weaker one will be taken (AddFeatures).
   const auto least =
       static_cast<float>(std::max(kMinEigenvalue, kQuality * kStrongestKept * strongest_));
   const int inner = response.cols - 2;
   Eigen::ArrayXf column_max(response.cols), block_max(inner);
-  std::vector<std::pair<float, cv::Point>> corners;
+  std::vector<RatedCorner> corners;
   for (int y = 1; y + 1 < response.rows; ++y) {
     using Row = Eigen::Map<const Eigen::ArrayXf>;
     const Row above(response[y - 1], response.cols), row(response[y], response.cols),
@@ -348,11 +348,7 @@ std::vector<std::pair<float, cv::Point>> Tracker::FindCorners(const cv::Rect& ce
   return corners;
 }
 
-void Tracker::AddFeatures() {
-  const int wanted = options_.max_features - static_cast<int>(features_.size());
-  if (wanted <= 0) {
-    return;
-  }
+std::vector<Tracker::RatedCorner> Tracker::CornersOfEmptyCells() const {
   std::vector<bool> taken(kGridColumns * kGridRows, false);
   for (const Feature& feature : features_) {
     const int column = static_cast<int>(feature.pixel.x) * kGridColumns / camera_.width;
@@ -361,8 +357,7 @@ void Tracker::AddFeatures() {
   }
   const bool in_turns =
       static_cast<double>(features_.size()) > kEnoughShare * options_.max_features;
-  ++turn_;
-  std::vector<std::pair<float, cv::Point>> corners;
+  std::vector<RatedCorner> corners;
   for (int row = 0; row < kGridRows; ++row) {
     for (int column = 0; column < kGridColumns; ++column) {
       if (taken[row * kGridColumns + column] ||
@@ -379,13 +374,22 @@ void Tracker::AddFeatures() {
   }
   std::stable_sort(corners.begin(), corners.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
+  return corners;
+}
+
+void Tracker::AddFeatures() {
+  const auto max_features = static_cast<size_t>(options_.max_features);
+  if (features_.size() >= max_features) {
+    return;
+  }
+  ++turn_;
+  const std::vector<RatedCorner> corners = CornersOfEmptyCells();
   if (!corners.empty()) {
     // The image's strongest corner, over all recent images: the empty cells alone may be blank.
     strongest_ = std::max(kStrongestKept * strongest_, static_cast<double>(corners.front().first));
   }
   for (const auto& [response, at] : corners) {
-    if (static_cast<int>(features_.size()) >= options_.max_features ||
-        response < kQuality * strongest_) {
+    if (features_.size() >= max_features || response < kQuality * strongest_) {
       break;
     }
     const cv::Point2f pixel(at);

@@ -77,7 +77,8 @@ class Tracker {
   using Pyramid = std::vector<cv::Mat>;  // each level and its derivatives, in turn
   // Where a search begins whose guess is good: coarser levels have no work to do.
   static constexpr int kNearLevel = 1;
-  using Found = std::optional<Eigen::Vector2f>;  // where in the newest image
+  using Found = std::optional<Eigen::Vector2f>;     // where in the newest image
+  using RatedCorner = std::pair<float, cv::Point>;  // its smaller eigenvalue
 
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
@@ -93,9 +94,11 @@ class Tracker {
   void TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_cam_lastcam, float dt_s);
   void TakePatches(const cv::Mat& image);
   void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
+  // Of the cells whose turn it is; the best first.
+  std::vector<RatedCorner> CornersOfEmptyCells() const;
   void AddFeatures();
   cv::Mat1f CornerResponse(const cv::Rect& cell) const;
-  std::vector<std::pair<float, cv::Point>> FindCorners(const cv::Rect& cell) const;
+  std::vector<RatedCorner> FindCorners(const cv::Rect& cell) const;
   bool Inside(const cv::Point2f& pixel) const;
   void FillFrame(int64_t utime);
 

@@ -74,6 +74,12 @@ struct Estimator::Impl {
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
   std::vector<FinishedKeyframe> Flush();
 
+  // Why it has not started with this frame.
+  std::optional<std::string> TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu);
+  // Why it is lost.
+  std::optional<std::string> Track(const TrackedFrame& frame,
+                                   std::vector<int32_t>* outlier_landmarks);
+  void TellNewest(FrameResult* result);
   void Start(const InitialState& initial);
   ImuFactor MakeImuFactor(const WindowFrame& from, int64_t to_imu_utime) const;
   void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
@@ -321,57 +327,74 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
   return std::nullopt;
 }
 
+std::optional<std::string> Estimator::Impl::TryStart(const TrackedFrame& frame,
+                                                     std::span<const ImuSample> imu) {
+  imu_samples.Forget(frame.utime - kStartSpan_us);
+  TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
+  shifted.utime = ImuTime(frame.utime);
+  const InitialResult initial = initialiser.AddFrame(shifted, imu, stamps.sigma_s());
+  if (!initial.state) {
+    return initial.reason;
+  }
+  Start(*initial.state);
+  stamps.SetReference();
+  Solve(kStartIterations);
+  return std::nullopt;
+}
+
+std::optional<std::string> Estimator::Impl::Track(const TrackedFrame& frame,
+                                                  std::vector<int32_t>* outlier_landmarks) {
+  if (lost) {
+    return "lost before";
+  }
+  const double gap_s = Seconds(frame.utime - Newest().utime);
+  if (gap_s > kMaxFrameGap_s) {
+    return fmt::format("no images for {:.1f} s", gap_s);
+  }
+  excess_interval_s = stamps.excess_interval_s();
+  if (const auto wrong = AddToWindow(frame)) {
+    return wrong;
+  }
+  *outlier_landmarks = Solve(kMaxIterations);
+  return std::nullopt;
+}
+
+void Estimator::Impl::TellNewest(FrameResult* result) {
+  const int newest = problem.state.Newest();
+  result->T_odom_body = problem.state.PoseAhead(newest, problem.state.Ahead(newest, 0));
+  result->v_odom_body = Newest().imu.v_odom_body;
+  result->motion = problem.state.MotionAhead(newest, problem.state.Ahead(newest, 0));
+  result->gyro_bias = Newest().imu.gyro_bias;
+  result->accel_bias = Newest().imu.accel_bias;
+  result->is_keyframe = Newest().is_keyframe;
+  const auto& factor = problem.imu_factors.back();
+  result->imu_contradicted = factor && factor->contradicted;
+}
+
 FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu) {
   FrameResult result;
   imu_samples.Add(imu);
   stamps.AddImage(frame.utime);
-  const auto fail = [&](const std::string& reason) {
+  std::optional<std::string> wrong;
+  if (started) {
+    wrong = Track(frame, &result.outlier_landmarks);
+  } else if (const auto why_not = TryStart(frame, imu)) {
+    result.reason = *why_not;
+    return result;
+  }
+  if (!wrong) {
+    wrong = Implausible();
+  }
+  if (wrong) {
     lost = true;
     result.state = EstimatorState::kLost;
-    result.reason = reason;
+    result.reason = *wrong;
     return result;
-  };
-  if (lost) {
-    return fail("lost before");
-  }
-  if (!started) {
-    imu_samples.Forget(frame.utime - kStartSpan_us);
-    TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
-    shifted.utime = ImuTime(frame.utime);
-    const InitialResult initial = initialiser.AddFrame(shifted, imu, stamps.sigma_s());
-    if (!initial.state) {
-      result.reason = initial.reason;
-      return result;
-    }
-    Start(*initial.state);
-    stamps.SetReference();
-    Solve(kStartIterations);
-  } else {
-    const double gap_s = Seconds(frame.utime - Newest().utime);
-    if (gap_s > kMaxFrameGap_s) {
-      return fail(fmt::format("no images for {:.1f} s", gap_s));
-    }
-    excess_interval_s = stamps.excess_interval_s();
-    if (const auto wrong = AddToWindow(frame)) {
-      return fail(*wrong);
-    }
-    result.outlier_landmarks = Solve(kMaxIterations);
-  }
-  if (const auto wrong = Implausible()) {
-    return fail(*wrong);
   }
   choice.Choose(history, &problem.state);
   ShrinkWindow(&result.finished);
   result.state = EstimatorState::kTracking;
-  const int newest = problem.state.Newest();
-  result.T_odom_body = problem.state.PoseAhead(newest, problem.state.Ahead(newest, 0));
-  result.v_odom_body = Newest().imu.v_odom_body;
-  result.motion = problem.state.MotionAhead(newest, problem.state.Ahead(newest, 0));
-  result.gyro_bias = Newest().imu.gyro_bias;
-  result.accel_bias = Newest().imu.accel_bias;
-  result.is_keyframe = Newest().is_keyframe;
-  const auto& factor = problem.imu_factors.back();
-  result.imu_contradicted = factor && factor->contradicted;
+  TellNewest(&result);
   return result;
 }
 
