@@ -86,27 +86,35 @@ bool DescriptorIndex::Restore(ByteReader* reader) {
 
 template <typename Visit>
 void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) const {
-  // The lists lie far apart in memory: they are fetched some words ahead.
-  constexpr size_t kBeginAhead = 24, kListsAhead = 12;
   std::vector<uint32_t> words(kTables * corners.size());
   for (size_t i = 0; i < words.size(); ++i) {
     words[i] = tables_[i % kTables].Word(corners[i / kTables].descriptor);
   }
-  for (size_t i = 0; i < words.size(); ++i) {
-    if (const size_t ahead = i + kBeginAhead; ahead < words.size()) {
-      tables_[ahead % kTables].postings.PrefetchBegin(words[ahead]);
-    }
-    if (const size_t ahead = i + kListsAhead; ahead < words.size()) {
-      tables_[ahead % kTables].postings.PrefetchLists(words[ahead]);
-    }
-    const Table& table = tables_[i % kTables];
-    const size_t corner = i / kTables;
-    const uint32_t signature = table.Signature(corners[corner].descriptor);
-    // Which corner it is rotates the sample.
-    table.postings.Sample(words[i], kMaxPostingsPerWord, corner,
-                          [&](int32_t keyframe, uint32_t posted) {
-                            visit(corner, keyframe, std::popcount(posted ^ signature));
-                          });
+  std::vector<PostingLists::PackedList> lists(words.size());
+  // Step by step, each some words behind the one before: what it reads lies far apart in memory and
+  // is fetched meanwhile.
+  constexpr size_t kStep = 16;
+  for (size_t i = 0; i < words.size() + 3 * kStep; ++i) {
+    const auto step = [&](size_t behind, const auto& take) {
+      if (const size_t at = i - behind; i >= behind && at < words.size()) {
+        take(at, tables_[at % kTables]);
+      }
+    };
+    step(0, [&](size_t at, const Table& table) { table.postings.PrefetchBegin(words[at]); });
+    step(kStep, [&](size_t at, const Table& table) { table.postings.PrefetchBits(words[at]); });
+    step(2 * kStep, [&](size_t at, const Table& table) {
+      lists[at] = table.postings.Find(words[at]);
+      table.postings.PrefetchList(words[at], lists[at]);
+    });
+    step(3 * kStep, [&](size_t at, const Table& table) {
+      const size_t corner = at / kTables;
+      const uint32_t signature = table.Signature(corners[corner].descriptor);
+      // Which corner it is rotates the sample.
+      table.postings.Sample(words[at], lists[at], kMaxPostingsPerWord, corner,
+                            [&](int32_t keyframe, uint32_t posted) {
+                              visit(corner, keyframe, std::popcount(posted ^ signature));
+                            });
+    });
   }
 }
 

@@ -1,8 +1,10 @@
 #include "place_recognition/descriptor_index.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
+#include <random>
 
 #include "place_recognition/test_world.h"
 
@@ -57,6 +59,30 @@ TEST(DescriptorIndex, AQueryOfFiveThousandKeyframesComparesAFewPostingsPerCorner
   const auto corners = world.See({kMap, 6000}, {0, 0, 1.5}, 0).corners;
   // Exhaustively it would be all 600,000.
   EXPECT_LT(index.CountPostings(corners) / static_cast<int64_t>(corners.size()), 60);
+}
+
+double HeapBytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
+}
+
+TEST(DescriptorIndex, AKeyframeOf600CornersTakesLessThan20kB) {
+  std::mt19937_64 rng(1);
+  std::vector<Corner> corners(600);
+  DescriptorIndex index;
+  const auto add = [&](int keyframes) {
+    for (int i = 0; i < keyframes; ++i) {
+      for (Corner& corner : corners) {
+        std::ranges::generate(corner.descriptor, rng);
+      }
+      index.Add(corners);
+    }
+  };
+  // As each table is packed at another time, some of this is still waiting.
+  add(500);
+  const double before = HeapBytes();
+  add(1500);
+  EXPECT_LT((HeapBytes() - before) / 1500, 20000);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 2;
+constexpr uint32_t kCheckpointFormat = 3;
 constexpr int64_t kStatusInterval_us = 1'000'000;
 // Bounds: of matches kept to be retransmitted (then the oldest go), and of what waits in a catch-up
 // or for its turn (then the first is worked off at once).

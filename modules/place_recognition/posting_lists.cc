@@ -1,97 +1,179 @@
 #include "place_recognition/posting_lists.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace pangea {
 namespace {
 
-void PutNumber(uint32_t number, std::vector<uint8_t>* bytes) {
-  for (; number >= 0x80; number >>= 7) {
-    bytes->push_back(static_cast<uint8_t>(number | 0x80));
-  }
-  bytes->push_back(static_cast<uint8_t>(number));
-}
-
-void PutSignature(uint32_t signature, std::vector<uint8_t>* bytes) {
-  uint8_t raw[sizeof(signature)];
-  std::memcpy(raw, &signature, sizeof(signature));
-  bytes->insert(bytes->end(), std::begin(raw), std::end(raw));
-}
+size_t NumLimbs(size_t bits) { return (bits + 63) / 64; }
 
 }  // namespace
 
+PostingLists::PostingLists(size_t num_words, size_t num_spans, size_t num_postings)
+    : num_words_(num_words), num_spans_(num_spans) {
+  const size_t num_bits = num_postings + num_words * num_spans;
+  while (block_shift_ > 0 && (num_bits << block_shift_) > kBitsABlock * num_words) {
+    --block_shift_;
+  }
+  high_.resize(NumLimbs(num_bits));
+  low_.resize(num_postings);
+  signatures_.resize(num_postings);
+  begin_.resize((num_words + (size_t{1} << block_shift_) - 1) >> block_shift_);
+  newest_.resize(begin_.size(), kNone);
+  waits_.resize(num_words);
+}
+
 void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
-  waiting_.push_back({keyframe, signature, newest_[word]});
-  newest_[word] = static_cast<uint32_t>(waiting_.size()) - 1;
+  uint32_t& newest = newest_[BlockOf(word)];
+  waits_[word] = true;
+  Waiting waiting;
+  waiting.keyframe = static_cast<uint32_t>(keyframe);
+  waiting.word_in_block = InBlock(word) & 0xf;
+  waiting.signature = signature;
+  waiting.older = newest;
+  waiting_.push_back(waiting);
+  newest = static_cast<uint32_t>(waiting_.size()) - 1;
+}
+
+size_t PostingLists::SkipZeros(size_t bit, size_t zeros) const {
+  if (zeros == 0) {
+    return bit;
+  }
+  uint64_t found = ~high_[bit / 64] >> (bit % 64);
+  for (size_t here = std::popcount(found); here < zeros; here = std::popcount(found)) {
+    zeros -= here;
+    bit += 64 - bit % 64;
+    found = ~high_[bit / 64];
+  }
+  // It is among so many bits, in the lower half of them or the upper.
+  for (int half = 32; half > 0; half /= 2) {
+    const size_t lower = std::popcount(found & ((uint64_t{1} << half) - 1));
+    if (lower < zeros) {
+      zeros -= lower;
+      found >>= half;
+      bit += half;
+    }
+  }
+  return bit + 1;
+}
+
+PostingLists::PackedList PostingLists::ListAt(size_t bit, uint32_t word) const {
+  const size_t end = SkipZeros(bit, num_spans_);
+  return {bit, bit - word * num_spans_, end - bit - num_spans_};
+}
+
+PostingLists::PackedList PostingLists::Find(uint32_t word) const {
+  return ListAt(SkipZeros(BlockBit(BlockOf(word)), InBlock(word) * num_spans_), word);
+}
+
+void PostingLists::ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const {
+  waiting->clear();
+  for (uint32_t i = newest_[block]; i != kNone; i = waiting_[i].older) {
+    waiting->emplace_back((block << block_shift_) + waiting_[i].word_in_block, i);
+  }
+  std::ranges::sort(*waiting);
 }
 
 void PostingLists::Pack() {
-  // Count, newest keyframe, gap and signature of a posting, at most.
-  constexpr size_t kMostBytes = 5 + 5 + 5 + sizeof(uint32_t);
-  std::vector<uint8_t> packed;
-  packed.reserve(packed_.size() + kMostBytes * waiting_.size());
-  for (uint32_t word = 0; word < newest_.size(); ++word) {
-    const auto begin = static_cast<uint32_t>(packed.size());
-    if (newest_[word] == kNone) {
-      packed.insert(packed.end(), packed_.begin() + begin_[word],
-                    packed_.begin() + begin_[word + 1]);
-    } else {
-      PackWord(word, &packed);
-    }
-    begin_[word] = begin;
+  if (waiting_.empty()) {
+    return;
   }
-  begin_.back() = static_cast<uint32_t>(packed.size());
-  packed_ = std::move(packed);
-  num_packed_ += waiting_.size();
-  waiting_.clear();
-  newest_.assign(newest_.size(), kNone);
+  PostingLists packed(num_words_, (waiting_.back().keyframe >> kLowBits) + 1,
+                      num_packed() + num_waiting());
+  size_t made = 0, blocks_begun = 0;
+  const auto put = [&](size_t word, size_t keyframe, uint32_t signature) {
+    for (; blocks_begun << packed.block_shift_ <= word; ++blocks_begun) {
+      packed.begin_[blocks_begun] = static_cast<uint32_t>(made);
+    }
+    const size_t bit = made + word * packed.num_spans_ + (keyframe >> kLowBits);
+    packed.high_[bit / 64] |= uint64_t{1} << (bit % 64);
+    packed.low_[made] = static_cast<uint8_t>(keyframe);
+    packed.signatures_[made] = signature;
+    ++made;
+  };
+  size_t next = 0, bit = 0, word = 0;
+  std::vector<WordAndNumber> waiting;
+  for (size_t block = 0; block < begin_.size(); ++block) {
+    ListWaiting(block, &waiting);
+    auto newer = waiting.begin();
+    const auto put_newer_before = [&](size_t end_word) {
+      for (; newer != waiting.end() && newer->first < end_word; ++newer) {
+        const Waiting& posting = waiting_[newer->second];
+        put(newer->first, posting.keyframe, posting.signature);
+      }
+    };
+    const size_t end = block + 1 < begin_.size() ? begin_[block + 1] : num_packed();
+    for (; next < end; ++next, ++bit) {
+      bit = NextOne(bit);
+      while (bit - next >= (word + 1) * num_spans_) {
+        ++word;
+      }
+      put_newer_before(word);
+      const size_t span = bit - next - word * num_spans_;
+      put(word, span << kLowBits | low_[next], signatures_[next]);
+    }
+    put_newer_before(num_words_);
+  }
+  std::fill(packed.begin_.begin() + static_cast<ptrdiff_t>(blocks_begun), packed.begin_.end(),
+            static_cast<uint32_t>(made));
+  *this = std::move(packed);
 }
 
 void PostingLists::Save(ByteWriter* writer) const {
-  writer->Put(static_cast<uint64_t>(num_packed_));
+  writer->Put(static_cast<uint64_t>(num_spans_));
+  writer->Put(high_);
+  writer->Put(low_);
+  writer->Put(signatures_);
   writer->Put(begin_);
-  writer->Put(packed_);
 }
 
 bool PostingLists::Restore(ByteReader* reader) {
-  uint64_t num_packed = 0;
-  std::vector<uint32_t> begin;
-  std::vector<uint8_t> packed;
-  reader->Get(&num_packed);
+  uint64_t num_spans = 0;
+  std::vector<uint64_t> high;
+  std::vector<uint8_t> low;
+  std::vector<uint32_t> signatures, begin;
+  reader->Get(&num_spans);
+  reader->Get(&high);
+  reader->Get(&low);
+  reader->Get(&signatures);
   reader->Get(&begin);
-  reader->Get(&packed);
-  if (!reader->ok() || begin.size() != begin_.size() || !std::ranges::is_sorted(begin) ||
-      begin.back() != packed.size()) {
+  constexpr size_t kMaxSpans = size_t{1} << 20;
+  if (!reader->ok() || num_spans > kMaxSpans ||
+      high.size() != NumLimbs(low.size() + num_words_ * num_spans)) {
     return false;
   }
-  num_packed_ = num_packed;
-  begin_ = std::move(begin);
-  packed_ = std::move(packed);
-  waiting_.clear();
-  newest_.assign(newest_.size(), kNone);
+  PostingLists restored(num_words_, num_spans, low.size());
+  if (signatures.size() != low.size() || begin.size() != restored.begin_.size()) {
+    return false;
+  }
+  restored.high_ = std::move(high);
+  restored.low_ = std::move(low);
+  restored.signatures_ = std::move(signatures);
+  restored.begin_ = std::move(begin);
+  if (!restored.IsConsistent()) {
+    return false;
+  }
+  *this = std::move(restored);
   return true;
 }
 
-void PostingLists::PackWord(uint32_t word, std::vector<uint8_t>* packed) const {
-  std::vector<const Waiting*> waiting;  // oldest last
-  for (uint32_t i = newest_[word]; i != kNone; i = waiting_[i].older) {
-    waiting.push_back(&waiting_[i]);
+// So many ones and zeros as it takes, and blocks where these say.
+bool PostingLists::IsConsistent() const {
+  const auto count_ones = [](size_t sum, uint64_t limb) { return sum + std::popcount(limb); };
+  if (std::accumulate(high_.begin(), high_.end(), size_t{0}, count_ones) != num_packed()) {
+    return false;
   }
-  const uint8_t* const end = packed_.data() + begin_[word + 1];
-  Reader reader(packed_.data() + begin_[word], end);
-  PutNumber(static_cast<uint32_t>(reader.count() + waiting.size()), packed);
-  PutNumber(static_cast<uint32_t>(waiting.front()->keyframe), packed);
-  packed->insert(packed->end(), reader.gaps(), reader.signatures());
-  int32_t keyframe = reader.newest();
-  for (auto it = waiting.rbegin(); it != waiting.rend(); ++it) {
-    PutNumber(static_cast<uint32_t>((*it)->keyframe - keyframe), packed);
-    keyframe = (*it)->keyframe;
+  size_t bit = 0;
+  for (size_t block = 0; block < begin_.size(); ++block) {
+    if (BlockBit(block) != bit) {
+      return false;
+    }
+    const size_t words = std::min(size_t{1} << block_shift_, num_words_ - (block << block_shift_));
+    bit = SkipZeros(bit, words * num_spans_);
   }
-  packed->insert(packed->end(), reader.signatures(), end);
-  for (auto it = waiting.rbegin(); it != waiting.rend(); ++it) {
-    PutSignature((*it)->signature, packed);
-  }
+  return bit == num_packed() + num_words_ * num_spans_;
 }
 
 }  // namespace pangea

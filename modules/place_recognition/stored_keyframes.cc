@@ -11,21 +11,6 @@ namespace {
 constexpr size_t kRayBytes = 4 * sizeof(double);
 constexpr size_t kCornerBytes = 45;
 
-bool ShareAnElement(const std::vector<int32_t>& a, const std::vector<int32_t>& b) {
-  if (a.empty() || b.empty() || a.back() < b.front() || b.back() < a.front()) {
-    return false;
-  }
-  auto i = a.begin();
-  auto j = b.begin();
-  while (i != a.end() && j != b.end()) {
-    if (*i == *j) {
-      return true;
-    }
-    *i < *j ? ++i : ++j;
-  }
-  return false;
-}
-
 std::vector<uint8_t> ToRecord(const RecognisedKeyframe& keyframe) {
   ByteRecordWriter writer;
   writer.Reserve(2 * sizeof(uint32_t) + (kCornerBytes + kRayBytes) * keyframe.corners.size());
@@ -58,6 +43,65 @@ RecognisedKeyframe::RecognisedKeyframe(const Keyframe& keyframe)
   std::sort(landmarks.begin(), landmarks.end());
 }
 
+AscendingNumbers::AscendingNumbers(const std::vector<int32_t>& numbers) {
+  if (numbers.empty()) {
+    return;
+  }
+  first_ = numbers.front();
+  last_ = numbers.back();
+  std::vector<uint8_t> gaps;
+  for (size_t i = 1; i < numbers.size(); ++i) {
+    auto gap = static_cast<uint32_t>(numbers[i] - numbers[i - 1]);
+    for (; gap >= 0x80; gap >>= 7) {
+      gaps.push_back(static_cast<uint8_t>(gap | 0x80));
+    }
+    gaps.push_back(static_cast<uint8_t>(gap));
+  }
+  gaps_.assign(gaps.begin(), gaps.end());  // in just the memory they need
+}
+
+bool AscendingNumbers::HasOneOf(const std::vector<int32_t>& ascending) const {
+  if (ascending.empty() || last_ < first_ || last_ < ascending.front() ||
+      ascending.back() < first_) {
+    return false;
+  }
+  auto other = ascending.begin();
+  const auto reaches = [&](int32_t number) {
+    while (other != ascending.end() && *other < number) {
+      ++other;
+    }
+    return other != ascending.end() && *other == number;
+  };
+  int32_t number = first_;
+  uint32_t gap = 0;
+  int shift = 0;
+  for (const uint8_t byte : gaps_) {
+    gap |= static_cast<uint32_t>(byte & 0x7f) << shift;
+    shift += 7;
+    if ((byte & 0x80) == 0) {
+      if (reaches(number)) {
+        return true;
+      }
+      number += static_cast<int32_t>(gap);
+      gap = 0;
+      shift = 0;
+    }
+  }
+  return reaches(number);
+}
+
+void AscendingNumbers::Save(ByteWriter* writer) const {
+  writer->Put(first_);
+  writer->Put(last_);
+  writer->Put(gaps_);
+}
+
+void AscendingNumbers::Restore(ByteReader* reader) {
+  reader->Get(&first_);
+  reader->Get(&last_);
+  reader->Get(&gaps_);
+}
+
 std::vector<uint8_t> CornersRecord(const Keyframe& keyframe) {
   return ToRecord(RecognisedKeyframe(keyframe));
 }
@@ -71,8 +115,7 @@ bool StoredKeyframes::Add(const RecognisedKeyframe& keyframe) {
     }
     ++counters_.in_memory;
   }
-  std::vector<int32_t> landmarks(keyframe.landmarks.begin(), keyframe.landmarks.end());
-  keyframes_.push_back({keyframe.id, std::move(landmarks), std::move(corners)});
+  keyframes_.push_back({keyframe.id, AscendingNumbers(keyframe.landmarks), std::move(corners)});
   return true;
 }
 
@@ -80,7 +123,7 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
   writer->PutCount(keyframes_.size());
   for (const Stored& keyframe : keyframes_) {
     writer->Put(keyframe.id);
-    writer->Put(keyframe.landmarks);
+    keyframe.landmarks.Save(writer);
     writer->Put(keyframe.corners.offset());
     writer->Put(keyframe.corners.size());
   }
@@ -88,16 +131,14 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
 
 bool StoredKeyframes::Restore(ByteReader* reader) {
   constexpr size_t kLeastBytes = 32;
-  std::vector<Stored> keyframes;
-  const size_t count = reader->GetCount(kLeastBytes);
-  keyframes.reserve(count);
-  for (size_t i = 0; i < count; ++i) {
+  std::deque<Stored> keyframes;
+  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
     KeyframeId id;
-    std::vector<int32_t> landmarks;
+    AscendingNumbers landmarks;
     int64_t offset = 0;
     uint32_t size = 0;
     reader->Get(&id);
-    reader->Get(&landmarks);
+    landmarks.Restore(reader);
     reader->Get(&offset);
     reader->Get(&size);
     keyframes.push_back({id, std::move(landmarks), Record(offset, size)});
@@ -107,7 +148,7 @@ bool StoredKeyframes::Restore(ByteReader* reader) {
 }
 
 bool StoredKeyframes::SharesLandmark(int number, const RecognisedKeyframe& other) const {
-  return ShareAnElement(keyframes_[number].landmarks, other.landmarks);
+  return keyframes_[number].landmarks.HasOneOf(other.landmarks);
 }
 
 std::shared_ptr<const RecognisedKeyframe> StoredKeyframes::Find(int number) {

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <vector>
 
@@ -29,6 +30,23 @@ struct RecognisedKeyframe {
  private:
   friend class StoredKeyframes;
   RecognisedKeyframe() = default;
+};
+
+// Ascending numbers, most of them in one byte: the first one, and the gaps as base-128 varints.
+class AscendingNumbers {
+ public:
+  AscendingNumbers() = default;
+  explicit AscendingNumbers(const std::vector<int32_t>& numbers);
+
+  bool HasOneOf(const std::vector<int32_t>& ascending) const;
+
+  void Save(ByteWriter* writer) const;
+  void Restore(ByteReader* reader);
+
+ private:
+  int32_t first_ = 0;
+  int32_t last_ = -1;  // before the first one: there are none
+  std::vector<uint8_t> gaps_;
 };
 
 // What StoredKeyframes keeps of a keyframe in the RecordStore.
@@ -62,12 +80,12 @@ class StoredKeyframes {
 
   struct Stored {
     KeyframeId id;
-    std::vector<int32_t> landmarks;
+    AscendingNumbers landmarks;
     Record corners;
   };
 
   std::shared_ptr<RecordStore> records_;
-  std::vector<Stored> keyframes_;
+  std::deque<Stored> keyframes_;
   RecentCache<int, RecognisedKeyframe> found_{kMaxFound};
   RecordCounters counters_;
 };
