@@ -92,6 +92,9 @@ void AgentHandlerProcess::SendBestEffort(int32_t agent_id, LinkKind kind,
 // new session.
 void AgentHandlerProcess::ReadKeys() {
   const std::map<int32_t, AgentKey> keys = key_folder_.Read();
+  for (const std::string& file : key_folder_.unusable()) {
+    node_.Refuse(file);
+  }
   if (keys.size() > kMaxAgents) {
     throw std::runtime_error(
         fmt::format("folder of keys {}: it has {}, and one server takes {} agents at most: take "
@@ -276,6 +279,13 @@ std::string AgentHandlerProcess::OtherKeys() const {
   return others;
 }
 
+std::string AgentHandlerProcess::UnusableKeys() const {
+  const auto& files = key_folder_.unusable();
+  return files.empty()
+             ? ""
+             : fmt::format("; {} of the key files cannot be used: {}", files.size(), files.front());
+}
+
 void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   int64_t pending = 0, given_up = 0, keyframes = 0, connected = 0;
   for (const auto& [agent_id, agent] : agents_) {
@@ -299,14 +309,14 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
   anchors_.SetCounters();
   node_.PublishStatus(
       now_utime, pending,
-      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}{}", connected,
+      fmt::format("{} agents, {} keyframes in the journal{}{}{}{}{}{}{}", connected,
                   archive_.num_keyframes(),
                   archive_.MayAnswer() ? ""
                                        : "; NO AGENT IS ANSWERED: no bridge to NATS says that "
                                          "the journal is replicated",
                   agents_.empty() ? "; the folder of keys is empty: nobody can join" : "",
                   archive_.disk_refuses() ? "; THE DISK REFUSES WRITES" : "", archive_.Damage(),
-                  OtherSoftware(), OtherKeys()));
+                  UnusableKeys(), OtherSoftware(), OtherKeys()));
 }
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {

@@ -66,6 +66,8 @@ class AgentHandlerProcess : public PolledProcess {
   void SendAnchors();
   // For people: agents whose software is not of this version.
   std::string OtherSoftware() const;
+  // For people: the files in the folder of keys that let nobody in.
+  std::string UnusableKeys() const;
   // For people: agents who say hello under another key.
   std::string OtherKeys() const;
   void PublishStatus(int64_t now_utime);

@@ -197,11 +197,18 @@ TEST_F(LinkWorld, AnAgentIsShutOutThoughAnotherKeyIsBad) {
     ASSERT_TRUE(DecodeMessage(data, &status));
     summary = status.summary;
   });
+  KillHandler();
+  StartHandler();  // which takes the good keys
+  PublishKeyframes(2);
+  Run(3);
+  EXPECT_EQ(delivered.size(), 6u);
+  EXPECT_THAT(summary, testing::HasSubstr("1 of the key files cannot be used: key file " +
+                                          KeyFile(2).string()));
   std::filesystem::remove(KeyFile(1));
   Run(2);
   PublishKeyframes(2);
   Run(5);
-  EXPECT_EQ(delivered.size(), 4u);
+  EXPECT_EQ(delivered.size(), 6u);
   EXPECT_THAT(summary, testing::HasSubstr("the folder of keys is empty: nobody can join"));
 }
 

@@ -65,7 +65,11 @@ void List(const Arguments& arguments) {
   const site::Site site = site::ReadSite(arguments.site);
   Admission admission(site);
   const auto joined = admission.Agents();
-  const auto keys = KeyFolder(site.keys()).Read();
+  KeyFolder folder(site.keys());
+  const auto keys = folder.Read();
+  for (const std::string& file : folder.unusable()) {
+    std::cerr << fmt::format("pangea-gateway: {}\n", file);
+  }
   std::set<int32_t> agents;
   for (const auto& [agent_id, agent] : joined) {
     agents.insert(agent_id);

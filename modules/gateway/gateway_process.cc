@@ -85,6 +85,9 @@ JoinResult GatewayProcess::Join(const JoinRequest& request) {
 void GatewayProcess::ReadAgents() {
   const auto joined = admission_.Agents();
   const auto keys = key_folder_.Read();
+  for (const std::string& file : key_folder_.unusable()) {
+    node_.Refuse(file);
+  }
   agents_.clear();
   for (const auto& [agent_id, read] : keys) {
     const auto named = joined.find(agent_id);
@@ -94,8 +97,8 @@ void GatewayProcess::ReadAgents() {
   gateway_.SetAgents(agents_);
 }
 
-// As agent_handler does: with a file that cannot be read the others stay as they were, but none
-// keeps in whose own file was taken away.
+// As agent_handler does: without the folder all stay as they were, but none keeps in whose own file
+// was taken away.
 void GatewayProcess::LookForKeys() {
   try {
     if (key_folder_.Changed()) {

@@ -31,8 +31,12 @@ struct RightWord {
 constexpr RightWord kRightWords[] = {
     {"read", AnchorRight::kRead}, {"own", AnchorRight::kEditOwn}, {"write", AnchorRight::kEditAll}};
 
+std::string Describe(const fs::path& file, const std::string& what) {
+  return fmt::format("key file {}: {}", file.string(), what);
+}
+
 [[noreturn]] void Fail(const fs::path& file, const std::string& what) {
-  throw std::runtime_error(fmt::format("key file {}: {}", file.string(), what));
+  throw std::runtime_error(Describe(file, what));
 }
 
 struct OpenFile {
@@ -214,7 +218,7 @@ KeyFolder::Stamps KeyFolder::Look() const {
 
 bool KeyFolder::Changed() const {
   try {
-    return Look() != seen_;
+    return !unusable_.empty() || Look() != seen_;
   } catch (const fs::filesystem_error&) {
     return true;
   }
@@ -224,6 +228,16 @@ bool KeyFolder::IsGone(int32_t agent_id) const {
   const auto file = files_.find(agent_id);
   std::error_code error;
   return file == files_.end() || !fs::exists(file->second, error);
+}
+
+std::optional<AgentKey> KeyFolder::ReadOrLast(const fs::path& file) {
+  try {
+    return ReadKeyFile(file);
+  } catch (const std::runtime_error& error) {
+    unusable_.emplace_back(error.what());
+  }
+  const auto last = std::ranges::find(files_, file, &std::pair<const int32_t, fs::path>::second);
+  return last == files_.end() ? std::nullopt : std::optional(keys_.at(last->first));
 }
 
 std::map<int32_t, AgentKey> KeyFolder::Read() {
@@ -237,15 +251,19 @@ std::map<int32_t, AgentKey> KeyFolder::Read() {
   const Stamps stamps = Look();
   std::map<int32_t, AgentKey> keys;
   std::map<int32_t, fs::path> files;
+  unusable_.clear();
   for (const auto& [file, stamp] : stamps) {
-    const AgentKey read = ReadKeyFile(file);
-    if (!keys.emplace(read.agent_id, read).second) {
-      Fail(file, fmt::format("is a second key of agent {}: take one of them out", read.agent_id));
+    const auto read = ReadOrLast(file);
+    if (read && keys.emplace(read->agent_id, *read).second) {
+      files[read->agent_id] = file;
+    } else if (read) {
+      unusable_.push_back(Describe(
+          file, fmt::format("is a second key of agent {}: take one of them out", read->agent_id)));
     }
-    files[read.agent_id] = file;
   }
   seen_ = stamps;
   files_ = std::move(files);
+  keys_ = keys;
   return keys;
 }
 

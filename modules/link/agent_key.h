@@ -53,20 +53,27 @@ class KeyFolder {
 
   explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  // Throws std::runtime_error: no such folder, a file of it cannot be used, two of one agent.
+  // Throws std::runtime_error: no such folder. A file that cannot be used lets nobody in, and its
+  // agent not out: it may be half written.
   std::map<int32_t, AgentKey> Read();
-  // Whether files have come, gone or changed since the last Read.
+  // For people: each file that the last Read could not use, a second key of an agent too, and the
+  // mend.
+  const std::vector<std::string>& unusable() const { return unusable_; }
+  // Whether files have come, gone or changed since the last Read, or wait to be mended.
   bool Changed() const;
-  // Whether the file is gone that the last successful Read had the agent's key from.
+  // Whether the file is gone that the last Read had the agent's key from.
   bool IsGone(int32_t agent_id) const;
 
  private:
   using Stamps = std::map<std::filesystem::path, std::filesystem::file_time_type>;
   Stamps Look() const;
+  std::optional<AgentKey> ReadOrLast(const std::filesystem::path& file);
 
   std::filesystem::path folder_;
   Stamps seen_;
   std::map<int32_t, std::filesystem::path> files_;
+  std::map<int32_t, AgentKey> keys_;  // as last read
+  std::vector<std::string> unusable_;
 };
 
 }  // namespace pangea

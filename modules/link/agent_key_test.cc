@@ -108,12 +108,37 @@ TEST_F(AgentKeyTest, AFolderOfKeys) {
   EXPECT_THAT(keys.Read(), testing::ElementsAre(testing::Key(4)));
   EXPECT_FALSE(keys.Changed());
   MakeKeyFile(folder / "again.key", 4);
-  EXPECT_THAT(ReasonOf([&] { keys.Read(); }), HasSubstr("second key of agent 4"));
+  EXPECT_TRUE(keys.Read().at(4).key == ReadKeyFile(folder / "agent_4.key").key);
+  EXPECT_THAT(keys.unusable(), testing::ElementsAre(testing::AllOf(
+                                   HasSubstr("again.key"), HasSubstr("second key of agent 4"))));
   EXPECT_TRUE(keys.Changed()) << "until it is mended";
   fs::remove(folder / "again.key");
+  keys.Read();
+  EXPECT_FALSE(keys.Changed());
   fs::remove(folder / "agent_4.key");
   EXPECT_TRUE(keys.Changed());
   EXPECT_TRUE(keys.Read().empty());
+}
+
+TEST_F(AgentKeyTest, AFolderOfKeysWithABadFile) {
+  KeyFolder keys(folder);
+  MakeKeyFile(folder / "agent_4.key", 4);
+  EXPECT_THAT(keys.Read(), testing::ElementsAre(testing::Key(4)));
+  Write("agent_3.key", "");
+  MakeKeyFile(folder / "agent_10.key", 10);
+  EXPECT_THAT(keys.Read(), testing::ElementsAre(testing::Key(4), testing::Key(10)));
+  EXPECT_THAT(keys.unusable(), testing::ElementsAre(HasSubstr("agent_3.key: is no key file")));
+  EXPECT_TRUE(keys.Changed()) << "until it is mended; chmod leaves no newer time";
+  fs::remove(folder / "agent_3.key");
+
+  const SecretKey last = ReadKeyFile(folder / "agent_4.key").key;
+  Write("agent_4.key", "agent: 4\nkey: 12");
+  EXPECT_TRUE(keys.Read().at(4).key == last) << "it may be half written";
+  EXPECT_THAT(keys.unusable(), testing::ElementsAre(HasSubstr("agent_4.key")));
+  EXPECT_THAT(KeyFolder(folder).Read(), testing::ElementsAre(testing::Key(10))) << "at a start";
+  fs::remove(folder / "agent_4.key");
+  EXPECT_THAT(keys.Read(), testing::ElementsAre(testing::Key(10)));
+  EXPECT_FALSE(keys.Changed());
 }
 
 }  // namespace
