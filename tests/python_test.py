@@ -132,5 +132,57 @@ class Python(unittest.TestCase):
             self.bus.publish("C" * 64, b"")
 
 
+class Examples(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.mav0 = Path(self.folder.name) / "mav0"
+        (self.mav0 / "cam0/data").mkdir(parents=True)
+        (self.mav0 / "imu0").mkdir()
+        transform = "T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"
+        self.write("cam0/sensor.yaml", transform + "resolution: [640, 480]\nintrinsics: [400, 400, 320, 240]\n"
+                   "distortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n")
+        self.write("imu0/sensor.yaml", transform)
+        self.write("cam0/data.csv", "#stamp,name\n1000000,a.png\n")
+        self.write("imu0/data.csv", "#stamp,w,a\n1000000,0,0,0,0,0,9.8\n")
+        self.write("cam0/data/a.png", "")
+
+    def write(self, name, text):
+        (self.mav0 / name).write_text(text)
+
+    def source(self, *arguments, **environment):
+        return subprocess.run([ROOT / "examples/sensor_source/euroc_source.py", *arguments], capture_output=True, text=True, timeout=20,
+                              env=os.environ | environment)
+
+    def test_the_sensor_source_names_file_and_line(self):
+        def said():
+            done = self.source("--agent", "3", "--recording", self.folder.name, "--bus", URL)
+            self.assertNotIn("Traceback", done.stderr)
+            return done.returncode, done.stderr
+
+        self.assertEqual(said(), (0, ""))
+        self.write("cam0/data.csv", "#stamp,name\n1000000,a.png\n2000000,b.png\n")
+        self.assertRegex(said()[1], r"^euroc_source: .*cam0/data/b\.png: is missing, and .*data\.csv names it")
+        self.write("cam0/data.csv", "#stamp,name\nx,a.png\n")
+        self.assertRegex(said()[1], r"^euroc_source: .*cam0/data\.csv:2: 'x,a\.png': give a stamp in ns")
+        self.write("imu0/data.csv", "1000000,0,0\n")
+        self.assertRegex(said()[1], r"^euroc_source: .*imu0/data\.csv:1: '1000000,0,0': give a stamp in ns, three numbers")
+        (self.mav0 / "imu0/data.csv").unlink()
+        self.assertRegex(said()[1], r"^euroc_source: /.*imu0/data\.csv: No such file or directory\n$")
+
+    def test_the_sensor_source_checks_its_command_line(self):
+        for arguments in (["--agent", "0"], ["--agent", "x"], ["--agent", "3", "--rate", "0"]):
+            done = self.source(*arguments, "--recording", self.folder.name)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertIn("give ", done.stderr)
+        self.assertIn("agent's bus", self.source("--help", PYTHONPATH="").stdout)
+
+    def test_the_anchor_client_names_the_server(self):
+        done = subprocess.run([ROOT / "examples/anchors/anchor_client.py", "--server", "http://127.0.0.1:1"], capture_output=True, text=True,
+                              timeout=20)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^anchor_client.py: GET http://127\.0\.0\.1:1/v1/agents: .*refused: is pangea-server running")
+
+
 if __name__ == "__main__":
     sys.exit(unittest.main())

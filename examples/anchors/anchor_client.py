@@ -24,6 +24,8 @@ def call(url, method="GET", body=None, revision=None):
             return json.loads(answer.read() or "null")
     except urllib.error.HTTPError as error:
         raise RuntimeError(f"{method} {url}: {error.code}: {error.read().decode()}") from None
+    except OSError as error:  # urllib's own errors too
+        raise RuntimeError(f"{method} {url}: {getattr(error, 'reason', error)}: is pangea-server running there, with --http?") from None
 
 
 def group_of(server, agent):

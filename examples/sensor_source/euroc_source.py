@@ -17,23 +17,29 @@ try:
     from pangea import camera_t, imu_t, pose_t
     from pangea.bus import DEFAULT_URL, Bus, image_chunks
 except ModuleNotFoundError:
-    sys.exit("euroc_source: no package pangea: set PYTHONPATH to build/release/python of Pangea's tree, or install Pangea")
+    if not {"-h", "--help"} & set(sys.argv):  # which needs none of it
+        sys.exit("euroc_source: no package pangea: set PYTHONPATH to build/release/python of Pangea's tree, or install Pangea")
 
 CAMERA_INTERVAL_S = 1.0
-STATES = {pose_t.STATE_INITIALISING: "initialising", pose_t.STATE_TRACKING: "tracking", pose_t.STATE_LOST: "lost"}
+
+
+def fail(why):
+    sys.exit(f"euroc_source: {why}")
 
 
 def numbers(text, key, path):
     """The list that stands at `key`; EuRoC's sensor.yaml without a YAML reader, which Python has not."""
     found = re.search(rf"\b{key}:\s*\[([^\]]*)\]", text)
     if not found:
-        sys.exit(f"euroc_source: {path}: field '{key}' (a list of numbers) is missing")
+        fail(f"{path}: field '{key}' (a list of numbers) is missing")
     return [float(number) for number in found[1].split(",")]
 
 
 def transform(text, path):
     """T_BS as (rotation rows, translation)."""
     m = numbers(text[text.index("T_BS"):] if "T_BS" in text else "", "data", path)
+    if len(m) != 16:
+        fail(f"{path}: T_BS: data: give 16 numbers, row by row, not {len(m)}")
     return [m[0:3], m[4:7], m[8:11]], [m[3], m[7], m[11]]
 
 
@@ -76,7 +82,10 @@ class Recording:
 
     def __init__(self, folder):
         mav0 = folder / "mav0" if (folder / "mav0").is_dir() else folder
-        self.camera = self._camera(mav0)
+        try:
+            self.camera = self._camera(mav0)
+        except ValueError as error:
+            fail(f"{mav0}/cam0/sensor.yaml or imu0/sensor.yaml: {error}")
         self.events = sorted([*self._imu(mav0), *self._images(mav0)], key=lambda event: event[0])
 
     def _camera(self, mav0):
@@ -94,21 +103,40 @@ class Recording:
         return camera
 
     @staticmethod
-    def _rows(path):
+    def _events(path, parse):
+        """What `parse` makes of each row."""
         with path.open() as file:
-            return [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+            reader = csv.reader(file)
+            for row in reader:
+                if not row or row[0].startswith("#"):
+                    continue
+                try:
+                    yield parse(*row)
+                except (TypeError, ValueError):
+                    fail(f"{path}:{reader.line_num}: '{','.join(row)[:60]}': give {parse.__doc__}")
 
     def _imu(self, mav0):
-        for stamp, *values in self._rows(mav0 / "imu0/data.csv"):
+        def parse(stamp, *values):
+            """a stamp in ns, three numbers of the gyroscope, three of the accelerometer"""
             sample = imu_t()
             sample.utime = int(stamp) // 1000
             gyro, accel = sample.gyro_body, sample.accel_body
             gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z = map(float, values[:6])
-            yield sample.utime, sample
+            return sample.utime, sample
+
+        return self._events(mav0 / "imu0/data.csv", parse)
 
     def _images(self, mav0):
-        for stamp, name, *_ in self._rows(mav0 / "cam0/data.csv"):
-            yield int(stamp) // 1000, mav0 / "cam0/data" / name.strip()
+        table = mav0 / "cam0/data.csv"
+
+        def parse(stamp, name, *_):
+            """a stamp in ns, an image's name"""
+            path = mav0 / "cam0/data" / name.strip()
+            if not path.is_file():
+                fail(f"{path}: is missing, and {table} names it: take that line out")
+            return int(stamp) // 1000, path
+
+        return self._events(table, parse)
 
 
 def play(recording, bus, agent, rate):
@@ -131,30 +159,45 @@ def play(recording, bus, agent, rate):
 
 def say_states(bus, agent):
     """One line whenever the odometry's state changes."""
+    states = {pose_t.STATE_INITIALISING: "initialising", pose_t.STATE_TRACKING: "tracking", pose_t.STATE_LOST: "lost"}
     last = [None]
 
     def on_pose(_, pose):
         if pose.state != last[0]:
             last[0] = pose.state
-            print(f"agent {agent}: {STATES.get(pose.state, '?')}", pose.reason, flush=True)
+            print(f"agent {agent}: {states.get(pose.state, '?')}", pose.reason, flush=True)
 
     bus.subscribe(f"POSE_{agent}", on_pose, pose_t)
 
 
+def agent_id(text):
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"'{text}': give 1 to 65535")
+    return int(text)
+
+
+def positive(text):
+    if not float(text) > 0:
+        raise argparse.ArgumentTypeError(f"'{text}': give a number above 0")
+    return float(text)
+
+
 def main():
     parser = argparse.ArgumentParser(description="Plays a recording in EuRoC's format onto an agent's bus.")
-    parser.add_argument("--agent", type=int, required=True, help="agent id")
+    parser.add_argument("--agent", type=agent_id, required=True, help="agent id, 1 to 65535")
     parser.add_argument("--recording", type=Path, required=True, help="folder that holds mav0")
-    parser.add_argument("--bus", default=DEFAULT_URL, help="LCM URL of the agent's bus")
-    parser.add_argument("--rate", type=float, default=1.0, help="times real time")
+    parser.add_argument("--bus", help="LCM URL of the agent's bus (default: that of pangea-vio)")
+    parser.add_argument("--rate", type=positive, default=1.0, help="times real time")
     arguments = parser.parse_args()
     try:
         recording = Recording(arguments.recording)
-        bus = Bus(arguments.bus)
-    except (OSError, ValueError) as error:
-        sys.exit(f"euroc_source: {error}")
-    say_states(bus, arguments.agent)
-    play(recording, bus, arguments.agent, arguments.rate)
+        bus = Bus(arguments.bus or DEFAULT_URL)
+        say_states(bus, arguments.agent)
+        play(recording, bus, arguments.agent, arguments.rate)
+    except OSError as error:
+        fail(f"{error.filename}: {error.strerror}" if error.filename else error)
+    except ValueError as error:
+        fail(error)
 
 
 if __name__ == "__main__":
