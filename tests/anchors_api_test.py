@@ -297,13 +297,14 @@ class AnchorsApi(unittest.TestCase):
         pixel = [keyframe.u_16th_px[corner] / 16, keyframe.v_16th_px[corner] / 16]
         tap = self.make(pose={"agent": 1, "utime": keyframe.utime, "pixel": pixel})
         self.assertIsNotNone(tap["pose"])
-        status, said = self.request("POST", "/v1/anchors", {"pose": {"agent": 1, "utime": keyframe.utime, "pixel": [-9000, 1]}})
+        status, said = self.request("POST", "/v1/anchors", {"name": "far", "pose": {"agent": 1, "utime": keyframe.utime, "pixel": [-9000, 1]}})
         self.assertEqual((status, said["field"]), (400, "pose"))
         for each in (anchor, tap):
             self.request("DELETE", f"/v1/anchors/{each['id']}")
 
     def test_3_bad_requests(self):
-        for body in (None, "", "{", "[]", b"\xff", "[" * 16000, {"pose": 1}, {"pose": {"group": "9/9", "position": [0, 0, 0]}}):
+        for body in (None, "", "{", "[]", b"\xff", "[" * 16000, {"pose": 1}, {"pose": {"group": "9/9", "position": [0, 0, 0]}},
+                     {"pose": {"group": self.journal.group(), "position": [0, 0, 0]}}):
             self.assertEqual(self.request("POST", "/v1/anchors", body)[0], 400, body)
         self.assertEqual(self.request("POST", "/v1/anchors", "x" * 20000)[0], 413)
         self.assertEqual(self.request("GET", "/v1/anchors?group=x")[0], 400)
@@ -356,7 +357,7 @@ class AnchorsApi(unittest.TestCase):
     def test_6_a_journal_that_does_not_answer(self):
         self.journal.deaf, self.journal.requests = True, 0
         begin = time.monotonic()
-        status, _ = self.request("POST", "/v1/anchors", {"pose": {"group": self.journal.group(), "position": [0, 0, 0]}})
+        status, _ = self.request("POST", "/v1/anchors", {"name": "a", "pose": {"group": self.journal.group(), "position": [0, 0, 0]}})
         took_s = time.monotonic() - begin
         self.journal.deaf = False
         self.assertEqual(status, 503)

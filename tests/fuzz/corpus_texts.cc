@@ -61,10 +61,10 @@ void AnchorApiRequests(const Corpus& corpus) {
  "orientation": [1, 0, 0, 0]}})");
   corpus.AddText("anchor_api", "keyframe",
                  R"(POST /v1/anchors
-{"pose": {"keyframe": {"map": "2/1001", "seq": 1}, "position": [1, 0, 0]}})");
+{"name": "door", "pose": {"keyframe": {"map": "2/1001", "seq": 1}, "position": [1, 0, 0]}})");
   corpus.AddText("anchor_api", "pixel",
                  R"(POST /v1/anchors
-{"pose": {"agent": 1, "utime": 1000000, "pixel": [376.5, 240]}})");
+{"name": "tap", "pose": {"agent": 1, "utime": 1000000, "pixel": [376.5, 240]}})");
   corpus.AddText("anchor_api", "change",
                  "PUT /v1/anchors/1%2F17\n{\"name\": \"pot\", \"revision\": 1}");
   corpus.AddText("anchor_api", "delete", "DELETE /v1/anchors/1/17\n");

@@ -69,8 +69,9 @@ TEST_F(AnchorApiTest, APoseOfAFusedGroupIsKeptByTheNearestKeyframe) {
 TEST_F(AnchorApiTest, AnAnchorByAKeyframeAndOneBehindAPixel) {
   const auto by_keyframe = Ask(
       "POST", "/v1/anchors",
-      fmt::format(R"({{"pose": {{"keyframe": {{"map": "{}", "seq": 4}}, "position": [1, 0, 0]}}}})",
-                  ToString(map(1))));
+      fmt::format(
+          R"({{"name": "a", "pose": {{"keyframe": {{"map": "{}", "seq": 4}}, "position": [1, 0, 0]}}}})",
+          ToString(map(1))));
   JournalNewest();
   EXPECT_EQ(by_keyframe->status, 201);
   EXPECT_EQ(by_keyframe->body["group"], ToString(map(1)));
@@ -80,7 +81,7 @@ TEST_F(AnchorApiTest, AnAnchorByAKeyframeAndOneBehindAPixel) {
   const Corner& corner = keyframe.corners[keyframe.points[keyframe.points.size() / 2].corner];
   const auto behind =
       Ask("POST", "/v1/anchors",
-          fmt::format(R"({{"pose": {{"agent": 1, "utime": {}, "pixel": [{}, {}]}}}})",
+          fmt::format(R"({{"name": "b", "pose": {{"agent": 1, "utime": {}, "pixel": [{}, {}]}}}})",
                       keyframe.utime, corner.pixel.x(), corner.pixel.y()));
   ASSERT_EQ(requested_.back().placement, AnchorEdit::Placement::kPixel) << behind->body;
   EXPECT_EQ(requested_.back().map, map(0));
@@ -107,7 +108,7 @@ TEST_F(AnchorApiTest, WhatCannotBePlacedIsRefusedBeforeItIsJournalled) {
       {R"({"group": "1/17", "position": [0, 0]})", "pose.position", "[x, y, z]"},
   };
   for (const auto& c : kCases) {
-    const auto heard = Ask("POST", "/v1/anchors", "{\"pose\": " + c.pose + "}");
+    const auto heard = Ask("POST", "/v1/anchors", "{\"name\": \"a\", \"pose\": " + c.pose + "}");
     EXPECT_EQ(heard->status, 400) << c.pose;
     EXPECT_EQ(heard->body.value("field", ""), c.field) << c.pose << heard->body;
     EXPECT_THAT(heard->body.value("error", ""), HasSubstr(c.error)) << c.pose;

@@ -149,6 +149,9 @@ EditBody ParseFields(const json& body, BodyOf of) {
   EditBody edit;
   if (fields.Has("name")) {
     edit.name = fields.Text("name", kMaxAnchorName);
+    if (edit.name->empty()) {
+      throw BadField{"name", fmt::format("is empty: give 1 to {} bytes", kMaxAnchorName)};
+    }
     if (HasControl(*edit.name)) {
       throw BadField{"name", "has control characters: give one line of text"};
     }
@@ -164,6 +167,9 @@ EditBody ParseFields(const json& body, BodyOf of) {
   }
   if (of == BodyOf::kNew || fields.Has("pose")) {
     edit.pose = ParsePose(fields.Need("pose"));
+  }
+  if (of == BodyOf::kNew) {
+    fields.Need("name");
   }
   if (of == BodyOf::kChange && !edit.name && !edit.payload && !edit.pose) {
     throw BadField{"", "there is nothing to change: give name, payload or pose"};

@@ -40,12 +40,13 @@ TEST(EditBody, APoseInAGroup) {
 }
 
 TEST(EditBody, APoseByAKeyframeAndOneBehindAPixel) {
-  const EditBody by_keyframe =
-      Good(R"({"pose": {"keyframe": {"map": "2/17", "seq": 5}, "position": [0, 0, 1]}})");
+  const EditBody by_keyframe = Good(
+      R"({"name": "a", "pose": {"keyframe": {"map": "2/17", "seq": 5}, "position": [0, 0, 1]}})");
   const auto& pose = std::get<PoseByKeyframe>(*by_keyframe.pose);
   EXPECT_EQ(pose.keyframe, (KeyframeId{{2, 17}, 5}));
   EXPECT_EQ(pose.T_body_anchor.q.w(), 1);
-  const EditBody behind = Good(R"({"pose": {"agent": 3, "utime": 1700, "pixel": [376.5, 240]}})");
+  const EditBody behind =
+      Good(R"({"name": "a", "pose": {"agent": 3, "utime": 1700, "pixel": [376.5, 240]}})");
   EXPECT_EQ(std::get<PoseBehindPixel>(*behind.pose).pixel, Eigen::Vector2d(376.5, 240));
 }
 
@@ -66,6 +67,8 @@ TEST(EditBody, WhatIsWrongIsNamedWithHowToMendIt) {
       {"[]", "", "give an object"},
       {"{\"name\": \"\xff\"}", "", "UTF-8"},
       {R"({"name": "a"})", "pose", "is missing"},
+      {"{" + at + "}}", "name", "is missing"},
+      {R"({"name": "", )" + at + "}}", "name", "1 to 50 bytes"},
       {"{\"nam\": 1, " + at + "}}", "nam", "did you mean 'name'"},
       {"{\"revision\": 1, " + at + "}}", "revision", "no such field"},
       {"{\"name\": 1, " + at + "}}", "name", "at most 50 bytes"},
@@ -103,6 +106,7 @@ TEST(EditBody, WhatIsWrongIsNamedWithHowToMendIt) {
     EXPECT_THAT(bad.error, HasSubstr(c.mend)) << c.text;
   }
   EXPECT_EQ(Bad(R"({"name": "a", "revision": 0})", BodyOf::kChange).field, "revision");
+  EXPECT_EQ(Bad(R"({"name": ""})", BodyOf::kChange).field, "name");
   EXPECT_EQ(Bad(std::string(16'384, '[')).error, "the body is not JSON in UTF-8");
 }
 
