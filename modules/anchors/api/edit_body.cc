@@ -7,6 +7,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -177,12 +178,32 @@ EditBody ParseFields(const json& body, BodyOf of) {
   return edit;
 }
 
+// `twice`: a field that an object has twice, of which the last one counts.
+json ParseNotingTwice(std::string_view text, std::optional<std::string>* twice) {
+  std::vector<std::set<std::string>> seen;  // of the objects that are open
+  const auto note = [&](int, json::parse_event_t event, const json& parsed) {
+    if (event == json::parse_event_t::object_start) {
+      seen.emplace_back();
+    } else if (event == json::parse_event_t::object_end) {
+      seen.pop_back();
+    } else if (event == json::parse_event_t::key && !seen.back().insert(parsed).second) {
+      *twice = parsed;
+    }
+    return true;
+  };
+  return json::parse(text, note, false);
+}
+
 }  // namespace
 
 std::variant<EditBody, BadField> ParseEditBody(std::string_view text, BodyOf of) {
-  const json body = json::parse(text, nullptr, false);
+  std::optional<std::string> twice;
+  const json body = ParseNotingTwice(text, &twice);
   if (body.is_discarded()) {
     return BadField{"", "the body is not JSON in UTF-8"};
+  }
+  if (twice) {
+    return BadField{*twice, "is given twice: give it once"};
   }
   try {
     return ParseFields(body, of);

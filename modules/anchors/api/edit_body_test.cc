@@ -107,6 +107,12 @@ TEST(EditBody, WhatIsWrongIsNamedWithHowToMendIt) {
   }
   EXPECT_EQ(Bad(R"({"name": "a", "revision": 0})", BodyOf::kChange).field, "revision");
   EXPECT_EQ(Bad(R"({"name": ""})", BodyOf::kChange).field, "name");
+  EXPECT_EQ(Bad(R"({"name": "a", "name": "b"})", BodyOf::kChange).error,
+            "is given twice: give it once");
+  EXPECT_EQ(Bad(R"({"name": "a", "pose": {"group": "1/17", "position": [1, 2, 3],
+                                          "position": [1, 2, 4]}})")
+                .field,
+            "position");
   EXPECT_EQ(Bad(std::string(16'384, '[')).error, "the body is not JSON in UTF-8");
 }
 
