@@ -289,7 +289,7 @@ TEST_F(HostileTest, AMillionBytesOfHeader) {
     Serve(1);
   }
   EXPECT_TRUE(client.closed());
-  EXPECT_EQ(NumRefused("request: the header is too long"), 1);
+  EXPECT_EQ(NumRefused("request: The headers are too long"), 1);
   ExpectLinkWorks();
 }
 

@@ -89,14 +89,17 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
   // An end between two requests is none.
   void OnReadError(beast::error_code error) {
     if (error == http::error::body_limit) {
-      RefuseBody();
+      RefuseUnread(413, fmt::format("The body has more than {} bytes.", WebServer::kMaxBody));
     } else if (error == http::error::header_limit || error == http::error::buffer_overflow) {
-      Note("request: the header is too long");
+      const bool has_target = !parser_->get().target().empty();
+      RefuseUnread(has_target ? 431 : 414,
+                   fmt::format("The {} too long: URL and headers may have {} bytes.",
+                               has_target ? "headers are" : "URL is", kMaxHeader));
     } else if (error == beast::error::timeout && parser_->got_some()) {
       Note("request: it takes too long");
     } else if (error != http::error::end_of_stream &&
                error.category() == make_error_code(http::error::bad_method).category()) {
-      Note("request: it is no HTTP");
+      RefuseUnread(400, fmt::format("This is no HTTP: {}.", error.message()));
     }
   }
 
@@ -108,9 +111,9 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
                    request.method() == http::verb::head, known ? origin : ""};
     if (!HostAllowed(host, server_.options.names)) {
       asked_->page = "";
-      Refuse(403, "This host name is not known here: the server's command line can allow it.\n");
+      Refuse(403, "This host name is not known here: the server's command line can allow it.");
     } else if (server_.options.for_programs && !known && IsOfAPage(request)) {
-      Refuse(403, "Pages of other origins may not ask: --allow-origin URL allows one.\n");
+      Refuse(403, "Pages of other origins may not ask: --allow-origin URL allows one.");
     } else if (websocket::is_upgrade(request)) {
       OpenSocket(std::move(request), known || (server_.options.for_programs && origin.empty()));
     } else if (server_.options.for_programs && request.method() == http::verb::options && known) {
@@ -158,7 +161,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     timer_.expires_after(kAnswering);
     timer_.async_wait([self = this->shared_from_this(), number](beast::error_code error) {
       if (!error) {
-        self->Answer(number, {503, "text/plain; charset=utf-8", "There is no answer yet.\n"});
+        self->Answer(number, self->Refusal(503, "There is no answer yet."));
       }
     });
     server_.site.Answer(request, [weak = this->weak_from_this(), number](WebAnswer answer) {
@@ -177,9 +180,9 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
 
   void OpenSocket(Request request, bool allowed) {
     if (!allowed) {
-      Refuse(403, "Only the page of this server may connect.\n");
+      Refuse(403, "Only the page of this server may connect.");
     } else if (server_.sockets.size() >= static_cast<size_t>(server_.options.max_peers)) {
-      Refuse(503, "Too many are connected.\n");
+      Refuse(503, "Too many are connected.");
     } else if (auto peer =
                    server_.site.Open(ToWebRequest(request, Text(request[http::field::host])))) {
       tcp_stream().expires_never();
@@ -188,19 +191,46 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
       server_.sockets.push_back(socket);
       socket->Open(std::move(request));
     } else {
-      Refuse(404, "There is no WebSocket here.\n");
+      Refuse(404, "There is no WebSocket here.");
     }
   }
 
-  // The rest of the body is not read, so nothing more can come on this connection.
-  void RefuseBody() {
+  // The rest of the request is not read, so nothing more can come on this connection.
+  void RefuseUnread(int status, const std::string& why) {
     asked_ = Asked{++number_, 11, false, false, ""};
-    Refuse(413, fmt::format("The body has more than {} bytes.\n", WebServer::kMaxBody));
+    has_unread_ = true;
+    Refuse(status, why);
   }
 
   void Refuse(int status, const std::string& why) {
-    Note("request: " + why.substr(0, why.find_first_of(":.\n")));
-    Send({status, "text/plain; charset=utf-8", why});
+    Note("request: " + why.substr(0, why.find_first_of(":.")));
+    Send(Refusal(status, why));
+  }
+
+  // As the site's own errors are; `why` has nothing that JSON would escape.
+  WebAnswer Refusal(int status, const std::string& why) const {
+    if (server_.options.for_programs) {
+      return {status, "application/json", fmt::format("{{\"error\":\"{}\"}}\n", why)};
+    }
+    return {status, "text/plain; charset=utf-8", why + "\n"};
+  }
+
+  // To close at once what still sends would reset it, and the answer with it.
+  void EndUnread() {
+    beast::error_code gone;
+    tcp_stream().socket().shutdown(tcp::socket::shutdown_send, gone);
+    BeginWithin(kAsking);
+    Discard();
+  }
+
+  void Discard() {
+    buffer_.clear();
+    tcp_stream().async_read_some(buffer_.prepare(kMaxHeader), [self = this->shared_from_this()](
+                                                                  beast::error_code error, size_t) {
+      if (!error) {
+        self->Discard();
+      }
+    });
   }
 
   void Note(const std::string& why) { server_.site.Refused(why); }
@@ -237,6 +267,8 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
                       [self = this->shared_from_this()](beast::error_code error, size_t) {
                         if (!error && self->response_->keep_alive()) {
                           self->Read();
+                        } else if (!error && self->has_unread_) {
+                          self->EndUnread();
                         }
                       });
   }
@@ -252,6 +284,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
   std::optional<http::request_parser<http::string_body>> parser_;
   int64_t number_ = 0;          // requests so far
   std::optional<Asked> asked_;  // until it is answered
+  bool has_unread_ = false;     // the rest of the last request
   WebAnswer answer_;            // what the response points into
   std::optional<http::response<http::span_body<const char>>> response_;
 };

@@ -13,6 +13,7 @@
 namespace pangea::web {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -276,13 +277,26 @@ TEST_F(WebServerTest, ANewConnectionTakesTheOldestsPlace) {
   Serve();
 }
 
-TEST_F(WebServerTest, ALongRequestEndsTheConnection) {
-  WebClient client(server_.port());
-  client.Send("GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(100'000, 'x') + "\r\n\r\n");
-  Serve();
-  bool closed = false;
-  EXPECT_EQ(client.Received(&closed), "");
-  EXPECT_TRUE(closed);
+TEST_F(WebServerTest, AMalformedRequestGetsAnAnswerAndEndsTheConnection) {
+  const std::string host = "Host: localhost\r\n", long_text(100'000, 'x');
+  const std::string post = "POST /echo HTTP/1.1\r\n" + host;
+  const std::pair<std::string, std::string> cases[] = {
+      {"nonsense\r\n\r\n", "400"},
+      {post + "Content-Length: -1\r\n\r\n", "400"},
+      {post + "Content-Length: 1\r\nContent-Length: 2\r\n\r\nab", "400"},
+      {post + "Content-Length: 99999999999999999999\r\n\r\n", "400"},
+      {post + "Transfer-Encoding: chunked\r\n\r\nx\r\n", "400"},
+      {"GET /" + long_text + " HTTP/1.1\r\n" + host + "\r\n", "414"},
+      {"GET / HTTP/1.1\r\n" + host + "X: " + long_text + "\r\n\r\n", "431"}};
+  for (const auto& [request, status] : cases) {
+    WebClient client(server_.port());
+    client.Send(request);
+    Serve();
+    bool closed = false;
+    EXPECT_THAT(client.Received(&closed), StartsWith("HTTP/1.1 " + status))
+        << request.substr(0, 80);
+    EXPECT_TRUE(closed) << request.substr(0, 80);
+  }
 }
 
 TEST(WebServer, SaysWhatIsWrongWithItsAddress) {
@@ -305,6 +319,14 @@ class ForProgramsTest : public WebServerTest {
                "Access-Control-Request-Method: PUT\r\nContent-Length: 0\r\n\r\n");
   }
 };
+
+TEST_F(ForProgramsTest, WhatTheServerRefusesIsJsonToo) {
+  const char* const json = "Content-Type: application/json\r\n";
+  EXPECT_THAT(Ask("nonsense\r\n\r\n"),
+              AllOf(HasSubstr(json), HasSubstr("{\"error\":\"This is no HTTP: ")));
+  EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n"),
+              AllOf(HasSubstr(json), HasSubstr("{\"error\":\"This host name is not known")));
+}
 
 TEST_F(ForProgramsTest, ProgramsMayAskWithoutAnOrigin) {
   EXPECT_THAT(Request("POST", ""), StartsWith("HTTP/1.1 201"));
