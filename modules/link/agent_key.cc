@@ -11,6 +11,8 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <iterator>
+#include <ranges>
 #include <stdexcept>
 #include <system_error>
 
@@ -230,14 +232,19 @@ bool KeyFolder::IsGone(int32_t agent_id) const {
   return file == files_.end() || !fs::exists(file->second, error);
 }
 
+const AgentKey* KeyFolder::LastOf(const fs::path& file) const {
+  const auto last = std::ranges::find(files_, file, &std::pair<const int32_t, fs::path>::second);
+  return last == files_.end() ? nullptr : &keys_.at(last->first);
+}
+
 std::optional<AgentKey> KeyFolder::ReadOrLast(const fs::path& file) {
   try {
     return ReadKeyFile(file);
   } catch (const std::runtime_error& error) {
     unusable_.emplace_back(error.what());
   }
-  const auto last = std::ranges::find(files_, file, &std::pair<const int32_t, fs::path>::second);
-  return last == files_.end() ? std::nullopt : std::optional(keys_.at(last->first));
+  const AgentKey* const last = LastOf(file);
+  return last == nullptr ? std::nullopt : std::optional(*last);
 }
 
 std::map<int32_t, AgentKey> KeyFolder::Read() {
@@ -252,7 +259,11 @@ std::map<int32_t, AgentKey> KeyFolder::Read() {
   std::map<int32_t, AgentKey> keys;
   std::map<int32_t, fs::path> files;
   unusable_.clear();
-  for (const auto& [file, stamp] : stamps) {
+  std::vector<fs::path> order;
+  std::ranges::copy(std::views::keys(stamps), std::back_inserter(order));
+  std::ranges::stable_partition(order,
+                                [this](const fs::path& file) { return LastOf(file) != nullptr; });
+  for (const fs::path& file : order) {
     const auto read = ReadOrLast(file);
     if (read && keys.emplace(read->agent_id, *read).second) {
       files[read->agent_id] = file;

@@ -54,7 +54,7 @@ class KeyFolder {
   explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   // Throws std::runtime_error: no such folder. A file that cannot be used lets nobody in, and its
-  // agent not out: it may be half written.
+  // agent not out: it may be half written. Of two keys of an agent the one that it has counts.
   std::map<int32_t, AgentKey> Read();
   // For people: each file that the last Read could not use, a second key of an agent too, and the
   // mend.
@@ -67,6 +67,8 @@ class KeyFolder {
  private:
   using Stamps = std::map<std::filesystem::path, std::filesystem::file_time_type>;
   Stamps Look() const;
+  // Null where the last Read had none from this file.
+  const AgentKey* LastOf(const std::filesystem::path& file) const;
   std::optional<AgentKey> ReadOrLast(const std::filesystem::path& file);
 
   std::filesystem::path folder_;
