@@ -172,6 +172,10 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
     agent.handler.emplace(MakeHandler(agent_id));
     Log(node_.name(), fmt::format("agent {} has joined", agent_id));
   }
+  if (opened.two_uplinks) {
+    node_.Refuse(fmt::format(
+        "two uplinks run as agent {}: end one, or give it an id and a key of its own", agent_id));
+  }
   if (opened.new_uplink) {
     agent.handler->OnNewUplink();
     anchors_.OnNewSession(agent_id);

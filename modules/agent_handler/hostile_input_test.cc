@@ -150,7 +150,10 @@ TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
   EXPECT_EQ(refused["packet of an agent whose key is not in the folder of keys"],
             static_cast<int64_t>(recorded.size()));
   EXPECT_GT(refused["repeated or too old"], 50);
-  EXPECT_GT(refused["not sealed for this session: forged, damaged, or of an earlier one"], 0);
+  EXPECT_GT(
+      refused["not sealed for this session: forged, damaged, of an earlier one, or of a second "
+              "uplink of this agent"],
+      0);
   EXPECT_GT(refused["packet before there is a session"], 50) << "agent 2 has a key, but no uplink";
   EXPECT_GT(refused["hello is forged or damaged"], 0);
   EXPECT_LE(counters.at("packets_1"), accepted + 10) << "the uplink's hellos alone";

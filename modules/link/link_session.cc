@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "link/bytes_io.h"
 
@@ -11,7 +12,9 @@ namespace {
 constexpr size_t kSessionClearBytes = 4;
 constexpr size_t kHandshakeClearBytes = 1 + kSealNonceBytes;
 constexpr int64_t kMaxNumber = int64_t{1} << 48;
-constexpr char kNotOurs[] = "not sealed for this session: forged, damaged, or of an earlier one";
+constexpr char kNotOurs[] =
+    "not sealed for this session: forged, damaged, of an earlier one, or of a second uplink "
+    "of this agent";
 constexpr char kTooLarge[] = "larger than any packet";
 constexpr char kRepeated[] = "repeated or too old";
 
@@ -192,8 +195,11 @@ HandlerSession::Opened HandlerSession::OnHello(Bytes bytes) {
     return opened;
   }
   if (!current) {
-    opened.new_uplink = hello->uplink_run != uplink_run_;
-    uplink_run_ = hello->uplink_run;
+    if (hello->uplink_run != uplink_run_) {
+      opened.new_uplink = true;
+      opened.two_uplinks = hello->uplink_run == earlier_uplink_run_;
+      earlier_uplink_run_ = std::exchange(uplink_run_, hello->uplink_run);
+    }
     run_ = next_run_;
     next_run_ = RandomNumber();
     up_ = KeyOf(agent_key_, "up", agent_id_, uplink_run_, run_);

@@ -96,6 +96,7 @@ class HandlerSession {
   struct Opened {
     std::optional<LinkPacket> packet;
     bool new_uplink = false;       // another run of the uplink than before
+    bool two_uplinks = false;      // ... which an earlier session was with: both are alive
     std::vector<uint8_t> welcome;  // to be sent back, unless it is empty
     std::string refused;
   };
@@ -121,6 +122,7 @@ class HandlerSession {
   SecretKey hello_key_;
   SecretKey welcome_key_;
   uint64_t uplink_run_ = 0;
+  uint64_t earlier_uplink_run_ = 0;
   uint64_t run_ = 0;
   uint64_t next_run_ = RandomNumber();  // offered in welcomes; used up by a session
   std::optional<SessionKey> up_, down_;

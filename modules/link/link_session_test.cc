@@ -53,6 +53,24 @@ TEST_F(LinkSessionTest, CarriesPacketsBothWays) {
   }
 }
 
+// Each takes the session from the other; one that was started again does not come back.
+TEST_F(LinkSessionTest, TwoUplinksOfOneAgentAreTold) {
+  UplinkSession other(kAgent, key);
+  const auto connect = [&](UplinkSession& session) {
+    const auto first = handler->Open(session.Seal({LinkKind::kHello, ++number, {1}}));
+    session.Open(first.welcome);
+    return handler->Open(session.Seal({LinkKind::kHello, ++number, {1}}));
+  };
+  EXPECT_FALSE(connect(*uplink).two_uplinks);
+  RestartUplink();
+  EXPECT_FALSE(connect(*uplink).two_uplinks);
+  EXPECT_FALSE(connect(other).two_uplinks);
+  const auto back = connect(*uplink);
+  EXPECT_TRUE(back.new_uplink);
+  EXPECT_TRUE(back.two_uplinks);
+  EXPECT_TRUE(connect(other).two_uplinks);
+}
+
 TEST_F(LinkSessionTest, TwentyBytesAPacket) {
   Connect();
   EXPECT_EQ(Piece(7).size(), 1u + kSessionOverheadBytes);
