@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "bus/bus.h"
+#include "bus/transport/udpm_socket.h"
 #include "files/text_file.h"
 #include "files/whole_file.h"
 #include "link/wire.h"
@@ -33,6 +34,25 @@ bool IsOurs(const std::string& name) {
          name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
+// As LcmBus does when it opens it, which needs a network; of what several processes can share.
+std::string WhyNoBus(const std::string& url) {
+  if (url.starts_with("tcpq://")) {
+    return "";
+  }
+  if (!url.starts_with("udpm://")) {
+    return fmt::format(
+        "'{}' is no LCM URL between processes: give udpm://GROUP:PORT?ttl=N, or "
+        "tcpq://HOST:PORT",
+        url);
+  }
+  try {
+    ParseUdpmUrl(url);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 void CheckDescription(const fs::path& file, const SiteDescription& description) {
   const auto refuse = [&](const std::string& what) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), what));
@@ -48,6 +68,11 @@ void CheckDescription(const fs::path& file, const SiteDescription& description) 
   }
   if (description.bus.empty() || description.link.empty() || description.bus == description.link) {
     refuse("bus, link: give two LCM URLs that differ");
+  }
+  for (const auto& [key, url] : {std::pair("bus", description.bus), {"link", description.link}}) {
+    if (const std::string why = WhyNoBus(url); !why.empty()) {
+      refuse(fmt::format("{}: {}", key, why));
+    }
   }
 }
 

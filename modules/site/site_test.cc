@@ -63,8 +63,20 @@ TEST(Site, NamesFileAndFieldOfWhatIsWrong) {
   EXPECT_THAT(refused("format: 1\nname: \"\"\n" + rest), HasSubstr("site.yaml: name: give 1 to"));
   EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: a\nlink: a\n"),
               HasSubstr("two LCM URLs that differ"));
+  EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: foo\nlink: udpm://\n"),
+              HasSubstr("site.yaml: bus: 'foo' is no LCM URL"));
+  EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: tcpq://a:1\nlink: udpm://x:y\n"),
+              HasSubstr("site.yaml: link: cannot open the bus 'udpm://x:y'"));
   EXPECT_THAT(refused("format: 1\n" + rest), HasSubstr("name"));
   EXPECT_THAT(refused("format: 1\nnaem: x\n" + rest), HasSubstr("did you mean 'name'"));
+}
+
+TEST(Site, IsNotMadeWithABusThatCannotBeOpened) {
+  const fs::path folder = FreshFolder("no_bus") / "hall";
+  SiteDescription description = NewDescription("hall");
+  description.bus = "foo";
+  EXPECT_THAT(WhyNot([&] { CreateSite(folder, description); }), HasSubstr("bus: 'foo' is no LCM"));
+  EXPECT_FALSE(fs::exists(folder));
 }
 
 TEST(SiteLock, IsHeldByOneAndNamesIt) {
