@@ -183,6 +183,10 @@ void CopyAgents(const std::vector<Site>& sites, const fs::path& agents) {
 
 MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& out,
                         const MergeOptions& options) {
+  if (fs::equivalent(first.folder, second.folder)) {
+    throw std::runtime_error(fmt::format("{} and {} are one site: give two", first.folder.string(),
+                                         second.folder.string()));
+  }
   SiteInTheMaking made(out);
   LogReadings readings;
   const MapsOfJournal maps = ReadMaps(first, &readings);

@@ -59,6 +59,13 @@ TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
   EXPECT_EQ(groups[0].keyframes.size(), 63u);
 }
 
+TEST_F(MergeTest, NeedsTwoSites) {
+  const Site a = MakeSite(folder / "a", {EditEvent({1, 7}, 1, 0)});
+  EXPECT_THAT(WhyNot([&] { MergeSites(a, ReadSite(folder / "a" / ""), out, {}); }),
+              testing::HasSubstr("are one site: give two"));
+  EXPECT_FALSE(fs::exists(out));
+}
+
 TEST_F(MergeTest, NumbersAnchorEditsOn) {
   const Site a = MakeSite(folder / "a", {EditEvent({1, 7}, 1, 0), EditEvent({1, 7}, 2, 1)});
   // Of one revision by two agents both count.
