@@ -60,11 +60,13 @@ bool Exists(const std::string& path) {
 }
 
 void WriteTextFile(const std::string& path, const std::string& text) {
+  errno = 0;
   std::ofstream file(path, std::ios::binary);
   file << text;
   file.close();
   if (!file) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written: {}", path, std::generic_category().message(errno)));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "files/make_folder.h"
 #include "files/text_file.h"
 
 namespace pangea {
@@ -44,6 +45,25 @@ TEST_F(WholeFile, OneOfThoseWhoRemoveItIsTold) {
   WriteNewFile(file, "", 0600);
   EXPECT_TRUE(RemoveFile(file));
   EXPECT_FALSE(RemoveFile(file));
+}
+
+TEST_F(WholeFile, TextFilesAndFoldersSayWhy) {
+  const auto why_not = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  MakeFolder(folder_ / "a" / "b");
+  MakeFolder(folder_ / "a" / "b");
+  WriteTextFile(folder_ / "a" / "file", "x");
+  EXPECT_EQ(why_not([&] { WriteTextFile(folder_ / "a" / "b", "x"); }),
+            (folder_ / "a" / "b").string() + ": cannot be written: Is a directory");
+  EXPECT_EQ(
+      why_not([&] { MakeFolder(folder_ / "a" / "file" / "c"); }),
+      "the folder " + (folder_ / "a" / "file" / "c").string() + " cannot be made: Not a directory");
 }
 
 TEST_F(WholeFile, SaysWhatCannotBeWritten) {
