@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -54,6 +55,14 @@ Matrix6d InverseOf(const Matrix6d& m) {
   return scale.asDiagonal() * scaled.llt().solve(Matrix6d::Identity()) * scale.asDiagonal();
 }
 
+// Of any file, for a terminal.
+std::string Shown(std::string word) {
+  constexpr size_t kMaxShown = 40;
+  std::ranges::replace_if(
+      word, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return word.size() <= kMaxShown ? word : word.substr(0, kMaxShown) + "...";
+}
+
 // One line's fields, or what is wrong with them.
 class Line {
  public:
@@ -71,7 +80,7 @@ class Line {
     const std::string word = Word();
     int64_t id = 0;
     if (!ParseNumber(word, &id) || id < 0 || id > std::numeric_limits<int>::max()) {
-      Fail(fmt::format("{} '{}' is no vertex' number", field, word));
+      Fail(fmt::format("{} '{}' is no vertex' number", field, Shown(word)));
     }
     return static_cast<int>(id);
   }
@@ -80,7 +89,7 @@ class Line {
     double value = 0;
     if (!ParseNumber(word, &value)) {
       Fail(word.empty() ? field + " is missing"
-                        : fmt::format("{} '{}' is not a finite number", field, word));
+                        : fmt::format("{} '{}' is not a finite number", field, Shown(word)));
     }
     if (std::abs(value) > most) {
       Fail(fmt::format("{} {} is not from {} to {}", field, word, -most, most));
@@ -115,7 +124,7 @@ class Line {
   }
   void End() {
     if (!AtEnd()) {
-      Fail(fmt::format("'{}' stands behind the last field", Word()));
+      Fail(fmt::format("'{}' stands behind the last field", Shown(Word())));
     }
   }
   [[noreturn]] void Fail(const std::string& what) const { FailAt(path_, number_, what); }
@@ -144,7 +153,7 @@ class Reader {
     } else if (kind == "EDGE_SE3:QUAT") {
       TakeEdge(&line);
     } else if (!kind.empty() && !kind.starts_with('#')) {
-      line.Fail(fmt::format("{} is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", kind));
+      line.Fail(fmt::format("{} is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", Shown(kind)));
     }
   }
 
