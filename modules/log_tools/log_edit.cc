@@ -45,6 +45,12 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
   ReadLog(log, read, readings, while_reading);
 }
 
+[[noreturn]] void ThrowEmpty(const std::string& log, const LogCut& cut) {
+  throw std::runtime_error(fmt::format(
+      "{}: no event of {} from {:g} to {:g} s; pangea-log info shows channels and times", log,
+      cut.channels, cut.from_s, cut.to_s));
+}
+
 // "a.b[12].c[3]" has the item 12 of an array.
 bool IsFarInArray(const std::string& path) {
   constexpr int kShown = 8;
@@ -95,7 +101,9 @@ struct Place {
 
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings) {
+  bool is_empty = true;
   const auto list = [&](const LogEvent& event, double seconds) {
+    is_empty = false;
     if (as == ListAs::kJson) {
       ListJson(event, out);
       return;
@@ -108,6 +116,9 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
     }
   };
   ReadCut(log, cut, readings, WhileReading::kTellNothing, list);
+  if (is_empty) {
+    ThrowEmpty(log, cut);
+  }
 }
 
 void CheckNew(const std::string& path) {
@@ -128,9 +139,7 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
     writer->Write(event.utime, event.channel, event.data);
   });
   if (!writer) {
-    throw std::runtime_error(fmt::format(
-        "{}: no event of {} from {:g} to {:g} s; pangea-log info shows channels and times", log,
-        cut.channels, cut.from_s, cut.to_s));
+    ThrowEmpty(log, cut);
   }
   return writer->count();
 }

@@ -26,7 +26,7 @@ enum class ListAs : uint8_t {
   kJson,    // one object: utime (of capture), channel, type, message
 };
 
-// The events of a cut, one a line.
+// The events of a cut, one a line. Throws std::runtime_error for a cut without an event.
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings = nullptr);
 

@@ -247,6 +247,10 @@ void AddCost(CLI::App& app, Arguments* arguments) {
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
   cost->callback([arguments] {
     const Graph graph = ReadG2o(arguments->g2o);
+    if (graph.vertices.empty()) {
+      throw std::runtime_error(
+          fmt::format("{}: has no VERTEX_SE3:QUAT: no pose graph in g2o format", arguments->g2o));
+    }
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
                              graph.vertices.size(), graph.edges.size(), Cost(graph));
   });
