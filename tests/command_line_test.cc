@@ -105,6 +105,9 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   const Outcome outcome = RunCommand("pangea-log info " + empty.string());
   EXPECT_GT(outcome.exit_code, 100) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
+  const Outcome cost = RunCommand("pangea-log cost " + empty.string());
+  EXPECT_EQ(cost.exit_code, 1);
+  EXPECT_THAT(cost.output, HasSubstr("empty.lcm: has no VERTEX_SE3:QUAT"));
 }
 
 // What is printed may be what was asked for.
@@ -166,6 +169,19 @@ TEST(Uplink, BandwidthAndBudgetHaveOneUnit) {
   EXPECT_THAT(outcome.output, HasSubstr("the bandwidth must be at least 1 kB/s"));
   outcome = RunCommand("pangea-uplink --agent 1 --key none --budget 4");
   EXPECT_THAT(outcome.output, HasSubstr("the budget must be at least 5 kB/s"));
+}
+
+// Or what goes out on one comes in on it again.
+TEST(Link, ItsTwoSidesDiffer) {
+  for (const char* command :
+       {"pangea-link-emulator --agent 1 --bus x --agent-link u --server-link u",
+        "pangea-uplink --agent 1 --key none --bus u --link u",
+        "pangea-server --journal none --keys none --bus u --link u",
+        "pangea-agent-handler --journal none --keys none --server u --link u"}) {
+    const Outcome outcome = RunCommand(fmt::format("timeout 10 {}", command));
+    EXPECT_EQ(outcome.exit_code, 1) << command;
+    EXPECT_THAT(outcome.output, HasSubstr("are both u: give two LCM URLs that differ")) << command;
+  }
 }
 
 // Not a report without ground truth, as if the recording had none.

@@ -47,6 +47,10 @@ int main(int argc, char** argv) {
     if (journal.empty() || keys.empty()) {
       throw std::runtime_error("give --journal FILE and --keys FOLDER (or: keygen --agent ID)");
     }
+    if (link == server) {
+      throw std::runtime_error(
+          fmt::format("--link and --server are both {}: give two LCM URLs that differ", link));
+    }
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::LcmBus server_bus(server);
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),

@@ -32,6 +32,12 @@ int main(int argc, char** argv) {
     if (agent_id == 0 || agent_link.empty() || server_link.empty() || status_bus.empty()) {
       throw std::runtime_error("give --agent ID, --agent-link, --server-link and --bus URL");
     }
+    if (agent_link == server_link) {
+      throw std::runtime_error(
+          fmt::format("--agent-link and --server-link are both {}: give two LCM URLs that differ, "
+                      "or it relays what it has sent itself",
+                      agent_link));
+    }
     constexpr auto kNoFragments = pangea::LcmBus::Fragments::kRefused;
     pangea::LcmBus agent_bus(agent_link, kNoFragments), server_bus(server_link, kNoFragments);
     pangea::LcmBus status(status_bus);

@@ -41,6 +41,10 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
   if (a.agent_id == 0 || a.key.empty()) {
     throw std::runtime_error("give --agent ID and --key FILE");
   }
+  if (a.bus == a.link) {
+    throw std::runtime_error(
+        fmt::format("--bus and --link are both {}: give two LCM URLs that differ", a.bus));
+  }
   std::optional<Spool> spool;
   std::optional<EditSpool> edit_spool;
   if (!a.spool.empty()) {

@@ -145,6 +145,10 @@ int Run(Arguments* arguments) {
     options.cluster.site = site.description.name;
   }
   UseDefaults(&options);
+  if (options.bus == options.link) {
+    throw std::runtime_error(
+        fmt::format("--bus and --link are both {}: give two LCM URLs that differ", options.bus));
+  }
   UseProcessOptions(arguments);
   if (!options.cluster.nats.empty()) {
     if (options.cluster.site.empty()) {
