@@ -152,6 +152,14 @@ TEST(SessionFolder, AnEarlierSessionIsMovedAside) {
   }
   EXPECT_TRUE(fs::exists(out / "session.lcm"));
   EXPECT_TRUE(fs::exists(out.string() + ".1/session.lcm"));
+  const Outcome with_slash = RunCommand(replay + "/");
+  EXPECT_EQ(with_slash.exit_code, 0) << with_slash.output;
+  EXPECT_TRUE(fs::exists(out.string() + ".2/session.lcm"));
+  const Outcome dot = RunCommand("cd " + out.string() +
+                                 " && pangea-session replay " PANGEA_SOURCE_DIR
+                                 "/logs/two_walks/session.lcm --until 4 --out .");
+  EXPECT_EQ(dot.exit_code, 1);
+  EXPECT_THAT(dot.output, HasSubstr("--out .: holds an earlier session"));
 }
 
 TEST(SessionMistakes, GetAnAnswer) {

@@ -18,6 +18,7 @@
 #include "replay/replay.h"
 #include "report/compare.h"
 #include "report/session_record.h"
+#include "session/out_folder.h"
 #include "session/run/session_runner.h"
 #include "session/session_file/session_file.h"
 #include "session/session_file/session_list.h"
@@ -27,25 +28,6 @@ namespace pangea::session {
 namespace {
 
 namespace fs = std::filesystem;
-
-// An earlier session in the folder is moved aside: nothing is lost.
-void PrepareOut(const fs::path& out) {
-  if (fs::exists(out) && !fs::is_directory(out)) {
-    throw std::runtime_error(fmt::format("--out {}: is a file, not a folder", out.string()));
-  }
-  if (fs::exists(out / "session.lcm")) {
-    for (int n = 1;; ++n) {
-      const fs::path aside = out.string() + fmt::format(".{}", n);
-      if (!fs::exists(aside)) {
-        fs::rename(out, aside);
-        std::cout << fmt::format("moved the earlier session in {} to {}\n", out.string(),
-                                 aside.string());
-        break;
-      }
-    }
-  }
-  fs::create_directories(out);
-}
 
 // Exit codes; a wrong command line has CLI11's, above 100; kExitLost is main's.
 constexpr int kFailed = 1;
@@ -86,7 +68,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   if (arguments.first_port != 0) {
     options.first_port = static_cast<uint16_t>(arguments.first_port);
   }
-  PrepareOut(options.out);
+  const OutFolder out(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
   WriteTiming(summary.wall_s, options.out);
@@ -190,7 +172,7 @@ ReplaySummary RunWholeReplay(const ReplayArguments& arguments, const ServerOptio
 int RunReplayOnly(const ReplayArguments& arguments, LogReadings* readings) {
   const std::string log = fs::path(arguments.out) / "session.lcm";
   const ServerOptions options = OptionsOf(arguments, readings);
-  PrepareOut(arguments.out);
+  const OutFolder out(arguments.out);
   RunReplayPart(arguments, options, log, readings);
   return PrintDiff(arguments.diff.empty() ? arguments.logs.front() : arguments.diff, log,
                    arguments.until_s, readings);
@@ -217,7 +199,7 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   }
   const SessionRecord known = KnownOf(arguments);
   const ServerOptions options = OptionsOf(arguments, readings);
-  PrepareOut(out);
+  const OutFolder folder(out);
   const int64_t begin = SteadyMicros();
   if (arguments.checkpoint_s) {
     RunReplayPart(arguments, options, out / "session.lcm", readings);

@@ -1,0 +1,70 @@
+#include "session/out_folder.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <stdexcept>
+#include <system_error>
+
+#include "files/make_folder.h"
+
+namespace pangea::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// As its name: without the slash that a shell completes it with.
+fs::path WithoutSlash(const fs::path& folder) {
+  const fs::path normal = folder.lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+}  // namespace
+
+OutFolder::OutFolder(const fs::path& given) : folder_(WithoutSlash(given)) {
+  if (fs::exists(folder_) && !fs::is_directory(folder_)) {
+    throw std::runtime_error(fmt::format("--out {}: is a file, not a folder", given.string()));
+  }
+  if (fs::exists(folder_ / "session.lcm")) {
+    MoveAside(given);
+  }
+  MakeFolder(folder_);
+}
+
+void OutFolder::MoveAside(const fs::path& given) {
+  if (folder_ == "." || folder_.filename() == "..") {
+    throw std::runtime_error(fmt::format(
+        "--out {}: holds an earlier session, and the folder one is in is not moved aside; give "
+        "another folder",
+        given.string()));
+  }
+  fs::path aside;
+  for (int n = 1; aside.empty() || fs::exists(aside); ++n) {
+    aside = folder_.string() + fmt::format(".{}", n);
+  }
+  std::error_code error;
+  fs::rename(folder_, aside, error);
+  if (error) {
+    throw std::runtime_error(
+        fmt::format("--out {}: holds an earlier session, which cannot be moved to {}: {}; give "
+                    "another folder",
+                    given.string(), aside.string(), error.message()));
+  }
+  std::cout << fmt::format("moved the earlier session in {} to {}\n", folder_.string(),
+                           aside.string());
+  aside_ = aside;
+}
+
+OutFolder::~OutFolder() {
+  std::error_code error;
+  if (!aside_ || !fs::is_empty(folder_, error) || error) {
+    return;
+  }
+  fs::remove(folder_, error);
+  fs::rename(*aside_, folder_, error);
+  if (!error) {
+    std::cout << fmt::format("moved it back to {}\n", folder_.string());
+  }
+}
+
+}  // namespace pangea::session
