@@ -41,5 +41,27 @@ TEST(SessionFaults, ACutOffAgentAndAKilledProcessCostNothing) {
   fs::remove_all(folder);
 }
 
+// As on a full disk: no file grows beyond 300 kB. The server never gets the rest written.
+TEST(SessionFaults, AFullDiskIsSaidAndCtrlCEndsTheWaiting) {
+  const fs::path folder = FreshFolder("session_full_disk");
+  const std::string keyframes = "keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
+  const fs::path file = WriteSession(folder, {"id: 1, " + keyframes, "id: 2, " + keyframes});
+  const std::string said = (folder / "said.txt").string();
+  const Outcome run = RunCommand(
+      "trap '' XFSZ; ulimit -f $((300 * 1024 / 512)); pangea-session run " + file.string() +
+      " --rate max --out " + (folder / "out").string() + " >" + said + " 2>&1 & session=$!; " +
+      "for i in $(seq 400); do grep -q 'REFUSES WRITES' " + said + " && test $(grep -c 'done$' " +
+      said +
+      ") -ge 2 && break; sleep 0.1; done; sleep 2; "
+      "kill -INT $session; for i in $(seq 150); do kill -0 $session || break; sleep 0.1; done; "
+      "kill -9 $session && echo IT GOES ON; wait $session");
+  EXPECT_EQ(run.exit_code, 1) << run.output;
+  EXPECT_THAT(run.output, testing::Not(HasSubstr("IT GOES ON")));
+  EXPECT_THAT(ReadFile(said),
+              testing::AllOf(HasSubstr("agent_handler: THE DISK REFUSES WRITES: make room in"),
+                             HasSubstr("the server had not worked off what had come")));
+  fs::remove_all(folder);
+}
+
 }  // namespace
 }  // namespace pangea::tests

@@ -72,10 +72,11 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
   WriteTiming(summary.wall_s, options.out);
-  const int exit_code = Print(ReportRun(script, summary, options.out, readings));
+  // Before the report, which a full disk has no room for.
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
   }
+  const int exit_code = Print(ReportRun(script, summary, options.out, readings));
   return summary.failures.empty() ? exit_code : kFailed;
 }
 

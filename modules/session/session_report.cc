@@ -125,9 +125,6 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
     ++input.restarts[name];
   }
   input.notes = summary.failures;
-  if (summary.interrupted) {
-    input.notes.emplace_back("interrupted: the recordings were not played to their end");
-  }
   input.anchors = WantedAnchors(script);
   input.expect = script.expect;
   NoteOptions(input.server_log, readings, &input);

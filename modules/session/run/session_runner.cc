@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <iterator>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "bus/process.h"
@@ -257,8 +258,11 @@ class Runner {
         player.ended_s = Now();
       }
     }
-    summary_.interrupted = StopRequested() && (ends_others || !ends_live);
-    if (StopRequested() && !summary_.interrupted) {
+    stopped_ = StopRequested();
+    interrupted_ = stopped_ && (ends_others || !ends_live);
+    if (interrupted_) {
+      summary_.failures.emplace_back("interrupted: the recordings were not played to their end");
+    } else if (stopped_) {
       progress_.PrintLine("the server works off what has come; Ctrl-C again ends it at once");
     }
   }
@@ -332,11 +336,24 @@ class Runner {
     }
   }
 
+  // In its status, which nobody reads while the session runs. It goes on once there is room.
+  void TellRefusedDisks() {
+    for (const auto& [name, status] : monitor_.statuses()) {
+      if (status.summary.find("DISK REFUSES WRITES") != std::string::npos &&
+          refused_disks_.insert(name).second) {
+        progress_.PrintLine(fmt::format(
+            "{}: THE DISK REFUSES WRITES: make room in {}, and it goes on; Ctrl-C ends the session",
+            name, options_.out.string()));
+      }
+    }
+  }
+
   void Step() {
     InjectFaults();
     monitor_.Handle(100);
     anchors_.Step();
     Revive();
+    TellRefusedDisks();
     std::vector<AgentLine> lines;
     for (const Player& player : players_) {
       lines.push_back({player.script.id, player.child.has_value(), player.done()});
@@ -357,18 +374,21 @@ class Runner {
   // Until every process has worked off what has come. A server that goes on verifying is slow, not
   // stuck: it is waited for.
   void Drain() {
-    const double patience_s = summary_.interrupted ? 2 * kQuiet_s : kStuckAfter_s;
-    // Of a live session, whose first one only ended the agents.
-    const auto ended_at_once = [] { return StopSignals() > 1; };
+    const double patience_s = interrupted_ ? 2 * kQuiet_s : kStuckAfter_s;
+    const int most_signals = stopped_ ? 1 : 0;  // that one only ended the agents
     double deadline = Now() + patience_s;
     int results = monitor_.num_results();
-    while (!monitor_.Idle(Working(), kQuiet_s) && !ended_at_once()) {
-      if (!summary_.interrupted && monitor_.num_results() > results) {
+    while (!monitor_.Idle(Working(), kQuiet_s)) {
+      if (StopSignals() > most_signals) {
+        summary_.failures.emplace_back("interrupted: the server had not worked off what had come");
+        return;
+      }
+      if (!interrupted_ && monitor_.num_results() > results) {
         results = monitor_.num_results();
         deadline = Now() + patience_s;
       }
       if (Now() > deadline) {
-        if (!summary_.interrupted) {
+        if (!interrupted_) {
           summary_.failures.push_back(fmt::format(
               "the server is not idle {} s after its last verification result", kStuckAfter_s));
         }
@@ -388,6 +408,9 @@ class Runner {
   KeptProcesses kept_;
   std::vector<Player> players_;
   std::vector<std::string> server_names_;
+  std::set<std::string> refused_disks_;  // processes that have been told of
+  bool stopped_ = false;                 // Ctrl-C came while agents played
+  bool interrupted_ = false;             // ... and they were recordings
   RunSummary summary_;
   double begin_ = 0;
   double play_begin_ = 0;

@@ -24,7 +24,6 @@ struct RunOptions {
 // What the captured logs cannot tell about a run.
 struct RunSummary {
   double wall_s = 0;
-  bool interrupted = false;                // Ctrl-C
   std::vector<std::string> restarted;      // names, once for each restart
   std::vector<std::string> failures;       // one line each: what could not be done
   std::map<std::string, status_t> status;  // newest status of each process
@@ -32,7 +31,8 @@ struct RunSummary {
   std::map<int32_t, double> played_s;      // how much of its recording it played
 };
 
-// Blocks until every recording is played and the server has worked everything off, or Ctrl-C.
+// Blocks until every recording is played and the server has worked everything off, or Ctrl-C; once
+// nothing is played any more, Ctrl-C ends it at once.
 // Progress goes to stdout. Throws std::runtime_error when the session cannot be started.
 RunSummary RunSession(const SessionScript& script, const RunOptions& options);
 
