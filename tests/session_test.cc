@@ -162,6 +162,33 @@ TEST(SessionFolder, AnEarlierSessionIsMovedAside) {
   EXPECT_THAT(dot.output, HasSubstr("--out .: holds an earlier session"));
 }
 
+// What is replayed is looked at before anything is moved for good.
+TEST(SessionMistakes, OfAReplayLeaveTheEarlierSession) {
+  const fs::path out = FreshFolder("replay_mistakes") / "out";
+  const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm ";
+  const std::string replay = "pangea-session replay " + log;
+  fs::create_directories(out);
+  std::ofstream(out / "session.lcm") << "mine";
+  const auto said = [&](const std::string& command) {
+    const Outcome outcome = RunCommand(command + " --out " + out.string());
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    EXPECT_EQ(ReadFile(out / "session.lcm"), "mine") << outcome.output;
+    EXPECT_FALSE(fs::exists(out.string() + ".1"));
+    return outcome.output;
+  };
+  EXPECT_THAT(said(replay + "--until 0.001"), HasSubstr("no keyframe had come by then"));
+  EXPECT_THAT(said(replay + log), HasSubstr("is given twice: give each log once"));
+  const std::string agent_9 = "--recording 9=" PANGEA_SOURCE_DIR;
+  EXPECT_THAT(said(replay + agent_9), HasSubstr("there are agents 1, 2"));
+  fs::remove(out / "session.lcm");
+  const fs::path no_keyframes = out.parent_path() / "constraints.lcm";
+  RunCommand("pangea-log cut " + log + "--channels CONSTRAINT --out " + no_keyframes.string());
+  const Outcome report =
+      RunCommand("pangea-session report " + no_keyframes.string() + " --out " + out.string());
+  EXPECT_EQ(report.exit_code, 1);
+  EXPECT_THAT(report.output, HasSubstr("no KEYFRAME_* in this log"));
+}
+
 TEST(SessionMistakes, GetAnAnswer) {
   const fs::path folder = FreshFolder("mistakes");
   const fs::path missing = WriteSession(folder, {"id: 1, recording: nowhere"});

@@ -70,6 +70,19 @@ std::string ChannelTable(const LogSummary& summary) {
 
 }  // namespace
 
+std::set<int32_t> AgentsIn(const std::vector<std::string>& logs, LogReadings* readings) {
+  std::set<int32_t> agents;
+  const auto add = [&agents](const LogEvent& event) {
+    if (event.channel.starts_with(channels::kKeyframePrefix)) {
+      agents.insert(channels::AgentOf(event.channel, channels::kKeyframePrefix));
+    }
+  };
+  for (const std::string& log : logs) {
+    ReadLog(log, add, readings);
+  }
+  return agents;
+}
+
 LogSummary Summarise(const std::string& log) {
   LogSummary summary;
   LogReadings readings;

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "core/ids.h"
 #include "log_file/log_reading.h"
@@ -30,6 +31,8 @@ struct LogSummary {
 
 // Of what can be read of it. Throws std::runtime_error when the log cannot be opened, or is none.
 LogSummary Summarise(const std::string& log);
+// Who made keyframes in the logs, by their channels.
+std::set<int32_t> AgentsIn(const std::vector<std::string>& logs, LogReadings* readings = nullptr);
 // For people.
 std::string ToText(const LogSummary& summary, const std::string& log);
 

@@ -16,6 +16,7 @@
 #include "log_tools/log_export.h"
 #include "log_tools/log_import.h"
 #include "log_tools/log_info.h"
+#include "log_tools/recording_arguments.h"
 
 namespace pangea::session {
 namespace {
@@ -158,6 +159,26 @@ TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
   EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
+TEST_F(LogToolsTest, AListWithoutAnEventIsRefusedAsACutIs) {
+  std::ostringstream out;
+  EXPECT_THAT([&] { ListEvents(kSample, {.channels = "NOPE"}, ListAs::kLines, out); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::HasSubstr("session.lcm: no event of NOPE from 0 to inf s; pangea-log")));
+  EXPECT_EQ(out.str(), "");
+  ListEvents(kSample, {.to_s = 1}, ListAs::kLines, out);
+  EXPECT_NE(out.str(), "");
+}
+
+TEST_F(LogToolsTest, ARecordingIsOfAnAgentOfTheLog) {
+  const std::string folder = testing::TempDir();
+  EXPECT_EQ(AgentsIn({kSample}), (std::set<int32_t>{1, 2}));
+  EXPECT_EQ(RecordingsOf({"2=" + folder}, {kSample}).at(2), folder);
+  EXPECT_THAT([&] { RecordingsOf({"9=" + folder}, {kSample}); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::AllOf(testing::HasSubstr("no keyframes of agent 9 in"),
+                                 testing::HasSubstr("there are agents 1, 2"))));
+}
+
 // An independent reading of the file has the cost that our own convention gives.
 TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   const NamedGraph named = GraphOf(kSample);
@@ -261,6 +282,9 @@ TEST_F(BadG2oTest, NamesLineAndField) {
   EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 0.5 0 0 0 0 0 0 1\n"),
             "bad.g2o:1: the id '0.5' is no vertex' number");
   EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n"), testing::HasSubstr("not a rotation"));
+  EXPECT_EQ(ErrorOf("\x1b[2J\xff" + std::string(100, 'a') + "\n"),
+            "bad.g2o:1: ?[2J?" + std::string(35, 'a') +
+                "... is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX");
 }
 
 TEST_F(BadG2oTest, NothingIsThereTwiceOrNowhere) {

@@ -10,9 +10,11 @@
 #include <stdexcept>
 
 #include "bus/process.h"
+#include "files/make_folder.h"
 #include "files/progress.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
+#include "log_tools/log_info.h"
 #include "log_tools/recording_arguments.h"
 #include "options/command_line.h"
 #include "replay/replay.h"
@@ -89,12 +91,12 @@ struct LogArguments {
 };
 
 // What is given on the command line goes before what the capture remembers.
-SessionRecord KnownOf(const LogArguments& arguments) {
+SessionRecord KnownOf(const LogArguments& arguments, LogReadings* readings) {
   SessionRecord known = ReadSessionRecord({arguments.logs.begin(), arguments.logs.end()});
   if (!arguments.expect.empty()) {
     known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
   }
-  for (const auto& [id, folder] : RecordingsById(arguments.recordings)) {
+  for (const auto& [id, folder] : RecordingsOf(arguments.recordings, arguments.logs, readings)) {
     AgentRun run;
     run.id = id;
     run.recording = folder;
@@ -102,6 +104,17 @@ SessionRecord KnownOf(const LogArguments& arguments) {
     known.agents.push_back(run);
   }
   return known;
+}
+
+// Or it would be two walks of the same agents.
+void CheckGivenOnce(const std::vector<std::string>& logs) {
+  for (size_t i = 1; i < logs.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      if (fs::equivalent(logs[i], logs[j])) {
+        throw std::runtime_error(fmt::format("{}: is given twice: give each log once", logs[i]));
+      }
+    }
+  }
 }
 
 struct ReplayArguments : LogArguments {
@@ -198,7 +211,8 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   if (!arguments.only.empty()) {
     return RunReplayOnly(arguments, readings);
   }
-  const SessionRecord known = KnownOf(arguments);
+  CheckGivenOnce(arguments.logs);
+  const SessionRecord known = KnownOf(arguments, readings);
   const ServerOptions options = OptionsOf(arguments, readings);
   const OutFolder folder(out);
   const int64_t begin = SteadyMicros();
@@ -226,8 +240,14 @@ int RunReport(const LogArguments& arguments, LogReadings* readings) {
     throw std::runtime_error(fmt::format(
         "--out {}: holds a session and its own report; give another folder", arguments.out));
   }
-  fs::create_directories(arguments.out);
-  return Print(ReportLog(arguments.logs.front(), KnownOf(arguments), arguments.out, readings));
+  if (AgentsIn(arguments.logs, readings).empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: no KEYFRAME_* in this log; give that of a server's bus: session.lcm, journal.lcm",
+        arguments.logs.front()));
+  }
+  const SessionRecord known = KnownOf(arguments, readings);
+  MakeFolder(arguments.out);
+  return Print(ReportLog(arguments.logs.front(), known, arguments.out, readings));
 }
 
 void AddResultOptions(CLI::App& command, LogArguments* arguments) {
