@@ -203,6 +203,21 @@ TEST(SessionMistakes, GetAnAnswer) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("recordin"), HasSubstr("recording")));
 
+  // Before anything is started or moved.
+  fs::create_directories(folder / "empty" / "mav0" / "cam0");
+  fs::create_directories(folder / "empty" / "mav0" / "imu0");
+  const fs::path empty = WriteSession(folder, {"id: 1, recording: empty"});
+  outcome =
+      RunCommand("pangea-session run " + empty.string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("pangea-session: agent 1: "));
+  const fs::path late = WriteSession(folder, {"id: 1, start: 500, recording: " + Walk(1).string()});
+  outcome =
+      RunCommand("pangea-session run " + late.string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("agent 1: start: 500 is beyond the end of"));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+
   const fs::path cut_off =
       WriteSession(folder, {"id: 1, keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm"});
   std::ofstream(cut_off, std::ios::app) << "faults: [{at: 1, disconnect: 1}]\n";

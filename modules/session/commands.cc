@@ -21,6 +21,7 @@
 #include "report/compare.h"
 #include "report/session_record.h"
 #include "session/out_folder.h"
+#include "session/processes/player.h"
 #include "session/run/session_runner.h"
 #include "session/session_file/session_file.h"
 #include "session/session_file/session_list.h"
@@ -62,6 +63,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
       ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
   CheckRate(arguments.rate, script);
   PlaceDisconnects(arguments.rate, &script);
+  std::ranges::for_each(script.agents, CheckRecording);
   RunOptions options;
   options.out = fs::path(arguments.out);
   options.rate = arguments.rate;

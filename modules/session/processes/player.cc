@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "bus/process.h"
+#include "recording/euroc.h"
 
 namespace pangea::session {
 
@@ -11,6 +14,24 @@ double Now() { return 1e-6 * static_cast<double>(WallUtime()); }
 bool Player::IsOver() const {
   return script.live && script.duration_s > 0 && started_s > 0 &&
          Now() - started_s >= script.duration_s;
+}
+
+void CheckRecording(const AgentScript& script) {
+  if (script.live || !script.keyframes.empty()) {
+    return;  // then it is for the ground truth alone
+  }
+  try {
+    const EurocRecording recording(script.resolved.string());
+    const auto& images = recording.images();
+    const double length_s = 1e-6 * static_cast<double>(images.back().utime - images.front().utime);
+    if (script.start_s > length_s) {
+      throw std::runtime_error(
+          fmt::format("start: {:g} is beyond the end of {}, which is {:.1f} s long", script.start_s,
+                      recording.mav0(), length_s));
+    }
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("agent {}: {}", script.id, error.what()));
+  }
 }
 
 std::vector<std::string> InputOf(const Player& player, const std::string& rate) {

@@ -29,6 +29,9 @@ struct Player {
   bool IsOver() const;
 };
 
+// Throws std::runtime_error, naming the agent, about a recording that its odometry would refuse.
+void CheckRecording(const AgentScript& script);
+
 // What it plays, as arguments of its program.
 std::vector<std::string> InputOf(const Player& player, const std::string& rate);
 

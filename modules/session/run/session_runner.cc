@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "bus/process.h"
+#include "files/make_folder.h"
 #include "files/text_file.h"
 #include "link/agent_key.h"
 #include "options/yaml_options.h"
@@ -55,7 +56,7 @@ class Runner {
 
   RunSummary Run() {
     begin_ = Now();
-    fs::create_directories(options_.out / "logs");
+    MakeFolder(options_.out / "logs");
     // The processes are one-threaded by design; BLAS must not start threads behind their back.
     setenv("OMP_NUM_THREADS", "1", 1);
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
@@ -98,7 +99,7 @@ class Runner {
   // Only this session's processes know them.
   void MakeKeys() {
     fs::remove_all(options_.out / "keys");
-    fs::create_directories(options_.out / "keys");
+    MakeFolder(options_.out / "keys");
     for (const Player& player : players_) {
       MakeKeyFile(KeyFile(player.script.id), player.script.id);
     }
