@@ -45,8 +45,8 @@ def check(value, schema, where):
     if "$ref" in schema:
         assert set(schema) <= {"$ref", "description"}, schema
         return check(value, OPENAPI["components"]["schemas"][schema["$ref"].removeprefix("#/components/schemas/")], where)
-    known = {"type", "required", "additionalProperties", "properties", "items", "minItems", "maxItems", "enum", "pattern", "minimum",
-             "maximum", "minProperties", "oneOf", "description"}
+    known = {"type", "required", "additionalProperties", "properties", "items", "minItems", "maxItems", "enum", "pattern", "minLength",
+             "minimum", "maximum", "minProperties", "oneOf", "description"}
     assert set(schema) <= known, f"{where}: not checked: {set(schema) - known}"
     if "oneOf" in schema:
         fitting, wrong = 0, []
@@ -66,6 +66,7 @@ def check(value, schema, where):
         assert schema.get("minimum", value) <= value <= schema.get("maximum", value), f"{where}: {value} is out of range"
     if kind == "string":
         assert re.search(schema.get("pattern", ""), value), f"{where}: {value!r} is not {schema['pattern']}"
+        assert len(value) >= schema.get("minLength", 0), f"{where}: {value!r} is too short"
     if kind == "array":
         assert schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)), f"{where}: {len(value)} items"
         for i, item in enumerate(value):
