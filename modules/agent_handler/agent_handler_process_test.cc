@@ -55,22 +55,6 @@ TEST_F(LinkWorld, HandlerKilledAndRestartedGoesOnFromItsJournal) {
   ExpectDelivered(70);
 }
 
-TEST_F(LinkWorld, ACaptureIsNoJournal) {
-  KillHandler();
-  std::filesystem::remove(journal_path);
-  {
-    LogFileWriter capture(journal_path);
-    capture.Write(1, "KEYFRAME_1", EncodeTestKeyframe({kMap, 0}));
-    capture.Write(2, "STATUS_fusion", EncodeMessage(status_t{}));
-  }
-  const auto bytes = std::filesystem::file_size(journal_path);
-  EXPECT_THAT([this] { StartHandler(); },
-              testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
-                  testing::HasSubstr("cannot read the journal '" + journal_path),
-                  testing::HasSubstr("it has STATUS_fusion, so it is the capture of a bus"))));
-  EXPECT_EQ(std::filesystem::file_size(journal_path), bytes);
-}
-
 TEST_F(LinkWorld, ATornJournalIsHealedByRetransmission) {
   PublishKeyframes(5);
   Run(3);

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <stdexcept>
 #include <utility>
 
 #include "bus/parse_message.h"
@@ -157,13 +156,6 @@ std::optional<Keyframe> Archive::Newest(const MapId& map) const {
 }
 
 bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place) {
-  if (channel == channels::kMapState || channel.starts_with(channels::kStatusPrefix)) {
-    throw std::runtime_error(
-        fmt::format("it has {}, so it is the capture of a bus, and is left as it is: give another "
-                    "name, or take its keyframes: pangea-log cut CAPTURE --channels "
-                    "'KEYFRAME_.*' --out JOURNAL",
-                    channel));
-  }
   if (channel.starts_with(channels::kKeyframePrefix)) {
     if (const auto keyframe = ParseMessage<KeyframeMessage>(data); keyframe.value) {
       const KeyframeId& id = keyframe.value->id;
