@@ -11,8 +11,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <iterator>
-#include <ranges>
 #include <stdexcept>
 #include <system_error>
 
@@ -233,7 +231,8 @@ bool KeyFolder::IsGone(int32_t agent_id) const {
 }
 
 const AgentKey* KeyFolder::LastOf(const fs::path& file) const {
-  const auto last = std::ranges::find(files_, file, &std::pair<const int32_t, fs::path>::second);
+  const auto last = std::find_if(files_.begin(), files_.end(),
+                                 [&file](const auto& item) { return item.second == file; });
   return last == files_.end() ? nullptr : &keys_.at(last->first);
 }
 
@@ -260,9 +259,11 @@ std::map<int32_t, AgentKey> KeyFolder::Read() {
   std::map<int32_t, fs::path> files;
   unusable_.clear();
   std::vector<fs::path> order;
-  std::ranges::copy(std::views::keys(stamps), std::back_inserter(order));
-  std::ranges::stable_partition(order,
-                                [this](const fs::path& file) { return LastOf(file) != nullptr; });
+  for (const auto& [file, stamp] : stamps) {
+    order.push_back(file);
+  }
+  std::stable_partition(order.begin(), order.end(),
+                        [this](const fs::path& file) { return LastOf(file) != nullptr; });
   for (const fs::path& file : order) {
     const auto read = ReadOrLast(file);
     if (read && keys.emplace(read->agent_id, *read).second) {

@@ -102,7 +102,7 @@ std::vector<std::string> UnreadFields(const std::string& path, const std::string
   std::vector<std::string> warnings;
   for (const auto& field : fields) {
     const auto name = field.first.IsScalar() ? field.first.Scalar() : "";
-    if (std::ranges::find(known, name) == known.end() && !kForPeople.contains(name)) {
+    if (std::find(known.begin(), known.end(), name) == known.end() && !kForPeople.contains(name)) {
       const auto meant = NearestWord(name, known);
       warnings.push_back(fmt::format("{}: field '{}' is not known, and not read{}", path, name,
                                      meant ? fmt::format("; did you mean '{}'?", *meant) : ""));
