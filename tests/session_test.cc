@@ -186,7 +186,7 @@ TEST(SessionMistakes, OfAReplayLeaveTheEarlierSession) {
   const Outcome report =
       RunCommand("pangea-session report " + no_keyframes.string() + " --out " + out.string());
   EXPECT_EQ(report.exit_code, 1);
-  EXPECT_THAT(report.output, HasSubstr("no KEYFRAME_* in this log"));
+  EXPECT_THAT(report.output, HasSubstr("no KEYFRAME_* and no POSE_* in this log"));
 }
 
 TEST(SessionMistakes, GetAnAnswer) {

@@ -80,21 +80,37 @@ CalibrationFolder::CalibrationFolder(const std::string& recording, const std::st
   if (fs::exists(out_)) {
     throw std::runtime_error(fmt::format("{}: exists already; give another --out", out_));
   }
+  if (fs::exists(part_)) {
+    throw std::runtime_error(
+        fmt::format("{}: is there already, of a run that goes on or was killed; remove it, or give "
+                    "another --out",
+                    part_));
+  }
   const fs::path from = Mav0Of(recording), to = fs::path(part_) / "mav0";
   recording_mav0_ = from.string();
   const cv::Size size = SizeOfImages(from);
   const ImuNoise noise = NoiseOf(from);
-  fs::remove_all(part_);  // of a run that was killed
-  LinkEntries(from, to);
-  LinkEntries(from / "cam0", to / "cam0");
-  LinkEntries(from / "imu0", to / "imu0");
   Result nothing_known;
   nothing_known.sigma.setConstant(0.1);  // what is written must be readable
   nothing_known.parameters.camera = GuessedCamera(size.width, size.height);
-  WriteSensorYaml(part_, nothing_known, noise);
+  try {
+    LinkEntries(from, to);
+    LinkEntries(from / "cam0", to / "cam0");
+    LinkEntries(from / "imu0", to / "imu0");
+    WriteSensorYaml(part_, nothing_known, noise);
+  } catch (...) {
+    Remove();
+    throw;
+  }
 }
 
 CalibrationFolder::~CalibrationFolder() {
+  if (!finished_) {
+    Remove();
+  }
+}
+
+void CalibrationFolder::Remove() {
   std::error_code error;
   fs::remove_all(part_, error);
 }
@@ -113,6 +129,7 @@ void CalibrationFolder::Finish(const Result& result, const ImuNoise& noise,
   WriteSensorYaml(part_, result, noise);
   WriteTextFile((fs::path(part_) / "calibration.txt").string(), summary);
   fs::rename(part_, out_);
+  finished_ = true;
 }
 
 }  // namespace pangea::calibration

@@ -14,7 +14,7 @@ class CalibrationFolder {
  public:
   // Links, and sensor.yaml files that know the image's size only. What the recording's own files
   // say of noise is kept, where there are any; of the camera nothing is. Throws std::runtime_error,
-  // also when `out` exists.
+  // also when `out` or its part exists.
   CalibrationFolder(const std::string& recording, const std::string& out);
   // Removes what was not finished.
   ~CalibrationFolder();
@@ -29,7 +29,10 @@ class CalibrationFolder {
   void Finish(const Result& result, const ImuNoise& noise, const std::string& summary);
 
  private:
+  void Remove();
+
   std::string recording_mav0_, out_, part_;
+  bool finished_ = false;
 };
 
 }  // namespace pangea::calibration

@@ -12,6 +12,7 @@
 #include "core/rigid3.h"
 #include "files/text_file.h"
 #include "recording/euroc_calibration.h"
+#include "recording/sensor_file.h"
 
 namespace pangea::calibration {
 namespace {
@@ -84,6 +85,13 @@ TEST_F(Program, WhatIsWrittenIsReadAgain) {
   EXPECT_DOUBLE_EQ(ReadEurocImuCalibration(Path("imu.yaml")).noise.gyro_noise_density, 7e-4);
 }
 
+TEST_F(Program, WhatIsWrittenIsKnownToReaders) {
+  WriteTextFile(Path("cam.yaml"), CameraYaml(Some(), 30));
+  EXPECT_THAT(UnreadFields(Path("cam.yaml"), "cam0"), testing::IsEmpty());
+  WriteTextFile(Path("imu.yaml"), ImuYaml(Some(), {}));
+  EXPECT_THAT(UnreadFields(Path("imu.yaml"), "imu0"), testing::IsEmpty());
+}
+
 TEST_F(Program, TheTimeOffsetIsAsUncertainAsTheExposureMakesIt) {
   Result some = Some();
   some.sigma[kTimeOffset] = 0.004;
@@ -110,10 +118,8 @@ TEST_F(Program, OnlyACalibratedFolderIsThereInTheEnd) {
   { const CalibrationFolder refused(Path("in"), Path("out")); }
   EXPECT_FALSE(fs::exists(Path("out")));
   EXPECT_FALSE(fs::exists(Path("out.part")));
-  fs::create_directories(Path("out.part/mav0/of_a_killed_run"));
   CalibrationFolder(Path("in"), Path("out")).Finish(Some(), {}, "known");
   EXPECT_FALSE(fs::exists(Path("out.part")));
-  EXPECT_FALSE(fs::exists(Path("out/mav0/of_a_killed_run")));
   EXPECT_EQ(ReadTextFile(Path("out/calibration.txt")), "known");
   EXPECT_DOUBLE_EQ(ReadEurocCamera(Path("out/mav0/cam0/sensor.yaml")).fx,
                    Some().parameters.camera.fx);
@@ -132,6 +138,9 @@ TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {
   EXPECT_THAT(complaint(".", "out"), HasSubstr("must hold mav0/cam0 and mav0/imu0"));
   EXPECT_THAT(complaint("in", "in"), HasSubstr("give another --out"));
   EXPECT_EQ(complaint("in", "out"), "");
+  fs::create_directories(Path("out.part/somebody's"));
+  EXPECT_THAT(complaint("in", "out"), HasSubstr("out.part: is there already"));
+  EXPECT_TRUE(fs::exists(Path("out.part/somebody's")));
 }
 
 TEST(Summary, SaysWhatToDoBetter) {

@@ -246,6 +246,14 @@ std::optional<AgentKey> KeyFolder::ReadOrLast(const fs::path& file) {
   return last == nullptr ? std::nullopt : std::optional(*last);
 }
 
+// Of two keys of an agent the one that counted last counts, then the one of the usual name.
+int KeyFolder::Rank(const fs::path& file, int32_t agent_id) const {
+  const auto last = files_.find(agent_id);
+  return last != files_.end() && last->second == file         ? 2
+         : file.filename() == fs::path(KeyFileName(agent_id)) ? 1
+                                                              : 0;
+}
+
 std::map<int32_t, AgentKey> KeyFolder::Read() {
   std::error_code error;
   if (!fs::is_directory(folder_, error)) {
@@ -258,19 +266,22 @@ std::map<int32_t, AgentKey> KeyFolder::Read() {
   std::map<int32_t, AgentKey> keys;
   std::map<int32_t, fs::path> files;
   unusable_.clear();
-  std::vector<fs::path> order;
   for (const auto& [file, stamp] : stamps) {
-    order.push_back(file);
-  }
-  std::stable_partition(order.begin(), order.end(),
-                        [this](const fs::path& file) { return LastOf(file) != nullptr; });
-  for (const fs::path& file : order) {
     const auto read = ReadOrLast(file);
-    if (read && keys.emplace(read->agent_id, *read).second) {
-      files[read->agent_id] = file;
-    } else if (read) {
-      unusable_.push_back(Describe(
-          file, fmt::format("is a second key of agent {}: take one of them out", read->agent_id)));
+    if (!read) {
+      continue;
+    }
+    const int32_t id = read->agent_id;
+    const auto [counts, is_first] = files.emplace(id, file);
+    const bool comes_first = is_first || Rank(file, id) > Rank(counts->second, id);
+    if (!is_first) {
+      unusable_.push_back(
+          Describe(comes_first ? counts->second : file,
+                   fmt::format("is a second key of agent {}: take one of them out", id)));
+    }
+    if (comes_first) {
+      counts->second = file;
+      keys.insert_or_assign(id, *read);
     }
   }
   seen_ = stamps;

@@ -70,6 +70,7 @@ class KeyFolder {
   // Null where the last Read had none from this file.
   const AgentKey* LastOf(const std::filesystem::path& file) const;
   std::optional<AgentKey> ReadOrLast(const std::filesystem::path& file);
+  int Rank(const std::filesystem::path& file, int32_t agent_id) const;
 
   std::filesystem::path folder_;
   Stamps seen_;

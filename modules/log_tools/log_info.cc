@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <vector>
 
 #include "log_file/log_event.h"
@@ -73,8 +74,10 @@ std::string ChannelTable(const LogSummary& summary) {
 std::set<int32_t> AgentsIn(const std::vector<std::string>& logs, LogReadings* readings) {
   std::set<int32_t> agents;
   const auto add = [&agents](const LogEvent& event) {
-    if (event.channel.starts_with(channels::kKeyframePrefix)) {
-      agents.insert(channels::AgentOf(event.channel, channels::kKeyframePrefix));
+    for (const std::string_view prefix : {channels::kKeyframePrefix, channels::kPosePrefix}) {
+      if (event.channel.starts_with(prefix)) {
+        agents.insert(channels::AgentOf(event.channel, prefix));
+      }
     }
   };
   for (const std::string& log : logs) {

@@ -31,7 +31,7 @@ struct LogSummary {
 
 // Of what can be read of it. Throws std::runtime_error when the log cannot be opened, or is none.
 LogSummary Summarise(const std::string& log);
-// Who made keyframes in the logs, by their channels.
+// Whose odometry is in the logs, by its channels: one that never started made no keyframes.
 std::set<int32_t> AgentsIn(const std::vector<std::string>& logs, LogReadings* readings = nullptr);
 // For people.
 std::string ToText(const LogSummary& summary, const std::string& log);

@@ -175,7 +175,7 @@ TEST_F(LogToolsTest, ARecordingIsOfAnAgentOfTheLog) {
   EXPECT_EQ(RecordingsOf({"2=" + folder}, {kSample}).at(2), folder);
   EXPECT_THAT([&] { RecordingsOf({"9=" + folder}, {kSample}); },
               testing::ThrowsMessage<std::runtime_error>(
-                  testing::AllOf(testing::HasSubstr("no keyframes of agent 9 in"),
+                  testing::AllOf(testing::HasSubstr("nothing of agent 9 in"),
                                  testing::HasSubstr("there are agents 1, 2"))));
 }
 

@@ -37,7 +37,7 @@ std::map<int32_t, std::string> RecordingsOf(const std::vector<std::string>& argu
   for (const auto& [id, folder] : folders) {
     if (!agents.contains(id)) {
       throw std::runtime_error(
-          fmt::format("--recording {}={}: no keyframes of agent {} in {}; there are agents {}", id,
+          fmt::format("--recording {}={}: nothing of agent {} in {}; there are agents {}", id,
                       folder, id, fmt::join(logs, ", "), fmt::join(agents, ", ")));
     }
   }

@@ -154,16 +154,19 @@ void Append(const std::vector<std::string>& more, std::vector<std::string>* warn
 
 // Nanoseconds they must be: images of other units stand within a thousandth of a second.
 void CheckUnitOfStamps(const std::vector<EurocImage>& images, const std::string& csv) {
-  constexpr int64_t kShortest_us = 1000;
+  constexpr double kShortest_us = 1000;
   constexpr size_t kEnough = 10;
-  std::vector<int64_t> periods;
-  for (size_t i = 1; i < images.size(); ++i) {
-    periods.push_back(images[i].utime - images[i - 1].utime);
+  if (images.size() < kEnough) {
+    return;
   }
-  if (periods.size() >= kEnough && Median(periods) < kShortest_us) {
-    throw std::runtime_error(
-        fmt::format("{}: its images are {} us apart (median): are the stamps nanoseconds?", csv,
-                    Median(periods)));
+  const auto [first, last] = std::minmax_element(
+      images.begin(), images.end(),
+      [](const EurocImage& a, const EurocImage& b) { return a.utime < b.utime; });
+  const double period_us =
+      static_cast<double>(last->utime - first->utime) / static_cast<double>(images.size() - 1);
+  if (period_us < kShortest_us) {
+    throw std::runtime_error(fmt::format(
+        "{}: its images are {:.3g} us apart: are the stamps nanoseconds?", csv, period_us));
   }
 }
 

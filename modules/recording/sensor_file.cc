@@ -39,9 +39,9 @@ const std::vector<std::string> kImuFields = {"T_BS",
                                              "gyroscope_scale_sigma",
                                              "rate_hz",
                                              "update_rate"};
-const std::set<std::string> kForPeople = {"T_cn_cnm1",   "T_i_b",      "cam_overlaps",  "comment",
-                                          "model",       "rate_hz",    "readout_sigma", "rostopic",
-                                          "time_offset", "sensor_type"};
+const std::set<std::string> kForPeople = {
+    "T_cn_cnm1", "T_i_b",   "cam_overlaps",  "comment",  "gyroscope_bias", "gyroscope_bias_sigma",
+    "model",     "rate_hz", "readout_sigma", "rostopic", "time_offset",    "sensor_type"};
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& what) {
   throw std::runtime_error(fmt::format("{}: {}", path, what));
@@ -51,7 +51,7 @@ void RefuseRepeated(const YAML::Node& fields, const std::string& path) {
   std::set<std::string> seen;
   for (const auto& field : fields) {
     const auto name = field.first.IsScalar() ? field.first.Scalar() : "";
-    if (!seen.insert(name).second) {
+    if (!name.empty() && !seen.insert(name).second) {
       Refuse(path, fmt::format("field '{}' is given twice; keep one", name));
     }
   }

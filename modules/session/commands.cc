@@ -243,9 +243,10 @@ int RunReport(const LogArguments& arguments, LogReadings* readings) {
         "--out {}: holds a session and its own report; give another folder", arguments.out));
   }
   if (AgentsIn(arguments.logs, readings).empty()) {
-    throw std::runtime_error(fmt::format(
-        "{}: no KEYFRAME_* in this log; give that of a server's bus: session.lcm, journal.lcm",
-        arguments.logs.front()));
+    throw std::runtime_error(
+        fmt::format("{}: no KEYFRAME_* and no POSE_* in this log; give that of a server's bus: "
+                    "session.lcm, journal.lcm",
+                    arguments.logs.front()));
   }
   const SessionRecord known = KnownOf(arguments, readings);
   MakeFolder(arguments.out);

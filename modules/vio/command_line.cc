@@ -77,6 +77,10 @@ double ParseRate(const std::string& rate) {
 int Outcome(const VioProcess& process) {
   const std::optional<std::string> why = process.NoPoseYet();
   std::cerr << fmt::format("pangea-vio: {}\n", why ? "no pose: " + *why : process.Totals());
+  if (process.output_error()) {
+    std::cerr << fmt::format("pangea-vio: {}\n", *process.output_error());
+    return 1;
+  }
   return why && !StopRequested() ? kNoPose : 0;
 }
 

@@ -62,6 +62,9 @@ VioProcess::VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_u
   }
   if (!options_.out_tum.empty()) {
     OpenTum(options_.out_tum);
+    if (output_error_) {
+      throw std::runtime_error(*output_error_);
+    }
   }
 }
 
@@ -179,7 +182,7 @@ void VioProcess::PublishKeyframe(const Keyframe& keyframe) {
 }
 
 void VioProcess::WriteTum(const VioOutput& output) {
-  if (options_.out_tum.empty()) {
+  if (options_.out_tum.empty() || output_error_) {
     return;
   }
   if (tum_map_ != output.map) {
@@ -189,22 +192,20 @@ void VioProcess::WriteTum(const VioOutput& output) {
     }
   }
   tum_ << ToTum({{output.utime, output.T_odom_body}}) << std::flush;
-  if (!tum_) {
-    ThrowTumFailed();
-  }
+  NoteTumFailure();
 }
 
 void VioProcess::OpenTum(const std::string& file) {
   tum_file_ = file;
   tum_ = std::ofstream(file);
-  if (!tum_) {
-    ThrowTumFailed();
-  }
+  NoteTumFailure();
 }
 
-void VioProcess::ThrowTumFailed() const {
-  throw std::runtime_error(
-      fmt::format("{}: cannot be written: {}", tum_file_, std::generic_category().message(errno)));
+void VioProcess::NoteTumFailure() {
+  if (!tum_ && !output_error_) {
+    output_error_ =
+        fmt::format("{}: cannot be written: {}", tum_file_, std::generic_category().message(errno));
+  }
 }
 
 std::string VioProcess::Totals() const {

@@ -59,8 +59,7 @@ class VioProcess : public Process {
             const std::optional<CalibrationSigmas>& sigmas = std::nullopt);
   bool open() const { return vio_.has_value(); }
 
-  // As Vio::AddImage and Vio::AddTracks; throw std::runtime_error when an output file is no longer
-  // written.
+  // As Vio::AddImage and Vio::AddTracks.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
   // How far the odometry is behind its sensors, and how many images were dropped for it since the
@@ -74,6 +73,8 @@ class VioProcess : public Process {
   std::string Totals() const;
   // Why no image has given a pose so far; nothing once one has.
   std::optional<std::string> NoPoseYet() const;
+  // Why the file of poses is not whole, as on a full disk; the odometry goes on without it.
+  const std::optional<std::string>& output_error() const { return output_error_; }
   // Everything is said: the last status, with the counter finished = 1.
   void PublishFinished(int64_t now_utime);
 
@@ -93,7 +94,7 @@ class VioProcess : public Process {
   void PublishKeyframe(const Keyframe& keyframe);
   void WriteTum(const VioOutput& output);
   void OpenTum(const std::string& file);
-  [[noreturn]] void ThrowTumFailed() const;
+  void NoteTumFailure();
   std::string Summary() const;
   std::string LagText() const;
   void TellLag(int64_t now_utime);
@@ -120,6 +121,7 @@ class VioProcess : public Process {
   int64_t next_lag_told_utime_ = 0;
   std::ofstream tum_;
   std::string tum_file_;
+  std::optional<std::string> output_error_;
   std::optional<MapId> tum_map_;
   int tum_files_ = 0;
   std::optional<LogFileWriter> keyframe_log_;

@@ -223,14 +223,16 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     Discard();
   }
 
-  void Discard() {
+  void Discard(size_t discarded = 0) {
+    constexpr size_t kMost = 4 << 20;
     buffer_.clear();
-    tcp_stream().async_read_some(buffer_.prepare(kMaxHeader), [self = this->shared_from_this()](
-                                                                  beast::error_code error, size_t) {
-      if (!error) {
-        self->Discard();
-      }
-    });
+    tcp_stream().async_read_some(
+        buffer_.prepare(kMaxHeader),
+        [self = this->shared_from_this(), discarded](beast::error_code error, size_t size) {
+          if (!error && discarded + size < kMost) {
+            self->Discard(discarded + size);
+          }
+        });
   }
 
   void Note(const std::string& why) { server_.site.Refused(why); }

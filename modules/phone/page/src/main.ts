@@ -66,7 +66,7 @@ byId("record").onclick = async () => {
 };
 picture.addEventListener("click", ({ clientX, clientY }) => {
   const ownerName = (owner: number) => (owner === self() ? undefined : people.nameOf(owner));
-  if (visit.walk) void onTap(clientX, clientY, visit.walk, stage, ownerName);
+  void onTap(clientX, clientY, () => visit.walk, stage, ownerName);
 });
 
 // --- recordings, and calibrations of this phone's camera

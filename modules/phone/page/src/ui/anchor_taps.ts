@@ -6,21 +6,24 @@ import type { Walk } from "../walk";
 
 const kTapRadius = 36; // CSS pixels around an anchor
 
-// `ownerName`: nothing for the visitor's own.
-export async function onTap(x: number, y: number, walk: Walk, stage: Stage, ownerName: (owner: number) => string | undefined) {
-  if (!stage.drawn) return;
+// `current`: the walk, which may be another one when a dialog is closed. `ownerName`: nothing for the visitor's own.
+export async function onTap(
+  x: number, y: number, current: () => Walk | undefined, stage: Stage, ownerName: (owner: number) => string | undefined,
+) {
+  const walk = current();
+  if (!walk || !stage.drawn) return;
   const { utime, anchors } = stage.drawn;
   const tapped = anchors.find(({ pixel }) => {
     const [u, v] = stage.screenOf(walk.camera, pixel);
     return Math.hypot(u - x, v - y) < kTapRadius;
   });
   if (tapped) {
-    if (await asksToRemove(tapped.name, ownerName(tapped.owner))) walk.removeAnchor(tapped.id);
+    if (await asksToRemove(tapped.name, ownerName(tapped.owner))) current()?.removeAnchor(tapped.id);
     return;
   }
   const pixel = stage.pixelAt(walk.camera, x, y);
   const name = pixel && (await askName());
-  if (name) walk.placeAnchor(name, utime, pixel);
+  if (name) current()?.placeAnchor(name, utime, pixel);
 }
 
 async function askName(): Promise<string> {
