@@ -10,6 +10,7 @@
 #include "agent_handler/agent_handler_process.h"
 #include "agent_handler/keygen.h"
 #include "bus/status_log.h"
+#include "options/command_line.h"
 #include "options/options_arguments.h"
 
 int main(int argc, char** argv) {
@@ -47,10 +48,7 @@ int main(int argc, char** argv) {
     if (journal.empty() || keys.empty()) {
       throw std::runtime_error("give --journal FILE and --keys FOLDER (or: keygen --agent ID)");
     }
-    if (link == server) {
-      throw std::runtime_error(
-          fmt::format("--link and --server are both {}: give two LCM URLs that differ", link));
-    }
+    pangea::RequireTwoUrls("--link", link, "--server", server);
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::LcmBus server_bus(server);
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),

@@ -8,6 +8,7 @@
 #include "calibration/priors.h"
 #include "calibration/sensor_yaml.h"
 #include "files/csv.h"
+#include "files/make_folder.h"
 #include "files/text_file.h"
 #include "recording/euroc_calibration.h"
 #include "recording/grey_image.h"
@@ -76,7 +77,7 @@ void WriteSensorYaml(const fs::path& folder, const Result& result, const ImuNois
 }  // namespace
 
 CalibrationFolder::CalibrationFolder(const std::string& recording, const std::string& out)
-    : out_((fs::path(out) / "").parent_path().string()), part_(out_ + ".part") {
+    : out_(WithoutSlash(out).string()), part_(out_ + ".part") {
   if (fs::exists(out_)) {
     throw std::runtime_error(fmt::format("{}: exists already; give another --out", out_));
   }

@@ -16,4 +16,9 @@ void MakeFolder(const std::filesystem::path& path) {
   }
 }
 
+std::filesystem::path WithoutSlash(const std::filesystem::path& folder) {
+  const std::filesystem::path normal = folder.lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
 }  // namespace pangea

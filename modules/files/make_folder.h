@@ -8,4 +8,7 @@ namespace pangea {
 // cause.
 void MakeFolder(const std::filesystem::path& path);
 
+// As its name: without the slash that a shell completes it with.
+std::filesystem::path WithoutSlash(const std::filesystem::path& folder);
+
 }  // namespace pangea

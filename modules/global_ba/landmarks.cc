@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/triangulation.h"
+#include "core/numerics/triangulation.h"
 
 namespace pangea {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "bus/status_log.h"
 #include "link_emulator/link_emulator_process.h"
+#include "options/command_line.h"
 #include "options/options_arguments.h"
 
 int main(int argc, char** argv) {
@@ -32,12 +33,7 @@ int main(int argc, char** argv) {
     if (agent_id == 0 || agent_link.empty() || server_link.empty() || status_bus.empty()) {
       throw std::runtime_error("give --agent ID, --agent-link, --server-link and --bus URL");
     }
-    if (agent_link == server_link) {
-      throw std::runtime_error(
-          fmt::format("--agent-link and --server-link are both {}: give two LCM URLs that differ, "
-                      "or it relays what it has sent itself",
-                      agent_link));
-    }
+    pangea::RequireTwoUrls("--agent-link", agent_link, "--server-link", server_link);
     constexpr auto kNoFragments = pangea::LcmBus::Fragments::kRefused;
     pangea::LcmBus agent_bus(agent_link, kNoFragments), server_bus(server_link, kNoFragments);
     pangea::LcmBus status(status_bus);

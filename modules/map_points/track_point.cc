@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/triangulation.h"
+#include "core/numerics/triangulation.h"
 
 namespace pangea {
 namespace {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 
 namespace pangea {
 namespace {
@@ -40,6 +41,14 @@ bool OutputIsWritten(const std::string& program) {
   }
   std::cerr << fmt::format("{}: the output cannot be written (disk full?)\n", program);
   return false;
+}
+
+void RequireTwoUrls(const std::string& option, const std::string& url,
+                    const std::string& other_option, const std::string& other_url) {
+  if (url == other_url) {
+    throw std::runtime_error(fmt::format("{} and {} are both {}: give two LCM URLs that differ",
+                                         option, other_option, url));
+  }
 }
 
 CLI::Validator Positive() {

@@ -14,6 +14,10 @@ int RunSubcommand(CLI::App& app, int argc, char** argv);
 // behind the program's name.
 bool OutputIsWritten(const std::string& program);
 
+// Throws std::runtime_error where two options name one LCM URL: what is relayed would come back.
+void RequireTwoUrls(const std::string& option, const std::string& url,
+                    const std::string& other_option, const std::string& other_url);
+
 // For an option's check(): finite, and above 0; or not below. CLI11's own let nan pass.
 CLI::Validator Positive();
 CLI::Validator NotNegative();

@@ -9,17 +9,8 @@
 #include "files/make_folder.h"
 
 namespace pangea::session {
-namespace {
 
 namespace fs = std::filesystem;
-
-// As its name: without the slash that a shell completes it with.
-fs::path WithoutSlash(const fs::path& folder) {
-  const fs::path normal = folder.lexically_normal();
-  return normal.has_filename() ? normal : normal.parent_path();
-}
-
-}  // namespace
 
 OutFolder::OutFolder(const fs::path& given) : folder_(WithoutSlash(given)) {
   if (fs::exists(folder_) && !fs::is_directory(folder_)) {

@@ -7,6 +7,7 @@
 
 #include "bus/status_log.h"
 #include "link/agent_key.h"
+#include "options/command_line.h"
 #include "options/options_arguments.h"
 #include "uplink/uplink_process.h"
 
@@ -41,10 +42,7 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
   if (a.agent_id == 0 || a.key.empty()) {
     throw std::runtime_error("give --agent ID and --key FILE");
   }
-  if (a.bus == a.link) {
-    throw std::runtime_error(
-        fmt::format("--bus and --link are both {}: give two LCM URLs that differ", a.bus));
-  }
+  RequireTwoUrls("--bus", a.bus, "--link", a.link);
   std::optional<Spool> spool;
   std::optional<EditSpool> edit_spool;
   if (!a.spool.empty()) {

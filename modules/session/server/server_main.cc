@@ -9,6 +9,7 @@
 
 #include "bus/bus.h"
 #include "link/wire.h"
+#include "options/command_line.h"
 #include "session/server/server.h"
 #include "site/site.h"
 #include "web/web_rules.h"
@@ -145,10 +146,7 @@ int Run(Arguments* arguments) {
     options.cluster.site = site.description.name;
   }
   UseDefaults(&options);
-  if (options.bus == options.link) {
-    throw std::runtime_error(
-        fmt::format("--bus and --link are both {}: give two LCM URLs that differ", options.bus));
-  }
+  RequireTwoUrls("--bus", options.bus, "--link", options.link);
   UseProcessOptions(arguments);
   if (!options.cluster.nats.empty()) {
     if (options.cluster.site.empty()) {

@@ -10,7 +10,7 @@
 #include <iostream>
 #include <map>
 
-#include "core/triangulation.h"
+#include "core/numerics/triangulation.h"
 #include "recording/euroc.h"
 #include "vio/front_end/tracker.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/triangulation.h"
+#include "core/numerics/triangulation.h"
 
 namespace pangea::vio {
 namespace {

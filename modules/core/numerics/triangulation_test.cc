@@ -1,4 +1,4 @@
-#include "core/triangulation.h"
+#include "core/numerics/triangulation.h"
 
 #include <gtest/gtest.h>
 
