@@ -53,7 +53,7 @@ int64_t DueResults::NumToCatchUp(const JournalFollower& journal) const {
   return std::ranges::count_if(due_, [&journal](const auto& item) {
     const Due& due = item.second;
     const auto goal = journal.Goal(due.query.map);
-    // Asked for twice by its name: the journal does not have it, it is still to be verified.
+    // A result requested twice without an answer is not in the journal: it is still to be verified.
     return goal && due.query.seq <= *goal && due.wait_us < 4 * timeouts::kResultWait_us;
   });
 }

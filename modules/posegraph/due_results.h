@@ -1,7 +1,8 @@
 #pragma once
 
-// Verification results that a PLACE_MATCH promised: which came, and when those that did not are
-// asked for by name (posegraph_process.h says why and how often). Bounds: kMax of them are watched.
+// Verification results that a PLACE_MATCH promised: records which of them arrived, and requests the
+// overdue ones by constraint id (posegraph_process.h says why and how often). At most kMax are
+// watched; a result promised beyond that is not requested.
 
 #include <cstdint>
 #include <map>
@@ -17,17 +18,18 @@ namespace pangea {
 class DueResults {
  public:
   void Promise(const PlaceMatch& match, int64_t now_utime);
-  // False when it is a repeat.
+  // False if this result was received before.
   bool MarkReceived(int64_t constraint_id);
-  // Looked at once a second.
+  // Publishes the requests; does nothing if it was called less than a second ago.
   void RequestOverdue(Node& node, int64_t now_utime);
 
   void Save(ByteWriter* writer) const;
-  // As if they were promised now.
+  // Every outstanding result is then treated as if it had been promised at `now_utime`.
   void Restore(ByteReader* reader, int64_t now_utime);
 
   size_t size() const { return due_.size(); }
-  // Of the journal, still to come.
+  // Number of results that the journal may hold and that have not arrived. A result requested twice
+  // without an answer is not counted: it is not in the journal and has yet to be verified.
   int64_t NumToCatchUp(const JournalFollower& journal) const;
 
  private:

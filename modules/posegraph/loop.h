@@ -1,6 +1,6 @@
 #pragma once
 
-// An accepted constraint whose keyframes are both known, as the pose graph works with it.
+// A loop closure of the pose graph: an accepted constraint whose two keyframes are both known.
 
 #include <cstdint>
 
@@ -21,8 +21,8 @@ struct Loop {
   NodeRef to;
   Relative4 relative;
   int num_inliers = 0;
-  bool derived = false;  // stands for constraints that merged its maps before
-  // Weight it had in the last solve: in force or switched off.
+  bool derived = false;  // made by thinning, in place of constraints that had merged the two maps
+  // Result of the last solve: true if the loop is in force, false if the solve switched it off.
   bool on = true;
 
   bool intra() const { return from.map == to.map; }

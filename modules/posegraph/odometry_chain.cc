@@ -9,7 +9,7 @@
 namespace pangea {
 namespace {
 
-// Of a keyframe without points: a room's usual depth, metres.
+// Scene depth of a keyframe without points, metres: typical for a room.
 constexpr double kUsualDepth = 3;
 
 Eigen::Vector3d MiddleOfScene(const Keyframe& keyframe) {
@@ -90,7 +90,8 @@ void OdometryChain::Bridge(Node* node) {
   node->edge_from = static_cast<int>(nodes_.size()) - 1;
   node->edge.t = node->T_odom_body.t - from.T_odom_body.t;
   node->edge.yaw = 0;
-  // Errors of the missing steps add up; each step's yaw error moves on average half the gap.
+  // Errors of the missing steps add up; on average, the yaw error of a step acts on half of the
+  // gap.
   node->edge.covariance =
       CovarianceAt(usual * ((node->seq - from.seq) / count), 0.5 * node->edge.t);
   ++num_bridged_;
@@ -99,7 +100,7 @@ void OdometryChain::Bridge(Node* node) {
 void OdometryChain::Accumulate(Node* node) const {
   const Node& from = nodes_[node->edge_from];
   node->path_m = from.path_m + node->edge.t.norm();
-  // The edge's error moves a point P by dt + z x (P - p_to) dyaw; at the origin P = 0.
+  // The edge's error moves a point P by dt + z x (P - p_to) dyaw; here P = 0, the origin of odom.
   node->drift_sum = from.drift_sum + CovarianceAt(node->edge.covariance, -node->T_odom_body.t);
 }
 

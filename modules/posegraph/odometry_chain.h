@@ -1,11 +1,12 @@
 #pragma once
 
-// One map's keyframes as the pose graph keeps them, and how far its odometry may have drifted
-// between any two of them.
+// The keyframes of one map as the pose graph stores them, and the covariance of the odometry's
+// drift between any two of them.
 //
-// In: keyframes of one map, ascending seq. Out: for nodes i and j the covariance of their relative
-// pose by the odometry alone, in constant time: each edge's error, seen as a displacement of all
-// that hangs on it, is a 4x4 form that adds up along the chain (prefix sums).
+// Input: the keyframes of one map in ascending seq. Output: for nodes i and j the covariance of
+// their relative pose from odometry alone, in constant time. The error of an edge displaces every
+// node after it. Expressed at the origin of odom, the covariance of that displacement is a 4x4
+// matrix, and those of successive edges add up: the chain stores prefix sums.
 
 #include <cstdint>
 #include <optional>
@@ -24,21 +25,21 @@ class OdometryChain {
     int64_t utime = 0;
     Rigid3 T_odom_body;
     Eigen::Matrix2d roll_pitch_covariance;
-    Eigen::Vector3d scene_odom;  // the middle of what it sees
+    Eigen::Vector3d scene_odom;  // the point on the optical axis at the median depth
     double scale_sigma = 0;      // Keyframe::scale_sigma
-    int edge_from = -1;          // index of the node its odometry edge begins at; -1 for the first
+    int edge_from = -1;          // index of the node where its odometry edge begins; -1: first node
     Relative4 edge;
     double path_m = 0;                      // travelled since the map's first keyframe
-    Matrix4d drift_sum = Matrix4d::Zero();  // of all edges before, at the origin of odom
+    Matrix4d drift_sum = Matrix4d::Zero();  // of all edges up to this node, at the origin of odom
   };
 
-  // False when it is there already or older than the newest. A keyframe without a usable edge is
-  // joined to the one before it by a composite edge: the relative pose of the two odometry poses,
-  // and the usual covariance of this map's edges for each keyframe that is missing.
+  // False if the keyframe is a repeat or older than the newest one. A keyframe without a usable
+  // edge is joined to its predecessor by a composite edge: the relative pose of their two odometry
+  // poses, with the mean covariance of this map's recent edges, once per missing keyframe.
   bool Add(const Keyframe& keyframe);
 
   void Save(ByteWriter* writer) const;
-  // False if these are not the bytes of one.
+  // False if the bytes are not those of an OdometryChain.
   bool Restore(ByteReader* reader);
 
   size_t size() const { return nodes_.size(); }
@@ -47,18 +48,18 @@ class OdometryChain {
   std::optional<int> Find(int32_t seq) const;
   int num_bridged() const { return num_bridged_; }
 
-  // Covariance, in the odom axes, of the displacement of `point_odom` (hanging on node j) relative
-  // to node i.
+  // Covariance of (x, y, z, yaw), in the odom axes: the displacement relative to node i of
+  // `point_odom`, a point rigidly attached to node j.
   Matrix4d DriftBetween(int i, int j, const Eigen::Vector3d& point_odom) const;
   double PathBetween(int i, int j) const;
-  double UnknownScale() const;  // sigma of the map's scale; 0 for a metric map
+  double UnknownScale() const;  // sigma of the map's log-scale; 0: the map is metric
 
  private:
   void JoinByEdge(const OdometryEdge& edge, int from, Node* node) const;
   void Bridge(Node* node);
   void Accumulate(Node* node) const;
 
-  // The one list of a node's parts, for writing and reading.
+  // Lists the members of a node once, for both Save and Restore.
   template <typename NodeType, typename Visit>
   static void VisitParts(NodeType& node, const Visit& visit) {
     visit(&node.seq);

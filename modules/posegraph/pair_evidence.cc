@@ -11,24 +11,25 @@
 namespace pangea {
 namespace {
 
-// Beyond this many a pair's decision stands on what it has: agreement takes a pass over all.
+// A pair takes no further candidates beyond this number: each new one is compared with all others.
 constexpr size_t kMaxCandidates = 600;
 constexpr size_t kMaxSeeds = 10;
 constexpr size_t kMaxCompared = 40;
 
-// Viewpoints that must agree: constraints that differ by a keyframe elsewhere, in either map. Fewer
-// are enough if each has so many inliers.
+// Number of viewpoints that must agree: constraints are different viewpoints if their keyframes are
+// elsewhere in either map. Fewer are enough if each has kStrongInliers inliers.
 constexpr int kMinViewpoints = 3;
 constexpr int kMinStrongViewpoints = 2;
 constexpr int kStrongInliers = 80;
-// A keyframe is elsewhere by this distance or this rotation of the view.
+// A keyframe is elsewhere if it is further away than this, or if its view is rotated by more than
+// this.
 constexpr double kViewpointDistance_m = 0.25;
 constexpr double kViewpointAngle_rad = 0.15;
-// Of the viewpoints, that the largest rival may have.
+// Largest share, of the agreeing viewpoints, that the best rival set may have.
 constexpr double kMaxRivalShare = 0.5;
 constexpr double kMaxRivalShareAtOneSpot = 0.25;
-// Odometry that claims less drift than this is not believed while maps are compared (it is no
-// weight of the solve): standard deviations per metre of path.
+// Minimum drift while maps are compared, as standard deviations per metre of path. It has no effect
+// on the weights of the solve.
 constexpr double kMinDrift_per_m = 0.02;
 constexpr double kMinYawDrift_rad_per_m = 0.001;
 
@@ -45,7 +46,8 @@ bool Elsewhere(const OdometryChain::Node& k, const OdometryChain::Node& l) {
          view_k.dot(view_l) < std::cos(kViewpointAngle_rad);
 }
 
-// Of a position `from_l` away from node l, in a map whose keyframes k and l may doubt its scale.
+// Covariance, from the unknown scale of the map of keyframes k and l, of a position `from_l` away
+// from node l.
 Eigen::Matrix3d ScaleCovariance(const OdometryChain::Node& k, const OdometryChain::Node& l,
                                 const Eigen::Vector3d& from_l) {
   const double sigma = UnknownScaleSigma(std::max(k.scale_sigma, l.scale_sigma));
@@ -70,7 +72,8 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
     return drift == Drift::kBelievable ? BelievableDrift(chain, i, j, point)
                                        : chain.DriftBetween(i, j, point);
   };
-  // Where l and the odometry of both maps put k's keyframe of map b, in the odom axes of a.
+  // Position of k's keyframe of map b as l and the odometry of both maps predict it, in the odom
+  // axes of a.
   const Eigen::Vector3d& p_b = (*b_)[k.node_b].T_odom_body.t;
   const Eigen::Vector3d p_a = l.T_odom_a_odom_b * p_b;
   const Eigen::Vector3d& from_k = (*a_)[k.node_a].T_odom_body.t;
@@ -106,7 +109,7 @@ void PairEvidence::Add(const Measurement& measurement) {
   const Eigen::Vector3d& p_b = (*b_)[measurement.node_b].T_odom_body.t;
   candidate.T_odom_a_odom_b = {p_a + relative.t - YawRotation(relative.yaw) * p_b, relative.yaw};
   for (const Candidate& earlier : candidates_) {
-    // Both ways round, so that nothing depends on which came first.
+    // Test both directions, so that the result does not depend on the order of arrival.
     candidate.agrees.push_back(Agree(candidate, earlier) && Agree(earlier, candidate));
   }
   candidates_.push_back(std::move(candidate));
@@ -251,7 +254,8 @@ int PairEvidence::BestMember(const std::vector<int>& agreeing) const {
       const int k = agreeing[j];
       const Innovation innovation = Compare(candidates_[k], candidates_[l]);
       const Matrix4d covariance = innovation.measurement + innovation.odometry;
-      // A likelihood, not a distance alone: a vague member is far from none.
+      // A likelihood, not the distance alone: by distance, a member with a large covariance always
+      // wins.
       sum += innovation.error.dot(covariance.ldlt().solve(innovation.error)) +
              std::log(covariance.determinant());
     }
@@ -297,7 +301,8 @@ void PairEvidence::Decide() {
     all.push_back(static_cast<int>(k));
   }
   agreeing_ = LargestAgreeing(all);
-  // A rival contradicts most of them; a true one that is a little off does not.
+  // A rival contradicts more than half of the agreeing set; a correct but inaccurate candidate does
+  // not.
   std::erase_if(all, [&](int k) {
     const auto agrees = std::ranges::count_if(agreeing_, [&](int l) { return AgreeAt(k, l); });
     return 2 * agrees >= static_cast<int64_t>(agreeing_.size());

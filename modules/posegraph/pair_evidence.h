@@ -1,15 +1,15 @@
 #pragma once
 
-// Are two maps one place? The evidence for one pair of maps, and the decision.
+// Collects the evidence that two maps overlap, and decides whether to merge them.
 //
 // Each accepted constraint between the maps is a candidate alignment T_odom_a_odom_b. Two
 // candidates agree when the cycle through them and both maps' odometry closes within its covariance
 // (pairwise consistency: Mangelson et al., ICRA 2018; Mahalanobis distance, four degrees of
-// freedom). The largest set that agrees mutually carries the merge if it is large enough, was not
-// all won by one viewpoint, and its best rival is clearly smaller. A constraint that thinning
-// derived stands for evidence that was enough once: it counts as the most that is ever asked for. A
-// pure function of the evidence: not of its order, and a merge once made is unmade when a rival
-// grows.
+// freedom). The maps are merged if the largest mutually consistent set is large enough, does not
+// come from a single viewpoint, and its best rival set is clearly smaller. A constraint that
+// thinning derived replaces constraints that once sufficed for a merge, so it counts as sufficient
+// evidence by itself; the test against rivals remains. The decision depends only on the set of
+// constraints, not on their order, and a growing rival set can revoke a merge.
 
 #include <cstdint>
 #include <optional>
@@ -21,9 +21,9 @@
 namespace pangea {
 
 struct MergeOptions {
-  // What the agreeing viewpoints see must not be one spot: an object has a look-alike somewhere.
-  // Agents that only ever looked at one spot need one viewpoint more, and next to no rival:
-  // look-alikes standing elsewhere would each be one.
+  // The agreeing viewpoints must see scenes at least this far apart: a single object may have a
+  // look-alike elsewhere. If all agents looked at one spot only, one more viewpoint is required and
+  // nearly no rival: each look-alike elsewhere would be a rival.
   double min_scene_extent_m = 1.5;
 
   template <typename Archive>
@@ -33,8 +33,8 @@ struct MergeOptions {
   }
 };
 
-// Covariance of the odometry between two nodes of a map, at a point, with the least drift added
-// that is believed while maps are compared.
+// Drift covariance of the odometry between nodes i and j, at a point (OdometryChain::DriftBetween),
+// plus a minimum drift: while maps are compared, no odometry is trusted further than that.
 Matrix4d BelievableDrift(const OdometryChain& chain, int i, int j, const Eigen::Vector3d& point);
 
 class PairEvidence {
@@ -47,12 +47,12 @@ class PairEvidence {
     int node_a = 0, node_b = 0;
     Relative4 relative;  // from node_a of map a to node_b of map b
     int num_inliers = 0;
-    bool derived = false;  // as Loop has it
+    bool derived = false;  // as in Loop
   };
   void Add(const Measurement& measurement);
 
   void Save(ByteWriter* writer) const;
-  // Of the same two maps. False if these are not the bytes of their evidence.
+  // For the evidence of the same two maps. False if the bytes are not those of a PairEvidence.
   bool Restore(ByteReader* reader);
 
   struct Decision {
@@ -65,9 +65,10 @@ class PairEvidence {
   // Averaged over the agreeing candidates; only after a decision to merge.
   Pose4 Alignment() const;
 
-  // What the agreeing candidates say of the odometry: the error of each against the one half of
-  // them further along map a, and the covariances it is made of (measurements, odometry). No
-  // candidate is in two, so that one that is off does not speak for all.
+  // Samples of the odometry's error, from the agreeing candidates: the candidates are sorted along
+  // map a, and candidate i is compared with candidate i + n/2. Each is used at most once, so that a
+  // single wrong one does not affect all samples. `measurement` and `odometry` are the two parts of
+  // the covariance of `error`.
   struct Innovation {
     Vector4d error;
     Matrix4d measurement;
@@ -78,10 +79,10 @@ class PairEvidence {
  private:
   struct Candidate : Measurement {
     Pose4 T_odom_a_odom_b;
-    std::vector<bool> agrees;  // with each candidate before it
+    std::vector<bool> agrees;  // one flag per earlier candidate
   };
 
-  // What the odometry is believed to drift.
+  // kAsClaimed: the drift that the covariances state. kBelievable: with BelievableDrift's minimum.
   enum class Drift : uint8_t { kAsClaimed, kBelievable };
   Innovation Compare(const Candidate& k, const Candidate& l,
                      Drift drift = Drift::kBelievable) const;
@@ -99,7 +100,7 @@ class PairEvidence {
   const OdometryChain* a_;
   const OdometryChain* b_;
   MergeOptions options_;
-  std::vector<Candidate> candidates_;  // in the order they came
+  std::vector<Candidate> candidates_;  // in order of arrival
   std::vector<int> agreeing_;
   Decision decision_;
 };

@@ -1,23 +1,23 @@
 #pragma once
 
-// The pose graph of all maps (the paper, section IV.D, "optimization of pose graph";
-// docs/maths.md, sections 3 to 5): which maps are one, and where every keyframe is.
+// The pose graph of all maps (the paper, section IV.D, "optimization of pose graph"; docs/maths.md,
+// sections 3 to 5): which maps are merged into one group, and where every keyframe is.
 //
 // In: keyframes of any maps, each map's in ascending seq, and verification results (constraints).
 // Out: after each solve the corrections (T_map_odom of each map) and the group's state. A node is
-// (x, y, z, yaw); roll and pitch are the odometry's. A map whose odometry does not know its scale
-// well has that as one more state. Map frame: the odom of the group's map that was seen first.
+// (x, y, z, yaw); roll and pitch are those of the odometry. A map whose scale is not well observed
+// has its scale as an additional state. The map frame is the odom frame of the group's oldest map.
 //
-// This class says what happens when; how is in its parts:
-//   graph/         maps (nodes, odometry), loops, constraints that wait for keyframes
-//   grouping/      pairs of maps and their merges, groups and when they are solved and published,
-//                  where a group's maps lie before they are solved
-//   optimization/  how a group is solved, its least-squares problem, how far its odometry drifts
-//   solver/        poses of four degrees of freedom, robust least squares
-//   publication/   refinements, and what is told of a group
+// This class decides what happens and when; its parts do the work:
+//   graph/         maps (nodes, odometry), loops, constraints whose keyframes are not here yet
+//   grouping/      pairs of maps and their merges; groups, when to solve and publish them;
+//                  initial placement of a group's maps
+//   optimization/  how a group is solved, its least-squares problem, the scale of its odometry
+//   drift solver/        poses of four degrees of freedom, robust least squares publication/
+//   refinements, and the published state of a group
 //
-// Deterministic: the same calls in the same order give the same bytes. When it solves depends on
-// counts of messages, and on when it is told to update, alone. One thread.
+// Deterministic: the same calls in the same order give the same bytes. When it solves depends only
+// on counts of messages and on the calls of Update and Finish. One thread.
 
 #include <cstdint>
 #include <vector>
@@ -42,62 +42,64 @@ class PoseGraph {
     int64_t maps = 0;
     int64_t groups = 0;
     int64_t in_force = 0;
-    int64_t switched_off = 0;  // by the robust solve
-    int64_t unused = 0;        // evidence between maps that are not merged
+    int64_t switched_off = 0;  // loops that the robust solve rejects
+    int64_t unused = 0;        // loops between maps that are not in one group
     int64_t solves = 0;
-    int64_t bridged = 0;        // composite edges
-    int64_t waiting = 0;        // constraints, for their keyframes
-    double odometry_scale = 1;  // largest of the groups, standard deviations
+    int64_t bridged = 0;        // composite edges (OdometryChain::Add)
+    int64_t waiting = 0;        // constraints whose keyframes are not all here
+    double odometry_scale = 1;  // largest factor on odometry sigmas, of all groups
     int64_t not_metric = 0;     // maps whose scale is a state of the solve
   };
 
-  // Revisions count from `first_revision`.
+  // The first published state has revision `first_revision`; each later one counts up by one.
   explicit PoseGraph(const PoseGraphOptions& options, int64_t first_revision = 1);
 
-  // What is added is looked at by the next Update.
+  // Additions take effect with the next Update.
 
-  // The map has its place in the order of age from now on, keyframes or not.
+  // Fixes the map's place in the order of age, even if it has no keyframe yet.
   void AddMap(const MapId& map) { NumberOf(map); }
-  // A repeat, or one older than the newest of its map, changes nothing.
+  // Ignores a repeat, and a keyframe older than the newest one of its map.
   void AddKeyframe(const Keyframe& keyframe);
-  // A repeat or a refusal changes nothing; one about an unknown keyframe waits for it
-  // (graph/received_constraints.h says how many).
+  // Ignores a repeat and a refused constraint. A constraint on an unknown keyframe waits for it
+  // (graph/received_constraints.h says how many may wait).
   void AddConstraint(const Constraint& constraint);
-  // A group's state after bundle adjustment (publication/refinement.h). A repeat, an older one and
-  // one about an unknown map change nothing.
+  // Adds a group's state after bundle adjustment (publication/refinement.h). Ignores a repeat, an
+  // older revision, and a state with an unknown map.
   void AddRefinement(const MapState& refined);
-  // The map's group is published again with the next update.
+  // The next Update publishes the map's group again.
   void Republish(const MapId& map);
 
-  // Solves what is due after all that was added, once, and publishes.
+  // Solves every group for which a solve is due, and publishes the groups for which that is due.
   PoseGraphUpdate Update();
-  // Solves every group from the beginning, as if all had come at once, and publishes what is new.
+  // For the end, or a quiet bus: redoes merges that were undone, solves from the beginning each
+  // group for which that is due, and publishes every group that has changed since it was published.
   PoseGraphUpdate Finish();
 
-  // All that was added but refinements, and its solution: solves first what is due, and publishes
-  // nothing. Restored, it publishes as one that was given all that: false, and nothing has changed,
-  // if these are not the bytes of a graph. Not for one that has published.
+  // Saves everything added, except refinements, and the solution; it first solves what is due, and
+  // publishes nothing. Restore is only for a graph that has published nothing yet; afterwards the
+  // graph publishes as if it had been given everything itself. False if the bytes are not those of
+  // a PoseGraph; then nothing has changed.
   void Save(ByteWriter* writer);
   bool Restore(ByteReader* reader);
 
   Counters counters() const;
-  // Ids of the constraints that the last solves keep, ascending.
+  // Ids of the constraints in force after the last solves, ascending.
   std::vector<int64_t> InForce() const;
-  // As the next state would say it.
+  // The states that would be published now, one per group.
   std::vector<MapState> States() const;
 
  private:
   int NumberOf(const MapId& map);
-  // False when a keyframe of it is unknown.
+  // False if one of its keyframes is unknown.
   bool UseConstraint(const Constraint& constraint);
   GroupOptimizer Optimizer() { return {options_, pairs_, &maps_, &loops_}; }
   bool WholeIsDue(const GraphGroup& group) const;
   bool SolveIsDue(const GraphGroup& group, bool from_the_beginning) const;
   void SolveOnce(GraphGroup* group, bool from_the_beginning);
-  // Until nothing is due.
+  // Repeats until no solve is due.
   void SolveDue(bool from_the_beginning);
-  // The first solve after a restart: what has joined a group since the checkpoint is solved beside
-  // the group's solution.
+  // The first solve after a restart: maps that joined a group since the checkpoint are solved while
+  // the group's restored solution stays fixed.
   void SolveRestored();
   bool UndoMerges(const GraphGroup& group);
   bool IsUsed(const Loop& loop) const { return groups_.AreOne(loop.from.map, loop.to.map); }
@@ -112,7 +114,7 @@ class PoseGraph {
   ReceivedConstraints constraints_;
   GroupPublisher publisher_;
   int64_t num_solves_ = 0;
-  bool restored_ = false;  // until the first update after a restart
+  bool restored_ = false;  // from Restore to the first Update
 };
 
 }  // namespace pangea

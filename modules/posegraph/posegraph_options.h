@@ -1,6 +1,6 @@
 #pragma once
 
-// What the pose graph lets one choose (posegraph.h).
+// Options of the pose graph (posegraph.h).
 
 #include "posegraph/pair_evidence.h"
 
@@ -8,13 +8,14 @@ namespace pangea {
 
 struct PoseGraphOptions {
   enum class Scope {
-    kAll,    // every keyframe of the group but one
-    kPaper,  // the main map from its first overlap on; the other maps from their first keyframe
+    kAll,    // every keyframe of the group is free, except one
+    kPaper,  // free: the oldest map from its first loop on, the others from the start
   };
   Scope scope = Scope::kAll;
   MergeOptions merge;
-  // Of a group with more keyframes than this a solve moves the maps that have new loops, and those
-  // that share loops with them; all others stay, until the group's loops have grown by a tenth.
+  // In a group with more keyframes than this, an ordinary solve moves only the maps with new loops
+  // and the maps that share loops in force with them; the others stay fixed. All maps are solved
+  // again once the loops have grown by a fifth (or by a tenth, when no more messages arrive).
   int local_keyframes = 1000;
 
   template <typename Archive>

@@ -3,25 +3,26 @@
 // KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT in; CORRECTION_k, MAP_STATE, STATUS_posegraph
 // out.
 //
-// Keyframes are added in seq order, map by map; what is missing is asked for at ticks
-// (RESEND_REQUEST, VERDICT_REQUEST, answers on AGAIN_posegraph): keyframes a gap or HAVE tells of,
-// verification results that a PLACE_MATCH promised and that did not come in two seconds (then ever
-// more rarely: it may only take its time, and a candidate of a match that the journal does not have
-// may never be verified), and after a restart all of them. Live, when nothing has come for a
-// second, and at the end of a replay (Finish) every group is solved from the beginning and
-// published in full.
+// Keyframes are added in seq order, map by map. Missing messages are requested at ticks
+// (RESEND_REQUEST, VERDICT_REQUEST; answers come on AGAIN_posegraph). These are: keyframes, where a
+// gap in seq or a HAVE shows that they exist; verification results that a PLACE_MATCH promised and
+// that did not arrive within two seconds (then at growing intervals: verification may be slow, and
+// a candidate of a match that is not in the journal may never be verified); after a restart,
+// everything. Each group is solved from the beginning and published in full when nothing has
+// arrived for a second (live), and at the end of a replay (Finish).
 //
-// After a restart nothing is told until the journal's keyframes and verification results are in, or
-// for five seconds none of them came: half a map would be taken for what became of the whole. A
-// verification result that the journal does not have either is not waited for: fusion may be behind
-// by minutes. Whoever comes late asks for MAP_STATE, and the group is sent again.
+// After a restart nothing is published until the journal's keyframes and verification results are
+// in, or until none of them has arrived for five seconds: a receiver would take half a map for the
+// whole. The process does not wait for a verification result that the journal does not have either:
+// fusion may be minutes behind. A process that starts late requests MAP_STATE, and its group is
+// published again.
 //
-// What already waits on the bus is added before anything is solved (at most kMaxWithoutUpdate of
-// it): a solve costs the same after one verification result as after ten, and verification results
-// that come faster than solves would make every correction late.
+// All messages that already wait on the bus are added before a solve (at most kMaxWithoutUpdate): a
+// solve costs the same after one verification result as after ten, and if results came faster than
+// solves, every correction would be late.
 //
-// Bounds: ReorderBuffer's for keyframes, those of due_results.h, the pose graph's own for
-// constraints that wait for keyframes.
+// Bounds: ReorderBuffer bounds the buffered keyframes, DueResults the promised results,
+// ReceivedConstraints the constraints that wait for keyframes.
 
 #include <string>
 
@@ -38,12 +39,13 @@ namespace pangea {
 
 class PoseGraphProcess : public Process {
  public:
-  // Live, the first revision is the wall clock at the start, so that revisions rise over restarts.
+  // Live, `first_revision` is the wall clock at the start, so that revisions increase across
+  // restarts.
   PoseGraphProcess(Bus& bus, const PoseGraphOptions& options, int64_t first_revision = 1,
                    const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
-  // Solves and publishes all that is not yet; a second call adds nothing.
+  // Solves and publishes everything that is still due; a second call publishes nothing.
   void Finish();
 
   const PoseGraph& graph() const { return graph_; }
@@ -70,7 +72,7 @@ class PoseGraphProcess : public Process {
   StateChunks refinements_;
   DueResults results_;
   int64_t now_utime_ = 0;     // of the newest tick
-  int64_t num_arrived_ = 0;   // keyframes, verification results
+  int64_t num_arrived_ = 0;   // keyframes and verification results
   int num_since_update_ = 0;  // messages added since the last update
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The loops of the pose graph, in the order in which they came: within maps and between them,
-// whether or not these are one group.
+// All loops of the pose graph in order of arrival: within maps and between maps, whether or not the
+// maps are in one group.
 
 #include <deque>
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace pangea {
 
-// An accepted constraint between two nodes.
+// Makes a loop of an accepted constraint between two known nodes.
 Loop MakeLoop(const Constraint& constraint, NodeRef from, NodeRef to, const GraphMaps& maps);
 
 class GraphLoops {
@@ -24,12 +24,12 @@ class GraphLoops {
   auto begin() const { return loops_.begin(); }
   auto end() const { return loops_.end(); }
 
-  // Those with both ends in these maps (ascending), in the order they came.
+  // The loops with both ends in `maps` (ascending), in order of arrival.
   std::vector<const Loop*> Among(const std::vector<int>& maps) const;
   std::vector<Loop*> Among(const std::vector<int>& maps);
 
   void Save(ByteWriter* writer) const;
-  // Into an empty one; false if these are not the bytes of loops of these maps.
+  // Call on an empty object. False if the bytes are not those of loops of `maps`.
   bool Restore(ByteReader* reader, const GraphMaps& maps);
 
  private:
@@ -37,7 +37,7 @@ class GraphLoops {
   std::vector<int> NumbersAmong(const std::vector<int>& maps) const;
 
   std::deque<Loop> loops_;
-  std::vector<std::vector<int>> from_;  // of each map: indices of the loops that begin in it
+  std::vector<std::vector<int>> from_;  // by map: indices of the loops that begin in it
 };
 
 }  // namespace pangea

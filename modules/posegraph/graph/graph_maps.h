@@ -1,7 +1,8 @@
 #pragma once
 
-// The maps of the pose graph: each one's odometry, and where the newest solution has its keyframes.
-// A map has a number, in the order in which maps were first seen: the lower, the older.
+// The maps of the pose graph: the odometry of each, and the poses of its keyframes in the newest
+// solution. Maps are numbered in the order in which they were first seen: a lower number is an
+// older map.
 
 #include <cmath>
 #include <cstdint>
@@ -25,32 +26,35 @@ struct GraphMap {
   Pose4 T_map_odom;
   double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)
   int newest_solved = -1;
-  Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom
-  // The oldest map of the group that it was last solved in; not in a checkpoint.
+  Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom, (x, y, z, yaw)
+  // Number of the oldest map of the group in which this map was last solved; not saved in a
+  // checkpoint.
   int solved_with = 0;
 
-  // Placed by odometry after the newest solution. False for a repeat and what is out of order.
+  // Appends a node and places it by odometry after the newest solved one. False for a repeat, and
+  // for a keyframe out of order.
   bool Add(const Keyframe& keyframe);
 
   double scale() const { return std::exp(log_scale); }
-  // Where the newest solution has a node by odometry alone.
+  // Pose of a node in the newest solution if odometry alone placed it.
   Pose4 PoseOf(int node) const {
     return T_map_odom * Pose4{scale() * chain[node].T_odom_body.t, 0};
   }
-  // The rigid transform that has the node, and what is near it, in its place.
+  // The rigid transform T_map_odom that is exact at this node; with log_scale = 0 it is the same
+  // for all.
   Pose4 RigidAt(int node) const {
     return {T_map_odom * Eigen::Vector3d((scale() - 1) * chain[node].T_odom_body.t),
             T_map_odom.yaw};
   }
-  // All nodes from this one on are where odometry alone has them.
+  // Places the nodes from `first` on by odometry alone.
   void PlaceByOdometry(int first);
-  // The whole map is displaced.
+  // Displaces the whole map, from frame "before" into the map frame.
   void Move(const Pose4& T_map_before);
 };
 
 class GraphMaps {
  public:
-  // The map's number: the next one if it is new.
+  // Returns the map's number; a new map gets the next one.
   int Add(const MapId& id);
 
   std::optional<int> Number(const MapId& id) const;
@@ -73,11 +77,11 @@ class GraphMaps {
   }
 
   void Save(ByteWriter* writer) const;
-  // Into an empty one; false if these are not the bytes of maps.
+  // Call on an empty object. False if the bytes are not those of maps.
   bool Restore(ByteReader* reader);
 
  private:
-  std::deque<GraphMap> maps_;  // which stay where they are: PairEvidence points to chains
+  std::deque<GraphMap> maps_;  // a deque, because PairEvidence keeps pointers to the chains
   std::map<MapId, int> numbers_;
 };
 

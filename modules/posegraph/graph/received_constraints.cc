@@ -3,7 +3,7 @@
 namespace pangea {
 namespace {
 
-// What is looked at of one that is accepted.
+// Saves only the fields of an accepted constraint that the pose graph uses.
 void Put(const Constraint& constraint, ByteWriter* writer) {
   writer->Put(constraint.from);
   writer->Put(constraint.to);

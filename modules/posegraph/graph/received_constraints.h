@@ -1,8 +1,8 @@
 #pragma once
 
-// Accepted constraints as they are received: each is used once, and one that is about an unknown
-// keyframe waits for it. At most kMaxWaiting wait: one that comes then is forgotten, and may come
-// again.
+// Accepted constraints as they arrive. Each is used once; a constraint on an unknown keyframe waits
+// until that keyframe arrives. At most kMaxWaiting wait: a further one is dropped, and is accepted
+// if it is sent again.
 
 #include <cstdint>
 #include <functional>
@@ -17,22 +17,22 @@ namespace pangea {
 class ReceivedConstraints {
  public:
   static constexpr size_t kMaxWaiting = 5000;
-  // Uses a constraint; false when a keyframe of it is unknown.
+  // Uses a constraint; returns false if one of its keyframes is unknown.
   using Use = std::function<bool(const Constraint&)>;
 
-  // A repeat and a refusal are not used.
+  // Ignores a repeat and a refused constraint.
   void Add(const Constraint& constraint, const Use& use);
-  // What waits for this keyframe is used, unless its other one is unknown.
+  // Uses the constraints that wait for this keyframe, unless their other keyframe is unknown.
   void KeyframeCame(const KeyframeId& id, const Use& use);
 
   size_t num_waiting() const { return waiting_.size(); }
 
   void Save(ByteWriter* writer) const;
-  // False if these are not the bytes of one.
+  // False if the bytes are not those of a ReceivedConstraints.
   bool Restore(ByteReader* reader);
 
  private:
-  std::set<int64_t> received_;  // ids of what was used or waits
+  std::set<int64_t> received_;  // ids of constraints that were used or that wait
   std::vector<Constraint> waiting_;
 };
 

@@ -25,7 +25,7 @@ inline Keyframe InARow(const MapId& map, int seq) {
   return keyframe;
 }
 
-// The first is agent 1's.
+// Map i belongs to agent i + 1.
 inline GraphMaps MakeRows(int num_maps, int num_keyframes) {
   GraphMaps maps;
   for (int number = 0; number < num_maps; ++number) {
@@ -37,7 +37,7 @@ inline GraphMaps MakeRows(int num_maps, int num_keyframes) {
   return maps;
 }
 
-// As it is measured where to's odom frame lies in from's at T.
+// The exact constraint if T is the pose of to's odom frame in from's odom frame.
 inline Constraint MakeConstraint(const KeyframeId& from, const KeyframeId& to, const Pose4& T) {
   Constraint constraint;
   constraint.from = from;
@@ -56,7 +56,7 @@ inline Loop LoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMap
                   from, to, maps);
 }
 
-// Enough alone to merge its maps.
+// A derived loop: one alone suffices to merge its two maps.
 inline Loop DerivedLoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMaps& maps) {
   Loop loop = LoopBetween(from, to, T, maps);
   loop.derived = true;

@@ -17,8 +17,8 @@ void SolveSchedule::Solved() {
 }
 
 bool SolveSchedule::LoopsWaitLongEnough(size_t num_keyframes) const {
-  // A group solves after each loop; a larger one, which takes longer, waits for one more loop per
-  // so many keyframes.
+  // A small group is solved after each loop. A larger group takes longer, so it waits for one more
+  // loop per kKeyframesPerLoop keyframes.
   constexpr int kKeyframesPerLoop = 300;
   const int enough = 1 + static_cast<int>(num_keyframes) / kKeyframesPerLoop;
   return waiting_loops >= enough ||

@@ -1,6 +1,7 @@
 #pragma once
 
-// Which maps are one group. A group is named by its oldest map; a new map is one by itself.
+// The partition of the maps into groups. A group is named by its oldest map; a new map is a group
+// of its own.
 
 #include <map>
 #include <vector>
@@ -13,26 +14,27 @@ namespace pangea {
 
 class GraphGroups {
  public:
-  // A group by itself, with the next number.
+  // Adds a map, with the next number, as a group of its own.
   void AddMap();
-  // By the merges as they are now. A group of the same maps as before stays as it was.
+  // Forms the groups from the present merges. A group whose set of maps is unchanged keeps its
+  // state.
   void Regroup(const MapPairs& pairs);
 
   GraphGroup& Of(int map) { return groups_.at(oldest_[map]); }
   bool AreOne(int map, int other) const { return oldest_[map] == oldest_[other]; }
 
   size_t num_maps() const { return oldest_.size(); }
-  // By their oldest maps.
+  // Keyed by the number of the group's oldest map.
   std::map<int, GraphGroup>& by_oldest() { return groups_; }
   const std::map<int, GraphGroup>& by_oldest() const { return groups_; }
 
   void Save(ByteWriter* writer) const;
-  // Into an empty one; false if these are not the bytes of groups of so many maps.
+  // Call on an empty object. False if the bytes are not those of groups of `num_maps` maps.
   bool Restore(ByteReader* reader, size_t num_maps);
 
  private:
   std::map<int, GraphGroup> groups_;
-  std::vector<int> oldest_;  // of the group of each map
+  std::vector<int> oldest_;  // by map: the oldest map of its group
 };
 
 }  // namespace pangea

@@ -1,8 +1,8 @@
 #pragma once
 
-// The pairs of maps that have loops between them: their evidence (pair_evidence.h), and which of
-// them are merged. A merge whose loops the robust solve switches off is undone until new evidence
-// comes.
+// The pairs of maps with loops between them: the evidence of each pair (pair_evidence.h), and
+// whether it is merged. If the robust solve switches off the loops of a merge, the merge is undone
+// until new evidence arrives.
 
 #include <map>
 #include <utility>
@@ -16,7 +16,7 @@
 namespace pangea {
 
 struct MapPair {
-  int a;  // numbers; a's id is the smaller one
+  int a;  // map numbers; a is the map with the smaller id (not number)
   int b;
   PairEvidence evidence;
   bool undone = false;
@@ -28,20 +28,20 @@ class MapPairs {
  public:
   explicit MapPairs(const MergeOptions& options) : options_(options) {}
 
-  // A loop between two maps; true when it merges them or separates them.
+  // Adds a loop between two maps. True if it merges or separates them.
   bool Add(const Loop& loop, const GraphMaps& maps);
 
-  // Both of these maps (ascending).
+  // The pairs whose two maps are both in `maps` (ascending).
   std::vector<const MapPair*> Among(const std::vector<int>& maps) const;
   std::vector<const MapPair*> All() const;
 
-  // Undoes merges of these maps (ascending) that fewer than two of their loops in force carry;
-  // whether there were any.
+  // Undoes the merges within `maps` (ascending) that have fewer than two loops in force (a derived
+  // loop counts as two). True if there was any.
   bool UndoMerges(const std::vector<int>& maps, const std::vector<const Loop*>& loops);
   void RedoMerges();
 
   void Save(ByteWriter* writer) const;
-  // Into an empty one; false if these are not the bytes of pairs of these maps.
+  // Call on an empty object. False if the bytes are not those of pairs of `maps`.
   bool Restore(ByteReader* reader, const GraphMaps& maps);
 
  private:

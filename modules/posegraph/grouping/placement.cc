@@ -19,7 +19,7 @@ Merges MergesOf(const GraphGroup& group, const MapPairs& pairs) {
   return merges;
 }
 
-// The next map of a group of which some are placed.
+// Chooses and places the next map of a group in which at least one map is placed.
 Placed PlaceNext(const Merges& merges, const std::set<int>& placed, const GraphMaps& maps) {
   const auto rank = [&maps](const MapPair& pair) {
     return std::tuple(-pair.evidence.decision().viewpoints, maps[pair.a].id, maps[pair.b].id);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where a group's maps lie to each other before they are solved: one after the other, along the
-// merges with the most agreeing viewpoints.
+// Initial placement of a group's maps relative to each other: the maps are placed one after
+// another, each time along the merge with the most agreeing viewpoints.
 
 #include <map>
 #include <set>
@@ -12,14 +12,14 @@
 
 namespace pangea {
 
-// From the beginning: every map as its odometry has it, the oldest one's odom is the map frame.
+// Places all maps anew: nodes by odometry alone; the odom frame of the oldest map is the map frame.
 void PlaceMaps(const GraphGroup& group, const MapPairs& pairs, GraphMaps* maps);
 
-// The group's maps that were solved together, by the oldest map of the group they were solved in.
+// Sets of maps that were solved together, keyed by the oldest map of the group of that solve.
 using GroupParts = std::map<int, std::set<int>>;
 GroupParts PartsOf(const GraphGroup& group, const GraphMaps& maps);
 
-// Beside a solution: these maps stay, and any part that was solved by itself moves as one.
+// Keeps the maps in `fixed`, and moves every other part as one rigid body.
 void PlaceParts(const GraphGroup& group, const std::set<int>& fixed, const GroupParts& parts,
                 const MapPairs& pairs, GraphMaps* maps);
 

@@ -15,7 +15,8 @@ void GroupOptimizer::Solve(GraphGroup* group, bool from_the_beginning) const {
   const std::vector<Loop*> loops = loops_.Among(group->maps);
   const auto num_loops = static_cast<int64_t>(loops.size());
   const bool cold = schedule.regrouped || from_the_beginning;
-  // Few loops are looked at anew each time, many when they have grown by a fifth.
+  // All loops are weighted anew when their number has grown by a fifth; a few loops, at every
+  // solve.
   constexpr int kShare = 5;
   const bool graduated = cold || kShare * (num_loops - schedule.known_loops) >= num_loops;
   if (cold) {

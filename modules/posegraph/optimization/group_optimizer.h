@@ -1,7 +1,8 @@
 #pragma once
 
-// How one group is solved: where its maps start, which loops are doubted, how far its odometry is
-// believed, which maps stay. It has no state of its own: what it finds is in maps, loops and group.
+// Solves one group. It chooses where the maps start, which loops the solve may reject, the factor
+// on the odometry covariances, and which maps stay fixed. It has no state of its own: the results
+// are written to maps, loops and group.
 
 #include <set>
 #include <vector>
@@ -20,19 +21,20 @@ class GroupOptimizer {
                  GraphLoops* loops)
       : options_(options), pairs_(pairs), maps_(*maps), loops_(*loops) {}
 
-  // A group with other maps than before always from the beginning.
+  // Solves from the beginning if asked to, or if the group's set of maps has changed.
   void Solve(GraphGroup* group, bool from_the_beginning) const;
 
-  // After maps have joined: the solution of the oldest map's part stays, the others are laid beside
-  // it and solved. A large group takes long from the beginning, and that is still to be done then;
-  // but its agents know where they are.
+  // Solves a group that other maps have joined: the solution of the oldest map's part stays fixed,
+  // and the other maps are placed beside it and solved. This is quick, so the agents get
+  // corrections early; the slow solve of the large group from the beginning stays due.
   void SolveJoined(GraphGroup* group) const;
   bool JoinsALargePart(const GraphGroup& group) const;
 
  private:
-  // Maps that neither have new loops nor share loops in force with one that has.
+  // The maps that have no new loops and share no loop in force with a map that has.
   static std::set<int> FarMaps(const GraphGroup& group, const std::vector<Loop*>& loops);
-  // In force is what the odometry, or the merge, agrees with.
+  // Sets each loop in force if it agrees with the odometry (within a map) or with the merge
+  // (between maps).
   void ResetLoops(const GraphGroup& group, const std::vector<Loop*>& loops) const;
   double OdometryVarianceOf(const GraphGroup& group, const std::vector<Loop*>& loops) const;
   void NoteSolved(GraphGroup* group) const;

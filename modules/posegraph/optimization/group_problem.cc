@@ -70,7 +70,7 @@ void GroupProblem::AddLoops() {
   for (const Loop* loop : loops_) {
     const SolvedMap& from = solved_.at(loop->from.map);
     const SolvedMap& to = solved_.at(loop->to.map);
-    // Between maps, verification has weighed their scales.
+    // Loops between maps are metric: verification has accounted for the scales in their covariance.
     solver_.AddLoop(from.offset + loop->from.node, to.offset + loop->to.node, loop->relative,
                     loop->on, loop->intra() ? from.scale : GroupSolver::kMetric);
   }

@@ -1,12 +1,12 @@
 #pragma once
 
-// A group's maps and loops as the robust least-squares problem (group_solver.h), and its solution
-// back into them.
+// Builds the robust least-squares problem (group_solver.h) of a group's maps and loops, and writes
+// its solution back into them.
 //
-// In: a group's loops, its maps as they lie now, and the maps that stay. Out: which of the loops
-// are in force, and where the other maps are. Of a map is solved: from the first node (of the
-// oldest map in the paper's scope: from the first with a loop) to the last with a loop; what comes
-// after is joined to the solution by odometry alone.
+// Input: a group's loops, its maps with their present poses, and the maps that stay fixed. Output:
+// which loops are in force, and the poses of the other maps. The nodes of a map that are solved
+// reach from the first node to the last one with a loop (in the paper's scope, the oldest map
+// begins at its first node with a loop). Later nodes are appended by odometry alone.
 
 #include <map>
 #include <set>
@@ -22,12 +22,11 @@ namespace pangea {
 
 class GroupProblem {
  public:
-  // Of a fixed map every node stays where it is, and its scale.
+  // In a fixed map, all node poses and the scale stay.
   GroupProblem(const GraphGroup& group, std::vector<Loop*> loops, std::set<int> fixed_maps,
                const PoseGraphOptions& options, GraphMaps* maps);
 
-  // From the beginning, or from the maps as they lie (GroupSolver says more). Then the solution is
-  // in maps and loops.
+  // Both solve (GroupSolver has the difference) and write the solution into maps and loops.
   void SolveGraduated();
   void SolveWarm(const std::vector<bool>& may_go);
 
@@ -35,8 +34,8 @@ class GroupProblem {
   struct SolvedMap {
     int first = 0;
     int last = 0;
-    int offset = 0;                    // of its nodes in the solver, which counts from its own zero
-    int scale = GroupSolver::kMetric;  // its state in the solver
+    int offset = 0;                    // node i of the map is node offset + i of the solver
+    int scale = GroupSolver::kMetric;  // index of its scale state in the solver
   };
 
   void FindSolvedMaps(bool whole_oldest);
@@ -51,7 +50,7 @@ class GroupProblem {
   std::vector<Loop*> loops_;
   std::set<int> fixed_maps_;
   GraphMaps& maps_;
-  std::map<int, SolvedMap> solved_;  // by number
+  std::map<int, SolvedMap> solved_;  // by map number
   GroupSolver solver_;
 };
 

@@ -22,7 +22,7 @@ double MedianDistance(const std::vector<PairEvidence::Innovation>& innovations, 
   return Median(std::move(distances));
 }
 
-// Of a loop within a map: the odometry's prediction against the measurement.
+// Odometry's prediction minus the measurement, for a loop within a map.
 Vector4d ErrorOf(const Loop& loop, const OdometryChain& chain) {
   return Residual({chain[loop.from.node].T_odom_body.t, 0}, {chain[loop.to.node].T_odom_body.t, 0},
                   loop.relative);
@@ -65,8 +65,9 @@ std::vector<PairEvidence::Innovation> Innovations(const std::vector<const Loop*>
 }
 
 double OdometryVariance(const std::vector<PairEvidence::Innovation>& innovations) {
-  // Loops at one place share one drift, so their median counts as a single sample: the likeliest
-  // factor brings it to its mean. Nowhere a jump, which would let the shape hang on one constraint.
+  // Loops at one place share one drift, so the median counts as a single sample, and the most
+  // likely factor brings it to its mean. The factor has no jump, or one constraint could decide the
+  // shape of the map.
   if (innovations.empty() || MedianDistance(innovations, 1) < kMeanChi2) {
     return 1;
   }

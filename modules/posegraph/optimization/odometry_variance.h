@@ -1,8 +1,9 @@
 #pragma once
 
-// How far a group's odometry drifts, of what its covariances say: one factor for all of them, the
-// one that brings the median innovation of its loops to that of chi-squared (variance component
-// estimation, robustly; docs/maths.md, section 5). Never below one.
+// The factor by which a group's odometry covariances are too small: one factor for the whole group.
+// It brings the median squared Mahalanobis distance of the innovations to 4, the mean of
+// chi-squared with four degrees of freedom (robust variance component estimation; docs/maths.md,
+// section 5). Never below one.
 
 #include <vector>
 
@@ -16,12 +17,13 @@ namespace pangea {
 // Whether a loop within a map agrees with its odometry.
 bool FitsOdometry(const Loop& loop, const OdometryChain& chain);
 
-// What loops within maps that fit the odometry, and merges, say of it; evenly some, if many.
+// Innovations of the loops within maps that fit the odometry, and of the merged pairs; an evenly
+// spaced sample if there are many.
 std::vector<PairEvidence::Innovation> Innovations(const std::vector<const Loop*>& loops,
                                                   const std::vector<const MapPair*>& pairs,
                                                   const GraphMaps& maps);
 
-// Of covariances; 1 without innovations.
+// The factor on the covariances; 1 if there are no innovations.
 double OdometryVariance(const std::vector<PairEvidence::Innovation>& innovations);
 
 }  // namespace pangea

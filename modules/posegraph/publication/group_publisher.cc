@@ -6,7 +6,7 @@
 namespace pangea {
 namespace {
 
-// At the newest keyframe that is solved.
+// The correction at the map's newest solved keyframe.
 Correction CorrectionOf(const GraphMap& map, const RefinedMap& told) {
   const int newest = std::max(map.newest_solved, 0);
   const OdometryChain::Node& node = map.chain[newest];

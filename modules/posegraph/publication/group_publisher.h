@@ -1,8 +1,8 @@
 #pragma once
 
-// What the world is told of a group: its state, under a new revision each time, and a correction
-// for each of its maps. A map that is alone and was never corrected is where its odometry says, and
-// gets none.
+// Makes the published messages of a group: its state, with a new revision each time, and one
+// correction per map. A map that is alone and was never corrected gets no correction: its map frame
+// is its odom.
 
 #include <cstdint>
 #include <map>
@@ -26,14 +26,14 @@ class GroupPublisher {
  public:
   explicit GroupPublisher(int64_t first_revision) : next_revision_(first_revision) {}
 
-  // False when it changes nothing.
+  // False if the refinement is not used (Refinements::Add).
   bool AddRefinement(const MapState& refined, const GraphMaps& maps) {
     return refinements_.Add(refined, maps);
   }
 
-  // As the next Publish would say it.
+  // The state that the next Publish would publish.
   MapState StateOf(const GraphGroup& group, const GraphMaps& maps, const GraphLoops& loops) const;
-  // Nothing of a group without keyframes.
+  // Appends the group's messages to `update`; appends nothing for a group without keyframes.
   void Publish(GraphGroup* group, const GraphMaps& maps, const GraphLoops& loops,
                PoseGraphUpdate* update);
 
@@ -45,7 +45,7 @@ class GroupPublisher {
 
   int64_t next_revision_;
   Refinements refinements_;
-  std::set<int> corrected_;  // maps of which a correction was published
+  std::set<int> corrected_;  // maps for which a correction was published
 };
 
 }  // namespace pangea

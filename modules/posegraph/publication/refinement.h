@@ -1,13 +1,13 @@
 #pragma once
 
-// A bundle adjustment's poses laid over the pose graph's solution.
+// Lays the poses of a bundle adjustment over the solution of the pose graph.
 //
-// The graph goes on solving as if there were none: no measurement counts twice, and what it decides
-// (groups, loops in force) does not depend on when a refinement comes. Where poses are told, those
-// of refined keyframes are the refinement's, as a whole rotated about z and shifted to lie best on
-// the solution, and other keyframes keep their place in the solution relative to the refined one
-// before them. A newer refinement replaces an older one of the same maps; one whose maps are no
-// longer in one group is not used.
+// The graph solves as if there were no refinement: so no measurement counts twice, and its
+// decisions (groups, loops in force) do not depend on when a refinement arrives. Only published
+// poses change. A refined keyframe gets its refined pose, after the refinement as a whole is
+// rotated about z and shifted to fit the solution best. Every other keyframe keeps its pose
+// relative to the refined keyframe before it. A newer refinement replaces an older one that shares
+// a map with it. A refinement whose maps are no longer all in one group is not used.
 
 #include <map>
 #include <utility>
@@ -35,25 +35,25 @@ class Refinement {
   std::map<KeyframeId, Rigid3> poses_;
 };
 
-// The rotation about z and the shift that lay the second points of the pairs best on the first.
+// The rotation about z and the shift T that minimise sum |first - T * second|^2 over the pairs.
 Pose4 FitYawAndShift(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& pairs);
 
-// One map's poses as they are told.
+// The published poses of one map.
 class RefinedMap {
  public:
   RefinedMap(const OdometryChain& chain, const std::vector<Pose4>& solved)
       : chain_(chain), solved_(solved) {}
 
-  // Nodes in ascending order.
+  // Adds a refined pose; call in ascending order of nodes.
   void Add(int node, const Rigid3& T_map_body) { refined_.emplace_back(node, T_map_body); }
 
   Rigid3 T_map_body(int node) const;
-  // What it does to the solution about a node.
+  // The displacement, in the map frame, from the solution to the published poses near a node.
   Pose4 Shift(int node) const;
 
  private:
   using Refined = std::pair<int, Rigid3>;
-  // The last one not after the node, or the first; null when there are none.
+  // The last refined node that is not after `node`, else the first one; null if there is none.
   const Refined* Before(int node) const;
 
   const OdometryChain& chain_;

@@ -6,7 +6,7 @@
 namespace pangea {
 namespace {
 
-// Lays it on the solution as a whole.
+// Fits the whole refinement to the solution and adds its poses to `told`.
 void Lay(const Refinement& refinement, const GraphMaps& maps, std::map<int, RefinedMap>* told) {
   std::vector<std::pair<NodeRef, Rigid3>> nodes;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> positions;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The refinements that are in use (refinement.h), and a group's maps as they are told with them.
+// The refinements in use (refinement.h), and the published poses of a group's maps with them.
 
 #include <map>
 #include <vector>
@@ -13,10 +13,11 @@ namespace pangea {
 
 class Refinements {
  public:
-  // False when it changes nothing: a repeat, an older one, one about an unknown map.
+  // False, and nothing changes, for a repeat, an older revision, or a refinement of an unknown map.
   bool Add(const MapState& refined, const GraphMaps& maps);
 
-  // Each of a group's maps, by number. Those that no refinement is about are as they are solved.
+  // The published poses of each of the group's maps, by map number. A map without a refinement
+  // keeps its solved poses.
   std::map<int, RefinedMap> Refine(const std::vector<int>& group, const GraphMaps& maps) const;
 
  private:

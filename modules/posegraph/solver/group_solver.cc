@@ -16,7 +16,7 @@ namespace {
 constexpr double kOne = 1;
 constexpr int kSwitchRounds = 5;
 constexpr int kMaxIterations = 30;  // of a solve
-// Of GNC, each step: its control parameter grows by this factor.
+// The control parameter of GNC grows by this factor in each step.
 constexpr double kGncFactor = 2.0;
 constexpr int kMaxGncSteps = 25;
 
@@ -33,10 +33,10 @@ double GraduatedWeight(double squared_residual, double c2, double mu) {
 
 using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
-// Of the inverse of P' L D L' P, the 4x4 block on the diagonal at `column`: Y' D^-1 Y with
-// L Y = P e. Y has few rows: those on the path of the elimination tree from the four columns up
-// (Davis, Direct Methods for Sparse Linear Systems, 2006, section 3.2), which meet and so lie on
-// one path. A column's parent is its first row below the diagonal.
+// The 4x4 diagonal block at `column` of the inverse of P' L D L' P: it is Y' D^-1 Y with L Y = P e.
+// Few rows of Y are not zero: those on the paths of the elimination tree from the four columns to
+// the root (Davis, Direct Methods for Sparse Linear Systems, 2006, section 3.2). The four paths
+// meet, so these rows lie on one path. A column's parent is its first row below the diagonal.
 Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int column) {
   const Eigen::SparseMatrix<double>& L = factor.matrixL().nestedExpression();
   const int size = static_cast<int>(L.cols());
@@ -130,7 +130,7 @@ void GroupSolver::Minimise(int max_iterations) {
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   options.num_threads = 1;
   options.max_num_iterations = max_iterations;
-  // A graph that odometry and alignments start well needs next to no damping.
+  // Odometry and alignments give a good initial guess, so almost no damping is needed.
   options.initial_trust_region_radius = 1e8;
   options.function_tolerance = 1e-9;
   options.parameter_tolerance = 1e-10;
@@ -179,7 +179,7 @@ void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
     for (size_t i = 0; i < loops_.size(); ++i) {
       const bool fits = SquaredResidual(loops_[i]) <= kMaxLoopChi2;
       const bool on = loop_on(static_cast<int>(i));
-      // A loop that came back stays: two that take turns would never end.
+      // Only loops with may_go are switched off, and none in the last round: two may alternate.
       if (fits != on && (!on || (may_go[i] && round < kSwitchRounds - 1))) {
         SetWeight(&loops_[i], fits ? 1 : 0);
         changed = true;

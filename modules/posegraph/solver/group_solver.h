@@ -1,12 +1,13 @@
 #pragma once
 
-// The robust least-squares problem of one group: odometry edges that hold, loops that may be wrong.
+// The robust least-squares problem of one group: odometry edges are trusted, loops may be outliers.
 //
 //   min  sum_odometry |r|^2 + sum_loops min(|r|^2, c^2) + sum_scales (kappa / sigma)^2
 //
-// by graduated non-convexity for truncated least squares (Yang et al., RA-L 2020), weights alone
-// from covariances: c^2 is a quantile of chi-squared with four degrees of freedom. Sparse Cholesky
-// (SuiteSparse through Ceres), one thread: the same calls give the same bytes.
+// by graduated non-convexity for truncated least squares (Yang et al., RA-L 2020), with weights
+// from covariances alone: c^2 is the 0.999 quantile of chi-squared with four degrees of freedom
+// (kMaxLoopChi2). Sparse Cholesky (SuiteSparse through Ceres), one thread: the same calls give the
+// same bytes.
 
 #include <array>
 #include <deque>
@@ -31,25 +32,27 @@ class GroupSolver {
   static constexpr int kMetric = -1;
 
   int AddNode(const Pose4& pose, bool fixed);
-  // A map whose metres are exp(kappa) true ones, kappa = 0 +- sigma; the solve begins at log_scale.
+  // Adds the scale of a map: one metre of its odometry is exp(kappa) metres, with the prior kappa =
+  // 0 +- sigma. The solve starts at kappa = log_scale.
   int AddScale(double log_scale, double sigma);
-  // `scale`: whose metres the measurement is in.
+  // `scale`: the index from AddScale for the map in whose units the measurement is; else kMetric.
   void AddOdometry(int from, int to, const Relative4& relative, int scale = kMetric);
-  // `on`: whether the solve begins with it.
+  // `on`: whether the loop is in force at the start of the solve.
   int AddLoop(int from, int to, const Relative4& relative, bool on, int scale = kMetric);
 
-  // From the beginning: every loop's weight is found anew.
+  // Finds the weight of every loop anew (graduated non-convexity).
   void SolveGraduated();
-  // From a solution: loops in `may_go` are switched off when they contradict it, and those that are
-  // off come back when they fit.
+  // Starts from a solution: loops with `may_go` are switched off if they contradict it, and loops
+  // that are off are switched on again if they fit.
   void SolveWarm(const std::vector<bool>& may_go);
 
   Pose4 pose(int node) const;
   bool loop_on(int loop) const { return loops_[loop].weight > 0.5; }
   double log_scale(int scale) const { return scales_[scale]; }
 
-  // Covariances of (p, yaw) of some nodes: 4x4 blocks of the inverse of J^T J, by one sparse
-  // factorisation, and of a solve what each needs. Zero for a fixed node.
+  // Covariances of (p, yaw) of some nodes: 4x4 diagonal blocks of the inverse of J^T J, from one
+  // sparse factorisation; per node only the needed part of the triangular solve is done. Zero for a
+  // fixed node.
   std::vector<Matrix4d> Marginals(const std::vector<int>& nodes) const;
 
  private:
@@ -58,7 +61,7 @@ class GroupSolver {
     Relative4 relative;
     Matrix4d whitening;
     double weight = 1;
-    double sqrt_weight = 1;  // what the cost function reads
+    double sqrt_weight = 1;  // the cost function reads it through a pointer
   };
 
   void AddEdge(int from, int to, int scale, const Relative4& relative, const Matrix4d& whitening,
@@ -66,7 +69,6 @@ class GroupSolver {
   void Minimise(int max_iterations);
   double SquaredResidual(const Loop& loop) const;
   static void SetWeight(Loop* loop, double weight);
-  // Until no loop changes sides; returns whether any did.
   void SwitchUntilStable(const std::vector<bool>& may_go);
 
   std::deque<std::array<double, 4>> nodes_;

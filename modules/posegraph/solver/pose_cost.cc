@@ -5,7 +5,7 @@
 namespace pangea {
 namespace {
 
-// `jacobians` as Ceres gives them: none, or for each parameter block one or none.
+// `jacobians` as Ceres passes it: null, or per parameter block a matrix or null.
 void EvaluateEdge(const WeightedEdge& edge, double const* const* parameters, double scale,
                   double* residuals, double** jacobians) {
   using JacobianMap = Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>;

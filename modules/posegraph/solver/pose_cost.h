@@ -20,7 +20,7 @@ struct WeightedEdge {
 };
 
 // Parameters: (x, y, z, yaw) of both keyframes. `sqrt_weight` multiplies the residual; it is read
-// at each evaluation and outlives the cost.
+// at each evaluation and must outlive the cost.
 class RelativePoseCost : public ceres::SizedCostFunction<4, 4, 4> {
  public:
   RelativePoseCost(const Relative4& measured, const Matrix4d& whitening, const double* sqrt_weight)
@@ -33,7 +33,7 @@ class RelativePoseCost : public ceres::SizedCostFunction<4, 4, 4> {
   WeightedEdge edge_;
 };
 
-// The same where the measurement's metres are exp(kappa) of the map's:
+// The same edge where one unit of the measurement is exp(kappa) metres of the map:
 //   r = W [ exp(-kappa) Rz(yaw_i)^T (p_j - p_i) - t ;  wrap(yaw_j - yaw_i - yaw) ].
 // Parameters: (x, y, z, yaw) of both keyframes, kappa.
 class ScaledPoseCost : public ceres::SizedCostFunction<4, 4, 4, 1> {
