@@ -35,7 +35,7 @@ struct Arguments {
   VioProcessOptions process;
 };
 
-// `--bus none`: says everything into the void.
+// `--bus none`: published messages are discarded.
 class NoBus : public Bus {
  public:
   void Publish(const std::string&, Bytes) override {}
@@ -73,7 +73,7 @@ double ParseRate(const std::string& rate) {
   return value;
 }
 
-// Says what came of it all. To be stopped before there is a pose is no failure.
+// Prints the outcome and returns the exit code. Being stopped before the first pose is no failure.
 int Outcome(const VioProcess& process) {
   const std::optional<std::string> why = process.NoPoseYet();
   std::cerr << fmt::format("pangea-vio: {}\n", why ? "no pose: " + *why : process.Totals());
@@ -126,9 +126,9 @@ void Check(const Arguments& a) {
   }
 }
 
-// The images of a frame and of a keyframe's scale space are given back and asked for again each
-// time; by default the C library returns them to the system, which clears every page: a tenth of
-// the odometry's time.
+// The images of a frame and of a keyframe's scale space are freed and allocated again each time. By
+// default the C library returns such memory to the system, which clears every page when it is
+// allocated again: this takes a tenth of the odometry's time.
 void KeepFreedMemory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 16 << 20);  // bytes
@@ -160,7 +160,7 @@ int RunCommandLine(int argc, char** argv) {
     arguments.playback.rate = ParseRate(arguments.rate);
     arguments.process.vio = file_options.vio;
     arguments.process.told_options = yaml.PrintWithoutHelp();
-    // The agent shares its machine with the other processes, and one thread gives the same bytes.
+    // One thread: the agent shares its machine with other processes, and results are reproducible.
     cv::setNumThreads(1);
     KeepFreedMemory();
     return Run(arguments, file_options.live_imu, options.Source());

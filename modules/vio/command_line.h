@@ -2,8 +2,7 @@
 
 namespace pangea::vio {
 
-// pangea-vio, whole: returns the exit code (--help has them). What is wrong is said in one line on
-// stderr.
+// The whole of pangea-vio. Returns the exit code (see --help); an error is one line on stderr.
 int RunCommandLine(int argc, char** argv);
 
 }  // namespace pangea::vio

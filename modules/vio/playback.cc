@@ -106,7 +106,7 @@ void Playback::Run() {
   process_.PublishFinished(WallUtime());
 }
 
-// Whether the image is to be played: in real time none is that comes too late.
+// Returns whether to play the image: in real time, an image that is too late is dropped.
 bool Playback::WaitUntilDue(int64_t played_us, int64_t begin_wall) {
   if (options_.rate <= 0) {
     pace_.WaitForAcknowledgements();
@@ -121,14 +121,14 @@ bool Playback::WaitUntilDue(int64_t played_us, int64_t begin_wall) {
   return !drop;
 }
 
-// What the odometry has not seen yet, up to and including the first sample at or after `utime`.
+// The samples not yet given to the odometry, up to and including the first one at or after `utime`.
 std::span<const ImuSample> Playback::ImuUntil(int64_t utime) {
   const std::vector<ImuSample>& imu = recording_.imu();
   const size_t begin = next_imu_;
   while (next_imu_ < imu.size() && (next_imu_ == begin || imu[next_imu_ - 1].utime < utime)) {
     ++next_imu_;
   }
-  // The sample at or after the last image may serve this one as well.
+  // The sample at or after the previous image may also be the one at or after this image.
   if (begin > 0 && begin < imu.size() && imu[begin - 1].utime >= utime) {
     next_imu_ = begin;
   }

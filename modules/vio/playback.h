@@ -1,9 +1,10 @@
 #pragma once
 
-// Plays a recording into the odometry, paced by the recording's own stamps. In real time (rate 1 or
-// less) it is as live sensors are: an odometry that cannot keep up drops images
-// (VioProcess::kMaxLag_us). Faster, none is dropped: it falls behind. Its status says how far
-// (lag_ms, in the recording's time; realtime_factor_permille).
+// Plays a recording into the odometry, paced by the recording's own stamps. At rate 1 or less it
+// behaves like live sensors: if the odometry cannot keep up, images are dropped
+// (VioProcess::kMaxLag_us). At a higher rate no image is dropped; the odometry falls behind
+// instead. The status reports by how much (lag_ms, in the recording's time;
+// realtime_factor_permille).
 
 #include <cstdint>
 #include <functional>
@@ -21,27 +22,28 @@
 namespace pangea::vio {
 
 struct PlaybackOptions {
-  double start_s = 0;                // after the recording's first image
-  std::optional<double> duration_s;  // to the end without it
-  double delay_s = 0;                // wall clock, before the first image
+  double start_s = 0;                // from the recording's first image
+  std::optional<double> duration_s;  // if empty, to the end of the recording
+  double delay_s = 0;                // wall clock, waited before the first image
   // Recording seconds per second; 0 = as fast as possible, but no faster than the server keeps up
   // (playback_pace.h).
   double rate = 1;
-  std::string tracks_csv;  // exact tracks instead of the tracker's; empty for none
+  std::string tracks_csv;  // file with exact tracks, used instead of the tracker; may be empty
 };
 
-// One csv row a feature: stamp_ns, landmark_id, u, v. By the image's stamp.
-// Throws std::runtime_error naming the file when nothing can be read from it.
+// Reads a csv file with one row per observation: stamp_ns, landmark_id, u, v (pixels). The result
+// is keyed by the image's stamp (utime). Throws std::runtime_error naming the file if it yields no
+// row.
 std::map<int64_t, TrackedFrame> ReadTracks(const std::string& csv, const CameraModel& camera);
 
 class Playback {
  public:
-  // `bus` may be null: nothing to listen to.
+  // `bus` may be null if there is nothing to listen to.
   Playback(LcmBus* bus, VioProcess& process, const EurocRecording& recording,
            const PlaybackOptions& options);
 
-  // To the end of the recording or to a signal, then until every keyframe is acknowledged or nobody
-  // will.
+  // Plays to the end of the recording or until a signal, then waits until every keyframe is
+  // acknowledged or no acknowledgement can be expected.
   void Run();
 
  private:

@@ -1,9 +1,10 @@
 #pragma once
 
-// A function marked so is compiled twice, for any processor and for those with AVX2; the first call
-// chooses. Both give the same bytes: the compiler neither contracts a product and a sum
-// (-ffp-contract=off) nor changes the order of a sum. What it calls must be inline to gain. Not
-// under sanitizers, which are not ready yet when the loader asks, nor with other compilers.
+// A function with this mark is compiled twice: for any x86-64 processor and for those with AVX2;
+// the first call selects one. Both give the same bytes: the compiler neither contracts a product
+// and a sum (-ffp-contract=off) nor reorders a sum. Functions that it calls gain only if they are
+// inlined. Disabled under sanitizers, which are not initialised yet when the loader selects, and
+// with other compilers.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define PANGEA_VECTOR_CLONES [[gnu::target_clones("arch=x86-64-v3", "default")]]

@@ -10,7 +10,7 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kMaxPoints = 150;  // map points of a keyframe, the best known ones
+constexpr size_t kMaxPoints = 150;  // map points of a keyframe: the most certain ones
 
 }  // namespace
 
@@ -27,7 +27,7 @@ Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
 }
 
 void Vio::OpenNewMap() {
-  // A map nobody has seen a keyframe of keeps its name.
+  // A map from which no keyframe was output keeps its id.
   if (maps_opened_ == 0 || next_seq_ > 0) {
     map_ = {agent_id_, open_map_()};
     ++maps_opened_;
@@ -43,7 +43,8 @@ void Vio::OpenNewMap() {
 int64_t Vio::ImuTimeOf(int64_t image_utime) const { return ImuTimeOfRow(image_utime, 1); }
 
 int64_t Vio::ImuTimeOfRow(int64_t image_utime, double row) const {
-  // Never less than the calibration says, so that samples come in order while the estimate moves.
+  // Not less than the calibrated offset, so that the requested times increase while the estimated
+  // offset changes.
   const double offset_s = std::max(camera_.time_offset_s, estimator_->camera().time_offset_s);
   return image_utime + std::llround(1e6 * (offset_s + row * camera_.readout_s));
 }

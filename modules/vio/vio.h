@@ -3,10 +3,10 @@
 // Visual-inertial odometry of one agent (the paper, section IV.A): images and inertial samples in,
 // the pose at every image and finished keyframes out.
 //
-// Tracker -> Estimator -> (at a keyframe) Describer. A keyframe comes out once, complete and final,
-// when the estimator's window lets it go. An estimator that is lost ends the map: its window is
-// dropped as suspect and a new map, with ids from 0, begins with the next image.
-// No thread, clock or file: the same input gives the same output.
+// Tracker -> Estimator -> (at a keyframe) Describer. A keyframe is output once, complete and final,
+// when it leaves the estimator's window. If the estimator is lost, the map ends: the keyframes in
+// its window are discarded as unreliable, and the next image begins a new map, with ids from 0.
+// Uses no thread, clock or file: the same input gives the same output.
 
 #include <cstdint>
 #include <functional>
@@ -42,53 +42,53 @@ struct VioOutput {
   EstimatorState state = EstimatorState::kInitialising;
   std::string reason;  // why it is not tracking
   MapId map;
-  Rigid3 T_odom_body;  // valid while tracking
+  Rigid3 T_odom_body;  // valid if state is kTracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
-  BodyMotion motion;  // from there on
+  BodyMotion motion;  // from this image on (rolling shutter)
   int num_tracked = 0;
-  // How well the scale is known, a share: of the newest keyframe that tells.
+  // Relative sigma of the scale, from the newest keyframe with enough depths to estimate it.
   std::optional<double> scale_sigma;
-  bool imu_contradicted = false;    // it feels an acceleration that the images do not show
-  bool is_keyframe = false;         // it was described, and will be finished as a keyframe later
-  std::vector<Keyframe> keyframes;  // finished by this image
+  bool imu_contradicted = false;    // it measures an acceleration that the images do not show
+  bool is_keyframe = false;         // corners are described; the keyframe is finished later
+  std::vector<Keyframe> keyframes;  // those that this image finished
 };
 
 class Vio {
  public:
-  // `open_map` gives the opened_utime of each new map: the wall clock, or what a test fixes.
+  // `open_map` returns the opened_utime of each new map: the wall clock, or a fixed value in tests.
   using OpenMap = std::function<int64_t()>;
   Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise, const VioOptions& options,
       OpenMap open_map);
 
-  // Images in time order. `imu`: all samples after those of the previous call, up to and including
-  // the first one at or after ImuTimeOf(utime).
+  // Images must come in time order. `imu`: all samples after those of the previous call, up to and
+  // including the first one at or after ImuTimeOf(utime).
   VioOutput AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
-  // The same with given tracks instead of the tracker's.
+  // The same, with given tracks instead of those of the tracker.
   VioOutput AddTracks(const TrackedFrame& frame, const cv::Mat& image,
                       std::span<const ImuSample> imu);
-  // The keyframes still in the window, at the end.
+  // At the end: finishes and returns the keyframes that are still in the window.
   std::vector<Keyframe> Flush();
-  // The same, and a new map: what comes next is from another time, perhaps an earlier one.
+  // Like Flush, and begins a new map: the next image may have any stamp, even an earlier one.
   std::vector<Keyframe> StartAnew();
 
-  // The IMU's time of an image's last row.
+  // The time, on the IMU's clock, at which the image's last row was exposed (microseconds).
   int64_t ImuTimeOf(int64_t image_utime) const;
   const MapId& map() const { return map_; }
   int maps_opened() const { return maps_opened_; }
-  // The newest image when it became a keyframe, and the window around it. Looking changes nothing.
+  // The newest image, if it became a keyframe, and the window at that time.
   struct View {
     CameraModel camera;
-    std::vector<Corner> corners;  // as a global shutter would have seen them
+    std::vector<Corner> corners;  // as a global shutter would see them
     WindowPoses window;
   };
-  // `output`: of that image.
+  // `output`: the result of AddImage or AddTracks for that image. Changes no state.
   View NewestKeyframe(const VioOutput& output) const;
-  // Goes into the keyframes: the newest correction applied to this map.
+  // Revision of the newest correction applied to this map; it is written into the keyframes.
   void set_group_revision(int64_t revision) { group_revision_ = revision; }
 
  private:
   void OpenNewMap();
-  int64_t ImuTimeOfRow(int64_t image_utime, double row) const;  // row: 0 the first, 1 the last
+  int64_t ImuTimeOfRow(int64_t image_utime, double row) const;  // row: 0 first, 1 last
   Eigen::Quaterniond CameraRotation(int64_t utime);
   VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
                      std::span<const ImuSample> imu);
@@ -111,9 +111,9 @@ class Vio {
   int64_t group_revision_ = 0;
   std::optional<double> scale_sigma_;
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
-  std::vector<ImuSample> rotation_imu_;  // samples the next rotation of the camera needs
+  std::vector<ImuSample> rotation_imu_;  // samples needed for the camera's next rotation
   std::optional<int64_t> last_utime_;
-  std::map<int64_t, std::vector<Corner>> described_;  // keyframes in the window, by utime
+  std::map<int64_t, std::vector<Corner>> described_;  // corners of the window's keyframes, by utime
 };
 
 }  // namespace pangea::vio

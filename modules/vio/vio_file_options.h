@@ -1,6 +1,6 @@
 #pragma once
 
-// The odometry's options as they stand in a file: `pangea-vio --print-options` shows them whole.
+// The odometry's options in an options file; `pangea-vio --print-options` prints all of them.
 
 #include "core/imu/imu.h"
 #include "vio/vio.h"

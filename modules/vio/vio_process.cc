@@ -24,7 +24,7 @@ constexpr int64_t kNotableLag_us = 500'000;
 constexpr char kContradicted[] =
     "the IMU feels an acceleration that the images do not show: a lift, a vehicle?";
 
-// In words, when the motion has not told the scale; else nothing.
+// A text for the status if the motion has not made the scale observable; else empty.
 std::string UnknownScale(const std::optional<double>& sigma) {
   return sigma && *sigma > kMetricScaleSigma
              ? fmt::format(
@@ -142,7 +142,8 @@ void VioProcess::FollowMaps(const VioOutput& output) {
   }
 }
 
-// Looks for the map's landmarks in a new keyframe. Without any the window is not even looked at.
+// Looks for landmarks of the map in a new keyframe. Without landmarks the window's covariance is
+// not computed.
 void VioProcess::Localize(const VioOutput& output) {
   if (!output.is_keyframe || !localization_.HasLandmarks()) {
     return;

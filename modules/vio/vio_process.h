@@ -3,8 +3,8 @@
 // The odometry on an agent's bus. Images come from a player (playback.h) or from the bus itself
 // (live_input.h); this class knows only "an image and its inertial samples".
 //
-//   POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz, OPTIONS_vio_k out;
-//   CORRECTION_k, LANDMARKS_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
+//   Out: POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz, OPTIONS_vio_k.
+//   In: CORRECTION_k, LANDMARKS_k; HAVE, RESEND_REQUEST (with answers on AGAIN_<requester>) as in
 //   reliable_keyframe_publisher.h, for the newest kKeptKeyframes.
 
 #include <cstdint>
@@ -33,49 +33,53 @@ namespace pangea::vio {
 struct VioProcessOptions {
   int32_t agent_id = 0;
   VioOptions vio;
-  // opened_utime of the first map, one more for each further one; the wall clock without it.
+  // opened_utime of the first map; each further map has one more. If empty: the wall clock.
   std::optional<int64_t> map_utime;
-  // What OPTIONS_vio_k says; nothing is said when empty.
+  // Text published on OPTIONS_vio_k; if empty, nothing is published.
   std::string told_options;
-  // Raw odometry at camera rate, TUM; a second map goes to FILE.2, a third to FILE.3.
+  // File for the raw odometry at camera rate, in TUM format; a second map goes to FILE.2, a third
+  // to FILE.3. Empty for none.
   std::string out_tum;
-  // Keyframes as an LCM log.
+  // LCM log for the keyframes; empty for none.
   std::string out_keyframes;
 };
 
 class VioProcess : public Process {
  public:
   static constexpr size_t kKeptKeyframes = 200;
-  // Images that come in real time and are further behind the newest one are dropped, the oldest
-  // first: an odometry that cannot keep up leaves images out, and stays this far behind.
+  // In real time, images further behind the newest one than this are dropped, the oldest first. An
+  // odometry that cannot keep up therefore skips images, and its lag stays bounded.
   static constexpr int64_t kMaxLag_us = 1'000'000;
 
-  // Throws std::runtime_error when an output file cannot be written.
+  // Throws std::runtime_error if an output file cannot be written.
   VioProcess(Bus& bus, const VioProcessOptions& options, int64_t now_utime);
   ~VioProcess() override;
 
-  // The calibration, and how well it is known where not as the options say: before the first image.
+  // Sets the calibration; call before the first image. `sigmas`, if given, replace those of the
+  // options.
   void Open(const CameraModel& camera, const ImuNoise& noise,
             const std::optional<CalibrationSigmas>& sigmas = std::nullopt);
   bool open() const { return vio_.has_value(); }
 
-  // As Vio::AddImage and Vio::AddTracks.
+  // Like Vio::AddImage and Vio::AddTracks.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
-  // How far the odometry is behind its sensors, and how many images were dropped for it since the
-  // last call. Told in the status, and on stderr where it cannot keep up.
+  // Reports how far the odometry is behind its sensors, and how many images were dropped for this
+  // since the last call. Published in the status, and printed on stderr if the odometry cannot keep
+  // up.
   void NoteLag(int64_t lag_us, int64_t dropped);
-  // The sensors' time begins anew: finishes the map, and opens another.
+  // Call when the sensors' time begins anew: finishes the map and opens another.
   void StartAnew();
-  // No more images: finishes the keyframes in the window.
+  // Call after the last image: finishes the keyframes in the window.
   void Flush();
-  // What came of all images so far.
+  // A summary of all images so far, for people.
   std::string Totals() const;
-  // Why no image has given a pose so far; nothing once one has.
+  // Why no image has given a pose so far; empty once one has.
   std::optional<std::string> NoPoseYet() const;
-  // Why the file of poses is not whole, as on a full disk; the odometry goes on without it.
+  // Why the file of poses is incomplete (for instance a full disk); the odometry goes on without
+  // it.
   const std::optional<std::string>& output_error() const { return output_error_; }
-  // Everything is said: the last status, with the counter finished = 1.
+  // Publishes the last status, with the counter finished = 1.
   void PublishFinished(int64_t now_utime);
 
   void Tick(int64_t now_utime) override;
@@ -110,13 +114,13 @@ class VioProcess : public Process {
   int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
-  std::string doubt_;             // while tracking
+  std::string doubt_;             // a warning while tracking
   std::string why_not_tracking_;  // at the newest image
   int64_t num_images_ = 0;
   int64_t num_poses_ = 0;
   int64_t num_keyframes_ = 0;
   int64_t lag_us_ = 0;
-  int64_t num_dropped_ = 0;  // for the lag
+  int64_t num_dropped_ = 0;  // because of the lag
   int64_t num_dropped_told_ = 0;
   int64_t next_lag_told_utime_ = 0;
   std::ofstream tum_;

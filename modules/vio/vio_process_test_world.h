@@ -1,6 +1,6 @@
 #pragma once
 
-// A vio process on a bus of its own: what it sees, and all that it says.
+// A vio process on its own bus, with simulated input and everything it publishes.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ inline constexpr int64_t kMapUtime = 1'000;
 inline constexpr int64_t kImuStep_us = 5'000;
 inline constexpr int64_t kImageStep_us = 100'000;
 
-// A hand-held loop of a few metres in a cloud of points, with exact tracks and exact samples.
+// A hand-held loop of a few metres in a point cloud, with exact tracks and exact IMU samples.
 class World {
  public:
   explicit World(uint64_t seed);

@@ -1,9 +1,9 @@
 #pragma once
 
-// What a blob looks like: SIFT's histograms of gradients (Lowe, IJCV 2004, sections 5 and 6), of
-// which 256 bits are kept. These are signs of random projections, which keep angles between
-// vectors (Charikar, STOC 2002): two rounds of random signs and a Hadamard transform, 128 bits, and
-// two others for the other 128 (Ailon and Chazelle, STOC 2006).
+// Binary descriptor of a blob: SIFT's histogram of gradients (Lowe, IJCV 2004, sections 5 and 6) in
+// 256 bits. The bits are signs of random projections, which preserve angles between vectors
+// (Charikar, STOC 2002). Two rounds of random signs and a Hadamard transform give 128 bits, and two
+// other rounds the other 128 (Ailon and Chazelle, STOC 2006).
 
 #include <span>
 #include <vector>
@@ -13,11 +13,10 @@
 
 namespace pangea::vio {
 
-// One for each direction in which it may be seen: the strongest gradient's, and others about as
-// strong.
+// One descriptor per dominant gradient orientation: the strongest, and others about as strong.
 std::vector<Descriptor> DescribeBlob(const ScaleSpace& space, const Blob& blob);
 
-// Of a histogram of 128 bins.
+// `histogram` has 128 bins.
 Descriptor SignsOfProjections(std::span<const float> histogram);
 
 }  // namespace pangea::vio

@@ -1,7 +1,7 @@
 #pragma once
 
-// Blobs beside corners, for recognising a place from another distance and side: corners repeat
-// between near views, blobs between far ones too (docs/decisions/real_revisits.md).
+// Blobs complement corners when a place is recognised from another distance or direction: corners
+// repeat between near views, blobs also between distant ones (docs/decisions/real_revisits.md).
 
 #include <opencv2/core.hpp>
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace pangea::vio {
 
-// At most `wanted` of them, spread over the image by cells of `cell_px`, strongest first; none is a
-// landmark.
+// Returns at most `wanted` blobs as corners with descriptor and without landmark_id, spread over
+// the image by cells of `cell_px`, the strongest first.
 std::vector<Corner> DescribeBlobs(const cv::Mat& image, int wanted, int cell_px);
 
 }  // namespace pangea::vio

@@ -1,12 +1,12 @@
 #pragma once
 
-// Describes a keyframe once: its tracked landmarks first, then blobs (blobs.h), then FAST corners
-// spread over the whole image and a pyramid. Landmarks and corners have a 256-bit rotation-aware
-// binary descriptor (ORB: Rublee et al., ICCV 2011, the intensity centroid's angle and learned
-// tests as OpenCV has them), blobs one of their own, as wide and like no other's.
+// Detects and describes the corners of a keyframe: its tracked landmarks, blobs (blobs.h), and FAST
+// corners spread over the image and a pyramid. Landmarks and FAST corners have OpenCV's ORB
+// descriptor (Rublee et al., ICCV 2011: 256 bits, orientation from the intensity centroid). Blobs
+// have a descriptor of their own, also 256 bits, which is not similar to any of a corner.
 //
-// Matching is across viewpoints and distances, so a tracked landmark is described on the octaves
-// where it is a corner, not where the tracker happens to follow it.
+// Keyframes are matched across viewpoints and distances, so a tracked landmark is described on the
+// octaves on which it is a corner, not on the octave on which the tracker follows it.
 
 #include <cstdint>
 #include <opencv2/core.hpp>
@@ -21,7 +21,7 @@
 namespace pangea::vio {
 
 struct DescriberOptions {
-  int max_blobs = 240;  // of a keyframe's kMaxCorners
+  int max_blobs = 240;  // at most, of a keyframe's kMaxCorners
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -34,8 +34,8 @@ class Describer {
  public:
   Describer(const CameraModel& camera, const DescriberOptions& options);
 
-  // Corners of the image: those with a landmark_id first, in the order of the frame; then
-  // the others, each blob beside a corner.
+  // Corners of the image: first those with a landmark_id, in the order of the frame; then the
+  // others, blobs and FAST corners alternating.
   std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame);
 
  private:
@@ -62,7 +62,7 @@ class Describer {
 
   CameraModel camera_;
   DescriberOptions options_;
-  std::vector<double> scales_;  // nominal, of each octave
+  std::vector<double> scales_;  // nominal scale of each octave
   std::vector<cv::Mat> pyramid_;
   std::vector<std::vector<cv::KeyPoint>> strong_;  // corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;

@@ -1,8 +1,8 @@
 #pragma once
 
 // Contrast-limited adaptive histogram equalisation (Zuiderveld, Graphics Gems IV, 1994): each tile
-// of the image has a table of grey values, a pixel blends those of the four tiles whose centres are
-// around it. The same tables as OpenCV's, blended in integers.
+// of the image has a table of grey values, and a pixel is interpolated between the tables of the
+// four tiles around it. The tables equal OpenCV's; the interpolation is in integers.
 
 #include <array>
 #include <cstdint>
@@ -13,14 +13,14 @@ namespace pangea::vio {
 
 class Equalizer {
  public:
-  // `clip`: what a grey value may have of a tile's pixels, in multiples of an even histogram's.
+  // `clip`: limit of a histogram bin, in multiples of the mean bin.
   explicit Equalizer(double clip) : clip_(clip) {}
 
-  // Of a grey image of at least kTiles x kTiles pixels; in its own memory.
+  // `image`: grey, 8 bit, at least kTiles x kTiles pixels. The result has its own memory.
   cv::Mat Apply(const cv::Mat& image);
 
  private:
-  static constexpr int kTiles = 8;  // each way
+  static constexpr int kTiles = 8;  // in each direction
   static constexpr int kGreys = 256;
   using Table = std::array<uint8_t, kGreys>;
 

@@ -1,11 +1,11 @@
 #pragma once
 
-// How a feature looked when its track began, to find it again without drift.
+// The image patch of a feature at the begin of its track, used to find the feature without drift.
 //
-// KLT from image to image matches each image with the one before, so its errors add up along a
-// track. Here the patch of the first image is matched directly: its affine deformation and its
-// change of brightness are followed, by inverse compositional alignment (Baker & Matthews, "Lucas-
-// Kanade 20 years on", IJCV 2004) of patches normalised to mean zero and length one.
+// KLT matches each image with the previous one, so its errors accumulate along a track. Here the
+// patch of the first image is matched directly, with an affine deformation and a change of
+// brightness, by inverse compositional alignment (Baker & Matthews, "Lucas-Kanade 20 years on",
+// IJCV 2004) of patches normalised to mean zero and length one.
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
@@ -15,14 +15,15 @@ namespace pangea::vio {
 
 class ReferencePatch {
  public:
-  // The patch around `pixel` of a grey image; empty if it does not lie in the image or is blank.
+  // The patch around `pixel` of a grey image; empty if it is not inside the image or has no
+  // texture.
   static std::optional<ReferencePatch> Take(const cv::Mat& image, const Eigen::Vector2f& pixel);
 
-  // Where the patch is in `image`, near `guess`; empty if it does not look like itself there. The
-  // deformation found is the next call's first guess.
+  // Position of the patch in `image`, near `guess`; empty if the patch does not match there. The
+  // deformation found is the initial guess of the next call.
   std::optional<Eigen::Vector2f> Find(const cv::Mat& image, const Eigen::Vector2f& guess);
 
-  // The deformation has become so strong that what is sampled is not what was taken.
+  // True if the deformation is too strong for the patch to be resampled faithfully.
   bool NeedsReplacement() const;
 
  private:
@@ -32,13 +33,13 @@ class ReferencePatch {
   using Values = Eigen::Matrix<float, kCount, 1>;
   using Jacobian = Eigen::Matrix<float, kCount, 6>;
 
-  // Takes mean and length out; returns the length, 0 if there is nothing but noise.
+  // Normalises to mean zero and length one; returns the former length, or 0 if there is only noise.
   static float Normalise(Values* values);
 
   Values look_;                      // normalised
-  Jacobian jacobian_;                // of look_ by (x, y, a11, a21, a12, a22)
-  Eigen::Matrix<float, 6, 6> gain_;  // inverse of its stiffened normal matrix
-  // Takes directions in the patch to those in the newest image.
+  Jacobian jacobian_;                // d(look_)/d(x, y, a11, a21, a12, a22)
+  Eigen::Matrix<float, 6, 6> gain_;  // inverse of its regularised J^T J
+  // Maps offsets in the patch to offsets in the newest image.
   Eigen::Matrix2f a_ = Eigen::Matrix2f::Identity();
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 
 // Blobs of an image: extrema of differences of Gaussians over place and scale (Lowe, IJCV 2004,
-// sections 3 and 4), for a keyframe's budget: two layers an octave in place of three, kernels that
-// end at three sigmas, and no search for the pixel next to which the extremum lies
+// sections 3 and 4), with cheaper settings for real time: two layers per octave instead of three,
+// kernels cut off at three sigmas, and no iterative search for the pixel nearest to an extremum
 // (docs/decisions/real_revisits.md).
 
 #include <opencv2/core.hpp>
@@ -12,27 +12,27 @@ namespace pangea::vio {
 
 struct Blob {
   cv::Point2f pixel;   // (0, 0) is the middle of the top-left pixel
-  float sigma_px = 0;  // of the Gaussian; a blob's radius is sqrt(2) of it
-  float response = 0;  // of the difference of Gaussians, of grey levels from 0 to 1
-  int level = 0;       // of the scale space, the nearest
+  float sigma_px = 0;  // of the Gaussian; the blob's radius is sqrt(2) * sigma_px
+  float response = 0;  // of the difference of Gaussians, grey levels in 0 .. 1
+  int level = 0;       // nearest level of the scale space
 };
 
 class ScaleSpace {
  public:
-  // Of an 8-bit image.
+  // `image`: 8-bit grey.
   explicit ScaleSpace(const cv::Mat& image);
 
-  // From the finest octave on.
+  // In the order of octaves, the finest first.
   const std::vector<Blob>& blobs() const { return blobs_; }
 
-  // The smoothed image where a blob was found, of floats from 0 to 1, and how many pixels of the
-  // image each of its own is wide.
+  // The smoothed image of the level at which a blob was found (float, 0 .. 1), and the width of its
+  // pixels in pixels of the original image.
   const cv::Mat& Level(const Blob& blob) const { return levels_[blob.level]; }
   float PixelWidth(const Blob& blob) const;
 
  private:
   std::vector<Blob> blobs_;
-  std::vector<cv::Mat> levels_;  // only those of blobs
+  std::vector<cv::Mat> levels_;  // only levels with blobs
 };
 
 }  // namespace pangea::vio

@@ -8,17 +8,17 @@
 
 namespace pangea::vio {
 
-// At most `wanted` of these, which have a `response`: the strongest of each cell of the image
-// first, then the second of each, and so on, so that they are spread evenly without losing the
-// strong ones. Equal ones in their order.
+// Selects at most `wanted` items, by their member `response`: first the strongest of each image
+// cell, then the second of each, and so on, so that they are spread evenly and strong ones are
+// kept. Items with equal response keep their order.
 template <typename T>
 std::vector<T> SpreadOver(std::vector<T> items, cv::Point2f T::*place, int cell_px,
                           int image_columns, size_t wanted) {
   std::stable_sort(items.begin(), items.end(),
                    [](const T& a, const T& b) { return a.response > b.response; });
   const int columns = (image_columns + cell_px - 1) / cell_px;
-  std::vector<std::pair<int, size_t>> ranked;  // in its cell
-  std::vector<int> count;                      // of each cell
+  std::vector<std::pair<int, size_t>> ranked;  // (rank in its cell, index)
+  std::vector<int> count;                      // items per cell
   for (size_t i = 0; i < items.size(); ++i) {
     const cv::Point2f& at = items[i].*place;
     const size_t cell =

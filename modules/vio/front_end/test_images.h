@@ -1,6 +1,6 @@
 #pragma once
 
-// Images for the front end's tests: a textured plane at infinity, seen by a rotating camera.
+// Images for tests of the front end: a textured plane at infinity, seen by a rotating camera.
 
 #include <cstdint>
 #include <opencv2/core.hpp>
@@ -15,8 +15,7 @@ cv::Mat RandomTexture(int width, int height, uint64_t seed);
 // 752 x 480 without distortion.
 CameraModel PlainCamera();
 
-// What the camera sees after rotating, when it saw `image` before: directions d_after = q *
-// d_before.
+// The image after the camera rotated, if it was `image` before: directions d_after = q * d_before.
 cv::Mat RotatedView(const cv::Mat& image, const CameraModel& camera, const Eigen::Quaterniond& q);
 
 }  // namespace pangea::vio

@@ -1,13 +1,13 @@
 #pragma once
 
-// Feature tracks through an image stream: Shi-Tomasi corners on a grid, KLT from where the gyro's
-// rotation and the feature's own motion lead, alignment with how the feature looked at first
-// (reference_patch.h), pyramidal KLT with a forward-backward check for what that does not confirm,
-// two-view outlier rejection on undistorted rays (the paper, section IV.A, and VINS-Mono's front
-// end, which it builds on).
+// Tracks features through an image stream (the paper, section IV.A, which builds on the front end
+// of VINS-Mono). New features are Shi-Tomasi corners on a grid. Each is predicted by the gyro's
+// rotation and its own motion, searched there by KLT, and aligned with its first appearance
+// (reference_patch.h). Features that this does not confirm are searched by pyramidal KLT with a
+// forward-backward check. Last comes two-view outlier rejection on undistorted rays.
 //
-// In: grey images and the rotation of the camera since the last one. Out: the tracked frame.
-// Landmark ids count up from 0 and are never used twice until Reset. One thread; deterministic.
+// Input: grey images and the camera's rotation since the previous one. Output: the tracked frame.
+// Landmark ids count up from 0 and are not reused until Reset. One thread; deterministic.
 
 #include <Eigen/Geometry>
 #include <cstdint>
@@ -42,18 +42,18 @@ class Tracker {
  public:
   Tracker(const CameraModel& camera, const TrackerOptions& options);
 
-  // `q_cam_lastcam` takes directions from the last image's camera frame to this one's.
+  // `q_cam_lastcam` maps directions from the previous image's camera frame to this one's.
   const TrackedFrame& Track(int64_t utime, const cv::Mat& image,
                             const Eigen::Quaterniond& q_cam_lastcam);
-  // Ends these tracks: the estimator has found them inconsistent.
+  // Ends these tracks; the estimator calls them outliers.
   void Drop(const std::vector<int32_t>& landmark_ids);
   // Forgets all tracks; ids start again at 0 (a new map).
   void Reset();
 
-  // Of the newest image: tracks that went on, and why the others ended.
+  // For the newest image: the tracks that continued, and why the others ended.
   struct Statistics {
     int tracked = 0;
-    int as_predicted = 0;  // of these: by the cheap search where the last motion leads
+    int as_predicted = 0;  // of these, found by the cheap search at the prediction
     int lost_klt = 0;
     int lost_backward = 0;
     int lost_two_view = 0;
@@ -66,19 +66,19 @@ class Tracker {
     int32_t id = 0;
     cv::Point2f pixel;
     Eigen::Vector2d ray = Eigen::Vector2d::Zero();
-    cv::Point2f flow;                       // px/s, beside the camera's rotation
-    std::unique_ptr<ReferencePatch> patch;  // null: to be taken anew
+    cv::Point2f flow;                       // px/s, without the effect of the camera's rotation
+    std::unique_ptr<ReferencePatch> patch;  // null: to be taken from the newest image
   };
   struct Bearing {
     int32_t id;
     Eigen::Vector2d ray;
   };
 
-  using Pyramid = std::vector<cv::Mat>;  // each level and its derivatives, in turn
-  // Where a search begins whose guess is good: coarser levels have no work to do.
+  using Pyramid = std::vector<cv::Mat>;  // each level, followed by its derivatives
+  // Coarsest pyramid level of a search with a good initial guess.
   static constexpr int kNearLevel = 1;
-  using Found = std::optional<Eigen::Vector2f>;     // where in the newest image
-  using RatedCorner = std::pair<float, cv::Point>;  // its smaller eigenvalue
+  using Found = std::optional<Eigen::Vector2f>;     // position in the newest image
+  using RatedCorner = std::pair<float, cv::Point>;  // the first is its smaller eigenvalue
 
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
@@ -94,7 +94,7 @@ class Tracker {
   void TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_cam_lastcam, float dt_s);
   void TakePatches(const cv::Mat& image);
   void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
-  // Of the cells whose turn it is; the best first.
+  // Examines only the cells whose turn it is; the strongest corner first.
   std::vector<RatedCorner> CornersOfEmptyCells() const;
   void AddFeatures();
   cv::Mat1f CornerResponse(const cv::Rect& cell) const;
@@ -110,7 +110,7 @@ class Tracker {
   std::vector<Feature> features_;  // oldest first
   int32_t next_id_ = 0;
   int turn_ = 0;
-  double strongest_ = 0;  // eigenvalue, running
+  double strongest_ = 0;  // running maximum of the eigenvalue
   Statistics statistics_;
   TrackedFrame frame_;
 };

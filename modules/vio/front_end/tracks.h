@@ -1,6 +1,6 @@
 #pragma once
 
-// What the front end hands to the estimator: where the tracked features are in one image.
+// The output of the front end for the estimator: the tracked features of one image.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,7 +18,7 @@ struct Observation {
 };
 
 struct TrackedFrame {
-  int64_t utime = 0;  // microseconds, IMU clock as far as the known time offset goes
+  int64_t utime = 0;  // microseconds, on the clock of the images
   std::vector<Observation> observations;
 };
 

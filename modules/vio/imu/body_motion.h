@@ -1,7 +1,7 @@
 #pragma once
 
-// How the body moves on while the rows of an image are read out: accelerations, since of a phone in
-// a hand a constant rotation rate is off by pixels at the last row.
+// The body's motion while the rows of an image are read out. It includes accelerations: for a
+// hand-held phone, a constant rotation rate would be wrong by pixels at the last row.
 
 #include <Eigen/Core>
 
@@ -9,18 +9,18 @@
 
 namespace pangea::vio {
 
-// In the body frame at the beginning.
+// All in the body frame at the begin.
 struct BodyMotion {
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // rad/s
   Eigen::Vector3d alpha = Eigen::Vector3d::Zero();  // rad/s^2
   Eigen::Vector3d v = Eigen::Vector3d::Zero();      // m/s
-  Eigen::Vector3d a = Eigen::Vector3d::Zero();      // m/s^2, gravity taken out
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();      // m/s^2, without gravity
 
-  // T_body_later, `s` seconds after the beginning; to the second order.
+  // T_body_later, `s` seconds after the begin; second order in s.
   Rigid3 After(double s) const {
     return {ExpSo3(s * omega + 0.5 * s * s * alpha), s * v + 0.5 * s * s * a};
   }
-  // The same motion, begun `s` seconds later.
+  // The same motion, described from `s` seconds later on.
   BodyMotion From(double s) const {
     const Eigen::Matrix3d R_later_body = After(s).R().transpose();
     return {omega + s * alpha, alpha, R_later_body * (v + s * a), R_later_body * a};

@@ -11,8 +11,8 @@ namespace pangea::vio {
 namespace {
 
 constexpr int64_t kMaxGap_us = 300'000;
-constexpr int64_t kMargin_us = 50'000;  // for changes of the time offset
-constexpr size_t kMinKept = 100;        // to tell whether it is stationary, or the noise, by
+constexpr int64_t kMargin_us = 50'000;  // for changes of the estimated time offset
+constexpr size_t kMinKept = 100;        // for the stationary detector and the noise measurement
 constexpr std::ptrdiff_t kNoiseSamples = 100;
 
 }  // namespace
@@ -53,12 +53,12 @@ ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
                                           const ImuIntrinsics& intrinsics,
                                           const Eigen::Vector3d& gyro_bias,
                                           const Eigen::Vector3d& accel_bias) const {
-  // The time offset may want a little more than has come: the last sample holds.
+  // A changed time offset may ask for slightly later samples: the last one is extended.
   return IntegrateScaled(SamplesBetween(samples_, from_utime, to_utime),
                          NoiseAround(from_utime, to_utime), intrinsics, gyro_bias, accel_bias);
 }
 
-// Measured on the span, or on as much before its end as tells the noise.
+// Measures the noise on the span, extended backwards to kNoiseSamples samples if it is shorter.
 ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
   const auto before = [](int64_t utime) {
     return [utime](const ImuSample& sample) { return sample.utime <= utime; };
@@ -89,7 +89,7 @@ BodyMotion ImuBuffer::MotionFrom(int64_t utime, double duration_s, const ImuIntr
     return Integrate(utime, until, intrinsics, state.gyro_bias, state.accel_bias).measured;
   };
   const Preintegration half = moved(utime + duration_us / 2), whole = moved(utime + duration_us);
-  // Through both rotations: t omega + t^2 / 2 alpha.
+  // Fit t omega + t^2 / 2 alpha to both rotations.
   const Eigen::Vector3d slope_half = LogSo3(half.delta_q) / half.duration_s;
   const Eigen::Vector3d slope_whole = LogSo3(whole.delta_q) / whole.duration_s;
   motion.alpha = 2 * (slope_whole - slope_half) / (whole.duration_s - half.duration_s);

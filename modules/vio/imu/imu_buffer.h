@@ -1,6 +1,7 @@
 #pragma once
 
-// The inertial samples that frames of the window or an edge may still ask for. Times are the IMU's.
+// The inertial samples that the window or an odometry edge may still need. All times are on the
+// IMU's clock (microseconds).
 
 #include <cstdint>
 #include <optional>
@@ -21,22 +22,22 @@ class ImuBuffer {
   explicit ImuBuffer(const ImuNoise& noise) : noise_(noise) {}
 
   void Add(std::span<const ImuSample> samples);
-  // Drops what is older than this, but for a margin and the newest few.
+  // Drops samples older than this, except for a margin and the newest 100 samples.
   void Forget(int64_t before_utime);
 
-  // What is missing for a span of time, in words; nothing when it is covered.
+  // A text that says what is missing in a span of time; empty if the samples cover it.
   std::optional<std::string> Gap(int64_t from_utime, int64_t to_utime) const;
-  // With the noise that the samples show, not less than the data sheet's (imu_noise.h).
+  // Preintegrates with the noise density that the samples show, within bounds (imu_noise.h).
   ScaledPreintegration Integrate(int64_t from_utime, int64_t to_utime,
                                  const ImuIntrinsics& intrinsics, const Eigen::Vector3d& gyro_bias,
                                  const Eigen::Vector3d& accel_bias) const;
-  // The first at or after this time, else the last of all. There must be one.
+  // The first sample at or after this time, else the newest. The buffer must not be empty.
   const ImuSample& At(int64_t utime) const;
-  // Rotation and acceleration from a time on, so that they hold at the middle and the end of
-  // `duration_s`; for none, the rotation rate then. The velocity is left open.
+  // Rotation and acceleration from `utime` on, fitted to the IMU at the middle and the end of
+  // `duration_s`. If `duration_s` is 0: only the rotation rate. The velocity is not set.
   BodyMotion MotionFrom(int64_t utime, double duration_s, const ImuIntrinsics& intrinsics,
                         const ImuState& state) const;
-  // The newest of them, `count` or as many as there are.
+  // The newest `count` samples, or all if there are fewer.
   std::vector<ImuSample> Latest(size_t count) const;
 
  private:

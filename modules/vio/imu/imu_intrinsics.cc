@@ -74,7 +74,7 @@ Eigen::Matrix<double, 15, kImuIntrinsicsSize> ImuIntrinsicsJacobian(
   const Vector3d rotated_by_bias =
       span.measured.bias_jacobian.topLeftCorner<3, 3>() * (gyro_bias - span.measured.gyro_bias);
   const Vector3d rotated_by_intrinsics = span.jacobian.topRows<3>() * Moved(span, intrinsics);
-  // dR Exp(s) Exp(b): what moves s moves what is right of it by Exp(-b).
+  // dR Exp(s) Exp(b): a change of s, moved to the right end, is rotated by Exp(-b).
   const Matrix3d rotation = -RightJacobianInverse(-r_theta) *
                             ExpSo3(-rotated_by_bias).toRotationMatrix() *
                             RightJacobian(rotated_by_intrinsics);

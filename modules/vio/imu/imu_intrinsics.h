@@ -1,7 +1,7 @@
 #pragma once
 
-// What calibration leaves of an IMU's scale factors and axes, and what the IMU factor says of them:
-// omega = (I + S_g) omega_m - b_g, a = (I + S_a) a_m - b_a (docs/maths_vio.md).
+// Residual errors of an IMU's scale factors and axes after calibration, and their effect on the IMU
+// factor: omega = (I + S_g) omega_m - b_g, a = (I + S_a) a_m - b_a (docs/maths_vio.md).
 
 #include <Eigen/Core>
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace pangea::vio {
 
-// Their error is plain: the columns of S_g, then those of S_a.
+// The error is a plain difference: the columns of S_g, then those of S_a.
 inline constexpr int kImuIntrinsicsSize = 18;
 
 struct ImuIntrinsics {
@@ -21,13 +21,13 @@ struct ImuIntrinsics {
   ImuSample Corrected(const ImuSample& sample) const;
   Eigen::Matrix<double, kImuIntrinsicsSize, 1> Stacked() const;
   void Add(const Eigen::Matrix<double, kImuIntrinsicsSize, 1>& error);
-  // Of the body whose axes are the gyro's: what rotated the gyro rotates the accelerometer (to
-  // first order; docs/decisions/imu.md).
+  // The same intrinsics for a body whose axes are the gyro's: the gyro's rotation is removed from
+  // both sensors (first order; docs/decisions/imu.md).
   ImuIntrinsics OfGyroAxes() const;
 };
 
-// A preintegration, and what the IMU intrinsics do to it (to first order, about those it was made
-// with).
+// A preintegration with its Jacobian with respect to the IMU intrinsics (first order about
+// `intrinsics`, with which it was made).
 struct ScaledPreintegration {
   Preintegration measured;
   ImuIntrinsics intrinsics;
@@ -39,9 +39,9 @@ ScaledPreintegration IntegrateScaled(std::span<const ImuSample> samples, const I
                                      const Eigen::Vector3d& gyro_bias,
                                      const Eigen::Vector3d& accel_bias);
 
-// What is measured at these IMU intrinsics; with the biases that it was made with.
+// The preintegration corrected to these IMU intrinsics, for unchanged biases.
 Preintegration At(const ScaledPreintegration& span, const ImuIntrinsics& intrinsics);
-// The derivative of the residual `r` at those IMU intrinsics by them.
+// Jacobian of the IMU factor's residual with respect to the IMU intrinsics, at `intrinsics`.
 Eigen::Matrix<double, 15, kImuIntrinsicsSize> ImuIntrinsicsJacobian(
     const ScaledPreintegration& span, const ImuIntrinsics& intrinsics,
     const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& r_theta);

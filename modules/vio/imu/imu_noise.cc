@@ -6,16 +6,16 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kMinSamples = 20;  // fewer say little
-// What is not white, but acts as noise: motion between samples, stamps, sensitivity across axes.
-// Chosen among 1, 2 and 4 (docs/decisions/imu.md).
+constexpr size_t kMinSamples = 20;  // fewer are not significant
+// Allows for errors that are not white but act as noise: motion between samples, stamps, cross-axis
+// sensitivity. Chosen among 1, 2 and 4 (docs/decisions/imu.md).
 constexpr double kMostShare = 2;
-// The usual parts' noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)): a given value up to this is possible
+// Noise of usual IMUs (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)): a given value up to this is accepted,
 // whatever a few rounded samples show.
 constexpr double kUsualGyroDensity = 2e-4, kUsualAccelDensity = 2e-3;
-// Random walks, of which a minute tells next to nothing: a range about EuRoC's part and phones'
-// (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)); chosen, but a walk of the accelerometer given far too small
-// costs more than one three times too large (docs/decisions/imu.md).
+// Range of random walks (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)), around those of EuRoC's IMU and of
+// phones. A minute of samples hardly shows them, so the range is chosen: an accelerometer walk that
+// is far too small costs more than one three times too large (docs/decisions/imu.md).
 constexpr double kLeastGyroWalk = 1e-5, kMostGyroWalk = 2e-4;
 constexpr double kLeastAccelWalk = 1e-3, kMostAccelWalk = 3e-3;
 
@@ -47,8 +47,8 @@ double Density(double given, double usual, std::span<const ImuSample> samples, C
   if (!(single > 0)) {
     return given;
   }
-  // White noise shows twice the variance in single samples as in pairs' means; vibration, a few
-  // lines of the spectrum, more, and motion integrates as much less of it.
+  // For white noise, single samples have twice the variance of means of pairs. For vibration (a few
+  // spectral lines) the ratio is larger, and vibration averages out in the integration accordingly.
   const double white_share = std::min(1.0, 2 * SquaredThirdDifferences(samples, of, 2) / single);
   const double shown = std::sqrt(dt * single / (20 * 3));
   return std::clamp(given, white_share * shown, std::max(kMostShare * shown, usual));

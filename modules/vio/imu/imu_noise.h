@@ -1,10 +1,10 @@
 #pragma once
 
-// How noisy an IMU really is where it is mounted. The white noise of a data sheet is that of a
-// sensor on a table; the rotors of a drone make it 20 to 40 times as much (EuRoC's MH flights: 0.07
-// instead of 0.002 m/s^2/sqrt(Hz)), and an estimator that does not know believes the IMU too much.
-// Published values are as often far too large (a calibration that put the motion into the noise),
-// and then scale is lost: the accelerometer alone tells it.
+// Measures the noise of an IMU as it is mounted. A data sheet gives the white noise of a sensor on
+// a table; the rotors of a drone raise it 20 to 40 times (EuRoC's MH flights: 0.07 instead of 0.002
+// m/s^2/sqrt(Hz)), and an estimator that does not know this trusts the IMU too much. Published
+// values are as often far too large (the calibration counted motion as noise); then the scale is
+// lost, which only the accelerometer observes.
 
 #include <Eigen/Core>
 #include <span>
@@ -13,15 +13,16 @@
 
 namespace pangea::vio {
 
-// `given` within what the samples allow. Motion is smooth from sample to sample, so their third
-// differences are noise (variance 20 sigma^2): white noise is hardly more than they show, and not
-// less than a share of it.
+// Returns `given` with its noise densities limited to what the samples allow. Motion is smooth from
+// sample to sample, so third differences of samples are noise (variance 20 sigma^2). The density is
+// at most twice the measured one (or the usual one, if that is more), and at least the white share
+// of the measured one.
 ImuNoise MeasuredNoise(const ImuNoise& given, std::span<const ImuSample> samples);
 
-// Random walks within what the parts of phones and cameras have.
+// Returns `given` with its random walks limited to the range of IMUs in phones and cameras.
 ImuNoise WithUsualWalks(ImuNoise given);
 
-// Means, and variances summed over the axes, of the samples as they are, motion and noise alike.
+// Mean of the samples, and variance summed over the axes; motion and noise are not separated.
 struct SampleMoments {
   Eigen::Vector3d gyro_mean = Eigen::Vector3d::Zero();   // rad/s
   Eigen::Vector3d accel_mean = Eigen::Vector3d::Zero();  // m/s^2

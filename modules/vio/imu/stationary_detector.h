@@ -1,7 +1,7 @@
 #pragma once
 
-// Tells whether the body is stationary: the image has not moved by more than its noise since the
-// body came to a stand, or for a while, and the IMU is quiet.
+// Detects whether the body is stationary: the image has moved by no more than its noise, since the
+// body stopped or during the last half second, and the IMU is quiet.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,13 +18,12 @@ namespace pangea::vio {
 
 class StationaryDetector {
  public:
-  // `ray_sigma`: of an observation with sigma_px 1.
+  // `ray_sigma`: of an observation with sigma_px 1, on the plane z = 1.
   StationaryDetector(const CameraModel& camera, double ray_sigma, const StationaryOptions& options)
       : camera_(camera), ray_sigma_(ray_sigma), options_(options) {}
 
-  // Frames in time order; whether the body is stationary at this one. `shift_sigmas`: how far the
-  // image has moved since a frame of the present stand, if there is one
-  // (TrackHistory::MedianShiftSigmas).
+  // Call in time order. Returns whether the body is stationary at this frame. `shift_sigmas`: how
+  // far the image has moved since the body stopped, if it has (TrackHistory::MedianShiftSigmas).
   bool AddFrame(const TrackedFrame& frame, std::optional<double> shift_sigmas, const ImuBuffer& imu,
                 const Eigen::Vector3d& gyro_bias);
 

@@ -1,10 +1,10 @@
 #pragma once
 
-// What a stationary body's IMU may show: more where motors or a ventilator shake it.
+// Limits on the IMU of a stationary body; motors or a fan may need larger ones.
 
 namespace pangea::vio {
 
-inline constexpr double kMaxStationaryRate = 0.05;  // rad/s, mean rate less bias
+inline constexpr double kMaxStationaryRate = 0.05;  // rad/s, norm of mean rate minus bias
 
 struct StationaryOptions {
   double accel_sigma = 0.3;  // m/s^2, standard deviation over a quarter of a second

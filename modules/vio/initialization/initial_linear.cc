@@ -19,9 +19,9 @@ using Eigen::Vector3d;
 
 constexpr size_t kMinPairs = 4;
 constexpr double kMaxTimeOffset_s = 0.06;  // searched to either side
-// A time offset must explain the rotations this much better than none.
+// A time offset is used only if its cost is below this share of the cost without.
 constexpr double kClearlyBetter = 0.8;
-constexpr size_t kMinShared = 20;  // landmarks two images must share to speak about their rotation
+constexpr size_t kMinShared = 20;  // shared landmarks that two images need for a relative rotation
 
 Vector3d Bearing(const Vector2d& ray) { return Vector3d(ray.x(), ray.y(), 1).normalized(); }
 
@@ -34,9 +34,9 @@ Preintegration IntegrateBetween(std::span<const StartFrame> frames, size_t from,
   return integrator.result();
 }
 
-// Two images, their shared bearings (in body orientation), and how their rotation follows the gyro
-// bias. The bearings a, b are needed only as sums, so a cost takes as long for many as for few
-// (Kneip & Lynen, ICCV 2013).
+// Two images: the moments of their shared bearings (in body orientation), and the dependence of
+// their rotation on the gyro bias. Bearings a, b enter only as sums, so the cost of an evaluation
+// does not depend on their number (Kneip & Lynen, ICCV 2013).
 struct RotationPair {
   int64_t from_utime = 0, to_utime = 0;
   size_t num_bearings = 0;
@@ -60,7 +60,8 @@ struct RotationPair {
   }
 };
 
-// Smallest eigenvalue of M = sum n n^T, n = a x R b: zero when R makes the pair epipolar.
+// Smallest eigenvalue of M = sum n n^T, n = a x R b: zero if the pair satisfies the epipolar
+// constraint with R.
 double EpipolarCost(const RotationPair& pair, const Vector3d& bias_change) {
   const Matrix3d R = (pair.delta_q * ExpSo3(pair.J_bias * bias_change)).toRotationMatrix();
   std::array<std::array<Matrix3d, 3>, 3> T;  // sum a_i a_j (R b)(R b)^T
@@ -85,7 +86,7 @@ double EpipolarCost(const RotationPair& pair, const Vector3d& bias_change) {
 std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                     const ImuNoise& noise) {
   std::vector<RotationPair> pairs;
-  constexpr size_t kSpan = 4;  // frames apart: long enough for the bias to show
+  constexpr size_t kSpan = 4;  // frames between the two images: the bias must be visible
   for (size_t i = 0; i + kSpan < frames.size(); ++i) {
     const StartFrame& a = frames[i];
     const StartFrame& b = frames[i + kSpan];
@@ -108,7 +109,7 @@ std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Ri
   return pairs;
 }
 
-// The gyro's rotation over a span of time that the samples cover; no bias taken off.
+// The gyro's rotation over a span of time that the samples cover, without bias correction.
 Quaterniond Rotation(std::span<const ImuSample> samples, int64_t from_utime, int64_t to_utime) {
   Quaterniond q = Quaterniond::Identity();
   for (size_t i = 0; i + 1 < samples.size(); ++i) {
@@ -132,7 +133,7 @@ FoundBias FindBias(const std::vector<RotationPair>& pairs, const Vector3d& start
   const auto cost = [&](const Vector3d& bias) {
     double sum = 0;
     for (const RotationPair& pair : pairs) {
-      // The square root keeps one pair with bad tracks from ruling the sum.
+      // The square root limits the influence of one pair with bad tracks.
       sum += std::sqrt(EpipolarCost(pair, bias) + 1e-10);
     }
     return sum;
@@ -186,7 +187,7 @@ std::optional<Vector6d> SolveWithGravityNorm(const Matrix6d& A, const Vector6d& 
   return y;
 }
 
-// Of each frame, from the first one.
+// The preintegration from the first frame to each frame.
 std::vector<Preintegration> FromFirst(std::span<const StartFrame> frames, const ImuNoise& noise,
                                       const Vector3d& gyro_bias) {
   std::vector<Preintegration> from_first;
@@ -198,7 +199,7 @@ std::vector<Preintegration> FromFirst(std::span<const StartFrame> frames, const 
   return from_first;
 }
 
-// By landmark: frame, and bearing in the first body frame's orientation.
+// (frame, bearing in the orientation of the first body frame)
 using Sighting = std::pair<size_t, Vector3d>;
 using Sightings = std::map<int32_t, std::vector<Sighting>>;
 
@@ -215,8 +216,8 @@ Sightings SeenOften(std::span<const StartFrame> frames, const Rigid3& T_body_cam
 }
 
 // The normal equations of one point X and y = (v0, g): across (X - v0 t - g t^2/2 - c) = 0 at each
-// sighting, where `across` takes what is perpendicular to the bearing and c is the known part of
-// the camera's place. All in the first body frame.
+// sighting, where `across` takes the part perpendicular to the bearing, and c is the known part of
+// the camera's position. All in the first body frame.
 class PointEquations {
  public:
   PointEquations(const std::vector<Sighting>& sightings,
@@ -236,7 +237,7 @@ class PointEquations {
     }
   }
 
-  // What they say of y once X is eliminated; false when they do not determine X.
+  // Eliminates X and adds the reduced equations of y; false if X is not determined.
   bool AddReduced(Matrix6d* A, Vector6d* b) const {
     const Matrix3d A_xx_inv = A_xx_.inverse();
     if (!A_xx_inv.allFinite()) {
@@ -295,7 +296,7 @@ std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const 
   if (best == costs.begin() || best + 1 == costs.end() || *best > kClearlyBetter * costs[kSteps]) {
     return std::nullopt;
   }
-  // Between the steps: the parabola through the best and its neighbours.
+  // Interpolate with a parabola through the best step and its neighbours.
   const double before = *(best - 1), after = *(best + 1);
   const double fraction = 0.5 * (before - after) / (before + after - 2 * *best);
   const double step = kMaxTimeOffset_s / kSteps;

@@ -20,15 +20,15 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kInlierSigmas = 4.0;
-constexpr double kOutlierCost = 6;  // Huber's of such a ray (start_problem.cc)
+constexpr double kOutlierCost = 6;  // Huber cost of an outlier ray (start_problem.cc)
 constexpr std::array<double, 2> kOtherScales = {0.4, 2.5};
 constexpr double kMaxDistance = 200;  // m, of a point: beyond it the start's baseline says nothing
-// A point straight ahead may be anywhere along its ray, and one such leaves all unknowns without a
-// covariance. So each is held to the closed-form solution, by this many times its distance.
+// A point in the direction of motion has no depth, and one such point makes the system singular. So
+// each point has a prior at its closed-form position, with a sigma of this many times its distance.
 constexpr double kPointPrior = 10;
 constexpr double kMinRefinedDepth = 0.1;  // m, of a point before a camera that saw it
-// The closed form is too small where noise is large beside the motion's changes, and scale is a
-// long flat valley: fewer iterations end half way up it, where the covariance is smaller.
+// The closed-form scale is too small if noise is large compared with the accelerations, and the
+// cost is flat along scale: fewer iterations would stop half way, where the covariance is smaller.
 constexpr int kMaxIterations = 100;
 
 void AddStates(const Quaterniond& q_odom_first, const LinearStart& start, StartProblem* problem) {
@@ -62,7 +62,7 @@ void AddStamps(std::span<const StartFrame> frames, StartProblem* problem) {
   }
 }
 
-// A ray counts where its point is before the camera. Returns how many rays there are, counted or
+// Uses only rays whose point is in front of the camera. Returns the number of all rays, used or
 // not.
 int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_first,
               const LinearStart& start, StartProblem* problem) {
@@ -89,7 +89,7 @@ int AddPoints(std::span<const StartFrame> frames, const Quaterniond& q_odom_firs
     }
   }
   for (const auto& [id, point] : points) {
-    // One ray gives no depth: a camera that moves ahead would meet the point where it is, and stop.
+    // One ray gives no depth: a point that stays where it is would stop a camera that moves ahead.
     if (point.rays.size() > 1) {
       problem->points.push_back(point);
     }
@@ -134,7 +134,7 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   }
   out.inlier_share = rays > 0 ? static_cast<double>(counted) / rays : 0;
   if (out.inlier_share < kMinInlierShare) {
-    return out;  // what is behind the cameras stays there: nothing to be gained by refining
+    return out;  // points behind the cameras would stay there: refining is useless
   }
   if (!problem.Optimise(kMaxIterations)) {
     return std::nullopt;

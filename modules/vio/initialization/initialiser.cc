@@ -25,26 +25,26 @@ constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgo
 constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
 constexpr size_t kMinTracks = 20;
 
-// What an accelerometer shows over a second or more, however it is moved by hand or flown: about
-// gravity. Far less is a dead sensor or one in units of g, far more one in other units.
+// The mean acceleration over a second or more is about gravity, however the device is moved. Far
+// less means a dead sensor or units of g; far more means other units.
 constexpr double kMinMeanAccel = 4;   // m/s^2
 constexpr double kMaxMeanAccel = 25;  // m/s^2
-// A rotation each second, at which no image is sharp; a sensor in degrees shows more.
+// About one rotation per second, at which no image is sharp; a sensor in degrees/s shows more.
 constexpr double kMaxMeanGyro = 6;  // rad/s
 
-// Stationary: the image stands, the accelerometer and the gyro are quiet.
+// Stationary: the image does not move, accelerometer and gyro are quiet.
 constexpr double kStationarySpan_s = 1.0;
 constexpr double kStationarySigmas =
     2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
-// All of the second is looked at, so less is allowed than later: shares of the options.
+// Limits as shares of the options: a whole second is tested, so they are tighter than later.
 constexpr double kStationaryAccel = 5.0 / 6;  // standard deviation, of accel_sigma
 constexpr double kStationaryGyro = 0.6;       // standard deviation, of gyro_rate
-// A stationary start has had less bias than a moving one allows for, or it would not be upright.
+// A stationary start assumes a smaller bias than a moving one; a larger one would tilt it.
 constexpr double kStationaryBias = 0.1 / 0.15;  // of accel_bias_sigma
 
 // A moving start must be at least this certain and explain this much.
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
-constexpr double kMaxSpeedShare = 0.03;     // of the speed: what 0.05 m/s are at a flight's 1.7
+constexpr double kMaxSpeedShare = 0.03;     // of the speed: 0.05 m/s at a typical flight's 1.7 m/s
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMaxRmsSigmas = 1.8;
 constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
@@ -77,8 +77,8 @@ double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::
   return sum / static_cast<double>(samples.size());
 }
 
-// What the first row would have seen, were the point far away: where a hand shakes, the rotation
-// during the read-out is off by several pixels at the last row.
+// The ray that the first row would have seen, for a distant point: with a shaking hand, the
+// rotation during the read-out is several pixels at the last row.
 Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
                        const BodyMotion& motion) {
   if (camera.readout_s <= 0 || camera.height < 2) {
@@ -214,7 +214,7 @@ InitialResult Initialiser::TryMoving() {
   return TryMoving(StartFrames());
 }
 
-// Nothing when the start is good.
+// Empty if the start is good.
 std::optional<InitialResult> Initialiser::Refusal(
     const std::optional<RefinedStart>& refined) const {
   if (!refined) {
@@ -226,8 +226,8 @@ std::optional<InitialResult> Initialiser::Refusal(
                                   : fmt::format("{:.1f} sigma", refined->rms_sigma);
     return InitialResult{std::nullopt, "the start does not explain the images: " + found, true};
   }
-  // The scale is what counts. At 5 m/s a solution too small by half would be the first to look
-  // certain, if certainty were asked for in metres per second.
+  // The scale must be certain, so the limit is relative to the speed: with a limit in m/s, a
+  // solution at half the true scale would pass first.
   const double speed = refined->states.back().v_odom_body.norm();
   const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
   if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {

@@ -2,11 +2,11 @@
 
 // The first state of a map, from a second or two of tracks and inertial samples.
 //
-// Stationary: gravity from the accelerometer, gyro bias from the gyro. Moving: the gyro bias that
-// makes every pair of images epipolar (Kneip & Lynen, ICCV 2013; He et al., CVPR 2023), then
-// velocity and gravity in closed form with |g| known (Dong-Si & Mourikis, IROS 2012), then bundle
-// adjustment with preintegrated IMU. A solution that is not well determined, or does not explain
-// the images, is refused with a reason: a bad start costs more than a late one.
+// Stationary start: gravity from the accelerometer, gyro bias from the gyro. Moving start: first
+// the gyro bias, from the epipolar constraints of pairs of images (Kneip & Lynen, ICCV 2013; He et
+// al., CVPR 2023); then velocity and gravity in closed form with known |g| (Dong-Si & Mourikis,
+// IROS 2012); then bundle adjustment with preintegrated IMU. A solution that is poorly determined,
+// or does not explain the images, is refused with a reason: a bad start is worse than a late one.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -24,38 +24,38 @@
 
 namespace pangea::vio {
 
-// odom: z up, origin at the body now, yaw free.
+// Frame odom: z up, origin at the newest body position, arbitrary yaw.
 struct InitialState {
-  // The frames the start was found from, oldest first, the newest last; one if it was stationary.
+  // The frames used for the start, oldest first; only one for a stationary start.
   struct Frame {
-    TrackedFrame tracked;      // its utime is the IMU's
+    TrackedFrame tracked;      // its utime is on the IMU's clock
     ImuState imu;              // at this time
-    double stamp_error_s = 0;  // of this image by itself
+    double stamp_error_s = 0;  // of this image alone
   };
   std::vector<Frame> frames;
   bool stationary = false;
-  // Of the stationary start: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
+  // Only for a stationary start: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
-  // The frames' utime is this much later than they were told with, and the images were taken this
-  // much later still.
+  // The frames' utime is later than the one given to AddFrame by time_offset_change_s; the images
+  // were taken later still, by time_offset_error_s.
   double time_offset_change_s = 0;
   double time_offset_error_s = 0;
 };
 
 struct InitialResult {
   std::optional<InitialState> state;
-  std::string reason;        // why there is none yet
-  bool contradicts = false;  // because images and inertial samples do not fit
+  std::string reason;        // why there is no state yet
+  bool contradicts = false;  // the reason is that images and IMU do not fit
 };
 
 class Initialiser {
  public:
-  // `pixel_sigma`: of an observation, pixels. Of `sigmas`, AddFrame says `stamp_s` anew.
+  // `pixel_sigma`: of an observation, pixels. AddFrame replaces `sigmas.stamp_s`.
   Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
               const StartSigmas& sigmas, const StationaryOptions& stationary);
 
-  // Frames in time order, with the samples since the previous frame (the last one at or after the
-  // frame). `stamp_sigma_s`: of the frames' stamps, as known by now; 0: they are exact.
+  // Frames must come in time order, with the samples since the previous frame; the last sample is
+  // at or after the frame. `stamp_sigma_s`: present estimate for the frames' stamps; 0: exact.
   InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
                          double stamp_sigma_s);
 
@@ -75,7 +75,7 @@ class Initialiser {
   std::vector<TrackedFrame> frames_;
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
   double time_offset_change_s_ = 0;
-  std::string why_not_ = "collecting images";  // at the newest try
+  std::string why_not_ = "collecting images";  // result of the newest attempt
 };
 
 }  // namespace pangea::vio

@@ -24,26 +24,27 @@ constexpr double kGyroBiasSigma = 0.02;  // rad/s, about the epipolar solution
 constexpr double kHeld = 1e-8;           // rad^2, m^2: the first frame's yaw and position
 constexpr double kHuber = 2.0;           // sigmas
 constexpr double kMinStartDepth = 0.05;  // m
-// A step that promises less than this of the cost (a half is one sigma of one direction) is the
-// last.
+// The iteration stops if the predicted decrease of the cost is below this (0.5 is one sigma of one
+// direction).
 constexpr double kEnough = 1e-3;
 constexpr int kMaxRetries = 8;
-// Likewise of a point for itself.
+// The same for the optimisation of a single point.
 constexpr double kPointEnough = 1e-4;
 constexpr int kPointIterations = 3;
-constexpr double kMaxRetreat = 0.9;  // of an inverse depth, in one step: ten times as far
+// relative, of an inverse depth in one step: at most ten times as far
+constexpr double kMaxRetreat = 0.9;
 
 double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
 double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
 
-// A ray's residual in sigmas, and its derivatives by the frame's pose and by the point in odom.
+// A ray's residual in sigmas, and its Jacobians: the frame's pose, the point in odom.
 struct RayTerm {
   Vector2d r;
   Eigen::Matrix<double, 2, kPoseSize> J_pose;
   Eigen::Matrix<double, 2, 3> J_point;
 };
 
-// Where the cameras were when their images were taken.
+// The camera poses at the times of the images.
 struct Cameras {
   struct Camera {
     Matrix3d R_cam_odom;
@@ -116,7 +117,7 @@ Equations::Elimination AddPoint(const StartProblem& problem, const Cameras& came
     g_point += term.J_point.transpose() * term.r;
   }
   V.diagonal() *= 1 + damping;
-  // With V = L L^T, what is left is H - S^T S, S = L^-1 W.
+  // With V = L L^T, the Schur complement is H - S^T S, S = L^-1 W.
   const Eigen::LLT<Matrix3d> llt(V);
   const Eigen::Matrix<double, 3, Eigen::Dynamic> S = llt.matrixL().solve(W);
   const Vector3d d = llt.matrixL().solve(g_point);
@@ -129,8 +130,8 @@ Equations::Elimination AddPoint(const StartProblem& problem, const Cameras& came
   return {first, -llt.matrixU().solve(d), -llt.matrixU().solve(S)};
 }
 
-// Moves a point to where its rays want it, from where it is or from `offered`, the better of the
-// two; by inverse depth in the camera that saw it first, in which rays are nearly linear.
+// Optimises a point alone, from its present position or from `offered`, whichever has the lower
+// cost. Uses inverse depth in the camera that saw the point first: rays are nearly linear in it.
 void Settle(const Cameras& cameras, const Vector3d& offered, StartPoint* point) {
   double cost = PointCost(cameras, *point, point->p_odom);
   const auto improve = [&](const Vector3d& p_odom) {
@@ -165,7 +166,8 @@ void Settle(const Cameras& cameras, const Vector3d& offered, StartPoint* point) 
   }
 }
 
-// What a stamp's error, growing, does to (dtheta, xi_p, xi_v) at the stamp while the image stays.
+// Derivative of (dtheta, xi_p, xi_v) at the stamp with respect to the stamp's error, for a fixed
+// image pose.
 Eigen::Matrix<double, 9, 1> ByStampError(const StartProblem& problem, int frame) {
   const ImuState& state = problem.states[frame];
   const Vector3d omega = state.T_odom_body.q * problem.stamps[frame].omega_body;
@@ -175,7 +177,8 @@ Eigen::Matrix<double, 9, 1> ByStampError(const StartProblem& problem, int frame)
   return change;
 }
 
-// By a frame's (dtheta, xi_p, xi_v, e), from those by its pose and velocity at the stamp.
+// Derivatives with respect to a frame's (dtheta, xi_p, xi_v, e), from those with respect to its
+// pose and velocity at the stamp.
 using FrameJacobian = Eigen::Matrix<double, 9, kPoseSize + 4>;
 FrameJacobian ByFrame(const StartProblem& problem, int frame,
                       const Eigen::Matrix<double, 9, 9>& J_stamp) {
@@ -185,7 +188,7 @@ FrameJacobian ByFrame(const StartProblem& problem, int frame,
   return J;
 }
 
-// Columns of its (dtheta, xi_p, xi_v, e).
+// Columns of a frame's (dtheta, xi_p, xi_v, e).
 std::vector<int> FrameColumns(const StartProblem& problem, int frame) {
   std::vector<int> columns(kPoseSize + 3);
   std::iota(columns.begin(), columns.begin() + kPoseSize, problem.PoseColumn(frame));
@@ -216,7 +219,7 @@ void AddImuFactor(const StartProblem& problem, int from, Equations* out) {
   out->g(columns) += JtL * residual.r.head<9>();
 }
 
-// What is known of the stamps' errors beforehand: nothing but their size.
+// The priors of the stamp errors: zero mean, with their sigmas.
 void AddStamps(const StartProblem& problem, Equations* out) {
   const auto add = [out](int column, double error_s, double sigma_s) {
     out->H(column, column) += 1 / (sigma_s * sigma_s);
@@ -340,7 +343,7 @@ std::optional<Matrix6d> StartProblem::NewestCovariance() const {
     return std::nullopt;
   }
   const int newest = num_frames() - 1;
-  // The newest (dtheta, dv), dv = xi_v + dtheta x v, by the error.
+  // Jacobian of the newest frame's (dtheta, dv), dv = xi_v + dtheta x v.
   MatrixXd J = MatrixXd::Zero(size(), 6);
   J.block<3, 3>(PoseColumn(newest) + kTheta, 0).setIdentity();
   J.block<3, 3>(PoseColumn(newest) + kTheta, 3) = Hat(states[newest].v_odom_body);

@@ -2,19 +2,19 @@
 
 // The start-up window as a least-squares problem: rays of points, inertial measurements between
 // consecutive frames, one pair of biases for all of them with weak priors. The first frame's
-// position and yaw are held.
+// position and yaw are fixed.
 //
-// Points are eliminated one by one (Schur complement). They are plain points of odom, so that a
-// change of scale is a straight line: scale is the long valley of a start. What is far away does
-// not step straight; so after each step of the frames every point settles where its rays want it
-// ("embedded point iterations": Jeong et al., CVPR 2010). A handful of steps does. Errors of frames
-// are right-invariant (window_state.h).
+// Points are eliminated one by one (Schur complement). They are Cartesian points in odom, so that a
+// change of scale, the least certain direction of a start, is a linear step. Distant points are not
+// linear in these coordinates; so after each step of the frames every point is optimised alone
+// ("embedded point iterations": Jeong et al., CVPR 2010). A few steps suffice. Errors of frames are
+// right-invariant (window_state.h).
 //
-// The error of the clocks' offset is an unknown and, where stamps jitter, that of each stamp. With
-// their sum e the image was taken where the body came to within e of the stamp, (R Exp(e w),
-// p + e v). Errors of a frame's pose are those where the image was taken, so that points know
-// nothing of stamps; but what steps straight is the pose at the stamp, to which inertial
-// measurements hold the frames far more tightly than rays do.
+// The error of the time offset is an unknown and, if stamps jitter, also that of each stamp. If e
+// is their sum, the image was taken e after its stamp, at the pose (R Exp(e w), p + e v). Errors of
+// a frame's pose are those at the time of the image, so that rays do not depend on stamps; but the
+// step is linear in the pose at the stamp, because inertial measurements hold the frames far more
+// tightly than rays do.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -35,14 +35,14 @@ struct StartRay {
 
 struct StartPoint {
   Eigen::Vector3d p_odom = Eigen::Vector3d::Zero();
-  Eigen::Vector3d expected = Eigen::Vector3d::Zero();  // in odom, and how well
+  Eigen::Vector3d expected = Eigen::Vector3d::Zero();  // prior position, in odom
   double expected_sigma = 0;                           // m
-  std::vector<StartRay> rays;                          // frames in order
+  std::vector<StartRay> rays;                          // in order of frames
 };
 
 struct StartStamp {
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rad/s, at the stamp
-  double error_s = 0;                                    // its own, beside the clocks'
+  double error_s = 0;                                    // in addition to that of all stamps
 };
 
 struct StartImuFactor {
@@ -54,10 +54,10 @@ class StartProblem {
  public:
   Rigid3 T_body_cam;
   double ray_sigma = 0;
-  std::vector<ImuState> states;    // at the stamps; all with one pair of biases
+  std::vector<ImuState> states;    // at the stamps; all have the same biases
   std::vector<StartStamp> stamps;  // of each frame
-  double stamp_sigma_s = 0;        // 0: stamps do not jitter, their errors no unknowns
-  double time_offset_error_s = 0;  // of all stamps
+  double stamp_sigma_s = 0;        // 0: no jitter; stamp errors are no unknowns
+  double time_offset_error_s = 0;  // common to all stamps
   double time_offset_sigma_s = 0.005;
   std::vector<StartImuFactor> imu_factors;  // imu_factors[i]: from frame i to frame i + 1
   std::vector<StartPoint> points;
@@ -74,22 +74,23 @@ class StartProblem {
   int VelocityColumn(int frame) const { return PoseColumn(num_frames()) + 3 * frame; }
   int StampColumn(int frame) const { return VelocityColumn(num_frames()) + frame; }
 
-  // The image was taken this much after its stamp.
+  // The image was taken this long after its stamp, seconds.
   double StampError(int frame) const { return time_offset_error_s + stamps[frame].error_s; }
-  // Where the body was then.
+  // Pose of the body at that time.
   Rigid3 ImagePose(int frame) const;
 
-  // A half of the sum of squared residuals, in sigmas (those of rays after Huber, 1964); infinite
-  // when a point is behind a camera that saw it.
+  // Half the sum of squared residuals in sigmas (rays with Huber's loss, 1964); infinite if a point
+  // is behind a camera that saw it.
   double Cost() const;
-  // Of every point's rays, in sigmas; or infinite.
+  // Error of every ray, point by point, in sigmas; infinite for a point behind the camera.
   std::vector<double> RayErrors() const;
-  // The cost's derivatives by the error, points eliminated; of H only the lower triangle.
+  // Derivatives of the cost with respect to the error, points eliminated; only the lower triangle
+  // of H is set.
   struct Equations {
     double cost = 0;
     Eigen::MatrixXd H;
     Eigen::VectorXd g;
-    // Of each point: its step = offset + gain * (step of the poses from `first_frame` on).
+    // Step of a point: offset + gain * (step of the poses from `first_frame` on).
     struct Elimination {
       int first_frame = 0;
       Eigen::Vector3d offset;
@@ -97,17 +98,17 @@ class StartProblem {
     };
     std::vector<Elimination> eliminations;
   };
-  // `damping`: Levenberg-Marquardt's, a share of the diagonal.
+  // `damping`: of Levenberg-Marquardt, relative to the diagonal.
   Equations Linearise(double damping) const;
-  // All of it may move (levenberg_marquardt.h).
+  // For levenberg_marquardt.h: the estimate is the whole problem.
   StartProblem Estimate() const { return *this; }
   void SetEstimate(StartProblem estimate) { *this = std::move(estimate); }
-  // Moves the frames by `step`, the points with them, and lets those settle.
+  // Applies `step` to the frames and the points, then optimises each point alone.
   void Retract(const Equations& equations, const Eigen::VectorXd& step);
-  // False when no step makes it better, though one was promised.
+  // False if no step lowers the cost, although the linearisation predicts one.
   bool Optimise(int max_iterations);
-  // Marginal covariance of the newest frame's (dtheta, dv), dv plain; nothing when something is not
-  // determined at all.
+  // Marginal covariance of the newest frame's (dtheta, dv), dv a plain difference; empty if the
+  // system is singular.
   std::optional<Matrix6d> NewestCovariance() const;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// A camera and an IMU on a path, as the steps of a moving start see them: for tests.
+// Simulates a camera and an IMU on a path, for tests of the steps of a moving start.
 
 #include <Eigen/Core>
 #include <functional>
@@ -25,8 +25,8 @@ struct StartWorld {
   std::vector<StartFrame> frames;  // taken `late_s` later than they say
 };
 
-// 2 s of images at 10 Hz, from the path's first second on. The samples go on for `margin_s` to
-// either side.
+// Records 2 s of images at 10 Hz, beginning at t = 1 s of the path. The samples extend `margin_s`
+// beyond both ends.
 StartWorld Record(const Path& path, double late_s, double ray_sigma, double margin_s = 0.1,
                   uint64_t seed = 7, double stamp_sigma_s = 0);
 

@@ -6,8 +6,8 @@
 namespace pangea::vio {
 namespace {
 
-// A frame is a window keyframe, or a keyframe, when less than this share of the last one's tracks
-// is left.
+// A frame becomes a window keyframe, or a keyframe, if less than this share of the last one's
+// tracks is left.
 constexpr double kWindowTrackShare = 0.7;
 constexpr double kKeyframeTrackShare = 0.5;
 constexpr double kStationaryTrackShare = 0.5;
@@ -19,7 +19,7 @@ bool HasMoved(const WindowState& state, const TrackHistory& history, int64_t sin
               double parallax, double track_share) {
   const auto since = state.Find(since_utime);
   if (!since || state.frames[*since].pose_only) {
-    return true;  // nothing is left in common to measure
+    return true;  // no observations of that frame are left to compare with
   }
   const WindowFrame& newest = state.frames.back();
   const Eigen::Quaterniond q_newest_since =
@@ -38,7 +38,7 @@ bool FrameChoice::IsWorthAPlace(const WindowState& state, const TrackHistory& hi
   const WindowFrame& newest = state.frames.back();
   const WindowFrame& last = state.frames[state.Newest() - 1];
   if (newest.stationary) {
-    // Standing still is held by the frame it began with, and handed on before its tracks run out.
+    // The first stationary frame stands for all that follow, until too few of its tracks are left.
     return !last.stationary ||
            HasMoved(state, history, last.utime, kAnyParallax, kStationaryTrackShare);
   }

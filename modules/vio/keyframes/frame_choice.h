@@ -1,8 +1,8 @@
 #pragma once
 
-// Which frames hold a place in the window, and which are keyframes: by how far the image has moved,
-// rotation taken out, and by how many tracks are left. The newest frame of the window is the one
-// that is decided on.
+// Decides which frames keep a place in the window, and which are keyframes: by the parallax (median
+// shift of the features, rotation taken out) and by the share of tracks that are left. The decision
+// is on the newest frame of the window.
 
 #include <cstdint>
 
@@ -12,14 +12,14 @@
 
 namespace pangea::vio {
 
-inline constexpr double kKeyframeInterval_s = 5;  // between keyframes, at most
+inline constexpr double kKeyframeInterval_s = 5;  // maximum between keyframes
 
 class FrameChoice {
  public:
   FrameChoice(const EstimatorOptions& options, const CameraModel& camera)
       : options_(options), pixel_angle_(camera.PixelAngle()) {}
 
-  // Whether the newest frame is worth a place beside the one before it.
+  // Whether the newest frame differs enough from the previous one to keep a place in the window.
   bool IsWorthAPlace(const WindowState& state, const TrackHistory& history) const;
   // Decides whether the newest frame is a keyframe, and whether it is a window keyframe.
   void Choose(const TrackHistory& history, WindowState* state);

@@ -17,13 +17,13 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-// A depth is worth sending when it is known to this share of itself.
+// A depth is published only if its relative sigma is below this.
 constexpr double kMaxRelativeSigma = 0.3;
 constexpr size_t kMinRays = 4;
 constexpr double kMaxRms = 2.0;          // sigmas
-constexpr size_t kMinDepthsOfScale = 8;  // what fewer have in common is not the scale's error
+constexpr size_t kMinDepthsOfScale = 8;  // fewer do not separate the error of the scale
 
-// Nothing is better known than this, whatever the window's rays say.
+// Lower limit of the relative sigma of a depth.
 constexpr double kMinRelativeSigma = 0.005;
 
 struct SeenPoint {
@@ -32,7 +32,7 @@ struct SeenPoint {
   std::vector<FrameRay> rays;
 };
 
-// What the window's error does to the inverse depth.
+// Jacobian of the inverse depth with respect to the window's error.
 Eigen::RowVectorXd DepthJacobian(RowViews& views, const SeenPoint& seen) {
   const WindowState& state = views.state();
   const std::vector<FrameRay>& rays = seen.rays;
@@ -51,14 +51,14 @@ Eigen::RowVectorXd DepthJacobian(RowViews& views, const SeenPoint& seen) {
   return J;
 }
 
-// The window has rotation first, messages translation.
+// Reorders: the window has rotation first, messages have translation first.
 Matrix6d ExtrinsicsCovariance(const MatrixXd& P) {
   const std::array<int, 6> order = {3, 4, 5, 0, 1, 2};
   const Matrix6d covariance = P.block<6, 6>(kExtrinsics, kExtrinsics)(order, order);
   return 0.5 * (covariance + covariance.transpose());
 }
 
-// The landmarks of one frame as its camera sees them.
+// Triangulates the landmarks of one frame, anchored in it.
 std::vector<SeenPoint> PointsSeen(const WindowState& state, const TrackHistory& history,
                                   int frame) {
   std::vector<SeenPoint> points;
@@ -77,7 +77,7 @@ std::vector<SeenPoint> PointsSeen(const WindowState& state, const TrackHistory& 
   return points;
 }
 
-// The depths worth sending, and what the errors common to them say of the scale.
+// Adds the depths to publish, and the sigma of the scale from the errors that they have in common.
 void AddDepths(const WindowState& state, const MatrixXd& P, const std::vector<SeenPoint>& points,
                FinishedKeyframe* keyframe) {
   const std::vector<int> rows = RowsOfPoses(state);
@@ -87,7 +87,7 @@ void AddDepths(const WindowState& state, const MatrixXd& P, const std::vector<Se
     J.row(static_cast<Eigen::Index>(k)) = DepthJacobian(views, points[k])(rows);
   }
   const MatrixXd P_rows = P(rows, rows);
-  // Variance: that of the rays, and what the errors of calibration and frames do to it.
+  // Variance: from the rays, plus the errors of calibration and frames propagated by J.
   const Eigen::VectorXd of_window = (J * P_rows).cwiseProduct(J).rowwise().sum();
   Eigen::RowVectorXd scale = Eigen::RowVectorXd::Zero(J.cols());
   for (size_t k = 0; k < points.size(); ++k) {
@@ -126,7 +126,8 @@ Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, 
       P_window.block<6, 6>(at_j, at_i), P_window.block<6, 6>(at_j, at_j);
   Matrix6d covariance = J * P * J.transpose();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  // Two poses of a stationary body are all but one: keep the matrix invertible (0.1 mm, 0.01 mrad).
+  // Two poses of a stationary body are almost equal: keep the matrix invertible (0.1 mm, 0.01
+  // mrad).
   Eigen::Matrix<double, 6, 1> floor;
   floor << Vector3d::Constant(1e-8), Vector3d::Constant(1e-10);
   covariance.diagonal() += floor;
@@ -141,7 +142,7 @@ Matrix6d CorrectionCovariance(const Matrix6d& lost, const Rigid3& T_odom_i,
   J.block<3, 3>(0, 3) = -R;
   J.block<3, 3>(3, 0) = -R;
   const Matrix6d covariance = J * lost * J.transpose();
-  // Differences of large numbers: rounding must not make it negative.
+  // A difference of large numbers: clear eigenvalues that rounding has made negative.
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (covariance + covariance.transpose()));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
          eigen.eigenvectors().transpose();
@@ -152,7 +153,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   const WindowFrame& frame = state.frames[index];
   FinishedKeyframe keyframe;
   keyframe.utime = frame.utime;
-  // The state is where the body was by the time offset as the frame came.
+  // The state belongs to the time offset at which the frame was added; move it to the present one.
   keyframe.T_odom_body = state.PoseAhead(index, state.Ahead(index, 0));
   keyframe.v_odom_body = frame.imu.v_odom_body;
   keyframe.motion = state.MotionAhead(index, state.Ahead(index, 0));

@@ -7,7 +7,7 @@
 namespace pangea::vio {
 namespace {
 
-// When a frame's image was taken, by the IMU's clock.
+// Time at which a frame's image was taken, on the IMU's clock.
 int64_t TakenAt(const WindowState& state, const WindowFrame& frame) {
   return frame.utime + std::llround(1e6 * state.OffsetOf(frame)) +
          std::llround(1e6 * frame.stamp_error_s);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Keyframes in the order they are published, each with its edge from the one before and the
-// inertial measurement of the same span.
+// Completes keyframes in the order of publication: adds the odometry edge from the previous
+// keyframe and the preintegrated IMU measurement of the same span.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -17,20 +17,21 @@ namespace pangea::vio {
 
 class KeyframePublisher {
  public:
-  // Frame `index` of the window, whose covariance is P.
+  // Publishes frame `index` of the window, whose covariance is P.
   FinishedKeyframe Publish(WindowState& state, const Eigen::MatrixXd& P,
                            const TrackHistory& history, const ImuBuffer& imu, int index);
-  // Samples that the images contradict are no measurement for an edge.
+  // Records the contradicted IMU factors; a keyframe whose span contains one gets no
+  // preintegration.
   void NoteContradicted(const WindowProblem& problem);
-  // Of the keyframe published last.
+  // utime of the last published keyframe; empty if there is none.
   std::optional<int64_t> last_utime() const;
 
  private:
   bool ContradictedWithin(int64_t after_utime, int64_t to_utime) const;
 
   std::optional<FinishedKeyframe> last_;
-  Matrix6d last_covariance_ = Matrix6d::Zero();  // of its pose, when it was published
-  std::set<int64_t> contradicted_utimes_;        // ends of such IMU factors since then
+  Matrix6d last_covariance_ = Matrix6d::Zero();  // of last_'s pose, at publication
+  std::set<int64_t> contradicted_utimes_;        // ends of contradicted IMU factors
 };
 
 }  // namespace pangea::vio

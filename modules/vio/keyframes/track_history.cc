@@ -11,10 +11,10 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kMinShared = 15;  // landmarks that tell whether an image stands still
+constexpr size_t kMinShared = 15;  // landmarks needed for a median shift
 
-// Another camera is as good as another pixel: (pixel - c) e + f d + what the distortion adds,
-// further in.
+// d(ray)/d(intrinsics): a change of the intrinsics acts like a change of the pixel by (pixel - c) e
+// + f d + (change of the distortion), with the opposite sign.
 Eigen::Matrix<double, 2, kIntrinsicsSize> ByIntrinsics(const Observation& observation,
                                                        const CameraModel& camera) {
   Eigen::Matrix<double, 2, 3> J_pixel;  // d(pixel)/d(ray, 1)
@@ -42,7 +42,7 @@ SeenLandmarks::const_iterator Find(const SeenLandmarks& seen, int32_t landmark_i
   return at != seen.end() && at->first == landmark_id ? at : seen.end();
 }
 
-// Calls use(ray in a, ray in b) for the landmarks that both saw.
+// Calls use(ray in a, ray in b) for each landmark in both.
 template <typename Use>
 void ForShared(const SeenLandmarks& a, const SeenLandmarks& b, const Use& use) {
   auto in_b = b.begin();

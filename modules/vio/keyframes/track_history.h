@@ -1,6 +1,6 @@
 #pragma once
 
-// What each frame of the window saw, by landmark.
+// The observations of each frame of the window, by landmark.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -17,26 +17,28 @@ namespace pangea::vio {
 
 class TrackHistory {
  public:
-  // The observations of the newest frame. `ray_sigma` is that of an observation with sigma_px 1.
+  // Adds the observations of a new frame. `ray_sigma`: of an observation with sigma_px 1, on the
+  // plane z = 1.
   void AddFrame(const TrackedFrame& frame, const CameraModel& camera, double ray_sigma);
   void RemoveFrame(int64_t utime) { frames_.erase(utime); }
   void RemoveLandmark(int32_t landmark_id);
 
-  // Every landmark's rays in the window's full frames that are tracked, oldest first; landmarks in
-  // order of their ids.
+  // The rays of every landmark in the window's full frames with is_tracked, oldest frame first;
+  // landmarks in ascending order of ids.
   struct Track {
     int32_t landmark_id = 0;
     std::vector<FrameRay> rays;
   };
   std::vector<Track> Tracks(const WindowState& state) const;
-  // What one frame saw, in the same order; FrameRay::frame is not set.
+  // The observations of one frame in order of landmark ids; FrameRay::frame is not set. Empty for
+  // an unknown frame.
   using SeenLandmarks = std::vector<std::pair<int32_t, FrameRay>>;
   const SeenLandmarks& Frame(int64_t utime) const;
-  bool Sees(int32_t landmark_id) const;                   // whether any frame did
-  size_t Shared(int64_t a_utime, int64_t b_utime) const;  // landmarks that both frames saw
+  bool Sees(int32_t landmark_id) const;                   // in any frame
+  size_t Shared(int64_t a_utime, int64_t b_utime) const;  // number of landmarks in both
 
-  // Median shift between two frames' shared landmarks, rotation taken out, in rays; and how many
-  // they share.
+  // Median shift of the landmarks that two frames share, rotation taken out, on the plane z = 1;
+  // and their number.
   struct Shift {
     double median = 0;
     size_t shared = 0;
@@ -44,8 +46,8 @@ class TrackHistory {
   Shift ShiftBetween(int64_t from_utime, int64_t to_utime,
                      const Eigen::Quaterniond& q_to_from) const;
 
-  // Median shift between two frames' shared landmarks as it is, in sigmas of a ray: 1.7 when
-  // nothing moves. Infinite with too few to tell.
+  // Median shift of the landmarks that two frames share, rotation not taken out, in sigmas of a
+  // ray: 1.7 if nothing moves. Infinite if they share too few.
   double MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const;
 
  private:

@@ -49,7 +49,7 @@ void LiveInput::OnCamera(const camera_t& message) {
     process_.node().Refuse("camera: " + camera.refused);
     return;
   }
-  // The calibration of a running odometry is the odometry's own.
+  // Later messages are ignored: a running odometry refines its calibration itself.
   if (!camera_) {
     camera_ = *camera.value;
     process_.Open(*camera_, noise_);
@@ -81,7 +81,8 @@ void LiveInput::OnImage(const image_t& message) {
   if (newest && message.utime <= *newest &&
       message.utime > *newest - SensorInput::kMaxImageStep_us) {
     process_.node().Refuse(
-        "image: not after the last one");  // a late chunk; no image is made of it
+        // a late chunk: its image was already taken or passed over
+        "image: not after the last one");
     return;
   }
   Assembly& assembly = AssemblyOf(message);
@@ -99,7 +100,8 @@ void LiveInput::OnImage(const image_t& message) {
   }
 }
 
-// Begun with its first chunk; of too many the one that was begun first goes.
+// Returns the image's assembly, creating it if needed; if there are too many, the oldest is
+// dropped.
 LiveInput::Assembly& LiveInput::AssemblyOf(const image_t& message) {
   const auto begun = std::ranges::find(assemblies_, message.utime, &Assembly::utime);
   if (begun != assemblies_.end()) {
@@ -125,7 +127,7 @@ void LiveInput::Complete(int64_t utime) {
   if (!sensors_.TakeImageStamp(utime)) {
     return;
   }
-  // Older ones have lost a chunk for good.
+  // The missing chunks of older images would come too late.
   process_.node().NoteDropped(static_cast<int64_t>(
       std::erase_if(assemblies_, [utime](const Assembly& other) { return other.utime < utime; })));
   const GreyImage image = Decode(complete.encoding, complete.bytes, *camera_);

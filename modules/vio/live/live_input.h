@@ -1,8 +1,8 @@
 #pragma once
 
-// Live sensors on the agent's bus: CAMERA_k once (repeated as often as the bridge likes), IMU_k,
-// and IMAGE_k in chunks, for sensor_input.h. Bounded: at most kMaxAssemblies images wait for their
-// chunks; the oldest go first and are counted as dropped.
+// Receives live sensors from the agent's bus: CAMERA_k (only the first one is used), IMU_k, and
+// IMAGE_k in chunks; passes them to sensor_input.h. At most kMaxAssemblies images wait for their
+// chunks; beyond that, the oldest is dropped and counted.
 
 #include <cstdint>
 #include <deque>
@@ -28,7 +28,7 @@ class LiveInput {
   LiveInput(VioProcess& process, int32_t agent_id, const ImuNoise& noise);
 
  private:
-  // An image whose chunks are still coming.
+  // An image of which some chunks have not arrived.
   struct Assembly {
     int64_t utime = 0;
     int8_t encoding = 0;
@@ -48,7 +48,7 @@ class LiveInput {
   SensorInput sensors_;
   ImuNoise noise_;
   std::optional<CameraModel> camera_;
-  std::deque<Assembly> assemblies_;  // as they began to come
+  std::deque<Assembly> assemblies_;  // in order of their first chunk
 };
 
 }  // namespace pangea::vio

@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 constexpr double kMinSearchDepth = 0.2;  // m
 constexpr double kBorder_px = 5;
-// Keyframes of the map in one alignment: each costs four unknowns.
+// Maximum number of source keyframes in one alignment: each adds four unknowns.
 constexpr size_t kMaxSources = 32;
 
 Eigen::Matrix4d PositionAndYaw(const Matrix6d& covariance) {
@@ -76,8 +76,8 @@ void MapLocalization::NotePublished(const Keyframe& keyframe) {
   }
 }
 
-// The correction as it is known at its own keyframe, carried along the odometry's edges to the
-// window's first pose.
+// Propagates the correction's covariance from the correction's keyframe along the odometry edges to
+// the window's first pose.
 std::optional<LocalizationPrior> MapLocalization::PriorAt(const WindowPoses& window) const {
   const auto at = std::find_if(published_.begin(), published_.end(),
                                [&](const Published& p) { return p.seq == correction_->seq; });
@@ -97,13 +97,14 @@ std::optional<LocalizationPrior> MapLocalization::PriorAt(const WindowPoses& win
   return LocalizationPrior{T_map_odom, PositionAndYaw(covariance)};
 }
 
-// Each landmark's nearest descriptor around where it should be; a corner is one landmark's only.
+// For each landmark, the corner with the nearest descriptor around its predicted position; a corner
+// is matched to one landmark at most.
 std::vector<MapLocalization::Match> MapLocalization::FindIn(const CameraModel& camera,
                                                             const std::vector<Corner>& corners,
                                                             const Rigid3& T_map_cam) const {
   const CornerGrid grid(corners);
   const Rigid3 T_cam_map = T_map_cam.Inverse();
-  std::map<int, std::pair<int, LandmarkKey>> nearest;  // of each corner: (distance, landmark)
+  std::map<int, std::pair<int, LandmarkKey>> nearest;  // by corner: (distance, landmark)
   for (const auto& [key, known] : known_) {
     const Vector3d p_cam = T_cam_map * known.p_map;
     const auto pixel = p_cam.z() > kMinSearchDepth ? camera.Project(p_cam) : std::nullopt;

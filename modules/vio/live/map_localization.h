@@ -1,15 +1,15 @@
 #pragma once
 
-// The agent's place in the fused map: the server's correction, sharpened by landmarks of the map
-// that the agent's own keyframes see.
+// The agent's pose in the fused map: the server's correction, refined with map landmarks that the
+// agent's own keyframes see.
 //
-// In: corrections, landmarks, the agent's published keyframes, and each new keyframe of the window
-// as soon as it is described. Out: T_map_odom. Nothing here reaches the odometry: the edges that
-// the agent publishes know nothing of what the server said, or the server would count its own
-// information twice. Without landmarks, or when too few are found or they contradict the
-// correction, the answer is the correction's.
+// Input: corrections, landmarks, the agent's published keyframes, and each new keyframe of the
+// window as soon as it is described. Output: T_map_odom. Nothing is fed back to the odometry:
+// published edges must be independent of the server's messages, or the server would count its own
+// information twice. If there are no landmarks, too few are found, or they contradict the
+// correction, T_map_odom is the correction's.
 //
-// A landmark is found again by projection and descriptor, once in each keyframe. Memory is bounded:
+// In each keyframe, landmarks are searched by projection and descriptor. Memory is bounded:
 // kMaxLandmarks landmarks, kMaxPublished odometry edges, the window's rays. No thread, no clock.
 
 #include <cstdint>
@@ -29,7 +29,7 @@ namespace pangea::vio {
 
 struct MapLocalizationOptions {
   LocalizationOptions localization;
-  // A landmark is looked for this far around where it should be, pixels.
+  // Search radius around a landmark's predicted position, pixels.
   double search_radius_px = 15;
   MatchingOptions matching;
   double pixel_sigma = 1.5;  // of a corner found again, at octave 0
@@ -42,25 +42,27 @@ class MapLocalization {
 
   explicit MapLocalization(const MapLocalizationOptions& options = {}) : options_(options) {}
 
-  // A new map of the agent.
+  // Call when the agent begins a new map: forgets everything but the counters.
   void Reset(const MapId& map);
-  // False for another map's, and for one that is not newer.
+  // False for a correction of another map, or with no newer revision; then nothing changes. If the
+  // group's frame changes, all landmarks are forgotten.
   bool Correct(const Correction& correction);
-  // False when they are in another frame than the newest correction.
+  // False if the landmarks are for another map, or in another frame than the newest correction.
   bool Take(const MapLandmarks& landmarks);
   void NotePublished(const Keyframe& keyframe);
   bool HasLandmarks() const { return !known_.empty(); }
   size_t num_landmarks() const { return known_.size(); }
-  // The newest pose of the window is a keyframe's. `corners`: as a global shutter saw them.
+  // Call when the window's newest pose is a keyframe. `corners`: of that keyframe, with rolling
+  // shutter compensated.
   void AddKeyframe(const CameraModel& camera, const std::vector<Corner>& corners,
                    const WindowPoses& window);
 
-  // Nothing before the first correction.
+  // Empty before the first correction.
   std::optional<Rigid3> T_map_odom() const;
 
   struct Counters {
     int64_t localized = 0;      // keyframes
-    int64_t not_localized = 0;  // too few landmarks, or in contradiction
+    int64_t not_localized = 0;  // too few landmarks, or contradicting ones
     int64_t seen = 0;           // landmarks, in all keyframes
   };
   const Counters& counters() const { return counters_; }
@@ -69,7 +71,7 @@ class MapLocalization {
   using LandmarkKey = std::pair<MapId, int32_t>;
   struct Known {
     KeyframeId source;
-    Eigen::Vector3d p_source;  // its camera, in the map
+    Eigen::Vector3d p_source;  // position of the source's camera, in the map
     Eigen::Vector3d p_map;
     Eigen::Matrix3d covariance;
     Descriptor descriptor;

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The camera that exposed a row, seen from the camera at the image's time.
+// Pose of the camera at the exposure of a row, relative to the camera at the image's time.
 Rigid3 RowCamera(const CameraModel& camera, const BodyMotion& motion, double row) {
   const double s = camera.readout_s * row / (camera.height - 1);
   return camera.T_body_cam.Inverse() * motion.After(s) * camera.T_body_cam;
@@ -33,7 +33,7 @@ std::vector<SeenDepth> SeenDepths(const Keyframe& keyframe) {
   return seen;
 }
 
-// The median of the map points nearest in the image; as if far away where there are none.
+// Median inverse depth of the map points nearest in the image; 0 if there are none.
 double InverseDepthNear(const Eigen::Vector2f& pixel, const std::vector<SeenDepth>& seen) {
   constexpr size_t kNearest = 5;
   if (seen.empty()) {

@@ -1,17 +1,16 @@
 #pragma once
 
-// A keyframe as a global shutter would have taken it at the image's time: what a rolling shutter
-// saw later, row by row, with the camera's motion during read-out taken out. Consumers of a
-// keyframe then need not know of rows.
+// Compensates the rolling shutter of a keyframe: moves its corners to where a global shutter would
+// have seen them at the image's time, so that users of keyframes need no model of rows.
 
 #include "core/keyframe.h"
 #include "vio/imu/body_motion.h"
 
 namespace pangea::vio {
 
-// Moves corners (map points by their depth, all others by the depths of the map points around
-// them) and the points' depths, by the body's motion from the image's time on.
-// Corners that leave the image stay as they are. Does nothing for a global shutter.
+// Moves the corners and the map points' depths by the body's motion after the image's time. A map
+// point uses its own depth, any other corner the median depth of the map points around it. A corner
+// that would leave the image is not moved. Does nothing for a global shutter.
 void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe);
 
 }  // namespace pangea::vio

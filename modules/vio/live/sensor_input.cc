@@ -23,7 +23,7 @@ bool SensorInput::TakeImageStamp(int64_t utime) {
   return TakeStamp(&image_stamps_, "image: ", utime);
 }
 
-// Whether it is the stream's, which may go on from an earlier time than before.
+// Whether the stamp continues its stream; starts anew if the stream went back in time.
 bool SensorInput::TakeStamp(StampCheck* stamps, const std::string& what, int64_t utime) {
   switch (stamps->Check(utime)) {
     case StampCheck::Decision::kNext:
@@ -57,7 +57,7 @@ void SensorInput::AddImage(int64_t utime, const cv::Mat& image) {
   Deliver();
 }
 
-// The oldest, until the rest is no further behind the newest than an odometry may be.
+// Drops the oldest images until the lag is within its limit.
 void SensorInput::DropStale() {
   int64_t dropped = 0;
   while (images_.size() > kMaxImages || Lag() > VioProcess::kMaxLag_us) {
@@ -84,10 +84,10 @@ void SensorInput::Deliver() {
   }
 }
 
-// Whether another one is ready.
+// Returns whether another image is ready.
 bool SensorInput::DeliverOne() {
   if (!Ready()) {
-    return false;  // the time began anew meanwhile
+    return false;  // StartAnew was called meanwhile
   }
   process_.NoteLag(Lag(), 0);
   const auto [utime, image] = images_.front();

@@ -1,12 +1,11 @@
 #pragma once
 
-// Images and inertial samples of live sensors, on their way into the odometry. An image goes there
-// as soon as the samples reach past it and no other message waits: so what has come is known, and
-// an odometry that cannot keep up drops images instead of falling ever further behind
-// (VioProcess::kMaxLag_us). Bounded: at most kMaxImages wait for their samples or the odometry, and
-// kMaxSamples for an image; the oldest go first and are counted as dropped. Stamps that do not go
-// on from the ones before are refused and counted (stamp_check.h); where a stream goes back the
-// odometry starts anew.
+// Buffers images and inertial samples of live sensors for the odometry. An image is passed on as
+// soon as the samples reach past it and no other message waits on the bus. So all received images
+// are known, and an odometry that cannot keep up drops images instead of falling further and
+// further behind (VioProcess::kMaxLag_us). At most kMaxImages images and kMaxSamples samples wait;
+// beyond that, the oldest are dropped and counted. Stamps that do not continue the stream are
+// refused and counted (stamp_check.h); if a stream goes back in time, the odometry starts anew.
 
 #include <cstdint>
 #include <deque>
@@ -26,7 +25,7 @@ class SensorInput {
  public:
   static constexpr size_t kMaxImages = 100;
   static constexpr size_t kMaxSamples = 20'000;  // 100 s at 200 Hz
-  // A longer hole in the samples, or in the images, is the end of the map anyway (imu_buffer.cc,
+  // A longer gap in the samples, or in the images, ends the map anyway (imu_buffer.cc,
   // estimator.cc).
   static constexpr int64_t kMaxImuStep_us = 300'000;
   static constexpr int64_t kMaxImageStep_us = 1'000'000;
@@ -34,11 +33,13 @@ class SensorInput {
   explicit SensorInput(VioProcess& process) : process_(process) {}
 
   void AddImu(const ImuSample& sample);
-  // Whether there is to be an image of this time, in two steps: who decodes need not do it in vain.
+  // Checks and accepts the stamp of an image. A separate step, so that an image is decoded only if
+  // its stamp is accepted.
   bool TakeImageStamp(int64_t utime);
-  // After TakeImageStamp, of the calibration's size; the pixels are not copied.
+  // Call after TakeImageStamp. The image has the size in the calibration; its pixels are not
+  // copied.
   void AddImage(int64_t utime, const cv::Mat& image);
-  // What waits is of a time that is over: the odometry finishes its map, and opens another.
+  // Drops everything that waits; the odometry finishes its map and opens another.
   void StartAnew();
 
   std::optional<int64_t> newest_image() const { return image_stamps_.newest(); }

@@ -26,8 +26,8 @@ bool ShownPose::Correct(const Correction& correction) {
 Rigid3 ShownPose::Show(int64_t utime, const Rigid3& T_odom_body) {
   const double dt = last_utime_ ? 1e-6 * static_cast<double>(utime - *last_utime_) : 0.0;
   last_utime_ = utime;
-  // The rest of the correction as it acts on the body: rotated about the body, then moved, so that
-  // a far origin is no lever.
+  // The remaining correction of the body pose: a rotation about the body and a shift, so that a
+  // distant odom origin is no lever.
   const Rigid3 now = shown_ * T_odom_body;
   const Rigid3 wanted = target_ * T_odom_body;
   const Eigen::Vector3d rotation = LogSo3(wanted.q * now.q.conjugate());

@@ -2,11 +2,11 @@
 
 // The pose an agent shows in the fused map: its odometry under the server's newest correction.
 //
-// A new correction of the same map frame is blended in, so that what is shown never jumps: the
-// correction moves the shown position at most at kMaxSpeed and rotates it at most at kMaxYawRate:
-// at 20 Hz, 15 mm from one image to the next. It rotates about the body, wherever the odom origin
-// is. When the group's frame itself changes (the map was fused into another), coordinates before
-// and after have nothing to do with each other, and the correction holds at once.
+// A new correction in the same map frame is blended in, so that the shown pose never jumps: it
+// moves at most at kMaxSpeed and rotates at most at kMaxYawRate (at 20 Hz: 15 mm per image). The
+// rotation is about the body, wherever the odom origin is. If the group's frame itself changes (the
+// map was fused into another one), old and new coordinates are unrelated, and the correction is
+// applied at once.
 
 #include <cstdint>
 #include <optional>
@@ -21,13 +21,14 @@ class ShownPose {
   static constexpr double kMaxSpeed = 0.3;    // m/s, on top of the agent's own motion
   static constexpr double kMaxYawRate = 0.1;  // rad/s
 
-  // A new map: its own odom frame until the server says otherwise.
+  // Call for a new map: until the first correction, the map frame is its odom frame.
   void Reset(const MapId& map);
-  // Takes a correction of this map with a higher revision than all before; false otherwise.
+  // False, and nothing changes, if the correction is of another map or its revision is not higher
+  // than all before.
   bool Correct(const Correction& correction);
-  // The newest correction, known better: what is shown goes there instead.
+  // Replaces the target of the blending by a refined T_map_odom (map_localization.h).
   void Sharpen(const Rigid3& T_map_odom) { target_ = T_map_odom; }
-  // T_map_body of an odometry pose; `utime` ascending.
+  // Returns T_map_body for an odometry pose. Call with ascending `utime`.
   Rigid3 Show(int64_t utime, const Rigid3& T_odom_body);
 
   int64_t revision() const { return revision_; }

@@ -16,7 +16,7 @@ StampCheck::Decision StampCheck::Check(int64_t utime) {
   return is_after ? Decision::kNext : Decision::kWentBack;
 }
 
-// A repeat of the last one, as a bus may deliver it, says nothing.
+// A repeat of the last refused stamp (a bus may deliver a message twice) does not count.
 bool StampCheck::Agrees(int64_t utime) {
   if (refused_ > 0 && utime == last_refused_) {
     return false;

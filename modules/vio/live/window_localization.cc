@@ -20,11 +20,10 @@ constexpr int kPose = 6;    // (dtheta, xi), right-invariant: see window_state.h
 constexpr int kSource = 4;  // (shift, yaw)
 constexpr int kRobustIterations = 4;
 constexpr int kFinalIterations = 3;
-// Nothing is known better than this: 0.01 mm, 0.01 mrad. It keeps the poses of a stationary body
-// apart.
+// Minimum variance (0.01 mm, 0.01 mrad): keeps the covariance invertible for a stationary body.
 constexpr double kFloor = 1e-10;
 
-// The same errors seen from a frame that lies at T: dtheta' = R dtheta, xi' = R xi + t x R dtheta.
+// Maps an error to another frame, T = T_new_old: dtheta' = R dtheta, xi' = R xi + t x R dtheta.
 MatrixXd Adjoint(const Rigid3& T) {
   MatrixXd A = MatrixXd::Zero(kPose, kPose);
   A.block<3, 3>(0, 0) = A.block<3, 3>(3, 3) = T.R();
@@ -32,7 +31,7 @@ MatrixXd Adjoint(const Rigid3& T) {
   return A;
 }
 
-// A shift and a yaw of a pose at p, as an error of it.
+// Jacobian of the error (dtheta, xi) of a pose at p with respect to its shift and yaw.
 Eigen::Matrix<double, kPose, 4> ShiftAndYaw(const Vector3d& p) {
   Eigen::Matrix<double, kPose, 4> N = Eigen::Matrix<double, kPose, 4>::Zero();
   N(2, 3) = 1;
@@ -50,7 +49,7 @@ class Problem {
         T_body_cam_(T_body_cam),
         landmarks_(landmarks),
         sources_(source_positions),
-        // Everything is told from where the newest pose is: no long levers.
+        // All coordinates are relative to the newest pose: no long levers.
         origin_((prior.T_map_odom * window.T_odom_body.back()).t),
         T_local_odom_(prior.T_map_odom.q, prior.T_map_odom.t - origin_),
         fits_(landmarks.size(), true) {
@@ -123,7 +122,7 @@ class Problem {
     const MatrixXd N = ShiftAndYaw(poses_.front().t);
     MatrixXd common(n, 4);
     for (int at = 0; at < n; at += kPose) {
-      // Position and yaw of the first pose given up: what is left is relative to it.
+      // Remove position and yaw of the first pose: the rest is relative to it.
       relative.block<4, 4>(at + 2, 2) -= Matrix4d::Identity();
       common.middleRows<kPose>(at) = N;
     }
@@ -151,7 +150,7 @@ class Problem {
     return WhitenLandmark(poses_, T_body_cam_, landmark, origin_, c, s);
   }
 
-  // A degree of freedom; infinite for one behind a camera.
+  // Chi-squared per degree of freedom; infinite if the landmark is behind a camera.
   double Chi2(size_t l) const {
     const Whitened w = Residual(l);
     return w.r.size() > 0 ? w.r.squaredNorm() / static_cast<double>(w.r.size())
@@ -186,7 +185,7 @@ class Problem {
     for (size_t l = 0; l < landmarks_.size(); ++l) {
       const Whitened w = fits_[l] ? Residual(l) : Whitened{};
       if (w.r.size() > 0) {
-        // Cauchy's weight, of the landmark as a whole.
+        // Cauchy weight of the whole landmark.
         const double chi2 = w.r.squaredNorm() / static_cast<double>(w.r.size());
         AddLandmark(l, w, robust ? 1 / (1 + chi2) : 1, &g);
       }

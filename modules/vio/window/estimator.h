@@ -3,10 +3,10 @@
 // Visual-inertial odometry of one map: tracked features and inertial samples in, poses and finished
 // keyframes out.
 //
-// Starts by itself, stationary or moving (initialiser.h), then optimises over a sliding window of
-// frames; what leaves it stays behind as a prior (window_problem.h). Frames: odom is
-// gravity-aligned (z up), its origin and yaw are those of the first pose. No threads, no clock, no
-// files: the same input gives the same output.
+// Initialises itself, stationary or moving (initialiser.h), then optimises over a sliding window of
+// frames; frames that leave the window are marginalised into a prior (window_problem.h). The odom
+// frame is gravity-aligned (z up), with the origin and yaw of the first pose. Uses no thread, clock
+// or file: the same input gives the same output.
 
 #include <cstdint>
 #include <memory>
@@ -30,12 +30,13 @@ namespace pangea::vio {
 
 struct EstimatorOptions {
   int window = 12;  // keyframes in the window
-  // A frame is a window keyframe when the image has moved this far (rotation taken out) since the
-  // last such frame, a keyframe when it has since the last one; or by what frame_choice.h has.
+  // Parallax (median shift of the features, rotation taken out) at which a frame becomes a window
+  // keyframe, which keeps its place in the window, and a keyframe, which is published. Measured
+  // since the last one of the kind. frame_choice.h has further criteria.
   double window_parallax_px = 15;
   double keyframe_parallax_px = 20;
-  double pixel_sigma = 0.7;        // of an observation with sigma_px 1, pixels
-  double accel_bias_sigma = 0.15;  // m/s^2, when it is switched on
+  double pixel_sigma = 0.7;        // pixels, of an observation with sigma_px 1
+  double accel_bias_sigma = 0.15;  // m/s^2, when the IMU is switched on
   CalibrationSigmas calibration;
   StationaryOptions stationary;
 
@@ -63,9 +64,9 @@ struct LandmarkDepth {
   double inverse_depth_var = 0;  // 1/m^2
 };
 
-// A keyframe that left the window, or has waited long enough: all of it is final.
+// A keyframe that left the window or has waited long enough; all its values are final.
 struct FinishedKeyframe {
-  int64_t utime = 0;  // of its TrackedFrame
+  int64_t utime = 0;  // of the TrackedFrame
   Rigid3 T_odom_body;
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
   BodyMotion motion;  // from there on

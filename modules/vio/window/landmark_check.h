@@ -1,13 +1,13 @@
 #pragma once
 
-// Which landmarks of an optimised window do not fit where they are said to be.
+// Finds the landmarks of an optimised window that do not fit their rays.
 
 #include "vio/window/window_problem.h"
 
 namespace pangea::vio {
 
 bool IsSeenIn(int frame, const Landmark& landmark);
-// A ray is far off, or all of them together.
+// True if one ray, or all rays together, have a large error.
 bool IsOutlier(RowViews& rows, const Landmark& landmark);
 // Whether its rays pass a chi-square test at 95 %.
 bool FitsAsWhole(RowViews& rows, const Landmark& landmark);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which tracks are landmarks of the window, and what is known of them between two images.
+// Decides which tracks are landmarks of the window, and keeps their estimates between images.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -14,15 +14,16 @@ namespace pangea::vio {
 
 class LandmarkStore {
  public:
-  // The landmarks of the window: tracks seen often enough, with a depth. New ones are triangulated.
+  // Returns the landmarks of the window: tracks seen often enough, with a depth. New ones are
+  // triangulated.
   std::vector<Landmark> Gather(const WindowState& state, const TrackHistory& history) const;
-  // Remembers the landmarks' estimates, and forgets all others.
+  // Keeps the estimates of the problem's landmarks, and forgets all others.
   void Keep(const WindowProblem& problem);
-  // What a track has told so far is in the prior: it starts anew after this image.
+  // The track's observations up to this image are in the prior, so only later ones are used again.
   void StartAnew(int32_t landmark_id, int64_t after_utime) {
     from_utime_[landmark_id] = after_utime;
   }
-  // Forgets tracks that no frame holds any more.
+  // Forgets the tracks that no frame in `history` contains any more.
   void Forget(const TrackHistory& history);
 
  private:

@@ -16,26 +16,27 @@ namespace pangea::vio {
 // An observation of one point in one frame of the window.
 struct FrameRay {
   int frame = 0;                                  // index into WindowState::frames
-  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // by the given intrinsics
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // with the given intrinsics
   double sigma = 0;
-  double row_s = 0;  // the row's exposure after the image's time (rolling shutter)
-  // d(ray)/d(WindowState::intrinsics), which are small: what the pixel's ray is by other ones.
+  double row_s = 0;  // exposure of the row, after the image's time (rolling shutter)
+  // d(ray of the pixel)/d(WindowState::intrinsics), which are small corrections.
   Eigen::Matrix<double, 2, kIntrinsicsSize> J_intrinsics =
       Eigen::Matrix<double, 2, kIntrinsicsSize>::Zero();
 
   Eigen::Vector2d RayBy(const WindowState& state) const {
     return ray + J_intrinsics * state.intrinsics / (1 + state.intrinsics.x());
   }
-  // The other way, of a ray near this one: what it is by the given intrinsics. The focal length
-  // acts on that ray, not on the measured one: with this one's noise in its derivative a longer
-  // focal length would make noise smaller, and be found (regression dilution).
+  // The inverse, for a predicted ray near this one: the ray with the given intrinsics. The focal
+  // length acts on the predicted ray, not on the measured one: with measurement noise in its
+  // derivative, the estimate would be biased to a longer focal length, which shrinks the noise
+  // (regression dilution).
   Eigen::Vector2d AsGiven(const WindowState& state, const Eigen::Vector2d& predicted) const {
     return predicted - J_intrinsics * state.intrinsics + state.intrinsics.x() * (predicted - ray);
   }
 };
 
-// A point by its ray (alpha, beta, 1) and inverse depth rho in the camera that took its anchor's
-// row.
+// A point as ray (alpha, beta, 1) and inverse depth rho (1/m), in the camera at the time of its
+// anchor's row.
 struct AnchoredPoint {
   int anchor = 0;  // index into WindowState::frames
   double anchor_row_s = 0;
@@ -45,21 +46,21 @@ struct AnchoredPoint {
   }
 };
 
-// A body when a row was exposed.
+// Pose and velocity of the body when a row was exposed.
 struct RowView {
   double row_s = 0, ahead_s = 0;
   Rigid3 T_odom_body;
   Eigen::Matrix3d R_odom_body;
   std::optional<Eigen::Vector3d> v_odom, omega_odom;
 };
-// Those of a window that does not change; of each frame the last row is kept, as one whose rows are
-// all exposed at once has no other.
+// Computes RowViews of a window that does not change. The last one of each frame is cached: all
+// rays of a global shutter's frame have the same.
 class RowViews {
  public:
   explicit RowViews(const WindowState& state) : state_(&state), last_(state.frames.size()) {}
   const WindowState& state() const { return *state_; }
   const RowView& At(int frame, double row_s);
-  // How fast a point moves that the frame carries along, m/s.
+  // Velocity, in odom, of a point rigidly attached to the moving body, m/s.
   Eigen::Vector3d CarriedBy(int frame, double row_s, const Eigen::Vector3d& p_odom);
 
  private:
@@ -67,9 +68,9 @@ class RowViews {
   std::vector<std::optional<RowView>> last_;
 };
 
-// Where a point should be seen by the given intrinsics, and d(ray) by the errors of the anchor's
-// pose, the seeing frame's pose, their stamps, the calibration, and (alpha, beta, rho). In its own
-// anchor the blocks of the two frames cancel.
+// The predicted ray of a point with the given intrinsics, and its Jacobians with respect to the
+// errors of the anchor's pose, of the observing frame's pose, of their stamps, of the calibration,
+// and of (alpha, beta, rho). If the frame is the anchor, the blocks of the two frames cancel.
 struct PredictedRay {
   Eigen::Vector2d ray;
   Eigen::Matrix<double, 2, kPoseSize> J_anchor, J_frame;
@@ -77,8 +78,8 @@ struct PredictedRay {
   Eigen::Matrix<double, 2, kCalibrationSize> J_calibration;
   Eigen::Matrix<double, 2, 3> J_point;
 };
-// A point as all its rays need it: where it is in odom, and how the errors of its anchor's side
-// move it there.
+// The part of a prediction that all rays of a point share: its position in odom, and the Jacobians
+// of this position with respect to the errors on the anchor's side.
 struct PointInOdom {
   PointInOdom(RowViews& rows, const AnchoredPoint& point);
   Eigen::Vector3d p_odom;
@@ -89,7 +90,7 @@ struct PointInOdom {
   double anchor_excess_interval_s = 0;
 };
 Eigen::Vector3d InOdom(RowViews& rows, const AnchoredPoint& point);
-// Nothing when the point is behind the camera.
+// Empty if the point is behind the camera.
 std::optional<Eigen::Vector2d> PredictRayOnly(RowViews& rows, const Eigen::Vector3d& p_odom,
                                               const FrameRay& seen);
 std::optional<PredictedRay> PredictRay(RowViews& rows, const PointInOdom& point,
@@ -97,11 +98,11 @@ std::optional<PredictedRay> PredictRay(RowViews& rows, const PointInOdom& point,
 
 struct Triangulated {
   AnchoredPoint point;
-  Eigen::Matrix3d covariance;  // of (alpha, beta, rho), poses taken as exact
-  double rms = 0;              // whitened residual
+  Eigen::Matrix3d covariance;  // of (alpha, beta, rho), for exact poses
+  double rms = 0;              // of the whitened residuals
 };
-// From at least two rays; the anchor is `rays[anchor]`. Nothing when the depth is not determined or
-// out of range.
+// Needs at least two rays; the anchor is the frame of `rays[anchor]`. Empty if the depth is
+// undetermined or out of range.
 std::optional<Triangulated> Triangulate(const WindowState& state, std::span<const FrameRay> rays,
                                         size_t anchor);
 

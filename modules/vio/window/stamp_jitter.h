@@ -1,8 +1,8 @@
 #pragma once
 
-// How far the stamps of images jitter, by themselves: those that are taken when an image arrives
-// (in phones' and browsers' applications) by some milliseconds, those of the exposure by next to
-// none. A frame rate that changes, or a lost image, is no jitter.
+// Estimates the jitter of the stamps of images, from the stamps alone. Stamps of the arrival of an
+// image (in applications on phones and in browsers) jitter by some milliseconds, stamps of the
+// exposure hardly at all. A change of frame rate or a lost image does not count as jitter.
 
 #include <cstdint>
 #include <deque>
@@ -12,7 +12,7 @@ namespace pangea::vio {
 class StampJitter {
  public:
   void AddFrame(int64_t utime);
-  // Standard deviation of a stamp; 0 when it is too small to matter, or too few have come.
+  // Standard deviation of a stamp; 0 if it is negligible or there are too few stamps.
   double sigma_s() const { return sigma_s_; }
 
  private:

@@ -1,7 +1,6 @@
 #pragma once
 
-// The window as others may look at it: where the body was at each of its frames, and how well that
-// is known. Looking changes nothing.
+// A copy of the window's poses with their covariance, for users outside the estimator.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -14,7 +13,7 @@ namespace pangea::vio {
 struct WindowPoses {
   std::vector<int64_t> utimes;  // ascending; the first may be a keyframe that was published
   std::vector<Rigid3> T_odom_body;
-  // Of all of them, 6 a pose, in the window's coordinates (window_state.h): (dtheta, xi_p).
+  // Joint covariance, 6 rows per pose: (dtheta, xi_p) in the coordinates of window_state.h.
   Eigen::MatrixXd covariance;
 };
 

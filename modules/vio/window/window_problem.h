@@ -1,7 +1,8 @@
 #pragma once
 
 // The sliding window as a least-squares problem: rays of landmarks, inertial measurements between
-// consecutive frames, zero-velocity updates, and a prior that holds what has left the window.
+// consecutive frames, zero-velocity updates, and a prior with the information of marginalised
+// frames.
 //
 // Landmarks are eliminated one by one (Schur complement); the reduced system is small and dense.
 
@@ -19,13 +20,13 @@ namespace pangea::vio {
 struct Landmark {
   int32_t id = 0;
   AnchoredPoint point;
-  std::vector<FrameRay> rays;  // at most one a frame; the anchor's own is among them
+  std::vector<FrameRay> rays;  // at most one per frame; includes the anchor's own
 };
 
 struct ImuFactor {
   ScaledPreintegration span;
-  ImuNoise noise;             // that `information` counts, unless contradicted
-  bool contradicted = false;  // by the images (unmodelled_acceleration.h)
+  ImuNoise noise;             // from which `information` is made, unless contradicted
+  bool contradicted = false;  // the images contradict it (unmodelled_acceleration.h)
   Eigen::Matrix<double, 15, 15> information = Eigen::Matrix<double, 15, 15>::Zero();
 };
 
@@ -37,10 +38,10 @@ struct WindowPrior {
   Eigen::VectorXd g;
 };
 
-// What optimising moves.
+// The variables that Optimise changes.
 struct WindowEstimate {
   WindowState state;
-  std::vector<Eigen::Vector3d> ray_rhos;  // of each landmark
+  std::vector<Eigen::Vector3d> ray_rhos;  // AnchoredPoint::ray_rho of each landmark
 };
 
 struct WindowProblem {
@@ -53,16 +54,16 @@ struct WindowProblem {
   void SetEstimate(WindowEstimate estimate);
 };
 
-// The cost and its derivatives by the window's error, landmarks eliminated:
+// The cost and its derivatives with respect to the window's error e, landmarks eliminated:
 // cost(state (+) e) ~ cost + g^T e + 1/2 e^T H e.
 struct NormalEquations {
   double cost = 0;
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  // What a step of the window means for each landmark: step = offset + gain * (step of its frames).
+  // The step of each landmark: offset + gain * (step of the calibration and of its frames).
   struct Elimination {
     Eigen::Vector3d offset;
-    // Columns: calibration, then of each ray's frame the pose and, if `stamps`, the stamp's error.
+    // Columns: calibration, then per ray the pose of its frame and, if `stamps`, its stamp error.
     Eigen::Matrix<double, 3, Eigen::Dynamic> gain;
     bool stamps = false;
 
@@ -72,18 +73,19 @@ struct NormalEquations {
   };
   std::vector<Elimination> eliminations;
 };
-// `damping`: Levenberg-Marquardt's, a share of the diagonal.
+// `damping`: of Levenberg-Marquardt, relative to the diagonal.
 NormalEquations Linearise(const WindowProblem& problem, double damping);
 
-// Optimises state and landmarks in place; the final cost.
+// Optimises state and landmarks in place; returns the final cost.
 double Optimise(WindowProblem& problem, int max_iterations);
 
-// Marginal covariance of the window's error: these rows and columns of it, zero elsewhere.
+// Marginal covariance of the window's error: full size, but only `rows` are computed (rows and
+// columns); the rest is zero.
 Eigen::MatrixXd WindowCovariance(const WindowProblem& problem, const std::vector<int>& rows);
 
-// Takes the oldest full frame out of the window (all of it, or all but its pose), with the
-// landmarks anchored in it, the IMU factor to the next frame and what the prior says of it; what
-// they tell of the rest goes into the prior. A pose kept before goes too when `drop_kept_pose`.
+// Marginalises the oldest full frame (entirely, or all but its pose if `keep_pose`), the landmarks
+// anchored in it and the IMU factor to the next frame: their information on the remaining variables
+// goes into the prior. `drop_kept_pose`: also marginalises a pose that was kept before.
 struct Marginalisation {
   bool keep_pose = false;
   bool drop_kept_pose = false;

@@ -1,9 +1,10 @@
 #pragma once
 
-// Solves the window's normal equations by their structure. Velocity and biases of a frame are tied
-// to its neighbours alone (IMU factors), and only the oldest frame's to more (the prior). So they
-// are eliminated first, newest frame first: each then meets the next older one's, and of the rest
-// only what belongs to the frames passed so far. The rest is half as large, and dense.
+// Solves the window's normal equations using their structure. Velocity and biases of a frame are
+// connected only to its neighbours (IMU factors); only those of the oldest frame are connected to
+// more (the prior). They are eliminated first, newest frame first: each elimination then fills in
+// only the next older frame's, and, of the remaining rows, those of the frames already passed. The
+// remaining system is half as large, and dense.
 
 #include <Eigen/Core>
 #include <vector>
@@ -12,11 +13,10 @@
 
 namespace pangea::vio {
 
-// The rest: rows of calibration, poses and stamps; newest frame first.
+// The remaining rows: calibration, poses and stamps; newest frame first.
 std::vector<int> RowsOfPoses(const WindowState& state);
 
-// The solution x of H x = b, H symmetric and positive semidefinite. Columns of b are solved
-// together.
+// The solution x of H x = b, H symmetric and positive semidefinite. b may have several columns.
 Eigen::MatrixXd SolveWindow(const WindowState& state, const Eigen::MatrixXd& H,
                             const Eigen::MatrixXd& b);
 

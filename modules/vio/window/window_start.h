@@ -1,7 +1,7 @@
 #pragma once
 
-// What is known of the window when it starts: the initialiser's state, the given calibration, and
-// what the IMU's may be off.
+// The first prior of the window: the initialiser's state, the given calibration, and the
+// uncertainty of the IMU's intrinsics.
 
 #include <Eigen/Core>
 
@@ -11,17 +11,19 @@
 
 namespace pangea::vio {
 
-// Whether nobody measured the lens to what a tenth of a pixel needs: then nobody measured the IMU.
+// Whether the calibration is rough: the distortion's sigma is above 0.001, about a tenth of a
+// pixel. The IMU is then taken to be uncalibrated too.
 bool IsRough(const CameraModel& camera, const CalibrationSigmas& given);
 
-// A moving start: the first of its frames has an origin and a yaw, which are chosen; all else its
-// frames will tell, but for biases of a plausible size. The accelerometer's is about zero.
+// Prior of a moving start. Origin and yaw of the first frame are chosen, so they are known; the
+// biases have weak priors, that of the accelerometer about zero; everything else follows from the
+// frames.
 WindowPrior MovingStartPrior(const WindowState& start, const CameraModel& camera,
                              const CalibrationSigmas& given, const ImuNoise& noise,
                              double accel_bias_sigma);
 
-// `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro bias, accel bias), dtheta on
-// the left, all differences plain (InitialState).
+// Prior of a stationary start; `start` has one frame. `covariance`: of its (dtheta, dp, dv, gyro
+// bias, accel bias), dtheta on the left, all others plain differences (InitialState).
 WindowPrior StartPrior(const WindowState& start, const Eigen::Matrix<double, 15, 15>& covariance,
                        const CameraModel& camera, const CalibrationSigmas& given,
                        const ImuNoise& noise);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The variables of the sliding window, and how an error of them looks.
+// The variables of the sliding window, and the parametrisation of their error.
 //
 // Errors are right-invariant: a rotation error dtheta is on the LEFT (R = Exp(dtheta) R^) and every
 // vector that lives in odom is carried along by it (p = Exp(dtheta) p^ + xi). In these coordinates
@@ -25,7 +25,7 @@ namespace pangea::vio {
 
 // One frame's error is laid out as in core/imu/imu_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
-// After it comes, where stamps jitter, the error of the frame's stamp.
+// If stamps jitter, the error of the frame's stamp follows.
 inline constexpr int kStampError = kFrameSize;
 // The calibration's error comes first: rotation (left) and translation of T_body_cam, time offset,
 // intrinsics, interval share.
@@ -37,27 +37,29 @@ inline constexpr int kSharedSize = kCalibrationSize + kImuIntrinsicsSize;
 
 using Intrinsics = Eigen::Matrix<double, kIntrinsicsSize, 1>;
 
-// A frame of the window: the body at the image's time as the time offset stood when it came.
+// A frame of the window: the state of the body at the image's time, by the time offset that was
+// estimated when the frame was added.
 struct WindowFrame {
   int64_t utime = 0;         // of its TrackedFrame
   int64_t imu_utime = 0;     // utime + time_offset_s
-  double time_offset_s = 0;  // WindowState::OffsetOf it, when it came
-  // How much further apart images are than at the start (image_stamps.h).
+  double time_offset_s = 0;  // WindowState::OffsetOf(*this) when the frame was added
+  // By how much the interval between images exceeds that at the start (image_stamps.h).
   double excess_interval_s = 0;
-  // The image was taken this much after its stamp says, and what it may be (image_stamps.h).
+  // The image was taken this much later than its stamp says (estimate and sigma; image_stamps.h).
   double stamp_error_s = 0;
-  double stamp_sigma_s = 0;  // 0: stamps are exact, and the error is no variable
+  double stamp_sigma_s = 0;  // 0: stamps are exact, stamp_error_s is no variable
   ImuState imu;
-  // How it moves on from there while the rows are read out (body_motion.h).
+  // Motion of the body while the rows are read out (body_motion.h).
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();
   Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();
   Eigen::Vector3d a_body = Eigen::Vector3d::Zero();
-  bool is_window_keyframe = false;  // it holds its place; else the next frame replaces it
+  bool is_window_keyframe = false;  // keeps its place; else the next frame replaces it
   bool is_keyframe = false;         // it is, or will be, published
   bool is_published = false;
-  bool pose_only = false;  // only its pose is left: the end of the next odometry edge
+  // velocity and biases are marginalised; the pose begins the next odometry edge
+  bool pose_only = false;
   bool stationary = false;
-  bool is_tracked = true;  // its rays count: they are not mere noise
+  bool is_tracked = true;  // its rays are used: they are more than noise
 
   bool has_stamp_error() const { return !pose_only && stamp_sigma_s > 0; }
   int size() const { return pose_only ? kPoseSize : kFrameSize + (has_stamp_error() ? 1 : 0); }
@@ -66,12 +68,12 @@ struct WindowFrame {
 struct WindowState {
   Rigid3 T_body_cam;
   double time_offset_s = 0;  // t_imu = t_image + time_offset_s
-  // By which share of the interval between images the offset grows with it. A camera that exposes
-  // as long as its frame rate lets it has -1/2 where a stamp is of the end of the exposure, 1/2
-  // where it is of the begin, and 0 where it is of the middle or the exposure is short.
+  // d(time offset) / d(interval between images). For a camera that exposes during the whole
+  // interval it is -1/2 if the stamp is at the end of the exposure, 1/2 if it is at the begin; it
+  // is 0 if the stamp is at the middle or the exposure is short.
   double interval_share = 0;
-  // Of the given camera: how much longer its focal length is, as a share of it, where its centre
-  // is, in focal lengths (x, y), and what its first two (radial) coefficients of distortion lack.
+  // Corrections of the given camera: relative change of the focal length, shift of the principal
+  // point in focal lengths (x, y), and change of the first two (radial) distortion coefficients.
   Intrinsics intrinsics = Intrinsics::Zero();
   ImuIntrinsics imu_intrinsics;
   std::vector<WindowFrame> frames;  // oldest first
@@ -80,7 +82,7 @@ struct WindowState {
   int size() const { return Offset(static_cast<int>(frames.size())); }
   int Newest() const { return static_cast<int>(frames.size()) - 1; }
   std::optional<int> Find(int64_t utime) const;
-  // The given camera as it is thought to be: extrinsics, time offset, focal length, centre,
+  // `given` with the estimated extrinsics, time offset, focal length, principal point and
   // distortion.
   CameraModel Calibrated(CameraModel given) const;
 
@@ -88,8 +90,9 @@ struct WindowState {
     return time_offset_s + interval_share * excess_interval_s;
   }
   double OffsetOf(const WindowFrame& frame) const { return OffsetAt(frame.excess_interval_s); }
-  // The body when a row of a frame's image was exposed, that much after the image's time: the
-  // frame's pose, moved on.
+  // The time, in seconds after the frame's state, at which a row was exposed that is exposed
+  // `row_s` after the image's time. PoseAhead and MotionAhead extrapolate the frame's state to such
+  // a time.
   double Ahead(int frame, double row_s) const {
     const WindowFrame& f = frames[frame];
     return OffsetOf(f) - f.time_offset_s + f.stamp_error_s + row_s;
@@ -101,7 +104,8 @@ struct WindowState {
   void Retract(const Eigen::VectorXd& error);
 };
 
-// a (-) b: b.Retract(Difference(a, b)) is a. Both have the same frames.
+// a (-) b: b.Retract(Difference(a, b)) gives a. `a` has at least the frames of b, in the same
+// order.
 Eigen::VectorXd Difference(const WindowState& a, const WindowState& b);
 
 }  // namespace pangea::vio

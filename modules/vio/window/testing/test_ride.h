@@ -1,6 +1,6 @@
 #pragma once
 
-// An estimator on its way through the test world, and what it said beside the truth.
+// Runs an estimator through the test world, and records its results beside the truth.
 
 #include <deque>
 #include <vector>
@@ -32,10 +32,10 @@ struct Ride {
   double started_s = -1;  // since the first image; negative until then
 };
 
-// Rides of 15 s to their end, with a calibration that is slightly off; made once.
+// Ten complete rides of 15 s, with a slightly wrong calibration; computed once.
 const std::deque<Ride>& TenRides();
-// Rides of 6 s like these, in worlds with these options. The IMU's scale factors and axes are off
-// by what the noise says, which the estimator is told.
+// Rides of 6 s with these options. The IMU's scale factors and axes have errors drawn from the
+// sigmas in the noise, which the estimator knows.
 std::deque<Ride> ShortRides(uint64_t count, const VioTestWorldOptions& options);
 
 }  // namespace pangea::vio

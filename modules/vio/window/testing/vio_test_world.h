@@ -1,7 +1,7 @@
 #pragma once
 
-// A hand-held camera with an IMU in a hall with points on its walls: what an ideal tracker and the
-// sensors would hand to the estimator, and the truth.
+// Simulates a hand-held camera with an IMU in a hall with points on its walls: the output of an
+// ideal tracker and of the sensors, and the truth.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -19,7 +19,7 @@
 
 namespace pangea::vio {
 
-// A mean, of NEES by their dimension for instance: then 1 is honest.
+// A running mean, for instance of NEES / dimension, which is 1 for an honest covariance.
 struct Mean {
   double sum = 0;
   int count = 0;
@@ -43,31 +43,33 @@ struct VioTestWorldOptions {
   uint64_t seed = 1;
   double frame_rate_hz = 10;
   double pixel_noise = 0.7;
-  double outlier_share = 0.03;                // of the tracks: they slide off their point
+  double outlier_share = 0.03;                // of the tracks; they drift away from their point
   ImuNoise imu_noise = ExactImuIntrinsics();  // EuRoC's white noise and walk
-  // Above 0: it drives straight ahead through a long hall, hardly shaken, m/s.
+  // If above 0: drives straight ahead through a long hall at this speed, hardly shaken, m/s.
   double drive_mps = 0;
-  double spin_rps = 0;  // above 0: it rotates on the spot, rad/s
-  // The body stands still in between, seconds.
+  double spin_rps = 0;  // if above 0: rotates on the spot, rad/s
+  // The body is stationary between these times, seconds.
   double stationary_begin_s = -10, stationary_end_s = -10;
   double stamp_jitter_s = 0;  // of the images' stamps
-  double readout_s = 0;     // above 0: the rows are exposed one after another, the first one first
-  double shake_radps2 = 0;  // above 0: the hand shakes, with this angular acceleration at most
-  // A crowd or a bus, 2 to 4 m away, has this share of the tracks. It comes, sets off with 1 m/s^2
-  // or is at its speed at once, and is gone at the end.
+  double readout_s = 0;       // if above 0: rolling shutter, first row first
+  double shake_radps2 = 0;    // if above 0: the hand shakes, maximum angular acceleration
+  // A crowd or a bus, 2 to 4 m away, has this share of the tracks. It appears at crowd_comes_s,
+  // moves from crowd_moves_s on (accelerating with 1 m/s^2 if crowd_sets_off, else at once with
+  // crowd_mps), and disappears at crowd_end_s.
   double crowd_share = 0;
   double crowd_mps = 1;
   double crowd_comes_s = 0, crowd_moves_s = 0, crowd_end_s = 0;
   bool crowd_sets_off = true;
-  // Errors of the calibration the estimator is given.
+  // Sigmas of the errors of the calibration that the estimator gets.
   double extrinsics_rotation_sigma = 0;  // rad
   double extrinsics_position_sigma = 0;  // m
   double time_offset_sigma = 0;          // s
-  double focal_sigma = 0;                // of the focal length
-  double centre_sigma = 0;               // of the focal length
-  // The lens's first coefficient, given as 0. Else the estimator knows that the lens has none.
+  double focal_sigma = 0;                // relative to the focal length
+  double centre_sigma = 0;               // relative to the focal length
+  // True first distortion coefficient, which the estimator gets as 0. If it is 0, the estimator
+  // knows that there is no distortion.
   double unknown_distortion = 0;
-  // Errors of the IMU's scale factors and axes, in what the noise says they are.
+  // Errors of the IMU's scale factors and axes, in multiples of the sigmas in imu_noise.
   double imu_intrinsics_sigmas = 1;
 };
 
@@ -77,26 +79,27 @@ class VioTestWorld {
 
   struct Input {
     TrackedFrame frame;
-    int64_t taken_utime = 0;     // its stamp, had it no error
-    std::vector<ImuSample> imu;  // since the previous call, to the first at or after the last row
+    int64_t taken_utime = 0;  // the stamp without its error
+    // since the previous call, up to the first at or after the last row
+    std::vector<ImuSample> imu;
   };
   Input Next();
-  // A tracker drops these.
+  // Ends these tracks, as a tracker would.
   void Drop(std::span<const int32_t> landmark_ids);
 
   const VioTestWorldOptions& options() const { return options_; }
-  CameraModel camera() const { return camera_; }  // as the estimator is given it
+  CameraModel camera() const { return camera_; }  // as the estimator gets it
   const CameraModel& true_intrinsics() const { return true_intrinsics_; }
   const Rigid3& true_T_body_cam() const { return true_T_body_cam_; }
   double true_time_offset_s() const { return true_time_offset_s_; }
-  // The body when an image of the past was taken.
+  // State of the body when a past image was taken.
   ImuState TruthAt(int64_t frame_utime) const;
-  // Along the camera's z axis; nothing for a track that slid off or moves.
+  // Along the camera's z axis, m; empty for a track that drifts off its point or moves.
   std::optional<double> TrueDepth(int32_t landmark_id, int64_t frame_utime) const;
 
  private:
   struct Track {
-    Eigen::Vector3d point;  // of the crowd: before it moved
+    Eigen::Vector3d point;  // for the crowd: its position before it moved
     bool in_crowd = false;
     bool slides = false;
     Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  // pixels per image
@@ -107,16 +110,16 @@ class VioTestWorld {
   ImuSample SampleAt(int64_t utime);
   std::optional<Eigen::Vector2d> SeenFrom(const Rigid3& T_odom_cam,
                                           const Eigen::Vector3d& point) const;
-  // In the image of that time, by the row that meets the point.
+  // The pixel in the image taken at `t`, with the row's own exposure time.
   std::optional<Eigen::Vector2d> Seen(const Eigen::Vector3d& point, double t) const;
   Eigen::Vector3d CrowdMoved(double t) const;
-  // Its tracks come, go on and end.
+  // Begins, continues and ends the crowd's tracks.
   void ObserveCrowd(double t);
   TrackedFrame Observe(int64_t utime);
 
   VioTestWorldOptions options_;
   std::mt19937_64 rng_;
-  std::mt19937_64 crowd_rng_;  // of its own: the world stays as it is
+  std::mt19937_64 crowd_rng_;  // separate, so that the rest of the world does not change
   CameraModel camera_;
   CameraModel true_intrinsics_;
   Rigid3 true_T_body_cam_;
@@ -124,7 +127,7 @@ class VioTestWorld {
   ImuIntrinsics true_imu_intrinsics_;
   Eigen::Vector3d phase_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> points_;
-  std::map<int32_t, Track> tracks_;  // those in sight
+  std::map<int32_t, Track> tracks_;  // visible ones
   std::map<int32_t, Track> all_tracks_;
   int32_t next_id_ = 1;
   int64_t next_frame_utime_ = 1'000'000;

@@ -1,7 +1,7 @@
 #pragma once
 
-// A small window to test on: frames that follow their inertial samples exactly, points that all of
-// them see.
+// A small window for tests: frames that follow their inertial samples exactly, and points that all
+// frames see.
 
 #include <Eigen/Core>
 #include <functional>
@@ -15,26 +15,26 @@ namespace pangea::vio {
 struct WindowTestOptions {
   uint64_t seed = 1;
   int frames = 5;
-  int landmarks = 12;        // landmark i is anchored in frame i % (frames - 1), seen from there on
+  int landmarks = 12;        // landmark i: anchored in frame i % (frames - 1), seen from there on
   double ray_noise = 0;      // sigmas
-  double row_s = 0;          // rows are exposed up to this after the image's time
-  double stamp_sigma_s = 0;  // of the frames' stamps; every second frame's is a variable
+  double row_s = 0;          // rows are exposed up to this long after the image's time
+  double stamp_sigma_s = 0;  // of the stamps; every second frame's error is a variable
   double interval_sigma_s = 0.01;  // of the intervals between images
-  double late_s = 0;               // the time offset has moved by this since the frames came
+  double late_s = 0;               // change of the time offset since the frames were added
 };
 
-// State and landmarks are true; the prior says nothing.
+// State and landmarks are the truth; the prior has no information.
 WindowProblem TestWindow(const WindowTestOptions& options);
 
-// Inertial samples of a lively motion, upright by and large.
+// Inertial samples of a lively motion, roughly upright.
 std::vector<ImuSample> TestSamples(int count, int64_t first_utime, uint64_t seed);
 Preintegration Integrate(std::span<const ImuSample> samples, const ImuNoise& noise,
                          const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias);
 
-// Makes the calibration and all of the first frame known: sigma of each of their errors.
+// Sets a prior with this sigma on the calibration and on the whole state of the first frame.
 void HoldStart(WindowProblem* problem, double sigma);
 
-// Every error of the window at random.
+// A random error of all the window's variables.
 Eigen::VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed);
 
 // The four directions that camera and IMU cannot observe, as columns: a shift along odom's axes,
