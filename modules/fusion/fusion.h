@@ -1,11 +1,11 @@
 #pragma once
 
-// Visual fusion of maps (the paper, section IV.D): candidates of kind inter, one verification
-// result each.
+// Visual fusion of maps (the paper, section IV.D): verifies candidates of kind inter, with one
+// verification result each.
 //
-// In: keyframes of all maps; candidates (query K_c of map c, match K_m of map m). Out: a Constraint
-// between the two bodies with its covariance, or the reason it was refused. Which maps form a
-// group follows from the constraints and is the posegraph's to say: nothing is glued here.
+// Input: keyframes of all maps; candidates (query K_c of map c, match K_m of map m). Output: a
+// Constraint between the two bodies with its covariance, or the reason of its refusal. Maps are not
+// merged here: the pose graph decides from the constraints which maps form a group.
 
 #include "loop_verification/loop_verifier.h"
 

@@ -3,10 +3,10 @@
 // Loops within one map (the paper, section IV.C): candidates of kind intra, one verification result
 // each.
 //
-// In: keyframes of all maps; candidates of which both keyframes are of one map. Out: a Constraint
-// between the two bodies with its covariance, or the reason it was refused. PnP, then bundle
-// adjustment of the windows before both keyframes, as in fusion; besides, the drift the loop would
-// mean must be one that odometry can make over that path.
+// Input: keyframes of all maps; candidates with both keyframes in one map. Output: a Constraint
+// between the two bodies with its covariance, or the reason of its refusal. The steps are those of
+// fusion: PnP, then bundle adjustment of the windows up to both keyframes. In addition, the drift
+// that the loop implies must be possible for odometry over that path (drift_gate.h).
 
 #include "loop_verification/loop_verifier.h"
 

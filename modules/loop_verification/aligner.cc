@@ -8,7 +8,7 @@
 namespace pangea {
 namespace {
 
-// Radians, of each odometry, while guessing.
+// Minimum tilt sigma of each odometry while the first pose is searched, radians.
 constexpr double kGuessTiltFloor = 0.006;
 
 void FillIn(const Verification& verification, Constraint* constraint) {

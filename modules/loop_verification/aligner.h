@@ -1,11 +1,11 @@
 #pragma once
 
-// From a candidate pair of keyframes to a verification result: the geometry that inter_map_ba and
-// fusion share (the paper, section IV.D).
+// Verifies a candidate pair of keyframes: the geometry that inter_map_ba and fusion share (the
+// paper, section IV.D).
 //
-// In: the windows of keyframes up to the match (m) and up to the query (c), and the candidate's
-// matched corners. Out: a Constraint between the two bodies, accepted with its covariance or
-// refused with the reason. The same input gives the same verification result. Not thread safe.
+// Input: the keyframes up to the match (m) and up to the query (c), and the candidate's matched
+// corners. Output: a Constraint between the two bodies, accepted with its covariance or refused
+// with the reason. The same input gives the same result. Not thread safe.
 
 #include <algorithm>
 
@@ -16,12 +16,12 @@ namespace pangea {
 
 class Aligner {
  public:
-  // Keyframes a verification result depends on: that many up to each of the two.
+  // A verification result depends on this many keyframes up to each of the two.
   static constexpr int kNumKeyframes = std::max(kMaxWindowKeyframes, kVisibilityKeyframes);
 
   explicit Aligner(LoopVerificationOptions options) : options_(options) {}
 
-  // kNumKeyframes up to the match and to the query, or fewer where their map begins.
+  // `keyframes`: kNumKeyframes up to the match and up to the query; fewer near the begin of a map.
   Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
                    const LoopVerificationGate& gate, LoopVerificationReport* report = nullptr);
 

@@ -28,7 +28,7 @@ inline Constraint Align(const TestAgent& query_agent, int query, const TestAgent
       candidate, kNoGate, report);
 }
 
-// Whose windows hold what the odometry gave a depth, and nothing else.
+// Options with which windows hold only landmarks with a depth from the odometry.
 inline LoopVerificationOptions OnlyTracked() {
   LoopVerificationOptions options;
   options.window.triangulation.few_landmarks = -1;

@@ -128,7 +128,7 @@ void CandidateProcess::CollectReady() {
   }
 }
 
-// If all rest on others that wait for keyframes, these come first.
+// The first ready candidate that depends on no pending one; none if all do.
 std::deque<CandidateProcess::Ready>::iterator CandidateProcess::NextReady() {
   PendingQueries pending;
   for (const auto& [ids, candidate] : waiting_) {
@@ -149,7 +149,7 @@ bool CandidateProcess::VerifyNext() {
   }
   const auto [query, candidate] = std::move(*next);
   ready_.erase(next);
-  // A verification result of a former run may come after its match.
+  // The journal may deliver the result of a former run after its match.
   if (!verified_.contains(ConstraintId(query, candidate))) {
     const Constraint constraint = verifier_->Verify(query, candidate);
     verified_.insert(constraint.Id());

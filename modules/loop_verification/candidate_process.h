@@ -1,24 +1,25 @@
 #pragma once
 
-// The process around a LoopVerifier: KEYFRAME_* and PLACE_MATCH in, CONSTRAINT out, exactly one a
-// candidate of its kind. A candidate about a keyframe not seen yet waits for it; what is missing is
-// asked for (journal_follower.h). Verification results of this run
-// that the journal lacks (VERDICT_REQUEST) are answered to its owner, the agent_handler, which
-// everyone else asks; of those that are still to be made nothing is said, they will come. Which
-// candidates are redundant depends on the results that they rest on
-// (core/candidates/candidate_order.h) and wait for; any other verification result on the keyframes
-// alone, not on when they came.
+// The process around a LoopVerifier. In: KEYFRAME_* and PLACE_MATCH. Out: CONSTRAINT, exactly one
+// for each candidate of its kind. A candidate waits for its keyframes; missing ones are requested
+// (journal_follower.h). The process answers VERDICT_REQUEST only to the journal's owner, the
+// agent_handler, with results of this run that the journal lacks; all others ask the agent_handler.
+// It does not answer for results that are still to be computed; they will be published. Whether a
+// candidate is redundant depends on earlier results, for which it waits
+// (core/candidates/candidate_order.h). Any other result depends only on the keyframes, not on the
+// order of arrival.
 //
-// A verification result takes long (tens of milliseconds), so live they are made one at a time, in
-// the order in which the candidates became ready but for what they rest on, when no message waits:
-// all that came is known, told as pending and answered for, however far behind the verification
-// results are.
+// A verification takes long (tens of milliseconds). Live, candidates are verified one at a time,
+// when no message waits: in the order in which they became ready, except that results on which
+// another candidate depends come first. So all messages are received, pending candidates are
+// counted in the status, and requests are answered, even if verification is far behind.
 //
-// A checkpoint ends before the first match with a candidate that has no result in the journal.
+// A checkpoint covers the matches before the first one with a candidate that has no result in the
+// journal.
 //
-// Bounds: at most kMaxWaiting candidates wait; beyond that a match is not taken, and asked for
-// again once half of them are verified. The newest kMaxSent verification results are kept to be
-// retransmitted.
+// Bounds: at most kMaxWaiting candidates wait; beyond that a match is not accepted, and is
+// requested again when half of them are verified. The newest kMaxSent results are kept for
+// retransmission.
 
 #include <cstdint>
 #include <deque>
@@ -43,7 +44,7 @@ class CandidateProcess : public Process {
   using MakeVerifier =
       std::function<std::unique_ptr<LoopVerifier>(const std::shared_ptr<RecordStore>& records)>;
 
-  // `records`: for keyframes that come over the bus; may be null.
+  // `records`: stores keyframes that come over the bus; may be null.
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                    const MakeVerifier& make_verifier, const std::shared_ptr<RecordStore>& records,
                    const CheckpointPlace& checkpoint);
@@ -61,9 +62,9 @@ class CandidateProcess : public Process {
   void OnHave(const Have& have);
   void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();
-  using Ready = std::pair<KeyframeId, PlaceCandidate>;  // with its query
+  using Ready = std::pair<KeyframeId, PlaceCandidate>;  // (query, candidate)
   std::deque<Ready>::iterator NextReady();
-  // Whether there may be another.
+  // Returns whether another candidate may be ready.
   bool VerifyNext();
   void PublishStatus(int64_t now_utime);
   size_t num_pending() const { return waiting_.size() + ready_.size(); }
@@ -73,11 +74,11 @@ class CandidateProcess : public Process {
   std::shared_ptr<JournalRecords> records_;
   std::unique_ptr<LoopVerifier> verifier_;
   JournalFollower journal_;
-  // Which wait for keyframes, by (query, match); and which wait for their turn.
+  // Candidates that wait for keyframes, by (query, match); and candidates that wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;
   std::deque<Ready> ready_;
   std::set<int64_t> verified_;   // constraint ids
-  std::deque<Constraint> sent_;  // newest verification results, to repeat
+  std::deque<Constraint> sent_;  // newest results, for retransmission
   int64_t next_status_utime_ = 0;
   int64_t num_accepted_ = 0;
 };

@@ -1,7 +1,7 @@
 #pragma once
 
-// How far one map's odometry may have drifted between two of its keyframes. Generous: a gate
-// against look-alikes at the other end of a hall, not an estimate of drift.
+// Limits the odometry drift between two keyframes of one map. The limits are generous: a gate
+// against look-alikes at the other end of a hall, not an estimate of the drift.
 
 #include <string>
 
@@ -10,10 +10,10 @@
 namespace pangea {
 
 struct DriftGateOptions {
-  double max_drift_m = 1.0;      // however short the path
+  double max_drift_m = 1.0;      // for a path of length 0
   double max_drift_share = 0.1;  // of the path between the keyframes
-  double max_yaw = 0.15;         // radians, however short the path
-  double max_yaw_per_m = 0.01;   // radians a metre of path
+  double max_yaw = 0.15;         // radians, for a path of length 0
+  double max_yaw_per_m = 0.01;   // radians per metre of path
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -25,8 +25,9 @@ struct DriftGateOptions {
   }
 };
 
-// For two keyframes of one map, `path_m` apart along its odometry. What the gate is given says how
-// far the odometry has drifted from the older (m) to the newer (c), which is at `p_odom_c`.
+// For two keyframes of one map, `path_m` apart along its odometry. The gate's argument
+// T_odom_m_odom_c is the drift of the odometry from the older keyframe (m) to the newer one (c),
+// which is at `p_odom_c`.
 LoopVerificationGate MakeDriftGate(const DriftGateOptions& options, double path_m,
                                    const Eigen::Vector3d& p_odom_c);
 

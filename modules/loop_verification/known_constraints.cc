@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-// Sigma of the odometry, of its path, as pair_evidence.h believes it.
+// Sigma of the odometry's position per metre of path; the same as in pair_evidence.cc.
 constexpr double kDriftPerM = 0.02;
 
 double WorstSigma(const Matrix6d& covariance) {
@@ -21,7 +21,7 @@ double WorstSigma(const Matrix6d& covariance) {
   return std::sqrt(solver.eigenvalues().maxCoeff());
 }
 
-// Of two keyframes of one map.
+// Path length between two keyframes of one map, m.
 std::optional<double> PathBetween(const MapId& map, int32_t a, int32_t b,
                                   const SubmapStore& store) {
   return store.PathBetween({map, std::min(a, b)}, {map, std::max(a, b)});

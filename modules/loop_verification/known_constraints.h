@@ -1,19 +1,19 @@
 #pragma once
 
-// What the map knows already of two keyframes' relative pose, and whether another constraint would
-// be worth its verification: measurement selection by information gain (Ila et al., "Information-
-// based compact pose SLAM", TRO 2010).
+// Estimates how well the relative pose of two keyframes is known already, and decides whether
+// another constraint is worth its verification: measurement selection by information gain (Ila et
+// al., "Information-based compact pose SLAM", TRO 2010).
 //
-// Only constraints that a candidate rests on count (core/candidates/candidate_order.h), so that the
-// answer does not depend on which others are there already.
+// Only constraints that precede the candidate in candidate_order.h count, so that the decision does
+// not depend on which others have arrived.
 //
-// Constraints verified nearby reach the two keyframes over a few metres of odometry. Each gives
-// the position to sigma^2 + (drift * path)^2; their information adds up as if they were
-// independent, though they share odometry. A constraint of their median sigma would add
-// 0.5 * log2(1 + I_new / I_known) bits to each coordinate. Where that is little it is redundant.
-// The first constraints between two maps are never redundant: whether the maps are one rests on
-// them. Nor are, within one map, the first within reach: a single one would move the map by
-// whatever it is wrong, and only others show it.
+// Nearby constraints are connected to the two keyframes by a few metres of odometry. Each gives the
+// relative position with the variance sigma^2 + (drift * path)^2; their information is added as if
+// they were independent, although they share odometry. A new constraint with their median sigma
+// would add 0.5 * log2(1 + I_new / I_known) bits to each coordinate. If this gain is small, the
+// candidate is redundant. The first constraints between two maps are never redundant: the decision
+// to merge the maps depends on them. The first nearby constraints within a map are not redundant
+// either: a single wrong one would displace the map, and only others can reveal it.
 
 #include <map>
 #include <utility>
@@ -26,7 +26,7 @@
 namespace pangea {
 
 struct KnownConstraintOptions {
-  double min_gain_bits = 1;   // one bit: the sigma of each coordinate halved
+  double min_gain_bits = 1;   // one bit halves the sigma of each coordinate
   int min_nearby = 10;        // chosen, not measured
   int min_between_maps = 10;  // chosen, not measured; a fusion takes 2 to 4 viewpoints
 
@@ -44,22 +44,21 @@ struct KnownConstraintOptions {
 
 class KnownConstraints {
  public:
-  // Of keyframes that are further away in seq nothing is asked.
+  // Constraints further away in seq, at either end, are not nearby.
   static constexpr int kMaxSeqDistance = 30;
 
   explicit KnownConstraints(const KnownConstraintOptions& options) : options_(options) {}
 
-  // An accepted constraint. A repeat must not come.
+  // Adds an accepted constraint; the caller must not repeat one.
   void Add(const Constraint& constraint);
   void Save(ByteWriter* writer) const;
   void Restore(ByteReader* reader);
   struct Nearby {
     int count = 0;
-    // What a constraint between the two would add to each coordinate; infinite where nothing is
-    // known.
+    // Information that a new constraint would add to each coordinate; infinite if count is 0.
     double gain_bits = 0;
   };
-  // Odometry is `store`'s.
+  // `store`: has the odometry of the maps.
   Nearby NearbyOf(const KeyframeId& query, const KeyframeId& match, const SubmapStore& store) const;
   bool IsRedundant(const KeyframeId& query, const KeyframeId& match,
                    const SubmapStore& store) const;
@@ -68,13 +67,13 @@ class KnownConstraints {
   struct Known {
     int32_t seq_a = 0, seq_b = 0;
     bool query_is_a = false;
-    double sigma_m = 0;  // of the position, its worst direction
+    double sigma_m = 0;  // of the position, in the worst direction
   };
-  // The accepted constraints between the candidate's maps that it rests on.
+  // The accepted constraints between the candidate's maps that precede it (RestsOn).
   std::vector<Known> KnownTo(const KeyframeId& query, const KeyframeId& match) const;
 
   KnownConstraintOptions options_;
-  std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // by seq_a
+  std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // inner key: seq_a
 };
 
 }  // namespace pangea

@@ -249,7 +249,7 @@ PlaceCandidate MakeTestCandidateByDescriptor(const TestAgent& query_agent, int q
 
 std::vector<std::pair<int, int>> PairsThatShareMost(const TestAgent& query_agent,
                                                     const TestAgent& match_agent, int count) {
-  // By room points of equal descriptor: far quicker than matching every pair of images.
+  // Counts common room points of equal descriptor: much faster than matching every pair of images.
   std::vector<std::tuple<int, int, int>> pairs;
   const auto seen = [](const TestAgent& agent, int k) {
     std::set<Descriptor> descriptors;

@@ -81,7 +81,8 @@ Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& ca
     if (!path_m) {
       return RefusedConstraint(query, candidate, "no odometry leads from one to the other");
     }
-    // Of another map they may still be on their way, and the result must not hang on that.
+    // Only within one map: of another map they may not have arrived, and the result must not depend
+    // on that.
     keyframes.after_m = store_.WindowBehind(candidate.match, kKeyframesBehind);
     gate = MakeDriftGate(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
   }

@@ -1,10 +1,9 @@
 #pragma once
 
-// The core that inter_map_ba and fusion build on: keyframes in, one verification result a candidate
-// out. What the map knows already is refused as redundant (known_constraints.h). Any other
-// verification result depends on the two keyframes, those just before each and, within one
-// map, the odometry edges between them; so it is the same whatever the order of arrival. Not thread
-// safe.
+// The core of inter_map_ba and fusion: keyframes in, one verification result per candidate out. A
+// candidate that would add little information is refused as redundant (known_constraints.h). Any
+// other result depends only on the two keyframes, on their neighbours and, within one map, on the
+// odometry between them; so it does not depend on the order of arrival. Not thread safe.
 
 #include <memory>
 #include <string>
@@ -20,7 +19,7 @@ namespace pangea {
 
 struct LoopVerifierOptions {
   LoopVerificationOptions alignment;
-  // For a candidate within one map.
+  // Only for candidates within one map.
   DriftGateOptions drift;
   KnownConstraintOptions redundancy;
 
@@ -35,7 +34,7 @@ struct LoopVerifierOptions {
 
 class LoopVerifier {
  public:
-  // `records`: for keyframes (submap_store.h).
+  // `records`: stores keyframes (submap_store.h); null: they stay in memory.
   explicit LoopVerifier(const LoopVerifierOptions& options,
                         std::shared_ptr<RecordStore> records = nullptr)
       : drift_(options.drift),
@@ -44,26 +43,26 @@ class LoopVerifier {
         store_({}, std::move(records)) {}
   virtual ~LoopVerifier() = default;
 
-  // In any order; a repeat changes nothing.
+  // Keyframes may come in any order; a repeat is ignored.
   void Add(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
-  // Nobody has these any more: nothing waits for them.
+  // These keyframes are lost for good: candidates no longer wait for them.
   void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
     store_.NoteLost(map, from_seq, to_seq);
   }
-  // A verification result of a former run.
+  // Adds a verification result of a former run.
   void NoteVerified(const Constraint& result);
-  // Whether every keyframe the verification result depends on is there.
+  // Whether all keyframes that the verification needs are here, or lost.
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
-  // Only when ready. Keyframes of one map pass the drift gate too; two maps' odom frames lie
-  // anyhow to each other.
+  // Call only if Ready. Two keyframes of one map must also pass the drift gate.
   virtual Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                             LoopVerificationReport* report = nullptr);
 
-  // Its record of a keyframe.
+  // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
     return SubmapStore::RecordOf(keyframe, {});
   }
-  // What it was given. Restored: false, and nothing has changed, if these are not its bytes.
+  // Saves the keyframes and known constraints. Restore returns false, and changes nothing, if the
+  // bytes are not those of a LoopVerifier.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
 
@@ -79,7 +78,7 @@ class LoopVerifier {
   SubmapStore store_;
 };
 
-// A verification result without an alignment.
+// A refused constraint without a pose.
 Constraint RefusedConstraint(const KeyframeId& query, const PlaceCandidate& candidate,
                              const std::string& reason);
 

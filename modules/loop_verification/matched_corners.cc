@@ -17,11 +17,11 @@ constexpr double kMaxLineSigmas = 3;  // from the epipolar line
 constexpr double kMaxRayChi2 = 9.2;   // 99 % of 2 degrees of freedom
 constexpr double kLeastBaseline_m = 0.02;
 constexpr double kNearest_m = 0.2, kFarthest_m = 60;
-// Verification takes the errors of landmarks as independent; an error that all have in common is a
-// wrong scale.
-constexpr double kMaxOdometrySigma = 0.05;   // a share of the depth
+// Verification treats the errors of landmarks as independent; a common error is an error of scale,
+// so it must be small.
+constexpr double kMaxOdometrySigma = 0.05;   // relative to the depth
 constexpr double kMaxNeighbourRatio = 0.85;  // best to second-best distance
-constexpr size_t kMaxAdded = 250;            // what a verification takes grows with each
+constexpr size_t kMaxAdded = 250;            // each adds to the time of a verification
 constexpr int kNotOfTheWindow = -1;
 
 // Another keyframe that may see the corners of the newest one, the host.
@@ -30,14 +30,14 @@ struct Neighbour {
   const KeyframeView* view = nullptr;
   Rigid3 T_cam_host;
   double sigma_m = 0, sigma_rad = 0;  // of the odometry between the two
-  // Of those that are no landmark yet: index, ray, and its sigma.
+  // Corners that are no landmark yet: index, ray, and its sigma.
   std::vector<int> corners;
   std::vector<float> x, y;
   std::vector<double> sigmas;
   double largest_sigma = 0;
 };
 
-// The host's corner as a neighbour sees it.
+// A neighbour's observation of a corner of the host.
 struct Sight {
   const Neighbour* neighbour = nullptr;
   int corner = 0;
@@ -47,7 +47,7 @@ struct Sight {
 
 struct InverseDepth {
   double value = 0, sigma = 0;  // 1/m
-  double odometry_sigma = 0;    // the part of it that all corners of the host have in common
+  double odometry_sigma = 0;    // the part common to all corners of the host
 };
 
 Eigen::Vector3d Ray(const KeyframeView& view, int corner) { return view.ray(corner).homogeneous(); }
@@ -84,7 +84,7 @@ class Triangulation {
     return sights;
   }
 
-  // Gauss-Newton over the inverse depth alone; nothing if a ray contradicts it.
+  // Gauss-Newton over the inverse depth alone; empty if a ray contradicts the result.
   std::optional<InverseDepth> Solve(int corner, const std::vector<Sight>& sights) const {
     constexpr int kIterations = 10;
     constexpr double kStart = 0.5, kEnough = 1e-6;  // 1/m
@@ -120,7 +120,7 @@ class Triangulation {
   }
 
  private:
-  // Of the odometry's edges one after the other, the same in all directions.
+  // Accumulated sigmas of successive odometry edges, isotropic.
   struct OdometryError {
     double var_m = 0, var_rad = 0;
     void Add(const OdometryEdge& edge) {
@@ -152,8 +152,8 @@ class Triangulation {
     }
   }
 
-  // Positions in the neighbour's lists, ascending, of corners near the epipolar line. A
-  // single-precision distance throws out most.
+  // Positions in the neighbour's lists, ascending, of corners near the epipolar line. Most are
+  // rejected by a single-precision distance.
   static std::vector<int> NearLine(const Eigen::Vector3d& line, double host_sigma,
                                    const Neighbour& neighbour) {
     constexpr double kSlack = 1.01, kSinglePrecision = 1e-5;
@@ -182,7 +182,7 @@ class Triangulation {
     return near;
   }
 
-  // The nearest descriptor near the epipolar line, if no other there is as near.
+  // The corner near the epipolar line with the nearest descriptor, if it passes the ratio test.
   std::optional<Sight> Find(int host_corner, double host_sigma, const Neighbour& neighbour) const {
     const Eigen::Vector3d line =
         neighbour.T_cam_host.t.cross(neighbour.T_cam_host.q * Ray(host_, host_corner));
@@ -204,7 +204,7 @@ class Triangulation {
                  sigma};
   }
 
-  // In sigmas, and its derivative by the inverse depth.
+  // The residual in sigmas, and its derivative with respect to the inverse depth.
   static std::pair<Eigen::Vector2d, Eigen::Vector2d> Residual(const Sight& sight,
                                                               const Eigen::Vector3d& host_ray,
                                                               double inverse_depth) {
@@ -215,7 +215,7 @@ class Triangulation {
             (T.t.head<2>() - projected * T.t.z()) / (p.z() * sight.sigma)};
   }
 
-  // Only the neighbours' own pixel noise averages out over them.
+  // Only the neighbours' own pixel noise is independent; the rest does not average out.
   void SetSigmas(int host_corner, const std::vector<Sight>& sights, InverseDepth* depth) const {
     double information = 0, own = 0, host = 0, odometry = 0;
     for (const Sight& sight : sights) {

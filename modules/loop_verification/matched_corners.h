@@ -1,18 +1,19 @@
 #pragma once
 
-// Landmarks of corners that no track gave a depth: matched between the newest keyframe of a window
-// and its neighbours along the epipolar lines of the odometry, and triangulated from its poses.
+// Adds landmarks for corners without a depth: matches them between the newest keyframe of a window
+// and its neighbours along the odometry's epipolar lines, and triangulates them with the odometry's
+// poses.
 //
-// An odometry gives depths to corners that it tracked long enough; on real phones that is one
-// landmark in four (docs/decisions/real_revisits.md). What the keyframes describe beside those
-// repeats in its neighbours all the same.
+// The odometry gives a depth only to corners that it tracked long enough; on real phones that is
+// one landmark in four (docs/decisions/real_revisits.md). Many of the other corners also repeat in
+// neighbouring keyframes.
 
 #include "loop_verification/window.h"
 
 namespace pangea {
 
-// Nothing is added to a window with more than few_landmarks. `after`: keyframes of the map behind
-// the newest one, ascending.
+// Adds nothing to a window with more than few_landmarks. `after`: the keyframes that follow the
+// window's newest one, ascending.
 void TriangulateMatchedCorners(const TriangulationOptions& options, const KeyframeWindow& after,
                                Window* window);
 

@@ -8,15 +8,15 @@ namespace pangea {
 namespace {
 
 constexpr int kPnpSamples = 300;
-// Of a match, 2 degrees of freedom: 4 sigma, wrong ones lie far outside.
+// Limit for an inlier, 2 degrees of freedom: 4 sigma; wrong matches lie far outside.
 constexpr double kPnpMaxChi2 = 16.0;
 
-// One pixel sigma in radians for this observation, about: to turn a tilt into pixel sigmas.
+// Approximate pixel sigmas per radian for this observation, to convert a tilt.
 double SigmaPerRadian(const PointObservation& observation) {
   return std::sqrt(std::abs(observation.sqrt_info.determinant()));
 }
 
-// Squared distance in sigmas of a ray from the plane through the baseline and the other ray.
+// Squared distance, in sigmas, of a ray from the plane of the baseline and the other ray.
 double EpipolarChi2(const RayPair& pair, const Rigid3& T_m_c, const Eigen::Vector3d& baseline_m) {
   const Eigen::Vector3d ray_c_m = T_m_c.q * pair.ray_c;
   const double triple = ray_c_m.dot(baseline_m.cross(pair.ray_m));
@@ -32,8 +32,8 @@ struct Problem {
   const Eigen::Vector3d& origin_m;
   std::vector<Eigen::Matrix3d> R_cam_w = {};  // by observation
 
-  // A truncated quadratic (MSAC). A ray pair constrains one dimension of two: half a vote. Or any
-  // score up to `best`, once more than that is out of reach.
+  // Truncated quadratic score (MSAC). A ray pair constrains one dimension of two, so it counts
+  // half. Returns some score up to `best` as soon as `best` cannot be exceeded.
   double Score(const Rigid3& T_m_c, const std::vector<double>& extra_var, double best) const {
     constexpr double kRounding = 1e-6;
     const Eigen::Matrix3d R_m_c = T_m_c.R();
@@ -62,8 +62,8 @@ struct Problem {
   }
 };
 
-// X from two observations of one direction. The camera's rays in its window's axes are the rays in
-// a gravity-aligned frame g at its centre.
+// Poses X = T_m_c from two observations of one direction. The window's axes are gravity-aligned, so
+// the camera's rays in these axes are rays in the frame g at its centre.
 std::vector<Rigid3> Hypotheses(const PointObservation& a, const PointObservation& b) {
   const auto ray_g = [](const PointObservation& o) {
     return Eigen::Vector3d(o.T_cam_w.q.conjugate() * Eigen::Vector3d(o.ray.x(), o.ray.y(), 1.0));
@@ -83,14 +83,14 @@ std::vector<Rigid3> Hypotheses(const PointObservation& a, const PointObservation
 std::vector<Rigid3> SolveUprightTwoPoint(const Eigen::Vector3d& p1_w, const Eigen::Vector3d& p2_w,
                                          const Eigen::Vector3d& ray1_g,
                                          const Eigen::Vector3d& ray2_g) {
-  // D = p1 - p2 = Rz (l1 d1 - l2 d2). Its z component and its length do not know the yaw:
+  // D = p1 - p2 = Rz (l1 d1 - l2 d2). Its z component and its length do not depend on the yaw:
   //   l1 d1z - l2 d2z = Dz,   |l1 d1 - l2 d2|^2 = |D|^2.
   const Eigen::Vector3d d1 = ray1_g.normalized();
   const Eigen::Vector3d d2 = ray2_g.normalized();
   const Eigen::Vector3d D = p1_w - p2_w;
   const Eigen::Vector2d a(d1.z(), -d2.z());
   if (a.squaredNorm() < 1e-6 || D.head<2>().squaredNorm() < 1e-8) {
-    return {};  // both rays level, or one point above the other: yaw is not seen
+    return {};  // both rays level, or one point above the other: yaw is not observable
   }
   // l = l0 + s e with a . e = 0: a quadratic in s.
   const Eigen::Vector2d l0 = a * (D.z() / a.squaredNorm());
@@ -104,7 +104,7 @@ std::vector<Rigid3> SolveUprightTwoPoint(const Eigen::Vector3d& p1_w, const Eige
   if (qa < 1e-12 || discriminant < -0.05 * qb * qb) {
     return {};
   }
-  discriminant = std::max(discriminant, 0.0);  // noise pushes a double root off the axis
+  discriminant = std::max(discriminant, 0.0);  // noise can make a double root complex
   std::vector<Rigid3> poses;
   for (const double sign : {-1.0, 1.0}) {
     const double s = (-qb + sign * std::sqrt(discriminant)) / qa;
@@ -159,7 +159,8 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
     return std::nullopt;
   }
 
-  // All six degrees of freedom on the inliers, twice: the first round still forgives the tilt.
+  // Refine all six degrees of freedom on the inliers, twice: the first inlier set still allows for
+  // the tilt.
   UprightPnpResult result{{best, Matrix6d::Identity()}, problem.Inliers(best, tilt_var)};
   for (int round = 0; round < 2; ++round) {
     std::vector<PointObservation> inliers;

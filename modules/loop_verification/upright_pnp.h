@@ -1,10 +1,10 @@
 #pragma once
 
-// The alignment of two gravity-aligned windows from matched corners, by RANSAC over the smallest
-// sample that fixes it: with roll and pitch known, two points give yaw and translation (the idea of
-// Kukelova et al., "Closed-form solutions to minimal absolute pose problems with known vertical
-// direction", ACCV 2010). Both directions vote: m's points in c's cameras and c's points in m's;
-// matches without a depth vote by the epipolar constraint. Seeded, so the same in every run.
+// Aligns two gravity-aligned windows by matched corners, with RANSAC over minimal samples: with
+// roll and pitch known, two points give yaw and translation (the idea of Kukelova et al.,
+// "Closed-form solutions to minimal absolute pose problems with known vertical direction", ACCV
+// 2010). Observations of both directions are scored: m's points in c's cameras and c's points in
+// m's; matches without a depth are scored by the epipolar constraint. Seeded, so reproducible.
 
 #include <cstdint>
 #include <optional>
@@ -14,18 +14,19 @@
 
 namespace pangea {
 
-// Poses T_w_cam_yawed such that two points p_w lie on two rays of a camera whose roll and pitch are
-// known: rays are given in a gravity-aligned frame g at the camera centre, result p_w = Rz(yaw) p_g
-// + t. Up to two.
+// Returns up to two poses with which two points p_w lie on two rays of a camera with known roll and
+// pitch. The rays are in a gravity-aligned frame g at the camera centre; a pose means p_w = Rz(yaw)
+// p_g + t.
 std::vector<Rigid3> SolveUprightTwoPoint(const Eigen::Vector3d& p1_w, const Eigen::Vector3d& p2_w,
                                          const Eigen::Vector3d& ray1_g,
                                          const Eigen::Vector3d& ray2_g);
 
-// Two matched corners of the newest keyframes without a depth: unit rays in the window frames.
+// A match without a depth between corners of the two newest keyframes: unit rays in the window
+// frames.
 struct RayPair {
   Eigen::Vector3d ray_m = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d ray_c = Eigen::Vector3d::UnitZ();
-  double sigma = 0;  // radians, of both together
+  double sigma = 0;  // radians, of both rays combined
 };
 
 struct UprightPnpResult {
@@ -33,8 +34,9 @@ struct UprightPnpResult {
   std::vector<int> inliers;  // indices into the observations, ascending
 };
 
-// `origin_c`, `origin_m`: the newest cameras' centres in their windows, where the ray pairs begin.
-// `tilt_sigma`: radians, of roll and pitch between the windows.
+// `origin_c`, `origin_m`: centres of the newest cameras in their window frames, origins of the ray
+// pairs. `tilt_sigma`: sigma of roll and pitch between the windows, radians. Empty if no pose is
+// found.
 std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservation>& observations,
                                                 const std::vector<RayPair>& ray_pairs,
                                                 const Eigen::Vector3d& origin_c,

@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-// Share of the median depth that the camera moved, for no more keyframes.
+// Baseline, relative to the median depth, at which kWindowKeyframes keyframes suffice.
 constexpr double kMinBaseline = 0.25;
 
 struct Estimate {
@@ -22,7 +22,7 @@ struct Estimate {
   double relative() const { return sigma / inverse_depth; }
 };
 
-// Metres; nothing without map points.
+// Metres; empty without map points.
 std::optional<double> MedianDepth(const Keyframe& keyframe) {
   std::vector<double> depths;
   for (const MapPoint& point : keyframe.points) {
@@ -31,9 +31,9 @@ std::optional<double> MedianDepth(const Keyframe& keyframe) {
   return depths.empty() ? std::nullopt : std::optional(Median(std::move(depths)));
 }
 
-// By landmark, ascending; points without a landmark stand alone, behind the others. Of a landmark
-// the newest depth, which rests on most observations. (Not the one that claims to be the most
-// certain: sigma over inverse depth favours depths whose error makes them near.)
+// Depths by landmark id, ascending; points without a landmark come last, unmerged. A landmark gets
+// its newest depth, which uses most observations. (Not the one with the smallest relative sigma:
+// that favours depths that are too small by error.)
 std::vector<std::pair<int32_t, Estimate>> DepthsOf(const Window& window) {
   std::map<int32_t, Estimate> newest;
   std::vector<std::pair<int32_t, Estimate>> alone;
@@ -59,7 +59,7 @@ std::vector<std::pair<int32_t, Estimate>> DepthsOf(const Window& window) {
   return depths;
 }
 
-// With every corner that is this landmark.
+// Adds a landmark with all its corners.
 void AddLandmark(int32_t id, const Estimate& estimate, Window* window) {
   WindowLandmark landmark =
       MakeWindowLandmark(*window, id, estimate.host, estimate.inverse_depth, estimate.sigma);

@@ -1,12 +1,13 @@
 #pragma once
 
-// A local window (the paper's vKF and vMP, section IV.D): a keyframe, those before it, and the map
-// points they hold, merged over the landmark they observe.
+// A local window (the paper's vKF and vMP, section IV.D): a keyframe, the ones before it, and their
+// map points; map points of the same landmark are merged.
 //
-// Frame `w` of a window: gravity-aligned like the map's odom, its origin at the newest keyframe's
-// body. Near origins keep rotations and translations of an alignment well separated.
+// The frame `w` of a window has the axes of the map's odom frame, and its origin at the newest
+// keyframe's body. With near origins, rotation and translation of an alignment are nearly
+// uncorrelated.
 //
-// The alignment X = T_m_c takes window frame c (the query's) to window frame m (the match's).
+// The alignment X = T_m_c maps window frame c (the query's) to window frame m (the match's).
 
 #include <Eigen/Core>
 #include <vector>
@@ -15,16 +16,16 @@
 
 namespace pangea {
 
-// At least: the keyframe and those before it (the paper's M). Of a camera that turns more than it
-// moves, as many more as it takes to see depths.
+// Minimum number of keyframes in a window (the paper's M). If the camera rotates more than it
+// moves, more are taken, until the baseline suffices for depths or the maximum is reached.
 inline constexpr int kWindowKeyframes = 5;
 inline constexpr int kMaxWindowKeyframes = 10;
-// Inverse depths less certain than this share of themselves are no map points.
+// Map points with a larger relative sigma of the inverse depth are ignored.
 inline constexpr double kMaxRelativeDepthSigma = 0.4;
 
-// Of corners that no track gave a depth.
+// For corners without a depth from the odometry (matched_corners.h).
 struct TriangulationOptions {
-  int few_landmarks = 150;  // of a window; with more, none are added
+  int few_landmarks = 150;  // a window with more landmarks gets none added
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -49,13 +50,14 @@ struct CornerRef {
 
 struct WindowLandmark {
   int32_t id = kNoLandmark;
-  CornerRef host;            // where its depth is best known
+  CornerRef host;            // the corner whose depth is used
   double inverse_depth = 0;  // 1/m, host camera's z axis
   double inverse_depth_sigma = 0;
   Eigen::Vector3d p_w = Eigen::Vector3d::Zero();
-  // What one sigma of inverse depth moves p_w by, first order.
+  // Displacement of p_w by one sigma of the inverse depth, first order.
   Eigen::Vector3d depth_sigma_w = Eigen::Vector3d::Zero();
-  // Every corner that is this landmark, ascending, host included; one or more in a frame (octaves).
+  // All corners of this landmark, ascending, including the host; a frame may have several
+  // (octaves).
   std::vector<CornerRef> observations;
 };
 
@@ -74,25 +76,25 @@ struct Window {
   }
 };
 
-// Of keyframes up to one, the last that make its window.
+// The last of `frames`: as many as the window of the newest one needs.
 KeyframeWindow LastOfWindow(const KeyframeWindow& frames);
 
-// Without its observations.
+// Makes a landmark without observations.
 WindowLandmark MakeWindowLandmark(const Window& window, int32_t id, const CornerRef& host,
                                   double inverse_depth, double inverse_depth_sigma);
 
-// `after`: keyframes of the map behind the newest one, which only triangulate its corners.
+// `after`: the keyframes that follow the newest one; they are used only to triangulate its corners.
 Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
                   const KeyframeWindow& after = {});
 
-// Forward: a point of m in a camera of c. Reverse: a point of c in a camera of m.
+// Forward: a point of m observed by a camera of c. Reverse: a point of c observed by a camera of m.
 enum class Direction { kForward, kReverse };
 inline constexpr Direction kBothDirections[] = {Direction::kForward, Direction::kReverse};
 
 struct WindowPair {
-  Window m, c;  // up to the candidate's match; up to the query
+  Window m, c;  // m: up to the candidate's match; c: up to the query
 
-  // Whose point it is, and whose camera sees it.
+  // The window that holds the point, and the window whose camera observes it.
   const Window& Holder(Direction direction) const {
     return direction == Direction::kForward ? m : c;
   }

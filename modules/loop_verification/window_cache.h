@@ -1,7 +1,7 @@
 #pragma once
 
-// Windows made last: neighbouring candidates share them, and the steps of one ask twice. A window
-// depends on nothing but its keyframes and the options. Not thread safe.
+// Caches the latest windows: neighbouring candidates share windows, and the steps of one candidate
+// need the same one twice. A window depends only on its keyframes and the options. Not thread safe.
 
 #include <cstddef>
 #include <memory>
@@ -14,7 +14,7 @@ namespace pangea {
 
 class WindowCache {
  public:
-  // As MakeWindow, always with the same options.
+  // Like MakeWindow; all calls must have the same options.
   Window Make(const KeyframeWindow& frames, const WindowOptions& options,
               const KeyframeWindow& after = {}) {
     const std::pair key(frames, after);
@@ -29,7 +29,7 @@ class WindowCache {
  private:
   static constexpr size_t kMaxWindows = 64;  // some 50 kB each
 
-  // By the views themselves, which an entry keeps alive.
+  // Keyed by the keyframe views; an entry keeps them alive.
   RecentCache<std::pair<KeyframeWindow, KeyframeWindow>, Window> windows_{kMaxWindows};
 };
 

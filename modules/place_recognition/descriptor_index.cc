@@ -49,8 +49,8 @@ DescriptorIndex::DescriptorIndex() {
 int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   const int keyframe = size();
   num_corners_.push_back(static_cast<int>(corners.size()));
-  // First all words, then all lists: these lie far apart, and the processor fetches several at
-  // once.
+  // First all words, then all lists: the lists are far apart in memory, and the processor fetches
+  // several at once.
   std::vector<std::pair<uint32_t, uint32_t>> hashes(corners.size());
   for (Table& table : tables_) {
     std::ranges::transform(corners, hashes.begin(), [&table](const Corner& corner) {
@@ -91,8 +91,8 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) con
     words[i] = tables_[i % kTables].Word(corners[i / kTables].descriptor);
   }
   std::vector<PostingLists::PackedList> lists(words.size());
-  // Step by step, each some words behind the one before: what it reads lies far apart in memory and
-  // is fetched meanwhile.
+  // A pipeline: each step works some words behind the previous step, so that the memory it reads
+  // has been prefetched.
   constexpr size_t kStep = 16;
   for (size_t i = 0; i < words.size() + 3 * kStep; ++i) {
     const auto step = [&](size_t behind, const auto& take) {
@@ -109,7 +109,7 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) con
     step(3 * kStep, [&](size_t at, const Table& table) {
       const size_t corner = at / kTables;
       const uint32_t signature = table.Signature(corners[corner].descriptor);
-      // Which corner it is rotates the sample.
+      // The corner's index selects the phase of the sample.
       table.postings.Sample(words[at], lists[at], kMaxPostingsPerWord, corner,
                             [&](int32_t keyframe, uint32_t posted) {
                               visit(corner, keyframe, std::popcount(posted ^ signature));

@@ -15,17 +15,17 @@ namespace {
 using Pairs = std::vector<std::pair<CornerRay, CornerRay>>;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
-// Gravity's own error between the two odom frames, radians.
+// Sigma of the tilt between the two gravity-aligned odom frames, radians.
 constexpr double kGravitySigma = 0.01;
-// Of RANSAC; the confidence that an outlier-free sample was drawn.
+// RANSAC: number of iterations, and confidence that an outlier-free sample was drawn.
 constexpr int kMaxIterations = 300;
 constexpr double kConfidence = 0.999;
-// log10 of how many sets of unrelated matches would be expected to pass: at most.
+// Limit on log10 of the expected number of false alarms (sets of unrelated matches that pass).
 constexpr double kMaxLog10FalseAlarms = -2.0;
 constexpr int kSampleSize = 3;
 constexpr int kRefinedDof = 5;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Below this parallax (in sigmas) the sign of a depth is noise.
+// Below this parallax, in sigmas, noise decides the sign of a depth.
 constexpr double kParallaxSigmas = 6.0;
 
 // The epipolar plane's normal of a pair as a function of yaw psi, with x = tan(psi / 2):
@@ -42,7 +42,7 @@ Normal MakeNormal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return {{constant + cosine, 2 * sine, constant - cosine}};
 }
 
-// Coefficients from x^0 up, and as many as are used.
+// Coefficients from x^0 upwards, and the degree.
 struct Polynomial {
   static constexpr int kMaxDegree = 4;
   std::array<double, kMaxDegree + 1> coefficients{};
@@ -64,14 +64,14 @@ struct Polynomial {
   }
 };
 
-// Ascending.
+// In ascending order.
 struct Roots {
   std::array<double, Polynomial::kMaxDegree> x{};
   int count = 0;
 };
 
 // det[n1 n2 n3] (1 + x^2)^3 has degree 6 and, as at x = i all three normals are perpendicular to
-// (1, i, 0), the factor 1 + x^2; what is left is a quartic.
+// (1, i, 0), the factor 1 + x^2; the quotient is a quartic.
 Polynomial YawPolynomial(const std::array<Normal, kSampleSize>& normals) {
   std::array<Eigen::Vector3d, 5> cross;
   cross.fill(Eigen::Vector3d::Zero());
@@ -93,7 +93,7 @@ Polynomial YawPolynomial(const std::array<Normal, kSampleSize>& normals) {
   return quartic;
 }
 
-// The root between two places of opposite sign: Newton's method, kept inside by bisection.
+// The root between two points of opposite sign: Newton's method, safeguarded by bisection.
 double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, double low,
                    double high) {
   constexpr int kMaxSteps = 60;
@@ -115,7 +115,7 @@ double RootBetween(const Polynomial& polynomial, const Polynomial& derivative, d
   return x;
 }
 
-// Those in [-1, 1], each between two roots of the derivative.
+// Roots in [-1, 1]; each lies between two roots of the derivative.
 Roots RootsWithinOne(const Polynomial& polynomial) {
   Roots roots;
   if (polynomial.degree < 1) {
@@ -137,8 +137,8 @@ Roots RootsWithinOne(const Polynomial& polynomial) {
   return roots;
 }
 
-// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees). Those beyond 1 are the
-// inverse roots of the reversed polynomial: no search begins far from its root.
+// Real roots in [-kLargestRoot, kLargestRoot] (yaw up to 179.9 degrees). Roots beyond 1 are the
+// inverses of the reversed polynomial's roots, so that every search interval is small.
 Roots RealRoots(const Polynomial& polynomial) {
   constexpr double kLargestRoot = 1e3;
   Polynomial reversed = polynomial;
@@ -165,7 +165,7 @@ Roots RealRoots(const Polynomial& polynomial) {
   return roots;
 }
 
-// Perpendicular to all three normals: the longest of their cross products.
+// The translation is perpendicular to all three normals: the longest of their cross products.
 Eigen::Vector3d Translation(const std::array<Normal, kSampleSize>& normals, double x) {
   Eigen::Vector3d longest = Eigen::Vector3d::Zero();
   for (int i = 0; i < kSampleSize; ++i) {
@@ -177,8 +177,8 @@ Eigen::Vector3d Translation(const std::array<Normal, kSampleSize>& normals, doub
   return longest.isZero(0) ? Eigen::Vector3d::UnitX() : Eigen::Vector3d(longest.normalized());
 }
 
-// Of e = b . (t x w), with w = R a: a's noise is rotated by (b x t) and b's by (t x w), across the
-// rays.
+// Variance of e = b . (t x w), with w = R a: de = (b x t) . dw + (t x w) . db, with noise dw, db
+// perpendicular to the rays.
 double SampsonVariance(const Eigen::Vector3d& w, double sigma_a, const CornerRay& b,
                        const Eigen::Vector3d& t) {
   const double variance = sigma_a * sigma_a * w.cross(b.direction.cross(t)).squaredNorm() +
@@ -196,7 +196,7 @@ std::vector<int> Inliers(const EpipolarModel& model, const Pairs& pairs, double 
   return inliers;
 }
 
-// How many, as long as they may still be more than `most`.
+// Counts inliers; stops early once the count cannot exceed `most`.
 size_t CountInliers(const EpipolarModel& model, const Pairs& pairs, double max_residual,
                     size_t most) {
   size_t count = 0;
@@ -206,7 +206,7 @@ size_t CountInliers(const EpipolarModel& model, const Pairs& pairs, double max_r
   return count;
 }
 
-// On the Sampson residuals of `inliers`.
+// One Gauss-Newton step on the Sampson residuals of `inliers`.
 void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, EpipolarModel* model) {
   EpipolarStep step(model->t_b_a, 1);
   const Eigen::Matrix3d R = model->R_b_a.toRotationMatrix();
@@ -215,7 +215,7 @@ void RefineStep(const Pairs& pairs, const std::vector<int>& inliers, EpipolarMod
     const Eigen::Vector3d w = R * a.direction;
     step.Add(w, b.direction, 1, 1 / SampsonVariance(w, a.sigma, b, model->t_b_a));
   }
-  // The gravity prior: the part of the rotation that is no yaw.
+  // Gravity prior on the part of the rotation that is not yaw.
   const Eigen::Vector3d tilt = LogSo3(YawRotation(-YawOf(model->R_b_a)) * model->R_b_a);
   for (int axis = 0; axis < 2; ++axis) {
     step.H(axis, axis) += 1.0 / (kGravitySigma * kGravitySigma);
@@ -236,7 +236,7 @@ EpipolarModel Refine(const Pairs& pairs, EpipolarModel model) {
   return model;
 }
 
-// How often wrongly paired corners of these keyframes obey the model.
+// Probability that wrongly paired corners of these keyframes fit the model.
 double ChanceOfInlier(const EpipolarModel& model, const Pairs& pairs, double max_residual) {
   const int n = static_cast<int>(pairs.size());
   int hits = 0;
@@ -250,7 +250,7 @@ double ChanceOfInlier(const EpipolarModel& model, const Pairs& pairs, double max
   return (hits + 1.0) / (trials + 2.0);
 }
 
-// log10 of P(at least k of n), each with chance p. A double would underflow.
+// log10 of P(at least k of n), each with probability p. P itself would underflow.
 double Log10BinomialTail(int n, int k, double p) {
   return k <= 0 ? 0
                 : static_cast<double>(std::log10(boost::math::ibeta<long double>(k, n - k + 1, p)));
@@ -322,7 +322,7 @@ EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed) {
     return best;
   }
   std::mt19937_64 rng(seed);
-  // A hypothesis still carries gravity's error: counted generously, then refined.
+  // A hypothesis still contains the error of gravity: count with a wider limit, then refine.
   const double generous = 2.0 * kMaxEpipolarResidual;
   size_t most = 0;
   int iterations = kMaxIterations;
@@ -346,7 +346,7 @@ EpipolarResult CheckEpipolar(const Pairs& pairs, uint64_t seed) {
   if (count < kMinEpipolarInliers) {
     return best;
   }
-  // The refined model's own degrees of freedom prove nothing.
+  // Subtract the pairs that the model's own degrees of freedom can always fit.
   const double chance = ChanceOfInlier(best.model, pairs, kMaxEpipolarResidual);
   best.log10_false_alarms = std::log10(static_cast<double>(kMaxIterations)) +
                             Log10BinomialTail(n - kRefinedDof, count - kRefinedDof, chance);

@@ -1,16 +1,16 @@
 #pragma once
 
-// Do matched corners of two keyframes obey one relative pose?
+// Checks whether matched corners of two keyframes agree with one relative pose.
 //
 // Both cameras know gravity, so the relative rotation of their odom frames is a yaw and three
-// correspondences fix an essential matrix (Fraundorfer et al., IROS 2010): far fewer samples than
-// with five, and far fewer chance agreements. What survives is refined in all five degrees of
-// freedom, with the gravity known to a prior sigma only.
+// correspondences fix an essential matrix (Fraundorfer et al., IROS 2010): far fewer RANSAC samples
+// than with five, and far fewer chance agreements. The best models are refined in all five degrees
+// of freedom, with a prior on gravity.
 //
-// How many inliers are enough follows from the matches themselves (a contrario, Moisan & Stival,
-// IJCV 2004): the chance that unrelated matches agree this well is measured on wrongly paired
-// corners of the same two keyframes. Nothing here asks for parallax: a rotation in place or a plane
-// fits many essential matrices, and any of them is a yes.
+// The number of inliers required follows from the matches themselves (a contrario, Moisan & Stival,
+// IJCV 2004): the probability that unrelated matches agree with a model is measured on wrongly
+// paired corners of the same two keyframes. No parallax is required: many essential matrices fit a
+// rotation in place or a plane, and any of them leads to acceptance.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -22,9 +22,9 @@
 
 namespace pangea {
 
-// Of an inlier, in sigmas: pixels at the image centre, on octave 0.
+// Largest residual of an inlier, in sigmas (one sigma is a pixel at the image centre, octave 0).
 inline constexpr double kMaxEpipolarResidual = 3.0;
-// Of a place that is recognised.
+// Fewest inliers of a recognised place.
 inline constexpr int kMinEpipolarInliers = 10;
 
 // A corner's ray: unit length, in its keyframe's odom (gravity-aligned) axes; sigma in radians.
@@ -39,7 +39,7 @@ struct EpipolarModel {
   Eigen::Quaterniond R_b_a = Eigen::Quaterniond::Identity();
   Eigen::Vector3d t_b_a = Eigen::Vector3d::UnitX();
 
-  // First-order (Sampson) residual in sigmas; infinite where the point would lie behind a camera.
+  // First-order (Sampson) residual in sigmas; infinite if the point would lie behind a camera.
   double Residual(const CornerRay& a, const CornerRay& b) const;
 };
 
@@ -50,7 +50,7 @@ struct EpipolarResult {
   bool accepted = false;
 };
 
-// All models that fit three pairs exactly; exposed for its test.
+// All models that fit three pairs exactly. Public only for its test.
 std::vector<EpipolarModel> SolveThreePairs(
     const std::vector<std::pair<CornerRay, CornerRay>>& pairs, const std::array<int, 3>& sample);
 

@@ -8,7 +8,7 @@ std::vector<std::pair<int, int>> MatchAlongEpipolarLines(std::vector<CornerMatch
                                                          const CornersAndRays& a,
                                                          const CornersAndRays& b,
                                                          const EpipolarModel& model) {
-  // A rival counts for the ratio test up to the distance at which it could no longer fail it.
+  // Only rivals up to this distance can make a match fail the ratio test.
   const int rival_distance =
       static_cast<int>(kGuidedMatching.max_distance / kGuidedMatching.max_ratio);
   std::erase_if(pairs, [&](const CornerMatch& pair) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// A second matching once a relative pose is known: along the epipolar line a corner has few rivals,
-// so repeated texture that failed the ratio test of the first matching finds its partner.
+// The second matching, when a relative pose is known: a corner has few rivals near its epipolar
+// line, so corners on repeated texture that failed the first ratio test are matched too.
 
 #include <utility>
 #include <vector>
@@ -11,18 +11,18 @@
 
 namespace pangea {
 
-// A keyframe's corners and their rays, index by index; a ray of sigma 0 is unusable.
+// A keyframe's corners and their rays, with the same indices; a ray with sigma 0 is unusable.
 struct CornersAndRays {
   const std::vector<Corner>& corners;
   const std::vector<CornerRay>& rays;
 };
 
-// Guided by the epipolar line there are far fewer rivals: the ratio test can be wider.
+// Near the epipolar line there are far fewer rivals, so the ratio test is looser.
 inline constexpr MatchingOptions kGuidedMatching{.max_distance = kAlikeHamming, .max_ratio = 0.9};
 
-// Mutual nearest neighbours among the pairs within kMaxEpipolarResidual of the model (which takes a
-// to b), as (corner of a, corner of b), in the order of a. `pairs`: PairsWithin RivalDistance at
-// least.
+// Returns mutual nearest neighbours, as (corner of a, corner of b) in the order of a, among the
+// pairs with a residual up to kMaxEpipolarResidual; `model` maps a to b. `pairs`: all pairs with a
+// descriptor distance up to RivalDistance(kGuidedMatching) or more (see PairsWithin).
 std::vector<std::pair<int, int>> MatchAlongEpipolarLines(std::vector<CornerMatch> pairs,
                                                          const CornersAndRays& a,
                                                          const CornersAndRays& b,

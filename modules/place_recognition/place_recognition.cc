@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-// Runs of keyframes looked at before they are spread over the maps.
+// Maximum number of places that Places returns.
 constexpr size_t kMaxPlaces = 100;
 // A place is a run of 2 * kPlaceHalfWidth + 1 keyframes of one map.
 constexpr int kPlaceHalfWidth = 5;
@@ -73,7 +73,7 @@ void PlaceRecognition::Search(const RecognisedKeyframe& query, const std::vector
 }
 
 void PlaceRecognition::Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match) {
-  // The best of each map before the second best of any.
+  // Order: first the best of each map, then the second best of each, and so on.
   std::stable_sort(verified.begin(), verified.end(),
                    [](const PlaceCandidate& a, const PlaceCandidate& b) {
                      return a.corner_matches.size() > b.corner_matches.size();
@@ -152,7 +152,7 @@ bool PlaceRecognition::IsRecent(const RecognisedKeyframe& query, int other) cons
 
 std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
     const std::vector<Place>& hits) const {
-  // Of equals the older first. A heap, since a few of the best are all that is wanted.
+  // With equal scores the older keyframe first. A heap, since only the best few are needed.
   const auto worse = [](const Place& a, const Place& b) {
     return std::pair(a.score, -a.keyframe) < std::pair(b.score, -b.keyframe);
   };
@@ -177,7 +177,8 @@ std::vector<PlaceRecognition::Place> PlaceRecognition::Places(
 
 std::vector<PlaceRecognition::Place> PlaceRecognition::Spread(const std::vector<Place>& places,
                                                               int limit) const {
-  // Half of them by score alone, then the best place of each map not yet among them, then by score.
+  // Half of them by score alone, then the best place of each map not represented yet, then by
+  // score.
   std::vector<Place> chosen;
   std::vector<bool> used(places.size(), false);
   std::vector<MapId> maps;

@@ -1,14 +1,14 @@
 #pragma once
 
-// Which places does this keyframe show again? (the paper, section IV.C)
+// Finds earlier keyframes that show the same place as a new keyframe (the paper, section IV.C).
 //
 // In: keyframes of any number of maps, and which maps are fused. Out: for each keyframe one
-// PlaceMatch with the older keyframes that show the same place, with their corner matches.
-// Two searches by one inverted index: in the keyframe's own map, without what odometry still
-// connects it to, and in all other maps. The best few places of each are verified: corners matched
-// by descriptor, then one relative pose has to explain them (epipolar_check.h), which then guides a
-// second matching. Whether a candidate is true is for the geometry of inter_map_ba and fusion to
-// decide: this module would rather ask once too often.
+// PlaceMatch with the candidates (older keyframes of the same place) and their corner matches. One
+// inverted index serves two searches: in the keyframe's own map, except its recent keyframes, and
+// in all other maps. The best places of each search are checked: corners are matched by descriptor,
+// one relative pose must explain the matches (epipolar_check.h), and this pose guides a second
+// matching. inter_map_ba and fusion verify the candidates, so this module prefers a false candidate
+// to a missed one.
 //
 // Deterministic: the same calls in the same order give the same matches. One thread.
 
@@ -28,7 +28,7 @@
 namespace pangea {
 
 struct PlaceRecognitionOptions {
-  // Keyframes beyond this many are still recognised but no longer remembered (about 20 kB each).
+  // Keyframes beyond this number are still recognised, but not stored (about 20 kB each).
   int max_keyframes = 100000;
 
   template <typename Archive>
@@ -38,22 +38,23 @@ struct PlaceRecognitionOptions {
   }
 };
 
-// A place that was looked at and how far it came, for whoever measures this module.
+// A place that was checked, and the result; for measurements of this module.
 struct PlaceReport {
   KeyframeId match;
   float score = 0;        // of the retrieval, 0 .. 1
-  int inliers = 0;        // matched corners that agree on one pose; 0: too few were matched
-  bool verified = false;  // more agree than chance explains
+  int inliers = 0;        // matches that fit one pose; 0: too few matches
+  bool verified = false;  // accepted by the epipolar check
 };
 
 class PlaceRecognition {
  public:
-  // Own map: a keyframe is recent while it is this near in seq or still shares a tracked landmark.
+  // A keyframe of the own map is recent, and not searched, if it is nearer than this in seq or
+  // shares a tracked landmark with the query.
   static constexpr int kMinSeqGap = 20;
 
   struct Counters {
     int64_t keyframes = 0;
-    int64_t places = 0;          // looked at by descriptor matching
+    int64_t places = 0;          // checked by descriptor matching
     int64_t candidates_own = 0;  // published
     int64_t candidates_other = 0;
     int64_t rejected_matching = 0;
@@ -65,17 +66,18 @@ class PlaceRecognition {
   explicit PlaceRecognition(const PlaceRecognitionOptions& options,
                             std::shared_ptr<RecordStore> records = nullptr);
 
-  // Recognises, then remembers. `report` gets every place that was looked at.
+  // Recognises, then stores the keyframe. `report` receives every place that was checked.
   PlaceMatch Add(const Keyframe& keyframe, std::vector<PlaceReport>* report = nullptr);
-  // Remembers only: for keyframes whose match is known from an earlier run.
+  // Only stores the keyframe: for one whose match is known from an earlier run.
   void Remember(const Keyframe& keyframe, const PlaceMatch& known);
 
-  // All it remembers, but for the groups, and the records of keyframes, of which it says where they
-  // are. Restored: false, and nothing has changed, if these are not the bytes of one.
+  // Saves everything stored, except the groups; of the keyframes' records only their places in the
+  // RecordStore. Restore returns false, and changes nothing, if the bytes are not those of a
+  // PlaceRecognition.
   void Save(ByteWriter* writer);
   bool Restore(ByteReader* reader);
 
-  // Which maps are one group. The highest revision wins, map by map.
+  // Updates which maps form one group. For each map the state with the highest revision counts.
   void Take(const MapState& state) { groups_.Take({state.revision, state.maps}); }
 
   const Counters& counters() const { return counters_; }
@@ -87,9 +89,9 @@ class PlaceRecognition {
     float score = 0;
   };
   struct Limits {
-    int places;            // verified: the best by retrieval
-    int continued_places;  // and those next to where the previous keyframe was recognised
-    int candidates;        // published at most: each costs its consumer a bundle adjustment
+    int places;            // checked: the best by retrieval score
+    int continued_places;  // checked in addition: near the previous keyframe's matches
+    int candidates;        // published at most; each costs a bundle adjustment
   };
   struct GroupMaps {
     int64_t revision = 0;
@@ -100,14 +102,15 @@ class PlaceRecognition {
 
   void Store(const RecognisedKeyframe& keyframe);
   bool IsRecent(const RecognisedKeyframe& query, int other) const;
-  // Best first, one per run of neighbouring keyframes.
+  // One hit per run of neighbouring keyframes, best first.
   std::vector<Place> Places(const std::vector<Place>& hits) const;
-  // Of places in many maps, so that no map crowds out another.
+  // Selects `limit` places so that no map crowds out the others.
   std::vector<Place> Spread(const std::vector<Place>& places, int limit) const;
-  // Where the previous keyframe of this map was recognised, one step further.
+  // The best hits near the places where the previous keyframe of this map was recognised.
   std::vector<Place> Continued(const KeyframeId& query, const std::vector<Place>& hits,
                                int limit) const;
-  // One of the two searches: from keyframes that share descriptors to published candidates.
+  // One of the two searches: selects and checks places among `hits`, and adds candidates to
+  // `match`.
   void Search(const RecognisedKeyframe& query, const std::vector<Place>& hits, const Limits& limits,
               PlaceMatch* match, std::vector<PlaceReport>* report);
   std::optional<PlaceCandidate> Verify(const RecognisedKeyframe& query, const Place& place,
@@ -119,7 +122,7 @@ class PlaceRecognition {
   PlaceRecognitionOptions options_;
   DescriptorIndex index_;
   StoredKeyframes stored_;                                 // numbered as in index_
-  std::map<MapId, std::vector<KeyframeId>> last_matches_;  // of each map's newest keyframe
+  std::map<MapId, std::vector<KeyframeId>> last_matches_;  // by map: matches of its newest keyframe
   GroupStates<GroupMaps> groups_;
   Counters counters_;
 };

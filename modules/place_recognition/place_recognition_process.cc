@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint32_t kCheckpointFormat = 3;
 constexpr int64_t kStatusInterval_us = 1'000'000;
-// Bounds: of matches kept to be retransmitted (then the oldest go), and of what waits in a catch-up
-// or for its turn (then the first is worked off at once).
+// Bounds: on matches kept for retransmission (beyond it the oldest are dropped), and on keyframes
+// that wait in a catch-up or for their turn (beyond it the first are recognised at once).
 constexpr size_t kMaxSentPerMap = 2000;
 constexpr size_t kMaxHeld = 2000;
 constexpr size_t kMaxKnownMatches = 100'000;
@@ -98,7 +98,7 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
   if (held_.size() > kMaxHeld) {
     journal_.StopCatchingUp();
   }
-  // Matches that came before any catch-up wait for their keyframes: a replay hands them on first.
+  // Matches received before any catch-up are kept: a replay delivers them before their keyframes.
   if (std::exchange(was_catching_up_, journal_.catching_up()) && !was_catching_up_) {
     known_matches_.clear();
   }
@@ -110,7 +110,7 @@ void PlaceRecognitionProcess::ReleaseHeldIfCaughtUp() {
 bool PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
   const KeyframeId query = match.query;
   if (query.seq >= journal_.next(query.map) && known_matches_.size() < kMaxKnownMatches) {
-    // Which places it names is all that Remember needs.
+    // Remember needs only the ids of the candidates.
     match.rejected.clear();
     for (PlaceCandidate& candidate : match.candidates) {
       candidate.corner_matches = {};

@@ -2,17 +2,17 @@
 
 // place_recognition on a bus: KEYFRAME_* and MAP_STATE in, one PLACE_MATCH per keyframe out.
 //
-// Keyframes are taken in seq order, map by map (journal_follower.h). After a restart the journal's
-// PLACE_MATCHes are read before its keyframes, or asked for along with them: a keyframe that has
-// its match is only remembered, and those without one wait until all the others are in, so that no
-// pair of keyframes goes unseen, and until the pose graph, which is asked for the groups, has said
-// which maps are fused: a candidate's kind hangs on it. It answers requests for the newest
-// PLACE_MATCHes itself.
+// Keyframes are processed in seq order, map by map (journal_follower.h). After a restart the
+// process reads the journal's PLACE_MATCHes before its keyframes, or requests them together. A
+// keyframe that has its match is only stored. A keyframe without one waits until all others are in,
+// so that no pair of keyframes is missed, and until the pose graph has answered the request for the
+// groups, which decide a candidate's kind. The process itself answers requests for the newest
+// PLACE_MATCHes.
 //
-// A checkpoint ends before the first keyframe without a match in the journal.
+// A checkpoint covers the keyframes before the first one without a match in the journal.
 //
 // Live, keyframes are recognised one at a time, when no message waits: after a catch-up there may
-// be many, and meanwhile groups are to be heard and requests answered.
+// be many, and meanwhile group states must be received and requests answered.
 
 #include <deque>
 #include <map>
@@ -30,7 +30,7 @@ namespace pangea {
 
 class PlaceRecognitionProcess : public Process {
  public:
-  // `records`: for corners, and messages to send again (core/record_store.h).
+  // `records`: for corners, and for messages to retransmit (core/record_store.h).
   PlaceRecognitionProcess(Bus& bus, const PlaceRecognitionOptions& options,
                           const std::shared_ptr<RecordStore>& records = nullptr,
                           const CheckpointPlace& checkpoint = {});
@@ -46,7 +46,7 @@ class PlaceRecognitionProcess : public Process {
   void Recognise(const Keyframe& keyframe);
   void ReleaseHeldIfCaughtUp();
   void RecogniseHeld();
-  // The first that is held; whether more may follow.
+  // Recognises the first held keyframe; returns whether more are held.
   bool RecogniseNext();
   void PublishStatus(int64_t now_utime);
 
@@ -55,9 +55,9 @@ class PlaceRecognitionProcess : public Process {
   PlaceRecognition recognition_;
   JournalFollower journal_;
   bool was_catching_up_ = false;
-  std::map<KeyframeId, PlaceMatch> known_matches_;  // of the journal, their keyframes still to come
-  std::deque<Keyframe> held_;                       // without a match, in order
-  std::map<MapId, std::map<int32_t, Record>> sent_;  // newest of this run, to send again
+  std::map<KeyframeId, PlaceMatch> known_matches_;   // from the journal; keyframe not seen yet
+  std::deque<Keyframe> held_;                        // keyframes to be recognised, in order
+  std::map<MapId, std::map<int32_t, Record>> sent_;  // newest of this run, to retransmit
   int64_t next_status_utime_ = 0;
 };
 

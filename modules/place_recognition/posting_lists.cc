@@ -47,7 +47,7 @@ size_t PostingLists::SkipZeros(size_t bit, size_t zeros) const {
     bit += 64 - bit % 64;
     found = ~high_[bit / 64];
   }
-  // It is among so many bits, in the lower half of them or the upper.
+  // Bisect: the wanted zero is in the lower or the upper half of the remaining bits.
   for (int half = 32; half > 0; half /= 2) {
     const size_t lower = std::popcount(found & ((uint64_t{1} << half) - 1));
     if (lower < zeros) {
@@ -159,7 +159,7 @@ bool PostingLists::Restore(ByteReader* reader) {
   return true;
 }
 
-// So many ones and zeros as it takes, and blocks where these say.
+// Checks the number of ones and zeros, and that the blocks begin where these say.
 bool PostingLists::IsConsistent() const {
   const auto count_ones = [](size_t sum, uint64_t limb) { return sum + std::popcount(limb); };
   if (std::accumulate(high_.begin(), high_.end(), size_t{0}, count_ones) != num_packed()) {

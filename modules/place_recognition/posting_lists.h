@@ -1,17 +1,17 @@
 #pragma once
 
-// The postings of one table of the index, by word, in little more than their signatures.
+// Compressed storage of one table's postings, by word; little larger than the signatures alone.
 //
-// All but the newest are packed: sorted by word and keyframe they are one Elias-Fano sequence
-// (Elias, JACM 1974; for inverted indices Vigna, WSDM 2013). Of each posting's keyframe the lowest
-// kLowBits lie in an array, beside the signatures. The rest is a bit string: for each word
-// `num_spans_` zeros, one for each span of 2^kLowBits keyframes, and before the zero of a span a
-// one for each posting in it. So the i-th one is where i + the zeros before it says, and where a
-// word begins is found from the nearest word in begin_ by counting zeros. The newest wait in chains
-// until Pack. With n postings a keyframe, a packed one takes 5.1 bytes and 128 / n more, a waiting
-// one 12; a word takes 1 to 8.
+// All but the newest postings are packed: sorted by word and keyframe, they form an Elias-Fano
+// sequence (Elias, JACM 1974; for inverted indices Vigna, WSDM 2013). The lowest kLowBits of a
+// posting's keyframe number are in an array parallel to the signatures. The upper bits are in a bit
+// string: for each word it has `num_spans_` zeros, one per span of 2^kLowBits keyframes, and before
+// the zero of a span a one for each posting in the span. So the i-th one is at position i + (zeros
+// before it), and the begin of a word is found by counting zeros from the nearest block begin in
+// begin_. The newest postings wait in linked lists until Pack. With n postings per keyframe, a
+// packed posting takes 5.1 + 128 / n bytes, a waiting one 12; a word takes 1 to 8.
 //
-// Deterministic; what is visited does not depend on when Pack was called. Not thread safe.
+// Deterministic; the postings visited do not depend on when Pack is called. Not thread safe.
 
 #include <bit>
 #include <cstdint>
@@ -28,12 +28,12 @@ class PostingLists {
   // Words are 0 .. num_words - 1.
   explicit PostingLists(size_t num_words) : PostingLists(num_words, 0, 0) {}
 
-  // Keyframes come in ascending order.
+  // Call with ascending keyframes.
   void Add(uint32_t word, int32_t keyframe, uint32_t signature);
-  // Packs what waits. Takes the time to copy all of it: so it is worth while when much waits.
+  // Packs the waiting postings. It copies all postings, so call it only when many wait.
   void Pack();
-  // With nothing waiting. False, and nothing has changed, if these are not the bytes of lists of so
-  // many words.
+  // Save requires that no posting waits. Restore returns false, and changes nothing, if the bytes
+  // are not those of PostingLists with the same number of words.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
   size_t num_packed() const { return signatures_.size(); }
@@ -41,13 +41,13 @@ class PostingLists {
 
   // A word's packed postings.
   struct PackedList {
-    size_t bit = 0;    // where it begins in the bit string
+    size_t bit = 0;    // position of its first bit in the bit string
     size_t first = 0;  // number of its first posting
     size_t count = 0;
   };
   PackedList Find(uint32_t word) const;
 
-  // What Find and Sample will read, so that the processor has it, each some words before the next.
+  // Prefetch the memory that Find (first two) and Sample read; call each some words in advance.
   void PrefetchBegin(uint32_t word) const {
     __builtin_prefetch(&begin_[BlockOf(word)]);
     __builtin_prefetch(&newest_[BlockOf(word)]);
@@ -63,9 +63,9 @@ class PostingLists {
     }
   }
 
-  // Calls visit(keyframe, signature), in any order, for the word's postings; of those that have
-  // more than `most`, for an even sample of about this many, which `phase` rotates. `list`: what
-  // Find says of the word.
+  // Calls visit(keyframe, signature), in any order, for the word's postings. If there are more than
+  // `most`, only for an evenly spaced sample of about `most`; `phase` selects which. `list`: the
+  // result of Find for this word.
   template <typename Visit>
   void Sample(uint32_t word, const PackedList& list, size_t most, size_t phase, Visit visit) const {
     const size_t count = list.count + CountWaiting(word);
@@ -77,7 +77,7 @@ class PostingLists {
         next += stride;
       }
     });
-    // From the last to the first.
+    // Waiting postings come from the last to the first.
     size_t position = count;
     ForEachWaiting(word, [&](const Waiting& posting) {
       if (--position % stride == phase % stride) {
@@ -89,7 +89,7 @@ class PostingLists {
  private:
   static constexpr uint32_t kNone = ~uint32_t{0};
   static constexpr int kLowBits = 8;
-  // A block has so many words, a power of two, that its part of the bit string is a cache line.
+  // A block has up to 2^kMaxBlockShift words: as many as fit, with their bits, in a cache line.
   static constexpr int kMaxBlockShift = 3;
   static constexpr size_t kBitsABlock = 512;
 
@@ -97,10 +97,10 @@ class PostingLists {
     uint32_t keyframe : 28 = 0;
     uint32_t word_in_block : 4 = 0;
     uint32_t signature = 0;
-    uint32_t older = kNone;  // of the same block
+    uint32_t older = kNone;  // next older one in the same block
   };
 
-  // With room for what is to be packed.
+  // Empty, with room for `num_postings` packed postings.
   PostingLists(size_t num_words, size_t num_spans, size_t num_postings);
 
   size_t BlockOf(size_t word) const { return word >> block_shift_; }
@@ -108,7 +108,7 @@ class PostingLists {
   size_t BlockBit(size_t block) const {
     return begin_[block] + (block << block_shift_) * num_spans_;
   }
-  // The first one from this bit on.
+  // Position of the first 1 bit at or after `bit`.
   size_t NextOne(size_t bit) const {
     uint64_t rest = high_[bit / 64] >> (bit % 64);
     while (rest == 0) {
@@ -117,12 +117,12 @@ class PostingLists {
     }
     return bit + std::countr_zero(rest);
   }
-  // Behind so many zeros from this bit on.
+  // Position after `zeros` 0 bits, counted from `bit` on.
   size_t SkipZeros(size_t bit, size_t zeros) const;
-  // Of the word that begins at this bit.
+  // The list of the word whose bits begin at `bit`.
   PackedList ListAt(size_t bit, uint32_t word) const;
 
-  // visit(i, keyframe, signature), i from 0 on.
+  // Calls visit(i, keyframe, signature) with i = 0, 1, ...
   template <typename Visit>
   void ForEach(const PackedList& list, Visit visit) const {
     size_t bit = list.bit;
@@ -133,7 +133,7 @@ class PostingLists {
       visit(i, static_cast<int32_t>(span << kLowBits | low_[posting]), signatures_[posting]);
     }
   }
-  // visit(waiting), the newest first.
+  // Calls visit(waiting) for the word's waiting postings, the newest first.
   template <typename Visit>
   void ForEachWaiting(uint32_t word, Visit visit) const {
     if (!waits_[word]) {
@@ -150,7 +150,7 @@ class PostingLists {
     ForEachWaiting(word, [&count](const Waiting&) { ++count; });
     return count;
   }
-  // What waits of a block, by word and age.
+  // Lists the waiting postings of a block, sorted by word, the oldest first.
   using WordAndNumber = std::pair<size_t, uint32_t>;
   void ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const;
   bool IsConsistent() const;
@@ -159,12 +159,12 @@ class PostingLists {
   size_t num_spans_;
   int block_shift_ = kMaxBlockShift;
   std::vector<uint64_t> high_;  // the bit string
-  std::vector<uint8_t> low_;    // of each packed posting, as the signatures
+  std::vector<uint8_t> low_;    // low bits of the keyframe, by packed posting
   std::vector<uint32_t> signatures_;
   std::vector<uint32_t> begin_;  // number of the first posting of each block of words
   std::deque<Waiting> waiting_;
-  std::vector<uint32_t> newest_;  // of each block, in waiting_
-  std::vector<bool> waits_;       // whether something of a word does
+  std::vector<uint32_t> newest_;  // by block: index of its newest in waiting_
+  std::vector<bool> waits_;       // by word: whether it has waiting postings
 };
 
 }  // namespace pangea

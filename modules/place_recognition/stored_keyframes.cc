@@ -57,7 +57,7 @@ AscendingNumbers::AscendingNumbers(const std::vector<int32_t>& numbers) {
     }
     gaps.push_back(static_cast<uint8_t>(gap));
   }
-  gaps_.assign(gaps.begin(), gaps.end());  // in just the memory they need
+  gaps_.assign(gaps.begin(), gaps.end());  // without spare capacity
 }
 
 bool AscendingNumbers::HasOneOf(const std::vector<int32_t>& ascending) const {

@@ -1,8 +1,8 @@
 #pragma once
 
-// The keyframes that recognition remembers, by number. In memory are ids, landmarks and where the
-// rest is; corners and rays, which only the verification of a place needs, are records
-// (core/record_store.h), and in memory for those verified last. Not thread safe.
+// The keyframes stored for recognition, by number. Ids and landmarks are in memory. Corners and
+// rays, which are needed only when a place is checked, are records (core/record_store.h); those of
+// the places checked last are cached. Not thread safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,13 +18,13 @@
 
 namespace pangea {
 
-// A keyframe as recognition looks at it.
+// The parts of a keyframe that recognition uses.
 struct RecognisedKeyframe {
   explicit RecognisedKeyframe(const Keyframe& keyframe);
 
   KeyframeId id;
   std::vector<Corner> corners;
-  std::vector<CornerRay> rays;     // zero direction where a pixel cannot be undistorted
+  std::vector<CornerRay> rays;     // zero direction and sigma if the pixel cannot be undistorted
   std::vector<int32_t> landmarks;  // ascending
 
  private:
@@ -32,7 +32,7 @@ struct RecognisedKeyframe {
   RecognisedKeyframe() = default;
 };
 
-// Ascending numbers, most of them in one byte: the first one, and the gaps as base-128 varints.
+// A compact list of ascending numbers: the first one, and the differences as base-128 varints.
 class AscendingNumbers {
  public:
   AscendingNumbers() = default;
@@ -45,31 +45,31 @@ class AscendingNumbers {
 
  private:
   int32_t first_ = 0;
-  int32_t last_ = -1;  // before the first one: there are none
+  int32_t last_ = -1;  // last_ < first_: the list is empty
   std::vector<uint8_t> gaps_;
 };
 
-// What StoredKeyframes keeps of a keyframe in the RecordStore.
+// The record of a keyframe that StoredKeyframes writes to the RecordStore.
 std::vector<uint8_t> CornersRecord(const Keyframe& keyframe);
 
 class StoredKeyframes {
  public:
-  // Without a RecordStore everything stays in memory.
+  // If `records` is null, everything stays in memory.
   explicit StoredKeyframes(std::shared_ptr<RecordStore> records) : records_(std::move(records)) {}
 
-  // False when there is no room for its corners, neither in the RecordStore nor in memory: then
-  // nothing of it is kept.
+  // False, and nothing is stored, if neither the RecordStore nor memory has room for the corners.
   bool Add(const RecognisedKeyframe& keyframe);
   int size() const { return static_cast<int>(keyframes_.size()); }
-  // Where the records are, not these themselves: whoever restores it has them at the same places.
-  // False if these are not its bytes.
+  // Saves the places of the records, not the records: these must be at the same places in the
+  // RecordStore when it is restored. Restore returns false if the bytes are not those of a
+  // StoredKeyframes.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
 
   const std::shared_ptr<RecordStore>& records() const { return records_; }
   const KeyframeId& id(int number) const { return keyframes_[number].id; }
   bool SharesLandmark(int number, const RecognisedKeyframe& other) const;
-  // Null when it cannot be read. Its landmarks are empty.
+  // Null if the record cannot be read. `landmarks` of the result is empty.
   std::shared_ptr<const RecognisedKeyframe> Find(int number);
 
   const RecordCounters& counters() const { return counters_; }

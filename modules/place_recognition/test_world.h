@@ -1,7 +1,7 @@
 #pragma once
 
 // A small world for this module's tests: points on the walls of a room, each with a descriptor,
-// seen with bit and pixel noise by keyframes anywhere in it.
+// which keyframes anywhere in the room see with bit and pixel noise.
 
 #include <algorithm>
 #include <random>
@@ -16,10 +16,10 @@ namespace pangea::test {
 struct TestWorldOptions {
   int num_points = 6000;
   double room_m = 12;     // a box, room_m x room_m x 4
-  int flipped_bits = 25;  // each time a point is seen
+  int flipped_bits = 25;  // per observation
   double pixel_sigma = 0.7;
   int max_corners = 500;
-  int clutter = 150;  // corners nobody sees again
+  int clutter = 150;  // corners that no other keyframe has
 };
 
 class TestWorld {
@@ -38,8 +38,8 @@ class TestWorld {
     }
   }
 
-  // What a body (x forward, z up) at this place and yaw sees. `T_odom_world` makes the map's own
-  // odom frame; landmark ids are the points' numbers where `tracked`.
+  // The keyframe of a body (x forward, z up) at this position and yaw. `T_odom_world` defines the
+  // map's odom frame. If `tracked`, landmark ids are the indices of the points.
   Keyframe See(const KeyframeId& id, const Eigen::Vector3d& p_world, double yaw,
                const Rigid3& T_odom_world = {}, bool tracked = false, double pitch = 0) {
     Keyframe keyframe;

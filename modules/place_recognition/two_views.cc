@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// Wider than usual: the epipolar check copes with wrong matches, and measures their chance.
+// Looser than usual: the epipolar check tolerates wrong matches and measures their probability.
 constexpr MatchingOptions kMatching{.max_distance = kCandidateHamming, .max_ratio = 0.85};
 constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// Do two keyframes show the same place? Corners matched by descriptor, then one relative pose has
-// to explain them (epipolar_check.h). Deterministic.
+// Checks whether two keyframes show the same place: matches corners by descriptor, then tests
+// whether one relative pose explains them (epipolar_check.h). Deterministic.
 
 #include <optional>
 #include <vector>
@@ -13,14 +13,15 @@
 namespace pangea {
 
 struct TwoViewResult {
-  std::vector<CornerMatch> pairs;          // PairsWithin what was asked for
-  int num_matches = 0;                     // corners that have a ray
-  std::optional<EpipolarResult> epipolar;  // none with fewer matches than inliers are asked for
+  std::vector<CornerMatch> pairs;          // by PairsWithin, see `pairs_up_to`
+  int num_matches = 0;                     // matches whose corners have rays
+  std::optional<EpipolarResult> epipolar;  // empty with fewer matches than kMinEpipolarInliers
 
   bool accepted() const { return epipolar && epipolar->accepted; }
 };
 
-// `pairs_up_to`: the distance of pairs that the caller wants, beyond what matching takes.
+// `pairs_up_to`: `pairs` also contains pairs up to this Hamming distance, if matching itself does
+// not need them.
 TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
                             int pairs_up_to = 0);
 

@@ -30,7 +30,7 @@ std::vector<PointMatch> FilterByFundamental(const WindowPair& windows,
   if (static_cast<int>(tested.size()) < min_pairs) {
     return matches;
   }
-  // OpenCV seeds this RANSAC the same way every time.
+  // OpenCV always uses the same seed for this RANSAC.
   std::vector<uchar> inliers;
   constexpr double kConfidence = 0.99;
   constexpr int kMaxIterations = 200;

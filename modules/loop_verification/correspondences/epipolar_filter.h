@@ -1,6 +1,7 @@
 #pragma once
 
-// The paper's fundamental-matrix RANSAC over the matches of a projection search (section IV.D).
+// The paper's RANSAC with a fundamental matrix, on the matches of a projection search (section
+// IV.D).
 
 #include <vector>
 
@@ -8,9 +9,10 @@
 
 namespace pangea {
 
-// Drops the matches in the newest keyframe of one window whose landmark is also seen in the newest
-// keyframe of the other, where the two corners contradict the fundamental matrix most of them
-// agree on. With fewer than `min_pairs` of them nothing is dropped: eight points fit anything.
+// Tests the matches between the two newest keyframes: those observed in the newest keyframe of one
+// window, whose landmark is seen by the newest keyframe of the other. Drops those that contradict
+// the best fundamental matrix by more than `max_error_px`; all other matches are kept. With fewer
+// than `min_pairs` tested matches nothing is dropped, because eight points fit any matrix.
 std::vector<PointMatch> FilterByFundamental(const WindowPair& windows,
                                             const std::vector<PointMatch>& matches,
                                             double max_error_px, int min_pairs);

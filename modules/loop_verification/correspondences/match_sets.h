@@ -10,33 +10,35 @@
 
 namespace pangea {
 
-// A match of the two keyframes as it can be drawn: a point's corner in one, and in the other where
-// the odometry has it; for matches found by projection how far the guess and the result miss it.
+// A match between the two keyframes, for drawing. The pixel of the observer is the corner; the
+// pixel of the holder is the projection of the point by the odometry. The misses are the
+// reprojection errors at two poses.
 struct ShownMatch {
   Eigen::Vector2d pixel_m, pixel_c;
   bool inlier = false;
   double miss_before_px = 0;  // at PnP's pose
-  double miss_after_px = 0;   // at the bundle adjustment's
+  double miss_after_px = 0;   // at the bundle adjustment's pose
 };
 
-// Those in the two keyframes themselves, none of their neighbours.
+// Returns only the matches observed in the two newest keyframes.
 std::vector<ShownMatch> Shown(const WindowPair& windows, const std::vector<PointMatch>& matches,
                               const std::vector<bool>& inlier, const Rigid3& T_m_c_before,
                               const Rigid3& T_m_c_after);
 
-// The candidate's matched corners that have a depth, in either keyframe or by their landmark in a
-// neighbour.
+// The candidate's matched corners with a depth: one in either keyframe, or that of their landmark
+// in a neighbour.
 std::vector<PointMatch> CandidateMatches(const WindowPair& windows,
                                          const PlaceCandidate& candidate);
 
-// Each landmark and corner once.
+// Removes repeats of the same landmark and corner.
 std::vector<PointMatch> Distinct(const std::vector<PointMatch>& matches);
 
-// Of the keyframes' votes on which landmark of the other window a landmark is, the majority stays;
-// corners that are no landmark vote for nothing and stay.
+// Keyframes may match a landmark to different landmarks of the other window: keeps only the matches
+// to the most frequent one. Matches to corners that are no landmark are kept.
 std::vector<PointMatch> Agreeing(const WindowPair& windows, const std::vector<PointMatch>& matches);
 
-// Those left and right of the middle one, across m's line of sight and level; T_m_c: windows.
+// Splits the matches at the median of their horizontal position in m's view: left and right half.
+// T_m_c: between the window frames.
 std::array<std::vector<PointMatch>, 2> HalvesOfView(const WindowPair& windows,
                                                     const std::vector<PointMatch>& matches,
                                                     const Rigid3& T_m_c);

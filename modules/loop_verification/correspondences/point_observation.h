@@ -1,7 +1,7 @@
 #pragma once
 
-// One map point of one window seen by a camera of the other: what PnP, the projection search and
-// the pose refinement share.
+// A map point of one window observed by a camera of the other, and its residual; used by PnP, the
+// projection search and the pose refinement.
 
 #include <Eigen/Core>
 #include <optional>
@@ -13,16 +13,16 @@ namespace pangea {
 
 struct PointMatch {
   Direction direction = Direction::kForward;
-  int landmark = 0;    // in the window that holds the point
+  int landmark = 0;    // index in the window that holds the point
   CornerRef observed;  // in the other window
   int distance = 0;    // Hamming
 };
 
-// A match with the numbers its residual needs.
+// A match with the values that its residual needs.
 struct PointObservation {
   Direction direction = Direction::kForward;
   Eigen::Vector3d p_w;            // in the frame of the window that holds the point
-  Eigen::Vector3d depth_sigma_w;  // one sigma of its depth
+  Eigen::Vector3d depth_sigma_w;  // displacement by one sigma of its depth
   Rigid3 T_cam_w;                 // the observing camera, in its own window
   Eigen::Vector2d ray;
   Eigen::Matrix2d sqrt_info;  // whitens a difference of rays by the corner's pixel sigma
@@ -31,8 +31,9 @@ struct PointObservation {
 PointObservation MakeObservation(const WindowPair& windows, const PointMatch& match,
                                  double pixel_sigma);
 
-// Residual in sigmas of its pixel, and what one sigma of the point's depth adds to it.
-// J, when given: d(residual)/d(xi), xi the tangent of X in the left frame (core/rigid3.h).
+// The residual in sigmas of the pixel, and its change by one sigma of the point's depth. Empty if
+// the point is behind the camera. J, if not null: d(residual)/d(xi), with xi the perturbation of X
+// = T_m_c in the left frame (core/rigid3.h).
 struct WhitenedResidual {
   Eigen::Vector2d r;
   Eigen::Vector2d depth_sigma;
@@ -40,14 +41,14 @@ struct WhitenedResidual {
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
                                          Eigen::Matrix<double, 2, 6>* J = nullptr);
 
-// The same with the rotations at hand: of T_m_c and of the observation's T_cam_w.
+// The same, with precomputed rotation matrices of T_m_c and of the observation's T_cam_w.
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
                                          const Eigen::Matrix3d& R_m_c,
                                          const Eigen::Matrix3d& R_cam_w,
                                          Eigen::Matrix<double, 2, 6>* J = nullptr);
 
-// Squared Mahalanobis distance under the pixel noise, `extra_var` more of it (in sigma^2), and the
-// depth's uncertainty; infinite behind the camera.
+// Squared Mahalanobis distance, with the pixel noise, an additional variance `extra_var` (in
+// sigma^2), and the uncertainty of the depth. Infinite behind the camera.
 double Chi2(const std::optional<WhitenedResidual>& residual, double extra_var = 0);
 inline double Chi2(const PointObservation& observation, const Rigid3& T_m_c, double extra_var = 0) {
   return Chi2(Residual(observation, T_m_c), extra_var);
@@ -58,7 +59,8 @@ struct PoseEstimate {
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-// Robust Gauss-Newton over X alone. Gravity's prior: the tilt of X is zero within `tilt_sigma`.
+// Robust Gauss-Newton over X = T_m_c alone, with a gravity prior: roll and pitch of X are zero,
+// with sigma `tilt_sigma` (radians).
 PoseEstimate RefinePose(const std::vector<PointObservation>& observations, const Rigid3& T_m_c,
                         double tilt_sigma);
 

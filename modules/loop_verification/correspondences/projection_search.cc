@@ -16,17 +16,17 @@ namespace {
 constexpr double kMaxRatio =
     0.9;  // best to second-best distance, corners kSamePx and further apart
 constexpr double kMaxChi2 = 11.8;  // within 3 sigma of the prediction (2 degrees of freedom)
-// Of the search, whatever the prediction claims.
+// Bounds on the search radius, whatever the prediction's covariance is.
 constexpr double kMinRadiusPx = 4;
 constexpr double kMaxRadiusPx = 40;
-constexpr double kMaxDepth_m = 60;     // the deeper, the worse triangulated
+constexpr double kMaxDepth_m = 60;     // more distant points are poorly triangulated
 constexpr double kMaxViewAngle = 0.9;  // radians between the two lines of sight
 constexpr double kMaxScale = 3.5;      // ratio of the two distances
 constexpr double kBorderPx = 12;
-// Two corners this near are one: a tracked and a detected one of the same spot.
+// Two corners nearer than this are taken as one: a tracked and a detected one of the same point.
 constexpr double kSamePx = 4;
 
-// The nearest of the landmark's descriptors in its own window.
+// Smallest distance to the landmark's descriptors in its own window.
 int LandmarkDistance(const Window& holder, const WindowLandmark& landmark,
                      const Descriptor& descriptor) {
   int best = kNoDistance;
@@ -36,7 +36,7 @@ int LandmarkDistance(const Window& holder, const WindowLandmark& landmark,
   return best;
 }
 
-// One corner, one landmark: the nearer descriptor keeps it.
+// Each corner keeps only the landmark with the nearest descriptor.
 std::vector<PointMatch> ResolveCorners(const std::vector<PointMatch>& matches) {
   std::map<int, size_t> owner;
   for (size_t i = 0; i < matches.size(); ++i) {
@@ -60,7 +60,7 @@ struct Prediction {
   bool comparable = false;
 };
 
-// The points of one window in one keyframe of the other.
+// Searches the points of one window in one keyframe of the other.
 class ProjectionSearch {
  public:
   ProjectionSearch(const WindowPair& windows, Direction direction, int frame,
@@ -101,8 +101,8 @@ class ProjectionSearch {
   }
 
  private:
-  // Between the host's line of sight and this one, to y in the observing window: the angle, and how
-  // much nearer or farther.
+  // Compares the host's line of sight with this one, to y in the observing window: the angle
+  // between them (radians), and the ratio of the distances.
   std::pair<double, double> ViewChange(const WindowLandmark& landmark,
                                        const Eigen::Vector3d& y) const {
     const Eigen::Vector3d ray = y - T_w_cam_.t;
@@ -112,7 +112,7 @@ class ProjectionSearch {
             std::abs(std::log(ray.norm() / host_ray.norm()))};
   }
 
-  // Of the pose and of the point's depth; J_y: d(pixel)/d(y).
+  // From the uncertainty of the pose and of the point's depth, pixels^2; J_y: d(pixel)/d(y).
   Eigen::Matrix2d Covariance(const WindowLandmark& landmark,
                              const Eigen::Matrix<double, 2, 3>& J_y) const {
     Eigen::Matrix<double, 2, 6> J_pose;
@@ -195,7 +195,7 @@ std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction d
   std::vector<int> near(corners.size()), rivals;
   std::vector<PointMatch> matches;
   for (size_t l = 0; l < holder.landmarks.size(); ++l) {
-    // The newest view of it stands for all: M times the comparisons gain little here.
+    // Only the newest observation is compared: comparing all gains little here.
     const std::vector<CornerRef>& seen = holder.landmarks[l].observations;
     descriptors.Distances(holder.corner(seen.back()).descriptor, &distances);
     for (auto ref = seen.rbegin() + 1; ref != seen.rend() && ref->frame == seen.back().frame;
@@ -204,7 +204,7 @@ std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction d
       std::ranges::transform(distances, of_octave, distances.begin(),
                              [](uint64_t a, uint64_t b) { return std::min(a, b); });
     }
-    // Without a branch for each: hardly any is near.
+    // Branch-free, since hardly any is near.
     size_t num_near = 0;
     for (size_t i = 0; i < corners.size(); ++i) {
       near[num_near] = static_cast<int>(i);

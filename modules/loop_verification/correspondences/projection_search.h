@@ -1,7 +1,7 @@
 #pragma once
 
-// Map points of one window looked for in a keyframe of the other, where an alignment says they
-// are: the paper's forward and reverse projection (section IV.D).
+// Searches map points of one window in a keyframe of the other, near their projections by an
+// alignment: the paper's forward and reverse projection (section IV.D).
 
 #include <Eigen/Core>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace pangea {
 
-// Of a corner on octave 0.
+// Sigma of a corner on octave 0, pixels.
 inline constexpr double kCornerSigma_px = 1.0;
 
 // A point that should be seen in the keyframe.
@@ -18,21 +18,22 @@ struct Projection {
   int landmark = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   bool found = false;
-  // Seen from so near its host's viewpoint that it ought to be found, unless occluded.
+  // The viewpoint is so similar to the host's that the point should be found, unless occluded.
   bool comparable = false;
 };
 
 struct SearchResult {
-  std::vector<PointMatch> matches;  // by landmark, each landmark and each corner at most once
+  // sorted by landmark; each landmark and each corner at most once
+  std::vector<PointMatch> matches;
   std::vector<Projection> projections;
 };
 
-// `pose` is T_m_c and its covariance whatever the direction.
+// `pose` is T_m_c with its covariance, for both directions.
 SearchResult SearchByProjection(const WindowPair& windows, Direction direction, int frame,
                                 const PoseEstimate& pose);
 
-// Nearest descriptors without any prediction: the newest keyframe's corners against the window's
-// points. For a first guess; a third of these may be wrong.
+// Matches the newest keyframe's corners to the window's points by nearest descriptor, without a
+// prediction. For a first guess; up to a third may be wrong.
 std::vector<PointMatch> MatchByDescriptor(const WindowPair& windows, Direction direction,
                                           int max_hamming, double max_ratio);
 

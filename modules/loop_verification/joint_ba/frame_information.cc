@@ -20,7 +20,7 @@ double PositionTrace(const Matrix6d& covariance) {
 template <typename Visit>
 void InformationShare::ForEachBlock(const MatrixXd& H, const std::vector<int>& columns,
                                     Eigen::Index size, const Visit& visit) {
-  // All but the last are of six, and of a size that the compiler knows.
+  // All blocks but the last have six columns, a size known to the compiler.
   const size_t last = columns.size() - 1;
   for (size_t a = 0; a < columns.size(); ++a) {
     for (size_t b = 0; b < columns.size(); ++b) {
@@ -82,8 +82,8 @@ std::optional<Matrix6d> CovarianceWithoutOne(const MatrixXd& total,
     return std::nullopt;
   }
   // The inverse of total - S is C + C B^T (I - B C B^T)^-1 B C for S = B^T B and C the inverse of
-  // total. So without S the trace grows by at least that of C S C, and at most by that over
-  // 1 - tr(C S). Those that may say most come first: what bounds the others is soon reached.
+  // total. So without S the trace grows by at least that of C S C, and at most by that over 1 -
+  // tr(C S). Landmarks with the largest bound come first, so that the others can soon be skipped.
   const MatrixXd C_position = C.leftCols<3>();
   const MatrixXd C2 = C_position * C_position.transpose();
   std::vector<std::pair<double, size_t>> order;

@@ -22,7 +22,7 @@ Vector3d InWorld(const Vector3d& point, const PosedCamera& host) {
 
 struct WhitenedObservation {
   Vector2d r;
-  Matrix23 J;  // by the point's place in the world
+  Matrix23 J;  // with respect to the point's position in w
 };
 
 std::optional<WhitenedObservation> Project(const HostedPoint::Observation& observation,
@@ -119,7 +119,7 @@ Matrix3d EliminatedPoint::Coupling(size_t a, size_t b) const {
   if (a == b) {
     C += poses[a].N;
   } else if (a == 0 || b == 0) {
-    C -= poses[std::max(a, b)].N;  // the host moves the point where a observation moves its camera
+    C -= poses[std::max(a, b)].N;  // the host displaces the point, an observing frame its camera
   }
   return C;
 }
@@ -177,14 +177,14 @@ void Eliminate(const HostedPoint& hosted, const Vector3d& point,
                double damping, EliminatedPoint* eliminated) {
   const PosedCamera& host = cameras[hosted.host];
   const Vector3d p_w = InWorld(point, host);
-  Matrix3d M;  // of p_w by the point
+  Matrix3d M;  // d(p_w)/d(point)
   M << host.R_w_cam.leftCols<2>() / point.z(), -(p_w - host.p_w_cam) / point.z();
 
   EliminatedPoint& out = *eliminated;
   out.poses.resize(1 + hosted.seen.size());
   EliminatedPoint::Pose& of_host = out.poses[0];
   of_host.arm = p_w - host.p_w_body;
-  of_host.N.setZero();  // sum of J^T J, by p_w
+  of_host.N.setZero();  // sum of J^T J, J with respect to p_w
   of_host.g.setZero();
   for (size_t i = 0; i < hosted.seen.size(); ++i) {
     const HostedPoint::Observation& observation = hosted.seen[i];

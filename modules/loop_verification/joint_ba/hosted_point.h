@@ -7,8 +7,8 @@
 //   seen:   r = S (pi(p_target_cam) - ray), under a robust loss;
 //   prior:  r = [S (xy - ray); (rho - exp(-kappa) rho_0) / sigma_rho], kappa the log scale of the
 //           host's window: that is truly exp(kappa) times as large as its odometry says.
-// All that the frames' errors do to the residuals goes through the point's and the camera's place
-// in the world, so products of Jacobians are of 3x3 matrices.
+// The errors of the frames act on the residuals only through the positions of point and camera in
+// w, so products of Jacobians need only 3x3 matrices.
 
 #include <Eigen/Core>
 #include <optional>
@@ -19,7 +19,7 @@
 
 namespace pangea {
 
-// A camera where a state has it. w: the axes of the bundle adjustment.
+// Pose of a camera in a state. w: the frame of the bundle adjustment.
 struct PosedCamera {
   PosedCamera(const Rigid3& T_w_body, const Rigid3& T_body_cam);
 
@@ -32,62 +32,62 @@ struct HostedPoint {
   struct Observation {
     int frame = 0;
     Eigen::Vector2d ray = Eigen::Vector2d::Zero();
-    Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();  // times the root of `share`
-    double share = 1;                                         // of one measurement
+    Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();  // multiplied by `share`
+    double share = 1;                                         // root of its part of one measurement
     size_t match = 0;
   };
 
-  int side = 0;  // whose scale
+  int side = 0;  // side (m or c) whose scale it has
   int host = 0;  // frame
-  // What the host's map knows of it.
+  // The host's measurement, and the prior of the depth from its map.
   Eigen::Vector2d ray = Eigen::Vector2d::Zero();
   Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();
   double inverse_depth = 0;
   double inverse_depth_sigma = 0;
-  std::vector<Observation> seen;  // by others than the host
+  std::vector<Observation> seen;  // by frames other than the host
 
-  // Of one observation, whitened; nothing behind the camera.
+  // Whitened residual of one observation; empty behind the camera.
   std::optional<Eigen::Vector2d> Residual(const Observation& observation,
                                           const Eigen::Vector3d& point,
                                           const std::vector<PosedCamera>& cameras) const;
-  // Of the depth against its prior, sigmas.
+  // Residual of the depth's prior, in sigmas.
   double DepthResidual(const Eigen::Vector3d& point, double kappa) const;
-  // Infinite when the point is behind a camera that sees it.
+  // Infinite if the point is behind a camera that sees it.
   double Cost(const Eigen::Vector3d& point, const std::vector<PosedCamera>& cameras, double kappa,
               const RobustLoss& loss) const;
 };
 
-// What is left of a point's residuals once it is eliminated: 1/2 e^T H e + g^T e, with e the errors
-// of the frames' poses that it touches (its host's, then those of its observations, six each) and
-// of kappa. A pose moves the point's place in the world by A = [I, -[arm]x] times its error; so H
-// is of blocks A^T C A, with C of 3x3.
+// The cost of a point's residuals after its elimination: 1/2 e^T H e + g^T e, with e the errors of
+// the poses involved (the host's, then those of its observations, six each) and of kappa. The error
+// of a pose displaces the point in w by A = [I, -[arm]x] times the error; so H consists of blocks
+// A^T C A with 3x3 matrices C.
 struct EliminatedPoint {
   struct Pose {
-    Eigen::Vector3d arm;  // from the body to the point, in the world
-    Eigen::Matrix3d N;    // information of its observations on the point's place
-    Eigen::Matrix3d U;    // L^-1 times the point's information that goes with it
-    Eigen::Vector3d g;    // before the point is eliminated
+    Eigen::Vector3d arm;  // from the body to the point, in w
+    Eigen::Matrix3d N;    // information of its observations on the point's position
+    Eigen::Matrix3d U;    // L^-1 times the cross information with the point
+    Eigen::Vector3d g;    // gradient before elimination of the point
   };
   std::vector<Pose> poses;
   Eigen::Vector3d u_scale;
   double h_scale = 0, g_scale = 0;
-  Eigen::Matrix3d L;  // V = L L^T, damped: V is of the point itself
+  Eigen::Matrix3d L;  // V = L L^T; V: the point's own damped information
   Eigen::Vector3d d;
 
-  // Into the lower triangle of H and into g, where `columns` has each pose and at last kappa; those
-  // behind their last are left out.
+  // Adds to the lower triangle of H and to g. `columns`: first column of each pose, then that of
+  // kappa; columns beyond the last one of H are left out.
   void AddTo(const std::vector<int>& columns, Eigen::MatrixXd* H, Eigen::VectorXd* g) const;
-  // All of H, one pose after the other.
+  // The full H, one pose after the other.
   Eigen::MatrixXd Information() const;
-  // The point's own step for the step of all columns.
+  // The point's step that belongs to the step of all columns.
   Eigen::Vector3d Step(const std::vector<int>& columns, const Eigen::VectorXd& step) const;
 
  private:
-  // Of H's block of two poses, C.
+  // C of H's block for poses a and b.
   Eigen::Matrix3d Coupling(size_t a, size_t b) const;
 };
 
-// At a state in which no point is behind a camera that sees it. `damping`: Levenberg-Marquardt's,
+// Requires that the point is behind no camera that sees it. `damping`: Levenberg-Marquardt damping
 // of the point.
 void Eliminate(const HostedPoint& hosted, const Eigen::Vector3d& point,
                const std::vector<PosedCamera>& cameras, double kappa, const RobustLoss& loss,

@@ -32,7 +32,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   JointBaResult result;
   result.inlier.assign(matches.size(), true);
   double chi2_sum = 0;
-  // Round one finds the outliers, round two is the estimate.
+  // The first round finds the outliers, the second one gives the estimate.
   constexpr double kLossScale = 2.0;  // sigmas
   for (const auto loss : {RobustLoss::Kind::kCauchy, RobustLoss::Kind::kHuber}) {
     if (!problem.Solve(matches, result.inlier, {.kind = loss, .scale = kLossScale})) {
@@ -47,7 +47,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   if (!marginals || result.num_inlier_observations == 0) {
     return std::nullopt;
   }
-  // chi2 is in sigmas of each corner's own octave; two dimensions an observation.
+  // chi2 is in sigmas of each corner's own octave; an observation has two dimensions.
   const double variance = chi2_sum / (2.0 * result.num_inlier_observations);
   result.rms_px = options.pixel_sigma * std::sqrt(2.0 * variance);
 
@@ -55,7 +55,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   const Rigid3 T_w_Kc = problem.NewestPose(kSideC);
   result.T_m_c = T_w_Kc * windows.c.T_w_body.back().Inverse();
   result.T_Km_Kc = T_w_Km.Inverse() * T_w_Kc;
-  // From the window's axes to Km's; its origin is Km's already.
+  // Rotate the covariance from the window's axes to Km's; the origin is Km's already.
   Matrix6d rotation = Matrix6d::Zero();
   rotation.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
   rotation.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
@@ -65,7 +65,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   Vector6d floor;
   floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(rotation_floor);
   const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {
-    // Never smaller than the residuals say.
+    // Scale up if the residuals are larger than expected.
     Matrix6d rotated = std::max(1.0, variance) * rotation * covariance * rotation.transpose();
     rotated.diagonal() += floor.cwiseAbs2();
     return rotated;

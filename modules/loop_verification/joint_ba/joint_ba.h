@@ -1,15 +1,17 @@
 #pragma once
 
-// The paper's local window optimisation (section IV.D, figure 2): both windows' points reprojected
-// into the other window's keyframes, over the relative pose, with what is uncertain beside it:
+// The paper's local window optimisation (section IV.D, figure 2): both windows' points are
+// reprojected into the other window's keyframes, to estimate the relative pose jointly with all
+// other uncertain variables:
 //
 //   min  sum rho(|r_reprojection|^2) + |r_point|^2 + |r_edge|^2 + |r_scale|^2
 //
-// over T_Km_Kc and the other keyframes' poses (held by their odometry edges with the covariances
-// the odometry gave), the points (bearing and inverse depth, with priors), and one scale a window:
-// depths and edges of one odometry share a scale error that their own variances do not show.
-// So the covariance of T_Km_Kc counts all of it. The pixel noise of a point's host corner enters
-// once however many keyframes see the point: matches of one landmark are not independent.
+// over T_Km_Kc, the other keyframes' poses (constrained by odometry edges with the odometry's
+// covariances), the points (bearing and inverse depth, with priors), and one scale per window:
+// depths and edges of one odometry share a scale error that their own variances do not contain. So
+// the covariance of T_Km_Kc includes all these uncertainties. The pixel noise of a point's host
+// corner enters only once, however many keyframes see the point: matches of one landmark are not
+// independent.
 
 #include <optional>
 #include <vector>
@@ -18,19 +20,19 @@
 
 namespace pangea {
 
-// Share by which a window may be larger than its odometry says.
+// Relative sigma of a window's scale, if its map is metric.
 inline constexpr double kWindowScaleSigma = 0.01;
 
 struct JointBaOptions {
   double pixel_sigma = 1.0;  // of a corner on octave 0
-  // What all corners of a view share and no number of them averages out: calibration, blur, the
-  // correlated errors of one odometry's depths. A rotation by so many pixels, and the sideways step
-  // that looks the same at the points' median distance.
+  // Systematic error that all corners of a view share and that does not average out: calibration,
+  // blur, correlated depth errors of one odometry. It adds a rotation of this many pixels, and the
+  // translation with the same effect at the median distance of the points.
   double systematic_px = 0.2;
-  double max_chi2 = 9.2;            // of an inlier: 99 % of 2 degrees of freedom
-  double max_depth_chi2 = 10.8;     // of a point's depth against its prior: 99.9 % of one
-  int sure_hamming = kSureHamming;  // a landmark is sure that is so alike in one match
-  int iterations = 8;               // each of the two rounds
+  double max_chi2 = 9.2;            // of an inlier: 99 %, 2 degrees of freedom
+  double max_depth_chi2 = 10.8;     // of a depth against its prior: 99.9 %, 1 degree of freedom
+  int sure_hamming = kSureHamming;  // a landmark is sure if a match has at most this distance
+  int iterations = 8;               // in each of the two rounds
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -47,19 +49,19 @@ struct JointBaOptions {
 };
 
 struct JointBaResult {
-  Rigid3 T_m_c;                                // windows
+  Rigid3 T_m_c;                                // between the window frames
   Rigid3 T_Km_Kc;                              // bodies of the newest keyframes
   Matrix6d covariance = Matrix6d::Identity();  // of T_Km_Kc, in Km's body frame
-  // The same if the landmark that says most were not there.
+  // The same without the single landmark that contributes most.
   Matrix6d covariance_without_one = Matrix6d::Identity();
-  // The same if there were none but sure landmarks; nothing when they do not fix the pose.
+  // The same with sure landmarks alone; empty if they do not determine the pose.
   std::optional<Matrix6d> covariance_of_sure;
-  std::vector<bool> inlier;  // by match
+  std::vector<bool> inlier;  // per match
   int num_inlier_observations = 0;
   double rms_px = 0;  // of the inliers, in pixels of octave 0
 };
 
-// Nothing when the problem degenerates.
+// Empty if the problem is degenerate.
 std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
                                           const std::vector<PointMatch>& matches,
                                           const Rigid3& T_m_c, const JointBaOptions& options);

@@ -12,7 +12,7 @@
 
 namespace pangea {
 
-// Two walks through one room, and what matches from the true alignment; all are inliers.
+// Two walks through one room, and the matches found with the true alignment; all are inliers.
 class JointBaTestWindows : public testing::Test {
  protected:
   JointBaTestWindows() {

@@ -11,8 +11,8 @@
 namespace pangea {
 namespace {
 
-// Adds a little to an odometry edge's covariance: no odometry is better than this, and a singular
-// matrix has no root.
+// Adds a small value to an odometry edge's covariance: no odometry is more accurate, and the matrix
+// must be invertible.
 Matrix6d Floored(const Matrix6d& covariance) {
   constexpr double kTranslation_m = 2e-4, kRotation_rad = 5e-5;
   Matrix6d floored = covariance;
@@ -70,7 +70,7 @@ int JointProblem::Frame(int side, int window_frame) const {
   return window_frame == num_c - 1 ? 0 : window_frame + 1;
 }
 
-// Windows of one map have its unknown scale in common.
+// Two windows of one map share its unknown scale, so only their difference counts.
 double JointProblem::ScaleSigma(int side) const {
   const Keyframe& newest = windows_[side]->newest_keyframe();
   const bool of_one_map = newest.id.map == windows_[1 - side]->newest_keyframe().id.map;
@@ -99,7 +99,7 @@ bool JointProblem::Solve(const std::vector<PointMatch>& matches, const std::vect
   if (!std::isfinite(Cost(state_, loss))) {
     return false;
   }
-  // A step that promises less than a fifth of a sigma of one direction is the last.
+  // Stop at a predicted decrease below 0.02: a step of a fifth of a sigma in one direction.
   const LevenbergMarquardtOptions options = {.max_iterations = options_.iterations,
                                              .max_retries = 6,
                                              .min_decrease = 0.02,
@@ -207,7 +207,7 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
                                        double damping) {
   const int n = num_columns();
   JointEquations out;
-  // Without the held frame's columns, which are behind all others.
+  // Without the columns of the fixed frame, which come last.
   out.H.setZero(n, n);
   out.g.setZero(n);
   out.cost = Cost(state, loss);

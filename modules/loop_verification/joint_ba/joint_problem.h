@@ -1,11 +1,11 @@
 #pragma once
 
-// The problem that SolveJointBa builds and solves twice, and what its solution knows of the newest
-// keyframe's pose (joint_ba.h). Internal to the alignment.
+// The least-squares problem that SolveJointBa builds and solves twice, and the marginal covariance
+// of the newest keyframe's pose (joint_ba.h). Internal to the alignment.
 //
-// Frames are counted through both windows: c's newest, c's others, m's others, and at last m's
-// newest, which is held. The normal equations have six columns for each but the last, then both
-// scales.
+// Frames are numbered through both windows: c's newest, c's others, m's others, and last m's
+// newest, which is fixed. The normal equations have six columns for each frame but the last, then
+// the two scales.
 
 #include <Eigen/Core>
 #include <array>
@@ -20,26 +20,26 @@
 
 namespace pangea {
 
-// Whose points and poses: the match's window or the query's.
+// The window of a point or pose: the match's or the query's.
 constexpr int kSideM = 0, kSideC = 1;
 
-// Of the window that holds the match's point.
+// The side of the window that holds the match's point.
 inline int HolderSide(const PointMatch& match) {
   return match.direction == Direction::kForward ? kSideM : kSideC;
 }
 
 struct JointState {
-  std::vector<Rigid3> T_w_body;         // of each frame; w: window m's axes
-  std::array<double, 2> log_scale{};    // of each side
+  std::vector<Rigid3> T_w_body;         // per frame; w: frame of window m
+  std::array<double, 2> log_scale{};    // per side
   std::vector<Eigen::Vector3d> points;  // (x, y, inverse depth)
 
-  // All of it is what a step moves (core/least_squares/levenberg_marquardt.h).
+  // For levenberg_marquardt.h: the estimate is the whole state.
   JointState Estimate() const { return *this; }
   void SetEstimate(JointState estimate) { *this = std::move(estimate); }
 };
 
-// The cost's derivatives by the frames' errors, points eliminated:
-// cost(state (+) e) ~ cost + g^T e + 1/2 e^T H e. Of H the lower triangle.
+// Derivatives of the cost with respect to the frames' errors e, points eliminated: cost(state (+)
+// e) ~ cost + g^T e + 1/2 e^T H e. Only the lower triangle of H is set.
 struct JointEquations {
   double cost = 0;
   Eigen::MatrixXd H;
@@ -52,13 +52,13 @@ class JointProblem {
   JointProblem(const JointProblem&) = delete;
   JointProblem& operator=(const JointProblem&) = delete;
 
-  // Builds the problem over the matches `use` names and solves it, from where the last solve ended.
-  // False when a point is behind a camera from the start.
+  // Builds the problem from the matches with `use`, and solves it, starting at the last solution.
+  // False if a point is behind a camera at the start.
   bool Solve(const std::vector<PointMatch>& matches, const std::vector<bool>& use,
              const RobustLoss& loss);
 
-  // Squared residuals of the matches in use; a point whose depth denies its prior counts as far
-  // off in all its matches.
+  // Decides which of the matches in use are inliers, and sums the inliers' squared residuals. If a
+  // point's depth contradicts its prior, all its matches are outliers.
   void Classify(std::vector<bool>* inlier, double* chi2_sum) const;
 
   Rigid3 NewestPose(int side) const {
@@ -66,16 +66,17 @@ class JointProblem {
   }
 
   // Marginal covariances of the newest c keyframe's pose, in window m's frame: the inverse of the
-  // Schur complement of the points in J^T J. Of all, without the landmark that says most, and of
-  // the sure landmarks alone.
+  // Schur complement of the points in J^T J. With all landmarks, without the landmark that
+  // contributes most, and with the sure landmarks alone. Empty if one of the first two is
+  // undetermined.
   struct Marginals {
     Matrix6d all, without_one;
-    std::optional<Matrix6d> of_sure;  // nothing when they do not fix it
+    std::optional<Matrix6d> of_sure;  // empty if undetermined
   };
   std::optional<Marginals> MarginalsOfNewestC(const std::vector<PointMatch>& matches,
                                               const std::vector<bool>& use);
 
-  // The last problem's pieces, for tests against another solver.
+  // The parts of the last problem, for tests against another solver.
   struct Edge {
     int from = 0, to = 0, side = 0;
     EdgeResidual residual;
@@ -92,24 +93,24 @@ class JointProblem {
   int num_frames() const { return static_cast<int>(T_body_cam_.size()); }
   int num_columns() const { return 6 * (num_frames() - 1) + 2; }
   int ScaleColumn(int side) const { return 6 * (num_frames() - 1) + side; }
-  // The held frame's are behind all others.
+  // The fixed frame's columns come after all others.
   int PoseColumn(int frame) const { return 6 * frame + (frame == num_frames() - 1 ? 2 : 0); }
   int Frame(int side, int window_frame) const;
 
   std::vector<PosedCamera> Cameras(const JointState& state) const;
   std::vector<int> ColumnsOf(const HostedPoint& point) const;
-  // By the last linearisation's points.
+  // Uses the eliminated points of the last linearisation.
   void Move(const Eigen::VectorXd& step, JointState* state) const;
 
   void AddMatch(const PointMatch& match, size_t index, double share);
   std::vector<bool> MutualMatches(const std::vector<PointMatch>& matches,
                                   const std::vector<bool>& use) const;
-  // The points that matches join into one landmark of both windows together, and whether one of
-  // these matches is sure.
+  // Groups the points that matches connect into one landmark of both windows, and marks a group as
+  // sure if one of its matches is.
   std::vector<JoinedPoints> Landmarks(const std::vector<PointMatch>& matches,
                                       const std::vector<bool>& use) const;
 
-  // The other window's landmark that the match's corner is, or -1.
+  // The landmark, in the observing window, of the match's corner; or -1.
   int Other(const PointMatch& match) const {
     return windows_[1 - HolderSide(match)]
         ->landmark_of_corner[match.observed.frame][match.observed.corner];
@@ -119,12 +120,12 @@ class JointProblem {
   JointBaOptions options_;
   std::vector<Rigid3> T_body_cam_;  // of each frame
   std::vector<Edge> edges_;
-  // By side and landmark: where the last solve left it, and its index in points_ or -1.
+  // By side and landmark: the result of the last solve, and the index in points_ or -1.
   std::array<std::vector<Eigen::Vector3d>, 2> solved_;
   std::array<std::vector<int>, 2> index_;
-  std::vector<HostedPoint> points_;          // those that matches use
-  std::vector<std::vector<int>> columns_;    // of each
-  std::vector<EliminatedPoint> eliminated_;  // each, in the last linearisation
+  std::vector<HostedPoint> points_;          // points with matches in use
+  std::vector<std::vector<int>> columns_;    // of each point
+  std::vector<EliminatedPoint> eliminated_;  // per point, from the last linearisation
   JointState state_;
 };
 

@@ -17,17 +17,17 @@ double PositionSigma(const Matrix6d& covariance) {
   return LargestSigma(covariance.topLeftCorner<3, 3>());
 }
 
-// Where the rest of the view leaves a direction open, one near point decides it, right or wrong:
-// it was looked for where the guess had it, and whatever was found there fits. So of what is
-// known in the worst direction no landmark may say more than all others together.
+// If the rest of the view leaves a direction undetermined, a single near point determines it, right
+// or wrong: it was searched near its predicted position, so whatever was found there fits. So in
+// the worst direction no landmark may contribute more information than all others together.
 bool OneSaysMost(Verification* v) {
   return !v->AtMost("sigma without one", PositionSigma(v->ba->covariance_without_one),
                     std::numbers::sqrt2 * PositionSigma(v->ba->covariance));
 }
 
-// One wrong match can be found out; two or three together, all near, agree. They are looked for
-// where the guess has them, so they fit, but they look alike only vaguely: what is surely the
-// same must keep the promise without them.
+// One wrong match can be detected, but two or three near ones may agree. They were searched near
+// their predicted positions, so they fit, but their descriptors are only vaguely similar: the sure
+// landmarks must meet the limit without them.
 bool HangsOnVagueMatches(Verification* v, double max_sigma_m) {
   constexpr double kNotFixed_m = 1e3;
   const auto& covariance = v->ba->covariance_of_sure;
@@ -35,7 +35,8 @@ bool HangsOnVagueMatches(Verification* v, double max_sigma_m) {
                     max_sigma_m);
 }
 
-// Distinct ones, and the image cells that they occupy in one of the two keyframes.
+// Number of distinct inlier landmarks, and of the image cells that they occupy in one of the two
+// keyframes.
 struct InlierCounts {
   size_t landmarks = 0;
   size_t cells = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the joint bundle adjustment must reach.
+// The joint bundle adjustment, and the requirements on its result.
 
 #include "loop_verification/steps/verification.h"
 
@@ -9,7 +9,7 @@ namespace pangea {
 struct InlierOptions {
   int min_inliers = 16;           // distinct landmarks
   double min_inlier_ratio = 0.5;  // of the matches the BA used
-  int min_occupied_cells = 6;     // of 6 x 4, in one of the two keyframes
+  int min_occupied_cells = 6;     // of 6 x 4 image cells, in one of the two keyframes
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -21,9 +21,10 @@ struct InlierOptions {
   }
 };
 
-// Accepted means: nearer to the truth than 0.5 m and 5 degrees. Five standard deviations of the
-// worst direction, as images with few points err more often than a normal distribution says.
-// Sure landmarks alone must keep it in position: vague matches that fit may be wrong ones.
+// An accepted constraint should have an error below 0.5 m and 5 degrees. These are five standard
+// deviations in the worst direction, because images with few points have large errors more often
+// than a normal distribution. The position must also meet max_sigma_m with sure landmarks alone:
+// vague matches that fit may be wrong.
 struct CertaintyOptions {
   double max_sigma_m = 0.1;
   double max_sigma_rad = 0.0175;
@@ -35,8 +36,8 @@ struct CertaintyOptions {
   }
 };
 
-// Between the poses of the view's two halves: 99.9 % of 6 degrees of freedom. What a real lens and
-// a real IMU add is not in the covariances, so 99 % refused many right ones
+// Limit between the poses of the view's two halves: 99.9 %, 6 degrees of freedom. The covariances
+// lack the errors of a real lens and IMU, so a limit of 99 % refused many correct constraints
 // (docs/decisions/real_revisits.md).
 struct HalvesOptions {
   double max_halves_chi2 = 22.5;
@@ -48,17 +49,18 @@ struct HalvesOptions {
   }
 };
 
-// Projection search in all keyframes, fundamental matrix, and the bundle adjustment itself.
+// Runs the projection search in all keyframes, the fundamental-matrix filter, and the bundle
+// adjustment.
 std::string Optimise(const InlierOptions& options, Verification* verification);
 
 std::string CheckInliers(const InlierOptions& options, Verification* verification);
 std::string CheckCertainty(const CertaintyOptions& options, Verification* verification);
 
-// The left and the right half of what both see, each solved alone. A rotation of the view and a
-// step to the side look alike over a narrow field; matches that are a little off then give a pose
-// far off, which gravity does not contradict and the residuals do not show. But it differs from
-// half to half. What both halves take from the odometries counts twice: the test lets pass too
-// much rather than too little.
+// Solves the left and the right half of the common view separately and compares the poses. In a
+// narrow field of view, a rotation and a sideways step look alike: slightly wrong matches then give
+// a very wrong pose, which neither gravity nor the residuals reveal. But this pose differs between
+// the halves. Both halves use the same odometry, whose covariance is thus counted twice: the test
+// is too tolerant rather than too strict.
 std::string CheckHalves(const HalvesOptions& options, Verification* verification);
 
 }  // namespace pangea

@@ -19,13 +19,13 @@ std::vector<PointMatch> FirstMatches(const Verification& v) {
   return Distinct(matches);
 }
 
-// In the window's axes.
+// Unit ray of a corner of the newest keyframe, in the window's axes.
 Eigen::Vector3d UnitRay(const Window& window, int corner) {
   const Eigen::Vector2d ray = window.frames.back()->ray(corner);
   return window.T_w_cam.back().q * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized();
 }
 
-// Radians.
+// Sigma of the ray, radians.
 double CornerAngleSigma(const Window& window, int corner) {
   const Keyframe& keyframe = window.newest_keyframe();
   return CornerSigma(keyframe.corners[corner], kCornerSigma_px) * keyframe.camera.PixelAngle();

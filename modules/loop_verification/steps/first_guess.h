@@ -1,6 +1,6 @@
 #pragma once
 
-// The first pose: PnP of the candidate's matched corners and the nearest descriptors.
+// The first pose: PnP on the candidate's matched corners and on nearest descriptors.
 
 #include "loop_verification/steps/verification.h"
 

@@ -1,19 +1,19 @@
 #pragma once
 
-// Roll and pitch between two gravity-aligned frames are zero within what the odometries say.
-// Guesses are led by it loosely, so that a wrong one is not bent into what gravity allows; what
-// the images alone say in the end must agree with it: 99 % of 2 degrees of freedom. The
-// odometries' claims do not count how well each knows its camera's rotation in its body; real
-// ones know it to a quarter of a degree (docs/decisions/loop_verification.md).
+// Roll and pitch between two gravity-aligned frames must be zero within the odometries'
+// covariances. Initial poses have only a weak gravity prior, so that a wrong pose is not forced to
+// agree with gravity. The final pose, from the images alone, must agree (99 %, 2 degrees of
+// freedom). The odometries' covariances do not contain the error of the camera's rotation in the
+// body; for real sensors it is a quarter of a degree (docs/decisions/loop_verification.md).
 
 #include "loop_verification/steps/verification.h"
 
 namespace pangea {
 
 struct GravityOptions {
-  double gravity_floor = 0.005;  // radians, of each odometry, at the end
+  double gravity_floor = 0.005;  // radians, minimum sigma of each odometry's tilt
   double max_tilt_chi2 = 9.2;
-  double max_tilt = 0.06;  // radians, whatever the odometries say
+  double max_tilt = 0.06;  // radians, for any covariance
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -26,8 +26,8 @@ struct GravityOptions {
   }
 };
 
-// Of roll or pitch between the two odometries, radians^2; each knows gravity no better than
-// `floor`.
+// Variance of roll or pitch between the two odometries, radians^2. `floor`: added sigma of each
+// odometry, radians.
 double TiltVariance(const WindowPair& windows, double floor);
 
 std::string CheckGravity(const GravityOptions& options, Verification* verification);

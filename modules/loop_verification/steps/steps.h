@@ -1,11 +1,11 @@
 #pragma once
 
-// All that a candidate must pass, in this order, and the options of all. The cheap steps come
-// first: a bad candidate dies in the first two.
+// The list of steps that a candidate must pass, in this order, and their options. Cheap steps come
+// first: most bad candidates are refused by the first two.
 //
-// Each step reads and writes the Verification, and returns why it refuses, or an empty string. A
-// new one is a function with an options struct of its own, and its lines here. What it measures by
-// AtLeast and AtMost, `pangea-log explain` shows.
+// Each step reads and writes the Verification, and returns the reason of a refusal, or an empty
+// string. To add a step, write a function with its own options struct, and list both here.
+// `pangea-log explain` shows the values that a step compares by AtLeast and AtMost.
 
 #include <string_view>
 
@@ -17,7 +17,7 @@
 
 namespace pangea {
 
-// The steps' options side by side: on disk and in captures all keys stand at one level.
+// The options of all steps; in files and recorded sessions, all keys are on one level.
 struct LoopVerificationOptions : CommonStepOptions,
                                  FirstGuessOptions,
                                  ViewOptions,
@@ -44,7 +44,7 @@ struct VerificationStep {
   std::string (*run)(const LoopVerificationOptions& options, Verification* verification);
 };
 
-// A step that sees only its own options.
+// Adapts a step that takes only its own options.
 template <auto kStep>
 std::string Run(const LoopVerificationOptions& options, Verification* verification) {
   return kStep(options, verification);

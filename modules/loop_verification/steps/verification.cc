@@ -58,7 +58,7 @@ std::vector<PointMatch> Verification::InlierMatches() const {
 
 std::string CheckGate(const CommonStepOptions& /*options*/, Verification* verification) {
   const auto& [m, c] = verification->windows;
-  // A window's frame is its odom, moved to the newest keyframe.
+  // A window frame is the odom frame, shifted to the newest keyframe's body.
   const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(), m.newest_keyframe().T_odom_body.t);
   const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(), c.newest_keyframe().T_odom_body.t);
   const Rigid3& T_m_c = verification->ba ? verification->ba->T_m_c : verification->pose.T_m_c;

@@ -1,6 +1,6 @@
 #pragma once
 
-// One candidate on its way through the steps (steps.h): what they are given, and what they hand on.
+// The state of one candidate in the steps (steps.h): their common input and their results.
 
 #include <functional>
 #include <optional>
@@ -18,7 +18,7 @@
 
 namespace pangea {
 
-// Of what several steps use.
+// Options that several steps use.
 struct CommonStepOptions {
   WindowOptions window;
   JointBaOptions ba;
@@ -30,36 +30,35 @@ struct CommonStepOptions {
   }
 };
 
-// A value that a step demands something of.
+// A value that a step compares with a limit.
 struct Measurement {
-  std::string_view step;    // its name in the list
+  std::string_view step;    // its name in kVerificationSteps
   std::string_view option;  // the limit's name
   double value = 0;
-  bool at_least = false;  // else at most
+  bool at_least = false;  // true: value >= limit is required; false: value <= limit
   double limit = 0;
 };
 
-// What the steps saw, beside the verification result: for tests, for choosing the options, and for
-// people.
+// Details of a verification beside its result: for tests, for tuning the options, and for people.
 struct LoopVerificationReport {
-  std::string_view refused_by;        // the step's name
+  std::string_view refused_by;        // name of the refusing step
   std::vector<Measurement> measured;  // in the order of the steps
-  std::vector<ShownMatch> first;      // the candidate's and the nearest descriptors'; PnP's inliers
-  std::vector<ShownMatch> found;      // by projection, in the two keyframes; inliers of the BA
+  std::vector<ShownMatch> first;      // candidate's matches and nearest descriptors; inliers of PnP
+  std::vector<ShownMatch> found;      // by projection, in the two keyframes; inliers of BA
 
-  // The last that was measured for this limit; 0 where no step came to it.
+  // The last value compared with this limit; 0 if no step has compared one.
   double Measured(std::string_view option) const;
 };
 
-// A further gate of the caller's kind; an empty string lets pass. `T_odom_m_odom_c` is the
-// alignment of the two maps' odom frames.
+// A gate supplied by the caller: returns the reason of a refusal, or an empty string.
+// `T_odom_m_odom_c` is the alignment of the two odom frames.
 using LoopVerificationGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
 
-// What a candidate is verified from. They go back further than the windows.
+// The keyframes for a verification. They reach further back than the windows.
 struct CandidateKeyframes {
   KeyframeWindow m;        // ends with the match
   KeyframeWindow c;        // ends with the query
-  KeyframeWindow after_m;  // behind the match: they help to triangulate its corners
+  KeyframeWindow after_m;  // following the match: help to triangulate its corners
 };
 
 struct Verification {
@@ -77,26 +76,26 @@ struct Verification {
 
   std::vector<PointMatch> first_matches;
   std::optional<UprightPnpResult> pnp;
-  PoseEstimate pose;                // the guess, refined
-  std::vector<PointMatch> matches;  // that the BA used
+  PoseEstimate pose;                // the current estimate, before the bundle adjustment
+  std::vector<PointMatch> matches;  // used by the BA
   std::optional<JointBaResult> ba;
-  std::string_view step;  // that looks at it now
+  std::string_view step;  // name of the running step
   LoopVerificationReport report;
 
-  // Whether the value is as demanded; it goes into the report.
+  // Whether the value meets the limit; also records it in the report.
   bool AtLeast(std::string_view option, double value, double limit);
   bool AtMost(std::string_view option, double value, double limit);
 
   std::vector<PointObservation> Observations(const std::vector<PointMatch>& of) const;
-  // Of the matches the BA used.
+  // Share of inliers among the matches that the BA used.
   double inlier_ratio() const;
   std::vector<PointMatch> InlierMatches() const;
 };
 
-// What the caller's gate says to the present alignment.
+// Applies the caller's gate to the present alignment.
 std::string CheckGate(const CommonStepOptions& options, Verification* verification);
 
-// Standard deviation in the worst direction.
+// Standard deviation in the direction where it is largest.
 double LargestSigma(const Eigen::Matrix3d& covariance);
 
 }  // namespace pangea

@@ -1,7 +1,7 @@
 #pragma once
 
-// Two keyframes that see the same: the angle between their lines of sight (for level cameras the
-// paper's yaw; a camera that looks down may be rotated any way), and their distance.
+// Limits for two keyframes with a common view: the angle between their optical axes (for level
+// cameras this is the paper's yaw; a camera that looks down may have any yaw), and their distance.
 
 #include "loop_verification/steps/verification.h"
 

@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-constexpr int kVisibilityStride = 3;  // every third keyframe along the way is looked into
+constexpr int kVisibilityStride = 3;  // every third keyframe on the way is searched
 constexpr char kContradicted[] = "the surroundings contradict";
 
 }  // namespace
@@ -37,8 +37,8 @@ void VisibilityCount::Add(const CameraModel& camera, const SearchResult& result)
 
 double VisibilityCount::supported_share() const {
   // Expectation maximisation over the rate and the share. The rate of chance finds is a property of
-  // the search: a corner within its radius, with a descriptor that near by accident. On real images
-  // 0.02 to 0.04, against 0.2 to 0.3 where the alignment is right.
+  // the search: a corner in the search radius has a similar descriptor by accident. On real images
+  // it is 0.02 to 0.04, compared with 0.2 to 0.3 if the alignment is right.
   constexpr double kChanceRate = 0.04, kMinRate = 0.08;
   constexpr int kIterations = 30;
   if (cells_.empty() || found_ == 0) {
@@ -67,7 +67,7 @@ double VisibilityCount::supported_share() const {
 std::string CheckVisibility(const VisibilityOptions& options, Verification* verification) {
   Verification& v = *verification;
   VisibilityCount count;
-  // The second round looks again from the refined pose.
+  // The second round searches again with the refined pose.
   for (int round = 0; round < 2; ++round) {
     std::vector<PointMatch> matches;
     count = {};

@@ -1,13 +1,14 @@
 #pragma once
 
-// Negative evidence: what ought to be seen in a keyframe, were an alignment right, and is not.
+// Negative evidence: points that should be visible in a keyframe if an alignment is right, but are
+// not found.
 //
-// Identical objects at different places align perfectly with each other and with nothing around
-// them. A right alignment finds its points all over the shared view, at whatever rate corners
-// repeat; a wrong one finds them on the object alone. So the image is cut into cells, and the
-// counts of points found in them are explained by a mixture: cells where points are found at one
-// common rate, and cells where they are found by chance only. The share of the first kind is what
-// counts; it does not depend on how well corners repeat.
+// Identical objects at different places align perfectly with each other, but their surroundings do
+// not. A correct alignment finds points all over the common view, at the rate at which corners
+// repeat; a wrong one finds points only on the object. So the image is divided into cells, and the
+// numbers of points found in them are modelled as a mixture: in some cells points are found at one
+// common rate, in the others only by chance. The share of cells of the first kind is tested; it
+// does not depend on how well corners repeat.
 
 #include <vector>
 
@@ -15,10 +16,10 @@
 
 namespace pangea {
 
-// Up to each of the two; not fewer than the window.
+// Number of keyframes up to each of the two; not fewer than in a window.
 inline constexpr int kVisibilityKeyframes = 10;
 
-// First in the two keyframes, then along the way to them.
+// The first four apply to the two keyframes, the last one to the keyframes on the way to them.
 struct VisibilityOptions {
   int min_found = 10;
   int min_comparable = 15;
@@ -40,24 +41,24 @@ struct VisibilityOptions {
   }
 };
 
-// Looks for the points around the guess in the two keyframes themselves, counts what should be
-// there and is not, and refines the guess.
+// Searches the points in the two keyframes themselves near their predicted positions, counts those
+// that should be visible but are not found, and refines the pose.
 std::string CheckVisibility(const VisibilityOptions& options, Verification* verification);
 
-// The same count along the way to the two keyframes, where more than the object before them is in
-// view.
+// The same count in the keyframes on the way to the two, whose views show more than the object
+// alone.
 std::string CheckWiderVisibility(const VisibilityOptions& options, Verification* verification);
 
 class VisibilityCount {
  public:
-  // One direction's search in one keyframe.
+  // Adds the result of one search in one keyframe.
   void Add(const CameraModel& camera, const SearchResult& result);
 
-  int comparable() const { return comparable_; }  // points that ought to be found
+  int comparable() const { return comparable_; }  // points that should be found
   int found() const { return found_; }
   double found_share() const { return comparable_ == 0 ? 0.0 : double(found_) / comparable_; }
-  // The share of cells where points are found at the common rate; the rest contradicts, or is
-  // hidden.
+  // The share of cells in which points are found at the common rate; the others contradict the
+  // alignment, or are occluded.
   double supported_share() const;
 
  private:
@@ -70,7 +71,7 @@ class VisibilityCount {
   std::vector<Cell> cells_;
 };
 
-// Image cells, 6 x 4.
+// Index of the image cell (6 x 4) of a pixel.
 int ImageCell(const CameraModel& camera, const Eigen::Vector2d& pixel);
 
 }  // namespace pangea
