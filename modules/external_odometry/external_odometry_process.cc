@@ -29,8 +29,8 @@ ExternalOdometryProcess::ExternalOdometryProcess(Bus& bus, int32_t agent_id,
   });
 }
 
-// As an even motion would have it, within what a body can be accelerated. Images that are left out
-// are no loss: the odometry has seen them.
+// Whether the pose continues the motion of the last one. A time without images is not a loss of
+// tracking: the odometry may have processed more images than it passes on.
 bool ExternalOdometryProcess::GoesOn(const Step& now) const {
   const double dt = 1e-6 * static_cast<double>(now.utime - last_->utime);
   const Eigen::Vector3d off = now.T_odom_body.t - last_->T_odom_body.t - last_->v_odom_body * dt;

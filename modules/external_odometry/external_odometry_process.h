@@ -1,12 +1,12 @@
 #pragma once
 
-// An odometry that is not ours as an agent on a bus: images and the poses it has for them in.
-//   POSE_k at every image, KEYFRAME_k once each, STATUS_external_odometry_k at 1 Hz out;
-//   CORRECTION_k in; HAVE, RESEND_REQUEST in and AGAIN_<requester> out as in
+// Makes an agent of an external odometry: images and their poses in, an agent's messages out.
+//   Out: POSE_k at every image, KEYFRAME_k once each, STATUS_external_odometry_k at 1 Hz.
+//   In: CORRECTION_k; HAVE, RESEND_REQUEST (with answers on AGAIN_<requester>) as in
 //   reliable_keyframe_publisher.h
 //
-// Such an odometry may find itself again elsewhere after it was lost, or correct itself by a jump.
-// Neither is motion: a new map begins.
+// After it was lost, such an odometry may continue elsewhere, or correct itself by a jump. A jump
+// is not motion, so it begins a new map.
 
 #include <cstdint>
 #include <functional>
@@ -24,23 +24,24 @@ namespace pangea {
 class ExternalOdometryProcess : public Process {
  public:
   static constexpr size_t kKeptKeyframes = 200;
-  // Lost for longer, what comes is a new map.
+  // If the odometry is lost for longer, the next pose begins a new map.
   static constexpr int64_t kMaxLost_us = 500'000;
-  // What a hand, or a drone, does not do: away from an even motion by more than this, and this over
-  // the square of the time; or a rotation that is faster.
+  // A pose is a jump if it deviates from a constant velocity by more than kMaxStep_m +
+  // kMaxAcceleration * dt^2, or if it rotates faster than kMaxRotation.
   static constexpr double kMaxStep_m = 0.1;
   static constexpr double kMaxAcceleration = 20;  // m/s^2
   static constexpr double kMaxRotation = 10;      // rad/s
 
-  // `open_map` gives each map's opened_utime, growing; `now_utime`: wall clock.
+  // `open_map` returns the opened_utime of each new map, ascending. `now_utime`: wall clock.
   ExternalOdometryProcess(Bus& bus, int32_t agent_id, const CameraModel& camera,
                           std::function<int64_t()> open_map, int64_t now_utime);
 
-  // 8-bit grey, in time order. `T_odom_body`: z up; nothing while the odometry is lost. The
-  // keyframe that it became, if it did: published.
+  // `image`: 8-bit grey, with ascending `utime`. `T_odom_body`: the z axis of odom points up; empty
+  // while the odometry is lost. Returns the keyframe if the image became one; it is already
+  // published.
   std::optional<Keyframe> AddImage(int64_t utime, const cv::Mat& image,
                                    const std::optional<Rigid3>& T_odom_body);
-  // What comes next is a new map.
+  // The next pose begins a new map.
   void StartAnew() { maker_.reset(); }
 
   void Tick(int64_t now_utime) override;
@@ -64,9 +65,9 @@ class ExternalOdometryProcess : public Process {
   ReliableKeyframePublisher publisher_;
   vio::ShownPose shown_;
   MapId map_;
-  std::optional<KeyframeMaker> maker_;  // of this map; none: the next pose opens one
-  std::optional<Step> last_;            // of this map
-  bool lost_ = false;                   // since then
+  std::optional<KeyframeMaker> maker_;  // for this map; empty: the next pose begins one
+  std::optional<Step> last_;            // the last pose of this map
+  bool lost_ = false;                   // since last_
   int64_t next_status_utime_ = 0;
 };
 

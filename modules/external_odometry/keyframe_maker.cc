@@ -26,7 +26,7 @@ std::optional<Keyframe> KeyframeMaker::Add(int64_t utime, const cv::Mat& image,
       last_ ? T_odom_cam.q.conjugate() * (last_->T_odom_body * camera_.T_body_cam).q
             : Eigen::Quaterniond::Identity();
   const vio::TrackedFrame& frame = tracker_.Track(utime, image, q_cam_lastcam);
-  std::map<int32_t, std::deque<Observation>> seen;  // tracks that ended are forgotten
+  std::map<int32_t, std::deque<Observation>> seen;  // drops the tracks that ended
   for (const vio::Observation& observation : frame.observations) {
     auto& observations = seen[observation.landmark_id];
     if (const auto known = observations_.find(observation.landmark_id);
@@ -51,7 +51,7 @@ std::optional<Keyframe> KeyframeMaker::Add(int64_t utime, const cv::Mat& image,
 
 bool KeyframeMaker::IsDue(const Step& now) const {
   if (!last_keyframe_) {
-    return last_.has_value();  // the first has a velocity and tracks
+    return last_.has_value();  // the first keyframe needs a velocity and tracks
   }
   const Rigid3 step = last_keyframe_->T_odom_body.Inverse() * now.T_odom_body;
   return step.t.norm() > options_.keyframe_distance_m ||
@@ -72,7 +72,7 @@ Keyframe KeyframeMaker::Make(const cv::Mat& image, const vio::TrackedFrame& fram
   keyframe.roll_pitch_covariance =
       Eigen::Matrix2d::Identity() * options_.tilt_sigma * options_.tilt_sigma;
   if (last_keyframe_) {
-    // An odometry that knows its own covariance sends that instead.
+    // If your odometry estimates a covariance, use that instead.
     const Eigen::Matrix3d R_from_odom = last_keyframe_->T_odom_body.R().transpose();
     const Eigen::Vector3d sigmas_odom(options_.tilt_sigma, options_.tilt_sigma,
                                       options_.edge_sigma_yaw);
@@ -128,7 +128,8 @@ std::optional<MapPoint> KeyframeMaker::Triangulate(int corner, const Corner& of,
     }
     inverse_depth = std::max(kMinInverseDepth, inverse_depth - gradient / information);
   }
-  constexpr double kMaxMeanError = 4;  // of two dimensions: beyond is no static point
+  // chi-squared, 2 dimensions: beyond it the point is not static
+  constexpr double kMaxMeanError = 4;
   const double deviation = 1 / std::sqrt(information);
   if (error / static_cast<double>(observations.size() - 1) > kMaxMeanError ||
       deviation > options_.max_relative_sigma * inverse_depth) {

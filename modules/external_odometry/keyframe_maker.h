@@ -1,11 +1,11 @@
 #pragma once
 
-// Any odometry as an agent: images and the poses it has for them in, keyframes out.
+// Makes keyframes from any odometry: images and their poses in, keyframes out.
 //
-// What a server needs of a keyframe beside its pose: corners with descriptors, map points with
-// depths, and how far to trust the step from the keyframe before. Features are followed by the
-// project's own tracker and described by its own describer, since corners match only if they are
-// described the same way; depths are triangulated with the given poses.
+// Beside the pose, the server needs corners with descriptors, map points with depths, and an
+// odometry edge with covariance from the previous keyframe. Features are tracked and described by
+// the project's own tracker and describer, since corners match only if they are described the same
+// way. Depths are triangulated with the given poses.
 
 #include <Eigen/Core>
 #include <deque>
@@ -20,27 +20,27 @@
 namespace pangea {
 
 struct KeyframeMakerOptions {
-  // A keyframe after so much motion, or so long.
+  // A keyframe is made after this distance, this rotation, or this time.
   double keyframe_distance_m = 0.3;
   double keyframe_angle = 0.25;  // radians
   double keyframe_interval_s = 1;
-  // What the odometry errs from one keyframe to the next, standard deviations.
+  // Standard deviations of the odometry's error from one keyframe to the next.
   double edge_sigma_m = 0.01;
   double edge_sigma_yaw = 0.002;    // radians
-  double tilt_sigma = 0.003;        // radians, roll and pitch
-  double triangulation_px = 1.0;    // of a track under the odometry's poses
-  double max_relative_sigma = 0.2;  // of a depth that is worth sending
+  double tilt_sigma = 0.003;        // radians, of roll and pitch
+  double triangulation_px = 1.0;    // sigma of a tracked corner, with the odometry's pose errors
+  double max_relative_sigma = 0.2;  // largest of a depth that is published
 };
 
 class KeyframeMaker {
  public:
-  // `map`: a new one for each run of the odometry, and whenever it starts again.
+  // `map`: must be a new one whenever the odometry starts.
   KeyframeMaker(const MapId& map, const CameraModel& camera, const KeyframeMakerOptions& options);
 
-  // `T_odom_body`: body is the IMU (or any frame that `camera.T_body_cam` refers to); odom's z
-  // points up. In time order. A keyframe when it is time for one.
+  // `T_odom_body`: body is the IMU (or the frame that `camera.T_body_cam` refers to); the z axis of
+  // odom points up. Call with ascending `utime`. Returns a keyframe if one is due.
   std::optional<Keyframe> Add(int64_t utime, const cv::Mat& image, const Rigid3& T_odom_body);
-  // Features in the newest image.
+  // Number of features in the newest image.
   int num_tracked() const { return static_cast<int>(observations_.size()); }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an adjustment leaves of a group: where the next one, which may be local, begins.
+// The result of adjusting a group; the next adjustment, which may be local, starts from it.
 
 #include <map>
 #include <optional>
@@ -11,22 +11,24 @@
 namespace pangea {
 
 struct AdjustedGroup {
-  // Those it knew; nothing for one that was left out. In a map frame of its own.
+  // All keyframes that it knew; the value is empty for one that was left out (redundant). The
+  // states are in a map frame of its own.
   std::map<KeyframeId, std::optional<ImuState>> keyframes;
   std::map<MapId, BaCamera> cameras;
 
   bool Knows(const KeyframeId& id) const { return keyframes.contains(id); }
-  // Null for one that was left out or is not known.
+  // Null for a keyframe that was left out or is unknown.
   const ImuState* Find(const KeyframeId& id) const;
-  // Whether a state has its shape: the same steps from keyframe to keyframe.
+  // Whether a state has the same shape: distances between successive keyframes agree to 0.1 mm.
   bool IsShapeOf(const MapPoses& state) const;
 };
 
-// The same motion where a state, which has the shape of the adjustment, has the keyframe.
+// The adjusted state of a keyframe, moved to the pose `T_map_body`: velocity is rotated along.
 ImuState MovedTo(const Rigid3& T_map_body, const ImuState& adjusted);
 
-// After the adjustment of a world, of a group as `state` has it. `before`: the last one's, for what
-// the world does not have or holds; null if the world is all of the group.
+// The result after adjusting `world`, for a group with the poses `state`. `before`: the previous
+// result, used for keyframes that the world lacks or keeps fixed; null if the world is the whole
+// group.
 AdjustedGroup AfterAdjustment(const BaWorld& world, const MapPoses& state,
                               const AdjustedGroup* before);
 

@@ -14,8 +14,8 @@ Eigen::Map<RowMajor<kRows, kColumns>> AsMatrix(double* jacobian) {
   return Eigen::Map<RowMajor<kRows, kColumns>>(jacobian);
 }
 
-// From the errors of a state's blocks to those of the inertial residual (right-invariant): a
-// rotation carries position and velocity along, e_p = dp + p x dtheta.
+// Converts J from the errors of the inertial residual (right-invariant) to those of the blocks: a
+// rotation error also rotates position and velocity, e_p = dp + p x dtheta.
 RowMajor<15, 7> PoseJacobian(const Eigen::Matrix<double, 15, 15>& J, const ImuState& state) {
   RowMajor<15, 7> J_pose;
   J_pose.leftCols<3>() = J.middleCols<3>(kPosition);

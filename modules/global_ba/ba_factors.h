@@ -1,12 +1,12 @@
 #pragma once
 
-// Residuals of the global bundle adjustment between its blocks, with analytic Jacobians; those of
-// landmarks are in solver/eliminated_landmarks.h.
+// Residuals of the global bundle adjustment, with analytic Jacobians, except those of landmarks
+// (solver/eliminated_landmarks.h).
 //
 // Blocks: a pose T_map_body is 7 doubles (quaternion x y z w, translation) with the project's
 // tangent (dp, dtheta) in the left frame; a motion is 9: velocity in the map frame (m/s), gyro bias
-// (rad/s), accelerometer bias (m/s^2). A factor writes its derivative by a pose's tangent into the
-// first six columns and zero into the seventh.
+// (rad/s), accelerometer bias (m/s^2). A factor writes its derivative with respect to a pose's
+// tangent into the first six columns, and zero into the seventh.
 
 #include <ceres/sized_cost_function.h>
 
@@ -22,8 +22,8 @@ void PoseToBlock(const Rigid3& pose, double* block);
 
 ImuState StateFromBlocks(const double* pose, const double* motion);
 
-// The preintegrated motion between two keyframes, and biases that wander
-// (core/imu/imu_factor.h). Blocks: pose and motion of the first, pose and motion of the
+// The preintegrated motion between two keyframes, with random walks of the biases
+// (core/imu/imu_factor.h). Blocks: pose and motion of the first keyframe, pose and motion of the
 // second.
 class PreintegrationFactor : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
@@ -36,7 +36,7 @@ class PreintegrationFactor : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
   Eigen::Matrix<double, 15, 15> sqrt_info_;
 };
 
-// Biases of a map's first keyframe, about zero: r = bias / sigma. Block: its motion.
+// Zero-mean prior on the biases of a map's first keyframe: r = bias / sigma. Block: its motion.
 class BiasPriorFactor : public ceres::SizedCostFunction<6, 9> {
  public:
   BiasPriorFactor(double gyro_sigma, double accel_sigma);
@@ -47,7 +47,7 @@ class BiasPriorFactor : public ceres::SizedCostFunction<6, 9> {
   Eigen::Matrix<double, 6, 1> inverse_sigma_;
 };
 
-// What is known of T_body_cam beforehand: r = (T (-) prior) / sigma. Block: T_body_cam.
+// Prior on the extrinsics: r = (T (-) prior) / sigma. Block: T_body_cam.
 class CameraPriorFactor : public ceres::SizedCostFunction<6, 7> {
  public:
   CameraPriorFactor(const Rigid3& T_body_cam, double position_sigma, double rotation_sigma);
@@ -70,7 +70,7 @@ class EdgeFactor : public ceres::SizedCostFunction<6, 7, 7, 1> {
   EdgeResidual residual_;
 };
 
-// r = kappa / sigma.
+// Prior on the log scale of a map's edges: r = kappa / sigma.
 class ScalePriorFactor : public ceres::SizedCostFunction<1, 1> {
  public:
   explicit ScalePriorFactor(double sigma) : sigma_(sigma) {}

@@ -5,14 +5,14 @@
 namespace pangea {
 
 struct BaOptions {
-  // How biases wander; white noise comes with each preintegration.
+  // Random walks of the biases; each preintegration contains its white noise.
   ImuNoise imu;
-  // Of a map's first keyframe, about zero.
+  // Sigmas of the zero-mean prior on the biases of a map's first keyframe.
   double gyro_bias_sigma = 0.05;   // rad/s
   double accel_bias_sigma = 0.15;  // m/s^2
   double loss_scale = 2.0;         // sigmas
-  double max_chi2 = 9.2;           // of an inlier: 99 % of 2 degrees of freedom
-  int max_iterations = 10;         // of each of the two rounds
+  double max_chi2 = 9.2;           // of an inlier: 99 %, 2 degrees of freedom
+  int max_iterations = 10;         // in each of the two rounds
   double function_tolerance = 5e-4;
 
   template <typename Archive>

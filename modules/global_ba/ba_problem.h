@@ -5,26 +5,26 @@
 //   min  sum_seen rho(|r_landmark|^2) + sum_keyframes ((1 - w) |r_inertial|^2 + w |r_edge|^2)
 //        + sum_maps |r_bias|^2 + |r_camera|^2 + |r_scale|^2
 //
-// over every keyframe's pose, velocity and biases, every landmark, and where each map's camera sits
-// on its IMU (ba_factors.h): an odometry finds that on its way, so early keyframes were made with a
-// poorer estimate than late ones.
+// over every keyframe's pose, velocity and biases, every landmark, and the extrinsics of each map's
+// camera (ba_factors.h): an odometry refines them while it runs, so early keyframes were made with
+// a poorer estimate than late ones.
 //
-// An odometry edge was made of the same samples and rays, and of many images more between the
-// keyframes: without it the adjustment knows less of a map than its odometry did. How much of their
-// errors the two share is not known, so they are weighted as covariance intersection does (Julier
-// and Uhlmann, 1997), which holds whatever they share. The edges of a map have their scale's error
-// in common, as none of their covariances can say: it is one unknown a map (ScalePriorFactor), with
-// the odometry's own sigma where a map is not metric.
+// An odometry edge comes from the same samples and rays, and from many more images between the
+// keyframes: without it the adjustment would have less information on a map than its odometry. The
+// correlation of their errors is unknown, so the two are weighted by covariance intersection
+// (Julier and Uhlmann, 1997), which is consistent for any correlation. The edges of a map share an
+// error of scale that their covariances do not contain: it is one unknown per map
+// (ScalePriorFactor), with the odometry's own sigma if the map is not metric.
 //
-// Two rounds of Levenberg-Marquardt (solver/ba_solver.h): with Cauchy's loss what does not fit
-// shows and is dropped, with Huber's the rest is estimated.
-// Position and yaw of the whole are free: damping leaves them where they began.
+// Two rounds of Levenberg-Marquardt (solver/ba_solver.h): the first, with Cauchy's loss, finds the
+// outliers, which are dropped; the second, with Huber's loss, estimates the rest. Position and yaw
+// of the whole are unobservable: damping keeps them at their initial values.
 //
-// What is held stays as it is: then it is the minimum over the rest alone. A world that is at its
-// minimum therefore stays there, whatever of it is held.
+// Fixed variables (`held`) keep their values, and the cost is minimised over the others. So a world
+// at its minimum stays there, whichever variables are fixed.
 //
-// In pieces of a few iterations, so that whoever runs it may look up in between and drop it. One
-// thread, no clock: the same world gives the same bytes.
+// The work is done in pieces of a few iterations, so that the caller can handle messages in between
+// or abandon it. One thread, no clock: the same world gives the same bytes.
 
 #include <memory>
 
@@ -39,12 +39,12 @@ class BaProblem {
   BaProblem(const BaProblem&) = delete;
   BaProblem& operator=(const BaProblem&) = delete;
 
-  // The next piece of work; false when there is none left.
+  // Does the next piece of work; false if none is left.
   bool Advance();
 
-  // As it stands.
+  // The present estimate.
   const BaWorld& world() const { return world_; }
-  // The last solve's, over all residuals; zero before.
+  // Cost of the last solve, over all residuals; zero before the first.
   double cost() const { return cost_; }
   int iterations() const { return iterations_; }
 

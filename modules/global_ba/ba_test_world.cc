@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 constexpr double kSampleStep_s = 0.005;
 
-// A lively round about the cloud, the camera towards its middle.
+// A lively flight around the cloud, with the camera towards its middle.
 class Flight {
  public:
   Flight(int agent, double drift_m_s)
@@ -100,7 +100,7 @@ class Maker {
     return BaEdge{T_measured, variance.asDiagonal()};
   }
 
-  // Integrated at zero bias; the biases wander meanwhile.
+  // Integrated with zero bias, while the true biases do a random walk.
   Preintegration Integrate(const Flight& flight, double from_s, Vector3d* gyro_bias,
                            Vector3d* accel_bias) {
     const ImuNoise noise;
@@ -186,7 +186,8 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
     if (start.previous >= 0) {
       const Rigid3& T_previous = world.start.keyframes[start.previous].imu.T_odom_body;
       keyframe.edge = {start.id.seq - 1, T_previous.Inverse() * keyframe.T_odom_body,
-                       1e-3 * Matrix6d::Identity()};  // what the start errs from one to the next
+                       // the start's error between successive keyframes
+                       1e-3 * Matrix6d::Identity()};
       keyframe.preintegration = start.preintegration;
     } else {
       state.maps.push_back(start.id.map);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Agents that fly rounds through one cloud of points, with IMU and rays, for tests of the bundle
-// adjustment. Truth, and what an odometry would start it with.
+// For tests of the bundle adjustment: agents that fly in circles through a point cloud, with IMU
+// and rays; the truth, and initial values as from an odometry.
 
 #include <cstdint>
 
@@ -19,27 +19,27 @@ struct BaTestOptions {
   int keyframes = 20;  // of each agent
   double step_s = 0.5;
   int landmarks = 150;
-  double drift_m_s = 0;      // of the rounds along x, and the cloud is as long
-  double max_depth_m = 1e3;  // of a landmark that is seen
-  double pixel_sigma = 0.5;  // of the rays, what they claim
-  double outlier_share = 0;  // rays of somewhere else
-  double edge_sigma_m = 0;   // of odometry edges, what they claim (rad: a tenth); 0: there are none
-  double edge_scale_error = 0;  // of all edges
+  double drift_m_s = 0;         // motion of the circles along x, m/s; the cloud is as long
+  double max_depth_m = 1e3;     // of a visible landmark
+  double pixel_sigma = 0.5;     // sigma of the rays, actual and stated
+  double outlier_share = 0;     // share of rays to wrong points
+  double edge_sigma_m = 0;      // of odometry edges, actual and stated (rad: a tenth); 0: no edges
+  double edge_scale_error = 0;  // relative, of all edges
   double noise = 1;             // 0: exact rays and samples
-  double scale_error = 0.02;    // of the start
+  double scale_error = 0.02;    // relative, of the initial values
   double start_sigma_m = 0.02;
 };
 
 struct BaTestWorld {
-  BaWorld truth;  // rays and preintegrations are noisy here too
+  BaWorld truth;  // rays and preintegrations contain noise here too
   BaWorld start;
 };
 
 BaTestWorld MakeBaTestWorld(const BaTestOptions& options);
 
-// The same as the server gets it: keyframes whose odometry is the start's, one match and
-// verification result between the k-th keyframes of two agents, and the group's state, which is the
-// start again.
+// The same world as messages of the server: keyframes whose odometry is the start, one match and
+// verification result between the k-th keyframes of two agents, and the group's state, which is
+// also the start.
 struct BaTestMessages {
   std::vector<Keyframe> keyframes;
   std::vector<PlaceMatch> matches;
@@ -48,8 +48,8 @@ struct BaTestMessages {
 };
 BaTestMessages MessagesOf(const BaTestWorld& world);
 
-// Largest error of a keyframe's position once position and yaw of the whole, which nothing
-// observes, are taken out by the first keyframe's pose.
+// Largest position error of a keyframe, m, after alignment of the (unobservable) position and yaw
+// by the first keyframe's pose.
 double WorstError(const BaWorld& world, const BaWorld& truth);
 
 }  // namespace pangea

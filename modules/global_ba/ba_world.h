@@ -1,7 +1,6 @@
 #pragma once
 
-// What a bundle adjustment starts with and ends with: keyframes, cameras, landmarks, and what is
-// seen of them.
+// Input and output of a bundle adjustment: keyframes, cameras, landmarks and observations.
 
 #include <optional>
 #include <vector>
@@ -19,22 +18,22 @@ struct BaEdge {
 struct BaKeyframe {
   KeyframeId id;
   int64_t utime = 0;
-  int camera = 0;  // of the world's
-  ImuState imu;    // odom is the group's map frame here
-  // The IMU and the odometry since keyframe `previous` of the world; none where a map or a piece
-  // of it begins.
+  int camera = 0;  // index into BaWorld::cameras
+  ImuState imu;    // "odom" is here the group's map frame
+  // Preintegration and odometry edge from keyframe `previous` of the world to this one; -1 and
+  // empty at the begin of a map or of a part of it.
   int previous = -1;
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;
   double unknown_scale = 0;  // sigma of its map's scale; 0 for a metric map
-  bool held = false;         // stays as it is
+  bool held = false;         // the keyframe's variables are fixed
 };
 
-// What the keyframes of a map have in common.
+// Variables shared by the keyframes of a map.
 struct BaCamera {
   Rigid3 T_body_cam;
-  double edge_log_scale = 0;  // how much longer the map's edges are than they should be
-  bool held = false;          // stays as it is; otherwise edge_log_scale starts at zero
+  double edge_log_scale = 0;  // the map's edges are too long by exp of it
+  bool held = false;          // fixed; else edge_log_scale starts at zero
 };
 
 struct BaObservation {
@@ -44,7 +43,7 @@ struct BaObservation {
   Eigen::Matrix2d sqrt_info = Eigen::Matrix2d::Identity();
 };
 
-// Indices are into its own vectors. A keyframe comes after its `previous`.
+// Indices refer to its own vectors. A keyframe comes after its `previous`.
 struct BaWorld {
   std::vector<BaCamera> cameras;
   std::vector<BaKeyframe> keyframes;
@@ -52,7 +51,7 @@ struct BaWorld {
   std::vector<BaObservation> observations;
 };
 
-// Takes out landmarks that fewer than two keyframes see, and what is seen of them.
+// Removes landmarks seen by fewer than two keyframes, with their observations.
 void DropUnderobservedLandmarks(BaWorld* world);
 
 }  // namespace pangea

@@ -33,15 +33,15 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
   return corners;
 }
 
-constexpr size_t kMinKeyframes = 10;  // of a group that is adjusted
-// A whole adjustment that moved keyframes by more than this (root mean square) is made once more
-// from where it ended: which landmarks it has rests on the poses that it begins with, and these are
-// others for who has adjusted the group before.
+constexpr size_t kMinKeyframes = 10;  // smallest group that is adjusted
+// A whole adjustment that moved keyframes by more than this (root mean square) is repeated from its
+// result: its set of landmarks depends on the initial poses, and so, without the repetition, the
+// result would depend on earlier adjustments.
 constexpr double kSettled_m = 1e-3;
 constexpr int kMaxPasses = 3;
 
-// A group's poses after its adjustment; what was left out keeps its place relative to the keyframe
-// before it.
+// A group's poses after its adjustment; a keyframe that was left out keeps its pose relative to the
+// adjusted one before it.
 MapPoses PosesAfter(const AdjustedGroup& adjusted, const MapPoses& before) {
   MapPoses after;
   Rigid3 T_after_before;
@@ -62,7 +62,7 @@ double RmsMove(const MapPoses& before, const MapPoses& after) {
   return std::sqrt(sum / static_cast<double>(before.size()));
 }
 
-// Largest move of a keyframe that was adjusted before.
+// Largest displacement, m, of a keyframe that was adjusted before.
 double LargestShift(const BaWorld& world, const AdjustedGroup& before, const MapPoses& poses) {
   double largest = 0;
   for (const BaKeyframe& keyframe : world.keyframes) {

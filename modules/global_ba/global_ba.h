@@ -1,21 +1,22 @@
 #pragma once
 
-// Global visual-inertial bundle adjustment of fused groups (ORB-SLAM3's and COVINS' last step:
-// Campos et al., TRO 2021; Schmuck et al., ISMAR 2021).
+// Global visual-inertial bundle adjustment of fused groups (like the last step of ORB-SLAM3, Campos
+// et al., TRO 2021, and of COVINS, Schmuck et al., ISMAR 2021).
 //
-// In: keyframes, place matches, verification results, group states, in any order. Out: the refined
-// state of a group: every keyframe's pose from all rays and all inertial measurements of all its
-// agents at once. The pose graph's edges and loops carry each odometry's own scale; here one
-// adjustment finds it from the whole flight, and landmarks that several agents see make it theirs
-// together.
+// Input: keyframes, place matches, verification results and group states, in any order. Output: the
+// refined state of a group: the keyframes' poses, estimated from all rays and inertial measurements
+// of all its agents together. In the pose graph, edges and loops have the scale of each odometry;
+// here the scale is estimated from the whole session, and landmarks seen by several agents make it
+// common to them.
 //
-// A group is due when its loops or keyframes are not those of its last refinement, or when the pose
-// graph has forgotten that one (it was started again). A large group is adjusted near what is new
-// (local_part.h), the rest held where the last refinement has it; as a whole when it has none, when
-// it has grown by half since it was (two groups that became one have), and when a local adjustment
-// has moved what was adjusted before further than that may be wrong. Either way the refinement is
-// of the whole group. Work goes in pieces, and is dropped when a message of its maps is taken. Map
-// frame: the state's. One thread, no clock: the same calls in the same order give the same bytes.
+// A group is due if its loops or keyframes differ from those of its last refinement, or if the pose
+// graph has lost that refinement (it was restarted). A large group is adjusted only near new
+// keyframes and matches (local_part.h); the rest is fixed at the last refinement. It is adjusted as
+// a whole if it has no refinement, if it has grown by half since its last whole adjustment (as
+// after a fusion of two groups), or if a local adjustment has moved adjusted keyframes by more than
+// max_shift_m. In all cases the refinement contains the whole group. The work is done in pieces,
+// and abandoned when a message about its maps arrives. Map frame: that of the state. One thread, no
+// clock: the same calls in the same order give the same bytes.
 
 #include <cstdint>
 #include <map>
@@ -51,33 +52,33 @@ class GlobalBa {
  public:
   struct Counters {
     int64_t begun = 0;
-    int64_t dropped = 0;  // because of a message
+    int64_t dropped = 0;  // abandoned because of a message
     int64_t finished = 0;
-    int64_t finished_local = 0;  // of these
+    int64_t finished_local = 0;  // of the finished ones
   };
 
-  // `records`: for keyframes and matches.
+  // `records`: stores keyframes and matches; null: they stay in memory.
   explicit GlobalBa(const GlobalBaOptions& options, std::shared_ptr<RecordStore> records = nullptr);
 
-  // Its record of a keyframe.
+  // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
     return SubmapStore::RecordOf(keyframe, kStore);
   }
-  // What it was given but for states. Restored: false, and nothing has changed, if these are not
-  // its bytes.
+  // Saves its input, except states. Restore returns false, and changes nothing, if the bytes are
+  // not those of a GlobalBa.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
 
-  // Repeats change nothing.
+  // Repeats are ignored.
   void Take(Keyframe keyframe);
   void Take(const PlaceMatch& match);
   void Take(const Constraint& constraint);
-  // Whole; the highest revision wins, map by map.
+  // A complete state (not a chunk). For each map the state with the highest revision counts.
   void Take(MapState state);
 
   // Whether a group is due or in work.
   bool HasWork() const { return work_ != nullptr || NextDue() != nullptr; }
-  // One piece of work, if there is any. The refined state when that was the last.
+  // Does one piece of work, if there is any. Returns the refined state after the last piece.
   std::optional<MapState> Advance();
 
   const Counters& counters() const { return counters_; }
@@ -87,7 +88,7 @@ class GlobalBa {
  private:
   using StatePointer = GroupStates<MapState>::Pointer;
 
-  // What a refinement rests on.
+  // The input that a refinement was made from, to detect changes.
   struct Basis {
     std::vector<MapId> maps;
     size_t keyframes = 0;
@@ -97,26 +98,26 @@ class GlobalBa {
   struct Refined {
     Basis basis;
     AdjustedGroup adjusted;
-    size_t whole_keyframes = 0;  // of the group when it was last adjusted as a whole
+    size_t whole_keyframes = 0;  // size of the group at its last whole adjustment
     bool whole_is_due = false;
   };
   struct Work {
     StatePointer state;
     std::vector<KeyframePair> new_pairs;
     bool local = false;
-    int passes = 0;  // that have ended
-    MapPoses begin;  // where this one began
+    int passes = 0;  // finished passes
+    MapPoses begin;  // poses at the start of this pass
     std::unique_ptr<BaProblem> problem;
   };
   static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
-  static constexpr size_t kMaxMatched = 200'000;  // candidates; what comes beyond is not used
+  static constexpr size_t kMaxMatched = 200'000;  // candidates; further ones are not used
 
   StatePointer NextDue() const;
   bool IsLocal(const MapState& state, const MapPoses& poses) const;
   void Begin(StatePointer state);
   bool BeginAgain();
-  // Matched pairs of the group that no refinement has.
+  // Takes from new_pairs_ the matched pairs with both ends in the group.
   std::vector<KeyframePair> TakeNewPairs(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Whole(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Local(const MapPoses& poses);
@@ -127,11 +128,11 @@ class GlobalBa {
   GlobalBaOptions options_;
   std::shared_ptr<RecordStore> records_;
   SubmapStore store_;
-  std::map<KeyframePair, Record> matched_;  // corners, by place recognition
+  std::map<KeyframePair, Record> matched_;  // matched corners, from place recognition
   MatchedPairs pairs_;
-  std::set<KeyframePair> new_pairs_;  // not in the refinement of a group that has both ends
+  std::set<KeyframePair> new_pairs_;  // matched pairs that no refinement contains
   GroupStates<MapState> states_;
-  std::map<MapId, Refined> refined_;  // by group
+  std::map<MapId, Refined> refined_;  // key: the group's id
   std::unique_ptr<Work> work_;
   Counters counters_;
 };

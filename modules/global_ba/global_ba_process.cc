@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint32_t kCheckpointFormat = 2;
 constexpr int64_t kSecond = 1'000'000;
-// Longer than the pose graph waits before it solves all from the beginning.
+// Longer than the time after which the pose graph solves everything from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;
 
 }  // namespace

@@ -2,12 +2,12 @@
 
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE in; REFINEMENT, STATUS_global_ba out.
 //
-// Works while the bus is quiet: three seconds after the last message a group is adjusted, in pieces
-// between which messages are handled, and dropped when they change anything. So it takes no time
-// from a session that runs; a replay calls Finish.
+// Works while the bus is quiet: three seconds after the last message a group is adjusted, in
+// pieces. Messages are handled between the pieces; the adjustment is abandoned if they change its
+// input. So it takes no computing time from a running session. A replay calls Finish.
 //
-// What is missing is asked for (journal_follower.h). A verification result that is lost later costs
-// its matches, nothing else.
+// Missing messages are requested (journal_follower.h). If a verification result is lost for good,
+// only its corner matches are missing.
 
 #include <memory>
 #include <utility>
@@ -23,13 +23,13 @@ namespace pangea {
 
 class GlobalBaProcess : public Process {
  public:
-  // `records`: for keyframes and matches (core/record_store.h).
+  // `records`: stores keyframes and matches (core/record_store.h).
   GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
                   const std::shared_ptr<RecordStore>& records = nullptr,
                   const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
-  // All that is due, to its end.
+  // Adjusts every group that is due, to the end.
   void Finish();
 
  private:

@@ -34,19 +34,19 @@ void SetUnknownScales(const std::vector<std::vector<double>>& sigmas_of_maps, Ba
   }
 }
 
-// Keys of a sorted container that are of the map.
+// Number of keys in a sorted container that belong to the map.
 template <typename Keyframes>
 auto NumOfMap(const Keyframes& keyframes, const MapId& map) {
   constexpr int32_t kLast = std::numeric_limits<int32_t>::max();
   return std::distance(keyframes.lower_bound({map, 0}), keyframes.upper_bound({map, kLast}));
 }
 
-// A world that grows: keyframes, what of them stays, then landmarks.
+// Builds a world in steps: keyframes, then which are fixed, then landmarks.
 class Maker {
  public:
   explicit Maker(SubmapStore* store) : store_(store) {}
 
-  // In ascending order.
+  // Call in ascending order of ids.
   void Add(const KeyframeId& id, const Rigid3& T_map_body) {
     const auto view = store_->Find(id);
     if (view == nullptr) {
@@ -54,7 +54,7 @@ class Maker {
     }
     const Keyframe& keyframe = view->keyframe();
     BaKeyframe start = Start(keyframe, T_map_body);
-    // A camera for each map, as the last keyframe has it.
+    // One camera per map, with the extrinsics of its last keyframe.
     const bool same_map = !world_.keyframes.empty() && world_.keyframes.back().id.map == id.map;
     world_.cameras.resize(world_.cameras.size() + (same_map ? 0 : 1));
     world_.cameras.back().T_body_cam = keyframe.camera.T_body_cam;
@@ -74,7 +74,7 @@ class Maker {
     cull_.push_back(Cull::kIfRedundant);
   }
 
-  // Begins where the adjustment before left it, which also left out what was redundant.
+  // Starts from the previous adjustment; fixed keyframes that it left out are left out again.
   void StartFrom(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
     for (size_t i = 0; i < world_.keyframes.size(); ++i) {
       BaKeyframe& keyframe = world_.keyframes[i];
@@ -131,7 +131,7 @@ class Maker {
   std::map<KeyframeId, int> index_;
 };
 
-// Those of landmarks that nothing that moves sees do not matter.
+// Removes the observations of landmarks that no moving keyframe sees: they have no effect.
 void DropWhatIsHeld(BaWorld* world) {
   std::vector<bool> moves(world->landmarks.size(), false);
   for (const BaObservation& seen : world->observations) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// A group, or a part of it, as the bundle adjustment starts with it: the pose graph's poses, the
-// odometry's velocities and biases, or where it was adjusted before the adjustment's, and the
-// landmarks.
+// Builds the bundle adjustment's initial world of a group or a part of it. Poses are those of the
+// state; velocities and biases come from the odometry, or from the previous adjustment if there is
+// one; landmarks are triangulated.
 
 #include <vector>
 
@@ -13,19 +13,19 @@
 
 namespace pangea {
 
-// Two keyframes that an accepted constraint joins, with the corners that place_recognition matched.
+// Two keyframes of an accepted (or redundant) candidate, with their matched corners.
 struct MatchedPlaces {
   KeyframeId query;
   KeyframeId match;
   std::vector<std::pair<int, int>> corners;  // (query's, match's)
 };
 
-// Keyframes of the state that the store does not have, and redundant ones, are left out.
+// Leaves out keyframes that the store does not have, and redundant ones (redundancy.h).
 BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPlaces>& places,
                        SubmapStore* store);
 
-// The part alone. A map's camera is held if most of its keyframes stay where they are: they know
-// more of it.
+// Only the part. A map's camera is fixed if most of the map's keyframes are: they have more
+// information on it.
 BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
                        const std::vector<MatchedPlaces>& places, SubmapStore* store);
 

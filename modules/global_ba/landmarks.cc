@@ -38,7 +38,7 @@ class Builder {
         continue;
       }
       const Keyframe& keyframe = seen.view->keyframe();
-      int32_t last = kNoLandmark;  // of several corners of one landmark the first
+      int32_t last = kNoLandmark;  // of several corners of one landmark only the first is used
       for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
         const int32_t id = keyframe.corners[corner].landmark_id;
         if (id != kNoLandmark && id != last && seen.view->has_ray(corner)) {
@@ -62,11 +62,12 @@ class Builder {
       const TrackId a = seen_a.TrackOf(corner_a);
       const TrackId b = seen_b.TrackOf(corner_b);
       const bool both = a.second != kNoLandmark && b.second != kNoLandmark;
-      // However many keyframes see two tracks meet, it is one place that they share or miss.
+      // However many keyframes match two tracks, this is a single match, right or wrong.
       if (both && (a == b || !met_.insert(std::minmax(a, b)).second)) {
         continue;
       }
-      // Each seen at the other's corner is the same measurement twice.
+      // Both landmarks are observed at each other's corner: the same measurement twice, so half
+      // weight.
       const double share = both ? std::sqrt(0.5) : 1;
       AddMatch(a, seen_b, corner_b, share);
       AddMatch(b, seen_a, corner_a, share);
@@ -93,7 +94,7 @@ class Builder {
   }
 
  private:
-  // A keyframe of the world and what it sees; null where it cannot be read.
+  // A keyframe of the world with its view; null if it cannot be read.
   struct Seen {
     int keyframe = 0;
     std::shared_ptr<const KeyframeView> view;
@@ -114,7 +115,7 @@ class Builder {
 
   void AddMatch(const TrackId& track, const Seen& seen, int corner, double share) {
     const auto known = tracks_.find(track);
-    // A corner that several keyframes of one track are matched with is one measurement of it.
+    // If several keyframes of one track match the same corner, it is one measurement.
     if (track.second != kNoLandmark && known != tracks_.end() &&
         matched_.insert({track, seen.keyframe, corner}).second) {
       const double sigma = CornerSigma(seen.CornerAt(corner), kMatchSigma_px);
@@ -122,7 +123,7 @@ class Builder {
     }
   }
 
-  // The point nearest to all rays; nothing when they are too parallel or it does not fit the track.
+  // The point nearest to all rays; empty if they are too parallel or do not fit.
   std::optional<Eigen::Vector3d> Triangulate(const std::vector<BaObservation>& seen) const {
     std::vector<LineOfSight> lines;
     double least_cosine = 1;
@@ -152,7 +153,7 @@ class Builder {
   std::vector<Rigid3> T_map_cam_;
   std::map<TrackId, Track> tracks_;
   std::set<std::pair<TrackId, TrackId>> met_;
-  std::set<std::tuple<TrackId, int, int>> matched_;  // and the keyframe and corner that saw it
+  std::set<std::tuple<TrackId, int, int>> matched_;  // (track, keyframe, corner)
 };
 
 }  // namespace

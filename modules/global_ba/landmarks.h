@@ -2,14 +2,15 @@
 
 // The landmarks that a group's keyframes share.
 //
-// Within a map a landmark is a track of its odometry (landmark_id): seen where the tracker followed
-// it, to a fraction of a pixel. Across maps and loops place_recognition's matched corners tie them:
-// a landmark of one keyframe is seen at the matched corner of the other, as well as descriptors
-// find a corner again (pixels). Two tracks that meet stay two landmarks: their corners may be
-// neighbours on one object, and a landmark merged of both would bend two maps to a pixel's error.
+// Within a map a landmark is a track of its odometry (landmark_id), observed with the accuracy of
+// the tracker, a fraction of a pixel. Matched corners from place_recognition connect landmarks
+// across maps and loops: a landmark of one keyframe is observed at the matched corner of the other,
+// with the lower accuracy of descriptor matches (pixels). Two matched tracks remain two landmarks:
+// their corners may be different points on one object, and one merged landmark would distort both
+// maps.
 //
-// In: keyframes with their poses, matches between them. Out: landmarks triangulated from their own
-// track's rays, and all their observations. Deterministic.
+// Input: keyframes with their poses, and matches between them. Output: landmarks, triangulated from
+// the rays of their own track, and all their observations. Deterministic.
 
 #include <memory>
 #include <utility>
@@ -20,20 +21,20 @@
 
 namespace pangea {
 
-// Of a tracked corner, and of a matched one at octave 0 (it grows by 1.2 with each octave).
+// Sigma of a tracked corner, and of a matched one on octave 0 (it grows by 1.2 per octave).
 inline constexpr double kTrackSigma_px = 0.5;
 inline constexpr double kMatchSigma_px = 1.5;
-// Of any ray from where its landmark is at first.
+// A ray further than this from its landmark's initial position is not used.
 inline constexpr double kMaxStartSigmas = 10;
 
-// Corners of two keyframes of the world that show the same.
+// Matched corners of keyframes a and b of the world.
 struct MatchedKeyframes {
   int a = 0, b = 0;
   std::vector<std::pair<int, int>> corners;  // (of a, of b)
 };
 
-// Adds landmarks and observations to a world that has its keyframes, which `store` has too: one is
-// looked at after the other, not all are held at once.
+// Adds landmarks and observations to a world with keyframes. `store` has the same keyframes; they
+// are read one after another, so that not all are in memory at once.
 void AddLandmarks(const std::vector<MatchedKeyframes>& matches, SubmapStore* store, BaWorld* world);
 
 }  // namespace pangea

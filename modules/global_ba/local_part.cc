@@ -44,7 +44,7 @@ class Chooser {
  private:
   using Shared = std::map<KeyframeId, int>;  // landmarks
 
-  // Those that share most landmarks with these, and are not among `known`.
+  // The keyframes not in `known` that share most landmarks with `ids`.
   std::vector<KeyframeId> Neighbours(const std::vector<KeyframeId>& ids,
                                      const std::set<KeyframeId>& known, size_t max_count) {
     Shared all;
@@ -72,7 +72,7 @@ class Chooser {
     return neighbours;
   }
 
-  // All that see landmarks of theirs, along their maps and where matched pairs lead from there.
+  // All keyframes that see landmarks of `ids`: along their own maps, and through matched pairs.
   std::set<KeyframeId> Around(const std::set<KeyframeId>& ids) {
     std::set<KeyframeId> around, partners;
     const auto add = [&](const KeyframeId& id) {
@@ -89,15 +89,16 @@ class Chooser {
     return around;
   }
 
-  // In the group.
+  // Only partners in the group.
   std::vector<KeyframeId> PartnersOf(const KeyframeId& id) const {
     std::vector<KeyframeId> partners = pairs_.PartnersOf(id);
     std::erase_if(partners, [this](const KeyframeId& p) { return !state_.contains(p); });
     return partners;
   }
 
-  // The keyframe, and those before and behind it as long as they see landmarks of it; at least to
-  // the next that takes part, which inertial measurements join to it.
+  // The keyframe, and its predecessors and successors as long as they see its landmarks; in both
+  // directions at least up to the next keyframe of the adjustment, to which inertial measurements
+  // connect it.
   const Shared& Along(const KeyframeId& id) {
     const auto [known, is_new] = along_.try_emplace(id);
     if (is_new) {
@@ -117,7 +118,7 @@ class Chooser {
     return known->second;
   }
 
-  // Whether it belongs to those along `id`.
+  // Adds `near` if it belongs to Along(id); false if not.
   bool Add(const KeyframeId& id, const KeyframeId& near, bool* joined, Shared* along) {
     const int shared = near.map == id.map ? NumShared(id, near) : 0;
     if (near.map != id.map || (shared == 0 && *joined)) {

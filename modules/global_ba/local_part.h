@@ -1,9 +1,10 @@
 #pragma once
 
-// The part of a group that an adjustment moves when the rest has been adjusted before (the local
-// bundle adjustment of Mur-Artal et al., TRO 2015, section VI.D, over what is new since then): new
-// keyframes and the ends of new matched pairs, then those that share landmarks with them, then with
-// these, up to a bound. Held are those that share landmarks with what moves.
+// The part of a group that a local adjustment moves, if the group has been adjusted before (like
+// the local bundle adjustment of Mur-Artal et al., TRO 2015, section VI.D). Moving are: new
+// keyframes and the ends of new matched pairs; keyframes that share landmarks with these; then
+// those that share landmarks with the latter, and so on up to a bound. Fixed are other keyframes
+// that share landmarks with moving ones.
 
 #include <set>
 #include <vector>
@@ -15,10 +16,10 @@
 namespace pangea {
 
 struct LocalOptions {
-  int keyframes = 500;        // of a group of which a part is adjusted
-  int max_neighbours = 100;   // that move beside what is new
-  double whole_growth = 1.5;  // of a group, since it was adjusted as a whole
-  double max_shift_m = 0.05;  // of what was adjusted before
+  int keyframes = 500;        // a group with more keyframes is adjusted in part
+  int max_neighbours = 100;   // moving keyframes in addition to new ones
+  double whole_growth = 1.5;  // relative size, since the last whole adjustment
+  double max_shift_m = 0.05;  // of keyframes adjusted before
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -35,7 +36,7 @@ struct LocalOptions {
 
 struct LocalPart {
   std::set<KeyframeId> moving;
-  std::set<KeyframeId> held;  // and those between that the adjustment before left out
+  std::set<KeyframeId> held;  // may include keyframes that the last adjustment left out
 };
 
 LocalPart ChooseLocalPart(const MapPoses& state, const AdjustedGroup& adjusted,

@@ -1,7 +1,7 @@
 #pragma once
 
-// Pairs of keyframes whose matched corners observe the same landmarks: accepted constraints, and
-// candidates redundant beside them.
+// Pairs of keyframes whose matched corners connect their landmarks: accepted constraints, and
+// candidates refused as redundant.
 
 #include <set>
 #include <utility>
@@ -22,11 +22,11 @@ class MatchedPairs {
   }
 
   const std::set<KeyframePair>& all() const { return by_query_; }
-  // Those whose query is of the map, ascending.
+  // Pairs whose query belongs to the map, ascending.
   std::vector<KeyframePair> OfMap(const MapId& map) const;
-  // Those whose query it is, ascending.
+  // Pairs with this query, ascending.
   std::vector<KeyframePair> OfQuery(const KeyframeId& query) const;
-  // The other keyframe of each pair that it is in.
+  // The other keyframe of every pair with this keyframe.
   std::vector<KeyframeId> PartnersOf(const KeyframeId& id) const;
 
  private:

@@ -5,7 +5,7 @@
 namespace pangea {
 namespace {
 
-// A keyframe is redundant if at least this share of its landmarks is seen by so many others.
+// A keyframe is redundant if at least this share of its landmarks is seen by this many others.
 constexpr double kRedundantShare = 0.9;
 constexpr int kObservers = 3;
 
@@ -114,9 +114,9 @@ class Culling {
   }
 
   BaWorld world_;
-  std::vector<int> next_;               // of each keyframe, in its map; -1 for none
-  std::vector<std::vector<int>> seen_;  // landmarks of each keyframe
-  std::vector<int> observers_;          // of each landmark
+  std::vector<int> next_;               // by keyframe: the next one in its map, or -1
+  std::vector<std::vector<int>> seen_;  // by keyframe: its landmarks
+  std::vector<int> observers_;          // by landmark: number of keyframes that see it
   std::vector<bool> gone_;
 };
 

@@ -1,11 +1,12 @@
 #pragma once
 
-// Keyframes that an adjustment can do without: nearly all of their landmarks are seen by enough
-// others (ORB-SLAM's rule: Mur-Artal et al., TRO 2015, section V.E). What the IMU measured up to
-// and from them becomes one span.
+// Removes redundant keyframes from an adjustment: those nearly all of whose landmarks are seen by
+// enough others (ORB-SLAM's rule: Mur-Artal et al., TRO 2015, section V.E). The preintegrations to
+// and from a removed keyframe are joined to one.
 //
-// Never the ends of a constraint, nor a map's first or last keyframe, nor one whose leaving makes a
-// span longer than kMaxGap_s: over a second the IMU holds two keyframes together badly.
+// Never removed are the ends of a constraint, a map's first or last keyframe, and a keyframe
+// without which a span would be longer than kMaxGap_s: over more than a second the IMU constrains
+// two keyframes poorly.
 
 #include <vector>
 
@@ -13,14 +14,13 @@
 
 namespace pangea {
 
-// Between keyframes that are kept.
+// Maximum time between successive keyframes that are kept.
 inline constexpr double kMaxGap_s = 1.0;
 
-// Whether a keyframe is to leave.
+// Whether a keyframe is removed.
 enum class Cull { kIfRedundant, kNever, kAlways };
 
-// The world without its redundant keyframes, looked at in their order; `cull` has one entry a
-// keyframe.
+// The world without its redundant keyframes, tested in their order. `cull`: one entry per keyframe.
 BaWorld WithoutRedundant(const BaWorld& world, const std::vector<Cull>& cull);
 
 }  // namespace pangea

@@ -6,7 +6,7 @@
 namespace pangea {
 namespace {
 
-// A variable's place in a clique.
+// A variable's position in a clique.
 struct Use {
   size_t clique = 0, member = 0;
 };
@@ -22,8 +22,8 @@ std::vector<std::vector<Use>> UsesOf(size_t num_variables,
   return uses;
 }
 
-// A variable, and those behind it that are in a clique with it, ascending. `last_seen_by`: of each
-// variable, whose this last found it beside.
+// The variable and the later ones that share a clique with it, ascending. `last_seen_by`: per
+// variable, the last variable whose neighbour it was found to be.
 std::vector<int> NeighboursBehind(int variable, const std::vector<Use>& uses,
                                   const std::vector<std::vector<int>>& cliques,
                                   std::vector<int>* last_seen_by) {
@@ -109,9 +109,9 @@ void BlockEquations::SetZero() {
 }
 
 void BlockEquations::Damp(double share) {
-  constexpr double kLeast = 1e-6;  // of what nothing is known
+  constexpr double kLeast = 1e-6;  // for a column without information
   for (size_t variable = 0; variable + 1 < first_column_.size(); ++variable) {
-    // A variable's own rows are the first of its columns.
+    // A variable's own rows come first in its columns.
     for (int column = first_column_[variable]; column < first_column_[variable + 1]; ++column) {
       const int row = column - first_column_[variable];
       double& value = H_.valuePtr()[H_.outerIndexPtr()[column] + row];

@@ -1,11 +1,11 @@
 #pragma once
 
-// Sparse normal equations H x = -g, H symmetric, of variables of several columns each, by CHOLMOD's
-// supernodal Cholesky (Chen et al., ACM TOMS 2008).
+// Sparse normal equations H x = -g, H symmetric, for variables with several columns each, solved by
+// CHOLMOD's supernodal Cholesky (Chen et al., ACM TOMS 2008).
 //
-// What a residual or an eliminated landmark ties together is a clique of variables. Where the
-// blocks of each clique are in H is found once; then they are added to in place, in blocks of a
-// size that the compiler knows. One thread: the same calls in the same order give the same bytes.
+// The variables of one residual or one eliminated landmark form a clique. The positions of each
+// clique's blocks in H are computed once; then values are added in place, in blocks of a size known
+// to the compiler. One thread: the same calls in the same order give the same bytes.
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
@@ -18,23 +18,23 @@ namespace pangea {
 
 class BlockEquations {
  public:
-  // `sizes`: columns of each variable. A clique is ascending, without repeats.
+  // `sizes`: number of columns of each variable. Each clique is ascending, without repeats.
   BlockEquations(const std::vector<int>& sizes, const std::vector<std::vector<int>>& cliques);
   ~BlockEquations();
   BlockEquations(const BlockEquations&) = delete;
   BlockEquations& operator=(const BlockEquations&) = delete;
 
   int num_columns() const { return static_cast<int>(g_.size()); }
-  // The first column of a variable; of one behind the last, how many columns there are.
+  // First column of a variable; for the index after the last one, the number of columns.
   int ColumnOf(int variable) const { return first_column_[variable]; }
   void SetZero();
 
-  // H += block: rows of the clique's member a, columns of its member b, a >= b. Where a is b the
-  // lower triangle counts.
+  // H += block, in the rows of the clique's member a and the columns of its member b, a >= b. If a
+  // == b, only the lower triangle is used.
   template <typename Block>
   void Add(size_t clique, size_t a, size_t b, const Eigen::MatrixBase<Block>& block) {
     constexpr int kColumns = Block::ColsAtCompileTime;
-    // A matrix of one row would be stored by rows.
+    // Eigen would store a matrix with one row in row-major order.
     constexpr int kRows =
         Block::RowsAtCompileTime == 1 && kColumns != 1 ? Eigen::Dynamic : Block::RowsAtCompileTime;
     const Place& place = places_[first_place_[clique] + a * (a + 1) / 2 + b];
@@ -42,18 +42,18 @@ class BlockEquations {
         H_.valuePtr() + place.value, block.rows(), block.cols(),
         Eigen::OuterStride<>(place.stride)) += block;
   }
-  // Its lower triangle counts.
+  // Only the lower triangle is valid.
   const Eigen::SparseMatrix<double>& H() const { return H_; }
   Eigen::VectorXd& g() { return g_; }
   const Eigen::VectorXd& g() const { return g_; }
 
-  // Adds a share of the diagonal to it (Marquardt 1963).
+  // Adds `share` times the diagonal to the diagonal (Marquardt 1963).
   void Damp(double share);
-  // x; nothing if H is not positive definite.
+  // Returns x; empty if H is not positive definite.
   std::optional<Eigen::VectorXd> Solve();
 
  private:
-  // Of a block in the values of H: its first, and from one of its columns to the next.
+  // Position of a block in the values of H: first value, and stride between its columns.
   struct Place {
     int value = 0, stride = 0;
   };
@@ -62,9 +62,9 @@ class BlockEquations {
   void FindPlaces(const std::vector<std::vector<int>>& cliques);
 
   std::vector<int> first_column_;
-  std::vector<size_t> first_place_;  // of each clique
+  std::vector<size_t> first_place_;  // by clique
   std::vector<Place> places_;
-  // By columns, the lower triangle, and of a variable with itself all.
+  // Column-major; the lower triangle, and the full diagonal blocks.
   Eigen::SparseMatrix<double> H_;
   Eigen::VectorXd g_;
   std::unique_ptr<Factor> factor_;

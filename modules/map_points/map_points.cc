@@ -12,21 +12,22 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kAhead_s = 0.5;       // how far the agent's motion is led on
+constexpr double kAhead_s = 0.5;       // prediction time of the agent's motion
 constexpr double kMaxDistance_m = 8;   // from the agent to a source
 constexpr double kMaxAngle_rad = 0.4;  // between the two lines of sight to a landmark
-constexpr double kMaxScale = 1.4;      // of the two distances to it
-constexpr int kOwnRecent = 15;         // newest keyframes of the agent's own map, no sources
-// A landmark is sent again after so many messages to the agent, or when it has moved so far.
+constexpr double kMaxScale = 1.4;      // ratio of the two distances to it
+constexpr int kOwnRecent = 15;         // newest keyframes of the agent's own map: not used
+// A landmark is sent again after kRepeatAfter messages to the agent, or if it has moved by
+// kMoved_m.
 constexpr int kRepeatAfter = 20;
 constexpr double kMoved_m = 0.005;
 constexpr double kMinDepth = 0.3;     // m
-constexpr double kBorder_px = 20;     // the agent's motion is not known to less
-constexpr double kMinSigma = 0.002;   // m; no point is known better
+constexpr double kBorder_px = 20;     // margin for the error of the predicted motion
+constexpr double kMinSigma = 0.002;   // m, minimum of a published sigma
 constexpr double kMaxAxes_rad = 1.2;  // between two cameras' axes
-constexpr size_t kMinPoints = 8;      // that a source must have in view
-constexpr size_t kMaxSources = 12;    // looked at for one message
-// Landmarks are spread: at most so many in a cell of the image.
+constexpr size_t kMinPoints = 8;      // in view, for a source to be used
+constexpr size_t kMaxSources = 12;    // considered for one message
+// Landmarks are spread over the image: at most kPerCell per cell.
 constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
 
 }  // namespace
@@ -57,7 +58,8 @@ std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent,
   return Outlook{camera, T_map_body * camera.T_body_cam, newest->first.seq};
 }
 
-// What of a keyframe's points the agent will see, and much as the keyframe did.
+// Selects the keyframe's points that the agent will see from a direction and distance similar to
+// the keyframe's.
 MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_cam,
                                   const Outlook& outlook) const {
   const Keyframe& keyframe = view.keyframe();
@@ -82,7 +84,7 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
   return source;
 }
 
-// Those that saw most of it first.
+// Sorted by the number of points in view, largest first.
 std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
                                                      const PosedGroup& group,
                                                      const Outlook& outlook) {
@@ -114,7 +116,7 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
   return sources;
 }
 
-// One message as it fills.
+// Fills one message.
 class MapPoints::Selection {
  public:
   Selection(const PosedGroup& group, const Outlook& outlook, SubmapStore* store,

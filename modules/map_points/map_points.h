@@ -1,17 +1,17 @@
 #pragma once
 
-// Chooses landmarks of a fused map for an agent: those it is likely to see next.
+// Chooses landmarks of the fused map for an agent: those that it will probably see next.
 //
-// In: keyframes, group states, refinements (groups after bundle adjustment), an agent's newest
-// pose. Out: MapLandmarks, small enough for one Ethernet frame. A landmark is a track of some
-// odometry; its descriptor is that of the keyframe that saw it most like the agent will. Only
-// keyframes that were bundle adjusted are a source, and of the agent's own map only those it left
-// long ago: what the pose graph alone has placed says less than the correction made of it, and of
-// what the agent saw just now the map knows nothing that its odometry does not
-// (docs/decisions/live_pose.md). Poses are always the newest state's.
+// Input: keyframes, group states, refinements (groups after bundle adjustment), an agent's newest
+// pose. Output: MapLandmarks, small enough for one Ethernet frame. A landmark is a track of any
+// agent's odometry; its descriptor is from the keyframe with the view most similar to the agent's.
+// Source keyframes must be bundle adjusted, and must not be recent ones of the agent's own map:
+// keyframes placed by the pose graph alone add nothing to the correction, and recent ones add
+// nothing to the agent's odometry (docs/decisions/live_pose.md). Poses are always those of the
+// newest state.
 //
-// No clock, no thread; the same calls give the same bytes. Bounded: keyframes as SubmapStore, and
-// what one agent was told lately.
+// No clock, no thread; the same calls give the same bytes. Bounded: keyframes as in SubmapStore,
+// and the landmarks recently sent to each map.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -29,37 +29,37 @@
 
 namespace pangea {
 
-// Of one message. A source is a keyframe they come from; together they fit 1200 bytes
-// (landmarks_t).
+// Limits for one message. A source is a keyframe from which landmarks come. A message fits into
+// 1200 bytes (landmarks_t).
 inline constexpr int kMostSources = 4;
 inline constexpr int kMostLandmarks = (1200 - 154) / static_cast<int>(25 + sizeof(Descriptor));
 
-// What an agent says of itself (POSE_k).
+// An agent's pose (POSE_k).
 struct AgentPose {
   MapId map;
-  Rigid3 T_map_body;  // as it shows it
+  Rigid3 T_map_body;  // as the agent shows it
   Eigen::Vector3d v_map_body = Eigen::Vector3d::Zero();
 };
 
 class MapPoints {
  public:
-  // `records`: for keyframes.
+  // `records`: stores keyframes; null: they stay in memory.
   explicit MapPoints(std::shared_ptr<RecordStore> records = nullptr)
       : store_(kStore, std::move(records)) {}
 
-  // Its record of a keyframe.
+  // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
     return SubmapStore::RecordOf(keyframe, kStore);
   }
-  // The keyframes. Restored: false, and nothing has changed, if these are not its bytes.
+  // Saves only the keyframes. Restore returns false if the bytes are not those of a MapPoints.
   void Save(ByteWriter* writer) const { store_.Save(writer); }
   bool Restore(ByteReader* reader) { return store_.Restore(reader) && reader->at_end(); }
 
   void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
-  // Whole; the highest revision wins, map by map.
+  // A complete state (not a chunk). For each map the state with the highest revision counts.
   void Take(const MapState& state);
   void TakeRefined(const MapState& refined);
-  // Nothing when the group knows nothing new that the agent could see.
+  // Empty if the group has no landmark that the agent might see and that was not sent recently.
   std::optional<MapLandmarks> Choose(const AgentPose& agent);
 
   size_t num_keyframes() const { return store_.size(); }
@@ -69,7 +69,7 @@ class MapPoints {
  private:
   static constexpr SubmapStoreOptions kStore{.max_views = 512};
 
-  // Where the agent will be.
+  // The agent's predicted view.
   struct Outlook {
     CameraModel camera;
     Rigid3 T_map_cam;

@@ -2,8 +2,8 @@
 
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE in; LANDMARKS_k, STATUS_map_points out.
 //
-// At most two messages a second to each agent that is in a group, 1200 bytes each: 2.4 kB/s. Best
-// effort: what is lost is sent again when the agent still looks there.
+// At most two messages per second, of up to 1200 bytes each, to each agent in a group: 2.4 kB/s.
+// Best effort: a lost landmark is sent again later if the agent still looks there.
 
 #include <cstdint>
 #include <map>
@@ -23,7 +23,7 @@ class MapPointsProcess : public Process {
  public:
   static constexpr int64_t kInterval_us = 500'000;  // between two messages to one agent
 
-  // `records`: for keyframes (core/submap_store.h).
+  // `records`: stores keyframes (core/submap_store.h).
   explicit MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>& records = nullptr,
                             const CheckpointPlace& checkpoint = {});
 
@@ -41,7 +41,7 @@ class MapPointsProcess : public Process {
   JournalFollower journal_;
   StateChunks states_;
   StateChunks refinements_;
-  std::map<int32_t, int64_t> sent_utime_;  // by agent: its pose's, at its last message
+  std::map<int32_t, int64_t> sent_utime_;  // by agent: utime of the pose at its last message
   int64_t next_status_utime_ = 0;
 };
 

@@ -15,10 +15,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr size_t kMinRays = 3;             // of a landmark
-constexpr double kMaxRelativeSigma = 0.1;  // of the distance
+constexpr double kMaxRelativeSigma = 0.1;  // relative to the distance
 constexpr double kMinTrackDepth = 0.3;     // m
 constexpr int kIterations = 3;
-constexpr double kMaxChi2 = 3;  // a degree of freedom
+constexpr double kMaxChi2 = 3;  // per degree of freedom
 
 struct Ray {
   Rigid3 T_map_cam;
@@ -41,7 +41,7 @@ std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t la
              view->pixel_jacobian(corners.front()) / kTrackPointSigma_px};
 }
 
-// A track is seen in one run of keyframes.
+// The track's observations: a track is one contiguous run of keyframes.
 std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
                         SubmapStore* store) {
   std::vector<Ray> rays;
@@ -57,7 +57,7 @@ std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t lan
   return rays;
 }
 
-// In the map frame.
+// The rays in the map frame.
 std::vector<LineOfSight> LinesOfSight(const std::vector<Ray>& rays) {
   std::vector<LineOfSight> lines;
   for (const Ray& ray : rays) {

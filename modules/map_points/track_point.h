@@ -1,7 +1,7 @@
 #pragma once
 
-// A track of some odometry as a point of the fused map: triangulated from every keyframe that
-// tracked it, where the group's state has them.
+// Triangulates a track of an odometry as a point of the fused map, from all keyframes that tracked
+// it, with their poses in the group's state.
 
 #include <Eigen/Core>
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace pangea {
 
-// Of a tracked corner, with what neighbouring poses add; pixels.
+// Sigma of a tracked corner, including errors of neighbouring poses; pixels.
 inline constexpr double kTrackPointSigma_px = 1.0;
 
 struct TrackPoint {
@@ -20,7 +20,7 @@ struct TrackPoint {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
-// `corner` of `source` must be a landmark's. Nothing when the rays do not say where it is.
+// `corner` of `source` must have a landmark_id. Empty if the rays do not determine the point.
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
                                        int corner, SubmapStore* store);
 

@@ -14,8 +14,8 @@
 namespace pangea {
 namespace {
 
-// If it is of a server process that computes. Returns what this version does not know. Throws what
-// the text deserves; `options` stays as it was then.
+// Takes the message if its process is one of ServerOptions. Returns the unknown options. Throws if
+// the text cannot be read; `options` is then unchanged.
 std::vector<std::string> Take(const ProcessOptions& message, const std::string& log,
                               ServerOptions* options) {
   ServerOptions taken = *options;
@@ -48,7 +48,7 @@ std::map<std::string, ProcessOptions> NewestByProcess(const std::filesystem::pat
   return newest;
 }
 
-// Processes of which the log says nothing.
+// Notes for the processes whose options are not in the logs.
 std::vector<std::string> NotTold(const std::set<std::string>& told) {
   ServerOptions options;
   YamlOptions yaml;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The options of all server processes that compute, by process: as one file, as the log of a live
-// server has them (OPTIONS_*), as single values.
+// The options of all server processes with options, one section per process. They come from a file,
+// from the log of a live server (OPTIONS_*), or as single values.
 //
 //   fusion:
 //     alignment: {min_inliers: 20}
@@ -31,7 +31,7 @@ struct ServerOptions {
   GlobalBaOptions global_ba;
   AnchorsOptions anchors;
 
-  // A section for each process, by its name on the bus.
+  // One section per process, with its name on the bus.
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Section("place_recognition", &place_recognition, "");
@@ -45,24 +45,24 @@ struct ServerOptions {
 
 struct LoggedOptions {
   ServerOptions options;
-  std::vector<std::string> notes;  // for people: which are defaults, and why
+  std::vector<std::string> notes;  // for people: which sections are defaults, and why
 };
 
-// The newest of each process in the logs, a later log before an earlier one. What this version
-// does not know is left out, and what it cannot read leaves that process' defaults; each with a
-// note. What is lost of a log is noted in `readings` (log_reader.h).
+// Reads the newest options of each process in the logs; a later log in the list takes precedence.
+// Unknown options are skipped, and a process whose options cannot be read has defaults; each case
+// adds a note. Damaged parts of a log are reported in `readings` (log_reader.h).
 LoggedOptions ReadLoggedOptions(const std::vector<std::filesystem::path>& logs,
                                 LogReadings* readings = nullptr);
 
-// Over `options`: the file, if there is one, then each "process.key=value". Throws
-// std::runtime_error.
+// Applies to `options`: first the file (if `file` is not empty), then each "process.key=value".
+// Throws std::runtime_error for an error in either.
 void Override(const std::string& file, const std::vector<std::string>& values,
               ServerOptions* options);
 
-// As each process tells them: its name, and what its --options takes.
+// By process name: the text that its --options takes, as published on OPTIONS_*.
 std::map<std::string, std::string> TextsByProcess(ServerOptions options);
 
-// "fusion.alignment.min_inliers 20 (default 16)", one for each value that is not the default.
+// "fusion.alignment.min_inliers 20 (default 16)", one line per value that is not the default.
 std::vector<std::string> OtherThanDefault(ServerOptions options);
 
 }  // namespace pangea

@@ -1,8 +1,8 @@
 #pragma once
 
-// The blocks of numbers that a bundle adjustment moves beside its landmarks (ba_factors.h): each
-// keyframe's pose and motion, each map's camera, and by how much its edges are too long, as a
-// logarithm. Each block that is not held is a variable of the normal equations, in this order.
+// The parameter blocks of a bundle adjustment, except landmarks (ba_factors.h): each keyframe's
+// pose and motion, each map's camera, and the log scale of each map's edges. Each block that is not
+// fixed is a variable of the normal equations, in this order.
 
 #include <Eigen/Core>
 #include <vector>
@@ -16,7 +16,7 @@ class BaBlocks {
  public:
   static constexpr int kHeld = -1;
   struct Block {
-    int first = 0, size = 0, tangent_size = 0;  // in the values
+    int first = 0, size = 0, tangent_size = 0;  // first, size: in values_
     int variable = kHeld;
   };
 
@@ -29,13 +29,13 @@ class BaBlocks {
 
   const Block& block(int index) const { return blocks_[index]; }
   const double* operator[](int index) const { return &values_[blocks_[index].first]; }
-  // Columns of each variable.
+  // Number of columns of each variable.
   std::vector<int> VariableSizes() const;
   void Move(const Eigen::VectorXd& step, const BlockEquations& equations);
   void ReadBack(BaWorld* world) const;
 
  private:
-  // The new block's values, to be filled in.
+  // Appends a block and returns its values, to be filled in.
   double* Add(int size, int tangent_size, bool held);
 
   int num_keyframes_ = 0, num_cameras_ = 0, num_variables_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The same bundle adjustment by Ceres: the reference of tests.
+// The same bundle adjustment solved by Ceres, as a reference for tests.
 
 #include <ceres/loss_function.h>
 #include <ceres/manifold.h>
@@ -22,9 +22,9 @@ class RigidManifold : public ceres::Manifold {
   bool MinusJacobian(const double* x, double* jacobian) const override;
 };
 
-// A landmark in a camera (eliminated_landmarks.h): r = S (pi(T_cam_body T_map_body^-1 p) - ray).
-// Blocks: pose, landmark, T_body_cam (7, as a pose). Behind the camera there is no ray: the
-// residual of an outlier, without a slope, so that one point does not hold up all others.
+// An observation of a landmark (eliminated_landmarks.h): r = S (pi(T_cam_body T_map_body^-1 p) -
+// ray). Blocks: pose, landmark, T_body_cam (7, as a pose). For a point behind the camera the
+// residual is a constant, that of an outlier, so that one point does not stop the optimisation.
 class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
  public:
   LandmarkFactor(const Eigen::Vector2d& ray, const Eigen::Matrix2d& sqrt_info)
@@ -37,7 +37,8 @@ class LandmarkFactor : public ceres::SizedCostFunction<2, 7, 3, 7> {
   Eigen::Matrix2d sqrt_info_;
 };
 
-// To the minimum, whose cost it returns, of metric maps. Takes the loss, of landmarks.
+// Solves to the minimum and returns its cost; only for metric maps. `loss`: of landmarks; takes
+// ownership.
 double SolveByCeres(const BaOptions& options, ceres::LossFunction* loss, BaWorld* world);
 
 }  // namespace pangea

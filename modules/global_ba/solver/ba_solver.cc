@@ -8,7 +8,7 @@
 namespace pangea {
 namespace {
 
-// Position and yaw of the whole are free: it leaves them where they began.
+// Damping keeps position and yaw of the whole, which are unobservable, at their initial values.
 constexpr double kFirstDamping = 1e-4;
 constexpr int kMaxRetries = 8;
 
@@ -77,7 +77,8 @@ BaSolver::Outcome BaSolver::Iterate() {
         state_ = std::move(moved);
         cost_ = cost;
         damping_ /= 3;
-        // Damped or not: to go on until an undamped step is small costs a fifth more, for nothing.
+        // Tests the damped step too: requiring a small undamped step takes a fifth longer, without
+        // benefit.
         const double least = tolerance_ * before;
         return predicted_decrease < least || before - cost < least ? Outcome::kConverged
                                                                    : Outcome::kGoesOn;

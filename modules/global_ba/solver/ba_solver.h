@@ -1,7 +1,8 @@
 #pragma once
 
 // Levenberg-Marquardt on a bundle adjustment's world: landmarks are eliminated
-// (eliminated_landmarks.h), the rest is one sparse Cholesky (least_squares/block_equations.h).
+// (eliminated_landmarks.h), and the rest is solved by sparse Cholesky
+// (least_squares/block_equations.h).
 
 #include <memory>
 #include <optional>
@@ -22,11 +23,11 @@ class BaSolver {
   BaSolver(const BaWorld& world, const BaOptions& options, const RobustLoss& loss);
 
   enum class Outcome { kGoesOn, kConverged, kStuck };
-  // Stuck: no step makes it better, though one should.
+  // One iteration. kStuck: no step lowers the cost, although the linearisation predicts one.
   Outcome Iterate();
 
   double cost() const { return cost_; }
-  // Of an observation, whitened.
+  // Whitened residual of an observation.
   Eigen::Vector2d Residual(const BaObservation& seen) const;
   void ReadBack(BaWorld* world) const;
 
@@ -39,13 +40,13 @@ class BaSolver {
 
   std::vector<View> Views(const State& state) const;
   double CostOf(const State& state) const;
-  // A step from the state and by how much it should lower the cost; nothing if there is none.
+  // The state after a step, and the predicted decrease of the cost; empty if the solve fails.
   std::optional<std::pair<State, double>> Step();
 
   RobustLoss loss_;
-  double tolerance_ = 0;  // relative decrease of the cost at which it has converged
+  double tolerance_ = 0;  // relative decrease of the cost at convergence
   double damping_ = 0;
-  std::vector<int> camera_of_;  // of each keyframe
+  std::vector<int> camera_of_;  // by keyframe
   State state_;
   BlockFactors factors_;
   std::unique_ptr<EliminatedLandmarks> landmarks_;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The residuals of a bundle adjustment between its blocks alone: inertial measurements, odometry
-// edges, and what is known beforehand (ba_factors.h).
+// The residuals of a bundle adjustment without landmarks: inertial measurements, odometry edges and
+// priors (ba_factors.h).
 
 #include <ceres/cost_function.h>
 
@@ -15,19 +15,19 @@
 
 namespace pangea {
 
-// Of T_body_cam about the odometry's last estimate.
+// Prior sigmas of T_body_cam, about the odometry's last estimate.
 inline constexpr double kCameraPositionSigma_m = 0.005;
 inline constexpr double kCameraRotationSigma = 0.005;  // radians
-// Covariance intersection's w (ba_problem.h); the IMU factor beside an edge has the rest.
+// Weight w of covariance intersection (ba_problem.h); the IMU factor parallel to an edge has 1 - w.
 inline constexpr double kEdgeWeight = 0.5;
-// Share by which all edges of a map may be too long.
+// Relative sigma of the length of all edges of a metric map.
 inline constexpr double kEdgeScaleSigma = 0.01;
 
 class BlockFactors {
  public:
   BlockFactors(const BaWorld& world, const BaOptions& options, const BaBlocks& blocks);
 
-  // What each ties together, after those that are there; to be called once.
+  // Appends the clique of each factor to `cliques`; call once.
   void AddCliques(const BaBlocks& blocks, std::vector<std::vector<int>>* cliques);
 
   double Cost(const BaBlocks& blocks) const;
@@ -38,7 +38,7 @@ class BlockFactors {
     std::unique_ptr<const ceres::CostFunction> cost;
     double weight = 1;
     std::vector<int> blocks;
-    std::vector<int> members;  // of the factor's clique, for each block; -1 for what is held
+    std::vector<int> members;  // per block: index in the factor's clique; -1: fixed
     size_t clique = 0;
   };
 

@@ -17,12 +17,12 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 
 constexpr double kMinDepth_m = 0.05;
 constexpr double kBehind = 20;  // sigmas
-// So that a landmark that is behind all its cameras stays where it is.
+// Keeps a landmark that is behind all its cameras where it is.
 constexpr double kLeastInformation = 1e-9;  // 1/m^2
 
 struct Linearised {
   Vector2d r;
-  Matrix23 J = Matrix23::Zero();  // by the landmark
+  Matrix23 J = Matrix23::Zero();  // with respect to the landmark
 };
 
 Linearised Project(const BaObservation& seen, const EliminatedLandmarks::View& view,
