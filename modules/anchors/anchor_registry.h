@@ -1,10 +1,10 @@
 #pragma once
 
-// What all edits together say of each anchor, whatever the order they came in.
+// Merges all edits into the state of each anchor; the result does not depend on their order.
 //
-// Of what an anchor is called and holds, the edit with the highest (revision, agent) counts; of
-// where it is, the highest of those that place it; one deletion, and it is deleted for ever. An
-// edit that its editor's key does not allow is refused and changes nothing.
+// Name and payload come from the edit with the highest (revision, agent); the place from the
+// highest edit that has a placement. A deletion is final. An edit that the editor's key does not
+// allow is refused and changes nothing.
 
 #include <cstdint>
 #include <map>
@@ -22,21 +22,21 @@ struct AnchorEntry {
   bool deleted = false;
   std::string name;
   std::string payload;
-  std::optional<AnchorEdit> place;  // the newest that says where it is
+  std::optional<AnchorEdit> place;  // the newest edit with a placement
 };
 
 class AnchorRegistry {
  public:
   explicit AnchorRegistry(size_t max_anchors) : max_anchors_(max_anchors) {}
 
-  // Why it is refused, or an empty string.
+  // Returns the reason of a refusal, or an empty string.
   std::string Take(const AnchorEdit& edit);
 
   const std::map<AnchorId, AnchorEntry>& entries() const { return entries_; }
   size_t num_deleted() const { return num_deleted_; }
 
  private:
-  const size_t max_anchors_;  // that are not deleted
+  const size_t max_anchors_;  // not counting deleted ones
   std::map<AnchorId, AnchorEntry> entries_;
   size_t num_deleted_ = 0;
 };

@@ -1,11 +1,11 @@
 #pragma once
 
-// Which anchors a listener is told of now: those that changed, at most every kInterval_us each, and
-// each again every kRepeat_us for whoever came late. An anchor that is gone is told kTimesGone
-// times in a row first.
+// Decides which anchors to send to one receiver now. A changed anchor is sent, but each at most
+// every kInterval_us. Every anchor is repeated every kRepeat_us, for receivers that start late. A
+// deleted anchor is first sent kTimesGone times, every kInterval_us.
 //
-// In: all that the listener is to know, and the time. Bounded: what is no longer among that is
-// forgotten.
+// Input: the states of all anchors for this receiver, and the time. Bounded: an anchor that is no
+// longer in the input is forgotten.
 
 #include <cstdint>
 #include <map>
@@ -16,7 +16,7 @@
 
 namespace pangea {
 
-// An anchor that moved by no more has not.
+// An anchor that moved by no more than this is unchanged.
 inline constexpr double kAnchorMoved_m = 0.002;
 inline constexpr double kAnchorMoved_rad = 0.002;
 
@@ -27,7 +27,7 @@ class AnchorUpdates {
   static constexpr int kTimesGone = 3;
 
   std::vector<AnchorState> Due(const std::vector<AnchorState>& states, int64_t now_utime);
-  // What the listener knows as placed.
+  // The anchors that the receiver may still believe to be placed.
   std::set<AnchorId> Told() const;
 
  private:

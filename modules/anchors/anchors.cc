@@ -11,10 +11,10 @@
 namespace pangea {
 namespace {
 
-constexpr int kHolds = 8;  // keyframes that hold an anchor, at most
+constexpr int kHolds = 8;  // maximum number of keyframes that hold an anchor
 constexpr size_t kMaxNotPlaced = 100;
 
-// The covariance of a transform whose left frame is rotated.
+// Expresses the covariance of a transform in a rotated left frame.
 Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
   Matrix6d J = Matrix6d::Zero();
   J.topLeftCorner<3, 3>() = R;
@@ -49,7 +49,7 @@ PlacementResult Anchors::Try(const AnchorEdit& edit) const {
   return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, kHolds);
 }
 
-// An anchor that cannot be put somewhere else stays where it is.
+// If the new placement fails, the anchor keeps its old one.
 void Anchors::PlaceOrWait(const AnchorId& id) {
   const AnchorEdit& edit = *registry_.entries().at(id).place;
   PlacementResult result = Try(edit);
@@ -96,7 +96,7 @@ Rigid3 Anchors::T_map_odom(const MapId& map) const {
   if (group == nullptr || track == tracks_.end()) {
     return {};
   }
-  // The newest that both know.
+  // The newest keyframe in both the state and the track.
   auto it = group->T_map_body.upper_bound({map, std::numeric_limits<int32_t>::max()});
   while (it != group->T_map_body.begin() && (--it)->first.map == map) {
     if (const TrackedKeyframe* const keyframe = track->second.Find(it->first.seq)) {
@@ -113,7 +113,8 @@ std::optional<Rigid3> Anchors::T_body_cam(const MapId& map) const {
              : std::optional(track->second.keyframes().rbegin()->second.camera->T_body_cam);
 }
 
-// A keyframe that the group's state does not have yet lies on the odometry behind those it has.
+// A keyframe that is not in the group's state yet is placed by odometry, from the newest one that
+// is.
 Rigid3 Anchors::T_map_body(const MapId& map, int32_t seq) const {
   if (const PosedGroup* const group = groups_.Find(map)) {
     const auto found = group->T_map_body.find({map, seq});
@@ -131,7 +132,7 @@ Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
     poses.push_back(T_map_body(placement.map, hold.seq) * hold.T_body_anchor);
     mean.T_map_anchor.t += hold.weight * poses.back().t;
   }
-  // Rotations around the first one, which they hardly differ from.
+  // Average the rotations in the tangent space of the first one; they are nearly equal.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Matrix6d spread = Matrix6d::Zero();
   for (size_t i = 0; i < poses.size(); ++i) {
@@ -173,7 +174,7 @@ AnchorState Anchors::Describe(const AnchorId& id, const MapId& map) const {
   return state;
 }
 
-// The newest first.
+// Deleted anchors of the map's group, the newest first.
 std::vector<AnchorId> Anchors::DeletedOf(const MapId& map) const {
   std::vector<AnchorId> deleted;
   for (const auto& [id, placement] : placements_) {
@@ -213,7 +214,8 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
     const InGroup& position = Positions().at(id);
     AnchorState& state = states.emplace_back(Describe(id, map));
     state.T_odom_anchor = T_odom_map * position.T_map_anchor;
-    // What the group is not sure of moves a map's own anchors with it.
+    // The uncertainty of the map's pose in the group does not concern its own anchors: they move
+    // with it.
     const bool own = placements_.at(id).map == map;
     state.covariance =
         ComposeCovariance(T_odom_map, own ? Matrix6d(Matrix6d::Zero()) : frame_covariance,

@@ -1,15 +1,15 @@
 #pragma once
 
-// The anchors of all maps, and where each is for whom.
+// The anchors of all maps, and their poses for each agent.
 //
-// In: keyframes (in the order of their maps), edits (in the journal's order), whole group states,
-// corrections. Out: for an agent, the anchors of its group near it, in its odom frame; for watchers
-// all anchors in their group's frame. An anchor is held by keyframes (placement.h), so it follows
-// when the pose graph or a bundle adjustment moves these, when maps are fused, and when a fusion is
-// undone.
+// Input: keyframes (in the order of each map), edits (in the journal's order), complete group
+// states, corrections. Output: for an agent, the anchors of its group near it, in its odom frame;
+// for other receivers, all anchors in their group's frame. An anchor is attached to keyframes
+// (placement.h), so it moves with them when the pose graph or a bundle adjustment moves them, when
+// maps are fused, and when a fusion is undone.
 //
-// No clock, no thread: the same calls give the same results. Bounded: max_anchors, and what
-// odometry_track.h has of a keyframe.
+// No clock, no thread: the same calls give the same results. Memory: max_anchors anchors, and the
+// data of each keyframe in odometry_track.h.
 
 #include <cstdint>
 #include <map>
@@ -32,7 +32,7 @@ namespace pangea {
 
 struct AnchorsOptions {
   int max_anchors = 10000;
-  double near_m = 50;  // from an agent
+  double near_m = 50;  // largest distance from an agent
   int max_near = 64;   // sent to one agent
 
   template <typename Archive>
@@ -52,40 +52,41 @@ class Anchors {
         registry_(static_cast<size_t>(options.max_anchors)) {}
 
   void Take(const Keyframe& keyframe);
-  // Why it is refused, or an empty string.
+  // Returns the reason of a refusal, or an empty string.
   std::string Take(const AnchorEdit& edit);
-  // Whole; the highest revision wins, map by map.
+  // A complete state (not a chunk). For each map the state with the highest revision counts.
   void Take(const MapState& state);
   void Take(const Correction& correction);
 
-  // The agents' maps: of each the newest.
+  // The newest map of each agent.
   std::vector<MapId> AgentMaps() const;
-  // Those near the map's newest keyframe, the nearest first; and those that are gone for it:
-  // deleted (the newest max_near), and of those `told` before what is in no group with it any more.
+  // The anchors near the map's newest keyframe, nearest first; then those that are gone for it:
+  // deleted ones (the newest max_near), and anchors in `told` that are no longer in its group.
   // Empty for a map without keyframes.
   std::vector<AnchorState> ForAgent(const MapId& map, const std::set<AnchorId>& told = {}) const;
-  // Every placed anchor in its group's frame, and those that were deleted.
+  // Every anchor with a place, in its group's frame; deleted ones too (AnchorState::gone).
   std::vector<AnchorState> All() const;
 
-  // What all edits together say, also of anchors that are not placed.
+  // The merged edits, also of anchors without a place.
   const AnchorRegistry& registry() const { return registry_; }
-  // One in its group's frame; nothing for one that is not placed.
+  // An anchor in its group's frame; empty if it has no place.
   std::optional<AnchorState> InItsGroup(const AnchorId& id) const;
-  // The group that a map belongs to, and its revision; the map itself and 0 while it is alone.
+  // The group of a map, and its revision; the map itself and 0 if no state has the map.
   std::pair<MapId, int64_t> GroupAndRevision(const MapId& map) const;
-  // The newest odom frame in the group's frame; of a map that is in no group the identity.
+  // Pose of the odom frame in the group's frame, at the newest keyframe; identity for a map without
+  // a group.
   Rigid3 T_map_odom(const MapId& map) const;
-  // Of a map's newest keyframe; nothing for a map without keyframes.
+  // Extrinsics of a map's newest keyframe; empty for a map without keyframes.
   std::optional<Rigid3> T_body_cam(const MapId& map) const;
-  // Of a group's keyframes the nearest to a point in its frame (metres); nothing for what is not,
-  // or no longer, the id of a group that has keyframes.
+  // The group's keyframe nearest to a point in its frame (metres); empty if `group` is not, or no
+  // longer, the id of a group with keyframes.
   struct NearKeyframe {
     KeyframeId id;
     Rigid3 T_map_body;
   };
   std::optional<NearKeyframe> NearestKeyframe(const MapId& group,
                                               const Eigen::Vector3d& p_map) const;
-  // Where an edit would put its anchor, as far as the maps have come.
+  // The placement that an edit would have, with the present maps.
   PlacementResult Try(const AnchorEdit& edit) const;
 
   size_t num_anchors() const { return registry_.entries().size() - registry_.num_deleted(); }
@@ -93,11 +94,11 @@ class Anchors {
   RecordCounters store_counters() const;
   const RecordStore* records() const { return records_.get(); }
   size_t num_waiting() const { return waiting_.size(); }
-  // Why anchors could not be placed, since the last call.
+  // Reasons why anchors could not be placed, since the last call.
   std::vector<std::string> TakeNotPlaced() { return std::exchange(not_placed_, {}); }
 
  private:
-  // Where something is in a group.
+  // A pose in the group's frame, with its covariance.
   struct InGroup {
     Rigid3 T_map_anchor;
     Matrix6d covariance;
@@ -106,10 +107,10 @@ class Anchors {
   void PlaceOrWait(const AnchorId& id);
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
   InGroup Position(const AnchorPlacement& placement) const;
-  // Of each placed anchor.
+  // The pose of each placed anchor.
   const std::map<AnchorId, InGroup>& Positions() const;
   bool SameGroup(const MapId& a, const MapId& b) const;
-  // Without its place.
+  // The anchor's state without its pose.
   AnchorState Describe(const AnchorId& id, const MapId& map) const;
   std::vector<AnchorId> DeletedOf(const MapId& map) const;
 
@@ -118,11 +119,11 @@ class Anchors {
   AnchorRegistry registry_;
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;
-  std::map<MapId, std::set<AnchorId>> waiting_;  // for a keyframe of this map
+  std::map<MapId, std::set<AnchorId>> waiting_;  // by map: anchors that wait for a keyframe
   GroupStates<PosedGroup> groups_;
   std::map<MapId, Correction> corrections_;
   std::vector<std::string> not_placed_;
-  // Since the last change; nothing: to be computed.
+  // Cache; empty after a change.
   mutable std::optional<std::map<AnchorId, InGroup>> positions_;
 };
 

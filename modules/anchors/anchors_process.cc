@@ -20,9 +20,9 @@ constexpr int64_t kSecond_us = 1'000'000;
 constexpr int64_t kPublishInterval_us = 250'000;
 constexpr int64_t kOthersInterval_us = 200'000;
 constexpr int32_t kMaxAsked = 50;
-// The newest edit has been heard then, and with it a gap before it: it comes every second.
+// agent_handler repeats the newest edit every second, so after this time any gap is known.
 constexpr int64_t kNewestEditRepeated_us = 2 * kSecond_us;
-// Edits are one stream over all maps.
+// Edits are a single stream for all maps; this is its key in ReorderBuffer.
 const MapId kAllMaps{1, 0};
 
 }  // namespace
@@ -149,7 +149,7 @@ void AnchorsProcess::Tick(int64_t now_utime) {
 }
 
 void AnchorsProcess::PublishStatus(int64_t now_utime) {
-  // Also of those that waited for a keyframe.
+  // Includes anchors that were waiting for a keyframe.
   for (const std::string& reason : anchors_.TakeNotPlaced()) {
     node_.Refuse(reason);
   }

@@ -3,10 +3,10 @@
 // KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT, HAVE in; ANCHOR_k, ANCHOR, OTHERS_k,
 // STATUS_anchors out.
 //
-// Edits are taken in the journal's order: what is missing is asked for at ticks (RESEND_REQUEST,
-// answers on AGAIN_anchors), and agent_handler repeats the newest, so that a lost tail shows. What
-// agents are told is paced by the clock (anchor_updates.h); in a replay nobody listens, and only
-// ANCHOR is said, at the end (Finish).
+// Edits are applied in the journal's order. Missing ones are requested at ticks (RESEND_REQUEST,
+// answers on AGAIN_anchors); agent_handler repeats the newest one, so that lost edits at the end
+// are noticed. Messages to agents are paced by the clock (anchor_updates.h). In a replay there is
+// no receiver, so only ANCHOR is published, at the end (Finish).
 
 #include <cstdint>
 #include <functional>
@@ -31,22 +31,23 @@ namespace pangea {
 
 class AnchorsProcess : public Process {
  public:
-  // `records`: what it sets aside; may be null.
+  // `records`: stores map points (odometry_track.h); may be null.
   AnchorsProcess(Bus& bus, const AnchorsOptions& options,
                  std::shared_ptr<RecordStore> records = nullptr);
 
   void Tick(int64_t now_utime) override;
-  // Says where every anchor is.
+  // Publishes the pose of every anchor on ANCHOR.
   void Finish();
 
   const Anchors& anchors() const { return anchors_; }
 
-  // Asks agent_handler to journal an edit of a tool on the server (agent 0).
+  // Requests that agent_handler journals an edit made by a tool on the server (agent 0).
   void Request(const AnchorEdit& edit);
-  // Called with each edit of the journal once it is taken, or why it was refused.
+  // Sets a function that is called with each edit of the journal after it was applied, and with the
+  // reason if it was refused.
   using EditHandler = std::function<void(const AnchorEdit&, const std::string& refused)>;
   void OnEditTaken(EditHandler handler) { on_edit_taken_ = std::move(handler); }
-  // All of the journal was heard, as far as anybody can tell.
+  // Whether the whole journal was received, as far as can be known.
   bool is_complete() const;
 
  private:
@@ -63,9 +64,9 @@ class AnchorsProcess : public Process {
   Anchors anchors_;
   JournalFollower journal_;
   StateChunks states_;
-  ReorderBuffer<AnchorEdit> edits_;  // one stream
+  ReorderBuffer<AnchorEdit> edits_;  // a single stream
   AnchorUpdates for_watchers_;
-  std::map<MapId, AnchorUpdates> for_agents_;  // the newest map of each
+  std::map<MapId, AnchorUpdates> for_agents_;  // key: newest map of an agent
   OtherAgents other_agents_;
   bool have_received_ = false;
   int64_t have_utime_ = 0;  // of the first tick after the first HAVE

@@ -1,6 +1,6 @@
 #pragma once
 
-// Two agents of the synthetic world, whose keyframes the anchors have heard: for tests.
+// For tests: two agents of the synthetic world, whose keyframes were given to `anchors_`.
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ class AnchorsTestWorld : public testing::Test {
 
   const MapId& map(int agent) const { return world_.agents[agent].map; }
 
-  // The true map, moved by T; of some agents.
+  // The true state of a group of these agents, displaced by T.
   MapState State(const std::vector<int>& agents, int64_t revision, const Rigid3& T = {}) const {
     MapState state;
     state.group = map(agents[0]);

@@ -78,7 +78,7 @@ OdometryTrack::Keyframes::const_iterator OdometryTrack::Nearest(int64_t utime) c
 }
 
 std::optional<Rigid3> OdometryTrack::Between(int64_t utime) const {
-  // Stamps grow with seq.
+  // Stamps ascend with seq.
   const auto after = std::ranges::find_if(
       keyframes_, [utime](const auto& item) { return item.second.utime >= utime; });
   if (after == keyframes_.end()) {

@@ -1,10 +1,10 @@
 #pragma once
 
-// Where agents are now, for the others of their group.
+// The present poses of agents, for the other agents of their group.
 //
-// In: the newest pose of each agent, as it was heard. Out: for each agent that tracks, the cameras
-// of the others of its group in its own odom frame. What was heard kFresh_us ago counts no more:
-// who is lost or away is not shown where it was. Bounded: kMaxAgents; of one agent the nearest
+// Input: the newest pose of each agent. Output: for each tracking agent, the camera poses of the
+// others in its group, in its own odom frame. A pose older than kFresh_us is not used: an agent
+// that is lost or offline is not shown. Bounded: kMaxAgents agents; for each, the nearest
 // kMaxOthers.
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class OtherAgents {
   static constexpr size_t kMaxAgents = 1000;
 
   void Take(const MapId& map, const Rigid3& T_odom_body, int64_t now_utime);
-  // `anchors`: what the maps and groups are. Nothing for an agent that is alone.
+  // `anchors`: has the maps and groups. No entry for an agent that is alone in its group.
   std::vector<Others> ForEach(const Anchors& anchors, int64_t now_utime);
 
  private:

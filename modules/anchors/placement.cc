@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 
 constexpr double kMinDepth_m = 0.1;
 constexpr double kPixelSigma = 1;
-// An anchor that nobody said anything of: placed by hand.
+// Sigmas of an anchor without a given covariance: placed by hand.
 constexpr double kUnknownSigma_m = 0.01, kUnknownSigma_rad = 0.02;
 constexpr double kFloorSigma_m = 0.001, kFloorSigma_rad = 0.0005;
 
@@ -37,13 +37,13 @@ Matrix6d Diagonal(double sigma_m, double sigma_rad) {
   return variances.asDiagonal();
 }
 
-// The points that keyframes around this time have, each once, as this view sees them.
+// The map points of keyframes around this time, each once, in the viewer's camera.
 std::vector<SurfacePoint> PointsInView(const OdometryTrack& track, int64_t utime,
                                        const Viewer& viewer) {
   const Rigid3 T_cam_odom = viewer.T_odom_cam.Inverse();
   std::vector<SurfacePoint> points;
   std::set<int32_t> landmarks;
-  // The newest keyframe that has a landmark knows it best.
+  // The newest keyframe with a landmark has its best estimate.
   for (auto it = track.keyframes().rbegin(); it != track.keyframes().rend(); ++it) {
     const TrackedKeyframe& keyframe = it->second;
     if (std::abs(keyframe.utime - utime) > kPlacementReach_us) {
@@ -96,8 +96,8 @@ bool Sees(const TrackedKeyframe& keyframe, const Vector3d& p_odom) {
   return pixel && keyframe.camera->Contains(*pixel);
 }
 
-// Of the keyframes that see the place, or of all where none does, those nearest in time; with the
-// weight of what the odometry knows between them and the placement.
+// Chooses the keyframes that hold the anchor: those nearest in time that see it, or of all if none
+// does. The weight is the inverse variance of the odometry between the keyframe and the placement.
 AnchorPlacement HoldBy(const OdometryTrack& track, int64_t utime, const Pose& pose, int count) {
   std::vector<std::pair<int64_t, int32_t>> seeing, blind;  // (microseconds away, seq)
   for (const auto& [seq, keyframe] : track.keyframes()) {
@@ -141,7 +141,7 @@ PlacementResult Held(const AnchorEdit& edit, const OdometryTrack& track, int64_t
   return placement;
 }
 
-// An editor's covariance is of T_ref_anchor, in the reference's frame.
+// The editor's covariance is of T_ref_anchor, in the reference frame.
 Pose Relative(const AnchorEdit& edit, const Rigid3& T_odom_ref) {
   const Matrix6d own = edit.covariance.value_or(Diagonal(kUnknownSigma_m, kUnknownSigma_rad));
   return {T_odom_ref * edit.T_ref_anchor,

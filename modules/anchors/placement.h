@@ -1,7 +1,7 @@
 #pragma once
 
-// Where an edit puts an anchor: relative to the keyframes around it, so that it follows whatever
-// moves them, and never as a pose in a map frame.
+// Places the anchor of an edit: relative to the keyframes around it, never as a pose in a map
+// frame, so that it moves with the keyframes.
 
 #include <string>
 #include <variant>
@@ -12,33 +12,34 @@
 
 namespace pangea {
 
-// Keyframes up to so long before and after an edit decide where it puts an anchor: they hold it,
-// and are the map around a pixel.
+// Only keyframes up to this long before and after an edit are used: they hold the anchor, and their
+// map points give the surface behind a pixel.
 inline constexpr int64_t kPlacementReach_us = 5'000'000;
 
 // One keyframe that holds an anchor.
 struct Hold {
-  int32_t seq = 0;  // of the placement's map
+  int32_t seq = 0;  // in the placement's map
   Rigid3 T_body_anchor;
-  double weight = 0;  // all of an anchor add up to 1
+  double weight = 0;  // the weights of an anchor add up to 1
 };
 
 struct AnchorPlacement {
   MapId map;
   std::vector<Hold> holds;
-  // Of T_odom_anchor when it was placed: what the editor said or the surface's depth, and the
-  // odometry to the keyframes that hold it.
+  // Of T_odom_anchor when it was placed: the editor's covariance, or that of the surface's depth,
+  // plus a small floor. The odometry between the keyframes that hold it is not included.
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-struct AwaitsKeyframe {};  // one at or after the edit's time is still to come
+// a needed keyframe has not arrived: the edit's own, or one at or after its time
+struct AwaitsKeyframe {};
 struct NotPlaced {
   std::string reason;
 };
 using PlacementResult = std::variant<AnchorPlacement, AwaitsKeyframe, NotPlaced>;
 
-// `track`: of the edit's map, as far as it has come. `holds`: keyframes at most. An anchor on a
-// surface stands upright: its z axis up, x horizontally towards the viewer.
+// `track`: the keyframes of the edit's map received so far. `holds`: maximum number of keyframes.
+// An anchor on a surface is upright: its z axis points up, its x axis horizontally to the viewer.
 PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds);
 
 }  // namespace pangea

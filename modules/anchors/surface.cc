@@ -9,10 +9,11 @@ namespace {
 
 constexpr size_t kMinPoints = 3;
 constexpr size_t kMaxPoints = 12;
-constexpr double kMaxDistance = 0.25;  // between rays: a seventh of a right angle
-// A surface bends: what a point says of the ray beside it is worth less with the distance.
-constexpr double kRelativeBend = 0.3;  // of the inverse depth, for each unit between the rays
-// Without points on all sides the slope is not known; it is not steeper than this, usually.
+constexpr double kMaxDistance = 0.25;  // between rays, on z = 1: about 14 degrees
+// A surface is not a plane: the weight of a point decreases with its distance from the ray.
+// relative sigma of the inverse depth, per unit of distance between the rays
+constexpr double kRelativeBend = 0.3;
+// Prior sigma of the relative slope, for points that do not surround the ray.
 constexpr double kRelativeSlope = 1.0;
 constexpr double kHuber = 1.5;  // standard deviations
 constexpr int kIterations = 10;
@@ -28,7 +29,7 @@ Fit FitPlane(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& points
   for (const SurfacePoint& point : points) {
     scale += point.inverse_depth / static_cast<double>(points.size());
   }
-  Eigen::Vector3d x(scale, 0, 0);  // inverse depth at the ray, and its two slopes
+  Eigen::Vector3d x(scale, 0, 0);  // inverse depth at the ray, and its gradient
   Eigen::Matrix3d information;
   double squares = 0;
   for (int i = 0; i < kIterations; ++i) {

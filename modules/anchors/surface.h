@@ -1,6 +1,6 @@
 #pragma once
 
-// How far away the surface is that a pixel shows, from the points of a map around that pixel.
+// Estimates the distance of the surface behind a pixel from the map points around it.
 
 #include <Eigen/Core>
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace pangea {
 
-// In the frame of one camera; `ray` is (x, y) on the plane z = 1.
+// A map point in the camera frame; `ray` is (x, y) on the plane z = 1.
 struct SurfacePoint {
   Eigen::Vector2d ray;
   double inverse_depth = 0;  // 1/m, along z
@@ -20,9 +20,9 @@ struct SurfaceDepth {
   double sigma_m = 0;
 };
 
-// The inverse depth of a plane is linear in the ray, so a plane is fitted to the nearest points,
-// robustly, and the more freely the better they surround the ray. Nothing where there are not
-// enough points close by, or they do not agree to a tenth.
+// The inverse depth of a plane is linear in the ray, so a plane is fitted robustly to the nearest
+// points, with a prior on its slope, which matters if they do not surround the ray. Empty if there
+// are too few points nearby, or if the relative sigma of the result is above 0.1.
 std::optional<SurfaceDepth> DepthBehind(const Eigen::Vector2d& ray,
                                         std::vector<SurfacePoint> points);
 

@@ -18,11 +18,11 @@ namespace {
 using nlohmann::json;
 using web::WebAnswer;
 
-// Further from everything that any agent has been, an anchor would be at the mercy of a rotation.
+// Further away from all keyframes, a small rotation would displace the anchor too far.
 constexpr double kMaxFromKeyframe_m = 1000;
 
-// Whether the journal's edit is the one that was requested. Another tool of agent 0 may have drawn
-// the same revision.
+// Whether the journal's edit is the requested one: another tool of agent 0 may have used the same
+// revision.
 bool IsSame(const AnchorEdit& a, const AnchorEdit& b) {
   return a.deleted == b.deleted && a.name == b.name && a.payload == b.payload &&
          a.placement == b.placement &&
@@ -332,7 +332,7 @@ BadField AnchorApi::SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const
   return {};
 }
 
-// The time, and never twice, whatever the clock does.
+// The id is the time, made unique even if the clock goes back.
 AnchorId AnchorApi::NewId() {
   AnchorId id{0, std::max(now_utime_, newest_created_utime_ + 1)};
   while (anchors_.registry().entries().contains(id)) {

@@ -1,11 +1,12 @@
 #pragma once
 
-// The anchors, for apps: what a request asks of them, and what is answered (openapi_anchors.json).
-// No socket, no bus, no clock: the owner gives requests, time, and the journal's edits, and
-// publishes the edits that this one makes. All of them are a tool's on the server (agent 0).
+// The HTTP API of the anchors, for apps (openapi_anchors.json): answers requests. Uses no socket,
+// bus or clock: the owner passes in requests, the time and the journal's edits, and publishes the
+// edits that the API makes. Its edits are those of a tool on the server (agent 0).
 //
-// An edit is requested each second until the journal has it; only then the asker is told so, or
-// after kTimeout_us that nobody knows. Bounded: kMaxPending edits under way.
+// An edit is requested every second until the journal has it; only then is the client answered.
+// After kTimeout_us it is answered that the outcome is unknown. At most kMaxPending edits are
+// pending.
 
 #include <cstdint>
 #include <functional>
@@ -30,17 +31,18 @@ class AnchorApi : public web::WebSite {
 
   using EditRequest = std::function<void(const AnchorEdit&)>;
 
-  // `anchors`, taken with `options`, outlive it. `request`: publishes an edit to be journalled.
+  // `anchors` was made with `options`, and must outlive the API. `request`: publishes an edit to be
+  // journalled.
   AnchorApi(const Anchors& anchors, const AnchorsOptions& options, EditRequest request)
       : anchors_(anchors),
         max_anchors_(static_cast<size_t>(options.max_anchors)),
         request_(std::move(request)),
         feed_(anchors) {}
 
-  // Often: repeats, time-outs. `complete`: the anchors are all those of the journal; until then no
-  // request is answered with less.
+  // Call often: handles repeats and timeouts. `complete`: the anchors of the whole journal are
+  // known; until then requests for anchors are answered with status 503.
   void Tick(int64_t now_utime, bool complete);
-  // The journal has this edit; `refused`: why it is nevertheless none, or empty.
+  // Call for each edit of the journal. `refused`: why it was refused, or empty.
   void Take(const AnchorEdit& edit, const std::string& refused);
 
   void Answer(const web::WebRequest& request, Reply reply) override;
@@ -52,20 +54,20 @@ class AnchorApi : public web::WebSite {
   struct Pending {
     AnchorEdit edit;
     Reply reply;
-    int64_t next_utime = 0;  // it is requested again
+    int64_t next_utime = 0;  // time of the next request
     int64_t timeout_utime = 0;
   };
 
   void AnswerAnchors(const web::WebRequest& request, const std::string& query, const Reply& reply);
   void AnswerAnchor(const web::WebRequest& request, const Path& path, const Reply& reply);
   void Make(const web::WebRequest& request, const Reply& reply);
-  // Changes or deletes one that is there.
+  // Changes or deletes an existing anchor.
   void Change(const web::WebRequest& request, const ListedAnchor& anchor, const Reply& reply);
   web::WebAnswer List(const std::string& query) const;
   web::WebAnswer Agents() const;
   web::WebAnswer AnchorsOfAgent(const std::string& agent) const;
 
-  // Fills in where the anchor is to be. Nothing wrong: an empty error.
+  // Fills in the placement of the anchor. The error is empty on success.
   BadField SetPose(const BodyPose& pose, AnchorEdit* edit) const;
   BadField SetPose(const PoseInGroup& pose, AnchorEdit* edit) const;
   BadField SetPose(const PoseByKeyframe& pose, AnchorEdit* edit) const;
@@ -83,7 +85,7 @@ class AnchorApi : public web::WebSite {
   bool complete_ = false;
   int64_t newest_created_utime_ = 0;
   std::list<Pending> pending_;
-  // Revisions that were requested and that the journal may still get.
+  // Newest requested revisions that the journal may not have yet.
   std::map<AnchorId, int64_t> requested_;
 };
 

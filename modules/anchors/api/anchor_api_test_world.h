@@ -1,6 +1,6 @@
 #pragma once
 
-// The API beside a journal that the test plays, without a socket and a bus.
+// The API without socket and bus; the test plays the journal.
 
 #include <fmt/format.h>
 
@@ -45,7 +45,7 @@ class AnchorApiTest : public AnchorsTestWorld {
   }
   Heard Get(const std::string& target) { return *Ask("GET", target); }
 
-  // As agent_handler and AnchorsProcess do.
+  // Journals an edit as agent_handler and AnchorsProcess do.
   void Journal(AnchorEdit edit) {
     edit.seq = next_seq_++;
     if (edit.agent_id == 0) {
@@ -61,7 +61,7 @@ class AnchorApiTest : public AnchorsTestWorld {
         R"({{"name": "kettle", "payload": "hot", "pose": {{"group": "{}", "position": [{}, {}, {}]}}}})",
         ToString(map(agent)), p.x(), p.y(), p.z());
   }
-  // An anchor near agent 1, journalled.
+  // Makes and journals an anchor near agent 1.
   nlohmann::json Make() {
     const auto heard = Ask("POST", "/v1/anchors", NewBody(0, NearAgent()));
     JournalNewest();

@@ -1,10 +1,10 @@
 #pragma once
 
-// What changes, for those who listen on a WebSocket. Each anchor has one newest state here, so a
-// slow listener is sent that and never a queue. Bounded by the number of anchors.
+// The changes of anchors, for clients on a WebSocket. Only the newest state of each anchor is kept,
+// so a slow client skips intermediate states and needs no queue. Bounded by the number of anchors.
 //
-// The clock is set by the owner; anchors are looked at every kInterval_us, and only while somebody
-// listens.
+// The owner sets the time. Anchors are compared every kInterval_us, and only while a client is
+// connected.
 
 #include <cstdint>
 #include <map>
@@ -21,12 +21,12 @@ class AnchorFeed {
  public:
   static constexpr int64_t kInterval_us = 200'000;
 
-  // `anchors` outlives it.
+  // `anchors` must outlive it.
   explicit AnchorFeed(const Anchors& anchors) : anchors_(anchors) {}
 
   void SetNow(int64_t now_utime) { now_utime_ = now_utime; }
 
-  // The first change after version `seen`; anchors that were gone at `since` already are left out.
+  // The first change after version `seen`. Deletions up to version `since` are left out.
   struct Change {
     int64_t version = 0;
     std::string json;
@@ -37,7 +37,7 @@ class AnchorFeed {
  private:
   struct Entry {
     int64_t version = 0;
-    std::optional<ListedAnchor> newest;  // nothing: gone
+    std::optional<ListedAnchor> newest;  // empty: gone
   };
 
   void Refresh();
@@ -49,17 +49,17 @@ class AnchorFeed {
   int64_t next_utime_ = 0;
   int64_t version_ = 0;
   std::map<AnchorId, Entry> entries_;
-  std::map<int64_t, AnchorId> by_version_;  // of each anchor the newest
+  std::map<int64_t, AnchorId> by_version_;  // newest version of each anchor
 };
 
-// One listener: all anchors first, then what changes.
+// One client: is sent all anchors first, then the changes.
 class AnchorListener : public web::WebPeer {
  public:
   explicit AnchorListener(AnchorFeed& feed) : feed_(feed), since_(feed.version()) {}
 
   bool is_text() const override { return true; }
   std::optional<std::vector<uint8_t>> Next() override;
-  // There is nothing to say to it.
+  // The client must not send anything: closes the connection.
   bool Receive(std::string_view) override { return false; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// Anchors as the API says them (openapi_anchors.json has the schemas).
+// Anchors as JSON of the API (openapi_anchors.json has the schemas).
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace pangea {
 
-// An anchor that is not deleted, and where its group has it, unless it is still to be placed.
+// An anchor that is not deleted, with its pose in its group if it is placed.
 struct ListedAnchor {
   AnchorState state;
   bool placed = false;
@@ -21,7 +21,7 @@ std::optional<ListedAnchor> FindAnchor(const Anchors& anchors, const AnchorId& i
 
 // `pose` is in the odom frame of the state's map.
 nlohmann::json ToJson(const ListedAnchor& anchor);
-// Texts of apps need not be UTF-8: what is not is replaced.
+// Texts from apps may contain invalid UTF-8; it is replaced.
 std::string ToText(const nlohmann::json& value);
 
 }  // namespace pangea

@@ -11,18 +11,19 @@
 
 namespace pangea {
 
-// "127.0.0.1:8090" or "[::1]:8090"; port 0: a free one. Throws std::runtime_error for what is none.
+// "127.0.0.1:8090" or "[::1]:8090"; port 0: any free port. Throws std::runtime_error if the text is
+// not an address and port.
 web::WebOptions ListenAt(const std::string& address_and_port);
 
 class AnchorsServer : public Process {
  public:
-  // Throws std::runtime_error when it cannot listen there; else says on stdout where it does.
+  // Throws std::runtime_error if it cannot listen there; prints the address on stdout.
   AnchorsServer(Bus& bus, const AnchorsOptions& options, std::shared_ptr<RecordStore> records,
                 const web::WebOptions& web_options);
 
   void Tick(int64_t now_utime) override { process_.Tick(now_utime); }
   void BetweenMessages(int64_t now_utime) override;
-  // So soon an answer begins after its request came.
+  // Limits the delay between a request and its answer.
   int longest_wait_ms() const override { return 10; }
 
   uint16_t port() const { return server_.port(); }

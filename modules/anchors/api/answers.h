@@ -1,6 +1,6 @@
 #pragma once
 
-// What the API's requests and answers are made of.
+// Helpers to parse the API's requests and to make its answers.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,19 +15,19 @@
 namespace pangea::anchor_answers {
 
 web::WebAnswer Json(int status, const nlohmann::json& body);
-// {"error": ...}, for people.
+// The body is {"error": ...}, a text for people.
 web::WebAnswer Error(int status, const std::string& error);
-// 400, with the field.
+// Status 400, with the field.
 web::WebAnswer Error(const BadField& bad);
-// 405, "GET, PUT".
+// Status 405; `methods`: the allowed ones, "GET, PUT".
 web::WebAnswer OnlyMethods(const char* methods);
-// With its revision as ETag.
+// The anchor, with its revision as ETag.
 web::WebAnswer OneAnchor(int status, const ListedAnchor& anchor);
 
 std::string PercentDecoded(std::string_view text);
 // "/v1/anchors/2/17" is {"v1", "anchors", "2", "17"}.
 std::vector<std::string> SplitPath(const std::string& path);
-// What If-Match says: "3" with its quotes, or 3.
+// Parses If-Match: "3" with quotes, or 3.
 std::optional<int64_t> RevisionOf(std::string_view if_match);
 
 }  // namespace pangea::anchor_answers

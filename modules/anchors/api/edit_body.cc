@@ -26,12 +26,12 @@ constexpr double kMaxDistance_m = 1e5;
 constexpr double kMaxPixel = 1e5;
 constexpr double kNormTolerance = 1e-3;
 
-// Unprintable: LCM's texts end at a zero, and a name is for people.
+// Control characters are refused: LCM's strings end at a zero, and a name is for people.
 bool HasControl(const std::string& text) {
   return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }
 
-// A JSON object whose fields are read by name; what is wrong is thrown as BadField.
+// Reads the fields of a JSON object by name; throws BadField for an error.
 class Fields {
  public:
   Fields(const json& object, std::string path, std::initializer_list<std::string> known)
@@ -118,7 +118,7 @@ Rigid3 ParseTransform(const Fields& fields) {
   return T;
 }
 
-// The field that names the frame says which of the three it is.
+// The field that names the frame decides which of the three alternatives it is.
 BodyPose ParsePose(const json& pose) {
   if (pose.is_object() && pose.contains("group")) {
     const Fields fields(pose, "pose", {"group", "position", "orientation"});
@@ -178,9 +178,9 @@ EditBody ParseFields(const json& body, BodyOf of) {
   return edit;
 }
 
-// `twice`: a field that an object has twice, of which the last one counts.
+// `twice`: a field that occurs twice in an object; the parser uses the last one.
 json ParseNotingTwice(std::string_view text, std::optional<std::string>* twice) {
-  std::vector<std::set<std::string>> seen;  // of the objects that are open
+  std::vector<std::set<std::string>> seen;  // one per open object
   const auto note = [&](int, json::parse_event_t event, const json& parsed) {
     if (event == json::parse_event_t::object_start) {
       seen.emplace_back();

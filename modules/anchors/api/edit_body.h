@@ -1,6 +1,6 @@
 #pragma once
 
-// What a request's body says an anchor shall be. Past ParseEditBody every field is bounded.
+// Parses the body of a request that makes or changes an anchor. ParseEditBody bounds every field.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace pangea {
 
-// Where an anchor is to be: in the map frame of a group,
+// The pose of an anchor: in the map frame of a group,
 struct PoseInGroup {
   MapId group;
   Rigid3 T_map_anchor;
@@ -34,25 +34,25 @@ using BodyPose = std::variant<PoseInGroup, PoseByKeyframe, PoseBehindPixel>;
 struct EditBody {
   std::optional<std::string> name;
   std::optional<std::string> payload;
-  std::optional<int64_t> revision;  // that the editor knows
+  std::optional<int64_t> revision;  // the newest one that the editor knows
   std::optional<BodyPose> pose;
 };
 
-// What is wrong with a request, for people.
+// An error in a request, for people.
 struct BadField {
   std::string field;  // "pose.position"; empty for the body as a whole
-  std::string error;  // with how to mend it
+  std::string error;  // including how to correct it
 };
 
-// `text`: JSON. Of a new anchor the pose is needed and there is no revision; of a change there is
-// at least one field.
+// `text`: JSON. A new anchor must have a pose and no revision; a change must have at least one
+// field.
 enum class BodyOf : uint8_t { kNew, kChange };
 std::variant<EditBody, BadField> ParseEditBody(std::string_view text, BodyOf of);
 
 // "2/1700000000000000".
 std::optional<MapId> ParseMapId(std::string_view text);
 std::optional<AnchorId> ParseAnchorId(std::string_view agent, std::string_view created);
-// Digits alone, 0 to `max`.
+// Only digits, 0 to `max`; else empty.
 std::optional<int64_t> ParseNumber(std::string_view text, int64_t max);
 
 }  // namespace pangea

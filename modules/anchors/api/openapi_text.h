@@ -2,7 +2,7 @@
 
 namespace pangea {
 
-// openapi_anchors.json, as the build found it.
+// The text of openapi_anchors.json at build time.
 extern const char* const kOpenApiText;
 
 }  // namespace pangea
