@@ -22,29 +22,29 @@ constexpr double kOtherRotation = 0.5;  // rad
 constexpr CameraModel::Kind kLenses[] = {CameraModel::Kind::kRadtan,
                                          CameraModel::Kind::kEquidistant};
 
-// Of the pairs searched on: what is not yet known adds up over time.
+// Largest gap within pairs for the search: errors of unknown parameters grow with time.
 constexpr double kSearchGap_s = 0.12;
 constexpr double kVelocityChange = 1;  // within a pair (epipolar.h)
-constexpr size_t kMaxRefined = 9;      // hypotheses, on a part of the pairs
-constexpr size_t kChooseOnEvery = 3;   // that part
+constexpr size_t kMaxRefined = 9;      // hypotheses refined on a part of the pairs
+constexpr size_t kChooseOnEvery = 3;   // that part: every third pair
 constexpr double kMinSeconds = 8;      // of pairs
-// The result is refused beyond these.
+// A result beyond these limits is refused.
 constexpr double kMaxSigmaRotation = 0.06;  // rad
 constexpr double kMaxSigmaLogFocal = 0.05;
 constexpr double kMaxSigmaTimeOffset_s = 0.01;
 constexpr double kMaxSigma_px = 2.5;
 constexpr double kMinFieldOfView = 0.7, kMaxFieldOfView = 2.3;  // rad
-constexpr double kMinCostRatio = 2;  // the next best rotation's over the best one's
-// A rotation found is the given one if it is within the 99.9 % bound (chi squared, 3 degrees of
-// freedom: 4.03 sigma) of the given one's error and of the largest error of a found one: 27
-// degrees. Wrong axes are off by 90 at least.
+constexpr double kMinCostRatio = 2;  // cost of the next best rotation / cost of the best
+// A rotation agrees with the given one if the difference is within the 99.9 % bound (chi-squared, 3
+// degrees of freedom: 4.03 sigma) of the errors of both: 27 degrees. Wrong axes differ by 90
+// degrees at least.
 const double kMaxOffGiven = 4.03 * std::hypot(kSigmaGivenRotation, kMaxSigmaRotation);
-// The given rotation fits worse than another beyond this: 99 %, which the fewest blocks can reach
-// (kMinSeconds of them all say so: 2.52).
+// The given rotation fits worse than another one if SigmasWorse exceeds this: 99 %. The fewest
+// blocks possible can reach it (if all kMinSeconds blocks agree: 2.52).
 constexpr double kMaxSigmasWorse = 2.33;
 
-// First without the lens: focal length and distortion run away together while the rotation is
-// rough.
+// Solves first without the lens: focal length and distortion would diverge together while the
+// rotation is inaccurate.
 Solution Refined(const Solver& solver, const Hypothesis& hypothesis, const Prior& prior) {
   Prior first = prior;
   first.sigma.tail<kSize - kLogFocal>().setZero();
@@ -52,7 +52,7 @@ Solution Refined(const Solver& solver, const Hypothesis& hypothesis, const Prior
   return solver.Solve(roughly.parameters, prior);
 }
 
-// With inertial samples all around, wherever the clocks are.
+// Pairs that inertial samples cover for any time offset in the search range.
 std::vector<FramePair> Pairs(const Input& input, double max_gap_s, int64_t origin) {
   std::vector<FramePair> pairs = MakePairs(input.frames, origin, max_gap_s);
   const OrientationCurve curve(input.imu, origin, Eigen::Vector3d::Zero());
@@ -63,8 +63,8 @@ std::vector<FramePair> Pairs(const Input& input, double max_gap_s, int64_t origi
   return pairs;
 }
 
-// Half of what lies between the results of the recording's halves: what the residuals do not show,
-// such as a focus or a delay that changes.
+// Half of the difference between the results of the recording's two halves. It shows errors that
+// the residuals do not, such as a changing focus or delay.
 Tangent HalfDifference(const Input& input, std::span<const FramePair> pairs, int64_t origin,
                        const Solution& solution, const Prior& prior) {
   const size_t middle = pairs.size() / 2;
@@ -76,7 +76,8 @@ Tangent HalfDifference(const Input& input, std::span<const FramePair> pairs, int
   return 0.5 * first.Minus(second);
 }
 
-// A gyroscope that reads too little makes lenses too long, by the same share.
+// Adds errors that the residuals cannot show. A gyroscope with too small a scale gives too large a
+// focal length, by the same factor.
 void AddFloors(const Input& input, Result& result) {
   const ImuNoise& noise = input.imu_noise;
   const auto add = [&result](int row, double sigma) {
@@ -85,7 +86,7 @@ void AddFloors(const Input& input, Result& result) {
   for (int axis = 0; axis < 3; ++axis) {
     add(kRotation + axis, noise.axes_sigma);
   }
-  // What two coefficients leave of a lens.
+  // Error of modelling a lens with two coefficients.
   constexpr double kLensSigma = 0.001;
   add(kDistortion, kLensSigma);
   add(kDistortion + 1, kLensSigma);
@@ -93,7 +94,7 @@ void AddFloors(const Input& input, Result& result) {
   result.sigma = result.covariance.diagonal().cwiseSqrt();
 }
 
-// Standard deviation of what the intervals between images make of the time offset.
+// Standard deviation of the time offset due to changing intervals between images.
 double TimeOffsetSpread(std::span<const FramePair> pairs, double interval_share) {
   double squared = 0;
   for (const FramePair& pair : pairs) {
@@ -145,7 +146,7 @@ std::string Refusal(const Result& result) {
 
 void Fill(const Solution& solution, Result& result) {
   result.parameters = solution.parameters;
-  // A global shutter's may come out a little below.
+  // For a global shutter the estimate may be slightly negative.
   CameraModel& camera = result.parameters.camera;
   if (camera.readout_s < 0) {
     camera.time_offset_s += 0.5 * camera.readout_s;
@@ -164,10 +165,10 @@ std::vector<FramePair> EveryNth(std::span<const FramePair> pairs) {
   return some;
 }
 
-// What best explains a part of the pairs, among the rotations searched.
+// The hypothesis that best explains a part of the pairs.
 struct Choice {
   Hypothesis best;
-  double next_cost = 0;  // of the best other rotation, over the best one's; 0: there is none
+  double next_cost = 0;  // cost of the best other rotation / cost of the best; 0: only one
 };
 
 Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int64_t origin) {
@@ -180,7 +181,8 @@ Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int6
   std::vector<Hypothesis> found =
       Search(searched, input.imu, origin, NominalCamera(input, CameraModel::Kind::kRadtan),
              rotations, fields);
-  // The gyroscope's bias may hide the right one: each is refined a little before most are dropped.
+  // An unknown gyro bias may hide the right hypothesis, so each is refined a little before most are
+  // dropped.
   const Solver roughly(searched, input.imu, origin, kSearchVelocityChange);
   for (Hypothesis& hypothesis : found) {
     Prior first = PriorOf(input, hypothesis.parameters);
@@ -213,9 +215,9 @@ double AngleBetween(const Parameters& a, const Eigen::Quaterniond& q_body_cam) {
   return a.camera.T_body_cam.q.angularDistance(q_body_cam);
 }
 
-// How surely `worse` is worse than `better`, in standard deviations: by the signed ranks of the
-// differences of blocks of time, which are independent witnesses (Wilcoxon, Biometrics 1945). Their
-// sizes differ as the motion does, so that their mean tells little.
+// Significance with which `worse` fits worse than `better`, in standard deviations: signed-rank
+// test on the cost differences of blocks of time, which are independent (Wilcoxon, Biometrics
+// 1945). The sizes of the differences vary with the motion, so their mean is not meaningful.
 double SigmasWorse(const Input& input, std::span<const FramePair> pairs, int64_t origin,
                    const Parameters& worse, const Parameters& better) {
   const std::vector<FramePair> some = EveryNth(pairs);
@@ -239,8 +241,9 @@ double SigmasWorse(const Input& input, std::span<const FramePair> pairs, int64_t
   return (ranks - n * (n + 1) / 4) / std::sqrt(n * (n + 1) * (2 * n + 1) / 24);
 }
 
-// Of all rotations what fits instead of the given one, if the points speak against that: the best
-// is not where the given one may be, and where the given one led is not there either or fits worse.
+// A choice from all rotations that fits better than the given rotation, if there is one: the best
+// rotation disagrees with the given one, and the result of the given one either disagrees too or
+// fits worse.
 std::optional<Choice> BetterThanGiven(const Input& input, std::span<const FramePair> pairs,
                                       int64_t origin, const Parameters& with_given) {
   Input free = input;
@@ -270,7 +273,7 @@ void RefuseGiven(const Eigen::Quaterniond& given, const Choice& better, Result* 
                                  q.angularDistance(given) / kDegree);
 }
 
-// With either kind of lens; the one that explains more.
+// Solves with both lens models and returns the better solution.
 Solution SolveAll(const Input& input, std::span<const FramePair> pairs, int64_t origin,
                   const Parameters& start) {
   const Solver solver(pairs, input.imu, origin, kVelocityChange);

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of a phone's sensor, where nobody says better.
+// Noise of a typical phone, if the recording does not have it.
 constexpr ImuNoise kPhoneNoise{.gyro_noise_density = 5e-4,
                                .gyro_random_walk = 5e-5,
                                .accel_noise_density = 5e-3,
@@ -92,7 +92,7 @@ CalibrationFolder::CalibrationFolder(const std::string& recording, const std::st
   const cv::Size size = SizeOfImages(from);
   const ImuNoise noise = NoiseOf(from);
   Result nothing_known;
-  nothing_known.sigma.setConstant(0.1);  // what is written must be readable
+  nothing_known.sigma.setConstant(0.1);  // the values written must be readable
   nothing_known.parameters.camera = GuessedCamera(size.width, size.height);
   try {
     LinkEntries(from, to);

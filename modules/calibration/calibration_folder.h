@@ -1,7 +1,7 @@
 #pragma once
 
-// A recording's folder beside the original: links to its images, samples and ground truth, and
-// sensor.yaml files of its own. So what is calibrated can be played as it is.
+// A new recording folder with links to the original's images, samples and ground truth, and its own
+// sensor.yaml files, so that the calibrated recording can be played directly.
 
 #include <string>
 
@@ -9,23 +9,24 @@
 
 namespace pangea::calibration {
 
-// It is made as `out`.part, so that nobody takes one without a calibration for one with.
+// The folder is named `out`.part until it is finished, so that nobody uses it without a
+// calibration.
 class CalibrationFolder {
  public:
-  // Links, and sensor.yaml files that know the image's size only. What the recording's own files
-  // say of noise is kept, where there are any; of the camera nothing is. Throws std::runtime_error,
-  // also when `out` or its part exists.
+  // Makes the links, and sensor.yaml files with only the image size. The noise in the recording's
+  // own files is kept, if there are any; their camera is not. Throws std::runtime_error, also if
+  // `out` or `out`.part exists.
   CalibrationFolder(const std::string& recording, const std::string& out);
-  // Removes what was not finished.
+  // Removes the folder if it is not finished.
   ~CalibrationFolder();
   CalibrationFolder(const CalibrationFolder&) = delete;
   CalibrationFolder& operator=(const CalibrationFolder&) = delete;
 
-  // The recording to calibrate on.
+  // The folder with the recording to calibrate.
   const std::string& part() const { return part_; }
-  // A message about files of the part, for people: about the recording's own.
+  // Replaces paths in the part by paths in the original recording, in a message for people.
   std::string AboutTheRecording(std::string text) const;
-  // The calibration, and its summary as calibration.txt.
+  // Writes the calibration, and its summary as calibration.txt, and gives the folder its name.
   void Finish(const Result& result, const ImuNoise& noise, const std::string& summary);
 
  private:

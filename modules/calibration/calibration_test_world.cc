@@ -11,7 +11,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr int kWaves = 6;
-constexpr double kRows_s = 1e-3;  // between the steps of the rotation's integral
+constexpr double kRows_s = 1e-3;  // step of the integration of the rotation
 
 // A sum of sines with the given rms, 0.2 to 1.6 Hz.
 class Waves {
@@ -76,7 +76,8 @@ Parameters RandomTruth(std::mt19937_64& rng, const TestWorldOptions& options) {
   return truth;
 }
 
-// As a rolling shutter sees it: the row at which it is exposed is the row it is seen in.
+// Observation with a rolling shutter: the row of the pixel is exposed at the time of the
+// observation.
 std::optional<Eigen::Vector2d> SeenAt(const Motion& motion, const CameraModel& camera,
                                       const Eigen::Vector3d& point, double image_s) {
   Eigen::Vector2d pixel(0, 0.5 * camera.height);

@@ -1,7 +1,7 @@
 #pragma once
 
-// A hand-held camera among points, with everything that is calibrated at random: its tracks and
-// inertial samples, exact but for noise.
+// A hand-held camera among points, with random calibration parameters: its tracks and inertial
+// samples, exact except for noise.
 
 #include <cstdint>
 
@@ -17,13 +17,13 @@ struct TestWorldOptions {
   int num_points = 1500;
   double pixel_sigma = 0.4;
   double stamp_sigma_s = 0;
-  // In the second half images come this many times as far apart, and the time offset grows by a
-  // share of the difference.
+  // In the second half, the interval between images is this many times as long, and the time offset
+  // grows by interval_share of the difference.
   double slower = 1;
   double interval_share = 0;
-  double outlier_share = 0;                        // of the tracks: off by up to 6 px in any image
+  double outlier_share = 0;  // of the tracks: wrong by up to 6 px in every image
   Eigen::Vector3d rotation_rms = {0.5, 0.6, 0.4};  // rad/s, about the camera's axes
-  double rough_rad = 0.06;                         // off the axis-aligned rotation
+  double rough_rad = 0.06;                         // deviation from an axis-aligned rotation
   bool exact_gyro = false;
 };
 

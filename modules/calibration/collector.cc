@@ -7,8 +7,8 @@
 namespace pangea::calibration {
 namespace {
 
-// As wide as a guessed lens and an unknown rotation ask for; outliers that stay are dealt with by
-// the robust loss.
+// Tolerances for a guessed lens and an unknown rotation; the robust loss handles the remaining
+// outliers.
 vio::TrackerOptions Forgiving() {
   vio::TrackerOptions options;
   options.two_view.inlier_px = 4;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What is calibrated on, gathered image by image from a camera that is not known yet. Images and
-// samples each in the order of their times; either may run ahead.
+// Collects the input of a calibration image by image, from an uncalibrated camera. Images and
+// samples must each come in time order; either may be ahead of the other.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -14,14 +14,14 @@ namespace pangea::calibration {
 
 class Collector {
  public:
-  // Of the image's size, in pixels. `q_body_cam` to some degrees, where it is known.
+  // `width`, `height`: of the images, pixels. `q_body_cam`: if known, to some degrees.
   Collector(int width, int height, const ImuNoise& noise,
             const std::optional<Eigen::Quaterniond>& q_body_cam);
 
   void AddImu(const ImuSample& sample) { input_.imu.push_back(sample); }
   // 8-bit grey.
   void AddImage(int64_t utime, const cv::Mat& image);
-  // Forgets what was before.
+  // Forgets all images and samples before this time.
   void Forget(int64_t before_utime);
 
   const Input& input() const { return input_; }

@@ -99,7 +99,7 @@ int RunCommandLine(int argc, char** argv) {
       kRefused));
   CLI11_PARSE(app, argc, argv);
   try {
-    cv::setNumThreads(1);  // one thread gives the same bytes
+    cv::setNumThreads(1);  // one thread: reproducible results
     return Run(arguments);
   } catch (const std::exception& error) {
     std::cerr << fmt::format("pangea-calibrate: {}\n", error.what());

@@ -11,9 +11,9 @@
 namespace pangea::calibration {
 namespace {
 
-constexpr double kLongestStep_s = 0.25;  // from pair to pair: images may come at 8 Hz
+constexpr double kLongestStep_s = 0.25;  // from pair to pair: images may come at only 8 Hz
 
-// Steps are longer than kPairStep_s where images do not come at multiples of it.
+// Steps are longer than kPairStep_s if images do not come at multiples of it.
 double SecondsOf(std::span<const FramePair> pairs) {
   double seconds = kPairStep_s;
   for (size_t i = 1; i < pairs.size(); ++i) {

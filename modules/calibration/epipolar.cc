@@ -9,10 +9,11 @@ namespace pangea::calibration {
 namespace {
 
 constexpr int kReweightings = 2;
-constexpr double kNoise_px = 0.5;  // what the change of velocity is weighed against
+// pixel noise, relative to which changes of velocity are weighted
+constexpr double kNoise_px = 0.5;
 
-// Rotation camera to the curve's frame within one image: rows rotate at the mean rate, to second
-// order (a read-out of 30 ms at 3 rad/s leaves 1e-5 rad).
+// Rotation from the camera to the curve's frame, by row of one image: at the mean rate, to second
+// order (error for a read-out of 30 ms at 3 rad/s: 1e-5 rad).
 class RowRotation {
  public:
   RowRotation(double image_s, double excess_s, const Parameters& parameters,
@@ -124,7 +125,7 @@ Translation PairGeometry::BestTranslation(const Eigen::VectorXd& weights,
       const double gain = best.isZero() ? focal_ : Gain(i, RowToRow(i, best));
       moments += weights[i] * gain * gain * k * k.transpose();
     }
-    // a and b eliminated; then the direction as always.
+    // Eliminate a and b; then find the direction as without them.
     const Eigen::Matrix<double, 6, 3> to_change =
         -moments.bottomRightCorner<6, 6>().ldlt().solve(moments.bottomLeftCorner<6, 3>());
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;

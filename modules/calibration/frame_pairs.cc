@@ -11,9 +11,8 @@ namespace {
 
 constexpr double kEnoughMotion_px = 60;  // median
 constexpr int kMinPoints = 25;
-constexpr int kMaxPoints = 50;  // kept of a pair, evenly
-constexpr double kMinShare =
-    0.4;  // of the first image's points: the second is as late as this allows
+constexpr int kMaxPoints = 50;     // per pair, evenly chosen
+constexpr double kMinShare = 0.4;  // smallest share of common points
 
 std::vector<PointPair> Common(const vio::TrackedFrame& a, const vio::TrackedFrame& b) {
   std::unordered_map<int32_t, Eigen::Vector2d> in_a;
@@ -30,7 +29,7 @@ std::vector<PointPair> Common(const vio::TrackedFrame& a, const vio::TrackedFram
   return points;
 }
 
-// What the interval exceeds the usual one at each image; within jitter it does not.
+// Excess of the interval over the usual one at each image; 0 within the jitter.
 std::vector<double> ExcessIntervals(const std::vector<vio::TrackedFrame>& frames) {
   vio::ImageStamps stamps{CameraModel{}};
   std::vector<double> excess_s;

@@ -5,10 +5,11 @@
 namespace pangea::calibration {
 namespace {
 
-constexpr double kSigmaAxisAligned = 0.25;  // rad: of a rotation found among the 24
-constexpr double kSigmaGyroBias = 0.1;      // rad/s
+// rad: of a rotation found among the 24 axis-aligned ones
+constexpr double kSigmaAxisAligned = 0.25;
+constexpr double kSigmaGyroBias = 0.1;  // rad/s
 constexpr double kSigmaLogFocal = 0.3;
-constexpr double kSigmaGivenLogFocal = 0.1;  // with a field of view
+constexpr double kSigmaGivenLogFocal = 0.1;  // if a field of view is given
 constexpr double kSigmaDistortionEquidistant = 0.03;
 constexpr double kReadout_s = 0.015;
 constexpr double kGuessedField = 1.13;  // rad

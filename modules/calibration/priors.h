@@ -1,6 +1,6 @@
 #pragma once
 
-// What is known of any phone before: standard deviations, and where the solver starts.
+// Priors for any phone: standard deviations, and initial values for the solver.
 
 #include "calibration/calibrate.h"
 
@@ -8,16 +8,17 @@ namespace pangea::calibration {
 
 constexpr double kSigmaGivenRotation = 0.1;  // rad
 constexpr double kSigmaTimeOffset_s = 0.1;
-constexpr double kSigmaCentre = 0.02;  // of the wider side
+constexpr double kSigmaCentre = 0.02;  // relative to the wider side
 constexpr double kSigmaDistortion = 0.15;
 constexpr double kSigmaReadout_s = 0.012;
-// Of stamps of the exposure's begin it is 1/2, of its end -1/2, of an image later -3/2.
+// interval_share is 1/2 if stamps are of the begin of the exposure, -1/2 for its end, -3/2 for one
+// image later.
 constexpr double kSigmaIntervalShare = 1;
 
-// Without a focal length.
+// Leaves the focal length open.
 CameraModel NominalCamera(const Input& input, CameraModel::Kind lens);
 
-// To begin with, where nothing is known but the image's size, in pixels.
+// Initial camera if only the image size (pixels) is known.
 CameraModel GuessedCamera(int width, int height);
 
 Prior PriorOf(const Input& input, const Parameters& mean);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What is calibrated on, from a recording: its images' tracks and its inertial samples.
+// Makes the input of a calibration from a recording: tracks of its images, and its samples.
 
 #include <optional>
 
@@ -13,7 +13,7 @@ struct PartOfRecording {
   double start_s = 0, duration_s = 60;
 };
 
-// `q_body_cam` as of Input.
+// `q_body_cam`: see Input.
 Input TracksOf(const EurocRecording& recording, const PartOfRecording& part,
                const std::optional<Eigen::Quaterniond>& q_body_cam);
 

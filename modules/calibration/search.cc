@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kOffsetStep_s = 0.015;
 constexpr size_t kMaxPairs = 50;
-constexpr int kMaxPointsOfPair = 25;  // of each
-constexpr double kGridSigma_px = 3;   // what the grid leaves
+constexpr int kMaxPointsOfPair = 25;  // per pair
+constexpr double kGridSigma_px = 3;   // residual error due to the grid
 
 double Motion(const FramePair& pair) {
   double squared = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where to begin: of the 24 rotations that take axes to axes, time offsets and fields of view, the
-// ones whose epipolar residuals are smallest.
+// Searches initial values: the best of the 24 axis-aligned rotations, of time offsets and of fields
+// of view, by epipolar residuals.
 
 #include <Eigen/Geometry>
 #include <cstdint>
@@ -15,19 +15,20 @@
 
 namespace pangea::calibration {
 
-constexpr double kMaxOffset_s = 0.15;  // searched to either side
-// Of the pairs searched on (epipolar.h): so short they are.
+constexpr double kMaxOffset_s = 0.15;  // search range, in both directions
+// velocity_change of the pairs for the search (epipolar.h); small, since they are short.
 constexpr double kSearchVelocityChange = 0.2;
 
 // Rotations camera to body.
 std::vector<Eigen::Quaterniond> AxisAlignedRotations();
 Eigen::Quaterniond NearestAxisAligned(const Eigen::Quaterniond& q_body_cam);
-// The body's axes along which the image's right, its down and the line of sight point, of the
-// nearest of these rotations: "-y,-x,-z".
+// The body axes to which the image's right, its down and the optical axis point, by the nearest of
+// these rotations: "-y,-x,-z".
 std::string AxesOf(const Eigen::Quaterniond& q_body_cam);
 
-// Best time offset of each rotation and field of view with its cost per residual, the best first.
-// `camera` has size, kind and read-out; fields of view are of its wider side, radians.
+// Returns, for each rotation and field of view, the best time offset with its cost per residual;
+// the best first. `camera`: gives image size, lens model and read-out. `fields_of_view`: of the
+// wider side, radians.
 struct Hypothesis {
   Parameters parameters;
   double cost = 0;
@@ -37,10 +38,10 @@ std::vector<Hypothesis> Search(std::span<const FramePair> pairs, std::span<const
                                std::span<const Eigen::Quaterniond> rotations,
                                std::span<const double> fields_of_view);
 
-// The best first.
+// Sorts by cost, the best first.
 void SortByCost(std::vector<Hypothesis>* hypotheses);
 
-// The pairs with most motion, each thinned.
+// Selects the pairs with most motion, and thins their points.
 std::vector<FramePair> WithMostMotion(std::span<const FramePair> pairs);
 
 }  // namespace pangea::calibration

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kTranslationSigma_m = 0.05;
 
-// T_BS as EuRoC writes it.
+// T_BS in EuRoC's format.
 std::string Matrix(const Eigen::Quaterniond& q) {
   const Eigen::Matrix3d R = q.toRotationMatrix();
   std::string data;

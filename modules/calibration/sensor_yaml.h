@@ -1,7 +1,7 @@
 #pragma once
 
-// A result as the sensor.yaml files of a recording (docs/recordings.md), standard deviations beside
-// the values.
+// Writes a result as sensor.yaml files of a recording (docs/recordings.md), with standard
+// deviations beside the values.
 
 #include <string>
 

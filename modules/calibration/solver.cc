@@ -13,22 +13,22 @@ namespace {
 
 constexpr double kMadToSigma = 1.4826;
 constexpr double kLeastSigma_px = 0.02, kLeastMedian_px = 0.2;
-constexpr double kTranslationStep = 1e-5;  // of its numeric derivative
-// Information about a direction of translation that nothing tells.
+constexpr double kTranslationStep = 1e-5;  // step of the numeric derivative
+// Information added for an undetermined direction of translation.
 constexpr double kDirectionDamping = 1e-3;
 constexpr double kInlierSigmas = 3;
-constexpr double kRobustAt = 2.4;  // of the Cauchy loss, in standard deviations
+constexpr double kRobustAt = 2.4;  // scale of the Cauchy loss, in standard deviations
 constexpr int kMaxIterations = 25;
 constexpr double kMaxDamping = 1e6;
 constexpr double kMinCurvature =
-    0.2;                        // of the robust loss, over its weights: where most are outliers
-constexpr int kLongBlocks = 8;  // of the whole recording: for what changes slowly, as exposure does
-// Lenses beyond these are not sought: epipolar residuals vanish as the focal length does.
+    0.2;                        // of the robust loss, relative to its weights: if most are outliers
+constexpr int kLongBlocks = 8;  // in the whole recording: for slow changes, such as the exposure
+// Limits of the search: epipolar residuals vanish as the focal length goes to zero.
 constexpr double kMinFieldOfView = 0.6, kMaxFieldOfView = 2.4;  // rad, of the wider side
 constexpr double kMaxDistortion = 0.6;
-constexpr double kMaxDistortionEquidistant = 0.15;  // a lens that is far from equidistant is none
+constexpr double kMaxDistortionEquidistant = 0.15;  // limit for the equidistant model
 
-// Step of the numeric derivative of each row: small against what a residual is linear in.
+// Steps of the numeric derivatives: small enough for residuals to be linear.
 Tangent DerivativeSteps() {
   Tangent h = Tangent::Constant(1e-5);
   h.segment<2>(kCentre).setConstant(1e-2);
@@ -36,7 +36,8 @@ Tangent DerivativeSteps() {
   return h;
 }
 
-// Two directions across a pair's translation, and its changes of velocity.
+// Tangent of a pair's translation: two directions perpendicular to d, and the changes of velocity
+// a, b.
 Eigen::Matrix<double, 9, 8> Steps(const Translation& translation) {
   Eigen::Matrix<double, 9, 8> steps = Eigen::Matrix<double, 9, 8>::Zero();
   const Eigen::Vector3d d = translation.head<3>();
@@ -46,7 +47,7 @@ Eigen::Matrix<double, 9, 8> Steps(const Translation& translation) {
   return steps;
 }
 
-// All points alike, then without the outliers.
+// First with equal weights, then with robust ones.
 Translation RobustTranslation(const PairGeometry& geometry) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(geometry.size());
   const Translation first = geometry.BestTranslation(weights, Translation::Zero());
@@ -64,7 +65,7 @@ Information PriorInformation(const Prior& prior) {
   return information;
 }
 
-// Rows without any information stay as they are.
+// Makes rows without information invertible; they do not move.
 Information WithHeldRows(Information information) {
   for (int i = 0; i < kSize; ++i) {
     information(i, i) += information(i, i) == 0 ? 1e12 : 0;
@@ -79,7 +80,7 @@ struct Solver::PairResiduals {
   Eigen::VectorXd residuals;
 };
 
-// A pair's part of the normal equations; `own` rows are of its translation (Steps).
+// A pair's part of the normal equations; `own` rows belong to its translation (Steps).
 struct Solver::PairTerms {
   Eigen::Matrix<double, 8, 8> own;
   Eigen::Matrix<double, 8, kSize> cross;
@@ -87,7 +88,7 @@ struct Solver::PairTerms {
   Own own_gradient;
   Tangent gradient;
 
-  // Of the translation; `damping` is a share of the diagonal.
+  // Factor of the translation's block; `damping`: relative to the diagonal.
   Eigen::LDLT<Eigen::Matrix<double, 8, 8>> OwnFactor(double damping) const {
     Eigen::Matrix<double, 8, 8> damped = own;
     damped.diagonal() *= 1 + damping;
@@ -102,8 +103,8 @@ struct Solver::Linearised {
   double sigma_px = 1;
   double inlier_share = 0;
   double cost = 0;
-  // Sums over residuals, of the robust loss: its weights, its derivative squared, its second
-  // derivative; in standard deviations.
+  // Sums over residuals of the robust loss's weight, squared derivative and second derivative; in
+  // units of standard deviations.
   double weights = 0, squared_slopes = 0, curvatures = 0;
 };
 
@@ -295,7 +296,7 @@ bool Solver::Plausible(const CameraModel& camera) const {
          camera.distortion.cwiseAbs().maxCoeff() < most;
 }
 
-// Of the sum of all pairs' gradients, from how those of blocks of time scatter.
+// Covariance of the sum of all pairs' gradients, from the scatter of the sums over blocks of time.
 Information Solver::Scatter(const Reduced& reduced, double block_s) const {
   std::map<int64_t, Tangent> blocks;
   for (size_t p = 0; p < pairs_.size(); ++p) {
@@ -313,8 +314,9 @@ Information Solver::Scatter(const Reduced& reduced, double block_s) const {
 
 Information Solver::Covariance(const Linearised& at) const {
   const Reduced reduced(at, 0);
-  // The sandwich of an M-estimator (Huber, 1967): the loss's second derivative, which is below its
-  // weight and beyond kRobustAt negative, about the scatter of the gradients.
+  // Sandwich covariance of an M-estimator (Huber, 1967): scatter of the gradients between inverse
+  // Hessians. The Hessian needs the loss's second derivative, which is smaller than its weight, and
+  // negative beyond kRobustAt.
   const double curvature = std::max(kMinCurvature, at.curvatures / at.weights);
   const Information inverse =
       WithHeldRows(curvature * reduced.hessian + at.prior).ldlt().solve(Information::Identity());
@@ -325,7 +327,7 @@ Information Solver::Covariance(const Linearised& at) const {
   const Information independent = with(at.squared_slopes / at.weights * reduced.hessian);
   const Information slow = with(Scatter(reduced, seconds / kLongBlocks));
   Information covariance = with(Scatter(reduced, kBlock_s));
-  // The largest of the three for each row: blocks may agree by chance.
+  // Use the largest of the three for each row: blocks may agree by chance.
   for (int i = 0; i < kSize; ++i) {
     const double largest = std::max({independent(i, i), covariance(i, i), slow(i, i)});
     const double scale = std::sqrt(largest / std::max(1e-30, covariance(i, i)));

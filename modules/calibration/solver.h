@@ -1,12 +1,12 @@
 #pragma once
 
-// Least squares over all pairs: robust (Cauchy), Levenberg-Marquardt, each pair's
-// translation eliminated (Kaufman, 1975), numeric derivatives with respect to the dozen parameters.
+// Robust least squares over all pairs: Cauchy loss, Levenberg-Marquardt, each pair's translation
+// eliminated (Kaufman, 1975), numeric derivatives with respect to the parameters.
 //
 // Covariance: residuals of one image share the errors of its stamp and of the gyroscope, so they
-// are no independent witnesses. It is that of estimating equations with residuals grouped into
-// blocks of time, short and long ones (Liang & Zeger, Biometrika 1986), or the usual one where that
-// is larger.
+// are not independent. The covariance is that of generalised estimating equations, with residuals
+// grouped into blocks of time, short and long ones (Liang & Zeger, Biometrika 1986), or the usual
+// one if that is larger.
 
 #include <span>
 #include <vector>
@@ -17,27 +17,27 @@
 namespace pangea::calibration {
 
 constexpr double kConverged = 0.1, kRoughlyConverged = 1;
-constexpr double kBlock_s = 1.0;  // of residuals that may share an error
+constexpr double kBlock_s = 1.0;  // block of residuals that may share an error
 
 struct Solution {
   Parameters parameters;
   Information covariance = Information::Identity();
   double sigma_px = 0;      // of residuals, robust
-  double inlier_share = 0;  // of residuals within three standard deviations
-  double cost = 0;          // robust, of all residuals, in units of 1 px
+  double inlier_share = 0;  // share of residuals within three standard deviations
+  double cost = 0;          // robust cost of all residuals, in units of 1 px
   int iterations = 0;
 };
 
 class Solver {
  public:
-  // `velocity_change` within a pair: epipolar.h.
+  // `velocity_change`: within a pair, see epipolar.h.
   Solver(std::span<const FramePair> pairs, std::span<const ImuSample> imu, int64_t origin_utime,
          double velocity_change);
 
-  // Until what remains is `within` this many standard deviations (of independent residuals: less
-  // than the covariance says). Rows whose prior's sigma is 0 stay as they are.
+  // Iterates until the step is below `within` standard deviations (for independent residuals, so
+  // smaller than those of the covariance). Rows with a prior sigma of 0 are fixed.
   Solution Solve(const Parameters& start, const Prior& prior, double within = kConverged) const;
-  // Robust, without prior: for hypotheses. Of each pair, and of all.
+  // Robust cost per pair, and of all pairs, without prior; to compare hypotheses.
   std::vector<double> Costs(const Parameters& parameters, double sigma_px) const;
   double Cost(const Parameters& parameters, double sigma_px) const;
 
@@ -49,15 +49,15 @@ class Solver {
   using Own = Eigen::Matrix<double, 8, 1>;
   struct State {
     Parameters parameters;
-    std::vector<Translation> translations;  // of each pair
+    std::vector<Translation> translations;  // per pair
     double cost = 0;
   };
   State Begin(const Parameters& parameters) const;
-  // Each translation is moved along or found afresh, whichever costs less.
+  // Each translation is either updated by the step or computed anew, whichever costs less.
   State Moved(const State& state, const Linearised& at, const Prior& prior, const Tangent& step,
               double damping) const;
   Linearised Linearise(const State& state, const Prior& prior) const;
-  // d residuals / d parameters of each pair, translations held.
+  // d(residuals)/d(parameters) of each pair, for fixed translations.
   std::vector<Eigen::MatrixXd> Jacobians(const Parameters& parameters, const Prior& prior,
                                          const std::vector<PairRays>& rays,
                                          const std::vector<PairResiduals>& terms) const;

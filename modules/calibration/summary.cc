@@ -14,7 +14,8 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kRough_px = 1.0;
-constexpr double kTold = 0.7;  // of the prior's sigma: above, the data did not tell
+// relative to the prior's sigma: above it, the data gave no information
+constexpr double kTold = 0.7;
 constexpr char kAxisNames[] = {'x', 'y', 'z'};
 constexpr const char* kAxes[] = {"up and down (the camera's x axis)",
                                  "left and right (the camera's y axis)", "about the line of sight"};

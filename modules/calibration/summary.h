@@ -1,6 +1,6 @@
 #pragma once
 
-// A calibration for people: each value, how sure it is, and what to do better.
+// A summary of a calibration for people: each value with its uncertainty, and advice.
 
 #include <string>
 
