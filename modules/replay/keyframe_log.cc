@@ -16,8 +16,9 @@
 namespace pangea::session {
 namespace {
 
-// Names what is missing: "map 1/17…: keyframes 12 to 15 are missing". Where an edge leads over a
-// gap, those in it are gone for good, and nothing waits for them. `edges`: where each begins.
+// Throws with the missing keyframes: "map 1/17…: keyframes 12 to 15 are missing". If an odometry
+// edge leads across a gap, its keyframes do not exist, and no process waits for them. `edges`: the
+// seq at which each keyframe's edge begins.
 void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs,
                const std::map<KeyframeId, int32_t>& edges, const LogReading& reading) {
   std::string gaps;
@@ -126,7 +127,7 @@ std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> 
     if (best == logs.size()) {
       return merged;
     }
-    // A copy: the log's first keyframe is its clock to the end.
+    // Copy, not move: the log's first keyframe is needed as its time origin until the end.
     merged.push_back(logs[best][next[best]++]);
     merged.back().elapsed_us = best_elapsed;
   }

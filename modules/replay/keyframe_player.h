@@ -1,8 +1,8 @@
 #pragma once
 
-// Stored keyframes on an agent's bus in place of an odometry: the server and the link are measured
-// without anybody computing the keyframes again.
-//   KEYFRAME_k, STATUS_keyframes_k out; HAVE, RESEND_REQUEST in, answered on AGAIN_<requester>.
+// Publishes stored keyframes on an agent's bus in place of an odometry, to measure server and link
+// without computing the keyframes again.
+//   Out: KEYFRAME_k, STATUS_keyframes_k. In: HAVE, RESEND_REQUEST (answers on AGAIN_<requester>).
 
 #include <cstdint>
 #include <optional>
@@ -18,20 +18,20 @@ struct KeyframePlayerOptions {
   int32_t agent_id = 0;
   // Recording seconds per second; 0 = as fast as the server keeps up.
   double rate = 1;
-  std::optional<double> duration_s;  // of the recording; to its end without it
+  std::optional<double> duration_s;  // of the recording; if empty, to its end
 };
 
 class KeyframePlayer : public Process {
  public:
-  // `keyframes`: this agent's.
+  // `keyframes`: only those of this agent.
   KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
                  std::vector<LoggedKeyframe> keyframes, int64_t now_utime);
 
-  // Time of the next keyframe since the first one, sensor clock; nothing at the end.
+  // Time of the next keyframe since the first one, sensor clock, microseconds; empty at the end.
   std::optional<int64_t> next_us() const;
   void PlayNext();
   void Tick(int64_t now_utime) override;
-  // Everything is said: the last status, with the counter finished = 1.
+  // Publishes the last status, with the counter finished = 1.
   void PublishFinished(int64_t now_utime);
 
   const ReliableKeyframePublisher& publisher() const { return publisher_; }
@@ -45,8 +45,8 @@ class KeyframePlayer : public Process {
   int64_t next_status_utime_ = 0;
 };
 
-// Plays all in the keyframes' own time, or as fast as the server keeps up; then waits until
-// everything is acknowledged or nobody will.
+// Plays all keyframes at the given rate; then waits until all are acknowledged, or no
+// acknowledgement can be expected.
 void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
                    std::vector<LoggedKeyframe> keyframes);
 

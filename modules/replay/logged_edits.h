@@ -1,6 +1,6 @@
 #pragma once
 
-// The anchor edits of captured LCM logs, ready to be fed to the server again.
+// Reads the anchor edits of captured LCM logs, to feed them to the server again.
 
 #include <filesystem>
 #include <map>
@@ -12,15 +12,15 @@
 
 namespace pangea::session {
 
-// By the keyframe that came before them; those that came before any, by the first one. The server's
-// log or a journal has them; an agent's has none.
+// Keyed by the keyframe that precedes the edits in the log; edits before the first keyframe have
+// that one's key. The server's log and a journal contain edits; an agent's log does not.
 using LoggedEdits = std::map<KeyframeId, std::vector<anchor_edit_t>>;
 
-// Each once. Throws std::runtime_error naming the log when it cannot be read. What of the log is
-// lost is noted in `readings` (log_reader.h).
+// Each edit once. Throws std::runtime_error that names the log if it cannot be read. Damaged parts
+// of the log are reported in `readings` (log_reader.h).
 LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readings = nullptr);
 
-// Edits of several logs.
+// Adds `edits` to `all`, for several logs.
 void Merge(const LoggedEdits& edits, LoggedEdits* all);
 
 }  // namespace pangea::session

@@ -30,8 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Everything said on the bus, into an LCM log. Time stamps are those of the logs replayed, never
-// the clock's.
+// Writes all messages on the bus into an LCM log. Time stamps are those of the replayed logs, never
+// the wall clock.
 class Recorder {
  public:
   Recorder(Bus& bus, const ServerOptions& options, const fs::path& log)
@@ -41,8 +41,9 @@ class Recorder {
     });
   }
 
-  // Events never share a stamp, so that tools which sort by it keep their order; but the options
-  // have that of the first event, which so is when it was without them.
+  // Events have distinct stamps, so that tools which sort by stamp keep their order. Only the
+  // options share the stamp of the first event, which therefore has the same stamp as without
+  // options.
   void SetTime(int64_t utime) {
     if (utime_ == 0) {
       WriteOptions(utime);
@@ -66,7 +67,7 @@ class Recorder {
   int64_t utime_ = 0;
 };
 
-// The server's processes, or some of them.
+// All or some of the server's processes.
 class Server {
  public:
   Server(LocalBus& bus, const ServerOptions& options, const std::set<std::string>& processes)
@@ -93,7 +94,7 @@ class Server {
     }
   }
 
-  // What waits for a quiet bus when live.
+  // Does the work that a live process does when the bus is quiet.
   void Finish() {
     if (posegraph_) {
       posegraph_->Finish();
@@ -128,25 +129,25 @@ void DropLater(double until_s, std::vector<LoggedKeyframe>* keyframes) {
   }
 }
 
-// A message of a log that is replayed for some processes.
+// A message of the log, for a replay of some processes.
 struct LoggedMessage {
   int64_t utime = 0;
   double elapsed_s = 0;  // since the log's first event
   std::string channel;
   std::vector<uint8_t> data;
-  bool own = false;  // one of them said it
+  bool own = false;  // sent by one of the replayed processes
 };
 
 bool IsKeyframe(const std::string& channel) {
   return channel.starts_with(channels::kKeyframePrefix);
 }
 
-// What agents say, and nobody computes.
+// Whether the channel carries messages of agents, which no server process computes.
 bool IsFromAgents(const std::string& channel) {
   return IsKeyframe(channel) || channel == channels::kAnchorEdit;
 }
 
-// What place_recognition, inter_map_ba and fusion say, once each.
+// Whether the channel is that of matches or verification results.
 bool IsMatchOrResult(const std::string& channel) {
   return channel == channels::kPlaceMatch || channel == channels::kConstraint;
 }
@@ -155,7 +156,7 @@ bool IsInput(const LoggedMessage& message) {
   return !message.own && (IsFromAgents(message.channel) || IsMatchOrResult(message.channel));
 }
 
-// Who says so; empty for agents.
+// Name of the sending process; empty for agents.
 std::string Speaker(const LogEvent& event) {
   if (event.channel == channels::kPlaceMatch) {
     return "place_recognition";
@@ -173,14 +174,14 @@ std::string Speaker(const LogEvent& event) {
   constraint_t message{};
   if (event.channel == channels::kConstraint && DecodeMessage(event.data, &message)) {
     if (message.kind == constraint_t::KIND_DERIVED) {
-      return "thinning";  // while no process ran
+      return "thinning";  // made while no process ran
     }
     return message.kind == place_candidate_t::KIND_INTRA ? "inter_map_ba" : "fusion";
   }
   return "";
 }
 
-// What says something of the map; not who has what and asks for what again.
+// Reads the messages about maps; without HAVE messages, requests and retransmissions.
 std::vector<LoggedMessage> ReadMessages(const std::set<std::string>& processes, const fs::path& log,
                                         double until_s, LogReadings* readings) {
   std::vector<LoggedMessage> messages;
@@ -201,8 +202,8 @@ std::vector<LoggedMessage> ReadMessages(const std::set<std::string>& processes, 
   return messages;
 }
 
-// What comes before the first keyframe that is later than `checkpoint_s`: so of each keyframe all
-// that was said is taken over, or nothing.
+// The messages before the first keyframe that is later than `checkpoint_s`: so the messages about a
+// keyframe are taken over either all or not at all.
 std::span<LoggedMessage> Past(std::vector<LoggedMessage>& messages, double checkpoint_s) {
   const auto end = std::ranges::find_if(messages, [checkpoint_s](const LoggedMessage& message) {
     return IsKeyframe(message.channel) && message.elapsed_s > checkpoint_s;
@@ -214,8 +215,8 @@ std::span<LoggedMessage> Past(std::vector<LoggedMessage>& messages, double check
   return {messages.begin(), end};
 }
 
-// Those who match and verify learn what they sent, as a process that was started again learns it
-// from the journal; the log says it in their place. Returns how much that is.
+// Gives the matching and verifying processes the messages that they sent, like the journal after a
+// restart; these come from the log. Returns the number of these messages.
 int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
   int64_t count = 0;
   for (LoggedMessage& message : past) {
@@ -239,7 +240,7 @@ int64_t TakeOver(std::span<LoggedMessage> past, LocalBus& bus) {
   return count;
 }
 
-// Which no process makes again, by their newer keyframe.
+// Derived constraints, which no process computes again; keyed by their newer keyframe.
 using DerivedConstraints = std::map<KeyframeId, std::vector<constraint_t>>;
 
 DerivedConstraints ReadDerived(const std::vector<fs::path>& logs, LogReadings* readings) {
@@ -280,7 +281,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
   Recorder recorder(bus, options, out_log);
   Server server(bus, options, {std::begin(kReplayed), std::end(kReplayed)});
   ReplaySummary summary;
-  int64_t next_edit = 0;  // of several logs they are numbered anew
+  int64_t next_edit = 0;  // for several logs, edits are renumbered
   for (const LoggedKeyframe& keyframe : keyframes) {
     recorder.SetTime(begin_utime + keyframe.elapsed_us);
     bus.Publish(keyframe.channel, keyframe.data);
@@ -337,7 +338,8 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
       bus.Publish(messages[i].channel, messages[i].data);
       bus.Drain();
     } else if (i >= after_input && !finished) {
-      // No input is left, and yet one of them sent something: it took the time for what waits.
+      // The process sent this message, although no input is left: it worked because the bus was
+      // quiet.
       server.Finish();
       finished = true;
     }

@@ -23,14 +23,14 @@ struct ReplaySummary {
   std::vector<int32_t> agent_ids;  // in order of appearance
 };
 
-// Reads the keyframes of `logs` and writes everything the server says about them, with them, to
-// `out_log` (an LCM log like a session's). Several logs are interleaved by the time since each
-// one's first keyframe, as if they had started together; the first log's map is the oldest.
-// They run with `options`, which the log says first (OPTIONS_*), so that a replay of it has them.
-// `until_s`: only keyframes of so many seconds, since the log's first event, or since the first
-// keyframes of several. Throws std::runtime_error for a log that cannot be read, has no keyframes,
-// or has gaps (named). What of a log is lost is noted in `readings` (log_reader.h), and how far it
-// is in `progress`, here and below.
+// Replays the keyframes of `logs`, and writes them and all messages of the server to `out_log` (an
+// LCM log like a session's). Several logs are interleaved by the time since each one's first
+// keyframe, as if they had started together; the first log's map is the oldest. The server runs
+// with `options`; they come first in `out_log` (OPTIONS_*), so that a replay of it uses them.
+// `until_s`: only the keyframes of the first `until_s` seconds, since the log's first event, or,
+// for several logs, since their first keyframes. Throws std::runtime_error for a log that cannot be
+// read, has no keyframes, or has gaps (listed). Damaged parts of a log are reported in `readings`
+// (log_reader.h), and the progress in `progress`, here and below.
 ReplaySummary Replay(const std::vector<std::filesystem::path>& logs, const ServerOptions& options,
                      double until_s, const std::filesystem::path& out_log, Progress& progress,
                      LogReadings* readings = nullptr);
@@ -40,20 +40,21 @@ inline constexpr const char* kReplayed[] = {"place_recognition", "inter_map_ba",
 
 struct ReplayedPart {
   std::set<std::string> processes{std::begin(kReplayed), std::end(kReplayed)};
-  // Up to here, seconds since the log's first event, matches and verification results are the
-  // log's.
+  // Up to this time, in seconds since the log's first event, matches and verification results are
+  // taken from the log.
   std::optional<double> checkpoint_s;
   double until_s = std::numeric_limits<double>::infinity();
   ServerOptions options;
 };
 
-// Some of these processes alone, or all of them from a checkpoint on, fed with what was said in the
-// log in its order by the others, and up to the checkpoint by those who match and verify:
-// keyframes, anchor edits, matches, verification results, states. Writes that and their own
-// messages, which stand in the log where they sent them now. A log of a replay gives the same
-// messages again. In a live session some of them depend on what came while the process was busy:
-// there, matches and states may differ for no fault of anyone's. Returns how many matches and
-// verification results are the log's instead of their own. Throws as Replay does.
+// Runs only some of these processes, or all of them from a checkpoint on. Their input comes from
+// the log, in its order: keyframes, anchor edits, matches, verification results and states of the
+// other processes, and, up to the checkpoint, all matches and verification results. Writes this
+// input and the processes' own messages, at the points where they are sent now. The log of a replay
+// gives the same messages again. In a live session, some messages depend on what arrived while a
+// process was busy: matches and states may then differ without any error. Returns how many matches
+// and verification results were taken from the log instead of being computed. Throws as Replay
+// does.
 int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
                    const std::filesystem::path& out_log, Progress& progress,
                    LogReadings* readings = nullptr);

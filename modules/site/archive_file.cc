@@ -33,7 +33,7 @@ void PutText(Block* block, size_t at, const std::string& text) {
   std::ranges::copy(text, block->begin() + static_cast<int64_t>(at));
 }
 
-// Eight gigabytes and more: GNU's binary numbers, which all tars read.
+// Sizes of 8 GiB and more use GNU's binary numbers, which all tars read.
 void PutSize(Block* block, int64_t bytes) {
   if (bytes <= kMaxOctal) {
     return PutText(block, 124, fmt::format("{:011o}", bytes));
@@ -44,7 +44,7 @@ void PutSize(Block* block, int64_t bytes) {
   }
 }
 
-// Its own eight bytes count as blanks.
+// The header's checksum; its own eight bytes count as blanks.
 uint32_t ChecksumOf(Block block) {
   std::fill_n(block.begin() + 148, 8, uint8_t{' '});
   return std::accumulate(block.begin(), block.end(), uint32_t{0});
@@ -66,7 +66,7 @@ Block HeaderOf(const std::string& name, int64_t bytes, int mode, int64_t utime) 
   return block;
 }
 
-// -1 for what is no number.
+// -1 if it is not a number.
 int64_t GetOctal(const Block& block, size_t at, size_t size) {
   int64_t value = 0;
   for (size_t i = at; i < at + size && block[i] != 0 && block[i] != ' '; ++i) {
@@ -192,7 +192,7 @@ struct ArchiveFileReader::Stream {
     in = {bytes.data(), static_cast<size_t>(size), 0};
   }
 
-  // Zero: nothing follows.
+  // Returns 0 at the end of the data.
   size_t Decompress(ZSTD_outBuffer* out) {
     if (in.pos == in.size) {
       Fill();
@@ -213,7 +213,7 @@ struct ArchiveFileReader::Stream {
     }
   }
 
-  // With the checksum that stands at the end.
+  // Reads to the end, so that the checksum there is verified.
   void ReadToEnd() {
     Block rest{};
     for (size_t left = 1; left != 0;) {

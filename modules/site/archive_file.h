@@ -1,7 +1,7 @@
 #pragma once
 
-// Files in one: a tar archive (POSIX ustar) compressed with zstd, so that `tar --zstd -xf` unpacks
-// it too. Regular files alone.
+// A tar archive (POSIX ustar) compressed with zstd; `tar --zstd -xf` also unpacks it. Only regular
+// files.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,15 +17,15 @@ namespace pangea::site {
 
 class ArchiveFileWriter {
  public:
-  // Throws std::runtime_error, here and below: the file exists, cannot be written.
+  // Here and below: throws std::runtime_error if the file exists or cannot be written.
   explicit ArchiveFileWriter(const std::filesystem::path& path);
   ~ArchiveFileWriter();
 
-  // Then exactly `bytes` bytes of it, in parts. `name`: at most 99 bytes; `mode`: 0600 and its
-  // like.
+  // Begins a file; then call Write, in parts, with exactly `bytes` bytes. `name`: at most 99 bytes.
+  // `mode`: permissions, such as 0600.
   void Begin(const std::string& name, int64_t bytes, int mode, int64_t utime);
   void Write(Bytes part);
-  // All is on the disk when it returns.
+  // Flushes everything to the disk.
   void Finish();
 
  private:
@@ -33,8 +33,8 @@ class ArchiveFileWriter {
   void Pad();
 
   std::unique_ptr<Stream> stream_;
-  int64_t left_ = 0;     // of the file that was begun
-  int64_t padding_ = 0;  // behind it
+  int64_t left_ = 0;     // bytes left of the present file
+  int64_t padding_ = 0;  // bytes of padding after it
 };
 
 struct ArchivedFile {
@@ -45,13 +45,14 @@ struct ArchivedFile {
 
 class ArchiveFileReader {
  public:
-  // Throws std::runtime_error, here and below: cannot be read, is no such archive, is damaged.
+  // Here and below: throws std::runtime_error if the file cannot be read, is no such archive, or is
+  // damaged.
   explicit ArchiveFileReader(const std::filesystem::path& path);
   ~ArchiveFileReader();
 
-  // The next file; nothing at the archive's end.
+  // The next file; empty at the end of the archive.
   std::optional<ArchivedFile> Next();
-  // The next part of it, empty at its end. Valid until the next call.
+  // The next part of the present file, empty at its end. Valid until the next call.
   Bytes Read();
 
  private:

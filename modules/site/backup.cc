@@ -27,11 +27,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kArchiveEnd = ".tar.zst";
-constexpr const char* kTop = "site/";  // the folder in the archive
+constexpr const char* kTop = "site/";  // folder name in the archive
 constexpr int64_t kCopiedPart = 1 << 20;
 constexpr int64_t kMegabyte = 1'000'000;
 
-// A file of the copy, and how much of it.
+// A file to copy, and how many bytes of it.
 struct Source {
   std::string name;  // relative to the site's folder
   fs::path path;
@@ -39,9 +39,9 @@ struct Source {
   int mode = 0;
 };
 
-// By name; to compare what was written with what was read.
+// By file name; to compare the copy with the original.
 using Checksums = std::map<std::string, uint32_t>;
-// begin(file), then write(part) until it has all.
+// Call begin(file), then write(part) until the file is complete.
 struct Target {
   std::function<void(const Source&)> begin;
   std::function<void(Bytes)> write;
@@ -106,7 +106,7 @@ Checksums CopyFiles(const std::vector<Source>& sources, const Target& target) {
   return checksums;
 }
 
-// A new file, part by part.
+// Writes a new file part by part.
 class NewFile {
  public:
   NewFile(const fs::path& path, int mode)
@@ -149,7 +149,7 @@ Checksums CopyToFolder(const std::vector<Source>& sources, const fs::path& folde
                              [&](Bytes part) { file->Write(part); }});
 }
 
-// Each file that `from` has, part by part.
+// Passes each file of the archive to `target`, part by part.
 Checksums ReadArchive(const fs::path& from, const Target& target) {
   Checksums checksums;
   ArchiveFileReader reader(from);
@@ -183,7 +183,7 @@ void CheckWritten(const Checksums& read, const Checksums& written, const fs::pat
   }
 }
 
-// Has its name only when it is whole.
+// An archive file that gets its name only when it is complete.
 class ArchiveInTheMaking {
  public:
   explicit ArchiveInTheMaking(const fs::path& to)

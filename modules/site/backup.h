@@ -1,7 +1,7 @@
 #pragma once
 
-// Copies of a site, made while its server runs: site.yaml, options, who joined, the journal up to
-// what is written to its end, and, if wanted, the keys: the agents' and the gateway's.
+// Copies a site, also while its server runs: site.yaml, options, the agents that joined by invite,
+// the complete part of the journal (site_files.h), and optionally the keys of agents and gateway.
 
 #include <cstdint>
 #include <filesystem>
@@ -13,16 +13,16 @@ namespace pangea::site {
 struct BackupSummary {
   int64_t journal_bytes = 0;
   int64_t events = 0;
-  int64_t lost_bytes = 0;  // by damage, as the journal has it
-  int64_t bytes = 0;       // of the file or folder that was written
+  int64_t lost_bytes = 0;  // damaged, in the journal itself
+  int64_t bytes = 0;       // size of the backup
 };
 
-// To a new FILE.tar.zst, or, under another name, to a new folder, which is a site. What was written
-// is read again and compared; it has its name only then. Throws std::runtime_error.
+// Backs up to a new FILE.tar.zst or, with any other name, to a new folder, which is a site. The
+// copy is read again and compared, and only then gets its name. Throws std::runtime_error.
 BackupSummary BackUp(const Site& site, const std::filesystem::path& to, bool with_keys);
 
-// A new site from a backup. Throws std::runtime_error: `from` is no backup or damaged, there is
-// something at `folder`, the disk refuses; then there is no new site.
+// Makes a new site from a backup. Throws std::runtime_error, and makes no site, if `from` is no
+// backup or is damaged, `folder` exists, or a write fails.
 BackupSummary Restore(const std::filesystem::path& from, const std::filesystem::path& folder);
 
 }  // namespace pangea::site

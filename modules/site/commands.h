@@ -8,8 +8,8 @@
 
 namespace pangea::site {
 
-// Adds the sub-commands to the app; the one that is given runs when the app has parsed. `readings`:
-// of the logs that were read and are not whole.
+// Adds the sub-commands to the app; the given one runs during parsing. `readings`: receives the
+// damage of the logs that were read.
 void AddCommands(CLI::App& app, LogReadings* readings);
 
 }  // namespace pangea::site

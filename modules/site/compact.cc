@@ -22,13 +22,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nobody else has it open; what is damaged is kept beside it.
+// Opens the journal exclusively; damaged parts are kept in a file beside it.
 Journal Lock(const fs::path& journal) {
   return Journal(journal.string(),
                  [](const std::string&, Bytes, const JournalPlace&) { return true; });
 }
 
-// Returns what it wrote.
+// Returns the contents that it wrote.
 JournalContents WriteWhatCounts(const fs::path& from, const JournalContents& contents,
                                 ThinnedJournal* thinned, const fs::path& to,
                                 const std::function<void(CompactStep)>& on_step) {
@@ -55,8 +55,8 @@ JournalContents WriteWhatCounts(const fs::path& from, const JournalContents& con
   return written;
 }
 
-// Owner and mode: the server's user goes on writing it, whoever compacts. A user may not even ask
-// to change the owner where systemd filters system calls.
+// Copies owner and mode: the server's user must be able to write the journal, whoever compacts it.
+// Changes the owner only if needed: systemd may filter that system call.
 void TakeOwner(const fs::path& from, const fs::path& to) {
   struct stat wanted {
   }, made{};
@@ -85,7 +85,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
   if (const std::string said = old.mend().Said(journal); !said.empty()) {
     std::cerr << said << "\n";
   }
-  fs::remove(made);  // of a run that was ended
+  fs::remove(made);  // left over by a killed run
   CompactSummary summary;
   summary.bytes_before = static_cast<int64_t>(fs::file_size(journal));
   on_step(CompactStep::kRead);
@@ -116,7 +116,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
     fs::remove(made);
     throw;
   }
-  fs::remove_all(site.checkpoints());  // they are of what it was
+  fs::remove_all(site.checkpoints());  // they belong to the old journal
   fs::rename(made, journal);
   on_step(CompactStep::kSwapped);
   SyncToDisk(site.folder);

@@ -1,13 +1,13 @@
 #pragma once
 
-// Makes a site's journal smaller: repeats, options that newer ones replaced, and what only fills
-// the place of damage go. Keyframes, matches, verification results and anchor edits stay, byte by
-// byte and in their order; thinned, also keyframes go whose view newer maps have
-// (thinning/thinning.h).
+// Makes a site's journal smaller: removes repeats, options replaced by newer ones, and the
+// placeholders of damaged parts. Keyframes, matches, verification results and anchor edits stay,
+// with the same bytes and in the same order. With thinning, keyframes whose view newer maps contain
+// are removed too (thinning/thinning.h).
 //
-// The new journal is written beside the old one, brought to the disk, compared with it, and then
-// takes its name in one step: whatever ends the program, the journal is the old one or the new one,
-// whole.
+// The new journal is written beside the old one, flushed to the disk, compared with the old one,
+// and then renamed atomically: whenever the program is killed, the journal is either the complete
+// old one or the complete new one.
 
 #include <cstdint>
 #include <functional>
@@ -23,7 +23,7 @@ enum class CompactStep : uint8_t { kRead, kWrite, kWritten, kCompared, kSwapped,
 struct CompactSummary {
   int64_t bytes_before = 0, bytes_after = 0;
   int64_t events_before = 0, events_after = 0;
-  int64_t keyframes_gone = 0, constraints_derived = 0;  // by thinning
+  int64_t keyframes_gone = 0, constraints_derived = 0;  // only with thinning
 };
 
 struct ThinJournal {
@@ -31,9 +31,9 @@ struct ThinJournal {
   int64_t now_utime = 0;  // wall clock
 };
 
-// `on_step` is called when a step is reached, of kWrite before each event. Throws
-// std::runtime_error: a server runs, there is no journal, the disk refuses. Then the old one
-// stands.
+// `on_step` is called when a step is reached; for kWrite, before each event. Throws
+// std::runtime_error, and keeps the old journal, if a server runs, there is no journal, or a write
+// fails.
 CompactSummary Compact(
     const Site& site, const std::optional<ThinJournal>& thin = std::nullopt,
     const std::function<void(CompactStep)>& on_step = [](CompactStep) {});

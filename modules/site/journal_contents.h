@@ -1,6 +1,6 @@
 #pragma once
 
-// What a journal says, event by event: what is a repeat, and whether two journals say the same.
+// The contents of a journal, to find repeats and to test whether two journals are equivalent.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,30 +12,30 @@
 
 namespace pangea::site {
 
-// Two events of one name say the same of the same thing: of a keyframe, match, verification result
-// or anchor edit the first counts, of a process' options the newest. Empty for what this version
-// does not know: then each event counts.
+// A name for the subject of an event. Of several events with the same name, only one counts: the
+// first for a keyframe, match, verification result or anchor edit; the newest for a process'
+// options. Empty for events that this version does not know; each of them counts.
 std::string NameOf(const LogEvent& event);
 
 struct JournalContents {
-  // Checksum of the data of the event that counts, by its name.
+  // Checksum of the data of the event that counts, by name.
   std::map<std::string, uint32_t> named;
-  std::vector<uint32_t> others;  // checksums, in order
+  std::vector<uint32_t> others;  // checksums of events without name, in order
   int64_t events = 0;            // all of them
   LogReading reading;
 
-  // The next event.
+  // Adds the next event.
   void Take(const LogEvent& event);
   bool SaysTheSame(const JournalContents& other) const {
     return named == other.named && others == other.others;
   }
 };
 
-// Of what can be read. Tells its progress. A journal that is not there yet is empty. Throws
-// std::runtime_error when it is none.
+// Reads the undamaged parts of a journal, and prints the progress. A missing journal is empty.
+// Throws std::runtime_error if the file is not a journal.
 JournalContents ReadContents(const std::filesystem::path& journal);
 
-// Picks the events that count, each once, from a second reading of the same journal.
+// Selects the events that count, each once, in a second reading of the same journal.
 class CountingEvents {
  public:
   explicit CountingEvents(const JournalContents& contents) : left_(contents.named) {}

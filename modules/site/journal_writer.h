@@ -1,6 +1,6 @@
 #pragma once
 
-// A new journal, written with its checksums as the agent_handler writes it.
+// Writes a new journal with checksums, as the agent_handler does.
 
 #include <cstdint>
 #include <filesystem>
@@ -13,12 +13,12 @@ namespace pangea::site {
 
 class JournalWriter {
  public:
-  // Throws std::runtime_error: it exists, or cannot be made.
+  // Throws std::runtime_error if the file exists or cannot be created.
   explicit JournalWriter(const std::filesystem::path& path);
 
-  // Throws std::runtime_error when the disk refuses.
+  // Throws std::runtime_error if writing fails.
   void Write(int64_t utime, const std::string& channel, Bytes data);
-  // All is on the disk when it returns; throws the same.
+  // Flushes everything to the disk; throws std::runtime_error if that fails.
   void Finish();
   int64_t count() const { return count_; }
 

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The data's checksum of each keyframe of a map.
+// By seq: checksum of the keyframe's data.
 using MapKeyframes = std::map<int32_t, uint32_t>;
 using MapsOfJournal = std::map<MapId, MapKeyframes>;
 
@@ -61,7 +61,7 @@ MapsOfJournal ReadMaps(const Site& site, LogReadings* readings) {
   return maps;
 }
 
-// The maps that both have. Throws if one of them is not the same in both.
+// The maps in both sites. Throws if one of them differs.
 std::set<MapId> MapsInBoth(const Site& first, const MapsOfJournal& maps_first, const Site& second,
                            const MapsOfJournal& maps_second) {
   std::set<MapId> both;
@@ -124,7 +124,8 @@ class Merger {
            (constraint->from.map != constraint->to.map || constraint->kind == PlaceKind::kDerived);
   }
 
-  // Capture times go on from the first's: they do not step back from one to the next.
+  // Capture times must not decrease, so those of the second site are at least the latest of the
+  // first.
   void Write(const LogEvent& event, int64_t* keyframes) {
     latest_utime_ = std::max(latest_utime_, event.utime);
     writer_.Write(latest_utime_, event.channel, event.data);
@@ -143,12 +144,12 @@ class Merger {
 
   JournalWriter writer_;
   const std::set<MapId> in_both_;
-  std::set<std::string> names_;  // of what is written
+  std::set<std::string> names_;  // names of written events
   int64_t latest_utime_ = 0;
   MergeSummary summary_;
 };
 
-// A file of the second site beside those of the first, unless it is there already.
+// Copies the site's keys, unless they are there already.
 void CopyKeys(const Site& site, const fs::path& keys) {
   for (const fs::path& key : KeyFiles(site)) {
     const fs::path to = keys / key.filename();
@@ -169,7 +170,7 @@ void CopyOptions(const Site& site, const fs::path& options) {
   }
 }
 
-// Who joined either by an invite; of two with one id the first.
+// Copies the agents that joined either site by invite; of two with the same id the first.
 void CopyAgents(const std::vector<Site>& sites, const fs::path& agents) {
   for (const Site& site : sites) {
     for (const fs::path& file : GatewayAgentFiles(site)) {

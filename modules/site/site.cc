@@ -27,14 +27,15 @@ namespace fs = std::filesystem;
 constexpr const char* kFolders[] = {"keys", "options", "logs"};
 constexpr size_t kMaxName = 100;
 
-// What stands in a site: only this may be in a folder that becomes one.
+// Whether a name is one of a site's files: a folder that becomes a site may have no others.
 bool IsOurs(const std::string& name) {
   return std::ranges::find(kFolders, name) != std::end(kFolders) || name == "lock" ||
          name == "gateway" || name == "recordings" || name == "site.yaml" ||
          name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
-// As LcmBus does when it opens it, which needs a network; of what several processes can share.
+// Checks a URL as LcmBus does when it opens it, but without a network; only buses that several
+// processes can share.
 std::string WhyNoBus(const std::string& url) {
   if (url.starts_with("tcpq://")) {
     return "";
@@ -94,7 +95,7 @@ void CheckCanBecomeSite(const fs::path& folder) {
   }
 }
 
-// Its folders, and then site.yaml, which makes it one.
+// Creates the site's folders, and then site.yaml, which makes it a site.
 void WriteSite(const Site& site) {
   CheckDescription(site.file(), site.description);
   for (const char* name : kFolders) {
@@ -111,19 +112,19 @@ void WriteSite(const Site& site) {
   SyncToDisk(site.folder);
 }
 
-// As the folder's: root may look after a site that a server's user owns.
+// Gives the file to the folder's owner: root may manage a site that the server's user owns.
 void GiveToOwnerOf(const fs::path& folder, int fd) {
   struct stat info {};
   if (geteuid() == 0 && stat(folder.c_str(), &info) == 0) {
-    // What fails shows when the owner opens the file.
+    // A failure shows when the owner opens the file.
     [[maybe_unused]] const int ignored = fchown(fd, info.st_uid, info.st_gid);
   }
 }
 
 fs::path LockOf(const Site& site) { return site.folder / "lock"; }
 
-// Of the whole file, held by who has it open: unlike flock's, it can be asked for without taking
-// it.
+// A lock of the whole file, held by the open file description: unlike one by flock, it can be
+// queried without taking it.
 struct flock WholeFile(short type) {
   struct flock lock {};
   lock.l_type = type;
@@ -131,7 +132,7 @@ struct flock WholeFile(short type) {
   return lock;
 }
 
-// Zero where it is not known.
+// 0 if unknown.
 int ReadPid(int fd) {
   char text[20] = {};
   return pread(fd, text, sizeof(text) - 1, 0) > 0 ? std::atoi(text) : 0;

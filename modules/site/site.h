@@ -7,10 +7,10 @@
 //   keys/         a key for each agent that may join; mode 0700
 //   options/      <process>.yaml
 //   logs/         what the server's processes print
-//   checkpoint/   what they made of the journal; without it they read all of that again
-//   gateway/      what pangea-gateway keeps (admission.h, identity.h there); mode 0700
-//   recordings/   what pages of phones have uploaded; mode 0700
-//   lock          held by the server, and by what changes the site
+//   checkpoint/   checkpoints of the server's processes; without them they read the whole journal
+//   gateway/      data of pangea-gateway (its admission.h, identity.h); mode 0700
+//   recordings/   recordings uploaded by phones; mode 0700
+//   lock          locked by the server, and by programs that change the site
 
 #include <cstdint>
 #include <filesystem>
@@ -51,34 +51,35 @@ struct Site {
   std::filesystem::path recordings() const { return folder / "recordings"; }
 };
 
-// What a site is called that nobody gave a name.
+// The default name of a site.
 std::string NameOfFolder(const std::filesystem::path& folder);
-// Made now, on the default buses.
+// A description with the present time and the default buses.
 SiteDescription NewDescription(const std::string& name);
 
-// Throws std::runtime_error that names the file, the field and the mend: there is no site, or
-// site.yaml is not one's.
+// Throws std::runtime_error with file, field and correction if there is no site or its site.yaml is
+// invalid.
 Site ReadSite(const std::filesystem::path& folder);
 
-// A new site. The folder is made; one that exists is taken if it has nothing but what a site has.
-// site.yaml comes last: a folder without it is no site yet. Throws std::runtime_error.
+// Creates a site. The folder is created; an existing one is used if it has only files of a site.
+// site.yaml is written last: a folder without it is not a site yet. Throws std::runtime_error.
 Site CreateSite(const std::filesystem::path& folder, const SiteDescription& description);
 
-// ReadSite, or CreateSite with the folder's name where there is none yet.
+// ReadSite, or, if there is no site, CreateSite with the folder's name.
 Site OpenSite(const std::filesystem::path& folder);
 
-// A folder beside `folder` in which a site is made ready; Commit gives it its name. What is not
-// committed is removed.
+// A temporary folder beside `folder` in which a site is prepared; Commit renames it to `folder`.
+// Without Commit it is removed.
 class SiteInTheMaking {
  public:
-  // Throws std::runtime_error when there is something at `folder` other than an empty folder.
+  // Throws std::runtime_error if `folder` exists and is not an empty folder.
   explicit SiteInTheMaking(const std::filesystem::path& folder);
   ~SiteInTheMaking();
   SiteInTheMaking(const SiteInTheMaking&) = delete;
   SiteInTheMaking& operator=(const SiteInTheMaking&) = delete;
 
   const std::filesystem::path& folder() const { return staging_; }
-  // Writes site.yaml if there is none yet; what is in the folder is on the disk when it returns.
+  // Writes site.yaml if there is none, flushes the folder's files to the disk, and renames the
+  // folder.
   void Commit(const SiteDescription& description);
 
  private:
@@ -86,8 +87,8 @@ class SiteInTheMaking {
   const std::filesystem::path staging_;
 };
 
-// One program at a time changes a site. Throws std::runtime_error that names the other's process
-// id.
+// Only one program at a time may change a site. The constructor throws std::runtime_error with the
+// process id of the other program if the site is locked.
 class SiteLock {
  public:
   explicit SiteLock(const Site& site);
@@ -99,7 +100,7 @@ class SiteLock {
   int fd_ = -1;
 };
 
-// Whose lock is on the site; nothing if nobody has one.
+// Process id of the program that has locked the site; empty if none has.
 std::optional<int> UserOf(const Site& site);
 
 // "20261123T055342Z"

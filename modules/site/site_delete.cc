@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// With "-2" and so on behind it where there is one already.
+// Appends "-2", "-3", ... if the name exists already.
 fs::path NameFor(const fs::path& folder) {
   const std::string first = fmt::format("{}.deleted-{}", folder.string(), TimeForFileName());
   std::string name = first;

@@ -6,8 +6,9 @@
 
 namespace pangea::site {
 
-// Takes the site away: its folder becomes <folder>.deleted-<UTC time>, which is returned; with
-// `now` that is removed too, and the path is empty. Throws std::runtime_error when a server runs.
+// Deletes a site: renames its folder to <folder>.deleted-<UTC time> and returns that path. With
+// `now` the folder is removed too, and the path is empty. Throws std::runtime_error if a server
+// runs.
 std::filesystem::path Delete(const Site& site, bool now);
 
 }  // namespace pangea::site

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a site's map amounts to, in formats that other programs read.
+// Exports a site's maps in formats of other programs.
 
 #include <filesystem>
 #include <string>
@@ -11,11 +11,11 @@
 
 namespace pangea::site {
 
-// Runs the deterministic replay of the journal, with the options that the journal has, into a new
-// folder: agent_<id>.tum (further groups: agent_<id>.<map>.tum), map.ply of the largest group; and
-// if there are anchors, anchors.json and map.gltf, which has them among the points of all groups.
-// Returns the files. A server may run: what it writes meanwhile is left out. Throws
-// std::runtime_error: no keyframes, keyframes are missing, `out` is not empty.
+// Runs the deterministic replay of the journal, with the options in the journal, and writes to a
+// new folder: agent_<id>.tum (other groups: agent_<id>.<map>.tum), map.ply of the largest group; if
+// there are anchors, also anchors.json and map.gltf, with the anchors and the points of all groups.
+// Returns the files. A server may run; what it writes meanwhile is left out. Throws
+// std::runtime_error if there are no keyframes, keyframes are missing, or `out` is not empty.
 std::vector<std::string> ExportSite(const Site& site, const std::filesystem::path& out,
                                     LogReadings* readings);
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 int64_t BytesIn(const fs::path& folder) {
   int64_t bytes = 0;
-  std::error_code ignored;  // what is not ours to read, or has just gone
+  std::error_code ignored;  // files that may not be read, or were just removed
   for (auto it = fs::recursive_directory_iterator(
            folder, fs::directory_options::skip_permission_denied, ignored);
        it != fs::recursive_directory_iterator(); it.increment(ignored)) {
@@ -31,7 +31,7 @@ int64_t BytesIn(const fs::path& folder) {
   return bytes;
 }
 
-// Counts what the events say.
+// Collects the counts of SiteInfo from the events.
 class Counter {
  public:
   explicit Counter(SiteInfo* info) : info_(info) {}
@@ -95,7 +95,7 @@ std::string UseOf(const std::optional<int>& user) {
   return user ? fmt::format("in use by process {}", *user) : "not in use";
 }
 
-// A server that runs is about to write the rest of the last event.
+// If a server runs, an incomplete last event is no damage: it is being written.
 std::string DamageOf(const SiteInfo& info) {
   LogReading reading = info.reading;
   if (info.user) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What sites there are, and what is in one. Both only read, and servers may run.
+// Lists sites, and describes the contents of one. Both only read; servers may run.
 
 #include <cstdint>
 #include <filesystem>
@@ -18,28 +18,27 @@ namespace pangea::site {
 
 struct SiteInfo {
   Site site;
-  std::optional<int> user;                       // process id of who has its lock
-  int64_t bytes = 0;                             // of its folder
-  int64_t free_bytes = 0;                        // of its disk
+  std::optional<int> user;                       // process id of the program that has locked it
+  int64_t bytes = 0;                             // size of its folder
+  int64_t free_bytes = 0;                        // free on its disk
   std::map<MapId, std::set<int32_t>> keyframes;  // seqs by map
   int64_t matches = 0;
   int64_t constraints_accepted = 0, constraints_refused = 0;
-  int64_t anchors = 0;                             // that are not deleted
-  std::optional<int64_t> first_utime, last_utime;  // of what is in the journal, wall clock
+  int64_t anchors = 0;                             // not deleted
+  std::optional<int64_t> first_utime, last_utime;  // of the journal's events, wall clock
   LogReading reading;
-  std::map<std::string, std::string> checkpoints;  // of each process: what it covers, for people
+  std::map<std::string, std::string> checkpoints;  // by process: what it covers, for people
 };
 
-// Reads all of the journal. Throws std::runtime_error when it cannot be read.
+// Reads the whole journal. Throws std::runtime_error if it cannot be read.
 SiteInfo ReadInfo(const Site& site);
-// For people.
+// A text for people.
 std::string ToText(const SiteInfo& info);
 
-// The folders that sites are in if nobody says otherwise, as far as they are there:
-// ~/.local/share/pangea, /var/lib/pangea.
+// The existing ones of the default folders of sites: ~/.local/share/pangea, /var/lib/pangea.
 std::vector<std::filesystem::path> DefaultSiteFolders();
-// The sites in a folder, by name of their own folder, a line each: name, folder, size, state.
-// Throws std::runtime_error when it is no folder.
+// Lists the sites in a folder, sorted by their folders' names, one line each: name, folder, size,
+// state. Throws std::runtime_error if it is no folder.
 std::string ListSites(const std::filesystem::path& folder);
 
 }  // namespace pangea::site

@@ -45,7 +45,7 @@ bool IsOf(const LogEvent& event, const std::set<int32_t>& agents) {
 
 constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
 
-// An event of the second walk as another visit's.
+// Makes an event of another visit from one of the second walk.
 template <typename Message, typename Rename>
 StoredEvent Renamed(const StoredEvent& event, const Rename& rename) {
   Message message{};
@@ -55,7 +55,7 @@ StoredEvent Renamed(const StoredEvent& event, const Rename& rename) {
   return {event.utime, event.channel, EncodeMessage(ToMessage(value))};
 }
 
-// Nothing where it says nothing of the second walk.
+// Empty if the event does not concern the second walk.
 std::optional<StoredEvent> OfVisit(const StoredEvent& event, int visit) {
   bool says_something = false;
   const auto rename = [&](KeyframeId* id) {
@@ -170,7 +170,7 @@ Site MakeSite(const fs::path& folder, const std::vector<StoredEvent>& events) {
   int since_sync = 0;
   for (const StoredEvent& event : events) {
     writer.Write(event.utime, event.channel, event.data);
-    if (++since_sync % 10 == 0) {  // as small groups as a server's
+    if (++since_sync % 10 == 0) {  // groups as small as those of a server
       writer.Finish();
     }
   }

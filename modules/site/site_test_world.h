@@ -1,6 +1,6 @@
 #pragma once
 
-// Sites for tests, of the walks in logs/two_walks.
+// Sites for tests, made of the two walks in logs/two_walks.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,15 +27,15 @@ struct StoredEvent {
 
   bool operator==(const StoredEvent&) const = default;
 };
-// What a journal would have of the two walks, of these agents: keyframes, matches and verification
-// results whose keyframes are theirs.
+// The journal's events of these agents' walks: their keyframes, and the matches and verification
+// results with only their keyframes.
 std::vector<StoredEvent> WalksOf(const std::set<int32_t>& agents);
-// The first walk, then the second four times, a day apart, with what was said of each.
+// The first walk, then the second one four times, a day apart, each with its matches and results.
 std::vector<StoredEvent> WalksAgainAndAgain();
-// A thinning an hour after these.
+// A thinning one hour after the last event.
 ThinJournal AfterTheLast(const std::vector<StoredEvent>& events);
 StoredEvent EditEvent(const AnchorId& anchor, int64_t revision, int64_t seq, bool deleted = false);
-// Makes it, beside that keyframe; `p_body_anchor`: metres.
+// Creates the anchor at `p_body_anchor` (metres) in the keyframe's body frame.
 StoredEvent PlacementEvent(const AnchorId& anchor, int64_t seq, const KeyframeId& keyframe,
                            const Eigen::Vector3d& p_body_anchor);
 StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
@@ -43,12 +43,12 @@ StoredEvent OptionsEvent(const std::string& process, const std::string& yaml);
 Site MakeSite(const std::filesystem::path& folder, const std::vector<StoredEvent>& events);
 // Without CHECKSUMS and DAMAGED.
 std::vector<StoredEvent> EventsOf(const Site& site);
-// Why it threw.
+// The message of the exception that `action` throws.
 std::string WhyNot(const std::function<void()>& action);
-// In a process of its own, for which no file can be longer than so many bytes, as on a full disk;
-// why it threw, empty if it did not.
+// Runs `action` in a child process that can write no file longer than `bytes`, as on a full disk.
+// Returns the message of its exception; empty if it throws none.
 std::string OnFullDisk(int64_t bytes, const std::function<void()>& action);
-// What the agent_handler that opens it finds amiss; empty: nothing.
+// Errors that the agent_handler finds when it opens the site's journal; empty: none.
 std::string FoundAtOpening(const Site& site);
 
 }  // namespace pangea::site

@@ -100,7 +100,7 @@ void ThinnedJournal::RewriteMatch(const LogEvent& event, const Write& write) con
   }
 }
 
-// Derived ones are all written anew at the end.
+// Derived constraints are all written anew at the end.
 void ThinnedJournal::RewriteConstraint(const LogEvent& event, const Write& write) const {
   const auto constraint = ParseMessage<constraint_t>(event.data).value;
   if (!constraint ||

@@ -1,7 +1,7 @@
 #pragma once
 
-// A journal's events as they are after a thinning: of keyframes that go nothing is left, but in
-// constraints that took the place of theirs.
+// Rewrites a journal's events for a thinning: removed keyframes disappear, and derived constraints
+// replace their constraints.
 
 #include <cstdint>
 #include <filesystem>
@@ -18,9 +18,9 @@ class ThinnedJournal {
   explicit ThinnedJournal(ThinnedMaps thinned) : thinned_(std::move(thinned)) {}
 
   using Write = std::function<void(const LogEvent&)>;
-  // Call it for each event in order: writes what is left of it, if anything is.
+  // Call for each event in order: writes what remains of it, if anything does.
   void Rewrite(const LogEvent& event, const Write& write);
-  // What is new, behind the last event.
+  // Writes the new events (derived constraints), after the last event.
   void Finish(const Write& write) const;
 
   int64_t keyframes_gone() const { return std::ssize(thinned_.gone); }
@@ -35,7 +35,7 @@ class ThinnedJournal {
   int64_t latest_utime_ = 0;
 };
 
-// Reads the journal, with the options of its processes. Nothing is written.
+// Computes the thinning of a journal, with the options of its processes. Writes nothing.
 ThinnedJournal Thin(const std::filesystem::path& journal, const ThinJournal& how);
 
 }  // namespace pangea::site

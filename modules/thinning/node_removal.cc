@@ -19,7 +19,7 @@ Factor ComposeFactors(const Factor& a, const Factor& b) {
   factor.relative = Compose(a.relative, b.relative);
   factor.odometry = a.odometry && b.odometry;
   factor.derived = true;
-  // Odometry has no inliers: what it is composed with has.
+  // Odometry has no inlier statistics: use those of the other factor.
   const Factor& weaker = a.odometry || (!b.odometry && b.num_inliers < a.num_inliers) ? b : a;
   factor.num_inliers = weaker.num_inliers;
   factor.inlier_ratio = weaker.inlier_ratio;
@@ -61,7 +61,7 @@ void NodeRemoval::Put(const KeyframeId& from, const KeyframeId& to, const Factor
 KeyframeId NodeRemoval::Hub(const Neighbours& neighbours, bool along_the_map) const {
   const auto rank = [&](const Neighbours::value_type& neighbour) {
     const auto& [id, factor] = neighbour;
-    // Along the map first, and there who stays.
+    // Prefer neighbours along the map, and of these the ones that stay.
     return std::tuple(along_the_map && !factor.odometry, along_the_map && going_.contains(id),
                       LogDeterminant(factor.relative));
   };
@@ -91,7 +91,7 @@ void NodeRemoval::Remove(const KeyframeId& id, bool along_the_map) {
 
 void NodeRemoval::RemoveRun(const std::vector<KeyframeId>& run) {
   going_ = {run.begin(), run.end()};
-  // From both ends, so that each goes to the nearer one.
+  // Remove from both ends, so that each keyframe is joined to the nearer one.
   for (size_t i = 0, j = run.size(); i < j;) {
     for (const KeyframeId& id : {run[i++], run[--j]}) {
       Remove(id, true);
@@ -101,7 +101,7 @@ void NodeRemoval::RemoveRun(const std::vector<KeyframeId>& run) {
 }
 
 void NodeRemoval::RemoveMaps(const std::set<KeyframeId>& keyframes) {
-  // Those with the fewest factors first: with two nothing is lost.
+  // Remove those with the fewest factors first: with two factors no information is lost.
   std::set<std::pair<size_t, KeyframeId>> queue;
   const auto degree = [this](const KeyframeId& id) {
     const auto it = factors_.find(id);
@@ -113,7 +113,7 @@ void NodeRemoval::RemoveMaps(const std::set<KeyframeId>& keyframes) {
   while (!queue.empty()) {
     const auto [known_degree, id] = *queue.begin();
     queue.erase(queue.begin());
-    // Degrees change as others go: looked at again when its time comes.
+    // Its degree has changed through other removals: put it back into the queue.
     if (const size_t now = degree(id); now > known_degree) {
       queue.emplace(now, id);
       continue;

@@ -15,7 +15,7 @@ RelativePose Compose(const RelativePose& a, const RelativePose& b) {
 }
 
 RelativePose Average(const RelativePose& a, const RelativePose& b) {
-  // x = a + K (b - a), K = A (A + B)^-1: needs the inverse of no single covariance.
+  // x = a + K (b - a), K = A (A + B)^-1: so neither covariance need be inverted by itself.
   const Eigen::LDLT<Matrix6d> sum(a.covariance + b.covariance);
   const Matrix6d gain = sum.solve(a.covariance).transpose();
   RelativePose mean;

@@ -1,7 +1,7 @@
 #pragma once
 
-// A relative pose of two keyframes with its covariance, composed, inverted and averaged, all to
-// first order.
+// A relative pose of two keyframes with covariance; composition, inverse and average, to first
+// order.
 
 #include "core/rigid3.h"
 
@@ -14,12 +14,12 @@ struct RelativePose {
   RelativePose Inverse() const;
 };
 
-// From a's first to b's second keyframe; their errors are independent.
+// The relative pose from a's first to b's second keyframe, for independent errors.
 RelativePose Compose(const RelativePose& a, const RelativePose& b);
-// The weighted mean of two independent measurements of the same.
+// The weighted mean of two independent measurements of the same relative pose.
 RelativePose Average(const RelativePose& a, const RelativePose& b);
-// The smaller the better known: the logarithm of the covariance's determinant, which the entropy of
-// a Gaussian is but for a factor and a constant.
+// log det(covariance): the smaller, the more certain. The entropy of a Gaussian is half of it plus
+// a constant.
 double LogDeterminant(const RelativePose& relative);
 
 }  // namespace pangea

@@ -1,4 +1,4 @@
-// Edges and constraints of the maps that Thinning leaves, and what the pose graph says of them.
+// Edges and constraints of the maps after Thinning, and the pose graph's solution for them.
 
 #include <algorithm>
 #include <optional>
@@ -9,10 +9,10 @@
 namespace pangea {
 namespace {
 
-// Longer preintegrations are refused by the messages' parser, and hold nothing together.
+// Longer preintegrations are refused by the messages' parser, and carry little information.
 constexpr double kMaxPreintegration_s = 60;
 
-// From the keyframe that `first` begins at to that of `second`.
+// Joins two successive edges: from the begin of `first` to the end of `second`.
 ThinnedMaps::Edge Join(const Keyframe& first, const ThinnedMaps::Edge& second) {
   ThinnedMaps::Edge joined;
   if (first.edge && second.edge) {
@@ -56,7 +56,7 @@ void Thinning::JoinEdges(ThinnedMaps* thinned) const {
 Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   PoseGraph graph(options_.posegraph);
   for (const MapId& map : maps_) {
-    graph.AddMap(map);  // the oldest first, also where none of its keyframes stays
+    graph.AddMap(map);  // in order of age, even if none of its keyframes stays
   }
   for (const MapId& map : maps_) {
     for (const Keyframe& keyframe : stored_.at(map).keyframes) {
@@ -88,7 +88,7 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   solution.in_force = {in_force.begin(), in_force.end()};
   for (const MapState& state : graph.States()) {
     if (state.keyframes.empty()) {
-      continue;  // a map of which nothing stays
+      continue;  // a map without remaining keyframes
     }
     for (const MapId& map : state.maps) {
       solution.group_of[map] = state.group;
@@ -112,7 +112,7 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
     }
   }
   for (const auto& [id, constraint] : constraints_) {
-    // A measured one whose keyframes both stay, stays as it is.
+    // A measured constraint whose keyframes both stay is unchanged.
     const bool changes = constraint.kind == PlaceKind::kDerived || gone.contains(constraint.from) ||
                          gone.contains(constraint.to);
     if (changes && solution.in_force.contains(id)) {
@@ -121,7 +121,8 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
   }
   std::set<KeyframeId> of_maps_that_go;
   for (const auto& [id, map] : stored_) {
-    if (gone.contains(map.keyframes.front().id)) {  // the first stays where any stays
+    // if any keyframe of a map stays, the first one does
+    if (gone.contains(map.keyframes.front().id)) {
       for (const Keyframe& keyframe : map.keyframes) {
         of_maps_that_go.insert(keyframe.id);
       }
@@ -141,9 +142,9 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
   return graph;
 }
 
-// Between keyframes that stay, from the older map or keyframe to the newer one; the best known
-// first. Their mean is the solution's, in which all that was measured has its part: so no two
-// contradict each other, whatever they share.
+// Constraints between remaining keyframes, from the older map or keyframe to the newer one; the
+// smallest covariance first. Their relative poses are those of the solution, which includes all
+// measurements: so they never contradict each other.
 std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
                                                  const NodeRemoval& removed) const {
   std::map<MapId, size_t> age;
@@ -179,11 +180,11 @@ std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
   return sorted;
 }
 
-// So many at a keyframe; and one that joins maps that no better known one has joined, always: what
-// was one group stays one.
+// Selects at most max_derived per keyframe. A constraint that joins maps which no more certain one
+// has joined is always kept: a group must not split.
 std::vector<Constraint> Thinning::Derive(const Solution& solution,
                                          const std::set<KeyframeId>& gone) const {
-  std::map<MapId, MapId> joined;  // each to another of its tree; the root has none
+  std::map<MapId, MapId> joined;  // union-find: parent of each map; a root has none
   const auto find = [&joined](MapId map) {
     for (auto next = joined.find(map); next != joined.end(); next = joined.find(map)) {
       map = next->second;
@@ -210,7 +211,7 @@ std::vector<Constraint> Thinning::Derive(const Solution& solution,
 
 std::set<MapId> Thinning::ComeApart(const Solution& before, const ThinnedMaps& thinned) const {
   const Solution after = Solve(thinned);
-  std::set<MapId> groups;  // the oldest map of each is whole: it names the group
+  std::set<MapId> groups;  // the oldest map of each group is kept, and names the group
   for (const auto& [map, group] : after.group_of) {
     if (group != before.group_of.at(map)) {
       groups.insert(before.group_of.at(map));

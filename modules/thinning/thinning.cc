@@ -11,10 +11,10 @@
 namespace pangea {
 namespace {
 
-constexpr double kUsualDepth_m = 3;  // of a keyframe without points
+constexpr double kUsualDepth_m = 3;  // scene depth of a keyframe without points
 constexpr double kHour_us = 3.6e9;
 
-// Without what is large: corners, and all points but that of the median depth.
+// A copy without the large parts: corners, and all map points except the one with the median depth.
 Keyframe Skeleton(const Keyframe& keyframe) {
   Keyframe skeleton = keyframe;
   skeleton.corners.clear();
@@ -88,7 +88,7 @@ ThinnedMaps Thinning::Make(const Solution& solution, const std::set<MapId>& whol
 std::set<MapId> Thinning::Whole(const Solution& solution, int64_t now_utime) const {
   std::set<MapId> whole;
   for (const auto& [map, group] : solution.group_of) {
-    whole.insert(group);  // named after its oldest
+    whole.insert(group);  // a group has the id of its oldest map
   }
   for (const auto& [id, map] : stored_) {
     const auto age_us = static_cast<double>(now_utime - map.journalled_utime);
@@ -114,7 +114,7 @@ std::set<KeyframeId> Thinning::MustStay(const Solution& solution) const {
                                                [](const Keyframe& k) { return k.id.seq; });
       utime = at == keyframes.end() ? keyframes.back().utime : at->utime;
     }
-    // One before and one after the reach: a stationary body gives few.
+    // Include one keyframe before and one after the reach: a stationary body has few keyframes.
     const auto first =
         std::ranges::lower_bound(keyframes, utime - kPlacementReach_us, {}, &Keyframe::utime);
     const auto last =

@@ -1,16 +1,16 @@
 #pragma once
 
-// A journal's maps without the keyframes of places that newer maps show as well.
+// Thins a journal's maps: removes keyframes of places that newer maps show as well.
 //
-// In: what the journal has, in its order: keyframes, verification results, anchor edits.
-// Out: which keyframes stay (view_coverage.h), the odometry edges over the gaps, and the
-// constraints that take the place of those whose keyframes go (node_removal.h).
+// Input: the journal's keyframes, verification results and anchor edits, in its order. Output: the
+// removed keyframes (view_coverage.h), the odometry edges across the gaps, and the derived
+// constraints that replace those of removed keyframes (node_removal.h).
 //
-// Whole stay the maps of the last `keep_hours`, which an agent may still be walking, and the oldest
-// map of each group, whose odom is the map frame. So do the keyframes that place an anchor, and
-// those that hold evidence between maps that are not fused yet. Maps that are fused stay fused by
-// derived constraints, which the pose graph trusts (posegraph/pair_evidence.h). That is tried: of a
-// group that would come apart nothing goes.
+// Kept completely are the maps of the last `keep_hours`, which may still be in use, and the oldest
+// map of each group, whose odom frame is the map frame. Also kept are the keyframes that place an
+// anchor, and the keyframes of constraints between maps that are not fused yet. Fused maps stay
+// fused by derived constraints, which the pose graph trusts (posegraph/pair_evidence.h). This is
+// tested with the pose graph: a group that would split is not thinned.
 //
 // Deterministic. One thread.
 
@@ -35,7 +35,8 @@ namespace pangea {
 struct ThinningOptions {
   CoverageOptions coverage;
   double keep_hours = 24;
-  // At one keyframe, constraints that took the place of others; the best known ones.
+  // Maximum number of derived constraints at a keyframe; those with the smallest covariance are
+  // kept.
   int max_derived = 8;
 
   template <typename Archive>
@@ -49,13 +50,13 @@ struct ThinningOptions {
 
 struct ThinnedMaps {
   std::set<KeyframeId> gone;
-  // Of keyframes that stay and whose odometry edge began at one that goes.
+  // The new edge of a kept keyframe whose odometry edge began at a removed one.
   struct Edge {
     std::optional<OdometryEdge> edge;
     std::optional<Preintegration> preintegration;
   };
   std::map<KeyframeId, Edge> edges;
-  // All of kind kDerived; those of earlier thinnings are among them, or gone.
+  // All derived constraints (kind kDerived). They replace those of earlier thinnings.
   std::vector<Constraint> derived;
 };
 
@@ -66,10 +67,10 @@ class Thinning {
     PoseGraphOptions posegraph;
   };
 
-  // `records`: for the keyframes' corners.
+  // `records`: stores the keyframes' corners.
   Thinning(const Options& options, std::shared_ptr<RecordStore> records);
 
-  // `journalled_utime`: wall clock.
+  // `journalled_utime`: when the keyframe was journalled, wall clock.
   void Take(const Keyframe& keyframe, int64_t journalled_utime);
   void Take(const Constraint& constraint);
   void Take(const AnchorEdit& edit);
@@ -80,16 +81,16 @@ class Thinning {
  private:
   static constexpr int kNotStored = -1;
   struct StoredMap {
-    std::vector<Keyframe> keyframes;  // ascending seq; without corners, with one point
-    std::vector<int> numbers;         // in recognised_, or kNotStored
-    int64_t journalled_utime = 0;     // the newest
+    std::vector<Keyframe> keyframes;  // ascending seq; without corners, only one map point
+    std::vector<int> numbers;         // index in recognised_, or kNotStored
+    int64_t journalled_utime = 0;     // of the newest keyframe
   };
-  // What the pose graph says of the keyframes that stay.
+  // The pose graph's solution for the keyframes that stay.
   struct Solution {
     std::map<KeyframeId, Rigid3> T_map_body;
     std::map<MapId, MapId> group_of;
     std::set<int64_t> in_force;
-    double odometry_scale = 1;  // standard deviations
+    double odometry_scale = 1;  // factor on standard deviations
   };
 
   Solution Solve(const ThinnedMaps& without) const;
@@ -102,13 +103,13 @@ class Thinning {
   std::vector<Constraint> BestKnownFirst(const Solution& solution,
                                          const NodeRemoval& removed) const;
   std::vector<Constraint> Derive(const Solution& solution, const std::set<KeyframeId>& gone) const;
-  // Groups of which a map is no longer in.
+  // The groups that a map has left.
   std::set<MapId> ComeApart(const Solution& before, const ThinnedMaps& thinned) const;
   bool LookAlike(int a, int b);
 
   const Options options_;
   StoredKeyframes recognised_;
-  std::vector<MapId> maps_;  // in the order they came: the oldest first
+  std::vector<MapId> maps_;  // in order of arrival: the oldest first
   std::map<MapId, StoredMap> stored_;
   std::map<int64_t, Constraint> constraints_;  // by id
   AnchorRegistry anchors_;

@@ -7,11 +7,11 @@
 namespace pangea {
 namespace {
 
-// A gap is never longer: processes believe an edge that leads over so many keyframes
+// Maximum length of a gap: processes accept an edge across at most this many keyframes
 // (ReorderBuffer::kMaxBuffered).
 constexpr int kMaxGap = 500;
 
-// How far two views' cameras are apart, 1 at the edge of what is one viewpoint.
+// Normalised distance between two views' cameras; 1 at the limit of one viewpoint.
 double Apart(const View& a, const View& b, const CoverageOptions& options) {
   const double reach_m = options.distance_share * std::min(a.depth_m, b.depth_m);
   const double cosine =
@@ -60,7 +60,7 @@ class Choice {
     return false;
   }
 
-  // The view of the same viewpoint that stays.
+  // The nearest kept view with the same viewpoint.
   std::optional<int> Nearest(int map, const View& view) const {
     std::optional<int> nearest;
     double least = 1;
@@ -74,8 +74,9 @@ class Choice {
     return nearest;
   }
 
-  // Each with those before it, no gap shorter than a row, none longer than kMaxGap; the first one,
-  // where any stays: before it no edge would say that nothing is missing.
+  // Extends the kept views: each with its predecessors, no gap shorter than a window, and none
+  // longer than kMaxGap. If any view stays, so does the map's first one: without it no edge would
+  // show that nothing is missing before.
   void InRows(std::vector<bool>* kept) const {
     const std::vector<bool> chosen = *kept;
     if (std::ranges::find(chosen, true) == chosen.end()) {

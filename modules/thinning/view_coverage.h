@@ -1,15 +1,16 @@
 #pragma once
 
-// Which keyframes of maps that show one place stay: those whose view no newer map has.
+// Chooses which keyframes stay, of several maps that show the same place: those whose view no newer
+// map contains.
 //
-// A view is a viewpoint and what was seen from there. Of each viewpoint the newest maps stay that
-// show it: `alike_maps` of one appearance, `maps` of all. So an appearance that no longer comes
-// fades as others come, and one that comes again has its newest keyframes. The rule is that of
-// lifelong visual maps (Konolige & Bowman, IROS 2009: a neighbourhood of views keeps a bounded
-// number of appearances, and gives up the one that was not seen for longest); what is alike is told
-// by the check that recognition itself makes.
+// A view is a viewpoint and its appearance. For each viewpoint the views of the newest maps are
+// kept: `alike_maps` maps per appearance, and `maps` maps in total. So an appearance that no longer
+// occurs is replaced by others, and a recurring one is represented by its newest keyframes. The
+// rule is that of lifelong visual maps (Konolige & Bowman, IROS 2009: a neighbourhood of views
+// keeps a bounded number of appearances, and drops the one not seen for longest). Two views have
+// the same appearance if place recognition's own check matches them.
 //
-// A keyframe that stays takes those before it along, with which it is verified.
+// With each kept keyframe, its predecessors are kept too, because verification needs them.
 
 #include <functional>
 #include <vector>
@@ -19,13 +20,14 @@
 namespace pangea {
 
 struct CoverageOptions {
-  // Of one viewpoint: the cameras' distance as a share of the scene's depth, and their angle. Half
-  // of what recognition copes with, so that what lies between is recognised.
+  // Two views have the same viewpoint if the distance of the cameras, relative to the scene's
+  // depth, and the angle between them (radians) are below these. They are half of what recognition
+  // tolerates, so that views in between are recognised.
   double distance_share = 0.2;
   double angle = 0.35;
   int alike_maps = 2;
   int maps = 4;
-  int window = 5;  // a keyframe is verified with those before it (kWindowKeyframes)
+  int window = 5;  // keyframes needed to verify one (kWindowKeyframes)
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -41,15 +43,16 @@ struct CoverageOptions {
 
 struct View {
   Rigid3 T_map_cam;
-  double depth_m = 0;      // of the scene, the median
-  bool must_stay = false;  // whoever else shows it
-  // Whether it was ever tied to another map. One that never was is worth no appearance of its own.
+  double depth_m = 0;      // median depth of the scene
+  bool must_stay = false;  // whatever other maps show
+  // Whether the view was ever matched with another map. One that never was is not kept as an
+  // appearance of its own.
   bool recognised = true;
 };
 
 struct MapViews {
   int group = 0;            // only maps of one group have a common frame
-  std::vector<View> views;  // in the order they were taken
+  std::vector<View> views;  // in order of time
 };
 
 struct ViewRef {
@@ -57,10 +60,10 @@ struct ViewRef {
   int view = 0;
 };
 
-// Whether two views are recognised as one place.
+// Whether recognition matches two views.
 using LooksAlike = std::function<bool(const ViewRef&, const ViewRef&)>;
 
-// For each view of each map whether it stays. `newest_first`: the maps.
+// Returns, for each view of each map, whether it stays. `newest_first`: the maps, newest first.
 std::vector<std::vector<bool>> ChooseViews(const std::vector<MapViews>& newest_first,
                                            const LooksAlike& looks_alike,
                                            const CoverageOptions& options);
