@@ -32,11 +32,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Exit codes; a wrong command line has CLI11's, above 100; kExitLost is main's.
+// Exit codes. A wrong command line has CLI11's codes, above 100; main adds kExitLost.
 constexpr int kFailed = 1;
 constexpr int kMissed = 2;
 
-// Prints the report; the exit code of a session that was played.
+// Prints the report; returns the exit code of a session that was played.
 int Print(const ReportOutcome& outcome) {
   std::cout << outcome.text << std::flush;
   for (const std::string& missed : outcome.missed) {
@@ -76,7 +76,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
   WriteTiming(summary.wall_s, options.out);
-  // Before the report, which a full disk has no room for.
+  // Print failures before the report, which may fail on a full disk.
   for (const std::string& failure : summary.failures) {
     std::cerr << fmt::format("pangea-session: {}\n", failure);
   }
@@ -84,7 +84,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   return summary.failures.empty() ? exit_code : kFailed;
 }
 
-// Of replay and report; the latter has one log.
+// Arguments of `replay` and `report`; the latter has only one log.
 struct LogArguments {
   std::vector<std::string> logs;
   std::string out;
@@ -92,7 +92,7 @@ struct LogArguments {
   std::string expect;                   // a session file
 };
 
-// What is given on the command line goes before what the capture remembers.
+// The command line takes precedence over the recorded session.
 SessionRecord KnownOf(const LogArguments& arguments, LogReadings* readings) {
   SessionRecord known = ReadSessionRecord({arguments.logs.begin(), arguments.logs.end()});
   if (!arguments.expect.empty()) {
@@ -108,7 +108,7 @@ SessionRecord KnownOf(const LogArguments& arguments, LogReadings* readings) {
   return known;
 }
 
-// Or it would be two walks of the same agents.
+// A log given twice would be two walks of the same agents.
 void CheckGivenOnce(const std::vector<std::string>& logs) {
   for (size_t i = 1; i < logs.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
@@ -135,7 +135,7 @@ int PrintDiff(const std::string& a, const std::string& b, double until_s, LogRea
   return diff.First() == nullptr ? 0 : kMissed;
 }
 
-// Those of the logs, what was given on the command line over them; and says which they are.
+// The options of the logs, overridden by those of the command line; prints them.
 ServerOptions OptionsOf(const ReplayArguments& arguments, LogReadings* readings) {
   LoggedOptions logged =
       ReadLoggedOptions({arguments.logs.begin(), arguments.logs.end()}, readings);
@@ -149,7 +149,8 @@ ServerOptions OptionsOf(const ReplayArguments& arguments, LogReadings* readings)
   return logged.options;
 }
 
-// With --only or --from-checkpoint: what is not run, or not yet, is taken from the log.
+// With --only or --from-checkpoint: messages of processes that do not run, or not yet, come from
+// the log.
 void RunReplayPart(const ReplayArguments& arguments, const ServerOptions& options,
                    const std::string& out_log, LogReadings* readings) {
   if (arguments.logs.size() != 1) {
@@ -184,7 +185,7 @@ ReplaySummary RunWholeReplay(const ReplayArguments& arguments, const ServerOptio
                 progress, readings);
 }
 
-// Some processes alone, and where what they say now parts from what they said.
+// Replays only some processes, and prints where their messages differ from those in the log.
 int RunReplayOnly(const ReplayArguments& arguments, LogReadings* readings) {
   const std::string log = fs::path(arguments.out) / "session.lcm";
   const ServerOptions options = OptionsOf(arguments, readings);

@@ -10,11 +10,11 @@ namespace pangea::session {
 
 struct CommandResult {
   int exit_code = 0;
-  LogReadings readings;  // of the logs it read
+  LogReadings readings;  // damage in the logs that were read
 };
 
-// Adds `run`, `list`, `replay`, `report` and `compare` to the app; whichever is given runs when the
-// app has parsed, and sets `result`.
+// Add the commands `run`, `list`, `replay`, `report` and `compare` to the app. The given command
+// runs during parsing, and sets `result`.
 void AddRunCommand(CLI::App& app, CommandResult* result);
 void AddListCommand(CLI::App& app);
 void AddReplayCommand(CLI::App& app, CommandResult* result);

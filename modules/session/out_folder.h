@@ -1,17 +1,18 @@
 #pragma once
 
-// --out of a session or a replay: the folder that it leaves everything in.
+// The folder --out, with all output of a session or a replay.
 
 #include <filesystem>
 #include <optional>
 
 namespace pangea::session {
 
-// An earlier session in the folder is moved aside: nothing is lost. Where nothing has come into the
-// folder by the end, it is moved back.
+// An earlier session in the folder is moved aside, so nothing is lost. If the folder is still empty
+// at the end, the earlier session is moved back.
 class OutFolder {
  public:
-  // Throws std::runtime_error naming --out: a file, a folder that cannot be made or moved aside.
+  // Throws std::runtime_error that names --out if it is a file, or if the folder cannot be created
+  // or moved aside.
   explicit OutFolder(const std::filesystem::path& given);
   ~OutFolder();
   OutFolder(const OutFolder&) = delete;

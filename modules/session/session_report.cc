@@ -55,7 +55,7 @@ std::vector<WantedAnchor> WantedAnchors(const SessionScript& script) {
   return wanted;
 }
 
-// Its report, and in words what it missed.
+// Writes the report; returns its text and the expectations that were not met.
 ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadings* readings) {
   WrittenReport report = WriteReport(input, out.string(), readings);
   ReportOutcome outcome{std::move(report.text), {}};
@@ -68,7 +68,7 @@ ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadin
   return outcome;
 }
 
-// Nobody showed any: without the agents' logs nothing is known of them.
+// In a replay no agent shows anchors: without the agents' logs there is no data.
 void ForgetAnchorsOfAReplay(ReportInput* input) {
   if (std::ranges::any_of(input->agents,
                           [](const AgentRun& run) { return !run.bus_log.empty(); })) {
@@ -82,7 +82,7 @@ void ForgetAnchorsOfAReplay(ReportInput* input) {
   }
 }
 
-// With which options the server ran, as far as they are not the defaults.
+// Notes the server's options that are not the defaults.
 void NoteOptions(const fs::path& log, LogReadings* readings, ReportInput* input) {
   const LoggedOptions logged = ReadLoggedOptions({log}, readings);
   input->notes.insert(input->notes.end(), logged.notes.begin(), logged.notes.end());
@@ -115,7 +115,8 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
     }
     input.agents.push_back(std::move(run));
   }
-  // What a process could do at most: seconds of session per second of its own CPU time.
+  // The largest possible real-time factor of a process: seconds of session per second of its CPU
+  // time.
   for (const auto& [name, status] : summary.status) {
     if (status.cpu_s > 0 && recorded_s > 0) {
       input.realtime_factors[name] = recorded_s / static_cast<double>(status.cpu_s);
@@ -138,7 +139,7 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
   input.agents = known.agents;
   input.anchors = known.anchors;
   input.expect = known.expect;
-  for (AgentRun& run : input.agents) {  // a session's own log has its agents' beside it
+  for (AgentRun& run : input.agents) {  // the agents' logs are beside a session's own log
     const fs::path bus_log = log.parent_path() / fmt::format("agent_{}.lcm", run.id);
     run.bus_log = fs::exists(bus_log) ? bus_log.string() : std::string();
   }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Joins what a run or a replay knows with the captured logs into the report, and checks what was
-// expected of it.
+// Makes the report of a run or a replay from its captured logs and its own data, and checks its
+// expectations.
 
 #include <filesystem>
 #include <string>
@@ -15,19 +15,20 @@
 namespace pangea::session {
 
 struct ReportOutcome {
-  std::string text;                 // report.md's
-  std::vector<std::string> missed;  // expectations that were not met, a line each
+  std::string text;                 // contents of report.md
+  std::vector<std::string> missed;  // one line per expectation that was not met
 };
 
-// Writes the report of a live run into `out`. `readings`: as WriteReport's, here and below.
+// Writes the report of a live run into `out`. `readings`: as in WriteReport, here and below.
 ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
                         const std::filesystem::path& out, LogReadings* readings);
 
-// The same for any log of a server bus. `known` may lack agents of the log.
+// The same for any log of a server bus. `known`: the session's record; it may lack agents of the
+// log.
 ReportOutcome ReportLog(const std::filesystem::path& log, const SessionRecord& known,
                         const std::filesystem::path& out, LogReadings* readings);
 
-// What is kept of the session beside its log.
+// Writes the session's record (report/session_record.h) beside its log.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);
 
 }  // namespace pangea::session

@@ -1,7 +1,7 @@
 #pragma once
 
-// The anchors of a session file on the agents' buses: reads the recordings' times, hears POSE_k (of
-// stored keyframes KEYFRAME_k) and ANCHOR_k, publishes ANCHOR_REQUEST_k.
+// Places a session file's anchors on the agents' buses: reads the recordings' times, receives
+// POSE_k (for stored keyframes KEYFRAME_k) and ANCHOR_k, publishes ANCHOR_REQUEST_k.
 
 #include <cstdint>
 #include <map>
@@ -13,17 +13,18 @@
 
 namespace pangea::session {
 
-// Each anchor with the image of the agent's recording nearest to its time. Throws
-// std::runtime_error when a recording cannot be read, has ended by then, or has no such pixel.
+// Assigns to each anchor the image of the agent's recording nearest to its time. Throws
+// std::runtime_error if a recording cannot be read, is over by then, or has no such pixel.
 std::vector<PlannedAnchor> PlanAnchors(const SessionScript& script);
 
 class AnchorApp {
  public:
   explicit AnchorApp(std::vector<PlannedAnchor> anchors) : placer_(std::move(anchors)) {}
 
-  // Before the agent starts. The bus must outlive this, and is not handled after it.
+  // Call before the agent starts. The bus must outlive this object, and must not be handled after
+  // this object is gone.
   void Join(const AgentScript& agent, Bus* bus);
-  // Publishes what is due.
+  // Publishes the requests that are due.
   void Step();
   std::vector<std::string> NotPlaced() const { return placer_.NotPlaced(); }
 

@@ -35,7 +35,7 @@ void AnchorPlacer::OnPose(int32_t agent, int64_t utime, const std::optional<MapI
   }
 }
 
-// Of an image that it did not track it knows nothing: then the first one that it does.
+// If the odometry did not track the image, use the first one that it tracked.
 void AnchorPlacer::Request(const Tracked& tracked, int64_t now_us, Task* task) {
   const AnchorScript& script = task->planned.script;
   last_created_ = std::max(now_us, last_created_ + 1);

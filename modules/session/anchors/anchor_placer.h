@@ -1,8 +1,8 @@
 #pragma once
 
-// Places the anchors of a session file, as an app on each agent's bus would: when the agent's
-// odometry has tracked the image it requests the anchor, and again every second until the agent
-// hears of it. Knows no bus and no clock.
+// Places the anchors of a session file, like an app on each agent's bus: when the agent's odometry
+// has tracked the image, it requests the anchor, and repeats this every second until the agent
+// receives the anchor. Uses no bus and no clock.
 
 #include <cstdint>
 #include <map>
@@ -24,26 +24,26 @@ class AnchorPlacer {
  public:
   explicit AnchorPlacer(std::vector<PlannedAnchor> anchors);
 
-  // A pose of an agent's odometry, or a stored keyframe; in the order of their times. `map`: none
-  // while it does not track. `now_us`: wall clock, here and below.
+  // Call for each pose of an agent's odometry, or for each stored keyframe, in time order. `map`:
+  // empty while the odometry does not track. `now_us`: wall clock, here and below.
   void OnPose(int32_t agent, int64_t utime, const std::optional<MapId>& map, int64_t now_us);
-  // An anchor that the agent has heard of.
+  // Call for each anchor that the agent receives.
   void OnAnchor(int32_t agent, const AnchorId& anchor, int64_t revision);
 
-  // What is to be published now, of any agent (AnchorEdit::agent_id).
+  // The requests to publish now, for all agents (AnchorEdit::agent_id).
   std::vector<AnchorEdit> TakeDue(int64_t now_us);
 
-  // The anchors that no agent has heard of, and why; a line each.
+  // One line for each anchor that its agent has not received, with the reason.
   std::vector<std::string> NotPlaced() const;
 
  private:
   struct Task {
     PlannedAnchor planned;
-    std::optional<AnchorEdit> request;  // since the odometry has tracked the image
-    int64_t due_us = 0;                 // of the next request
+    std::optional<AnchorEdit> request;  // set when the odometry has tracked the image
+    int64_t due_us = 0;                 // time of the next request
     bool heard = false;
   };
-  // While an agent's odometry tracks without a break.
+  // A period of uninterrupted tracking of an agent's odometry.
   struct Tracked {
     MapId map;
     int64_t since_utime = 0;

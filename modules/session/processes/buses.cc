@@ -14,8 +14,7 @@ namespace {
 
 constexpr uint32_t kLastPort = 65535;
 
-// LCM shares its port with other programs on the bus; binding it alone tells whether anybody is
-// there.
+// LCM's sockets share a port; binding it exclusively shows whether another program uses it.
 bool PortIsFree(uint16_t port) {
   const int fd = socket(AF_INET, SOCK_DGRAM, 0);
   if (fd < 0) {
@@ -30,8 +29,8 @@ bool PortIsFree(uint16_t port) {
   return is_free;
 }
 
-// Below the ports that the kernel gives to sockets without one, as every LCM sender's is: such a
-// socket could take a port between this look and the bus' opening.
+// A port below the kernel's range for automatic ports, which every LCM sender uses: otherwise such
+// a socket could take the port between this check and the opening of the bus.
 uint32_t RandomPort(size_t needed) {
   constexpr uint32_t kFirst = 20000, kEnd = 32000;
   std::random_device random;

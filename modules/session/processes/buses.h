@@ -14,7 +14,7 @@ struct Buses {
   std::string server;
   std::string link;                            // the server's end
   std::map<int32_t, std::string> agents;       // by agent id
-  std::map<int32_t, std::string> agent_links;  // of agents that have a link bus of their own
+  std::map<int32_t, std::string> agent_links;  // only for agents with their own link bus
 
   const std::string& LinkOf(int32_t agent_id) const {
     const auto own = agent_links.find(agent_id);
@@ -22,9 +22,9 @@ struct Buses {
   }
 };
 
-// Picks free UDP ports; from `first_port` upwards when it is given, and then a port in use is an
-// error that names it. `with_own_link`: agents between whose link and the server's something
-// stands. Throws std::runtime_error.
+// Chooses free UDP ports. If `first_port` is given: the ports from it upwards, and a port in use is
+// an error that names it. `with_own_link`: agents whose link passes through an emulator. Throws
+// std::runtime_error.
 Buses ChooseBuses(const std::vector<int32_t>& agent_ids, const std::vector<int32_t>& with_own_link,
                   std::optional<uint16_t> first_port);
 

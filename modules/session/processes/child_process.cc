@@ -43,8 +43,8 @@ ChildProcess::ChildProcess(std::string name, std::vector<std::string> argv,
     setpgid(0, 0);
     dup2(out, STDOUT_FILENO);
     dup2(out, STDERR_FILENO);
-    // LCM opens its sockets without close-on-exec. A child that had those of hundreds of buses
-    // would number its own from thousands on, which lcm-logger's select() cannot take.
+    // LCM opens its sockets without close-on-exec. If a child inherited those of hundreds of buses,
+    // its own would have numbers in the thousands, which lcm-logger's select() does not support.
     close_range(STDERR_FILENO + 1, std::numeric_limits<unsigned>::max(), 0);
     execv(arguments[0], arguments.data());
     _exit(127);

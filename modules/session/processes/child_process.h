@@ -1,6 +1,6 @@
 #pragma once
 
-// A child process with its output in a file: start, look, stop. Linux only.
+// A child process with its output in a file: start, poll, stop. Linux only.
 
 #include <sys/types.h>
 
@@ -19,28 +19,27 @@ class ChildProcess {
     int signal = 0;  // the signal that ended it; 0 if it exited by itself
   };
 
-  // Starts argv[0] with stdout and stderr appended to `output`, and no other file of the parent's
-  // open. The child dies with its parent, and ignores the terminal's Ctrl-C: the session ends it in
-  // order. Throws std::runtime_error when it
-  // cannot be started.
+  // Starts argv[0] with stdout and stderr appended to `output`; no other file of the parent is
+  // inherited. The child dies with its parent, and ignores Ctrl-C from the terminal: the session
+  // ends its children in order. Throws std::runtime_error if it cannot be started.
   ChildProcess(std::string name, std::vector<std::string> argv, std::filesystem::path output);
-  ~ChildProcess();  // kills what still runs
+  ~ChildProcess();  // kills the process if it still runs
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&&) = delete;
 
   const std::string& name() const { return name_; }
   pid_t pid() const { return pid_; }
-  // Its exit, once it has ended.
+  // Its exit; empty while it runs.
   std::optional<Exit> Poll();
   bool running() { return !Poll().has_value(); }
   void Signal(int signal);
-  // SIGINT, then SIGKILL after the grace period.
+  // Sends SIGINT, and SIGKILL after the grace period.
   void Stop(double grace_s);
-  // Last non-empty line of its output: usually why it ended.
+  // Last non-empty line of its output: usually the reason of its end.
   std::string LastLine() const;
-  // Of one that has: "exit code 1: <its last line>", "signal 9: ...".
+  // For an ended process: "exit code 1: <its last line>", "signal 9: ...".
   std::string HowItEnded();
-  // Of one that has ended: for how long it ran, until Poll saw the end.
+  // For an ended process: how long it ran, until Poll saw the end.
   double RanSeconds() const;
 
  private:
@@ -52,11 +51,11 @@ class ChildProcess {
   std::chrono::steady_clock::time_point ended_;
 };
 
-// Directory of the running program: its siblings are there.
+// Directory of the running program, which contains the other programs.
 std::filesystem::path ProgramDirectory();
-// Full path of one of them. Throws std::runtime_error when it is not there.
+// Full path of another program there. Throws std::runtime_error if it is missing.
 std::string SiblingProgram(const std::string& name);
-// Full path of a program on PATH, or nothing.
+// Full path of a program on PATH; empty if there is none.
 std::optional<std::filesystem::path> FindOnPath(const std::string& program);
 
 }  // namespace pangea::session

@@ -1,8 +1,8 @@
 #pragma once
 
-// The processes a session keeps alive: what ends is started again, until it has done so too often,
-// or has ended at its start kMaxQuickDeaths times in a row, each time for the same reason: then it
-// would never come up.
+// The processes that a session keeps alive: a process that ends is restarted. It is given up if it
+// has ended too often, or kMaxQuickDeaths times in a row soon after its start and for the same
+// reason, since it would then never start.
 
 #include <deque>
 #include <filesystem>
@@ -14,13 +14,14 @@
 
 namespace pangea::session {
 
-// Counts the deaths at the start of one process.
+// Counts how often one process ends soon after its start.
 class QuickDeaths {
  public:
   static constexpr int kMaxQuickDeaths = 3;
   static constexpr double kAtItsStart_s = 10;
 
-  // It ended, for this reason, after so many seconds. Whether starting it once more is in vain.
+  // Notes that the process ended, with this reason, after `ran_s` seconds. True if another start
+  // would be useless.
   bool Note(const std::string& why, double ran_s);
 
  private:
@@ -30,28 +31,28 @@ class QuickDeaths {
 
 class KeptProcesses {
  public:
-  static constexpr int kMaxRestarts = 20;  // of one process; then it is given up
+  static constexpr int kMaxRestarts = 20;  // per process; then it is given up
 
-  // What each says goes to <name>.txt there.
+  // `logs`: the folder for the processes' output, <name>.txt.
   explicit KeptProcesses(std::filesystem::path logs);
 
   void Start(const std::string& name, std::vector<std::string> argv);
-  // Null where there is none of that name.
+  // Null if there is none with that name.
   ChildProcess* Find(const std::string& name);
-  // Its next end is one that the session wants, and counts for nothing.
+  // The next end of this process is intended, and is not counted.
   void ExpectEnd(const std::string& name);
 
   struct Revived {
     std::string name;
     std::string why;        // how it ended, for people
     bool given_up = false;  // it is not started again
-    int unexpected = 0;     // how often it ended and was not meant to
+    int unexpected = 0;     // number of unintended ends
   };
-  // Starts those again that have ended.
+  // Restarts the processes that have ended.
   std::vector<Revived> Revive();
   bool GivenUp(const std::string& name) const;
 
-  // Sources first, loggers last, so that nothing said is missed.
+  // Stops sources first and loggers last, so that no message is missed.
   void StopAll(double grace_s);
 
  private:

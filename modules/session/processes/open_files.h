@@ -4,8 +4,8 @@
 
 namespace pangea::session {
 
-// Lets this process have `count` files open at once: the soft limit (RLIMIT_NOFILE), 1024 by
-// custom, is raised to it. Throws std::runtime_error that names both where the hard limit is below.
+// Raises the soft limit on open files (RLIMIT_NOFILE, usually 1024) to `count`. Throws
+// std::runtime_error that names both limits if the hard limit is lower.
 void AllowOpenFiles(size_t count);
 
 }  // namespace pangea::session

@@ -18,7 +18,7 @@ bool Player::IsOver() const {
 
 void CheckRecording(const AgentScript& script) {
   if (script.live || !script.keyframes.empty()) {
-    return;  // then it is for the ground truth alone
+    return;  // the recording then only provides ground truth
   }
   try {
     const EurocRecording recording(script.resolved.string());

@@ -1,7 +1,7 @@
 #pragma once
 
-// Who gives a session's agent its keyframes: a vio, or the player of its stored keyframes. Ends by
-// itself when its recording is over; the vio of a live agent is ended.
+// The source of an agent's keyframes in a session: pangea-vio, or the player of its stored
+// keyframes. It ends by itself when its recording is over; the vio of a live agent is stopped.
 
 #include <optional>
 #include <string>
@@ -25,17 +25,17 @@ struct Player {
   bool is_told_to_end = false;
 
   bool done() const { return ended_s > 0; }
-  // A live one has had its duration.
+  // Whether a live agent has reached its duration.
   bool IsOver() const;
 };
 
-// Throws std::runtime_error, naming the agent, about a recording that its odometry would refuse.
+// Throws std::runtime_error that names the agent if its odometry would refuse the recording.
 void CheckRecording(const AgentScript& script);
 
-// What it plays, as arguments of its program.
+// The program's arguments for its input.
 std::vector<std::string> InputOf(const Player& player, const std::string& rate);
 
-// For people: where the sensors of a live agent are awaited.
+// For people: the channels on which a live agent's sensors are expected.
 std::string DescribeLive(const AgentScript& script, const std::string& bus);
 
 }  // namespace pangea::session

@@ -126,7 +126,7 @@ void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
   }
 }
 
-// Stored keyframes come without poses between them.
+// Stored keyframes are played without poses between them.
 void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
   KeyframeMessage message;
   if (with_odometry_.contains(agent_id) || !DecodeMessage(data, &message)) {
@@ -164,7 +164,7 @@ void SessionMonitor::Handle(int timeout_ms) {
     return;
   }
   for (size_t i = 0; i < fds.size(); ++i) {
-    // Bounded, so that a flood on one bus cannot keep the session from its other work.
+    // Bounded, so that a flood on one bus cannot block the session.
     for (int n = 0; n < 200 && (fds[i].revents & POLLIN) != 0 && buses_[i]->Handle(0); ++n) {
     }
   }

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a running session shows: listens on the server bus and the agents' buses, and tells how far
-// each agent is, who is fused with whom, and whether the server has worked everything off.
+// Monitors a running session: listens on the server bus and the agents' buses, and provides the
+// progress of each agent, which agents are fused, and whether the server has finished all its work.
 
 #include <cstdint>
 #include <map>
@@ -19,15 +19,15 @@
 namespace pangea::session {
 
 struct AgentProgress {
-  // Of its first image, sensor clock; 0 while there is none. Where stored keyframes are played: of
-  // the first of these.
+  // Stamp of its first image, sensor clock; 0 if there is none yet. For stored keyframes: of the
+  // first keyframe.
   int64_t first_utime = 0;
-  int64_t newest_utime = 0;  // of its newest
+  int64_t newest_utime = 0;  // of its newest image
   bool tracking = false;
   std::string reason;  // why it is not tracking
   int64_t keyframes = 0;
-  std::vector<int32_t> fused_with;  // agents in its group, itself not counted
-  // How far corrections have moved the agent's newest keyframe since its map joined its group,
+  std::vector<int32_t> fused_with;  // other agents in its group
+  // By how much corrections have moved the agent's newest keyframe since its map joined its group,
   // metres.
   double drift_m = 0;
 
@@ -39,22 +39,22 @@ class SessionMonitor {
   explicit SessionMonitor(const Buses& buses);
   ~SessionMonitor();
 
-  // Handles what waits on all buses, at most for `timeout_ms`.
+  // Handles the waiting messages of all buses; waits at most `timeout_ms`.
   void Handle(int timeout_ms);
 
   const AgentProgress& agent(int32_t id) const;
-  // Its bus, which Handle handles.
+  // The agent's bus, which Handle handles.
   Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
-  // Newest status of each process by name, whichever bus it came on.
+  // Newest status of each process, by name, from any bus.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
   int constraints_accepted() const { return accepted_; }
   int constraints_refused() const { return refused_; }
   int num_results() const { return accepted_ + refused_; }
 
-  // Every named process reported within the last 3 s that nothing is pending, and the server bus
-  // has carried no work for `quiet_s`.
+  // Whether each of these processes has reported within the last 3 s that nothing is pending, and
+  // the server bus has carried no message of work for `quiet_s`.
   bool Idle(const std::vector<std::string>& processes, double quiet_s) const;
-  // No message of work on the server bus for this long, seconds.
+  // Time since the last message of work on the server bus, seconds.
   double QuietSeconds() const;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 
-// The running session on the terminal: one line per agent, redrawn in place; plain lines every few
-// seconds when the output is a file.
+// Shows a running session on the terminal: one line per agent, redrawn in place; if the output is a
+// file, plain lines every few seconds.
 
 #include <cstdint>
 #include <string>
@@ -21,10 +21,10 @@ class SessionProgress {
  public:
   explicit SessionProgress(bool is_terminal) : is_terminal_(is_terminal) {}
 
-  // Draws when it is time to.
+  // Draws if enough time has passed.
   void Update(const std::vector<AgentLine>& agents, const SessionMonitor& monitor,
               double elapsed_s);
-  // A line that stays.
+  // Prints a line that is not redrawn.
   void PrintLine(const std::string& line);
   void Finish();
 

@@ -31,8 +31,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kStartTimeout_s = 20;  // for the server processes to report
-constexpr double kStuckAfter_s = 300;   // without a verification result, though not idle
-constexpr double kQuiet_s = 2.5;        // two HAVE intervals and a resend: a lost tail would show
+constexpr double kStuckAfter_s = 300;   // without a verification result, although not idle
+// two HAVE intervals and a retransmission: lost last messages would be noticed
+constexpr double kQuiet_s = 2.5;
 constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
@@ -57,7 +58,7 @@ class Runner {
   RunSummary Run() {
     begin_ = Now();
     MakeFolder(options_.out / "logs");
-    // The processes are one-threaded by design; BLAS must not start threads behind their back.
+    // The processes are single-threaded by design; BLAS must not start threads.
     setenv("OMP_NUM_THREADS", "1", 1);
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
     MakeKeys();
@@ -78,7 +79,7 @@ class Runner {
   }
 
  private:
-  // The monitor listens on the server's bus and on each agent's.
+  // The monitor needs files for the server's bus and for each agent's.
   static Buses OpenBuses(const SessionScript& script, const RunOptions& options) {
     AllowOpenFiles(kFilesBeside + kFilesPerBus * (script.agents.size() + 1));
     return ChooseBuses(Ids(script, false), Ids(script, true), options.first_port);
@@ -96,7 +97,7 @@ class Runner {
 
   fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
 
-  // Only this session's processes know them.
+  // Keys that only this session's processes know.
   void MakeKeys() {
     fs::remove_all(options_.out / "keys");
     MakeFolder(options_.out / "keys");
@@ -117,7 +118,7 @@ class Runner {
     return file.string();
   }
 
-  // lcm-logger refuses an existing file, and a restarted one must go on in it: append.
+  // lcm-logger refuses an existing file; a restarted one must continue it: append.
   void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
     const auto logger = FindOnPath("lcm-logger");
     if (!logger) {
@@ -185,7 +186,7 @@ class Runner {
                        buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
   }
 
-  // A killed player of stored keyframes begins again: what the uplink has is a repeat.
+  // A killed player of stored keyframes starts again from the begin; the uplink ignores repeats.
   void StartPlayer(Player& player) {
     const int32_t id = player.script.id;
     const bool stored = !player.script.keyframes.empty();
@@ -207,8 +208,8 @@ class Runner {
     }
   }
 
-  // Seconds of session time: wall time scaled by the rate; at rate max, how far the furthest agent
-  // is.
+  // Session time, seconds: wall time multiplied by the rate; at rate max, the recording time of the
+  // furthest agent.
   double SessionTime() const {
     if (options_.rate != "max") {
       return (Now() - play_begin_) * std::stod(options_.rate);
@@ -222,14 +223,14 @@ class Runner {
         any_playing = any_playing || !player.done();
       }
     }
-    // With nobody playing, session time would stand still: the next agent starts at once.
+    // If no agent plays, session time would stop: the next agent starts at once.
     return any_playing ? furthest : 1e18;
   }
 
   void Play() {
     play_begin_ = Now();
     const auto done = [](const Player& player) { return player.done(); };
-    // At rate max nothing happens after the last recording: there is no time any more.
+    // At rate max there is no session time after the last recording.
     const auto faults_to_come = [&] {
       return options_.rate != "max" && SessionTime() < faults_.end_s();
     };
@@ -247,7 +248,7 @@ class Runner {
     EndPlayers();
   }
 
-  // Ctrl-C is how a live agent ends; of recordings it is an interruption.
+  // Ctrl-C is the normal end of a live agent, but an interruption of recordings.
   void EndPlayers() {
     bool ends_live = false, ends_others = false;
     for (Player& player : players_) {
@@ -277,12 +278,12 @@ class Runner {
     if (!exit || player.done()) {
       return;
     }
-    // What a killed vio left may be too short to start in.
+    // The rest of the recording after a killed vio may be too short for an initialisation.
     const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
     if (exit->code == 0 || is_rest || player.is_told_to_end || StopRequested()) {
       player.ended_s = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {
-      // Killed: the same agent goes on where it was, in a new map.
+      // Killed: the same agent continues at the same place of the recording, in a new map.
       ++player.restarts;
       summary_.restarted.push_back(player.child->name());
       player.played_before_s = monitor_.agent(player.script.id).recorded_s();
@@ -337,7 +338,8 @@ class Runner {
     }
   }
 
-  // In its status, which nobody reads while the session runs. It goes on once there is room.
+  // A full disk is reported in a status, which nobody reads while the session runs: print it. The
+  // process continues when there is room again.
   void TellRefusedDisks() {
     for (const auto& [name, status] : monitor_.statuses()) {
       if (status.summary.find("DISK REFUSES WRITES") != std::string::npos &&
@@ -362,7 +364,7 @@ class Runner {
     progress_.Update(lines, monitor_, Now() - begin_);
   }
 
-  // The processes that say when they have nothing to do.
+  // The processes that report when they have nothing to do.
   std::vector<std::string> Working() const {
     std::vector<std::string> names = server_names_;
     for (const Player& player : players_) {
@@ -372,11 +374,11 @@ class Runner {
     return names;
   }
 
-  // Until every process has worked off what has come. A server that goes on verifying is slow, not
-  // stuck: it is waited for.
+  // Waits until every process has finished its work. A server that still publishes verification
+  // results is slow, not stuck, so it is given more time.
   void Drain() {
     const double patience_s = interrupted_ ? 2 * kQuiet_s : kStuckAfter_s;
-    const int most_signals = stopped_ ? 1 : 0;  // that one only ended the agents
+    const int most_signals = stopped_ ? 1 : 0;  // the first signal only ended the agents
     double deadline = Now() + patience_s;
     int results = monitor_.num_results();
     while (!monitor_.Idle(Working(), kQuiet_s)) {
@@ -409,9 +411,9 @@ class Runner {
   KeptProcesses kept_;
   std::vector<Player> players_;
   std::vector<std::string> server_names_;
-  std::set<std::string> refused_disks_;  // processes that have been told of
+  std::set<std::string> refused_disks_;  // processes already reported
   bool stopped_ = false;                 // Ctrl-C came while agents played
-  bool interrupted_ = false;             // ... and they were recordings
+  bool interrupted_ = false;             // ... and recordings were played
   RunSummary summary_;
   double begin_ = 0;
   double play_begin_ = 0;

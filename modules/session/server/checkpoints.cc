@@ -19,10 +19,10 @@ namespace fs = std::filesystem;
 
 constexpr const char* kProcesses[] = {"place_recognition", "posegraph", "inter_map_ba", "fusion",
                                       "global_ba",         "map_points"};
-// The server's start comes first.
+// Not during the start of the server.
 constexpr double kFirstAfter_s = 60;
-// What a start may read of the journal: so much, or this share of it, since a round writes all of
-// each checkpoint.
+// A new round begins when the journal has grown by this many bytes and by this share: a round
+// rewrites every checkpoint completely.
 constexpr int64_t kLeastBytes = 20'000'000;
 constexpr int64_t kShare = 20;
 constexpr int kBehindTheServer = 10;

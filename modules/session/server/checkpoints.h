@@ -1,8 +1,8 @@
 #pragma once
 
-// The checkpoints of a server's processes, so that its next start reads little of the journal: each
-// is written by a second run of the process' program, which reads the journal and ends; one after
-// the other, while the server runs and when it has ended.
+// Writes checkpoints of the server's processes, so that the next start reads little of the journal.
+// Each is written by a second run of the process' program, which reads the journal and exits; one
+// after another, while the server runs and after it has ended.
 
 #include <cstdint>
 #include <deque>
@@ -17,19 +17,20 @@ namespace pangea::session {
 
 class Checkpoints {
  public:
-  // `logs`: where checkpoints.txt gets what the runs say.
+  // `logs`: folder for checkpoints.txt, the output of these runs.
   Checkpoints(std::filesystem::path folder, std::filesystem::path journal,
               const std::filesystem::path& logs);
 
-  // Arguments of a process, for its own start and for the run that writes; none for one that keeps
-  // no checkpoint.
+  // Additional arguments of a process, for its own start and for the run that writes; empty if the
+  // process has no checkpoint.
   std::vector<std::string> ArgumentsOf(const std::string& process) const;
-  // The process was started with these.
+  // Registers a process with the command line it was started with.
   void Add(const std::string& process, std::vector<std::string> argv);
 
-  // Every 100 ms or so while the server runs; steady clock.
+  // Call about every 100 ms while the server runs; `now_s`: steady clock.
   void Tick(double now_s);
-  // When its processes have ended: all that is due, until that is done or a further signal comes.
+  // Call when the server's processes have ended: writes all checkpoints that are due, until done or
+  // until another signal comes.
   void Finish();
 
  private:
@@ -39,7 +40,7 @@ class Checkpoints {
   };
   int64_t JournalBytes() const;
   void BeginRound();
-  // Whether one is still at work, or to be. Those that it starts get this nice value.
+  // Starts the next run with this nice value, if none runs. True while one runs or is due.
   bool Advance(int niceness);
 
   const std::filesystem::path folder_;
@@ -48,8 +49,8 @@ class Checkpoints {
   std::vector<Writer> writers_;
   std::deque<Writer> to_run_;
   std::optional<ChildProcess> running_;
-  std::optional<double> began_s_;         // the server
-  std::optional<int64_t> journal_bytes_;  // at the newest round
+  std::optional<double> began_s_;         // start of the server
+  std::optional<int64_t> journal_bytes_;  // size at the newest round
 };
 
 }  // namespace pangea::session

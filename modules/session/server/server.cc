@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr double kServerStopGrace_s = 5;
 constexpr const char* kGateway = "gateway";
 constexpr const char* kBridge = "bridge";
-// What workers run, and a server of several hosts does not.
+// Processes that workers run, and a server on several hosts does not.
 constexpr const char* kVerifiers[] = {"fusion", "inter_map_ba"};
 constexpr std::chrono::milliseconds kServerLookInterval{100};
 
@@ -81,7 +81,8 @@ bool IsServerProcess(const std::string& process) {
   return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
 }
 
-// Whether one was given up: a server that lacks a process is none. It is one without the gateway.
+// Restarts ended processes; true if one was given up. The server cannot run without a process,
+// except the gateway.
 bool ReviveAll(KeptProcesses* kept) {
   bool given_up = false;
   for (const KeptProcesses::Revived& revived : kept->Revive()) {
@@ -93,7 +94,7 @@ bool ReviveAll(KeptProcesses* kept) {
   return given_up;
 }
 
-// Until a signal comes or one is given up; then all have ended. Whether one was given up.
+// Runs until a signal comes or a process is given up, then stops all. True if one was given up.
 bool KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
   bool given_up = false;
   while (!StopRequested() && !given_up) {
@@ -171,7 +172,7 @@ int Serve(const ServerOptions& options) {
     if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
       return 0;
     }
-    // The first to start is the last to end: then another host may have the site.
+    // The bridge starts first and ends last: only then may another host take the site.
     Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
   }
   for (const auto& [process, argv] : commands) {

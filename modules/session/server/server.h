@@ -1,8 +1,9 @@
 #pragma once
 
-// The server of a site by one command: the eight server processes and, if wanted, the gateway, each
-// started again when it ends, until Ctrl-C or SIGTERM ends them in order (what they say goes to
-// files). On several hosts: six of them and a bridge, once this host has the site; and a worker.
+// Runs the server of a site with one command: the eight server processes and, optionally, the
+// gateway. A process that ends is restarted; Ctrl-C or SIGTERM ends all in order. Their output goes
+// to files. On several hosts: six of the processes and a bridge, once this host has the site; and
+// workers.
 
 #include <cstdint>
 #include <filesystem>
@@ -23,29 +24,31 @@ struct ServerOptions {
   std::filesystem::path logs;
   std::filesystem::path checkpoints;  // folder
   std::string http;                   // ADDRESS:PORT of the anchors' API; empty: none
-  std::vector<std::string> origins;   // whose pages may use it
-  std::vector<std::string> names;     // of this machine, by which apps may ask it
-  // Of the gateway for phones' browsers, which needs a site; nothing: none. The server runs without
-  // it when it cannot start.
+  std::vector<std::string> origins;   // web origins that may use it
+  std::vector<std::string> names;     // host names of this machine that apps may use
+  // Port of the gateway for phones' browsers, which needs a site; empty: no gateway. If the gateway
+  // cannot start, the server runs without it.
   std::optional<uint16_t> phone_port;
   std::filesystem::path site;
-  std::map<std::string, std::filesystem::path> options;  // of each process, its file
+  std::map<std::string, std::filesystem::path> options;  // options file by process
   ClusterOptions cluster;
 };
 
-// "fusion=FILE" into `options`. Throws std::runtime_error naming the mend.
+// Parses "fusion=FILE" into `options`. Throws std::runtime_error with the correction.
 void AddProcessOptions(const std::string& text, ServerOptions* options);
-// <process>.yaml of each process that has one there.
+// Adds <process>.yaml of each process that has one in the folder.
 void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
 
-// The path of a server process' program, which belongs beside this one; throws std::runtime_error.
+// The path of a server process' program, in the same directory as this one. Throws
+// std::runtime_error.
 std::string ProgramOf(const std::string& process);
 double SteadySeconds();
 
-// Returns the exit code: 0 after a signal, 1 when a process was given up (kept_processes.h). Tells
-// on stdout what it starts. Throws std::runtime_error when it cannot begin.
+// Returns the exit code: 0 after a signal, 1 if a process was given up (kept_processes.h). Prints
+// on stdout what it starts. Throws std::runtime_error if it cannot start.
 int Serve(const ServerOptions& options);
-// The verifiers and a bridge for another host's server: bus, logs, options, cluster. The same.
+// Runs the verifiers and a bridge for another host's server; uses only bus, logs, options and
+// cluster. Exit code and exceptions as above.
 int ServeAsWorker(const ServerOptions& options);
 
 }  // namespace pangea::session

@@ -17,7 +17,7 @@
 namespace pangea::session {
 namespace {
 
-// Another than a server's, and with what a worker's verifiers say to each other on this host alone.
+// Differs from a server's bus; messages between a worker's verifiers stay on this host.
 constexpr char kWorkerBusUrl[] = "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
 
 struct Arguments {
@@ -84,7 +84,7 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
       ->needs(site);
 }
 
-// What the command line leaves open is the site's.
+// Takes the values that the command line does not give from the site.
 void UseSite(const site::Site& site, Arguments* arguments) {
   ServerOptions& options = arguments->options;
   options.site = site.folder;

@@ -87,7 +87,7 @@ void CheckAgents(const SessionScript& script, const std::string& file) {
   }
 }
 
-// What a session's processes are called.
+// The names of a session's processes.
 std::set<std::string> ProcessNames(const SessionScript& script) {
   std::set<std::string> names(std::begin(kServerProcesses), std::end(kServerProcesses));
   names.insert("logger_server");
@@ -132,7 +132,7 @@ void CheckFaults(const SessionScript& script, const std::string& file) {
   }
 }
 
-// The border of messages takes no other.
+// The parser of messages accepts only such names.
 bool IsPrintable(const std::string& name) {
   return std::ranges::none_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// A scripted session: which recordings are played by which agents, and when.
+// A scripted session: which agents play which recordings, and when.
 //
 //   agents:
 //     - {id: 1, recording: ../recordings/MH_01}
@@ -34,43 +34,43 @@
 
 namespace pangea::session {
 
-// What one machine has been seen to run: each agent is three processes and an LCM bus.
+// Tested on one machine: each agent is three processes and an LCM bus.
 inline constexpr size_t kMaxSessionAgents = 200;
 
 inline constexpr size_t kMaxScriptedAnchors = 1000;
 
 struct AgentScript {
   int32_t id = 0;  // 1 .. 65535, unique in the session
-  // Folder, relative to the session file or to --recordings; may be absent where there are
-  // keyframes, or live sensors.
+  // Folder, relative to the session file or to --recordings; may be missing if there are keyframes
+  // or live sensors.
   std::string recording;
-  // Its sensors publish on its bus, and no recording is played; one that is named is only its
-  // ground truth. Ends after `duration_s`, or with the session.
+  // The agent's sensors publish on its bus, and no recording is played; a given recording only
+  // provides ground truth. Ends after `duration_s`, or with the session.
   bool live = false;
   double delay_s = 0;     // session time at which the agent starts
   double start_s = 0;     // where in the recording it starts
   double duration_s = 0;  // how much of it is played; 0 = to the end
-  // An LCM log with the agent's keyframes (and perhaps others'), which are played instead of
-  // running the odometry; the recording is then only its ground truth. Relative to the session
+  // An LCM log with the agent's keyframes (and possibly others'). They are played instead of
+  // running the odometry; the recording then only provides ground truth. Relative to the session
   // file; empty for none.
   std::string keyframes;
-  std::optional<LinkConditions> link;              // a bad link of its own to the server
-  std::optional<vio::VioFileOptions> vio_options;  // its odometry's options; none: the defaults
+  std::optional<LinkConditions> link;              // emulated bad link to the server
+  std::optional<vio::VioFileOptions> vio_options;  // odometry options; empty: defaults
   UplinkOptions uplink;
-  std::filesystem::path resolved;  // the recording's folder, found; empty without a recording
+  std::filesystem::path resolved;  // the recording's folder as found; empty without a recording
   std::filesystem::path resolved_keyframes;
 };
 
-// What an agent places: the surface that its image nearest to `at_s` shows at `pixel`.
+// An anchor that an agent places: on the surface at `pixel` in its image nearest to `at_s`.
 struct AnchorScript {
-  int32_t agent = 0;  // one with a recording
-  double at_s = 0;    // of its recording, since its first image, as AgentScript::start_s
+  int32_t agent = 0;  // must have a recording
+  double at_s = 0;    // since the recording's first image, like AgentScript::start_s
   std::string name;   // unique in the session
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw: x, y
   std::string payload;
 };
 
-// Of the server's processes, those that compute and the one that keeps the journal.
+// Options of the server's processes, including agent_handler, which keeps the journal.
 struct SessionServerOptions : pangea::ServerOptions {
   AgentHandlerOptions agent_handler;
 
@@ -89,31 +89,31 @@ struct SessionScript {
   Expectations expect;
 };
 
-// Processes of a session that are started once, whoever its agents are.
+// The server processes of a session; each is started once.
 inline constexpr const char* kServerProcesses[] = {
     "agent_handler", "place_recognition", "inter_map_ba", "fusion",
     "posegraph",     "global_ba",         "map_points",   "anchors"};
 
-// Reads and checks a session file, without a look at the recordings and logs it names. Throws
-// std::runtime_error that names file, key and mend.
+// Reads and checks a session file, but not the recordings and logs it names. Throws
+// std::runtime_error with file, key and correction.
 SessionScript ParseSessionFile(const std::filesystem::path& file);
 
-// Finds the recordings and keyframe logs of a session: recordings relative to `recordings` if that
-// is given, else to the file's own folder; there, MH_01 also finds MH_01_easy. Returns what is
-// missing, a line each: "agent 2: /data/MH_09".
+// Finds the recordings and keyframe logs of a session. Recordings are relative to `recordings` if
+// given, else to the session file's folder; MH_01 also finds MH_01_easy. Returns one line for each
+// missing input: "agent 2: /data/MH_09".
 std::vector<std::string> FindInputs(const std::filesystem::path& file,
                                     const std::optional<std::filesystem::path>& recordings,
                                     SessionScript* script);
 
-// Both; throws for missing inputs too.
+// ParseSessionFile and FindInputs; also throws for missing inputs.
 SessionScript ReadSessionFile(const std::filesystem::path& file,
                               const std::optional<std::filesystem::path>& recordings);
 
-// A session with live agents is played at rate "1": theirs is the wall clock. Throws
-// std::runtime_error at another.
+// Throws std::runtime_error if a session with live agents has a rate other than "1": live agents
+// use the wall clock.
 void CheckRate(const std::string& rate, const SessionScript& script);
 
-// `disconnect` faults become partitions of the agents' links, which count wall time, for a session
+// Converts `disconnect` faults to partitions of the agents' links, in wall time, for a session
 // played at this rate ("1", "2", ...). Throws std::runtime_error at rate "max", which has no
 // session time.
 void PlaceDisconnects(const std::string& rate, SessionScript* script);

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The first line, where that is a comment.
+// The first line, if it is a comment.
 std::string Title(const fs::path& file) {
   std::ifstream stream = OpenFile(file);
   std::string line;

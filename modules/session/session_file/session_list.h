@@ -1,6 +1,6 @@
 #pragma once
 
-// Session files at hand, for people: what each is, who is in it, and what it lacks to be run.
+// Lists session files for people: description, agents, and missing inputs of each.
 
 #include <filesystem>
 #include <optional>
@@ -9,18 +9,19 @@
 
 namespace pangea::session {
 
-// Where a session that is given by its name is looked for (sessions/demo.yaml is "demo"): sessions/
-// here, or where there is none, those that are installed with the programs.
+// The folder of sessions that are given by name ("demo" is sessions/demo.yaml): sessions/ in the
+// working directory, else the folder installed with the programs.
 std::filesystem::path SessionFolder();
 
-// The *.yaml of a folder, by name; empty when there is no such folder.
+// The *.yaml files of a folder, by name; empty if there is no such folder.
 std::vector<std::filesystem::path> SessionFiles(const std::filesystem::path& folder);
 
-// The file itself, or the session of this name. Throws std::runtime_error that names the nearest.
+// The file itself, or the session with this name. Throws std::runtime_error with the most similar
+// name.
 std::filesystem::path FindSessionFile(const std::string& name_or_file);
 
-// A paragraph each: the file and its first comment; its agents, faults and expectations; what is
-// missing. A file that is wrong is told with its error.
+// One paragraph per file: name and first comment; agents, faults and expectations; missing inputs.
+// For an invalid file: its error.
 std::string DescribeSessions(const std::vector<std::filesystem::path>& files,
                              const std::optional<std::filesystem::path>& recordings);
 
