@@ -20,7 +20,7 @@ void Warn(const std::vector<std::string>& warnings) {
   }
 }
 
-// A TUM or EuRoC ground-truth file, or a recording's folder.
+// Reads a TUM or EuRoC ground-truth file, or a recording's folder.
 Trajectory ReadReference(const std::string& path) {
   std::vector<std::string> warnings;
   Trajectory reference = std::filesystem::is_directory(path)
@@ -33,7 +33,7 @@ Trajectory ReadReference(const std::string& path) {
   return reference;
 }
 
-// CLI11's ranges take "nan".
+// CLI11's ranges accept "nan".
 const CLI::Validator kLength(
     [](const std::string& text) -> std::string {
       double value = 0;
@@ -45,7 +45,7 @@ const CLI::Validator kLength(
 
 constexpr const char* kStdout = "-";
 
-// The table, and the JSON into its file; on stdout it stands alone.
+// Prints the table and writes the JSON to its file; JSON on stdout replaces the table.
 void Write(const std::string& table, const nlohmann::ordered_json& json, const std::string& path) {
   const std::string text = json.dump(2) + "\n";
   fmt::print("{}", path == kStdout ? text : table);

@@ -16,9 +16,9 @@ namespace pangea {
 
 class EvalCommandLine {
  public:
-  // Adds its subcommands to `app`, which must outlive it; parse, then Run.
+  // Adds its subcommands to `app`, which must outlive it. Call Run after parsing.
   explicit EvalCommandLine(CLI::App& app);
-  // Throws std::runtime_error with one line for the user.
+  // Throws std::runtime_error with a one-line message for the user.
   void Run();
 
  private:

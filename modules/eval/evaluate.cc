@@ -58,7 +58,7 @@ std::string Associated(const std::string& name, size_t associated, size_t poses)
       100 * kMinAssociatedShare, span(input.estimate), span(input.reference)));
 }
 
-// Throws std::runtime_error when too few poses have ground truth.
+// Throws std::runtime_error if too few poses have ground truth.
 std::vector<PosePair> PairsOf(const EvaluationInput& input, double max_gap_s) {
   std::vector<PosePair> pairs =
       Associate(input.estimate, input.reference, std::llround(1e6 * max_gap_s));

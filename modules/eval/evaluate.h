@@ -1,6 +1,6 @@
 #pragma once
 
-// What pangea-eval prints, as text, JSON and plots, from pairs of trajectories.
+// The results of pangea-eval, as text, JSON and plots, from pairs of trajectories.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -12,26 +12,27 @@
 
 namespace pangea {
 
-// One agent: what was estimated and what is true.
+// One agent: estimate and ground truth.
 struct EvaluationInput {
   std::string name;
   Trajectory estimate;
   Trajectory reference;
 };
 
-// Fewer partners than this are an accident, such as another clock, and their error says nothing.
+// Fewer associated poses are taken as a mistake (such as a different clock); their error would be
+// meaningless.
 inline constexpr size_t kMinAssociated = 10;
 inline constexpr double kMinAssociatedShare = 0.05;
 
 // Absolute error under one alignment for all inputs, by SE(3), yaw and Sim(3).
 struct AbsoluteEvaluation {
   std::vector<std::string> names;
-  std::vector<size_t> poses;  // of each estimate; those with a partner: by_alignment's counts
+  std::vector<size_t> poses;  // of each estimate; by_alignment has the associated ones
   std::vector<std::optional<double>> coverage;
   std::vector<std::pair<TrajectoryAlignmentKind, JointAte>> by_alignment;
 };
-// Throws std::runtime_error when too few poses have ground truth (kMinAssociated poses and
-// kMinAssociatedShare of each input), or an error is no number.
+// Throws std::runtime_error if too few poses have ground truth (fewer than kMinAssociated poses, or
+// than kMinAssociatedShare of an input), or if an error is not a number.
 AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s);
 std::string ToText(const AbsoluteEvaluation& evaluation);
 nlohmann::ordered_json ToJson(const AbsoluteEvaluation& evaluation);
@@ -47,8 +48,8 @@ struct RelativeEvaluation {
   std::vector<RelativeRow> over_distance_m;
   std::vector<RelativeRow> over_time_s;
 };
-// Throws std::runtime_error when too few poses have ground truth, no stretch is long enough, or an
-// error is no number.
+// Throws std::runtime_error if too few poses have ground truth, no part is long enough, or an error
+// is not a number.
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s);
@@ -62,7 +63,7 @@ Plot TrajectoryPlot(const std::string& title, const std::vector<EvaluationInput>
 Plot ErrorPlot(const std::string& title, const std::vector<EvaluationInput>& inputs,
                const JointAte& joint);
 
-// The line of a trajectory in top view, broken where poses are more than kMaxPoseStepUs apart.
+// The line of a trajectory in top view; it breaks between poses more than kMaxPoseStepUs apart.
 std::vector<Eigen::Vector2d> TopView(const Trajectory& trajectory,
                                      const TrajectoryAlignment& alignment);
 std::vector<Eigen::Vector2d> ErrorOverTime(const std::vector<PoseError>& errors, int64_t begin);

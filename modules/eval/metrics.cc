@@ -25,7 +25,8 @@ Ate ErrorsUnder(const TrajectoryAlignment& alignment, const std::vector<PosePair
   return ate;
 }
 
-// `progress` ascends with the pairs; each stretch goes from i to the first j that is `length` on.
+// `progress` ascends with the pairs; each part goes from i to the first j with progress larger by
+// `length`.
 std::optional<Rpe> RelativeError(const std::vector<PosePair>& pairs,
                                  const std::vector<double>& progress, double length) {
   std::vector<double> position_m;
@@ -144,7 +145,7 @@ std::optional<double> Coverage(const Trajectory& estimate, const Trajectory& ref
     return std::nullopt;
   }
   int64_t covered = 0;
-  int64_t until = begin;  // what is before it has been looked at
+  int64_t until = begin;  // the time before it is accounted for
   for (size_t i = 0; i < estimate.size(); ++i) {
     const int64_t utime = estimate[i].utime;
     const bool joined = i > 0 && utime - estimate[i - 1].utime <= kMaxPoseStepUs;

@@ -23,7 +23,7 @@ extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leav
 namespace pangea {
 namespace {
 
-// A gnuplot string literal: in single quotes nothing is special but the quote itself.
+// A gnuplot string literal: in single quotes only the quote itself is special.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) {
@@ -32,7 +32,7 @@ std::string Quoted(const std::string& text) {
   return quoted + "'";
 }
 
-// Pixels: with equal axes the picture has the shape of what is drawn.
+// Size in pixels; with equal axes the picture has the shape of the data.
 Eigen::Vector2i CanvasSize(const Plot& plot) {
   constexpr int kWidth = 1400;
   constexpr int kMargins = 150;  // title, legend, axis labels
@@ -106,7 +106,7 @@ std::string Script(const Plot& plot, const std::string& path) {
           i, line.colour);
     }
   }
-  if (commands.empty()) {  // nothing to draw is still a picture that says so
+  if (commands.empty()) {  // an empty plot is a picture that says so
     commands =
         "set xrange [0:1]\nset yrange [0:1]\nset label 'no data' at 0.5,0.5 center\n"
         "plot NaN notitle";
@@ -151,7 +151,7 @@ class MemoryFile {
   int fd_;
 };
 
-// `what` is for the error.
+// `what`: for the error message.
 void RunGnuplot(const std::string& commands, const std::string& what) {
   const MemoryFile script("gnuplot script");
   const MemoryFile complaints("gnuplot stderr");
@@ -160,7 +160,7 @@ void RunGnuplot(const std::string& commands, const std::string& what) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
-  // Where gnuplot may not write a file it complains, and writes the picture to its output.
+  // If gnuplot may not write a file, it prints an error, and writes the picture to stdout.
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, complaints.fd(), STDERR_FILENO);
   std::array<char*, 2> argv = {const_cast<char*>("gnuplot"), nullptr};
@@ -188,7 +188,7 @@ std::string AgentColour(size_t index) {
   return kColours[index % kColours.size()];
 }
 
-// Of a full disk gnuplot says nothing.
+// gnuplot does not report a full disk, so the file is checked.
 void WritePng(const Plot& plot, const std::string& path) {
   RunGnuplot(Script(plot, path), path);
   if (!ReadTextFile(path).ends_with(std::string_view("IEND\xae\x42\x60\x82"))) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Line plots, and their pictures as PNG files, drawn by gnuplot (Debian package gnuplot-nox) as a
-// child process. The same lines give the same bytes.
+// Line plots, drawn as PNG files by gnuplot (Debian package gnuplot-nox) in a child process. The
+// same lines give the same bytes.
 
 #include <Eigen/Core>
 #include <limits>
@@ -16,7 +16,7 @@ inline const Eigen::Vector2d kPlotBreak =
 
 struct PlotLine {
   std::string label = {};  // in the legend; empty for none
-  std::string name = {};   // where a chart can be asked: what this line is; empty: its label
+  std::string name = {};   // shown when hovering; empty: its label
   std::string colour;      // "#rrggbb"
   double width = 2;
   bool dashed = false;
@@ -28,19 +28,20 @@ struct Plot {
   std::string title;
   std::string x_label;
   std::string y_label;
-  bool equal_axes = false;  // one unit is as long on both axes
+  bool equal_axes = false;  // the same scale on both axes
   bool y_from_zero = false;
-  int height = 1000;  // pixels, of a width of 1400; with equal axes what is drawn decides
-  // In place of numbers at y = 1, 2, ...
+  int height = 1000;  // pixels, for a width of 1400; ignored with equal axes
+  // Labels instead of numbers at y = 1, 2, ...
   std::vector<std::string> y_names = {};
   std::vector<PlotLine> lines = {};  // later ones are drawn above earlier ones
 };
 
-// Colours that people with any colour vision tell apart (Okabe & Ito 2008), repeating after seven.
+// Colours that people with any colour vision can distinguish (Okabe & Ito 2008); they repeat after
+// seven.
 std::string AgentColour(size_t index);
 inline constexpr const char* kGroundTruthColour = "#999999";
 
-// Throws std::runtime_error when gnuplot is absent, naming the package, or when it fails.
+// Throws std::runtime_error if gnuplot is missing (names the package) or fails.
 void WritePng(const Plot& plot, const std::string& path);
 
 }  // namespace pangea

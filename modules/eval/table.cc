@@ -11,7 +11,7 @@ bool IsNumber(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.,+-% ") == std::string::npos;
 }
 
-// Length of the UTF-8 sequence that begins here; 0 when it is none.
+// Length of the UTF-8 sequence that begins here; 0 if it is invalid.
 size_t SequenceAt(const std::string& text, size_t at) {
   const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
   const size_t length = byte(at) < 0x80   ? 1

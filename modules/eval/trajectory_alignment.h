@@ -15,7 +15,7 @@ namespace pangea {
 
 enum class TrajectoryAlignmentKind {
   kSe3,   // rotation and translation
-  kYaw,   // rotation about z and translation: what visual-inertial odometry cannot observe
+  kYaw,   // rotation about z and translation: unobservable for visual-inertial odometry
   kSim3,  // rotation, translation, scale
 };
 
@@ -33,8 +33,8 @@ struct TrajectoryAlignment {
   }
 };
 
-// Both of equal size, at least one point. Points on a line or all in one place leave part of the
-// rotation free; any of the optima is returned.
+// Both must have the same size, at least one point. If all points are on a line or equal, part of
+// the rotation is undetermined; one of the optima is returned.
 TrajectoryAlignment AlignTrajectories(const std::vector<Eigen::Vector3d>& estimate,
                                       const std::vector<Eigen::Vector3d>& reference,
                                       TrajectoryAlignmentKind kind);

@@ -9,7 +9,7 @@
 namespace pangea::session {
 namespace {
 
-// Parsed, or nothing.
+// The parsed message; empty if it does not parse.
 template <typename Message>
 auto Read(const LogEvent& event) -> decltype(Parse(Message()).value) {
   Message message{};

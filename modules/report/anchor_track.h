@@ -1,6 +1,6 @@
 #pragma once
 
-// What a report needs of the anchors on an agent's bus.
+// The anchor messages on an agent's bus, for the report.
 
 #include <cstdint>
 #include <map>
@@ -12,16 +12,16 @@
 
 namespace pangea::session {
 
-// What was shown with one pose, while the odometry tracked.
+// The anchors shown together with one pose, while the odometry tracked.
 struct AnchorFrame {
   int64_t utime = 0;      // of the image, sensor clock
-  int64_t log_utime = 0;  // when it was captured, wall clock
+  int64_t log_utime = 0;  // capture time, wall clock
   MapId map;
   Rigid3 T_odom_body;
-  std::shared_ptr<const ShownAnchors> shown;  // the newest before it
+  std::shared_ptr<const ShownAnchors> shown;  // the newest one before the pose
 };
 
-// ANCHOR_k: where an anchor is, unblended.
+// An ANCHOR_k message: the pose of an anchor, without blending.
 struct HeardAnchor {
   int64_t log_utime = 0;
   int64_t revision = 0;
@@ -32,11 +32,11 @@ struct HeardAnchor {
 
 struct AnchorTrack {
   std::vector<AnchorFrame> frames;                     // from the first SHOWN_ANCHORS_k on
-  std::map<AnchorId, std::vector<HeardAnchor>> heard;  // each in the order of the log
-  std::map<AnchorId, AnchorEdit> requests;             // the newest of each
+  std::map<AnchorId, std::vector<HeardAnchor>> heard;  // by anchor, in the order of the log
+  std::map<AnchorId, AnchorEdit> requests;             // newest request by anchor
 };
 
-// Of the log of one agent's bus, event by event.
+// Reads the log of one agent's bus, event by event.
 class AnchorTrackReader {
  public:
   explicit AnchorTrackReader(int32_t agent_id);

@@ -48,7 +48,7 @@ std::string Nees(const json& truth) {
   return nees.is_null() ? "-" : Text(nees.at("mean"), "{:.2f}");
 }
 
-// Of what is only known where there is ground truth.
+// Number of wrong constraints; only known with ground truth.
 std::string Wrong(const json& truth) {
   const int64_t checked = truth.at("checked").get<int64_t>();
   return checked == 0 ? "-" : fmt::format("{} of {}", truth.at("wrong").get<int64_t>(), checked);
@@ -68,7 +68,7 @@ void AddRow(const fs::path& run, const fs::path& file, const json& report, Table
               fmt::format("{}", report.at("groups").size()), WallTime(file.parent_path())});
 }
 
-// As the report has them among its notes.
+// The options, from the notes of the report.
 std::string OptionsOf(const fs::path& run, const json& report) {
   std::string text;
   for (const json& note : report.at("notes")) {

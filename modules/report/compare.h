@@ -1,6 +1,6 @@
 #pragma once
 
-// Several runs side by side, from their report.json: for choosing options.
+// Compares several runs by their report.json, for choosing options.
 
 #include <filesystem>
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace pangea::session {
 
-// How long a run took, for CompareRuns; a report says nothing of it, as it is the same each time.
+// Writes how long a run took, for CompareRuns. It is not in the report, which must be reproducible.
 void WriteTiming(double wall_s, const std::filesystem::path& folder);
 
-// A table with a row for each: constraints, their error where there is ground truth, ATE, groups,
-// time; below it the options that are not the defaults. `runs`: folders of `run`, `replay` or
-// `report`, or the report.json in them. Throws std::runtime_error about one that has no report.
+// Returns a table with one row per run: constraints, their error if there is ground truth, ATE,
+// groups, time; below it the options that are not the defaults. `runs`: output folders of `run`,
+// `replay` or `report`, or the report.json in them. Throws std::runtime_error if one has no report.
 std::string CompareRuns(const std::vector<std::filesystem::path>& runs);
 
 }  // namespace pangea::session

@@ -15,7 +15,7 @@ using nlohmann::ordered_json;
 
 enum class Relation : uint8_t { kExactly, kAtMost, kAtLeast };
 
-// A value of the session, or one of each agent.
+// A value of the session, or of one agent.
 struct Value {
   std::string of;  // "agent 2: "; empty for the session's
   std::optional<double> value;
@@ -34,7 +34,7 @@ std::set<int32_t> Agents(const ordered_json& group) {
   return group.at("agents").get<std::set<int32_t>>();
 }
 
-// The first fusion that all agents were in, and have not left since.
+// The time of the first fusion of all agents after which none has left the group.
 Values FusedBy(const ordered_json& report) {
   std::set<int32_t> all;
   for (const ordered_json& agent : report.at("agents")) {
@@ -76,7 +76,7 @@ Values Joint(const ordered_json& report) { return {{"", Number(report.at("ate_jo
 
 Values Wrong(const ordered_json& report) {
   const ordered_json& truth = report.at("constraints_truth");
-  // Nothing was checked: nothing is known.
+  // If no constraint was checked, the value is unknown.
   const bool any = truth.at("checked").get<int64_t>() > 0;
   return {{"", any ? Number(truth.at("wrong")) : std::nullopt}};
 }
@@ -85,8 +85,9 @@ constexpr char kAnchorError[] = "error_m";
 constexpr char kAnchorPixels[] = "error_px";
 constexpr char kAnchorJump[] = "largest_jump_m";
 
-// Of each other agent of its group; an anchor that none of them could show has no value. One that
-// an agent shows and never looks at has no pixels to be off by, and misses nothing.
+// A value for each other agent of the anchor's group. An anchor that none of them could show has no
+// value. If an agent shows an anchor but never has it in view, there is no pixel error, and the
+// bound is met.
 template <const char* kKey>
 Values EachAnchor(const ordered_json& report) {
   Values metrics;
@@ -115,7 +116,7 @@ struct Kind {
   std::string_view name;
   Relation relation;
   std::string_view unit;
-  double most;  // that a bound may be
+  double most;  // largest bound allowed
   Values (*metrics)(const ordered_json& report);
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a session must come to: bounds on metrics of its report, so that a session is a test with an
-// exit code.
+// Expectations of a session: bounds on the metrics of its report, so that a session can be a test
+// with an exit code.
 //
 //   expect: {groups: 1, fused_by: 40, ate_joint_m: 0.1}
 //
@@ -16,8 +16,8 @@
 //   anchor_error_m, anchor_error_px, anchor_largest_jump_m
 //                       at most, each anchor at each other agent of its group
 //
-// Metrics are report.json's (docs/report.md). One that is not there, because there is no ground
-// truth or no fusion, misses its bound. All of them but the anchors' are in a replay's report too.
+// The metrics are those in report.json (docs/report.md). A missing metric (no ground truth or no
+// fusion) does not meet its bound. A replay's report has all of them except those of anchors.
 
 #include <map>
 #include <nlohmann/json.hpp>
@@ -37,7 +37,7 @@ using Expectations = std::map<std::string, double>;
 class ExpectationsSection {
  public:
   ExpectationsSection(YamlOptions& yaml, const std::string& key);
-  // What has been read.
+  // The bounds that were read.
   Expectations Take() const;
 
  private:
@@ -52,11 +52,11 @@ struct CheckedExpectation {
   bool met = false;
 };
 
-// Of a report.json.
+// Checks the metrics in a report.json.
 std::vector<CheckedExpectation> Check(const Expectations& expectations,
                                       const nlohmann::ordered_json& report);
 
-// For report.md and report.html, and for report.json.
+// ToTable is for report.md and report.html, ToJson for report.json.
 Table ToTable(const std::vector<CheckedExpectation>& checked);
 nlohmann::ordered_json ToJson(const std::vector<CheckedExpectation>& checked);
 

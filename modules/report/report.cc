@@ -77,7 +77,7 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
     markdown += fmt::format("\n## Expectations\n\n{}", table.Text());
     html = WithSection(std::move(html), "expectations", "Expectations", table);
   }
-  // Texts of a log may be any bytes.
+  // Texts in a log may contain any bytes.
   WriteTextFile(folder + "/report.json",
                 json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
   WriteTextFile(folder + "/report.md", markdown);

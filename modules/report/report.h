@@ -1,7 +1,7 @@
 #pragma once
 
-// From captured logs to the output directory: trajectories, map, metrics, pictures. A pure function
-// of its input, the same after a live run and after a replay; the same input gives the same bytes.
+// Makes the output directory from captured logs: trajectories, map, metrics, pictures. The same
+// after a live run and after a replay; the same input gives the same bytes.
 //
 // Writes into `folder` (which must exist):
 //   agent_<id>.vio.tum       T_odom_body of the agent's main map, raw odometry at camera rate
@@ -15,7 +15,7 @@
 //   recordings trajectory.png, error.png  (groups that no ground truth places:
 //   trajectory.<map>.png)
 //
-// A map that no MAP_STATE mentions is a group of its own with the odometry's poses. <map> is
+// A map that no MAP_STATE mentions is a group of its own, with the odometry's poses. <map> is
 // "<agent>_<opened utime>".
 
 #include <cstdint>
@@ -29,7 +29,7 @@
 
 namespace pangea::session {
 
-// A bad link between an agent and the server, as the session made it.
+// An emulated bad link between an agent and the server.
 struct LinkRun {
   std::string conditions;                     // for people: "loss 5 %, delay 50 ms"
   std::map<std::string, int64_t> packets_up;  // by what became of them: "taken", "delivered", ...
@@ -38,23 +38,23 @@ struct LinkRun {
 
 struct AgentRun {
   int32_t id = 0;
-  // EuRoC folder, for ground truth; empty, or without ground truth: no ATE
+  // EuRoC folder with ground truth; without it there is no ATE
   std::string recording;
   // the part of the recording that was played, seconds since its first image
   double start_s = 0;
-  std::optional<double> duration_s;  // none: to its end
-  // log of the agent's bus with POSE_<id>, anchors; empty or absent: the VIO's track is that of its
-  // keyframes
+  std::optional<double> duration_s;  // empty: to its end
+  // log of the agent's bus with POSE_<id> and anchors; without it, the odometry's trajectory is
+  // that of its keyframes
   std::string bus_log;
-  // payload on the link bus, both directions; none when it was not measured (a replay)
+  // payload on the link bus; empty if not measured (a replay)
   std::optional<int64_t> bytes_up;
   std::optional<int64_t> bytes_down;
   std::optional<LinkRun> link;
-  // recording time played / wall time it took
+  // recording time played / wall time
   std::optional<double> realtime_factor;
 };
 
-// An anchor that the session was to place: one that is not in the logs is reported too.
+// An anchor that the session should place; it is reported even if it is not in the logs.
 struct WantedAnchor {
   int32_t agent = 0;
   std::string name;
@@ -63,13 +63,13 @@ struct WantedAnchor {
 struct ReportInput {
   // log of the server bus: KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_*
   std::string server_log = {};
-  // an agent that is only in the log need not be here
+  // may lack agents of the log
   std::vector<AgentRun> agents = {};
-  // of the other processes, by process name: recording time / CPU or wall time, as measured
+  // of the other processes, by name: measured recording time / CPU or wall time
   std::map<std::string, double> realtime_factors = {};
-  // how often each process died and was started again, by name; none are not listed
+  // number of restarts by process name; only processes that were restarted
   std::map<std::string, int> restarts = {};
-  // what else a reader must know, e.g. warnings about a recording
+  // further notes for the reader, e.g. warnings about a recording
   std::vector<std::string> notes = {};
   std::vector<WantedAnchor> anchors = {};
   // bounds on the metrics, checked at the end of the report
@@ -78,13 +78,14 @@ struct ReportInput {
 
 struct WrittenReport {
   std::string text;                         // of report.md
-  std::vector<CheckedExpectation> checked;  // each of the input's
+  std::vector<CheckedExpectation> checked;  // one per expectation of the input
 };
 
-// Throws std::runtime_error when the server log cannot be read or the folder not written; a picture
-// that cannot be drawn is a note in the report. Of a damaged log the metrics are of what can be
-// read, and the report says so at its top; what is lost is noted in `readings` (log_reader.h), and
-// the report tells that of the logs noted there already too, which this one was made from.
+// Throws std::runtime_error if the server log cannot be read or the folder cannot be written; a
+// picture that cannot be drawn becomes a note in the report. For a damaged log, the metrics use its
+// readable parts, and the report says so at its top. The damage is added to `readings`
+// (log_reader.h); the report also states the damage that `readings` contains already, of the logs
+// from which this one was made.
 WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
                           LogReadings* readings = nullptr);
 

@@ -17,18 +17,18 @@ namespace {
 
 constexpr int kWidth_px = 640;
 constexpr int kCaption_px = 30;
-constexpr int64_t kMaxOff_us = 60'000;  // of the image from the pose
-constexpr double kCubeSide = 0.1;       // of the maker's distance
-// Okabe and Ito's, told apart with any colour vision (BGR).
+constexpr int64_t kMaxOff_us = 60'000;  // between image and pose
+constexpr double kCubeSide = 0.1;       // relative to the distance from the maker's camera
+// Colours by Okabe and Ito, distinguishable with any colour vision (BGR).
 const cv::Scalar kShown(0, 159, 230), kTrue(233, 180, 86), kText(255, 255, 255);
 
-// Images of recordings, each opened once.
+// Images of recordings; each recording is opened once.
 class Images {
  public:
   Images(const ReportMetrics& metrics, std::vector<std::string>* notes)
       : metrics_(metrics), notes_(notes) {}
 
-  // In colour, of the camera's size; empty when there is none.
+  // The image, in colour, with the camera's size; empty if there is none.
   cv::Mat At(int32_t agent, int64_t utime) {
     const EurocRecording* recording = Open(agent);
     if (recording == nullptr) {
@@ -71,7 +71,7 @@ class Images {
   std::map<int32_t, std::unique_ptr<EurocRecording>> recordings_;
 };
 
-// One image with what is drawn into it.
+// One image to draw into.
 class Canvas {
  public:
   Canvas(const cv::Mat& image, const CameraModel& camera)
@@ -80,7 +80,7 @@ class Canvas {
                0, cv::INTER_AREA);
   }
 
-  // Upright on the anchor, a cross at the anchor itself.
+  // Draws a cube that stands upright on the anchor, and a cross at the anchor itself.
   void DrawCube(const Rigid3& T_cam_anchor, double side) {
     for (int a = 0; a < 8; ++a) {
       for (const int bit : {1, 2, 4}) {
@@ -131,7 +131,7 @@ class Canvas {
   cv::Mat canvas_;
 };
 
-// OpenCV's fonts have no other letters.
+// OpenCV's fonts have only ASCII letters.
 std::string Ascii(std::string text) {
   for (char& c : text) {
     c = static_cast<unsigned char>(c) < 0x80 ? c : '?';
@@ -139,7 +139,7 @@ std::string Ascii(std::string text) {
   return text;
 }
 
-// The other agent with the best view; null for none.
+// The other agent with the best view; null if there is none.
 const AnchorAtAgent* BestView(const AnchorMetrics& anchor, const CapturedSession& session) {
   const AnchorAtAgent* best = nullptr;
   double best_inside = -1;
@@ -156,7 +156,7 @@ const AnchorAtAgent* BestView(const AnchorMetrics& anchor, const CapturedSession
   return best;
 }
 
-// Both images of one anchor; empty when one is missing.
+// Both images of one anchor; empty if one is missing.
 cv::Mat Row(const AnchorMetrics& anchor, const CapturedSession& session,
             const ReportMetrics& metrics, Images* images) {
   const AnchorAtAgent* other = BestView(anchor, session);
@@ -169,7 +169,7 @@ cv::Mat Row(const AnchorMetrics& anchor, const CapturedSession& session,
   const cv::Mat right = images->At(seen.agent, seen.utime);
   if (left.cols != session.cameras.at(placing.agent).width ||
       right.cols != session.cameras.at(seen.agent).width) {
-    return {};  // none, or of another camera than the odometry's
+    return {};  // no image, or one of another camera
   }
   const double side = kCubeSide * placing.T_cam_anchor.t.norm();
   Canvas maker(left, session.cameras.at(placing.agent));

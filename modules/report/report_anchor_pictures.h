@@ -1,6 +1,6 @@
 #pragma once
 
-// Anchors in the images of those who see them.
+// Draws anchors into the images of the agents that see them.
 
 #include <string>
 
@@ -15,9 +15,9 @@ inline constexpr const char* kAnchorPictureExplained =
     "agent "
     "shows the anchor, the circle is where ground truth has it.";
 
-// A row for each of the first kMaxAnchorPictures anchors that two agents have in an image: the
-// maker's at the placing, and that of the other agent in whose image it is furthest inside. JPEG;
-// empty where no anchor or no recording is at hand. What cannot be read is added to `notes`.
+// One row for each of the first kMaxAnchorPictures anchors in images of two agents: the image in
+// which it was placed, and the other agent's image in which it is furthest inside. Returns a JPEG;
+// empty if there is no anchor or no recording. Reading errors are added to `notes`.
 std::string AnchorsJpeg(const CapturedSession& session, const ReportMetrics& metrics,
                         std::vector<std::string>* notes);
 

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// A microsecond, a micrometre: no more digits than mean something.
+// Rounds to a microsecond or micrometre: further digits are meaningless.
 ordered_json Number(double value) { return std::round(value * 1e6) / 1e6; }
 ordered_json Number(const std::optional<double>& value) {
   return value ? Number(*value) : ordered_json();
@@ -161,7 +161,7 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
                               {"constraints_switched_off", group.group.num_switched_off},
                               {"ate_joint_m", JointJson(group)}});
   }
-  // The first group has most agents.
+  // The first group has the most agents.
   json["ate_joint_m"] = metrics.groups.empty() ? ordered_json() : JointJson(metrics.groups.front());
   const ConstraintCounts counts = CountConstraints(session);
   json["constraints"] = {{"accepted", counts.accepted_inter + counts.accepted_intra},

@@ -1,6 +1,6 @@
 #pragma once
 
-// report.json, but for what was expected of the session: that is checked against these metrics.
+// report.json without the expectations, which are checked against these metrics.
 
 #include <nlohmann/json_fwd.hpp>
 

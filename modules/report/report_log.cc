@@ -31,7 +31,7 @@ CapturedKeyframe Captured(const Keyframe& keyframe, double session_s) {
   return captured;
 }
 
-// Puts the chunks of MAP_STATE together and keeps what counts.
+// Assembles the chunks of MAP_STATE; keeps the newest states and the changes of groups.
 class States {
  public:
   explicit States(CapturedSession* session) : session_(session) {}
@@ -111,7 +111,7 @@ void AddPose(Bytes data, PoseTrack* track) {
   }
 }
 
-// The frame each map is shown in from a revision on.
+// By map and revision: the frame in which the map is shown from this revision on.
 using Frames = std::map<MapId, std::map<int64_t, MapId>>;
 
 void AddFrame(Bytes data, Frames* frames) {
@@ -120,7 +120,7 @@ void AddFrame(Bytes data, Frames* frames) {
   }
 }
 
-// A pose and the correction in it come in any order, so frames are told at the end.
+// A pose and its correction come in any order, so frames are assigned at the end.
 void Finish(const Frames& frames, PoseTrack* track) {
   for (auto& [map, odometry] : track->odometry) {
     SortByTime(&odometry);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a report needs of a session's logs.
+// Reads the parts of a session's logs that a report needs.
 
 #include <cstdint>
 #include <map>
@@ -31,10 +31,10 @@ struct CapturedKeyframe {
   int64_t utime = 0;
   Rigid3 T_odom_body;
   std::vector<CapturedPoint> points;
-  double session_s = 0;  // when it came, since the log's first event
+  double session_s = 0;  // capture time, since the log's first event
 };
 
-// What an agent showed at one image.
+// The pose that an agent showed at one image.
 struct LivePose {
   int64_t utime = 0;
   MapId map;    // its odom frame
@@ -44,15 +44,15 @@ struct LivePose {
   Rigid3 T_map_body;
 };
 
-// What a process said of itself, once a second.
+// Values from a process' status, once a second.
 struct ProcessSample {
-  int64_t utime = 0;                            // the log's, wall clock
+  int64_t utime = 0;                            // capture time, wall clock
   double cpu_s = 0;                             // since the process' start
-  std::optional<int64_t> bytes_up, bytes_down;  // on the link, of an uplink
+  std::optional<int64_t> bytes_up, bytes_down;  // on the link; only an uplink's
 };
 using ProcessSamples = std::map<std::string, std::vector<ProcessSample>>;  // by process
 
-// POSE_k and CORRECTION_k of one agent, its anchors, and what its processes said of themselves.
+// POSE_k and CORRECTION_k of one agent, its anchors, and the status of its processes.
 struct PoseTrack {
   std::optional<int64_t> first_utime;  // first pose message, whatever its state
   std::optional<int64_t> first_tracking_utime;
@@ -64,37 +64,37 @@ struct PoseTrack {
 
 // A change of groups, in the order of the log.
 struct GroupChange {
-  bool fused = true;                        // false: maps were taken apart
+  bool fused = true;                        // false: a group was split
   double session_s = 0;                     // since the log's first event
-  int64_t revision = 0;                     // of the state that made it
+  int64_t revision = 0;                     // of the state with the change
   MapId frame;                              // the map whose odom frame is the group's
   std::vector<MapId> maps;                  // the group after it
-  std::map<int32_t, int64_t> newest_utime;  // of each agent's keyframes in the group
+  std::map<int32_t, int64_t> newest_utime;  // by agent: of its keyframes in the group
 };
 
 struct CapturedSession {
   int64_t begin_utime = 0;  // the log's first event, wall clock
   std::map<KeyframeId, CapturedKeyframe> keyframes;
-  // the newest complete state that mentions the map; maps of one group share the object
+  // by map: the newest complete state that mentions it; maps of one group share the object
   std::map<MapId, std::shared_ptr<const MapState>> states;
   std::vector<GroupChange> changes;
   std::map<int64_t, Constraint> constraints;  // by id
-  // in any order; of one revision and editor the first
+  // by anchor, in any order; of the same revision and editor only the first
   std::map<AnchorId, std::vector<AnchorEdit>> anchor_edits;
-  std::set<AnchorId> anchors_placed;         // that the server has said the place of
+  std::set<AnchorId> anchors_placed;         // whose place the server has published
   std::map<int32_t, CameraModel> cameras;    // by agent, of the newest keyframe
   std::map<std::string, status_t> statuses;  // newest of each process
   ProcessSamples samples;
   std::map<int32_t, PoseTrack> poses;
   std::map<std::string, int> unreadable;  // messages that did not decode or parse, by channel
-  int incomplete_states = 0;              // of which a chunk is missing
+  int incomplete_states = 0;              // with a missing chunk
 };
 
-// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_* of a server bus' log. What of the
-// log is lost is noted in `readings` (log_reader.h), here and below.
+// Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_* of a server bus' log. Damaged
+// parts of the log are reported in `readings` (log_reader.h), here and below.
 CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = nullptr);
-// Reads POSE_<agent_id>, CORRECTION_<agent_id>, STATUS_* and what AnchorTrack has of an agent bus'
-// log.
+// Reads POSE_<agent_id>, CORRECTION_<agent_id>, STATUS_* and the messages for AnchorTrack of an
+// agent bus' log.
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
 
 }  // namespace pangea::session

@@ -12,7 +12,7 @@
 namespace pangea::session {
 namespace {
 
-// A point whose depth is less certain than this is a ray, not a point.
+// Points with a larger relative sigma of the depth are not drawn.
 constexpr double kMaxRelativeSigma = 0.3;
 
 struct PlyPoint {
@@ -20,7 +20,7 @@ struct PlyPoint {
   double relative_sigma = 0;
 };
 
-// Landmarks by id, then the points that are none, of all keyframes of one map.
+// The points of all keyframes of one map: landmarks by id, then points without landmark.
 std::vector<Eigen::Vector3d> PointsOf(const CapturedSession& session, const FinalGroup& group,
                                       const MapId& map) {
   std::map<int32_t, PlyPoint> landmarks;

@@ -17,11 +17,11 @@ struct ColouredPoint {
   std::array<uint8_t, 3> rgb;  // its agent's
 };
 
-// The group's map points in its map frame; a landmark seen by several keyframes of a map counts
-// once, from where its depth is known best.
+// The group's map points in its map frame; a landmark seen by several keyframes of a map appears
+// once, from the keyframe with its most certain depth.
 std::vector<ColouredPoint> MapPoints(const CapturedSession& session, const ReportMetrics& metrics,
                                      const FinalGroup& group);
-// The same as ASCII PLY.
+// The map points as ASCII PLY.
 std::string MapPly(const CapturedSession& session, const ReportMetrics& metrics,
                    const FinalGroup& group);
 
@@ -30,7 +30,7 @@ struct Picture {
   Plot plot;
 };
 
-// One top view of everything ground truth places; each further group in its own.
+// One top view of all groups with ground truth; each other group has its own.
 std::vector<Picture> Pictures(const ReportMetrics& metrics);
 
 }  // namespace pangea::session

@@ -1,7 +1,7 @@
 #pragma once
 
-// The tables and lists of a report, for its Markdown and its page alike. A table without rows has
-// nothing to tell.
+// The tables and lists of a report, for its Markdown and its page. A table without rows is left
+// out.
 
 #include <string>
 #include <vector>
@@ -13,13 +13,13 @@ namespace pangea::session {
 
 Table AgentTable(const ReportMetrics& metrics);
 Table GroupTable(const ReportMetrics& metrics);
-Table LiveTable(const ReportMetrics& metrics);       // what agents showed
-Table LinksTable(const ReportMetrics& metrics);      // links that the session made bad
+Table LiveTable(const ReportMetrics& metrics);       // poses that agents showed
+Table LinksTable(const ReportMetrics& metrics);      // emulated bad links
 Table RefusedTable(const CapturedSession& session);  // constraints, by reason
 Table TruthTable(const ReportMetrics& metrics);      // accepted constraints against ground truth
-Table AnchorTable(const ReportMetrics& metrics);     // where they are shown, against ground truth
+Table AnchorTable(const ReportMetrics& metrics);     // shown positions against ground truth
 Table ProcessTable(const ReportInput& input, const CapturedSession& session);
-Table TrafficTable(const ReportMetrics& metrics);  // on the link, beside the paper's
+Table TrafficTable(const ReportMetrics& metrics);  // on the link, compared with the paper
 
 inline constexpr const char* kLostExplained =
     "Not all of the logs could be read; this is what the rest of them says.";
@@ -30,9 +30,9 @@ inline constexpr const char* kAnchorsExplained =
 inline constexpr const char* kNeesExplained =
     "NEES: squared error / covariance, per dimension; 1 when the covariance is honest.";
 
-// When maps became one or were taken apart, a line each.
+// One line for each fusion or split of a group.
 std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics);
-// How many constraints were accepted and refused.
+// Numbers of accepted and refused constraints.
 std::string ConstraintsLine(const CapturedSession& session);
 
 }  // namespace pangea::session

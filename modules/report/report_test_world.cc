@@ -125,7 +125,8 @@ Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s) {
   keyframe.camera.fx = keyframe.camera.fy = 100;
   keyframe.camera.cx = keyframe.camera.cy = 50;
   keyframe.T_odom_body = Odometry(map.agent_id, s);
-  // A landmark that every keyframe sees straight ahead at 2 m, one of its own, an uncertain one.
+  // A landmark that every keyframe sees straight ahead at 2 m, one seen only by it, an uncertain
+  // one.
   for (const int32_t landmark : {0, 1 + seq, 10'000 + seq}) {
     Corner corner;
     corner.pixel = {50, 50};

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the report's tests report on: two agents that walk for half a minute, their recordings with
-// ground truth, the logs of their buses and of the server's.
+// Test data for the report: two agents that walk for half a minute, their recordings with ground
+// truth, and the logs of their buses and of the server's bus.
 
 #include <gtest/gtest.h>
 
@@ -38,10 +38,10 @@ class LogWriter {
   int64_t utime_ = kOpened;
 };
 
-// Where agent k's body is `s` seconds after its first image, in the ground truth's frame.
+// Body pose of the agent `s` seconds after its first image, in the ground truth's frame.
 Rigid3 Truth(int32_t agent, double s);
 Rigid3 OdomFromTruth(int32_t agent);
-// Scale drift of 2 %.
+// The odometry's pose; its scale is wrong by 2 %.
 Rigid3 Odometry(int32_t agent, double s);
 int64_t Utime(double s);
 
@@ -49,7 +49,7 @@ class ReportWorld : public ::testing::Test {
  protected:
   static constexpr double kDuration = 30;       // seconds of recording
   static constexpr double kInit = 2;            // first pose
-  static constexpr double kCorrected = 12.025;  // what an agent shows, from here on exact
+  static constexpr double kCorrected = 12.025;  // the shown pose is exact from here on
   static constexpr double kKeyframePeriod = 0.5;
 
   void SetUp() override;
@@ -65,13 +65,13 @@ class ReportWorld : public ::testing::Test {
 
   void LogKeyframes(const MapId& map, int begin, int end);
   void LogBoth();
-  // Perfect poses in the odom frame of the first map's agent, but for a shift of agent 2's.
+  // True poses in the odom frame of the first map's agent, except for a shift of agent 2's.
   static MapState State(int64_t revision, const std::vector<MapId>& maps, int num_keyframes,
                         const Eigen::Vector3d& shift_of_second = Eigen::Vector3d::Zero());
   void LogState(const MapState& state);
   void LogConstraint(int seq, bool accepted, const std::string& reason);
 
-  // Writes the report; its report.json.
+  // Writes the report; returns its report.json.
   nlohmann::json Report();
   std::string Text(const std::string& file) const;
   Trajectory Tum(const std::string& file) const;

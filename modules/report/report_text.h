@@ -8,10 +8,10 @@
 
 namespace pangea::session {
 
-// "1_1700000000000000": a map's name in file names.
+// A map's name in file names: "1_1700000000000000".
 std::string FileName(const MapId& map);
 
-// `has_anchor_picture`: kAnchorPicture is beside it.
+// report.md. `has_anchor_picture`: the file kAnchorPicture exists.
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
                            const ReportMetrics& metrics, bool has_anchor_picture);
 

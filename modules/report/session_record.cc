@@ -67,7 +67,7 @@ void KeepRecordings(const std::vector<fs::path>& logs, const fs::path& out) {
   if (!kept.agents.empty()) {
     Write(kept, OwnFile(out));
   } else {
-    fs::remove(OwnFile(out));  // an earlier log's of this name
+    fs::remove(OwnFile(out));  // left by an earlier log of this name
   }
 }
 
@@ -91,7 +91,7 @@ SessionRecord ReadSessionRecord(const std::vector<fs::path>& logs) {
         session.anchors.push_back(
             {anchor.at("agent").get<int32_t>(), anchor.at("name").get<std::string>()});
       }
-      // Of several sessions together nothing was expected.
+      // Several sessions together have no expectations.
       session.expect =
           seen.size() == 1 ? remembered.value("expect", Expectations()) : Expectations();
     } catch (const json::exception& error) {

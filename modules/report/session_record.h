@@ -1,8 +1,8 @@
 #pragma once
 
-// What a session keeps beside its log (recordings.json), so that a later replay or explanation
-// finds ground truth and images: what each agent played, which anchors were to be
-// placed, and what was expected.
+// The record of a session beside its log (recordings.json), with which a later replay or
+// explanation finds ground truth and images: what each agent played, the anchors to be placed, and
+// the expectations.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,23 +16,23 @@
 namespace pangea::session {
 
 struct SessionRecord {
-  std::vector<AgentRun> agents;  // id, recording and the part of it that was played
+  std::vector<AgentRun> agents;  // only id, recording and the part that was played
   Expectations expect;
   std::vector<WantedAnchor> anchors;
 };
 
-// Both throw std::runtime_error when the file cannot be written, or read.
+// Both throw std::runtime_error if the file cannot be written or read.
 void WriteSessionRecord(const SessionRecord& session, const std::filesystem::path& folder);
-// Of the logs themselves (KeepRecordings), else of the folders that hold them; empty where there is
-// none.
+// Reads the record of the logs themselves (KeepRecordings), else that of their folders; empty if
+// there is none.
 SessionRecord ReadSessionRecord(const std::vector<std::filesystem::path>& logs);
 
-// Who played what, for a log made of others: beside it, as <out>.recordings.json. What was expected
-// of the whole is not expected of a part.
+// Writes the record for a log made from others, as <out>.recordings.json; without expectations,
+// which hold only for the whole session.
 void KeepRecordings(const std::vector<std::filesystem::path>& logs,
                     const std::filesystem::path& out);
 
-// Those recordings that are still there, folders by agent.
+// Folders, by agent, of the recordings that still exist.
 std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
 
 }  // namespace pangea::session

@@ -10,7 +10,7 @@ namespace pangea::session {
 namespace {
 
 constexpr int kChartHeight = 480;
-constexpr size_t kNumColours = 7;  // of AgentColour, before they repeat
+constexpr size_t kNumColours = 7;  // number of different colours of AgentColour
 
 Plot Chart(const std::string& title, const std::string& y_label) {
   return {.title = title,
@@ -24,8 +24,8 @@ double SessionSeconds(const CapturedSession& session, int64_t utime) {
   return 1e-6 * static_cast<double>(utime - session.begin_utime);
 }
 
-// By how much a count that a process tells once a second grew, per second. A process that started
-// again counts from zero: the line breaks.
+// Growth per second of a count that a process publishes once a second. A restarted process counts
+// from zero: the line breaks there.
 std::vector<Eigen::Vector2d> Rate(const CapturedSession& session,
                                   const std::vector<ProcessSample>& samples,
                                   const std::function<double(const ProcessSample&)>& count) {
@@ -53,14 +53,14 @@ void AddLoad(const CapturedSession& session, const ProcessSamples& processes, Pl
   }
 }
 
-// One map's bar while it is drawn.
+// The bar of one map.
 struct Bar {
   double y = 0;
   double from_s = 0;
   double to_s = 0;
   size_t colour = 0;
   std::string name = {};
-  int32_t frame_agent = 0;  // in whose map frame it is
+  int32_t frame_agent = 0;  // the agent whose map frame it is in
 };
 
 void AddBar(const Bar& bar, double to_s, Plot* plot) {
@@ -79,7 +79,7 @@ std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportMetrics& m
     bar->second.from_s = std::min(bar->second.from_s, keyframe.session_s);
     bar->second.to_s = std::max(bar->second.to_s, keyframe.session_s);
   }
-  auto y = static_cast<double>(bars.size());  // the first on top
+  auto y = static_cast<double>(bars.size());  // the first one on top
   for (auto& [map, bar] : bars) {
     bar.y = y--;
   }

@@ -13,8 +13,8 @@
 namespace pangea::session {
 namespace {
 
-// Nothing is fetched and no other script runs than ours, known by its hash: the policy forbids it,
-// whatever a log's texts hold.
+// The content security policy forbids all requests and every script except this one, identified by
+// its hash, whatever the texts of a log contain.
 constexpr const char* kPolicy = R"(<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -116,7 +116,7 @@ std::string Head() {
   return fmt::format(kPolicy, Base64(hash)) + kHead;
 }
 
-// A chart, or why there is none.
+// A chart, or the reason why there is none.
 std::string ChartOr(const Plot& plot, const std::string& what, const std::string& otherwise) {
   return plot.lines.empty() ? Paragraph(otherwise) : ChartHtml(plot, what);
 }
@@ -200,7 +200,7 @@ std::string Paper(const ReportMetrics& metrics) {
                                    "read ours as a check of the system.");
 }
 
-// In the page itself: it fetches nothing.
+// The picture is embedded in the page.
 std::string AnchorFigure(const std::string& jpeg) {
   return jpeg.empty()
              ? ""

@@ -1,6 +1,6 @@
 #pragma once
 
-// report.html: the whole report as one page that needs nothing else: no network, no further file.
+// report.html: the whole report as a single page without other files or network access.
 
 #include <string>
 
@@ -9,11 +9,11 @@
 
 namespace pangea::session {
 
-// `anchors_jpeg`: of AnchorsJpeg; empty for none.
+// `anchors_jpeg`: from AnchorsJpeg; empty for none.
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
                        const ReportMetrics& metrics, const std::string& anchors_jpeg);
 
-// The page with one more section at its end.
+// Returns the page with a further section at its end.
 std::string WithSection(std::string page, const std::string& id, const std::string& title,
                         const Table& table);
 

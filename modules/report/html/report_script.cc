@@ -2,7 +2,7 @@
 
 namespace pangea::session {
 
-// A page is read as HTML and, in tests, as XML: hence CDATA.
+// CDATA, because tests parse the page as XML.
 const char* const kChartScript = R"js(//<![CDATA[
 "use strict";
 

@@ -13,7 +13,7 @@ namespace pangea::session {
 namespace {
 
 constexpr double kWidth = 1000;
-constexpr double kPlotUnit = 1.4;  // Plot's sizes are of a width of 1400
+constexpr double kPlotUnit = 1.4;  // Plot's sizes are for a width of 1400
 constexpr double kLeft = 90;       // numbers and names of the y axis
 constexpr double kRight = 15;
 constexpr double kTop = 12;
@@ -31,7 +31,7 @@ double NiceStep(double least) {
 struct Axis {
   double low = 0;
   double high = 1;
-  double from = 0;  // where low and high are drawn
+  double from = 0;  // positions of low and high in the drawing
   double to = 1;
   double step = 1;
 
@@ -62,7 +62,7 @@ Eigen::AlignedBox2d BoundsOf(const Plot& plot) {
                        : box;
 }
 
-// From step to step, about `steps` of them.
+// Rounds the range to multiples of a nice step, about `steps` of them.
 void Round(int steps, Axis* axis) {
   if (axis->high <= axis->low) {
     axis->high = axis->low + std::max(1e-6, std::abs(axis->low));
@@ -72,7 +72,7 @@ void Round(int steps, Axis* axis) {
   axis->high = axis->step * std::ceil(axis->high / axis->step - 1e-9);
 }
 
-// Widens the axis whose unit is drawn longer, to both sides.
+// Widens, on both sides, the range of the axis with the longer unit.
 void MakeUnitsEqual(Canvas* canvas) {
   const auto unit = [](const Axis& axis) {
     return std::abs(axis.to - axis.from) / (axis.high - axis.low);
@@ -147,7 +147,7 @@ std::string YAxis(const Plot& plot, const Canvas& canvas) {
   return svg;
 }
 
-// A polyline for each stretch between breaks.
+// One polyline for each part between breaks.
 std::string Stretches(const PlotLine& line, const Canvas& canvas) {
   std::string svg;
   std::string points;

@@ -1,8 +1,7 @@
 #pragma once
 
-// A chart of report.html as SVG in the page: what is drawn is also what its script reads, so that
-// every series can be asked for its value under the pointer and be taken away. (PNG files are
-// gnuplot's: eval/plot.h.)
+// A chart of report.html as SVG in the page. The page's script reads the drawing, so that it can
+// show each series' value under the pointer and hide a series. (For PNG files see eval/plot.h.)
 
 #include <string>
 
@@ -10,12 +9,12 @@
 
 namespace pangea::session {
 
-// A figure with a title, a legend and the drawing; `what` is for those who do not see it. The
-// ranges of the axes stand in `data-x` and `data-y` as "low high from to": from, to are the ends
-// in units of the drawing. `data-pick`: "x" asks every series at one x, "line" the nearest line.
+// A figure with title, legend and drawing; `what` is its description for screen readers. `data-x`
+// and `data-y` contain the ranges of the axes as "low high from to"; from and to are in units of
+// the drawing. `data-pick`: "x" shows every series at one x, "line" the nearest line.
 std::string ChartHtml(const Plot& plot, const std::string& what);
 
-// The page's script: hovering and the legends. It reads the drawings, fetches nothing.
+// The page's script, for hovering and legends. It reads only the drawings.
 extern const char* const kChartScript;
 
 }  // namespace pangea::session

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which agents were in one group, and since when.
+// Computes which agents were in one group, and since when.
 
 #include <cstdint>
 #include <map>
@@ -16,15 +16,15 @@ class GroupHistory {
   // `session` must outlive this.
   explicit GroupHistory(const CapturedSession& session) : session_(session) {}
 
-  // Agents with a map in its group at the end, its own included.
+  // Agents with a map in this map's group at the end, including its own agent.
   std::set<int32_t> AgentsWith(const MapId& map) const;
-  // Wall clock, microseconds, since when the map is in one group with one of the agent's, for good;
-  // none when they are apart at the end.
+  // Time (wall clock, microseconds) since which the map has been in one group with a map of the
+  // agent until the end; empty if they are not together at the end.
   std::optional<int64_t> TogetherSince(const MapId& map, int32_t agent) const;
 
  private:
-  // The group of each map after the first so many changes, as a number that its maps share; a map
-  // that is in none of them is alone.
+  // The group of each map after the first `num_changes` changes, as a number shared by its maps. A
+  // map that is not contained is alone.
   std::map<MapId, size_t> At(size_t num_changes) const;
 
   const CapturedSession& session_;

@@ -13,18 +13,18 @@
 namespace pangea::session {
 namespace {
 
-// Poses around a placing, and frames between which a step is a jump.
+// Largest gap between the poses around a placement, and between frames for a jump.
 constexpr int64_t kMaxPoseGap_us = 1'000'000;
 constexpr double kErrorWidth_px = 640;
 
-// Of the edits of one anchor, what says where it is.
+// An edit with a placement, and the true position that follows from it.
 struct Placing {
-  int64_t revision = 0;  // in force from this one on
+  int64_t revision = 0;  // valid from this revision on
   MapId map;
   int64_t utime = 0;
-  std::optional<Rigid3> T_odom_body = {};  // as the edit has it
+  std::optional<Rigid3> T_odom_body = {};  // from the edit
   std::optional<Eigen::Vector3d> p_truth = {};
-  std::string reason = {};  // why there is none
+  std::string reason = {};  // why there is no p_truth
   std::optional<AnchorView> view = {};
 };
 
@@ -33,7 +33,7 @@ bool IsAllowed(const AnchorEdit& edit) {
          (edit.right != AnchorRight::kEditOwn || edit.agent_id == edit.anchor.agent_id);
 }
 
-// What may say it, ascending by revision; of equal ones the highest agent's.
+// The edits with a placement by revision; of equal revisions the one of the highest agent.
 std::map<int64_t, AnchorEdit> InForce(const std::vector<AnchorEdit>& edits) {
   std::map<int64_t, AnchorEdit> in_force;
   for (const AnchorEdit& edit : edits) {
@@ -47,7 +47,7 @@ std::map<int64_t, AnchorEdit> InForce(const std::vector<AnchorEdit>& edits) {
   return in_force;
 }
 
-// In one frame that an agent showed.
+// The anchor in one frame of an agent.
 struct Sighting {
   const AnchorFrame* frame = nullptr;
   int64_t revision = 0;
@@ -67,7 +67,7 @@ Sightings SightingsOf(const AnchorTrack& track) {
   return sightings;
 }
 
-// Between two poses around it, else the nearest within a frame or so.
+// Interpolates between the two poses around the time; else the nearest one within about a frame.
 std::optional<Rigid3> PoseAt(const Trajectory& poses, int64_t utime) {
   if (auto between = Interpolate(poses, utime, kMaxPoseGap_us)) {
     return between;
@@ -84,7 +84,7 @@ std::optional<Rigid3> TruthAt(const AnchorViewer& viewer, int64_t utime) {
   return Interpolate(*viewer.ground_truth, utime, kMaxGroundTruthGapUs);
 }
 
-// All about one session's anchors.
+// Evaluates the anchors of one session.
 class Evaluation {
  public:
   Evaluation(const CapturedSession& session, const std::vector<AnchorViewer>& viewers)
@@ -141,7 +141,8 @@ class Evaluation {
     return placings;
   }
 
-  // Why it is not known, or nothing. `until`: the first revision that places it elsewhere.
+  // Returns why the truth is unknown, or an empty string. `until`: the next revision with a
+  // placement.
   std::string FindTruth(const AnchorId& id, int64_t until, Placing* placing) const {
     const int32_t agent = placing->map.agent_id;
     const auto maker = viewers_.find(agent);
@@ -193,7 +194,7 @@ class Evaluation {
   std::map<int32_t, Sightings> sightings_;
 };
 
-// The one in force; null before the first.
+// The placement valid at a revision; null before the first.
 const Placing* InForceAt(const std::vector<Placing>& placings, int64_t revision) {
   const auto after = std::ranges::upper_bound(placings, revision, {}, &Placing::revision);
   return after == placings.begin() ? nullptr : &*std::prev(after);
@@ -213,7 +214,7 @@ double LargestJump(const std::vector<Sighting>& sightings, const std::vector<Pla
   return largest;
 }
 
-// What ANCHOR_k says at that frame.
+// The pose in the newest ANCHOR_k at that frame.
 std::optional<Rigid3> Unblended(const std::vector<HeardAnchor>& heard, const AnchorFrame& frame) {
   const auto after = std::ranges::upper_bound(heard, frame.log_utime, {}, &HeardAnchor::log_utime);
   if (after == heard.begin() || std::prev(after)->gone || std::prev(after)->map != frame.map) {
@@ -222,7 +223,7 @@ std::optional<Rigid3> Unblended(const std::vector<HeardAnchor>& heard, const Anc
   return std::prev(after)->T_odom_anchor;
 }
 
-// Where it ought to be seen and can be drawn nowhere: the image's diagonal.
+// If the anchor should be visible but cannot be projected: the image's diagonal.
 double PixelError(const CameraModel& camera, const Eigen::Vector3d& p_shown,
                   const Eigen::Vector3d& p_truth) {
   const auto shown = p_shown.z() > 0 ? camera.Project(p_shown) : std::nullopt;
@@ -235,7 +236,7 @@ std::optional<double> Median(const std::vector<double>& values) {
   return values.empty() ? std::nullopt : std::optional(StatisticsOf(values).median);
 }
 
-// One anchor at one agent, frame by frame.
+// Errors of one anchor at one agent, frame by frame.
 class Errors {
  public:
   Errors(const AnchorViewer& viewer, const CameraModel* camera, int64_t fused_utime)
@@ -361,7 +362,7 @@ std::vector<AnchorMetrics> AnchorsOf(const CapturedSession& session,
   std::map<AnchorId, std::vector<AnchorEdit>> edits = session.anchor_edits;
   for (const AnchorViewer& viewer : viewers) {
     for (const auto& [id, request] : viewer.track->requests) {
-      edits.try_emplace(id, std::vector{request});  // it never came to the server
+      edits.try_emplace(id, std::vector{request});  // the server never received it
     }
   }
   const Evaluation evaluation(session, viewers);

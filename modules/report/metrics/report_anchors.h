@@ -1,14 +1,14 @@
 #pragma once
 
-// Where agents show anchors, against where ground truth has them.
+// Compares the positions at which agents show anchors with ground truth.
 //
-// An anchor's true place follows from its placing by agent i at an image:
+// The true position of an anchor follows from its placement by agent i at an image:
 //   p_truth = T_truth_body_i * T_odom_body_i^-1 * p_odom
-// with p_odom where agent i first heard that it is, and T_odom_body_i the pose that it was placed
-// by (so that a tap on a pixel is on the ray through that pixel). Agent j shows it at p_odom_shown,
-// so at
+// with p_odom the position that agent i received first, and T_odom_body_i the pose used for the
+// placement (so that the tapped pixel's ray goes through the anchor). Agent j shows the anchor at
+// p_odom_shown, which in the ground truth's frame is
 //   T_truth_body_j * T_odom_body_j^-1 * p_odom_shown
-// and the distance of the two is the error. All ground truths are in one frame.
+// and the distance between the two is the error. All ground truths are in one frame.
 
 #include <cstdint>
 #include <map>
@@ -26,41 +26,43 @@ namespace pangea::session {
 // An anchor in one image.
 struct AnchorView {
   int32_t agent = 0;
-  int64_t utime = 0;                       // of the image
-  Rigid3 T_cam_anchor;                     // as it is shown
-  std::optional<Eigen::Vector3d> p_truth;  // in the camera; none at its placing, where it is true
+  int64_t utime = 0;    // of the image
+  Rigid3 T_cam_anchor;  // as shown
+  // in the camera; empty at the placement, which defines the truth
+  std::optional<Eigen::Vector3d> p_truth;
 };
 
-// All by ground truth, metres, but for the jump; none where they are not known.
+// Errors against ground truth, metres (the jump needs none); empty if unknown.
 struct AnchorAtAgent {
   int32_t agent = 0;
-  std::optional<double> error_m;   // median from kAnchorSettled_us after the fusion on
-  std::optional<double> error_px;  // the same, at 640 wide, where the true place is in the image
-  std::optional<double> largest_jump_m;     // shown, in its odom frame, from a frame to the next
-  std::optional<double> error_at_fusion_m;  // as first shown after it
-  std::optional<double> error_10s_m;        // the first from then on
+  std::optional<double> error_m;            // median, from kAnchorSettled_us after the fusion on
+  std::optional<double> error_px;           // the same in pixels, for an image 640 wide, if in view
+  std::optional<double> largest_jump_m;     // of the shown position, in its odom frame, per image
+  std::optional<double> error_at_fusion_m;  // when first shown after the fusion
+  std::optional<double> error_10s_m;        // first error from kAnchorSettled_us on
   std::optional<double> error_end_m;
   std::optional<double> error_max_m;        // from then on
-  std::optional<double> error_unblended_m;  // as error_m, of what ANCHOR_k says
-  std::string reason;                       // why there is no error_m; empty where there is
-  std::optional<AnchorView> view;           // from then on, furthest inside the image
+  std::optional<double> error_unblended_m;  // like error_m, for the pose in ANCHOR_k
+  std::string reason;                       // why there is no error_m; else empty
+  std::optional<AnchorView> view;           // from kAnchorSettled_us on: furthest inside the image
 };
 
 struct AnchorMetrics {
-  std::optional<AnchorId> id;  // none: it was never requested
+  std::optional<AnchorId> id;  // empty: never requested
   std::string name;
   int32_t made_by = 0;  // 0: a tool on the server
-  bool placed = false;  // an agent heard where it is, or the server said it
+  bool placed = false;  // an agent received its pose, or the server published it
   std::optional<AnchorView> placing;
-  std::vector<AnchorAtAgent> agents;  // the others of its group at the end, ascending
+  std::vector<AnchorAtAgent> agents;  // other agents in its group at the end, ascending
 };
 
 inline constexpr int64_t kAnchorSettled_us = 10'000'000;
 
-// Pixels from the nearest border of a point in the camera frame; none where it is not in the image.
+// Distance, in pixels, of a point from the nearest image border; empty if it is not in the image.
+// `p_cam`: in the camera frame.
 std::optional<double> Inside(const CameraModel& camera, const Eigen::Vector3d& p_cam);
 
-// What is known of one agent.
+// The data of one agent.
 struct AnchorViewer {
   int32_t agent = 0;
   const AnchorTrack* track = nullptr;
@@ -68,7 +70,7 @@ struct AnchorViewer {
   const Trajectory* ground_truth = nullptr;
 };
 
-// Ascending by id; those of `wanted` that were never requested at the end.
+// Metrics of all anchors, ascending by id; last come those of `wanted` that were never requested.
 std::vector<AnchorMetrics> AnchorsOf(const CapturedSession& session,
                                      const std::vector<AnchorViewer>& viewers,
                                      const std::vector<WantedAnchor>& wanted);

@@ -10,7 +10,7 @@ struct Span {
   int64_t begin = 0, end = 0;
 };
 
-// From the first pose of its odometry to the last, sensor clock.
+// Time from the odometry's first pose to its last, sensor clock.
 std::optional<Span> OdometrySpan(const AgentMetrics& agent) {
   std::optional<Span> span;
   for (const auto& [map, odometry] : agent.odometry) {
@@ -23,7 +23,7 @@ std::optional<Span> OdometrySpan(const AgentMetrics& agent) {
   return span;
 }
 
-// Recording time played: of its link bytes, what a second of it costs.
+// Recording time played, to which the link's bytes are related.
 std::optional<double> PlayedSeconds(const AgentMetrics& agent) {
   const Span span = OdometrySpan(agent).value_or(Span());
   const double seconds = 1e-6 * static_cast<double>(span.end - span.begin) +
@@ -31,7 +31,7 @@ std::optional<double> PlayedSeconds(const AgentMetrics& agent) {
   return seconds > 0 ? std::optional(seconds) : std::nullopt;
 }
 
-// Refused for the same reason, whatever the numbers in it.
+// Replaces numbers in a reason, so that equal reasons are counted together.
 std::string WithoutNumbers(const std::string& reason) {
   std::string text;
   for (size_t i = 0; i < reason.size(); ++i) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a report counts and converts, for its JSON, its text and its page alike.
+// Counts and conversions shared by the report's JSON, text and page.
 
 #include <map>
 #include <optional>
@@ -13,16 +13,16 @@ namespace pangea::session {
 struct ConstraintCounts {
   int accepted_intra = 0;
   int accepted_inter = 0;
-  std::map<std::string, int> refused;  // by reason, the numbers in it as '#'
+  std::map<std::string, int> refused;  // by reason, with '#' for its numbers
   int num_refused = 0;
 };
 
 ConstraintCounts CountConstraints(const CapturedSession& session);
 
-// On the link, per second of recording played; none when it was not measured. 1 kB = 1000 B.
+// Uplink traffic per second of recording played; empty if not measured. 1 kB = 1000 B.
 std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent);
 
-// Time in an agent's recording, since its first image.
+// Time in an agent's recording, seconds since its first image.
 double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime);
 
 }  // namespace pangea::session

@@ -9,8 +9,8 @@ namespace {
 
 using Poses = std::map<KeyframeId, FinalKeyframe>;
 
-// Adds the captured keyframes of `map` that are not solved, by the drift of their solved
-// neighbour: T_map_odom = T_map_body * T_odom_body^-1.
+// Adds the captured keyframes of `map` that are not solved, with T_map_odom = T_map_body *
+// T_odom_body^-1 of their solved neighbour.
 void CarryOn(const CapturedSession& session, const MapId& map, Poses* poses) {
   std::map<int32_t, Rigid3> T_map_odom;  // by seq of a keyframe both solved and captured
   for (const auto& [id, solved] : *poses) {

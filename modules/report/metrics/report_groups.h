@@ -1,6 +1,6 @@
 #pragma once
 
-// The outcome of a session: which maps are one, and where each keyframe lies in its group's frame.
+// The result of a session: the groups of maps, and the pose of each keyframe in its group's frame.
 
 #include <vector>
 
@@ -18,18 +18,19 @@ struct FinalGroup {
   MapId frame;                           // the map whose odom frame is the map frame
   std::vector<MapId> maps;               // ascending
   std::vector<FinalKeyframe> keyframes;  // ascending by id
-  int num_switched_off = 0;              // constraints the robust solve switched off
+  int num_switched_off = 0;              // constraints that the robust solve switched off
 
   std::vector<int32_t> Agents() const;     // ascending, each once
   size_t CountOf(int32_t agent_id) const;  // keyframes of that agent
-  // Of one agent's keyframes, or of one of its maps.
+  // Trajectory of one agent's keyframes, or of one map.
   Trajectory TrajectoryOf(int32_t agent_id) const;
   Trajectory TrajectoryOf(const MapId& map) const;
 };
 
-// Each map belongs to the newest state that mentions it. Keyframes that state does not hold move
-// with the solved one before them (the odometry carried on); a map no state mentions is a group
-// of its own, its poses the odometry's. Most agents first, then most keyframes.
+// Each map belongs to the newest state that mentions it. Keyframes missing in that state are placed
+// by odometry from the solved keyframe before them. A map that no state mentions is a group of its
+// own, with the odometry's poses. Groups are sorted by number of agents, then of keyframes, the
+// largest first.
 std::vector<FinalGroup> FinalGroups(const CapturedSession& session);
 
 }  // namespace pangea::session

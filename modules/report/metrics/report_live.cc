@@ -24,7 +24,7 @@ Iterator Begin(const std::vector<LivePose>& poses, const std::map<MapId, int64_t
              : std::ranges::find_if(poses, [](const LivePose& p) { return p.revision > 0; });
 }
 
-// Squared errors, over stretches with an alignment each.
+// Sums squared errors over parts with separate alignments.
 class PooledAte {
  public:
   void Add(const Trajectory& stretch, const Trajectory& ground_truth) {
@@ -52,7 +52,7 @@ std::optional<double> JumpMax(const std::vector<LivePose>& poses) {
     const LivePose& before = poses[i - 1];
     const LivePose& now = poses[i];
     if (SameFrame(before, now)) {
-      // Both motions as the body saw them before it moved.
+      // Both motions in the body frame before the motion.
       const Rigid3 shown = before.T_map_body.Inverse() * now.T_map_body;
       const Rigid3 raw = before.T_odom_body.Inverse() * now.T_odom_body;
       largest = std::max(largest, (shown.t - raw.t).norm());

@@ -24,7 +24,7 @@ std::map<int32_t, AgentRun> Runs(const ReportInput& input, const CapturedSession
   return runs;
 }
 
-// First image that was played; nothing without a recording that can be read.
+// Stamp of the first image played; empty without a readable recording.
 std::optional<int64_t> PlayedFrom(const AgentRun& run) {
   const auto first = run.recording.empty() ? std::nullopt : FirstImageUtimeOf(run.recording);
   return first ? std::optional(*first + std::llround(1e6 * run.start_s)) : std::nullopt;
@@ -141,7 +141,7 @@ void ChooseMain(const std::vector<GroupMetrics>& groups, const CapturedSession& 
   }
 }
 
-// What the agent's uplink said last, where nobody counted for the report.
+// The byte counts in the uplink's last status, if the session has not counted.
 void CountBytes(AgentMetrics* agent) {
   const auto uplink = agent->samples.find(fmt::format("uplink_{}", agent->id));
   if (uplink != agent->samples.end() && !agent->run.bytes_up) {

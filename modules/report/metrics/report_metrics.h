@@ -1,6 +1,6 @@
 #pragma once
 
-// The metrics of a report, from what was captured and the recordings' ground truth.
+// The metrics of a report, from captured logs and the recordings' ground truth.
 
 #include <optional>
 #include <string>
@@ -30,12 +30,12 @@ struct AgentMetrics {
   std::optional<Ate> vio;               // odometry of the main map, SE(3)
   std::optional<Ate> server;            // its keyframes in the main group, SE(3)
   std::optional<double> coverage;
-  LiveMetrics live;        // of what it showed while the session ran
+  LiveMetrics live;        // of the poses that it showed during the session
   AnchorTrack anchors;     // on its bus
   ProcessSamples samples;  // of the processes on its bus
   AgentRun run;
 
-  // Only then does an error say something (coverage >= 0.95 and one map).
+  // Whether the ATE is meaningful: coverage >= 0.95 and a single map.
   bool AteCounts() const;
 };
 
@@ -47,19 +47,20 @@ struct GroupMetrics {
 
 struct ReportMetrics {
   std::vector<AgentMetrics> agents;  // ascending id
-  std::vector<GroupMetrics> groups;  // as FinalGroups orders them
+  std::vector<GroupMetrics> groups;  // in the order of FinalGroups
   ConstraintsTruth all_constraints;
   ConstraintsTruth inter_constraints;
   ConstraintsTruth intra_constraints;
   std::vector<AnchorMetrics> anchors;
   std::vector<std::string> notes;
-  std::vector<std::string> lost;  // of the logs read, lines of LossLines
+  std::vector<std::string> lost;  // damage of the logs, lines of LossLines
 
-  // The agent's place in `agents`, which gives it its colour.
+  // Index of the agent in `agents`, which determines its colour.
   size_t IndexOf(int32_t agent_id) const;
 };
 
-// What is lost of the agents' logs is noted in `readings` (log_reader.h); `lost` is of all in it.
+// Damaged parts of the agents' logs are added to `readings` (log_reader.h); ReportMetrics::lost
+// describes everything in it.
 ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& session,
                              LogReadings* readings = nullptr);
 

@@ -10,11 +10,11 @@
 namespace pangea::session {
 namespace {
 
-// The same metrics as in bench/accuracy_lib/anchors.py, by bench/accuracy_test.py.
+// bench/accuracy_test.py checks that these values equal those in bench/accuracy_lib/anchors.py.
 //
 // Table II, ATE in metres: VINS-Mobile2 alone and with the server (the better phone of the two),
-// VINS-Mono. Table III: the second half fused into the first, the first into the second, one agent
-// over all of it.
+// VINS-Mono. Table III: the second half fused into the first, the first into the second, and one
+// agent over the whole sequence.
 struct PaperSequence {
   std::string_view name;
   double alone, server, vins_mono;
@@ -28,7 +28,7 @@ constexpr std::array<PaperSequence, 5> kSequences = {{
     {"MH_05", 0.087, 0.093, 0.107, 0.159, 0.090, 0.096},
 }};
 
-// Table IV: of the second agent, fused with the first, alone with the server, and VINS-Mono's
+// Table IV, for the second agent: fused with the first, alone with the server, and VINS-Mono's
 // multi-session mode.
 struct PaperPair {
   std::string_view first, second;

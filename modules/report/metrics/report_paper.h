@@ -1,6 +1,6 @@
 #pragma once
 
-// The paper's tables II to IV beside this session's metrics, where its recordings are EuRoC's.
+// The paper's tables II to IV beside this session's metrics, for recordings of EuRoC.
 
 #include <optional>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace pangea::session {
 
-// "MH_01" to "MH_05" by the folder's name; nothing for any other recording.
+// "MH_01" to "MH_05" by the folder's name; empty for any other recording.
 std::optional<std::string> SequenceOf(const std::string& recording);
 
 struct PaperTable {
@@ -19,7 +19,7 @@ struct PaperTable {
   Table table;
 };
 
-// Those that have something of this session, each with at least one row.
+// The tables with at least one row for this session.
 std::vector<PaperTable> PaperTables(const ReportMetrics& metrics);
 
 }  // namespace pangea::session

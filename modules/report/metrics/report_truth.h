@@ -1,10 +1,10 @@
 #pragma once
 
-// Accepted constraints against the recordings' ground truth: are they right, and is their
-// covariance honest?
+// Checks accepted constraints against the recordings' ground truth: whether they are right, and
+// whether their covariance is honest.
 //
-// The error is measured (-) true in the covariance's own tangent (docs/conventions.md), so
-// error^T covariance^-1 error has the mean 6 if the covariance says what the errors are.
+// The error is measured (-) true in the covariance's own tangent (docs/conventions.md), so error^T
+// covariance^-1 error has the mean 6 if the covariance is honest.
 
 #include <map>
 #include <numbers>
@@ -15,27 +15,27 @@
 
 namespace pangea::session {
 
-// Beyond either a constraint is wrong: it closes a loop between places that are not one.
+// A constraint with a larger error in either is wrong: it connects two different places.
 inline constexpr double kWrongTranslation_m = 0.5;
 inline constexpr double kWrongRotation_rad = 5 * std::numbers::pi / 180;
 
 struct ConstraintWithTruth {
   Constraint constraint;
   Rigid3 T_from_to;                // true, bodies
-  Eigen::Quaterniond q_odom_from;  // gravity in from's body: its odom axes have z up
+  Eigen::Quaterniond q_odom_from;  // gives gravity in from's body: the z axis of odom points up
 };
 
 // Squared error normalised by the covariance, per dimension: mean 1 for an honest one.
 struct NormalisedError {
   double mean = 0;
   double median = 0;
-  double share_above_99 = 0;  // beyond what 99 % of honest ones stay below
+  double share_above_99 = 0;  // share above the 99 % quantile of an honest covariance
 };
 
 struct ConstraintsTruth {
   size_t checked = 0;
   size_t wrong = 0;
-  // Over all checked, wrong ones too; without meaning when there are none.
+  // Over all checked constraints, including wrong ones; meaningless if checked is 0.
   NormalisedError pose;  // 6 dimensions
   NormalisedError position;
   NormalisedError yaw;
@@ -45,8 +45,8 @@ struct ConstraintsTruth {
   std::optional<double> Precision() const;
 };
 
-// The accepted constraints of which both keyframes have ground truth, by id. `ground_truth` is by
-// agent, all of it in one frame.
+// The accepted constraints whose keyframes both have ground truth, sorted by id. `ground_truth`: by
+// agent, all in one frame.
 std::vector<ConstraintWithTruth> ConstraintsWithTruth(
     const CapturedSession& session, const std::map<int32_t, Trajectory>& ground_truth);
 
