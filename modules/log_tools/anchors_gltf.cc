@@ -17,14 +17,14 @@ namespace {
 
 using nlohmann::ordered_json;
 
-static_assert(std::endian::native == std::endian::little);  // as glTF's buffers
+static_assert(std::endian::native == std::endian::little);  // like glTF's buffers
 
-// glTF's numbers.
+// Constants of glTF.
 constexpr int kFloat = 5126, kUnsignedByte = 5121, kArrayBuffer = 34962, kPoints = 0;
 
 Eigen::Vector3d YUp(const Eigen::Vector3d& v) { return {v.x(), v.z(), -v.y()}; }
 
-// The anchor's own axes become y up too.
+// The anchor's own axes become y-up too.
 Eigen::Quaterniond YUp(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.z(), -q.y()}; }
 
 std::string Base64(const std::vector<uint8_t>& bytes) {
@@ -70,7 +70,7 @@ class GltfWriter {
           {{"byteLength", buffer_.size()},
            {"uri", "data:application/octet-stream;base64," + Base64(buffer_)}});
     }
-    // A name or a payload is not always UTF-8.
+    // A name or a payload may be invalid UTF-8.
     return json_.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
   }
 
@@ -98,7 +98,7 @@ class GltfWriter {
               {"sigma_m", PositionSigma(*anchor.state)}}}};
   }
 
-  // Appends to the buffer; the accessor.
+  // Appends to the buffer; returns the index of the accessor.
   size_t AddAccessor(const void* data, size_t bytes, ordered_json accessor) {
     const size_t offset = buffer_.size();
     buffer_.resize(offset + bytes);
@@ -111,7 +111,7 @@ class GltfWriter {
 
   size_t AddMesh(const std::vector<ColouredPoint>& points) {
     std::vector<Eigen::Vector3f> positions;
-    std::vector<uint8_t> colours;  // four to a point: each attribute begins on a multiple of four
+    std::vector<uint8_t> colours;  // four bytes per point: attributes must be aligned to four bytes
     for (const ColouredPoint& point : points) {
       positions.push_back(YUp(point.p_map).cast<float>());
       colours.insert(colours.end(), {point.rgb[0], point.rgb[1], point.rgb[2], 255});
@@ -142,7 +142,7 @@ class GltfWriter {
   std::vector<uint8_t> buffer_;
 };
 
-// The given ones, and those that anchors alone name.
+// The given groups, and those that occur only in anchors.
 std::vector<GltfGroup> AllGroups(const LoggedAnchors& logged, std::vector<GltfGroup> groups) {
   for (const auto& [id, anchor] : logged.anchors) {
     if (anchor.state && !anchor.deleted &&

@@ -1,9 +1,9 @@
 #pragma once
 
-// Map points and anchors as glTF 2.0, one file with its buffer in it.
+// Exports map points and anchors as glTF 2.0, in one file with embedded buffer.
 //
-// glTF is y up, our map frame z up: (x, y, z) becomes (x, z, -y), for the points, the anchors'
-// positions and their own axes. So what stands upright on an anchor here does so there.
+// glTF is y-up, the map frame z-up: (x, y, z) becomes (x, z, -y), for points, positions of anchors,
+// and the anchors' own axes. So an object that is upright on an anchor stays upright.
 
 #include <string>
 #include <vector>
@@ -13,19 +13,20 @@
 
 namespace pangea::session {
 
-// One map frame with what is in it.
+// One map frame with its points.
 struct GltfGroup {
   MapId frame;
   std::vector<ColouredPoint> points;
 };
 
-// One scene for each group, the first of `groups` the one to show: a node "map ID" whose children
-// are its points (a point cloud with colours) and its placed anchors, each a node with its name,
-// pose, and in `extras` id, payload (parsed where it is JSON) and sigma_m. A group that only
-// anchors name has a scene too, after them. Throws std::runtime_error if there is nothing at all.
+// Makes one scene per group; the first of `groups` is the default scene. A scene has a node "map
+// ID"; its children are a coloured point cloud and the placed anchors, each a node with name, pose,
+// and in `extras` id, payload (parsed if it is JSON) and sigma_m. A group that only occurs in
+// anchors also gets a scene, after the others. Throws std::runtime_error if there is nothing to
+// export.
 std::string ToGltf(const LoggedAnchors& logged, const std::vector<GltfGroup>& groups);
 
-// Of a server bus' log. Throws std::runtime_error when the log has edits only.
+// Exports the log of a server bus. Throws std::runtime_error if the log has only edits.
 void ExportGltf(const std::string& log, const LoggedAnchors& logged, const std::string& file,
                 LogReadings* readings = nullptr);
 

@@ -70,7 +70,7 @@ PlaceCandidate FindCandidate(const std::string& log, const Constraint& constrain
   return *found;
 }
 
-// Median over the inliers, for people.
+// Median reprojection error of the inliers, for people.
 std::string MissOf(const std::vector<ShownMatch>& matches, double ShownMatch::*miss) {
   std::vector<double> values;
   for (const ShownMatch& match : matches) {
@@ -86,7 +86,7 @@ std::string CountOf(const std::vector<ShownMatch>& matches) {
   return fmt::format("{} of {} inliers", inliers, matches.size());
 }
 
-// Those of its process that differ from the defaults, or why they are defaults.
+// The process' options that differ from the defaults, or why they are the defaults.
 std::vector<std::string> NotesOf(const LoggedOptions& logged, const std::string& process) {
   std::vector<std::string> notes = logged.notes;
   for (const std::string& other : OtherThanDefault(logged.options)) {
@@ -123,7 +123,7 @@ std::string WindowBaText(const Explanation& e) {
       c.T_from_to.t.z(), Degrees(LogSo3(c.T_from_to.q).norm()));
 }
 
-// A step to a paragraph of lines, down to the one that refused.
+// One paragraph per step, up to the one that refused.
 std::string MeasuredText(const LoopVerificationReport& report) {
   std::string text;
   std::string_view step;

@@ -1,8 +1,7 @@
 #pragma once
 
-// Why a constraint was accepted or refused: the verification result made again from the log's
-// keyframes and the candidate that asked for it, step by step, as text and as a picture of both
-// keyframes.
+// Explains why a constraint was accepted or refused: repeats the verification with the log's
+// keyframes and candidate, and shows each step, as text and as a picture of both keyframes.
 
 #include <map>
 #include <string>
@@ -16,25 +15,24 @@ namespace pangea::session {
 
 struct Explanation {
   PlaceCandidate candidate;
-  Constraint said;   // as the log has it
-  Constraint again;  // made again from the same keyframes
+  Constraint said;   // from the log
+  Constraint again;  // computed again from the same keyframes
   LoopVerificationReport report;
   Keyframe from, to;
-  std::vector<std::string> options_notes;  // for people: where these are from
+  std::vector<std::string> options_notes;  // for people: the source of the options
 };
 
-// Every verification result of the log, a line each. What of the log is lost is noted in `readings`
-// (log_reader.h), here and below.
+// One line for each verification result of the log. Damaged parts of the log are reported in
+// `readings` (log_reader.h), here and below.
 std::string ListResults(const std::string& log, LogReadings* readings = nullptr);
-// Made again with the options of the log (OPTIONS_*), or the defaults where it has none.
-// Throws std::runtime_error when the log lacks the verification result, its candidate or a
-// keyframe.
+// Repeats the verification with the options of the log (OPTIONS_*), or the defaults if it has none.
+// Throws std::runtime_error if the log lacks the verification result, its candidate or a keyframe.
 Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings = nullptr);
 
 std::string ToText(const Explanation& explanation);
-// Rows of the match on the left and the query on the right: the candidate's corners, PnP, and where
-// it got so far the window BA; below them the verification result. `recordings`: folders by agent;
-// where there is none, corners on a dark ground.
+// Each row shows the match on the left and the query on the right: the candidate's corners, PnP,
+// and, if it was reached, the window BA; below is the verification result. `recordings`: folders by
+// agent; without one, corners are drawn on a dark background.
 void WriteExplanationPng(const Explanation& explanation,
                          const std::map<int32_t, std::string>& recordings, const std::string& path);
 

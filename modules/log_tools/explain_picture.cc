@@ -12,12 +12,12 @@
 namespace pangea::session {
 namespace {
 
-// Okabe and Ito's, told apart with any colour vision (BGR).
+// Colours by Okabe and Ito, distinguishable with any colour vision (BGR).
 const cv::Scalar kGood(115, 158, 0), kBad(0, 94, 213), kNeutral(233, 180, 86), kText(255, 255, 255);
 constexpr int kCaption_px = 34;
-constexpr int kBetween_px = 4;  // the two images
+constexpr int kBetween_px = 4;  // between the two images
 
-// The image nearest to the keyframe in time, in colour; dark without one.
+// The image nearest to the keyframe in time, in colour; dark if there is none.
 cv::Mat ImageOf(const Keyframe& keyframe, const std::map<int32_t, std::string>& recordings) {
   cv::Mat image(keyframe.camera.height, keyframe.camera.width, CV_8UC3, cv::Scalar(40, 40, 40));
   const auto folder = recordings.find(keyframe.id.map.agent_id);
@@ -47,14 +47,14 @@ cv::Point ToPoint(const Eigen::Vector2d& pixel) {
   return {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
 }
 
-// A line of words as wide as the rows.
+// A line of text, as wide as the rows.
 cv::Mat Caption(const std::string& text, int width, const cv::Scalar& colour = kText) {
   cv::Mat strip(kCaption_px, width, CV_8UC3, cv::Scalar(0, 0, 0));
   cv::putText(strip, text, {8, 24}, cv::FONT_HERSHEY_SIMPLEX, 0.7, colour, 1, cv::LINE_AA);
   return strip;
 }
 
-// Both images side by side, with what is matched.
+// Both images side by side, with the matches.
 class Row {
  public:
   Row(const cv::Mat& left, const cv::Mat& right)
@@ -71,7 +71,7 @@ class Row {
     cv::circle(canvas_, a, 4, colour, 1, cv::LINE_AA);
     cv::circle(canvas_, b, 4, colour, 1, cv::LINE_AA);
   }
-  // Inliers above the rest.
+  // Draws inliers above the others.
   void Join(const std::vector<ShownMatch>& matches) {
     for (const bool inlier : {false, true}) {
       for (const ShownMatch& match : matches) {
@@ -111,7 +111,7 @@ cv::Mat MatchesRow(const std::vector<ShownMatch>& matches, const Pair& images) {
   return row.canvas();
 }
 
-// With what most verification results hang on.
+// The result, with its most important values.
 std::string ResultOf(const Explanation& explanation) {
   const Constraint& result = explanation.again;
   const LoopVerificationReport& report = explanation.report;

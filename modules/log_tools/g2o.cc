@@ -21,7 +21,7 @@
 namespace pangea::session {
 namespace {
 
-// d e / d xi: e's translation is in the measurement's frame, and its rotation part half an angle.
+// de/dxi: the translation of e is in the measurement's frame, its rotation part is half an angle.
 Matrix6d ErrorOfTangent(const Rigid3& T_from_to) {
   Matrix6d J = Matrix6d::Zero();
   J.topLeftCorner<3, 3>() = T_from_to.R().transpose();
@@ -35,10 +35,10 @@ std::string Pose(const Rigid3& pose) {
 }
 
 constexpr double kMaxInformation = 1e30;
-// Of a matrix whose diagonal is scaled to ones: below it, the inverse would be noise.
+// Limit for a matrix with its diagonal scaled to one: below it, the inverse would be noise.
 constexpr double kMinEigenvalue = 1e-13;
 
-// With any units of its rows.
+// Independent of the units of the rows.
 bool PositiveDefinite(const Matrix6d& m) {
   if (!m.allFinite() || m.diagonal().minCoeff() < 1 / kMaxInformation) {
     return false;
@@ -55,7 +55,7 @@ Matrix6d InverseOf(const Matrix6d& m) {
   return scale.asDiagonal() * scaled.llt().solve(Matrix6d::Identity()) * scale.asDiagonal();
 }
 
-// Of any file, for a terminal.
+// Makes a word of any file printable on a terminal.
 std::string Shown(std::string word) {
   constexpr size_t kMaxShown = 40;
   std::ranges::replace_if(
@@ -63,7 +63,7 @@ std::string Shown(std::string word) {
   return word.size() <= kMaxShown ? word : word.substr(0, kMaxShown) + "...";
 }
 
-// One line's fields, or what is wrong with them.
+// Parses the fields of one line; throws for an error.
 class Line {
  public:
   Line(const std::string& path, int number, const std::string& text)
@@ -101,7 +101,7 @@ class Line {
     for (int i = 0; i < 3; ++i) {
       pose.t[i] = Number(std::string(1, "xyz"[i]), max_position_m);
     }
-    Eigen::Vector4d q;  // in Eigen's order and g2o's: x y z w
+    Eigen::Vector4d q;  // in the order of Eigen and of g2o: x y z w
     for (int i = 0; i < 4; ++i) {
       q[i] = Number(std::string("q") + "xyzw"[i], 2);
     }
@@ -111,7 +111,7 @@ class Line {
     pose.q = Eigen::Quaterniond(q).normalized();
     return pose;
   }
-  // Upper triangle, row by row.
+  // The upper triangle, row by row.
   Matrix6d Information() {
     Matrix6d information;
     for (int row = 0; row < 6; ++row) {
@@ -157,7 +157,7 @@ class Reader {
     }
   }
 
-  // A file may have its edges before their vertices.
+  // Checks the edges at the end: a file may have edges before their vertices.
   Graph Finish() {
     for (size_t i = 0; i < graph_.edges.size(); ++i) {
       for (const int id : {graph_.edges[i].from, graph_.edges[i].to}) {
@@ -233,8 +233,8 @@ class Reader {
   const double max_position_m_;
   Graph graph_;
   std::map<int, int> vertex_lines_;  // by vertex
-  std::vector<int> fixed_lines_;     // as graph_.fixed
-  std::vector<int> edge_lines_;      // as graph_.edges
+  std::vector<int> fixed_lines_;     // parallel to graph_.fixed
+  std::vector<int> edge_lines_;      // parallel to graph_.edges
   std::map<std::pair<int, int>, std::vector<size_t>> edges_between_;
 };
 

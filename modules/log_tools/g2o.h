@@ -5,7 +5,7 @@
 //
 // g2o's error of an edge i -> j with measurement Z is e = (t, q_xyz) of Z^-1 T_i^-1 T_j: in the
 // measurement's own frame, and half an angle. Ours is xi in the left frame (docs/conventions.md).
-// Covariances are carried over, so the same graph has the same cost in both.
+// Covariances are converted, so that the graph has the same cost in both.
 
 #include <map>
 #include <string>
@@ -27,15 +27,15 @@ struct Graph {
   std::vector<GraphEdge> edges;
 };
 
-// Sum of the edges' xi^T covariance^-1 xi. Throws std::runtime_error that names an edge whose share
-// is no number from 0 up.
+// Sum of the edges' xi^T covariance^-1 xi. Throws std::runtime_error that names an edge whose term
+// is negative or not a number.
 double Cost(const Graph& graph);
 
 std::string ToG2o(const Graph& graph);
-// Throws std::runtime_error with one line that names the file, the line, the field and what is
-// wrong: a number that is none, a coordinate of a pose beyond `max_position_m`, a vertex or an edge
-// that is there twice, an end of an edge that is no vertex, an information matrix that is not
-// positive definite. Two different edges between the same vertices are two measurements.
+// Throws std::runtime_error with a one-line message with file, line, field and error: an invalid
+// number, a coordinate of a pose beyond `max_position_m`, a repeated vertex or edge, an end of an
+// edge that is not a vertex, or an information matrix that is not positive definite. Two different
+// edges between the same vertices are two measurements.
 Graph ReadG2o(const std::string& path, double max_position_m = 1e12);
 
 }  // namespace pangea::session

@@ -43,7 +43,7 @@ class Collector {
     for (auto& [id, state] : states_) {
       LoggedAnchor& anchor = logged_.anchors[id];
       anchor.deleted |= state.gone;
-      // A log may lack edits that the anchors' process had.
+      // A log may lack edits that the anchors process received.
       if (state.revision > anchor.revision) {
         anchor.revision = state.revision;
         anchor.edited_by = state.edited_by;
@@ -67,7 +67,8 @@ class Collector {
   }
 
   LoggedAnchors logged_;
-  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};  // a file is as bounded as its size
+  // the size of the file bounds the number
+  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};
   std::map<AnchorId, AnchorState> states_;
 };
 
@@ -206,7 +207,7 @@ std::string ToJson(const LoggedAnchors& logged) {
   for (const auto& [id, anchor] : logged.anchors) {
     anchors.push_back(AnchorJson(id, anchor));
   }
-  // A payload is not always UTF-8.
+  // A payload may be invalid UTF-8.
   return ordered_json{{"anchors", std::move(anchors)}}.dump(
              1, ' ', false, ordered_json::error_handler_t::replace) +
          "\n";

@@ -41,10 +41,10 @@ Channels ReadChannels(const std::string& log, double until_s, LogReadings* readi
   return channels;
 }
 
-// Drawn by each run: from the clock where it is live, from 1 in a replay.
+// Each run has its own revisions: from the clock in a live run, from 1 in a replay.
 bool IsRevision(const std::string& path) { return path == "revision"; }
 
-// Empty when they say the same.
+// Empty if they are equal.
 std::string HowTheyDiffer(const Message& a, const Message& b) {
   const auto fields_a = DecodeFields(a.data), fields_b = DecodeFields(b.data);
   if (!fields_a || !fields_b) {
@@ -106,7 +106,7 @@ ChannelDiff Compare(const std::string& channel, const std::vector<Message>& a,
 
 const ChannelDiff* LogDiff::First() const {
   const ChannelDiff* first = nullptr;
-  // A channel of one log alone, as a replay has no poses, comes after all others.
+  // A channel in only one log comes after all others; for instance, a replay has no poses.
   const auto order = [](const ChannelDiff& channel) {
     return std::pair(channel.count_a == 0 || channel.count_b == 0, channel.seconds);
   };

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where two runs part: the first message of each channel that is not the same in two logs, and the
-// first field of it that is not.
+// Finds where two runs begin to differ: the first different message of each channel in two logs,
+// and its first different field.
 
 #include <cstdint>
 #include <limits>
@@ -16,26 +16,25 @@ namespace pangea::session {
 struct ChannelDiff {
   std::string channel;
   int64_t count_a = 0, count_b = 0;
-  // The first message that differs, counted from 0 on this channel; none: all are the same.
+  // The first message that differs, counted from 0 on this channel; empty: all are equal.
   std::optional<int64_t> first;
-  double seconds = 0;  // when it was captured, since its log's first event: a's, or where a has no
-                       // more, b's
-  std::string how;     // "candidates[0].score: 0.41 | 0.4, and 3 more fields"
+  // capture time of that message, since its log's first event: in a, or in b if a has no more
+  double seconds = 0;
+  std::string how;  // "candidates[0].score: 0.41 | 0.4, and 3 more fields"
 };
 
 struct LogDiff {
   std::vector<ChannelDiff> channels;  // by name
 
-  // Of the channels that differ, the one that does so first, if possible one that is in both logs;
-  // null when none does.
+  // The channel that differs first, if possible one that is in both logs; null if none differs.
   const ChannelDiff* First() const;
 };
 
-// The n-th message of a channel is compared with the n-th of the other's, field by field but for
-// revisions, which each run counts in its own way; capture times are not compared. STATUS_*, HAVE,
-// RESEND_REQUEST, VERDICT_REQUEST and AGAIN_*, which tell of the run and not of its outcome, are
-// left out. Of both logs the first `until_s` seconds. Throws std::runtime_error for a log that
-// cannot be read; what of one is lost is noted in `readings` (log_reader.h).
+// Compares the n-th message of each channel in a with the n-th in b, field by field, except
+// revisions, which each run counts differently; capture times are not compared. STATUS_*, HAVE,
+// RESEND_REQUEST, VERDICT_REQUEST and AGAIN_* are left out: they describe the run, not its result.
+// Compares the first `until_s` seconds of both logs. Throws std::runtime_error for a log that
+// cannot be read; damaged parts are reported in `readings` (log_reader.h).
 LogDiff DiffLogs(const std::string& a, const std::string& b,
                  double until_s = std::numeric_limits<double>::infinity(),
                  LogReadings* readings = nullptr);

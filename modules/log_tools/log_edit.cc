@@ -28,7 +28,7 @@ std::regex Expression(const std::string& text) {
   }
 }
 
-// handler(event, seconds since the log's first event).
+// Calls handler(event, seconds since the log's first event).
 template <typename Handler>
 void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
              WhileReading while_reading, Handler handler) {
@@ -36,7 +36,7 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
   std::optional<int64_t> first;
   const auto read = [&](const LogEvent& event) {
     first = first.value_or(event.utime);
-    // Capture times may step back by a little, before the first one too.
+    // Capture times may decrease slightly, even below the first one.
     const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
     if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
       handler(event, seconds);
@@ -51,7 +51,7 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
       cut.channels, cut.from_s, cut.to_s));
 }
 
-// "a.b[12].c[3]" has the item 12 of an array.
+// Whether a path has an array index of eight or more, such as "a.b[12].c[3]".
 bool IsFarInArray(const std::string& path) {
   constexpr int kShown = 8;
   for (size_t open = path.find('['); open != std::string::npos; open = path.find('[', open + 1)) {
@@ -86,11 +86,11 @@ void ListJson(const LogEvent& event, std::ostream& out) {
   nlohmann::ordered_json json = {{"utime", event.utime}, {"channel", event.channel}};
   json["type"] = message ? nlohmann::ordered_json(message->type) : nullptr;
   json["message"] = message ? ToJson(*message) : nullptr;
-  // Texts are whatever was on the bus.
+  // Texts from the bus may be invalid UTF-8.
   out << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
 }
 
-// The place of an event in its log.
+// The position of an event in its log.
 struct Place {
   int64_t utime = 0;
   size_t log = 0;
@@ -131,7 +131,8 @@ void CheckNew(const std::string& path) {
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings) {
   CheckNew(out);
-  std::optional<LogFileWriter> writer;  // an empty file would be no log
+  // created with the first event: an empty file would not be a log
+  std::optional<LogFileWriter> writer;
   ReadCut(log, cut, readings, WhileReading::kTellProgress, [&](const LogEvent& event, double) {
     if (!writer) {
       writer.emplace(out);
@@ -151,7 +152,7 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
   std::vector<Place> places;
   for (size_t log = 0; log < logs.size(); ++log) {
     size_t event = 0;
-    // Within a log its own order stands: capture times in a log may step back.
+    // Each log keeps its own order, although its capture times may decrease.
     int64_t latest = std::numeric_limits<int64_t>::min();
     const auto note = [&](const LogEvent& read) {
       latest = std::max(latest, read.utime);

@@ -1,8 +1,8 @@
 #pragma once
 
-// LCM logs listed, cut and put together. The logs made are ordinary ones; events keep their capture
-// time. Of a damaged log what can be read is taken: the new one is whole. What was lost is noted in
-// `readings` (log_reader.h).
+// Lists, cuts and merges LCM logs. The results are ordinary logs; events keep their capture time.
+// From a damaged log the readable parts are used, so the new log is undamaged. Damaged parts are
+// reported in `readings` (log_reader.h).
 
 #include <cstdint>
 #include <limits>
@@ -21,24 +21,24 @@ struct LogCut {
 };
 
 enum class ListAs : uint8_t {
-  kLines,   // when, seconds since the log's first event; channel, type, bytes
-  kFields,  // and below it each field of the message, of arrays the first eight items
-  kJson,    // one object: utime (of capture), channel, type, message
+  kLines,   // time (seconds since the log's first event), channel, type, bytes
+  kFields,  // also each field of the message; of arrays the first eight items
+  kJson,    // one object: utime (capture time), channel, type, message
 };
 
-// The events of a cut, one a line. Throws std::runtime_error for a cut without an event.
+// Lists the events of a cut, one per line. Throws std::runtime_error if the cut has no event.
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings = nullptr);
 
-// Throws std::runtime_error when the file exists: nothing is overwritten.
+// Throws std::runtime_error if the file exists: nothing is overwritten.
 void CheckNew(const std::string& path);
 
-// Both return how many events they wrote, and throw std::runtime_error for a log that cannot be
-// read, an output that exists or cannot be written, an expression that is none, and a cut without
-// an event.
+// Both return the number of events written. They throw std::runtime_error if a log cannot be read,
+// the output exists or cannot be written, the regular expression is invalid, or the cut has no
+// event.
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings = nullptr);
-// All events of the logs in the order of capture; of equal times the earlier log's first.
+// Writes all events of the logs in order of capture time; at equal times, in the order of the logs.
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
                   LogReadings* readings = nullptr);
 

@@ -17,7 +17,7 @@
 namespace pangea::session {
 namespace {
 
-// The odometry edges of the log's keyframes, by the keyframe they end at.
+// The odometry edges of the log's keyframes, by the keyframe at their end.
 std::map<KeyframeId, OdometryEdge> OdometryEdges(const std::string& log, LogReadings* readings) {
   std::map<KeyframeId, OdometryEdge> edges;
   const auto add = [&edges](const LogEvent& event) {
@@ -48,7 +48,7 @@ class GraphBuilder {
     }
   }
 
-  // An edge to a keyframe that the log has no pose of is left out.
+  // An edge to a keyframe without a pose in the log is left out.
   void AddEdge(const KeyframeId& from, const KeyframeId& to, const Rigid3& T_from_to,
                const Matrix6d& covariance) {
     const auto a = numbers_.find(from), b = numbers_.find(to);
@@ -73,7 +73,7 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
   std::map<int32_t, int> of_agent;
   for (const FinalGroup& group : FinalGroups(ReadServerLog(log, readings))) {
     for (const int32_t agent : group.Agents()) {
-      // The first group that an agent is in has most of its company.
+      // Groups are sorted by number of agents, so the agent's first group is the largest.
       const std::string name = of_agent[agent]++ == 0
                                    ? fmt::format("agent_{}.tum", agent)
                                    : fmt::format("agent_{}.{}.tum", agent, FileName(group.frame));

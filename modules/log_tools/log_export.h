@@ -1,7 +1,7 @@
 #pragma once
 
-// What a server bus' log amounts to, in other tools' formats. What of the log is lost is noted in
-// `readings` (log_reader.h).
+// Exports the result in a server bus' log in formats of other tools. Damaged parts of the log are
+// reported in `readings` (log_reader.h).
 
 #include <string>
 #include <vector>
@@ -12,16 +12,16 @@
 
 namespace pangea::session {
 
-// Where each agent's keyframes are, in its group's map frame: <folder>/agent_<id>.tum, one file
-// more for each further map. Returns the files.
+// Writes the poses of each agent's keyframes in its group's map frame: <folder>/agent_<id>.tum, and
+// another file for each further group of the agent. Returns the files.
 std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
                                    LogReadings* readings = nullptr);
-// Map points of the largest group, coloured by agent.
+// Writes the map points of the largest group, coloured by agent.
 void ExportPly(const std::string& log, const std::string& file, LogReadings* readings = nullptr);
 
-// The keyframes of all groups as the log has them last, their odometry edges, and the accepted
-// constraints, those too that a robust solve would switch off. Vertices are numbered from 0 by
-// group, map and seq; `keyframes` tells which keyframe each one is.
+// The pose graph at the end of the log: keyframes of all groups, odometry edges, and all accepted
+// constraints, including those that a robust solve would switch off. Vertices are numbered from 0
+// by group, map and seq; `keyframes` has the keyframe of each vertex.
 struct NamedGraph {
   Graph graph;
   std::vector<KeyframeId> keyframes;

@@ -37,7 +37,7 @@ void CheckVertices(const NamedGraph& exported, const Graph& solved, const std::s
   }
 }
 
-// A group's state as the log has it last, with other poses: `next` is the group's first vertex.
+// A group's last state in the log, with the solved poses; `next`: the group's first vertex.
 MapState Solved(const FinalGroup& group, const CapturedSession& session, const Graph& graph,
                 int* next) {
   MapState state;
@@ -55,7 +55,7 @@ MapState Solved(const FinalGroup& group, const CapturedSession& session, const G
   return state;
 }
 
-// Every group's new state, as it will be read again.
+// The messages of every group's new state.
 std::vector<map_state_t> Chunks(const CapturedSession& session, const Graph& solved,
                                 const std::string& g2o) {
   std::vector<map_state_t> chunks;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Another solver's answer brought back into a log.
+// Imports the solution of another solver into a log.
 
 #include <cstdint>
 #include <string>
@@ -9,12 +9,12 @@
 
 namespace pangea::session {
 
-// Writes `log` again to `out`, and at its end, as the newest MAP_STATE of each group, the poses of
-// a g2o file that was exported from it (vertices as GraphOf numbers them) and solved elsewhere. A
-// report or a viewer of `out` shows that solution. Of the file's edges nothing is taken. Returns
-// how many keyframes it placed. Throws std::runtime_error, and writes nothing, when the file's
-// vertices are not the log's keyframes or a pose is one that no message may carry. What of the log
-// is lost is noted in `readings` (log_reader.h); the new one is whole.
+// Copies `log` to `out`, and appends, as the newest MAP_STATE of each group, the poses of a g2o
+// file that was exported from the log (with the vertex numbers of GraphOf) and solved elsewhere. A
+// report or a viewer of `out` shows that solution. The file's edges are not used. Returns the
+// number of keyframes with a new pose. Throws std::runtime_error, and writes nothing, if the file's
+// vertices are not the log's keyframes, or if a pose is invalid in a message. Damaged parts of the
+// log are reported in `readings` (log_reader.h); the new log is undamaged.
 int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
                   LogReadings* readings = nullptr);
 

@@ -33,7 +33,7 @@ void AddResult(Bytes data, LogSummary* summary) {
   }
 }
 
-// "0-62", or with what is missing: "0-11, 16-62".
+// "0-62", or with gaps: "0-11, 16-62".
 std::string Ranges(const std::set<int32_t>& seqs) {
   std::string text;
   for (auto it = seqs.begin(); it != seqs.end();) {
@@ -47,7 +47,7 @@ std::string Ranges(const std::set<int32_t>& seqs) {
   return text;
 }
 
-constexpr double kShortest_s = 0.1;  // that tells a rate; a burst does not
+constexpr double kShortest_s = 0.1;  // shortest time for a rate; shorter is a burst
 
 std::string ChannelTable(const LogSummary& summary) {
   size_t width = 7;

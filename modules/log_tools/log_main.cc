@@ -1,4 +1,4 @@
-// pangea-log: what is in a captured log, parts of it, and what it amounts to in other formats.
+// pangea-log: the contents of a captured log, parts of it, and exports to other formats.
 
 #include <fmt/format.h>
 
@@ -32,7 +32,7 @@ struct Arguments {
   std::vector<std::string> recordings;  // ID=DIR
   bool fields = false, json = false;
   int exit_code = 0;
-  LogReadings readings;  // of the logs it read
+  LogReadings readings;  // damage in the logs that were read
 };
 
 void Export(Arguments& arguments) {
@@ -98,7 +98,7 @@ std::string IsJsonOrGltf(const std::string& path) {
              : fmt::format("{}: ends neither in .json nor in .gltf", path);
 }
 
-// A file that is no log, its reader refuses.
+// The log's reader refuses a file that is not a log.
 std::string IsNotEmpty(const std::string& path) {
   return std::filesystem::file_size(path) > 0 ? ""
                                               : fmt::format("{}: is empty: no event in it", path);

@@ -18,7 +18,7 @@ namespace {
 struct Member {
   std::string type;
   std::string name;
-  std::vector<std::string> dimensions;  // numbers, or members that come before
+  std::vector<std::string> dimensions;  // numbers, or names of earlier members
 };
 
 struct Type {
@@ -26,7 +26,7 @@ struct Type {
   std::vector<Member> members;
 };
 
-// Words and punctuation of a type's text, without comments.
+// Splits a type's text into words and punctuation, without comments.
 std::vector<std::string> Tokens(const std::string& text) {
   std::vector<std::string> tokens;
   for (size_t i = 0; i < text.size();) {
@@ -52,7 +52,7 @@ std::vector<std::string> Tokens(const std::string& text) {
   return tokens;
 }
 
-// What lcm-gen has accepted already: package p; struct t { type name[n]; const ...; }
+// Parses a text that lcm-gen has accepted: package p; struct t { type name[n]; const ...; }
 Type ParseType(const std::string& text) {
   const std::vector<std::string> tokens = Tokens(text);
   Type type;
@@ -98,7 +98,7 @@ struct Types {
   }
 };
 
-// Big-endian, as LCM encodes. Past the end it gives zeros and says so.
+// Reads big-endian values, as LCM encodes them. Past the end it returns zeros and sets a flag.
 class Reader {
  public:
   explicit Reader(Bytes data) : data_(data) {}
@@ -117,7 +117,7 @@ class Reader {
     return GetBigEndian(data_.data() + at_ - bytes, bytes);
   }
   void Fail() { good_ = false; }
-  // Length, characters, and a zero.
+  // A string is its length, its characters, and a zero.
   std::string String() {
     const uint64_t length = Unsigned(4);
     if (length < 1 || length > left()) {
@@ -140,14 +140,14 @@ class Decoder {
   Decoder(Bytes data, std::vector<MessageField>* fields) : reader_(data), fields_(fields) {}
 
   bool Decode(const Type& type) {
-    reader_.Unsigned(8);  // the fingerprint
+    reader_.Unsigned(8);  // skip the fingerprint
     Struct(type, "");
     return reader_.AtEnd();
   }
 
  private:
   void Struct(const Type& type, const std::string& prefix) {
-    std::map<std::string, int64_t> lengths;  // integers so far, which may be dimensions
+    std::map<std::string, int64_t> lengths;  // integer members so far, which may be dimensions
     for (const Member& member : type.members) {
       std::vector<int64_t> sizes;
       for (const std::string& dimension : member.dimensions) {
@@ -160,7 +160,7 @@ class Decoder {
     }
   }
 
-  // The value, of a single integer.
+  // Returns the value of a single integer; empty for others.
   std::optional<int64_t> Array(const std::string& type, const std::string& path,
                                const std::vector<int64_t>& sizes, size_t depth = 0) {
     if (depth == sizes.size()) {
@@ -223,7 +223,7 @@ class Decoder {
   std::vector<MessageField>* fields_;
 };
 
-// "candidates[0].score" as /candidates/0/score.
+// Converts "candidates[0].score" to /candidates/0/score.
 nlohmann::ordered_json::json_pointer Pointer(const std::string& path) {
   std::string pointer = "/";
   for (const char c : path) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Any of our messages, field by field, by the text of its type (lcmtypes/*.lcm): for tools that
-// show messages or compare them, whatever the type.
+// Decodes any message of this project field by field, using the text of its type (lcmtypes/*.lcm);
+// for tools that show or compare messages of any type.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,7 +14,7 @@ namespace pangea::session {
 
 struct MessageField {
   std::string path;   // "candidates[0].score"
-  std::string value;  // numbers as short as they read back the same; texts in quotes, as in JSON
+  std::string value;  // numbers in the shortest exact form; strings in quotes, as in JSON
 };
 
 struct DecodedMessage {
@@ -22,13 +22,13 @@ struct DecodedMessage {
   std::vector<MessageField> fields;
 };
 
-// Nothing when the fingerprint is none of ours or the bytes do not fit the type. The fields of long
-// arrays are as many as their items: a keyframe has some 25,000.
+// Empty if the fingerprint is unknown or the bytes do not fit the type. Each item of an array is a
+// field: a keyframe has about 25,000.
 std::optional<DecodedMessage> DecodeFields(Bytes data);
-// The message as the type nests it. A number that is none, or infinite, is null; a whole number of
-// more than 53 bits is a text, for most readers of JSON would round it.
+// The message as nested JSON. NaN and infinity become null; an integer with more than 53 bits
+// becomes a string, because most readers of JSON would round it.
 nlohmann::ordered_json ToJson(const DecodedMessage& message);
-// The type alone.
+// Only the type.
 std::optional<std::string> TypeOf(Bytes data);
 
 }  // namespace pangea::session

@@ -1,6 +1,7 @@
 #pragma once
 
-// --recording ID=FOLDER of the command lines: an agent's recording, for its ground truth or images.
+// The command-line option --recording ID=FOLDER: an agent's recording, for its ground truth or
+// images.
 
 #include <cstdint>
 #include <map>
@@ -11,11 +12,11 @@
 
 namespace pangea::session {
 
-// Folders by agent; of an agent given twice the last. Throws std::runtime_error about what is not
-// ID=FOLDER, and a folder that is not there.
+// Folders by agent; if an agent is given twice, the last one. Throws std::runtime_error for an
+// argument that is not ID=FOLDER, or a missing folder.
 std::map<int32_t, std::string> RecordingsById(const std::vector<std::string>& arguments);
 
-// The same; throws too about an agent that is not in the logs.
+// The same; also throws for an agent that is not in the logs.
 std::map<int32_t, std::string> RecordingsOf(const std::vector<std::string>& arguments,
                                             const std::vector<std::string>& logs,
                                             LogReadings* readings = nullptr);

@@ -158,7 +158,7 @@ void CommandLine::Apply() {
   if (shrink_ > 1) {
     options_.camera = Shrunk(options_.camera, shrink_);
   }
-  // A recorded IMU must fit the images: the rotations it felt are followed to some 25 Hz.
+  // A recorded IMU must fit the images: the path must follow its rotations up to about 25 Hz.
   options_.spline = options_.imu_file.empty() ? SplinePathOptions{} : SplinePathOptions{0.05, 0.02};
   if (knot_spacing_s_ > 0) {
     options_.spline = {knot_spacing_s_, 0.5 * knot_spacing_s_};

@@ -15,9 +15,9 @@ namespace pangea::sim {
 
 class CommandLine {
  public:
-  // Adds its options to `app`; both must stay until Run has returned.
+  // Adds its options to `app`; both must exist until Run has returned.
   explicit CommandLine(CLI::App& app);
-  // Throws std::runtime_error with one line for the user.
+  // Throws std::runtime_error with a one-line message for the user.
   void Run();
 
  private:

@@ -19,9 +19,9 @@ class EurocWriter {
       "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
       "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
 
-  // Creates `folder`/mav0 and its folders. Refuses one that holds a recording already.
+  // Creates `folder`/mav0 and its subfolders. Throws if it contains a recording already.
   explicit EurocWriter(const std::string& folder);
-  // Writes on into one that was created before.
+  // Continues a recording that was created before.
   static EurocWriter Existing(const std::string& folder);
 
   const std::string& mav0() const { return mav0_; }
@@ -29,11 +29,11 @@ class EurocWriter {
   void WriteCamera(const CameraModel& camera, double rate_hz, const std::string& comment) const;
   void WriteImuCalibration(const ImuNoise& noise) const;
   void WriteImu(const SimulatedImu& imu) const;
-  // 17 columns with the biases of `imu`; 8 where they are not known (nullptr).
+  // 17 columns with the biases of `imu`; 8 columns if `imu` is null.
   void WriteGroundTruth(const SplinePath& path, const std::vector<int64_t>& stamps_ns,
                         const SimulatedImu* imu) const;
   void WriteImageList(const std::vector<int64_t>& stamps_ns) const;
-  // From any thread.
+  // Thread-safe.
   void WriteImage(int64_t stamp_ns, const cv::Mat& image) const;
   void WriteText(const std::string& file, const std::string& text) const;
 
@@ -42,7 +42,7 @@ class EurocWriter {
   std::string mav0_;
 };
 
-// 8-bit PNG at the fastest compression; throws when it cannot be written.
+// 8-bit PNG with the fastest compression; throws if it cannot be written.
 void WritePng(const std::string& path, const cv::Mat& image);
 
 }  // namespace pangea::sim

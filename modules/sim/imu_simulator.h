@@ -1,6 +1,6 @@
 #pragma once
 
-// What an IMU feels along a path: exact, or with white noise and biases that walk.
+// Simulates an IMU along a path: exact, or with white noise and random-walk biases.
 
 #include <cstdint>
 #include <vector>

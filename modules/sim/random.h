@@ -1,7 +1,7 @@
 #pragma once
 
-// Seeded random numbers, the same on every machine: the standard engine with distributions of our
-// own (the standard's are implementation-defined).
+// Seeded random numbers, the same on every machine: the standard engine with own distributions (the
+// standard's are implementation-defined).
 
 #include <cmath>
 #include <cstdint>

@@ -22,7 +22,7 @@
 namespace pangea::sim {
 namespace {
 
-// Counts up whenever the same options give other noise-free frames.
+// Increment this whenever the same options give different noise-free frames.
 constexpr uint64_t kRenderVersion = 1;
 
 std::vector<Eigen::Vector3d> PointsOf(const Trajectory& trajectory) {
@@ -38,7 +38,7 @@ uint64_t HashValue(const T& value, uint64_t hash) {
   return HashBytes(&value, sizeof(value), hash);
 }
 
-// Of everything a noise-free frame depends on, but its stamp.
+// Hash of everything that a noise-free frame depends on, except its stamp.
 uint64_t FrameKey(const SceneOptions& scene, const SplinePath& path, const CameraModel& camera,
                   const SensorOptions& sensor) {
   uint64_t hash = HashValue(kRenderVersion, path.Hash());
@@ -131,7 +131,7 @@ Recorder::Recorder(const RecordingOptions& options)
     trajectory = SpreadSteps(raw, options.steps);
     std::vector<std::string> files = options.keep_clear_files;
     files.push_back(options.path_file);
-    // In an order of its own, so that every recording of the scene sees the same points.
+    // Sorted by hash, so that every recording of the scene uses the same points.
     std::vector<std::pair<uint64_t, std::vector<Eigen::Vector3d>>> sets;
     for (const std::string& file : files) {
       const auto points = PointsOf(ReadTrajectory(file, &warnings));

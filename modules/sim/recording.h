@@ -28,7 +28,7 @@ namespace pangea::sim {
 struct RecordingOptions {
   std::string out;  // folder that will hold mav0
 
-  // The path: a file (EuRoC ground-truth csv or TUM), or generated when there is none.
+  // The path: from a file (EuRoC ground-truth csv or TUM), or generated if this is empty.
   std::string path_file;
   GeneratedPathOptions generated;
   SplinePathOptions spline;
@@ -37,14 +37,14 @@ struct RecordingOptions {
   double duration_s = 0;  // 0: to the end
 
   SceneOptions scene;
-  std::vector<std::string> keep_clear_files;  // beside the path's own file
+  std::vector<std::string> keep_clear_files;  // in addition to the path's own file
 
   CameraModel camera = EurocCamera();
   double image_rate_hz = 20;
   SensorOptions sensor;
   ImuNoise imu;
 
-  // A recorded IMU and the stamps of its camera, instead of made ones.
+  // A recorded IMU and the stamps of its camera, instead of simulated ones.
   std::string imu_file;
   std::string stamps_file;
 
@@ -52,7 +52,7 @@ struct RecordingOptions {
   bool perfect = false;  // no noise, no blur, no changing exposure, exact IMU
   bool tracks = false;   // cam0/tracks.csv with exact feature tracks
 
-  std::string cache_dir;  // of noise-free frames; empty: none
+  std::string cache_dir;  // cache of noise-free frames; empty: none
   int threads = 0;        // 0: one per core
 };
 
@@ -67,7 +67,7 @@ struct RecordingSummary {
 // Called with (frames done, frames in all), from one thread at a time.
 using Progress = std::function<void(size_t, size_t)>;
 
-// Throws std::runtime_error with one line for the user.
+// Throws std::runtime_error with a one-line message for the user.
 RecordingSummary RenderRecording(const RecordingOptions& options, const Progress& progress = {});
 
 }  // namespace pangea::sim

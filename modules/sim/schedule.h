@@ -1,6 +1,6 @@
 #pragma once
 
-// Which stamps a recording has, made up or taken from a recorded camera and IMU.
+// The stamps of a recording: generated, or taken from a recorded camera and IMU.
 
 #include <cstdint>
 #include <string>
@@ -15,13 +15,13 @@ struct Span {
 
 struct Schedule {
   std::vector<int64_t> images_ns;
-  Span imu;  // around the images
+  Span imu;  // span of the IMU samples, which contains the images
 };
 
-// Every image's stamp is also an IMU sample's, as in EuRoC, and has a sample on either side.
+// Every image has the stamp of an IMU sample, as in EuRoC, with a sample before and after it.
 Schedule MakeSchedule(const Span& span, double imu_rate_hz, double image_rate_hz);
 
-// A recorded IMU, its rows as they stand in the file.
+// A recorded IMU, with the rows of its file unchanged.
 struct RecordedImu {
   std::vector<int64_t> stamps_ns;
   std::vector<std::string> rows;
@@ -31,9 +31,9 @@ struct RecordedImu {
   std::vector<int64_t> Stamps(const Span& span) const;
 };
 
-// Both throw std::runtime_error naming file and line.
+// Both throw std::runtime_error with file and line.
 RecordedImu ReadRecordedImu(const std::string& path);
-// The stamps of the file that lie within the span and the IMU's time.
+// The stamps of the file within the span and the time of the IMU.
 Schedule ReadSchedule(const std::string& stamps_file, const Span& span, const RecordedImu& imu);
 
 }  // namespace pangea::sim

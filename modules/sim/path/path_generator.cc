@@ -70,7 +70,7 @@ class Traveller {
     return p;
   }
 
-  // Where the camera looks: along the way, swinging to the sides and up and down.
+  // Direction of the camera: along the path, swinging sideways and up and down.
   Vector3d YawPitchRoll() const {
     const bool walk = options_.motion == Motion::kWalk;
     const double yaw = heading_ + 0.7 * yaw_.At(time_) + (walk ? 0.02 : 0.01) * tremble_.At(time_);
@@ -93,7 +93,7 @@ class Traveller {
   Wander tremble_{1.5, 5.0, &rng_};
 };
 
-// Camera with z forward, x right, y down, level and with yaw 0 while stationary, looking along +x.
+// Camera with z forward, x right, y down; while stationary it is level and looks along +x (yaw 0).
 Eigen::Quaterniond LevelCamera() {
   Eigen::Matrix3d R;
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -106,7 +106,7 @@ Eigen::Quaterniond Attitude(const Vector3d& yaw_pitch_roll) {
                             Eigen::AngleAxisd(yaw_pitch_roll.z(), Vector3d::UnitX()));
 }
 
-// A drone's thrust points along gravity's reaction plus its acceleration.
+// A drone's thrust points along its acceleration minus gravity.
 Eigen::Quaterniond Lean(const Vector3d& acceleration) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(),
                                             acceleration + Vector3d(0, 0, kGravity));
@@ -116,8 +116,9 @@ Eigen::Quaterniond Lean(const Vector3d& acceleration) {
 
 Trajectory GeneratePath(const GeneratedPathOptions& options) {
   constexpr double kPeriod = 0.02;
-  // Accelerations are second differences over this many samples to either side: the lean of a body
-  // with inertia. So many are made, and dropped again, before and behind the path.
+  // Accelerations are second differences over this many samples on each side, which models the
+  // inertia of the tilting body. As many samples are added at both ends of the path, and dropped
+  // again.
   constexpr int kReach = 5;
   const int count = static_cast<int>(options.duration_s / kPeriod) + 1;
   Traveller traveller(options);

@@ -1,8 +1,8 @@
 #pragma once
 
-// Paths of our own along a scene's route (route.h): a hand-held walk, or a drone's flight that
-// leans into its accelerations. Several rounds over the same area, so that two paths of one scene
-// overlap.
+// Generates paths along a scene's route (route.h): a hand-held walk, or the flight of a drone that
+// tilts with its accelerations. A path makes several rounds in the same area, so that two paths of
+// one scene overlap.
 
 #include <cstdint>
 
@@ -18,7 +18,7 @@ struct GeneratedPathOptions {
   SceneKind scene = SceneKind::kHall;
   uint64_t seed = 1;
   double duration_s = 60;
-  double static_start_s = 0;  // stationary this long first; 0: moving from the first frame
+  double static_start_s = 0;  // initially stationary; 0: moving from the first frame
   Eigen::Quaterniond q_body_cam = Eigen::Quaterniond::Identity();  // the camera looks ahead
 };
 

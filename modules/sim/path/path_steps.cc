@@ -7,8 +7,8 @@
 namespace pangea::sim {
 namespace {
 
-// Share of a step's offset that has come in: 0 before, 1 after, with zero velocity and acceleration
-// at both ends (the quintic smoothstep).
+// Share of a step's offset that is blended in: 0 before, 1 after, with zero velocity and
+// acceleration at both ends (quintic smoothstep).
 double Blend(double x) {
   x = std::clamp(x, 0.0, 1.0);
   return x * x * x * (x * (6 * x - 15) + 10);
@@ -40,7 +40,7 @@ std::vector<PositionStep> FindSteps(const Trajectory& trajectory, const StepOpti
   std::vector<PositionStep> steps;
   for (size_t i = 1; i < trajectory.size(); ++i) {
     const double dt = 1e-6 * static_cast<double>(trajectory[i].utime - trajectory[i - 1].utime);
-    // A move over a gap, or at a low rate, says nothing about steps.
+    // A motion across a gap, or at a low rate, gives no information on steps.
     constexpr double kLongestInterval = 0.02;
     if (dt > kLongestInterval) {
       continue;

@@ -15,8 +15,8 @@ constexpr int kDegree = UniformSpline::kDegree;
 using Weights = std::array<double, kDegree + 1>;
 
 // Weights of the kDegree + 1 control points around u in [0, 1] of a segment, for the derivative of
-// that order by u. Cox-de Boor on integer knots; each derivative is a difference of the basis of
-// one degree less.
+// the given order with respect to u. Cox-de Boor on integer knots; each derivative is a difference
+// of the basis of one degree less.
 Weights BasisWeights(double u, int order) {
   Weights b{1.0};
   for (int d = 1; d <= kDegree; ++d) {
@@ -50,7 +50,7 @@ Eigen::MatrixXd Positions(const Trajectory& trajectory) {
   return rows;
 }
 
-// Coefficients x y z w, with the sign that continues the row before.
+// Coefficients x y z w, with the sign that is continuous with the previous row.
 Eigen::MatrixXd Quaternions(const Trajectory& trajectory) {
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(trajectory.size()), 4);
   Eigen::Vector4d previous = trajectory.front().T.q.coeffs();

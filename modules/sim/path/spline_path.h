@@ -2,7 +2,7 @@
 
 // A smooth path of the body: uniform quintic B-splines, one on the position and one on the
 // unnormalised quaternion, fitted to timed poses by linear least squares. Velocity, acceleration
-// and angular velocity are exact derivatives of what At() returns, so an IMU made from them
+// and angular velocity are exact derivatives of the pose in At(), so an IMU made from them
 // integrates back to the path. Frames: `ref` is the trajectory's own, gravity-aligned (z up).
 //
 // Source: de Boor, A Practical Guide to Splines, ch. IX (uniform knots); the quaternion's rate as
@@ -20,8 +20,8 @@ class UniformSpline {
  public:
   static constexpr int kDegree = 5;
 
-  // Least squares through `values` (one row a time) at `times_s`, ascending from 0. A weak penalty
-  // on third differences carries the curve over gaps.
+  // Least-squares fit to `values` (one row per time) at `times_s`, ascending from 0. A weak penalty
+  // on third differences bridges gaps.
   UniformSpline(const Eigen::VectorXd& times_s, const Eigen::MatrixXd& values, double spacing_s);
 
   // Value (order 0) or derivative (order 1, 2) at a time inside the fitted span.
@@ -41,7 +41,7 @@ struct PathState {
 };
 
 struct SplinePathOptions {
-  // Content above about 1 / (2 spacing) is smoothed away.
+  // Frequencies above about 1 / (2 * spacing) are smoothed away.
   double position_spacing_s = 0.1;
   double rotation_spacing_s = 0.05;
 };
@@ -59,7 +59,7 @@ class SplinePath {
   }
   // Seconds from begin_ns.
   PathState AtSeconds(double time_s) const;
-  // Of everything that shapes the path.
+  // Hash of everything that determines the path.
   uint64_t Hash() const;
 
  private:

@@ -30,7 +30,8 @@ CameraModel PhoneCamera() {
   camera.cy = 243.1;
   camera.distortion << 0.021, -0.012, 0.004, -0.001;
   camera.readout_s = 0.012;
-  // Held upright in landscape, looking ahead: the body's z points out of the screen.
+  // Held upright in landscape orientation, looking ahead: the body's z axis points out of the
+  // screen.
   Eigen::Matrix3d R_body_cam;
   R_body_cam << 0, 1, 0, 1, 0, 0, 0, 0, -1;
   camera.T_body_cam = Rigid3(Eigen::Quaterniond(R_body_cam).normalized(), {0.04, 0.01, -0.005});

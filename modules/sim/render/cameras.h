@@ -1,6 +1,6 @@
 #pragma once
 
-// The cameras recordings are made with.
+// The cameras of rendered recordings.
 
 #include "core/camera_model.h"
 
@@ -10,9 +10,9 @@ namespace pangea::sim {
 CameraModel EurocCamera();
 // A phone's wide camera: equidistant lens, rolling shutter.
 CameraModel PhoneCamera();
-// A fisheye whose picture reaches beyond 90 degrees from the axis: TUM-VI's cam0 at 512 x 512.
+// A fisheye with a view of more than 90 degrees from the axis: TUM-VI's cam0 at 512 x 512.
 CameraModel WideCamera();
-// The same camera with its image, and all that is in pixels, shrunk by a factor.
+// The same camera with its image, and all values in pixels, divided by `factor`.
 CameraModel Shrunk(const CameraModel& camera, double factor);
 
 }  // namespace pangea::sim

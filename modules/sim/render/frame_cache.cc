@@ -32,7 +32,7 @@ void FrameCache::Store(int64_t stamp_ns, const cv::Mat& frame) const {
   if (folder_.empty()) {
     return;
   }
-  // Under another name first: a reader never sees half a file.
+  // Write with another name first, so that a reader never sees an incomplete file.
   const std::string partial = fmt::format("{}/{}.{}.partial.png", folder_, stamp_ns, getpid());
   std::error_code error;
   if (cv::imwrite(partial, frame, {cv::IMWRITE_PNG_COMPRESSION, 1})) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Noise-free frames on disk, one folder per (scene, path, camera, optics), one PNG per stamp. They
-// can be deleted at any time; several programs may share them.
+// A cache of noise-free frames on disk: one folder per (scene, path, camera, optics), one PNG per
+// stamp. The files can be deleted at any time; several programs may share them.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -11,10 +11,10 @@ namespace pangea::sim {
 
 class FrameCache {
  public:
-  // An empty `root` keeps nothing.
+  // If `root` is empty, nothing is cached.
   FrameCache(const std::string& root, uint64_t key);
 
-  // Empty when it is not there, or is not what was stored.
+  // Empty if the frame is not cached, or not as it was stored.
   cv::Mat Load(int64_t stamp_ns, cv::Size size) const;
   // Failures (a full disk) are ignored: the cache only saves time.
   void Store(int64_t stamp_ns, const cv::Mat& frame) const;

@@ -15,12 +15,12 @@ float Angle(const Vector3f& a, const Vector3f& b) {
 
 }  // namespace
 
-// What one frame's rendering shares between its tiles.
+// State of one frame's rendering, shared by its tiles.
 struct Renderer::FrameState {
   std::vector<RowPose> rows;
-  std::vector<Vector3f> centres;  // of the primitives, from the middle row's camera, its frame
+  std::vector<Vector3f> centres;  // of the primitives, in the frame of the middle row's camera
   std::vector<float> slack;       // how far a rolling shutter moves the camera, as a radius
-  std::vector<std::vector<Candidate>> candidates;  // of each tile
+  std::vector<std::vector<Candidate>> candidates;  // by tile
   std::vector<int32_t> keys;                       // what each pixel sees: primitive and face
   RenderedView view;
 
@@ -70,7 +70,7 @@ void Renderer::MakeTiles() {
         cone.half_angle = std::max(cone.half_angle, Angle(cone.axis, RayAt(x, y).direction));
       }
     }
-    cone.half_angle *= 1.1f;  // a pixel's own width, and edges that bend outward
+    cone.half_angle *= 1.1f;  // for the width of a pixel, and for edges that bend outwards
     tiles_.push_back(cone);
   }
 }
@@ -86,7 +86,7 @@ void Renderer::FindCandidates(int tile, FrameState* state) const {
     const float along = c.dot(cone.axis);
     const float distance2 = c.squaredNorm();
     const float across = std::sqrt(std::max(distance2 - along * along, 0.0f));
-    // Distance of the centre outside the cone's surface.
+    // Compare the distance of the centre from the cone's surface with the radius.
     if (across * cos_half - along * sin_half > radius || along + radius < 0) {
       continue;
     }
@@ -129,8 +129,8 @@ void Renderer::RenderTile(int tile, FrameState* state) const {
   }
 }
 
-// The mean of a pixel crossed by an edge: five rays, spread so that edges of any direction cross
-// them one after another.
+// Mean of a pixel crossed by an edge, from five rays, spread so that an edge of any direction
+// crosses them one after another.
 float Renderer::ShadeAcross(int x, int y, const FrameState& state) const {
   constexpr float kOffsets[5][2] = {
       {0, 0}, {-0.4f, -0.2f}, {0.2f, -0.4f}, {0.4f, 0.2f}, {-0.2f, 0.4f}};

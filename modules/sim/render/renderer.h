@@ -1,8 +1,8 @@
 #pragma once
 
-// Ray casts a scene through a camera model: what light reaches each pixel, before blur and noise.
-// One ray a pixel and a band-limited texture look-up, five rays more where a pixel's neighbour sees
-// another face. Objects are culled by tiles of pixels. Deterministic; const and thread-safe.
+// Ray casting of a scene through a camera model: the light at each pixel, before blur and noise.
+// One ray per pixel with a band-limited texture look-up; five more rays if a neighbouring pixel
+// sees another face. Objects are culled by tiles of pixels. Deterministic; const and thread-safe.
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -23,7 +23,7 @@ class Renderer {
   // Both must outlive the renderer.
   Renderer(const Scene& scene, const CameraModel& camera);
 
-  // T_ref_cam: one pose for all rows (global shutter), or one a row.
+  // T_ref_cam: one pose for all rows (global shutter), or one per row.
   RenderedView Render(const std::vector<Rigid3>& T_ref_cam) const;
 
  private:
@@ -31,7 +31,7 @@ class Renderer {
   struct PixelRay {
     Eigen::Vector3f direction;  // unit, camera frame
     float angle = 0;            // width of the pixel, radians
-    bool valid = false;         // the camera model reaches it
+    bool valid = false;         // the camera model has a ray for it
   };
   struct TileCone {
     Eigen::Vector3f axis;

@@ -25,8 +25,8 @@ float BilinearAt(const cv::Mat& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
-// Slow changes of exposure: three incommensurate waves with phases of the seed's own, within
-// +- variation.
+// Slow changes of exposure within +- variation: three incommensurate waves with phases that depend
+// on the seed.
 double ExposureGain(double variation, uint64_t seed, double time_s) {
   Rng rng(seed, "exposure");
   double sum = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// From the light on the sensor to the picture: vignetting and motion blur (the noise-free frame,
-// which depends on path and scene alone), then exposure changes and noise (which depend on the
+// Converts the light on the sensor to the image: vignetting and motion blur (the noise-free frame,
+// which depends only on path and scene), then exposure changes and noise (which depend on the
 // seed).
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ namespace pangea::sim {
 
 struct SensorOptions {
   double exposure_s = 0.003;    // motion blur; 0: none
-  double brightness = 1.0;      // mean gain of the picture
-  double vignetting = 0.35;     // light lost in the corners, a share
+  double brightness = 1.0;      // mean gain of the image
+  double vignetting = 0.35;     // share of light lost in the corners
   double gain_variation = 0.2;  // slow exposure changes, +- share
   double read_noise = 1.0;      // grey levels
   double shot_noise = 0.12;     // grey levels at grey 1, grows with the root of the grey
@@ -33,9 +33,9 @@ class Sensor {
  public:
   Sensor(const CameraModel& camera, const SensorOptions& options);
 
-  // 8-bit, of the view as the camera moves.
+  // 8-bit image of the view, with motion blur.
   cv::Mat NoiseFree(const RenderedView& view, const CameraRates& rates) const;
-  // Exposure and noise of one frame; time_s and frame number the draw.
+  // Adds exposure and noise; `seed`, `time_s` and `frame` determine the random numbers.
   cv::Mat Develop(const cv::Mat& noise_free, uint64_t seed, double time_s, uint64_t frame) const;
 
  private:

@@ -8,7 +8,7 @@
 namespace pangea::sim {
 namespace {
 
-// Points where random rays from inside the room meet it: dense on what is near and in view.
+// Points where random rays from inside the room meet its surfaces: dense on near and visible ones.
 std::vector<Eigen::Vector3d> ScatterLandmarks(const Scene& scene, uint64_t seed) {
   constexpr int kLandmarks = 12000;
   Rng rng(seed, "landmarks");

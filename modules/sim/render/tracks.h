@@ -1,7 +1,7 @@
 #pragma once
 
-// Exact feature tracks: persistent points of the scene's surfaces, where they appear in each frame.
-// A point once seen is followed for as long as it is visible; new ones fill the empty cells.
+// Exact feature tracks: the pixels of fixed points on the scene's surfaces. A point is followed as
+// long as it is visible; new points fill the empty cells.
 
 #include <cstdint>
 #include <optional>
@@ -19,15 +19,15 @@ struct TrackedPoint {
 
 class TrackMaker {
  public:
-  // Both must outlive it. `count` points a frame, where that many are visible.
+  // Scene and camera must outlive it. `count`: points per frame, if that many are visible.
   TrackMaker(const Scene& scene, const CameraModel& camera, int count, uint64_t seed);
 
   const std::vector<Eigen::Vector3d>& landmarks() const { return landmarks_; }
-  // Call in order of time. T_ref_cam: one pose for all rows, or one a row, as in Renderer::Render.
+  // Call in time order. T_ref_cam: one pose for all rows, or one per row, as in Renderer::Render.
   std::vector<TrackedPoint> Next(const std::vector<Rigid3>& T_ref_cam);
 
  private:
-  // Where a landmark falls into the image, and the pose of the row it falls on.
+  // Pixel of a landmark, and the pose of the row at this pixel.
   std::optional<Eigen::Vector2d> PixelOf(const std::vector<Rigid3>& T_ref_cam,
                                          const Eigen::Vector3d& landmark, Rigid3* pose) const;
   bool Hidden(const Eigen::Vector3d& eye, const Eigen::Vector3d& landmark) const;

@@ -118,7 +118,7 @@ Piece Column(Rng* rng) {
   return piece;
 }
 
-// The axes of a part's face that its sheet's u and v run along.
+// Size of the sheet of a part's face, along u and v.
 Eigen::Vector2d SheetSize(const Primitive& primitive, int face) {
   const Vector3d size = 2 * primitive.half.cast<double>();
   if (primitive.kind == Primitive::Kind::kCylinder) {
@@ -199,7 +199,7 @@ int SceneClad::AddSheet(const std::string& paint, const Eigen::Vector2d& size_m,
                         Marks marks) {
   Rng rng(seed_, paint + " style");
   SheetStyle style;
-  // From bare sheets to crowded ones.
+  // Sheets differ in how many marks they have.
   const double crowd = rng.Uniform();
   style.tone = rng.Uniform(40, 180);
   style.panel_m = rng.Uniform(0.6, 2.5);

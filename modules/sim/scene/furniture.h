@@ -16,7 +16,7 @@ namespace pangea::sim {
 // A primitive of a piece; until placed, in the piece's own frame (standing on z = 0).
 struct Part {
   Primitive primitive;
-  std::string paint;  // names the stream of its paint; empty: by its place in the scene
+  std::string paint;  // random stream of its paint; empty: by its position in the scene
 };
 using Piece = std::vector<Part>;
 
@@ -25,12 +25,13 @@ Piece RandomSmallPiece(Rng* rng);    // fits into a cube of 0.8 m
 Piece RandomWallPiece(Rng* rng);     // boxes and pipes along x
 Piece RandomCeilingPiece(Rng* rng);  // ducts and beams along x
 
-// The piece rotated about z and moved.
+// The piece, rotated about z and moved to `at`.
 std::vector<Part> Placed(const Piece& piece, const Eigen::Vector3d& at, double yaw);
 
-enum class Marks { kMany, kFew };  // few: bare walls, whitewashed
+enum class Marks { kMany, kFew };  // kFew: bare white walls
 
-// Gives every face its sheet: sizes and streams first, then painted in parallel.
+// Assigns a painted sheet to every face: first sizes and random streams, then all are painted in
+// parallel.
 class SceneClad {
  public:
   SceneClad(uint64_t seed, std::string stream, double coarseness)

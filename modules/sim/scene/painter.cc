@@ -9,7 +9,7 @@
 namespace pangea::sim {
 namespace {
 
-// A sheet at work: the picture and the scale.
+// A sheet being painted: image and scale.
 struct Sheet {
   cv::Mat image;  // 8-bit
   double texel_m;
@@ -20,11 +20,11 @@ struct Sheet {
     return std::max(1, static_cast<int>(std::lround(metres / texel_m)));
   }
   double Area() const { return texel_m * texel_m * static_cast<double>(image.total()); }
-  // How many things of a density to draw.
+  // Number of things to draw for a density.
   int Count(double per_m2) const { return static_cast<int>(per_m2 * Area() + rng->Uniform()); }
   cv::Point RandomPoint() const { return {rng->Index(image.cols), rng->Index(image.rows)}; }
   int Grey(double low, double high) const { return static_cast<int>(rng->Uniform(low, high)); }
-  // The grey of a mark: now and then far from the sheet's tone, mostly near it.
+  // The grey of a mark: mostly near the sheet's tone, sometimes far from it.
   int Mark() const {
     const double grey = rng->Chance(0.3) ? rng->Uniform(5, 250) : tone + 32 * rng->Normal();
     return static_cast<int>(std::clamp(grey, 0.0, 255.0));
@@ -188,7 +188,7 @@ cv::Mat PaintSheet(double width_m, double height_m, double texel_m, const SheetS
                       std::max(4, static_cast<int>(std::ceil(height_m / texel_m))));
   Sheet sheet{BaseCoat(size, style, texel_m, rng), texel_m, style.tone, rng};
   PaintPanels(&sheet, cv::Rect(cv::Point(0, 0), size), style.panel_m);
-  // From large to small; numbers grow with the inverse area, a little slower.
+  // From large to small; the number grows slightly slower than the inverse area.
   for (double scale = 0.5; scale > 3 * texel_m; scale *= 0.45) {
     const double density = style.shapes_per_m2 * std::pow(0.5 / scale, 1.4) * 0.2;
     for (int i = sheet.Count(density); i > 0; --i) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// Paints the sheets a scene is clad with: panels, seams and rivets, labels with numbers, warning
-// stripes, stains, scratches and shapes of every size, over noise of every scale. No two sheets of
-// one stream are alike.
+// Paints the sheets of a scene's surfaces: panels, seams and rivets, labels with numbers, warning
+// stripes, stains, scratches and shapes of every size, over noise of every scale. All sheets of one
+// stream are different.
 
 #include <opencv2/core/mat.hpp>
 
@@ -13,8 +13,8 @@ namespace pangea::sim {
 struct SheetStyle {
   double tone = 110;         // mean grey
   double panel_m = 1.0;      // typical size of a panel
-  double shapes_per_m2 = 6;  // marks, at the scale of half a metre; smaller ones are more
-  double noise = 24;         // grey values, of the largest scale
+  double shapes_per_m2 = 6;  // marks of about half a metre; smaller ones are more frequent
+  double noise = 24;         // grey values, at the largest scale
   double stain = 70;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// The routes that generated paths follow and generated scenes keep clear: a figure of eight.
+// The route of generated paths, which generated scenes keep clear: a figure of eight.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -12,9 +12,9 @@ namespace pangea::sim {
 struct Route {
   double length_m;  // half extent along x
   double width_m;   // half extent along y
-  double low_m;     // heights the paths keep to
+  double low_m;     // range of heights of the paths
   double high_m;
-  double sideways_m;  // how far the paths stray to the side
+  double sideways_m;  // sideways deviation of the paths
 
   // phase 0 .. 2 pi is one round.
   Eigen::Vector2d At(double phase) const {

@@ -71,7 +71,7 @@ bool IntersectCylinder(const Primitive& cylinder, int index, const Vector3f& o, 
   const float c = o.x() * o.x() + o.y() * o.y() - radius * radius;
   const float discriminant = b * b - a * c;
   if (discriminant <= 0) {
-    return false;  // also rays along the axis, which see a cap at most: a sliver
+    return false;  // also rays along the axis, which could only meet a cap
   }
   const float root = std::sqrt(discriminant);
   const float mantle = (-b - root) / a;
@@ -163,7 +163,7 @@ float Scene::Shade(const Hit& hit, float pixel_angle) const {
   constexpr float kGrazing = 0.02f;
   footprint.major = footprint.minor / std::max(hit.cosine, kGrazing);
   float grey = surface.texture.Sample(footprint);
-  // Fine detail is gone where a pixel is wider than its largest marks.
+  // No fine detail where a pixel is wider than its largest marks.
   constexpr float kDetailEndsAt = 0.12f;
   if (surface.detail_gain > 0 && footprint.minor < kDetailEndsAt) {
     footprint.u += surface.detail_u;

@@ -12,10 +12,10 @@
 
 namespace pangea::sim {
 
-// A painted sheet: its own picture, multiplied by a window of the scene's fine detail.
+// A painted sheet: its own texture, multiplied by a window of the scene's fine detail.
 struct Surface {
   Texture texture;
-  float detail_u = 0, detail_v = 0;  // where the window begins, metres
+  float detail_u = 0, detail_v = 0;  // origin of the window, metres
   float detail_gain = 0.5f;          // 0: none
 };
 
@@ -30,7 +30,7 @@ struct Primitive {
   std::array<int, 6> surfaces{};
 
   float BoundingRadius() const;
-  // Distance from a point to the primitive, 0 inside.
+  // Distance of a point from the primitive, 0 inside.
   float Distance(const Eigen::Vector3f& p) const;
 };
 
@@ -55,9 +55,9 @@ struct Scene {
   Texture detail;
 
   const Surface& SurfaceOf(const Hit& hit) const;
-  // Grey value 0 .. 255 of what a pixel of the given angular width sees.
+  // Grey value, 0 .. 255, of a pixel with the given angular width (radians).
   float Shade(const Hit& hit, float pixel_angle) const;
-  // The nearest hit; a point outside the room sees nothing.
+  // The nearest hit; empty if `origin` is outside the room.
   std::optional<Hit> Cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
 };
 

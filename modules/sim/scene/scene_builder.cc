@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Everything about a scene but its paint.
+// Geometry of a scene, without paint.
 class Layout {
  public:
   Layout(const SceneOptions& options, const Vector3d& room_min, const Vector3d& room_max,
@@ -58,7 +58,7 @@ class Layout {
   std::vector<Part> parts_;
 };
 
-// What the generated paths may reach.
+// Points that the generated paths may reach.
 std::vector<Vector3d> RoutePoints(SceneKind kind) {
   const Route route = RouteOf(kind);
   std::vector<Vector3d> points;
@@ -76,7 +76,7 @@ std::vector<Vector3d> RoutePoints(SceneKind kind) {
   return points;
 }
 
-// One point per cube of 0.2 m is enough to keep clear of, and much faster.
+// Keeps one point per cube of 0.2 m: enough for the clearance, and much faster.
 std::vector<Vector3d> Thinned(const std::vector<Vector3d>& points) {
   constexpr double kCell = 0.2;
   std::vector<std::array<int64_t, 3>> cells;
@@ -143,7 +143,7 @@ void FurnishCeiling(Layout* layout, double per_m2, Rng* rng) {
   }
 }
 
-// Its paint has a stream of its own: the same wherever it stands.
+// Gives the piece its own stream of paint, so that it looks the same wherever it stands.
 Piece Shared(Piece piece, int number) {
   for (Part& part : piece) {
     part.paint = fmt::format("shared {} {}", number, &part - piece.data());
@@ -151,7 +151,7 @@ Piece Shared(Piece piece, int number) {
   return piece;
 }
 
-// The dozen objects both twin rooms have.
+// Places the dozen objects that both twin rooms have.
 void PlaceSharedObjects(Layout* layout, const SceneOptions& options, Rng* rng) {
   Rng shared(options.seed, "shared objects");
   constexpr int kObjects = 12;
@@ -168,8 +168,8 @@ void PlaceSharedObjects(Layout* layout, const SceneOptions& options, Rng* rng) {
   }
 }
 
-// Two kinds of machine by turns over all the floor, and one thing all along the walls, wherever the
-// paths leave room for it.
+// Places two kinds of machine alternately on the whole floor, and one object along all walls, where
+// the paths leave room.
 void PlaceRows(Layout* layout, const SceneOptions& options) {
   constexpr double kEvery_m = 4;
   constexpr double kInset_m = 1.5;

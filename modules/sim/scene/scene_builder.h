@@ -1,9 +1,8 @@
 #pragma once
 
-// Builds the scenes: a machine hall, a hall with hardly a mark in it, small rooms; and pairs that
-// are easily mistaken for one another: two rooms that differ in everything but a dozen identical
-// objects, which stand at different places in each, and two halls with the same machines in rows
-// and the same things along the walls, every few metres.
+// Builds the scenes: a machine hall, a hall with hardly any texture, small rooms; and pairs that
+// are easily confused: two different rooms with a dozen identical objects at different places, and
+// two halls with the same machines in rows and the same objects along the walls, every few metres.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -24,12 +23,13 @@ constexpr bool IsHall(SceneKind kind) {
 struct SceneOptions {
   SceneKind kind = SceneKind::kHall;
   uint64_t seed = 1;  // changes everything
-  // Points of the paths the scene must contain and stay clear of. Without any, the paths of
-  // path_generator.h are kept clear. The scene depends on them: recordings of one scene need the
-  // same ones.
+  // Points of the paths, which the scene must contain and keep clear. If empty, the paths of
+  // path_generator.h are kept clear. The scene depends on these points: recordings of one scene
+  // need the same ones.
   std::vector<Eigen::Vector3d> keep_clear;
   double clearance_m = 0.8;
-  // Multiplies the size of a texel: above 1 the scene is built faster and looks softer close up.
+  // Factor on the size of a texel: above 1 the scene is built faster, but near surfaces look
+  // blurred.
   double coarseness = 1.0;
 };
 

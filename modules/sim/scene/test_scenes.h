@@ -9,8 +9,8 @@
 
 namespace pangea::sim {
 
-// An empty room of 10 m around the origin, all in one grey but for a disc on the wall x = 5, centre
-// (5, 0.8, 0.4).
+// An empty room of 10 m around the origin, in a single grey except for a disc on the wall x = 5,
+// centre (5, 0.8, 0.4).
 inline const Eigen::Vector3d kDisc(5, 0.8, 0.4);
 
 inline Scene RoomWithDisc(int grey, int disc_grey) {
@@ -19,7 +19,7 @@ inline Scene RoomWithDisc(int grey, int disc_grey) {
   scene.room_min.setConstant(-5);
   scene.room_max.setConstant(5);
   cv::Mat plain(8, 8, CV_8U, cv::Scalar(grey));
-  // Anti-aliased: a texel's share of the disc.
+  // Anti-aliased: the share of the texel covered by the disc.
   cv::Mat wall(1000, 1000, CV_8U);
   constexpr double kRadius = 0.08;
   for (int y = 0; y < wall.rows; ++y) {

@@ -75,14 +75,14 @@ inline float Texture::Bilinear(const Level& level, float x, float y) const {
 
 float Texture::Sample(const Footprint& f) const {
   constexpr float kMaxTaps = 4;
-  // Taps stand up to one and a half pixels apart.
+  // Taps are up to one and a half pixels apart.
   const float wanted = std::clamp(0.67f * f.major / f.minor + 0.5f, 1.0f, kMaxTaps);
   const int taps = static_cast<int>(wanted);
   const float size = std::max(f.minor, f.major / static_cast<float>(taps));
   const float lod = std::clamp(FastLog2(std::max(size * texels_per_m_, 1.0f)), 0.0f,
                                static_cast<float>(levels_.size() - 1));
   const int fine = static_cast<int>(lod);
-  // Blended only near the middle between two levels: most look-ups need one level alone.
+  // Blends levels only near the middle between two: most look-ups need a single level.
   const float fraction = lod - static_cast<float>(fine);
   const float blend = std::clamp(2.5f * (fraction - 0.3f), 0.0f, 1.0f);
   const Level& a = levels_[static_cast<size_t>(fine)];

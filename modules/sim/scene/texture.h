@@ -1,6 +1,6 @@
 #pragma once
 
-// Grey textures with box-filtered mip levels, sampled so that nothing finer than a pixel remains:
+// Grey textures with box-filtered mip levels. Sampling removes detail finer than a pixel:
 // trilinear, with up to four samples along the longer axis of the pixel's footprint.
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace pangea::sim {
 
-// What one pixel covers on a surface, in metres of the surface's own coordinates.
+// The area that one pixel covers on a surface, in the surface's own coordinates, metres.
 struct Footprint {
   float u = 0, v = 0;              // centre
   float major_u = 1, major_v = 0;  // unit direction of the longer axis
@@ -19,7 +19,7 @@ struct Footprint {
 class Texture {
  public:
   Texture() = default;
-  // `image` is 8-bit grey. A repeating one must have sides that are powers of two.
+  // `image` is 8-bit grey. If `repeat`, its sides must be powers of two.
   Texture(const cv::Mat& image, float texel_m, bool repeat);
 
   // Mean grey over the footprint, 0 .. 255.
