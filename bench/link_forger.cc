@@ -1,8 +1,8 @@
 // pangea-link-forger: floods a link bus with forged packets while a command (a session) runs, and
-// returns what the command returns. For bench/link and its metrics only.
+// returns the command's exit code. Only for bench/link.
 //
-// It knows no key. It makes up packets, repeats those it has overheard, late, changes them, turns
-// them back, and puts them under another agent's name.
+// It has no key. It invents packets, and takes overheard ones: replays them late, modifies them,
+// reflects them to the sender, and sends them under another agent's name.
 
 #include <fmt/format.h>
 #include <signal.h>
@@ -24,7 +24,7 @@ namespace {
 constexpr size_t kRemembered = 4000;
 constexpr size_t kLargest = 1450;
 constexpr int kBatch_us = 2000;
-// The session looks first whether its ports are free.
+// Wait, because the session first checks that its ports are free.
 constexpr int64_t kListenAfter_us = 5'000'000;
 
 struct Packet {
@@ -78,7 +78,7 @@ class Forger {
       case 3:
         packet.channel = channels::LinkUp(static_cast<int32_t>(60'000 + rng_() % 1000));
         break;
-      default:  // as it was
+      default:  // unchanged
         break;
     }
     return packet;

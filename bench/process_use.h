@@ -1,6 +1,6 @@
 #pragma once
 
-// What this process uses, for benches: heap and CPU.
+// Heap and CPU use of this process, for benches.
 
 #include <malloc.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Heap and CPU of several cores in one process, by the name of the process that each would be.
+// Heap and CPU of several cores in one process, by the name of the process to which each belongs.
 
 #include <map>
 #include <string>
@@ -17,13 +17,13 @@ struct Use {
 
 class UseByProcess {
  public:
-  // What `work` returns; what it used is the process'.
+  // Runs `work`, adds its use to that of `process`, and returns its result.
   template <typename Work>
   auto Measure(const std::string& process, const Work& work) {
     const double heap = HeapBytes(), cpu_ms = CpuMs();
     const auto account = [&] {
       Use& use = use_[process];
-      // The CPU first: HeapBytes takes longer the more pieces the heap is in.
+      // CPU first: HeapBytes takes longer for a fragmented heap.
       use.cpu_ms += CpuMs() - cpu_ms;
       use.heap_bytes += HeapBytes() - heap;
     };
@@ -37,7 +37,7 @@ class UseByProcess {
     }
   }
 
-  // The CPU is that since it was last asked.
+  // cpu_ms is that since the last call.
   std::map<std::string, Use> Take() {
     std::map<std::string, Use> use = use_;
     for (auto& [process, own] : use_) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Runs the built programs as a user would, and looks at what they leave.
+// Runs the built programs like a user, and reads their output.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -16,7 +16,7 @@ struct Outcome {
   std::string output;  // stdout and stderr
 };
 
-// A shell command with the build's bin folder first on PATH.
+// Runs a shell command with the build's bin folder first on PATH.
 Outcome RunCommand(const std::string& command);
 
 // An empty folder for one test.
@@ -24,15 +24,15 @@ std::filesystem::path FreshFolder(const std::string& name);
 std::string ReadFile(const std::filesystem::path& path);
 nlohmann::json ReadJson(const std::filesystem::path& path);
 
-// Root mean square of the distances between the keyframes of two TUM files in one frame; infinite
-// when the first does not exist or they are not the same keyframes.
+// Root mean square distance, metres, between the keyframes of two TUM files in the same frame;
+// infinite if the first does not exist, or if the keyframes are not the same.
 double Distance_m(const std::filesystem::path& got, const std::filesystem::path& expected);
 
-// The recording walk_1 or walk_2: two walks of 14 s through one hall at half size, which ctest has
-// rendered before (the fixture `walks` in CMakeLists.txt).
+// The recording walk_1 or walk_2: walks of 14 s through one hall, at half the image size, rendered
+// by ctest (the fixture `walks` in CMakeLists.txt).
 std::filesystem::path Walk(int walk);
 
-// A session of agents 1, 2, ... with these recordings; returns the file.
+// Writes a session file with agents 1, 2, ... and these recordings; returns its path.
 std::filesystem::path WriteSession(const std::filesystem::path& folder,
                                    const std::vector<std::string>& agents);
 

@@ -1,6 +1,6 @@
-// Heap, resident memory and CPU of the cores of the server's processes against the number of
-// keyframes: stored keyframes are played again and again under new map ids, each time with other
-// bits of every descriptor flipped, as another visit would see the place.
+// Measures heap, resident memory and CPU of the server's cores over the number of keyframes: stored
+// keyframes are played repeatedly with new map ids, each time with different flipped bits in every
+// descriptor, like another visit of the place.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -31,7 +31,7 @@ namespace pangea::bench {
 namespace {
 
 constexpr int kFlippedBits = 20;  // of 256
-// Two logs may have the same map ids.
+// Offset of agent ids, because two logs may have the same map ids.
 constexpr int32_t kAgentsOfALog = 100;
 
 std::vector<session::LoggedKeyframe> ReadAll(const std::vector<std::string>& logs) {
@@ -79,10 +79,10 @@ double ResidentBytes() {
   return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-// A core that takes keyframes. `look` is what it does with them later, where that is measured.
+// A core that takes keyframes. `look`: its later work on them, if that is measured.
 struct Subject {
   std::function<void(const Keyframe&)> take;
-  std::function<uint64_t(const Keyframe&)> look = {};  // a hash of what it said
+  std::function<uint64_t(const Keyframe&)> look = {};  // a hash of the result
 };
 
 uint64_t HashOf(const PlaceMatch& match) {

@@ -6,7 +6,7 @@
 namespace pangea::bench {
 namespace {
 
-// Counts up what passes, one after the other.
+// Accumulates the candidates that pass, one after another.
 class Count {
  public:
   explicit Count(const std::vector<KeyframeId>& with_overlap)

@@ -2,8 +2,8 @@
 
 // Precision and recall of one stage.
 //
-// Precision: the share of what passes that is right. Recall: of the keyframes that have a place to
-// be recognised, the share for which at least one right candidate passes.
+// Precision: the share of right candidates among those that pass. Recall: among the keyframes with
+// a place to be recognised, the share for which at least one right candidate passes.
 
 #include <vector>
 
@@ -14,23 +14,23 @@ namespace pangea::bench {
 // A candidate at one stage.
 struct Scored {
   KeyframeId query;
-  double score = 0;  // the higher, the surer the stage is
+  double score = 0;  // higher: the stage is more certain
   bool right = false;
-  bool passed = false;  // as the system decides
+  bool passed = false;  // by the system's own decision
 };
 
 struct PrecisionRecall {
   size_t passed = 0;
-  size_t right = 0;  // of those
-  size_t found = 0;  // keyframes with a right one among those
+  size_t right = 0;  // right ones among those that passed
+  size_t found = 0;  // keyframes with at least one right candidate that passed
   double precision = 0;
   double recall = 0;
 };
 
-// As the system decides. `with_overlap`: the keyframes that have a place to be recognised.
+// For the system's own decisions. `with_overlap`: the keyframes with a place to be recognised.
 PrecisionRecall AsDecided(const std::vector<Scored>& scored,
                           const std::vector<KeyframeId>& with_overlap);
-// If instead all passed whose score is at least a threshold: for each score that occurs, highest
+// For decisions by a threshold on the score instead: one entry per score that occurs, highest
 // first.
 std::vector<PrecisionRecall> OverThresholds(std::vector<Scored> scored,
                                             const std::vector<KeyframeId>& with_overlap);

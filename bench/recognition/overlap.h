@@ -1,12 +1,12 @@
 #pragma once
 
-// How much two keyframes truly see of the same, from ground truth.
+// Computes, from ground truth, how much the views of two keyframes overlap.
 //
-// A keyframe's map points (its corners with a depth) are placed by its true pose. Such a point is
-// seen from another keyframe if it falls into its image, from a direction no more than 45 degrees
-// from where the first saw it, at half to twice the distance: further apart no descriptor is meant
-// to match. The overlap of two keyframes is the mean of the two shares of points that the other
-// sees. Walls in between are not looked for.
+// A keyframe's map points (corners with a depth) are placed by its true pose. Another keyframe sees
+// such a point if it projects into the image, at an angle of at most 45 degrees to the first line
+// of sight, and at half to twice the distance: beyond that, descriptors are not expected to match.
+// The overlap of two keyframes is the mean of the two shares of points that the other one sees.
+// Occlusion by walls is not considered.
 
 #include <Eigen/Core>
 #include <vector>
@@ -15,10 +15,10 @@
 
 namespace pangea::bench {
 
-// From here on a place is the right one.
+// A candidate is right if the overlap is at least this.
 inline constexpr double kRightOverlap = 0.25;
 
-// What a keyframe sees, in the ground truth's frame.
+// The view of a keyframe, in the ground truth's frame.
 struct View {
   CameraModel camera;
   Rigid3 T_reference_cam;

@@ -1,5 +1,5 @@
-// Precision and recall on hand-made answers, overlap on known views, and the whole way on the
-// captured session.
+// Tests precision and recall on hand-made candidates, overlap on known views, and the whole
+// pipeline on the captured session.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 KeyframeId Id(int32_t seq) { return {{1, 1000}, seq}; }
 
-// Keyframes 1 to 4 have a place; 5 has none, so nothing can be right about it.
+// Keyframes 1 to 4 have a place to be recognised; 5 has none, so no candidate of it can be right.
 const std::vector<KeyframeId> kWithOverlap = {Id(1), Id(2), Id(3), Id(4)};
 const std::vector<Scored> kScored = {
     {Id(1), 0.9, true, true},  {Id(1), 0.8, true, true},   {Id(2), 0.8, false, true},
@@ -89,8 +89,8 @@ TEST(Overlap, EndsWhereDistancesDifferTooMuch) {
   EXPECT_EQ(Overlap(here, WallView({Eigen::Quaterniond::Identity(), {0, 0, -9}}, {})), 0);
 }
 
-// Two walks through one hall. The reference is what the session must replay to, some centimetres
-// from the truth: nothing beside the metres and tens of degrees that overlap is about.
+// Two walks through one hall. The reference is the expected result of the replay, some centimetres
+// from the truth: negligible for overlaps, which are a matter of metres and tens of degrees.
 TEST(Recognition, FindsWhereTwoWalksMeet) {
   const std::string sample = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks";
   const std::string log = sample + "/session.lcm";

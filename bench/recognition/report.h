@@ -1,6 +1,7 @@
 #pragma once
 
-// What pangea-recognition-bench writes: a table, the curves, and a row for every place looked at.
+// Output of pangea-recognition-bench: a table, the curves, and one row for every place that was
+// checked.
 
 #include <filesystem>
 #include <string>
@@ -11,8 +12,9 @@ namespace pangea::bench {
 
 // Markdown.
 std::string Table(const Outcome& outcome);
-// own_map.png and other_maps.png: precision over recall, a dot where the system decides; no picture
-// of a search that has nothing to find. Throws std::runtime_error when gnuplot fails.
+// Writes own_map.png and other_maps.png: precision over recall, with a dot for the system's own
+// decision; no picture for a search without any place to be recognised. Throws std::runtime_error
+// if gnuplot fails.
 void WriteCurves(const Outcome& outcome, const std::filesystem::path& folder);
 std::string Csv(const Outcome& outcome);
 

@@ -64,7 +64,7 @@ class Stages {
     return known;
   }
 
-  // As place recognition has it: what odometry still connects is no place seen again.
+  // The same criterion as in place recognition: a recent keyframe is not a revisited place.
   bool IsRecent(const Known& query, const Known& other) const {
     return query.id.seq - other.id.seq < PlaceRecognition::kMinSeqGap ||
            std::any_of(query.landmarks.begin(), query.landmarks.end(),
@@ -116,7 +116,7 @@ class Stages {
 
   const std::map<int32_t, Trajectory>& truth_;
   PlaceRecognition recognition_{PlaceRecognitionOptions{}};
-  // Every candidate on its own: none is redundant.
+  // Every candidate is verified: none is redundant.
   static constexpr KnownConstraintOptions kVerifyAll{.min_gain_bits = 0};
   InterMapBa intra_{InterMapBaOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
   Fusion inter_{FusionOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
@@ -124,7 +124,7 @@ class Stages {
   Outcome outcome_;
 };
 
-// Nothing for what did not come to the stage.
+// Empty if the place did not reach the stage.
 std::optional<Scored> ScoredAt(const Retrieved& retrieved, size_t stage) {
   const bool right = retrieved.overlap >= kRightOverlap;
   const bool placed = retrieved.pnp_inliers >= LoopVerificationOptions{}.min_pnp_inliers;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Place recognition and the two verifiers of its candidates run over keyframes in order, and every
-// place looked at is followed through the four stages: retrieval, epipolar check, PnP, window BA.
+// Runs place recognition and the two verifiers on keyframes in order, and follows every place that
+// was checked through the four stages: retrieval, epipolar check, PnP, window BA.
 
 #include <array>
 #include <map>
@@ -14,41 +14,43 @@
 
 namespace pangea::bench {
 
-// Where a place is looked for.
+// The maps in which a place is searched.
 enum class Search { kOwnMap, kOtherMaps };
 inline constexpr std::array kSearches = {Search::kOwnMap, Search::kOtherMaps};
 std::string ToString(Search search);
 
-// A place looked at for a keyframe, and how far it came.
+// A place that was checked for a keyframe, and its results in the stages.
 struct Retrieved {
   KeyframeId query, match;
-  double overlap = 0;  // true (overlap.h)
+  double overlap = 0;  // from ground truth (overlap.h)
   float score = 0;     // retrieval
   int epipolar_inliers = 0;
-  bool verified = false;   // the epipolar check lets it pass
-  bool published = false;  // and it is among the best of those
+  bool verified = false;   // passed the epipolar check
+  bool published = false;  // among the best that passed
   int pnp_inliers = 0;
   int landmarks = 0;  // inliers of the window BA
   bool accepted = false;
-  double error_m = 0;  // of the pose that the window BA found, if it has landmarks
+  double error_m = 0;  // error of the pose by the window BA, if landmarks > 0
   double error_rad = 0;
 
-  bool right_pose() const;  // to 0.5 m and 5 degrees
+  bool right_pose() const;  // error below 0.5 m and 5 degrees
 };
 
 struct Outcome {
   size_t keyframes = 0;  // with ground truth
-  // Keyframes of which an earlier one truly shows the same, recent ones of their own map left out.
+  // Keyframes with an earlier keyframe that truly overlaps, not counting recent ones of their own
+  // map.
   std::map<Search, std::vector<KeyframeId>> with_overlap;
   std::vector<Retrieved> retrieved;
 };
 
-// `truth` is by agent, all of it in one frame; keyframes without a true pose are recognised but not
+// `truth`: by agent, all in one frame. Keyframes without a true pose are recognised, but not
 // counted.
 Outcome RunStages(const std::vector<Keyframe>& keyframes,
                   const std::map<int32_t, Trajectory>& truth);
 
-// What a stage says of those that came to it; `score`: retrieval score, or its inliers.
+// The candidates that reached a stage, with its decision. `score`: retrieval score, or number of
+// inliers.
 inline constexpr std::array kStages = {"retrieval", "epipolar", "PnP", "window BA"};
 std::vector<Scored> AtStage(const Outcome& outcome, Search search, size_t stage);
 

@@ -1,8 +1,8 @@
-// A journal of as many keyframes as are asked for, made of a recorded one: its maps come again and
-// again under new ids, as if agents had walked there on further days. Each time other bits of every
-// descriptor are flipped, as another visit would see the place. Place matches and verification
-// results come along; and what fused two maps of a visit also holds between one of them and the
-// other of the visit before, so all is one group.
+// Makes a journal with a given number of keyframes from a recorded one: its maps are repeated with
+// new ids, as if agents had walked there on further days. Each time different bits of every
+// descriptor are flipped, like another visit of the place. Place matches and verification results
+// are copied; the constraints that fuse two maps of a visit are also copied between one of them and
+// the other map of the previous visit, so that everything is one group.
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ namespace pangea::bench {
 namespace {
 
 constexpr int kFlippedBits = 20;                   // of 256
-constexpr int64_t kVisit_us = 24 * 3'600'000'000;  // from one to the next
+constexpr int64_t kVisit_us = 24 * 3'600'000'000;  // from one visit to the next
 
 struct Event {
   int64_t utime = 0;
@@ -77,7 +77,7 @@ class Visits {
 
   int64_t num_keyframes() const { return num_keyframes_; }
 
-  // As much of the visit as still fits.
+  // Adds as much of the visit as max_keyframes allows.
   void Add(int visit, int64_t max_keyframes) {
     for (const Event& event : events_) {
       if (event.channel == channels::kPlaceMatch) {

@@ -21,7 +21,7 @@ constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
 constexpr double kCell_m = 2;
 constexpr double kWrong_m = 0.5;
 constexpr double kWrong_rad = 5 * M_PI / 180;
-// From a hall to the next, and how well a door tells it.
+// Distance from one hall to the next, and sigmas of the constraint through a door.
 constexpr double kHall_m = 30, kDoorSigma_m = 0.1, kDoorSigma_rad = 0.02;
 
 template <typename Message>
@@ -50,7 +50,7 @@ Descriptor MaskOf(int hall) {
   return mask;
 }
 
-// One of `every` cells along each axis.
+// Whether a point is in one of `every` cells along each axis.
 bool InModelCell(const Eigen::Vector3d& p_map, int every) {
   const auto cell = static_cast<int64_t>((p_map / kCell_m).array().floor().sum());
   return (cell % every + every) % every == 0;
@@ -189,7 +189,7 @@ void City::SetLook(int map, int hall, std::vector<Keyframe>* keyframes) const {
 
 std::vector<Keyframe> City::Walk(int map, int hall, int visit) const {
   const MapId id = At(hall, visit, {maps_[map], 0}).map;
-  // Every map has a seed of its own.
+  // Each map has its own seed.
   const uint64_t seed = StableHash(KeyframeId{id, 0}, KeyframeId{id, 0}, 0);
   std::vector<Keyframe> keyframes = VisitAgain(of_map_[map], id.opened_utime, seed);
   for (Keyframe& keyframe : keyframes) {
@@ -201,7 +201,7 @@ std::vector<Keyframe> City::Walk(int map, int hall, int visit) const {
 
 std::vector<Keyframe> City::Walk(int hall, int visit) const { return Walk(0, hall, visit); }
 
-// The recorded verification, between the visit and the one before it too.
+// The recorded verification results, also between this visit and the previous one.
 std::vector<Constraint> City::ResultsAt(int hall, int visit, const Step& recorded) const {
   std::vector<Constraint> results;
   for (Constraint result : recorded.results) {

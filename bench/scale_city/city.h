@@ -1,16 +1,15 @@
 #pragma once
 
-// A city of halls, made of one recorded hall: as many as are asked for, each visited several times.
+// Simulates a city of many halls from one recorded hall, each visited several times.
 //
-// Every hall is the recorded one with a look of its own: its descriptors are the recorded ones,
-// with the bits of one random mask flipped. Within a hall distances of descriptors stay as they
-// were, and two halls have no more in common than chance. Each visit is the recorded walks under
-// new map ids with fresh noise (visits/visit.h); the place matches and verification results of the
-// recording come along, and hold between a visit and the one before it too, so that a hall is one
-// group.
+// Every hall is the recorded one with its own appearance: its descriptors are the recorded ones,
+// with the bits of one random mask flipped. Within a hall the distances between descriptors are
+// unchanged, and two halls are similar only by chance. A visit is a copy of the recorded walks with
+// new map ids and new noise (visits/visit.h). The recording's place matches and verification
+// results are copied too, also between a visit and the previous one, so that a hall is one group.
 //
-// Some halls look like the one before them: of a part of their landmarks, those in every second (or
-// third ...) cell of space, the look is that hall's. What else ought to be seen there is not.
+// Some halls resemble the previous hall: part of their landmarks, those in every second (or third,
+// ...) cell of space, have the appearance of that hall. The other landmarks differ.
 
 #include <cstdint>
 #include <map>
@@ -24,13 +23,14 @@
 namespace pangea::bench {
 
 struct CityOptions {
-  int alike_every = 8;  // of so many halls the second looks like the first; 0: none
-  int alike_cells = 2;  // so far: one of so many cells of it
-  // Halls are rooms of one building: a constraint, given as known, leads from each to the next.
+  // in every group of this many halls, the second resembles the first; 0: none
+  int alike_every = 8;
+  int alike_cells = 2;  // one in this many cells is alike
+  // Halls are rooms of one building: a known constraint connects each to the next.
   bool joined = false;
 };
 
-// A keyframe and what the server made of it.
+// A keyframe with its match and verification results.
 struct Step {
   Keyframe keyframe;
   PlaceMatch match;
@@ -39,22 +39,22 @@ struct Step {
 
 class City {
  public:
-  // `log`: with keyframes, matches and verification results. Throws std::runtime_error.
+  // `log`: contains keyframes, matches and verification results. Throws std::runtime_error.
   City(const std::string& log, const CityOptions& options);
 
-  // In the order of the recording.
+  // A visit's keyframes with their results, in the order of the recording.
   std::vector<Step> Visit(int hall, int visit) const;
-  // Of the recording's first map, as one agent that comes for the first time: without what the
-  // server makes of it.
+  // The keyframes of the recording's first map, as a new agent: without matches and results.
   std::vector<Keyframe> Walk(int hall, int visit) const;
   int keyframes_a_visit() const { return static_cast<int>(recorded_.size()); }
 
-  // The hall that a part of this one looks like.
+  // The hall that this one resembles; empty if none.
   std::optional<int> ModelOf(int hall) const;
   int HallOf(const MapId& map) const;
-  // In its hall; of all visits the same, which the recording's own solution tells.
+  // The true pose in its hall, the same for all visits: from the pose graph's solution of the
+  // recording.
   const Rigid3& Truth(const KeyframeId& id) const;
-  // An accepted one that joins two halls, or is off by more than 0.5 m or 5 degrees.
+  // Whether an accepted constraint joins two halls, or has an error above 0.5 m or 5 degrees.
   bool IsWrong(const Constraint& constraint) const;
 
  private:
@@ -64,7 +64,7 @@ class City {
 
   void Read(const std::string& log);
   void Solve();
-  // The same of an accepted one of the recording.
+  // The same for an accepted constraint of the recording.
   bool IsOff(const Constraint& recorded) const;
   void FindCells();
   int MapIndex(const MapId& map) const {
@@ -80,8 +80,8 @@ class City {
   CityOptions options_;
   std::vector<Step> recorded_;
   std::vector<MapId> maps_;                    // of the recording
-  std::vector<std::vector<Keyframe>> of_map_;  // by index of the map, ascending seq
-  std::vector<Landmarks> landmarks_;           // the same
+  std::vector<std::vector<Keyframe>> of_map_;  // by map index; ascending seq
+  std::vector<Landmarks> landmarks_;           // by map index
   std::map<KeyframeId, Rigid3> truth_;         // of the recording
 };
 

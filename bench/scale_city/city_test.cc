@@ -9,7 +9,7 @@
 namespace pangea::bench {
 namespace {
 
-constexpr int kVisitNoise = 20;  // bits at most, of two visits
+constexpr int kVisitNoise = 20;  // maximum different bits between two visits
 const char* const kLog = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
 
 class CityTest : public testing::Test {

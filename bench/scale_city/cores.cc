@@ -78,7 +78,7 @@ void Cores::Tell(const PoseGraphUpdate& update) {
     states_.Take(state);
     use_.Measure("place_recognition", [&] { recognition_->Take(state); });
     use_.Measure("map_points", [&] { map_points_->Take(state); });
-    // Groups as the city had them were adjusted long ago.
+    // The city's groups were adjusted long ago.
     if (started_) {
       use_.Measure("global_ba", [&] { global_ba_->Take(state); });
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// The cores of the server's processes in one process, each measured by itself.
+// The cores of the server's processes in one process, each measured separately.
 
 #include <map>
 #include <memory>
@@ -22,25 +22,25 @@ namespace pangea::bench {
 
 class Cores {
  public:
-  // `recognition_alone`: the others get nothing.
+  // `recognition_alone`: the other cores get no input.
   Cores(bool recognition_alone, const GlobalBaOptions& global_ba);
 
-  // As from a journal.
+  // Adds a keyframe with its results, as from a journal.
   void Remember(const Step& step);
-  // Every group is solved, and its keyframes count as adjusted: the city has been there for long.
-  // `adjust`: they are.
+  // Solves every group, and marks its keyframes as adjusted, as in a city that has existed for
+  // long. `adjust`: adjusts them really.
   void Start(bool adjust);
 
-  // The keyframe as it comes from an agent, and the results of its candidates.
+  // Processes a keyframe from an agent; returns the results of its candidates.
   std::vector<Constraint> Take(const Keyframe& keyframe);
-  // What follows when nothing more comes: all is solved anew and the groups that changed since
-  // Start are adjusted.
+  // The work when no more messages come: solves everything anew, and adjusts the groups that have
+  // changed since Start.
   void Quiet();
 
-  // The newest state of the map's group; null before there is any.
+  // The newest state of the map's group; null if there is none yet.
   const MapState* StateOf(const MapId& map) const { return states_.Find(map); }
   std::map<std::string, Use> TakeUse() { return use_.Take(); }
-  // CPU of the pose graph's longest work on a keyframe since it was last asked.
+  // CPU time of the pose graph's longest work on a keyframe since the last call.
   double TakeLongestSolve_ms() { return std::exchange(longest_solve_ms_, 0); }
 
  private:

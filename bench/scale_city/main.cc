@@ -1,8 +1,8 @@
-// What a keyframe costs the server's cores when a city of so many keyframes is there already, and
-// how well an agent finds its hall in it. One line of JSON.
+// Measures the cost of a keyframe for the server's cores in a city of many keyframes, and how well
+// an agent finds its hall. Prints one line of JSON.
 //
-// The city (city.h) is remembered as from a journal. Then agents come, one after the other, each
-// into a hall of its own; what is measured is theirs.
+// The city (city.h) is loaded as from a journal. Then agents come one after another, each into
+// another hall; the metrics are for them.
 
 #include <fmt/format.h>
 
@@ -60,7 +60,7 @@ class Bench {
           {"kept_kb_a_keyframe", 1e-3 * use.heap_bytes / (int64_t{halls} * a_hall)},
           {"known_ms_a_keyframe", use.cpu_ms / (int64_t{halls} * a_hall)}};
     }
-    // The same halls whatever the city's size, two of them alike.
+    // The same halls for every size of the city; two of them are alike.
     for (int hall = 0; hall < std::min(arguments_.agents, halls); ++hall) {
       out["agents"].push_back(Come(hall));
     }
@@ -121,7 +121,7 @@ class Bench {
             {"joint_ate_m", JointAte(map)}};
   }
 
-  // That the map's group reaches into.
+  // Number of other halls in the map's group.
   int NumOtherHalls(const MapId& map) const {
     std::set<int> halls{city_.HallOf(map)};
     if (const MapState* state = cores_.StateOf(map)) {
@@ -132,7 +132,7 @@ class Bench {
     return static_cast<int>(halls.size()) - 1;
   }
 
-  // Of the hall's maps.
+  // Joint ATE of the hall's maps.
   double JointAte(const MapId& map) const {
     const MapState* state = cores_.StateOf(map);
     std::map<MapId, std::vector<PosePair>> pairs;

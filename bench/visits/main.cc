@@ -1,7 +1,8 @@
-// A hundred visits of one hall: keyframes kept, memory and CPU of the server's cores, recall and
-// accuracy against the number of visits, thinned now and then.
+// Measures, over a hundred visits of one hall with regular thinning: kept keyframes, memory and CPU
+// of the server's cores, recall and accuracy.
 //
-// A visit is a recording's stored keyframes with fresh noise (visit.h), a day after the one before.
+// A visit consists of a recording's stored keyframes with new noise (visit.h), one day after the
+// previous visit.
 
 #include <fmt/format.h>
 
@@ -22,7 +23,7 @@ namespace {
 
 constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
 constexpr int64_t kFirst_utime = 1'790'000'000'000'000;
-// Of an accepted constraint that is wrong (bench/README.md).
+// An accepted constraint with a larger error is wrong (bench/README.md).
 constexpr double kWrong_m = 0.5;
 constexpr int64_t kTruthGap_us = 100'000;
 
@@ -45,9 +46,9 @@ std::vector<Recording> ReadRecordings(const std::vector<std::string>& logs,
 struct Row {
   int visit = 0;
   size_t keyframes = 0, maps = 0, constraints = 0;
-  std::map<std::string, Use> use;  // of the CPU, of this visit
+  std::map<std::string, Use> use;  // CPU: of this visit
   size_t new_keyframes = 0, recognised = 0, wrong = 0;
-  double joint_m = 0, newest_m = 0;  // ATE of all keyframes, of the newest visit's among them
+  double joint_m = 0, newest_m = 0;  // joint ATE of all keyframes; part of the newest visit
   size_t groups = 0;
   double thin_ms = 0;
 };
@@ -83,7 +84,7 @@ class Bench {
     return row;
   }
 
-  // An hour after a visit.
+  // Thins the journal one hour after a visit.
   void Thin(const Thinning::Options& options, Row* row) {
     const double begin = CpuMs();
     server_.reset();

@@ -1,7 +1,7 @@
 #pragma once
 
-// The cores of the server over many visits, and the journal they would have: what a thinning leaves
-// of it is what they start with again.
+// The cores of the server over many visits, with their journal; after a thinning they start again
+// from the thinned journal.
 
 #include <map>
 #include <memory>
@@ -26,27 +26,27 @@ struct Journal {
     PlaceMatch match;
     int64_t journalled_utime = 0;
   };
-  std::vector<std::vector<Entry>> maps;  // the oldest first; ascending seq
+  std::vector<std::vector<Entry>> maps;  // the oldest map first; ascending seq
   std::map<int64_t, Constraint> constraints;
 
   size_t num_keyframes() const;
   size_t num_accepted() const;
-  // As pangea-site does with the events of a file; what it left out and put in.
+  // Thins the journal as pangea-site does; returns the removed keyframes and the new constraints.
   ThinnedMaps Thin(const Thinning::Options& options, int64_t now_utime);
 };
 
 class Server {
  public:
-  // With what the journal has.
+  // Starts from the contents of a journal.
   explicit Server(const Journal& journal);
 
-  // The keyframe as it comes from an agent; what follows goes into the journal too. The results of
-  // its candidates.
+  // Processes a keyframe from an agent, and adds it with its results to the journal. Returns the
+  // results of its candidates.
   std::vector<Constraint> Take(const Keyframe& keyframe, Journal* journal);
-  // Every group from the beginning.
+  // Solves every group from the beginning.
   void Finish();
 
-  // By process; of the CPU since it was last asked.
+  // By process; cpu_ms is that since the last call.
   std::map<std::string, Use> TakeUse() { return use_.Take(); }
   std::vector<MapState> States() const { return graph_->States(); }
 

@@ -8,7 +8,7 @@
 namespace pangea::bench {
 namespace {
 
-constexpr double kPixelSigma = 0.3;  // at octave 0, beside what the recording has
+constexpr double kPixelSigma = 0.3;  // on octave 0, in addition to the recording's noise
 constexpr int kFlippedBits = 10;     // of 256
 constexpr float kMinInverseDepth = 1e-3F;
 
@@ -35,7 +35,8 @@ void AddNoise(const CameraModel& camera, Noise* noise, Corner* corner) {
   }
 }
 
-// The odometry's drift so far, in odom: of yaw and position, as gravity holds the rest.
+// The accumulated drift of the odometry, in odom: yaw and position; gravity determines roll and
+// pitch.
 class Walk {
  public:
   Rigid3 Step(const Keyframe& keyframe, const Rigid3& T_odom_previous, Noise* noise) {
@@ -47,7 +48,7 @@ class Walk {
     const Vector6d error = L.matrixL() * white;
     const double yaw = (T_odom_previous.q * Eigen::Vector3d(error.tail<3>())).z();
     const Eigen::Quaterniond rotation = YawRotation(yaw);
-    // About where the edge begins.
+    // The rotation is about the begin of the edge.
     const Eigen::Vector3d shift = T_odom_previous.q * Eigen::Vector3d(error.head<3>()) +
                                   T_odom_previous.t - rotation * T_odom_previous.t;
     drift_ = drift_ * Rigid3(rotation, shift);

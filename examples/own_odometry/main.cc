@@ -23,7 +23,7 @@ struct Arguments {
   std::string recording, poses, bus, out_keyframes;
 };
 
-// As fast as the server keeps up; a live odometry calls AddImage from its camera's callback
+// Plays as fast as the server keeps up. A live odometry calls AddImage from its camera's callback
 // instead.
 void Play(const Arguments& arguments) {
   const EurocRecording recording(arguments.recording);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where make_corpus writes: a folder for each fuzz target.
+// The output of make_corpus: one folder per fuzz target.
 
 #include <filesystem>
 #include <string>
@@ -25,7 +25,7 @@ class Corpus {
   std::filesystem::path folder_;
 };
 
-// The seeds that are texts: files of options, requests to the anchors' API, recordings.
+// Adds the seeds that are texts: options files, requests to the anchors' API, recordings.
 void AddTexts(const Corpus& corpus);
 
 }  // namespace pangea::fuzz

@@ -1,9 +1,9 @@
 #pragma once
 
-// What the fuzz targets share. A target is one function of bytes, in a file fuzz_<name>.cc:
-// whatever the bytes, it must not crash, hang, leak or let memory grow, and what it accepts must
-// keep its promises (Require). Clang's libFuzzer drives it (scripts/fuzz); in every other build
-// replay_main.cc feeds it the corpus.
+// Common parts of the fuzz targets. A target is a function of bytes, in a file fuzz_<name>.cc. For
+// any bytes, it must not crash, hang, leak or let memory grow, and accepted input must fulfil the
+// checked promises (Require). Clang's libFuzzer drives it (scripts/fuzz); in every other build
+// replay_main.cc runs it on the corpus.
 
 #include <cstdint>
 #include <deque>
@@ -19,12 +19,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace pangea::fuzz {
 
-// Ends the process, and so is found, if it does not hold.
+// Aborts the process if the promise does not hold, so that the fuzzer reports it.
 void Require(bool holds, const char* promise);
 
-// One message of an input that is a sequence of them: a byte (low four bits: the channel, high
-// four: how much time passes first), two bytes of length, little-endian, and so many of payload. A
-// length beyond the input's end stops there.
+// One message of an input that is a sequence of messages. Each is encoded as one byte (low four
+// bits: the channel; high four bits: the time that passes before it), two bytes of length,
+// little-endian, and the payload. A length beyond the end of the input is cut there.
 struct Step {
   int channel = 0;
   int64_t wait_us = 0;  // 1 ms to 33 s
@@ -43,15 +43,15 @@ template <typename Message>
 Channel ChannelOf(const std::string& name) {
   return {name, Message::getHash()};
 }
-// Number of the channel in the table; -1 if it is not there.
+// Index of the channel in the table; -1 if it is not there.
 int Find(const std::vector<Channel>& table, const std::string& channel);
 
-// Overwrites the first eight bytes: with any other fingerprint decoding ends at once, and so would
-// nearly all inputs.
+// Overwrites the first eight bytes: with a wrong fingerprint decoding fails at once, which would
+// waste nearly all inputs.
 void SetFingerprint(int64_t fingerprint, std::vector<uint8_t>* payload);
 
-// As LocalBus, but many times faster, since it knows no regular expressions but "[0-9]+" at the end
-// and ".*".
+// Like LocalBus, but many times faster: the only regular expressions it knows are "[0-9]+" at the
+// end, and ".*".
 class QuickBus : public Bus {
  public:
   void Publish(const std::string& channel, Bytes data) override;
@@ -61,7 +61,7 @@ class QuickBus : public Bus {
  private:
   struct Subscription {
     std::string prefix;
-    bool whole = true;  // the channel's name is the prefix
+    bool whole = true;  // the prefix must be the whole channel name
     Handler handler;
   };
   struct Message {
@@ -76,7 +76,7 @@ class QuickBus : public Bus {
 void Play(Bytes input, const std::vector<Channel>& table, QuickBus* bus,
           const std::function<void(int64_t wait_us)>& poll);
 
-// A folder of this process alone, in memory where the machine has that; gone at the end.
+// A folder only of this process, in memory if possible; removed at the end.
 const std::filesystem::path& ScratchFolder();
 void WriteFile(const std::filesystem::path& file, Bytes bytes);
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// What the two ends of the link listen to. What goes through the link is sealed, so that a
-// stranger's bytes end at the first check; HELLO, PIECE, LANDMARKS, ... are bodies that a harness
-// seals with the agent's key: what an agent or a server that has been taken over may send.
+// The input channels of the two ends of the link. Packets on the link are sealed, so a stranger's
+// bytes fail at the first check. HELLO, PIECE, LANDMARKS, ... are bodies that a harness seals with
+// the agent's key: messages that a compromised agent or server may send.
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an odometry on live sensors listens to.
+// The input channels of an odometry on live sensors.
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the server's processes listen to.
+// The input channels of the server's processes.
 
 #include <vector>
 
