@@ -48,7 +48,7 @@ class Walk {
     const Vector6d error = L.matrixL() * white;
     const double yaw = (T_odom_previous.q * Eigen::Vector3d(error.tail<3>())).z();
     const Eigen::Quaterniond rotation = YawRotation(yaw);
-    // The rotation is about the begin of the edge.
+    // The rotation is about the start of the edge.
     const Eigen::Vector3d shift = T_odom_previous.q * Eigen::Vector3d(error.head<3>()) +
                                   T_odom_previous.t - rotation * T_odom_previous.t;
     drift_ = drift_ * Rigid3(rotation, shift);

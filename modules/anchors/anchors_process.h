@@ -1,7 +1,7 @@
 #pragma once
 
-// KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT, HAVE in; ANCHOR_k, ANCHOR, OTHERS_k,
-// STATUS_anchors out.
+// In: KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT, HAVE. Out: ANCHOR_k, ANCHOR,
+// OTHERS_k, STATUS_anchors.
 //
 // Edits are applied in the journal's order. Missing ones are requested at ticks (RESEND_REQUEST,
 // answers on AGAIN_anchors); agent_handler repeats the newest one, so that lost edits at the end

@@ -1,6 +1,6 @@
 #pragma once
 
-// KEYFRAME_*, PLACE_MATCH (candidates of kind inter) in; CONSTRAINT, STATUS_fusion out.
+// In: KEYFRAME_*, PLACE_MATCH (candidates of kind inter). Out: CONSTRAINT, STATUS_fusion.
 
 #include <memory>
 

@@ -21,7 +21,7 @@ struct BaKeyframe {
   int camera = 0;  // index into BaWorld::cameras
   ImuState imu;    // "odom" is here the group's map frame
   // Preintegration and odometry edge from keyframe `previous` of the world to this one; -1 and
-  // empty at the begin of a map or of a part of it.
+  // empty at the start of a map or of a part of it.
   int previous = -1;
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;
@@ -32,7 +32,7 @@ struct BaKeyframe {
 // Variables shared by the keyframes of a map.
 struct BaCamera {
   Rigid3 T_body_cam;
-  double edge_log_scale = 0;  // the map's edges are too long by exp of it
+  double edge_log_scale = 0;  // the map's edges are too long by the factor exp(edge_log_scale)
   bool held = false;          // fixed; else edge_log_scale starts at zero
 };
 

@@ -76,7 +76,7 @@ class GlobalBa {
   // A complete state (not a chunk). For each map the state with the highest revision counts.
   void Take(MapState state);
 
-  // Whether a group is due or in work.
+  // Whether an adjustment is due or running.
   bool HasWork() const { return work_ != nullptr || NextDue() != nullptr; }
   // Does one piece of work, if there is any. Returns the refined state after the last piece.
   std::optional<MapState> Advance();

@@ -1,6 +1,6 @@
 #pragma once
 
-// KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE in; REFINEMENT, STATUS_global_ba out.
+// In: KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE. Out: REFINEMENT, STATUS_global_ba.
 //
 // Works while the bus is quiet: three seconds after the last message a group is adjusted, in
 // pieces. Messages are handled between the pieces; the adjustment is abandoned if they change its

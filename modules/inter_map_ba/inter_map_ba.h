@@ -1,7 +1,7 @@
 #pragma once
 
-// Loops within one map (the paper, section IV.C): candidates of kind intra, one verification result
-// each.
+// Loop closures within one map (the paper, section IV.C): verifies candidates of kind intra, with
+// one verification result each.
 //
 // Input: keyframes of all maps; candidates with both keyframes in one map. Output: a Constraint
 // between the two bodies with its covariance, or the reason of its refusal. The steps are those of

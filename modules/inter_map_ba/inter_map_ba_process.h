@@ -1,6 +1,6 @@
 #pragma once
 
-// KEYFRAME_*, PLACE_MATCH (candidates of kind intra) in; CONSTRAINT, STATUS_inter_map_ba out.
+// In: KEYFRAME_*, PLACE_MATCH (candidates of kind intra). Out: CONSTRAINT, STATUS_inter_map_ba.
 
 #include <memory>
 

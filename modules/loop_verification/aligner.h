@@ -21,7 +21,7 @@ class Aligner {
 
   explicit Aligner(LoopVerificationOptions options) : options_(options) {}
 
-  // `keyframes`: kNumKeyframes up to the match and up to the query; fewer near the begin of a map.
+  // `keyframes`: kNumKeyframes up to the match and up to the query; fewer near the start of a map.
   Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
                    const LoopVerificationGate& gate, LoopVerificationReport* report = nullptr);
 

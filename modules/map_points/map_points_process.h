@@ -1,6 +1,6 @@
 #pragma once
 
-// KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE in; LANDMARKS_k, STATUS_map_points out.
+// In: KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE. Out: LANDMARKS_k, STATUS_map_points.
 //
 // At most two messages per second, of up to 1200 bytes each, to each agent in a group: 2.4 kB/s.
 // Best effort: a lost landmark is sent again later if the agent still looks there.

@@ -1,6 +1,6 @@
 #pragma once
 
-// place_recognition on a bus: KEYFRAME_* and MAP_STATE in, one PLACE_MATCH per keyframe out.
+// Place recognition on a bus. In: KEYFRAME_*, MAP_STATE. Out: one PLACE_MATCH per keyframe.
 //
 // Keyframes are processed in seq order, map by map (journal_follower.h). After a restart the
 // process reads the journal's PLACE_MATCHes before its keyframes, or requests them together. A

@@ -7,7 +7,7 @@
 // posting's keyframe number are in an array parallel to the signatures. The upper bits are in a bit
 // string: for each word it has `num_spans_` zeros, one per span of 2^kLowBits keyframes, and before
 // the zero of a span a one for each posting in the span. So the i-th one is at position i + (zeros
-// before it), and the begin of a word is found by counting zeros from the nearest block begin in
+// before it), and the start of a word is found by counting zeros from the nearest block start in
 // begin_. The newest postings wait in linked lists until Pack. With n postings per keyframe, a
 // packed posting takes 5.1 + 128 / n bytes, a waiting one 12; a word takes 1 to 8.
 //

@@ -1,7 +1,7 @@
 #pragma once
 
-// KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT in; CORRECTION_k, MAP_STATE, STATUS_posegraph
-// out.
+// In: KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT. Out: CORRECTION_k, MAP_STATE,
+// STATUS_posegraph.
 //
 // Keyframes are added in seq order, map by map. Missing messages are requested at ticks
 // (RESEND_REQUEST, VERDICT_REQUEST; answers come on AGAIN_posegraph). These are: keyframes, where a

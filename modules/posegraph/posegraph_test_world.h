@@ -1,7 +1,7 @@
 #pragma once
 
-// For tests of the pose graph: a world's keyframes and constraints into a graph, and how good what
-// comes out is.
+// For tests of the pose graph: passes a synthetic world's keyframes and constraints to a graph, and
+// measures the errors of the result.
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +24,7 @@ inline SyntheticWorldOptions PosesOnly(int num_agents, int num_keyframes, uint64
   return options;
 }
 
-// About `count` of the overlapping pairs, evenly; a share of them false.
+// Constraints for about `count` of the overlapping pairs, evenly chosen; a share of them is false.
 inline std::vector<Constraint> MakeConstraints(const SyntheticWorld& world, int count,
                                                double false_share, uint64_t seed = 11) {
   Random random(seed);
@@ -44,7 +44,7 @@ inline std::vector<Constraint> BetweenMaps(std::vector<Constraint> constraints) 
   return constraints;
 }
 
-// As each comes, the graph is solved and published.
+// Adds one keyframe or constraint, then solves and publishes.
 inline PoseGraphUpdate Add(const Keyframe& keyframe, PoseGraph* graph) {
   graph->AddKeyframe(keyframe);
   return graph->Update();
@@ -76,7 +76,7 @@ inline PoseGraphUpdate Solve(const SyntheticWorld& world,
   return graph->Finish();
 }
 
-// RMSE of positions after the best rotation about z and shift: the joint ATE of a group.
+// Joint ATE of a group: RMSE of positions after the best rotation about z and shift, m.
 inline double JointAte(const SyntheticWorld& world, const MapState& state) {
   Eigen::Vector3d mean_map = Eigen::Vector3d::Zero(), mean_hall = Eigen::Vector3d::Zero();
   const auto count = static_cast<double>(state.keyframes.size());
@@ -109,8 +109,8 @@ inline const Keyframe& NewestOf(const SyntheticWorld& world, const Correction& c
   return world.agents[0].keyframes[0];
 }
 
-// Of (x, y, z, yaw) of the keyframe that a correction knows last. The map frame is the odom of the
-// first map, fixed at its first keyframe.
+// Error (x, y, z, yaw) of the correction's keyframe. The map frame is the odom of the first map,
+// fixed at its first keyframe.
 inline Vector4d ErrorOfNewest(const SyntheticWorld& world, const Correction& correction) {
   const Keyframe& first = world.agents[0].keyframes[0];
   const Keyframe& newest = NewestOf(world, correction);
@@ -125,7 +125,7 @@ inline Vector4d ErrorOfNewest(const SyntheticWorld& world, const Correction& cor
   return error;
 }
 
-// In the error's covariance the keyframe, not the origin of odom, is what is known best.
+// Covariance of that error: of the pose of the keyframe, not of the origin of odom.
 inline Matrix4d CovarianceOfNewest(const SyntheticWorld& world, const Correction& correction) {
   constexpr int kBlock[4] = {0, 1, 2, 5};
   const Matrix4d at_origin = correction.covariance(kBlock, kBlock);

@@ -1,6 +1,6 @@
 #pragma once
 
-// A pose graph's process on a bus within this process, for its tests.
+// For tests: a pose graph process on an in-process bus.
 
 #include <gtest/gtest.h>
 
@@ -37,13 +37,13 @@ inline std::vector<Constraint> MakeConstraints(const SyntheticWorld& world) {
   return constraints;
 }
 
-// Says that more waits when a test says so.
+// A bus on which a test sets whether more messages wait.
 struct TestBus : LocalBus {
   bool MoreWaits() override { return more_waits; }
   bool more_waits = false;
 };
 
-// A server bus with the process on it, and all that it says.
+// A server bus with the process, and all messages that the process publishes.
 struct Server {
   explicit Server(int64_t first_revision = 1) : process(bus, {}, first_revision) {
     bus.Subscribe(".*", [this](const std::string& channel, Bytes data) {

@@ -7,7 +7,7 @@
 //
 //   groups              as many groups of fused maps at the end
 //   fused_by            at most: seconds, since the capture began, until all agents are in one
-//                       group for good
+//                       group until the end
 //   maps                at most, each agent: a new map is opened when tracking was lost
 //   coverage            at least, each agent
 //   ate_vio_m, ate_server_m  at most, each agent

@@ -26,7 +26,7 @@ std::vector<std::filesystem::path> GatewayIdentityFiles(const Site& site);
 bool IsFileOfSite(const std::string& name);
 
 struct WholePart {
-  int64_t bytes = 0;       // from the begin to the end of the last complete group
+  int64_t bytes = 0;       // from the start to the end of the last complete group
   int64_t events = 0;      // complete events in it, including CHECKSUMS
   int64_t lost_bytes = 0;  // of damaged parts
 };

@@ -12,7 +12,7 @@ namespace {
 // Longer preintegrations are refused by the messages' parser, and carry little information.
 constexpr double kMaxPreintegration_s = 60;
 
-// Joins two successive edges: from the begin of `first` to the end of `second`.
+// Joins two successive edges: from the start of `first` to the end of `second`.
 ThinnedMaps::Edge Join(const Keyframe& first, const ThinnedMaps::Edge& second) {
   ThinnedMaps::Edge joined;
   if (first.edge && second.edge) {

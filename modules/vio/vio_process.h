@@ -1,7 +1,7 @@
 #pragma once
 
 // The odometry on an agent's bus. Images come from a player (playback.h) or from the bus itself
-// (live_input.h); this class knows only "an image and its inertial samples".
+// (live_input.h); this class only gets images with their inertial samples.
 //
 //   Out: POSE_k at every image, KEYFRAME_k once each, STATUS_vio_k at 1 Hz, OPTIONS_vio_k.
 //   In: CORRECTION_k, LANDMARKS_k; HAVE, RESEND_REQUEST (with answers on AGAIN_<requester>) as in

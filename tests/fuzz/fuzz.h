@@ -33,8 +33,8 @@ struct Step {
 std::vector<Step> Steps(Bytes input);
 void AppendStep(int channel, Bytes data, std::vector<uint8_t>* sequence);
 
-// The channels a target listens to, and the fingerprint of the type each carries, if it is one of
-// LCM's.
+// A channel to which a target listens, and the fingerprint of its LCM type; empty for other
+// contents.
 struct Channel {
   std::string name;
   std::optional<int64_t> fingerprint;

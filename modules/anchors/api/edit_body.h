@@ -18,7 +18,7 @@ struct PoseInGroup {
   MapId group;
   Rigid3 T_map_anchor;
 };
-// in the body frame of a keyframe,
+// or in the body frame of a keyframe,
 struct PoseByKeyframe {
   KeyframeId keyframe;
   Rigid3 T_body_anchor;

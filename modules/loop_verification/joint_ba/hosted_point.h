@@ -6,7 +6,7 @@
 // A point is (x, y, inverse depth) in the camera of its host. Its residuals:
 //   seen:   r = S (pi(p_target_cam) - ray), under a robust loss;
 //   prior:  r = [S (xy - ray); (rho - exp(-kappa) rho_0) / sigma_rho], kappa the log scale of the
-//           host's window: that is truly exp(kappa) times as large as its odometry says.
+//           host's window: it is exp(kappa) times as large as in its odometry.
 // The errors of the frames act on the residuals only through the positions of point and camera in
 // w, so products of Jacobians need only 3x3 matrices.
 

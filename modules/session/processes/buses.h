@@ -1,6 +1,6 @@
 #pragma once
 
-// The LCM buses of one session: all on loopback multicast (ttl 0), each on a port of its own.
+// The LCM buses of one session: all on loopback multicast (ttl 0), each with its own port.
 
 #include <cstdint>
 #include <map>

@@ -186,7 +186,7 @@ class Runner {
                        buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
   }
 
-  // A killed player of stored keyframes starts again from the begin; the uplink ignores repeats.
+  // A killed player of stored keyframes starts again from the start; the uplink ignores repeats.
   void StartPlayer(Player& player) {
     const int32_t id = player.script.id;
     const bool stored = !player.script.keyframes.empty();

@@ -34,7 +34,7 @@ struct Primitive {
   float Distance(const Eigen::Vector3f& p) const;
 };
 
-// Where a ray meets the scene.
+// The point where a ray meets the scene.
 struct Hit {
   float range = 0;     // along the unit ray
   int primitive = -1;  // -1: the room itself

@@ -22,7 +22,7 @@ constexpr bool IsHall(SceneKind kind) {
 
 struct SceneOptions {
   SceneKind kind = SceneKind::kHall;
-  uint64_t seed = 1;  // changes everything
+  uint64_t seed = 1;  // another seed gives another scene
   // Points of the paths, which the scene must contain and keep clear. If empty, the paths of
   // path_generator.h are kept clear. The scene depends on these points: recordings of one scene
   // need the same ones.

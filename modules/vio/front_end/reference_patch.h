@@ -1,6 +1,6 @@
 #pragma once
 
-// The image patch of a feature at the begin of its track, used to find the feature without drift.
+// The image patch of a feature at the start of its track, used to find the feature without drift.
 //
 // KLT matches each image with the previous one, so its errors accumulate along a track. Here the
 // patch of the first image is matched directly, with an affine deformation and a change of

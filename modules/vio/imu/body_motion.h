@@ -9,14 +9,14 @@
 
 namespace pangea::vio {
 
-// All in the body frame at the begin.
+// All vectors are in the body frame at the start.
 struct BodyMotion {
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // rad/s
   Eigen::Vector3d alpha = Eigen::Vector3d::Zero();  // rad/s^2
   Eigen::Vector3d v = Eigen::Vector3d::Zero();      // m/s
   Eigen::Vector3d a = Eigen::Vector3d::Zero();      // m/s^2, without gravity
 
-  // T_body_later, `s` seconds after the begin; second order in s.
+  // T_body_later, `s` seconds after the start; second order in s.
   Rigid3 After(double s) const {
     return {ExpSo3(s * omega + 0.5 * s * s * alpha), s * v + 0.5 * s * s * a};
   }

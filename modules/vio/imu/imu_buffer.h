@@ -25,7 +25,7 @@ class ImuBuffer {
   // Drops samples older than this, except for a margin and the newest 100 samples.
   void Forget(int64_t before_utime);
 
-  // A text that says what is missing in a span of time; empty if the samples cover it.
+  // A text for people about missing samples in a span of time; empty if the samples cover it.
   std::optional<std::string> Gap(int64_t from_utime, int64_t to_utime) const;
   // Preintegrates with the noise density that the samples show, within bounds (imu_noise.h).
   ScaledPreintegration Integrate(int64_t from_utime, int64_t to_utime,

@@ -22,7 +22,7 @@ Eigen::Vector3d VelocityAt(const Path& path, double t);
 
 struct StartWorld {
   std::vector<ImuSample> samples;
-  std::vector<StartFrame> frames;  // taken `late_s` later than they say
+  std::vector<StartFrame> frames;  // taken `late_s` after their stamps
 };
 
 // Records 2 s of images at 10 Hz, beginning at t = 1 s of the path. The samples extend `margin_s`

@@ -32,7 +32,7 @@ struct MapLocalizationOptions {
   // Search radius around a landmark's predicted position, pixels.
   double search_radius_px = 15;
   MatchingOptions matching;
-  double pixel_sigma = 1.5;  // of a corner found again, at octave 0
+  double pixel_sigma = 1.5;  // of a corner that matches a landmark, on octave 0
 };
 
 class MapLocalization {

@@ -24,7 +24,7 @@ namespace pangea::vio {
 // The estimate without landmarks.
 struct LocalizationPrior {
   Rigid3 T_map_odom;  // only translation and yaw
-  // Of the window's first pose in the map: x, y, z, yaw (map axes, yaw about the pose itself).
+  // Of the window's first pose in the map: (x, y, z, yaw), in map axes, yaw about the pose itself.
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();
 };
 

@@ -72,33 +72,35 @@ struct FinishedKeyframe {
   BodyMotion motion;  // from there on
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-  Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();  // about odom x, y
-  // Of all of it, in the window's coordinates (window_state.h).
+  // about the x and y axes of odom
+  Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();
+  // Covariance of the whole state (15), in the window's coordinates (window_state.h).
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
-  // From the keyframe finished before; none in the first of the map.
+  // Odometry edge from the previous finished keyframe; empty for the map's first keyframe.
   struct Edge {
     Rigid3 T_previous_this;
     Matrix6d covariance = Matrix6d::Identity();  // (translation, rotation) in previous' body frame
   };
   std::optional<Edge> edge;
-  // The same span; none where the images contradict it (unmodelled_acceleration.h).
+  // Preintegration of the same span; empty if the images contradict it (unmodelled_acceleration.h).
   std::optional<Preintegration> preintegration;
   std::vector<LandmarkDepth> landmarks;
-  Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // (translation, rotation) in the left frame
-  // Of the scale of what it sees, as a share; none with too few depths to tell.
+  // (translation, rotation), perturbation in the left frame (body)
+  Matrix6d T_body_cam_covariance = Matrix6d::Zero();
+  // Relative sigma of the scale, from the depths; empty if there are too few depths.
   std::optional<double> scale_sigma;
 };
 
 struct FrameResult {
   EstimatorState state = EstimatorState::kInitialising;
   std::string reason;  // why it is not tracking
-  Rigid3 T_odom_body;  // at this frame; valid while tracking
+  Rigid3 T_odom_body;  // at this frame; valid if state is kTracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
   BodyMotion motion;  // from there on
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   bool is_keyframe = false;       // this frame will be finished as a keyframe later
-  bool imu_contradicted = false;  // the IMU feels an acceleration that the images do not show
+  bool imu_contradicted = false;  // the IMU measures an acceleration that the images do not show
   std::vector<FinishedKeyframe> finished;
   std::vector<int32_t> outlier_landmarks;  // the tracker should drop these
 };
@@ -110,14 +112,15 @@ class Estimator {
   Estimator(Estimator&&) noexcept;
   Estimator& operator=(Estimator&&) noexcept;
 
-  // Frames in time order. `imu`: all samples after those of the previous call, up to and including
-  // the first one at or after this frame's time (the estimator keeps what it still needs).
+  // Frames must come in time order. `imu`: all samples after those of the previous call, up to and
+  // including the first one at or after this frame's time.
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
-  // The keyframes still in the window, at the end.
+  // At the end: finishes and returns the keyframes that are still in the window.
   std::vector<FinishedKeyframe> Flush();
   // The calibration in use, refined online.
   CameraModel camera() const;
-  // The window as the newest frame left it; only while tracking. Costs about an iteration.
+  // The window's poses after the newest frame; only while tracking. Takes about as long as one
+  // iteration.
   WindowPoses Poses() const;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 
 // Estimates, from the stamps of images, how far these differ from the time of the image, which is
-// the middle of the exposure. A phone stamps the begin or the end of the exposure, or the arrival
+// the middle of the exposure. A phone stamps the start or the end of the exposure, or the arrival
 // of the image. In the dark a camera exposes longer and, if needed, takes fewer images per second:
 // then the middle of the exposure moves with the interval between images
 // (WindowState::interval_share).

@@ -23,7 +23,7 @@
 
 namespace pangea::vio {
 
-// One frame's error is laid out as in core/imu/imu_factor.h.
+// The order of one frame's error is that in core/imu/imu_factor.h.
 inline constexpr int kPoseSize = 6;  // (dtheta, xi_p)
 // If stamps jitter, the error of the frame's stamp follows.
 inline constexpr int kStampError = kFrameSize;
@@ -69,7 +69,7 @@ struct WindowState {
   Rigid3 T_body_cam;
   double time_offset_s = 0;  // t_imu = t_image + time_offset_s
   // d(time offset) / d(interval between images). For a camera that exposes during the whole
-  // interval it is -1/2 if the stamp is at the end of the exposure, 1/2 if it is at the begin; it
+  // interval it is -1/2 if the stamp is at the end of the exposure, 1/2 if it is at the start; it
   // is 0 if the stamp is at the middle or the exposure is short.
   double interval_share = 0;
   // Corrections of the given camera: relative change of the focal length, shift of the principal
