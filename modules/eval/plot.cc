@@ -114,7 +114,7 @@ std::string Script(const Plot& plot, const std::string& path) {
   return script + commands + "\n";
 }
 
-// A file without a name that lives as long as its descriptor.
+// An unnamed file in memory, which exists as long as its descriptor is open.
 class MemoryFile {
  public:
   explicit MemoryFile(const char* name) : fd_(memfd_create(name, MFD_CLOEXEC)) {

@@ -96,7 +96,8 @@ Keyframe KeyframeMaker::Make(const cv::Mat& image, const vio::TrackedFrame& fram
   return keyframe;
 }
 
-// Gauss-Newton in the inverse depth along the newest ray, from all earlier observations.
+// Triangulates by Gauss-Newton in the inverse depth along the newest ray, with all earlier
+// observations.
 std::optional<MapPoint> KeyframeMaker::Triangulate(int corner, const Corner& of,
                                                    const Rigid3& T_odom_cam) const {
   const auto found = observations_.find(of.landmark_id);

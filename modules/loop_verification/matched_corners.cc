@@ -24,7 +24,7 @@ constexpr double kMaxNeighbourRatio = 0.85;  // best to second-best distance
 constexpr size_t kMaxAdded = 250;            // each adds to the time of a verification
 constexpr int kNotOfTheWindow = -1;
 
-// Another keyframe that may see the corners of the newest one, the host.
+// A neighbouring keyframe that may see corners of the newest keyframe, the host.
 struct Neighbour {
   int frame = kNotOfTheWindow;
   const KeyframeView* view = nullptr;

@@ -1,4 +1,4 @@
-// pangea-keyframe-player: a log of keyframes ─► KEYFRAME_k
+// pangea-keyframe-player: log of keyframes ─► KEYFRAME_k
 
 #include <fmt/format.h>
 

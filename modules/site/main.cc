@@ -1,4 +1,4 @@
-// pangea-site: the maps of a server, each in a folder of its own.
+// pangea-site: manages the maps of a server, each in its own folder.
 
 #include "options/command_line.h"
 #include "site/commands.h"

@@ -186,7 +186,8 @@ std::vector<MapPoint> Vio::Points(const FinishedKeyframe& finished,
       points.push_back({corner->second, depth, variance});
     }
   }
-  // By relative uncertainty: a point at 10 m known to 10 cm is as good as one at 1 m known to 1 cm.
+  // Sort by relative uncertainty: a point at 10 m with sigma 10 cm is as good as one at 1 m with 1
+  // cm.
   std::stable_sort(points.begin(), points.end(), [](const MapPoint& a, const MapPoint& b) {
     return a.inverse_depth_var * b.inverse_depth * b.inverse_depth <
            b.inverse_depth_var * a.inverse_depth * a.inverse_depth;

@@ -32,7 +32,7 @@ NormalisedError Normalised(const std::vector<double>& squared, int dimensions, d
   return error;
 }
 
-// The smallest value that 95 % of all do not exceed.
+// The 95 % percentile: the smallest value that 95 % of all do not exceed.
 double Percentile95(std::vector<double> values) {
   if (values.empty()) {
     return 0;
@@ -81,7 +81,7 @@ ConstraintsTruth CheckConstraints(const std::vector<ConstraintWithTruth>& constr
     const Eigen::Matrix3d position_covariance = covariance.topLeftCorner<3, 3>();
     pose.push_back(error.dot(covariance.ldlt().solve(error)));
     position.push_back(dp.dot(position_covariance.ldlt().solve(dp)));
-    // Rotated into axes with z up, where dtheta.z is yaw.
+    // Rotate into axes with z up, in which dtheta.z is yaw.
     const Eigen::Vector3d up = q_odom_from.conjugate() * Eigen::Vector3d::UnitZ();
     const double dyaw = up.dot(error.tail<3>());
     yaw.push_back(dyaw * dyaw / up.dot(covariance.bottomRightCorner<3, 3>() * up));

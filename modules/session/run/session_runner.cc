@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kStartTimeout_s = 20;  // for the server processes to report
+constexpr double kStartTimeout_s = 20;  // time for the server processes to report
 constexpr double kStuckAfter_s = 300;   // without a verification result, although not idle
 // two HAVE intervals and a retransmission: lost last messages would be noticed
 constexpr double kQuiet_s = 2.5;
@@ -412,7 +412,7 @@ class Runner {
   std::vector<Player> players_;
   std::vector<std::string> server_names_;
   std::set<std::string> refused_disks_;  // processes already reported
-  bool stopped_ = false;                 // Ctrl-C came while agents played
+  bool stopped_ = false;                 // a signal came while agents played
   bool interrupted_ = false;             // ... and recordings were played
   RunSummary summary_;
   double begin_ = 0;

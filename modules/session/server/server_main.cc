@@ -1,4 +1,4 @@
-// pangea-server: all server processes by one command.
+// pangea-server: runs all server processes with one command.
 
 #include <fmt/format.h>
 

@@ -46,7 +46,7 @@ class Traveller {
     phase_ = rng_.Uniform(0, 2 * M_PI);
   }
 
-  // Advances by dt; `go` in 0 .. 1 scales everything that moves.
+  // Advances by dt; `go` in 0 .. 1 scales the speed.
   void Step(double dt, double go) {
     time_ += go * dt;
     const double hall = IsHall(options_.scene) ? 1.0 : 0.45;
@@ -64,7 +64,7 @@ class Traveller {
     Vector3d p(centre.x() + route_.sideways_m * x_.At(time_),
                centre.y() + route_.sideways_m * y_.At(time_), middle + 0.9 * reach * z_.At(time_));
     if (options_.motion == Motion::kWalk) {
-      // At arm's height, with the steps of a walk.
+      // Held at chest height, with the bobbing of steps.
       p.z() = 1.45 + 0.12 * z_.At(time_) + 0.02 * std::sin(2 * M_PI * 1.8 * time_);
     }
     return p;

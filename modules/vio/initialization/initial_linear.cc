@@ -1,4 +1,4 @@
-// Gyro bias and the closed-form start.
+// Solves for the gyro bias, the time offset and the closed-form start.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr size_t kMinPairs = 4;
-constexpr double kMaxTimeOffset_s = 0.06;  // searched to either side
+constexpr double kMaxTimeOffset_s = 0.06;  // search range, in both directions
 // A time offset is used only if its cost is below this share of the cost without.
 constexpr double kClearlyBetter = 0.8;
 constexpr size_t kMinShared = 20;  // shared landmarks that two images need for a relative rotation

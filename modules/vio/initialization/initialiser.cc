@@ -20,8 +20,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
-constexpr double kMinSpan_s = 1.0;        // shortest start-up window, and
-constexpr double kMaxSpan_s = 3.0;        // the longest: older images are forgotten
+constexpr double kMinSpan_s = 1.0;        // shortest start-up window
+constexpr double kMaxSpan_s = 3.0;        // longest start-up window: older images are forgotten
 constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
 constexpr size_t kMinTracks = 20;
 
@@ -42,7 +42,7 @@ constexpr double kStationaryGyro = 0.6;       // standard deviation, of gyro_rat
 // A stationary start assumes a smaller bias than a moving one; a larger one would tilt it.
 constexpr double kStationaryBias = 0.1 / 0.15;  // of accel_bias_sigma
 
-// A moving start must be at least this certain and explain this much.
+// Requirements on the result of a moving start.
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
 constexpr double kMaxSpeedShare = 0.03;     // of the speed: 0.05 m/s at a typical flight's 1.7 m/s
 constexpr double kMaxTiltSigma = 0.035;     // rad
@@ -169,8 +169,8 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
   imu.gyro_bias = moments.gyro_mean;
   state.frames.push_back({frames_.back(), imu, 0});
-  // An accelerometer bias and a tilt look alike in a stationary body: the tilt is as uncertain as
-  // the bias.
+  // For a stationary body, an accelerometer bias cannot be distinguished from a tilt: so the bias
+  // determines the uncertainty of the tilt.
   Eigen::Matrix<double, 15, 1> sigma;
   const double bias_sigma = kStationaryBias * sigmas_.accel_bias;
   sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
@@ -205,7 +205,7 @@ InitialResult Initialiser::TryMoving() {
   if (result.state || !result.contradicts) {
     return result;
   }
-  // The clocks may be further apart than the calibration says.
+  // The time offset may differ from the calibrated one.
   const auto offset = SolveTimeOffset(frames, camera_.T_body_cam, samples_, noise_);
   if (!offset) {
     return result;

@@ -14,7 +14,7 @@ constexpr double kStationaryTrackShare = 0.5;
 constexpr double kMinKeyframeInterval_s = 0.2;
 constexpr double kAnyParallax = std::numeric_limits<double>::infinity();
 
-// Whether the newest image has changed enough since another frame of the window.
+// Whether the newest image differs enough from another frame of the window.
 bool HasMoved(const WindowState& state, const TrackHistory& history, int64_t since_utime,
               double parallax, double track_share) {
   const auto since = state.Find(since_utime);

@@ -74,7 +74,7 @@ void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe) {
     const Rigid3 T_cam_row = RowCamera(camera, motion, static_cast<double>(corner.pixel.y()));
     const double rho = point_of[i] != nullptr ? static_cast<double>(point_of[i]->inverse_depth)
                                               : InverseDepthNear(corner.pixel, seen);
-    // (x, y, z) * rho, so that a point at infinity is no special case.
+    // Scaled by rho, so that a point at infinity is no special case.
     const Vector3d moved = T_cam_row.q * Vector3d(ray->x(), ray->y(), 1) + rho * T_cam_row.t;
     const auto pixel = camera.Project(moved);
     if (!pixel || !camera.Contains(*pixel)) {
