@@ -6,7 +6,7 @@ namespace pangea::session {
 const char* const kChartScript = R"js(//<![CDATA[
 "use strict";
 
-const kReach = 20;  // largest distance of the pointer from a line, in units of the drawing
+const kReach = 20; // how far from a line the pointer may be, in units of the drawing
 
 function axisOf(svg, which) {
   const [low, high, from, to] = svg.dataset[which].split(" ").map(Number);
