@@ -26,7 +26,7 @@ struct LogSummary {
   int64_t first_utime = 0, last_utime = 0;  // capture time
   std::map<std::string, ChannelSummary> channels;
   std::map<MapId, std::set<int32_t>> keyframes;  // seqs by map
-  std::map<std::string, int64_t> results;        // constraints by reason; "accepted"
+  std::map<std::string, int64_t> results;        // constraints by reason of refusal, or "accepted"
 };
 
 // Summarises the readable parts. Throws std::runtime_error if the file cannot be opened or is not a

@@ -61,7 +61,7 @@ Type ParseType(const std::string& text) {
     ++i;
   }
   type.name = tokens.at(i + 1);
-  for (i += 3; tokens.at(i) != "}"; ++i) {  // past "{", and then past each ";"
+  for (i += 3; tokens.at(i) != "}"; ++i) {  // skips "{", and then each ";"
     if (tokens.at(i) == "const") {
       while (tokens.at(i) != ";") {
         ++i;

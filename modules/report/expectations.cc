@@ -17,7 +17,7 @@ enum class Relation : uint8_t { kExactly, kAtMost, kAtLeast };
 
 // A value of the session, or of one agent.
 struct Value {
-  std::string of;  // "agent 2: "; empty for the session's
+  std::string of;  // "agent 2: "; empty for the session
   std::optional<double> value;
 };
 using Values = std::vector<Value>;

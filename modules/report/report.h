@@ -32,7 +32,7 @@ namespace pangea::session {
 // An emulated bad link between an agent and the server.
 struct LinkRun {
   std::string conditions;                     // for people: "loss 5 %, delay 50 ms"
-  std::map<std::string, int64_t> packets_up;  // by what became of them: "taken", "delivered", ...
+  std::map<std::string, int64_t> packets_up;  // by outcome: "taken", "delivered", ...
   std::map<std::string, int64_t> packets_down;
 };
 

@@ -28,8 +28,8 @@ class NodeRemoval {
     RelativePose relative;
     bool odometry = false;  // an odometry edge
     bool derived = false;   // not an original factor
-    // The statistics below are those of the weakest of composed, and of the strongest of averaged,
-    // measurements.
+    // Statistics of the weakest measurement in a composition, and of the strongest one in an
+    // average.
     int num_inliers = 0;
     double inlier_ratio = 0;
     double rms_px = 0;
