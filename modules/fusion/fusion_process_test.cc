@@ -14,7 +14,7 @@ namespace {
 
 constexpr int64_t kSecond = 1'000'000;
 
-// Two agents in one room on a LocalBus with both processes; what they say is kept.
+// Two agents in one room on a LocalBus with both processes; their messages are recorded.
 class VerificationProcesses : public testing::Test {
  protected:
   VerificationProcesses() {
@@ -78,7 +78,7 @@ TEST_F(VerificationProcesses, OneResultFromTheProcessOfItsKind) {
   EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
 }
 
-// What somebody says later under an id that is taken, changes nothing.
+// A later keyframe with an id that exists already changes nothing.
 TEST_F(VerificationProcesses, AKeyframeIsTakenOnce) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
@@ -91,8 +91,8 @@ TEST_F(VerificationProcesses, AKeyframeIsTakenOnce) {
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
 }
 
-// The journal's owner gets what it names retransmitted, once it was sent; of what is still to be
-// verified nothing is said.
+// The journal's owner gets the results it names retransmitted if they were sent; there is no answer
+// for candidates that are still to be verified.
 TEST_F(VerificationProcesses, RetransmitsAResultThatTheJournalLacks) {
   std::vector<Constraint> again;
   listener_.Subscribe<again_t>(
@@ -223,7 +223,7 @@ TEST_F(VerificationProcesses, AfterARestartKnownResultsAreNotRepeated) {
   EXPECT_TRUE(constraints_.empty());
 }
 
-// What former runs verified is known: a candidate beside it says nothing new.
+// Results of former runs are known: a candidate near them is redundant.
 TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);
@@ -243,7 +243,7 @@ TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   EXPECT_EQ(constraints_[0].reason, kRedundant);
 }
 
-// The first result of its map is still to come: what is redundant may depend on it.
+// The first result of its map is pending: whether this one is redundant may depend on it.
 TEST_F(VerificationProcesses, ACandidateWaitsForThoseThatItRestsOn) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 1, 12);
@@ -259,7 +259,7 @@ TEST_F(VerificationProcesses, ACandidateWaitsForThoseThatItRestsOn) {
   EXPECT_EQ(constraints_[1].to.seq, 9);
 }
 
-// What nobody has any more is not waited for: the windows end there.
+// Lost keyframes are not waited for: the windows end there.
 TEST_F(VerificationProcesses, WhatIsLostIsNotWaitedFor) {
   SendKeyframes(agent_m_, 4, 12);
   SendKeyframes(agent_c_, 3, 12);
@@ -278,8 +278,9 @@ TEST_F(VerificationProcesses, WhatIsLostIsNotWaitedFor) {
   EXPECT_TRUE(constraints_[0].accepted) << constraints_[0].reason;
 }
 
-// Live: all that came is known, and told as pending, before it is verified; a candidate comes after
-// those that it rests on, and what comes meanwhile is heard between two of them.
+// Live: all received candidates are known and reported as pending before they are verified. A
+// candidate is verified after those that it depends on, and messages are handled between two
+// verifications.
 TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   const auto room = MakeTestRoom({.seed = 5});
   TestAgentOptions first, second;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr int kRound = 68;  // keyframes of one round through the room
 
-// Once round the room and a little further: keyframe kRound + k stands where k stood.
+// One round through the room and a little further: keyframe kRound + k is at the place of keyframe
+// k.
 TestAgent RoundTrip(uint64_t seed, double edge_sigma_m) {
   TestAgentOptions walk;
   walk.map = {1, static_cast<int64_t>(seed)};

@@ -1,4 +1,4 @@
-// What looks like one place and is not, or does not say enough: refused, with the reason.
+// Refusals, with their reasons: look-alikes, and candidates with too little information.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,9 +25,9 @@ TEST(AlignerTest, RefusesAnotherRoom) {
   }
 }
 
-// Two rooms with the same dozen objects, at other places: the objects match perfectly, everything
-// around them does not. The candidates are the pairs that share most, as a place recognition would
-// send them.
+// Two rooms with the same dozen objects at different places: the objects match perfectly, their
+// surroundings do not. The candidates are the pairs with most common corners, as from place
+// recognition.
 TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
   int sharing = 0;
   std::map<std::string, int> reasons;
@@ -55,8 +55,9 @@ TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
   EXPECT_GT(sharing, 40);  // or nothing was tested
 }
 
-// The worst case: one object large in view, from the same side in both rooms, so that it aligns
-// perfectly; only what is around it tells. The same walks in one room are accepted.
+// The worst case: one object fills much of the view, from the same side in both rooms, so that it
+// aligns perfectly; only the surroundings reveal the error. The same walks in one room are
+// accepted.
 TEST(AlignerTest, RefusesOneObjectSeenFromTheSameSide) {
   for (int run = 0; run < 10; ++run) {
     std::mt19937_64 random(run);
@@ -107,9 +108,9 @@ TEST(AlignerTest, RefusesTooFewPoints) {
   EXPECT_FALSE(constraint.reason.empty());
 }
 
-// Accepted is a promise of half a metre and five degrees. A narrow piece of a far wall in view:
-// with few points a rotation and a step to the side cannot be told apart well enough to keep it,
-// with many they can.
+// An accepted constraint should have an error below half a metre and five degrees. The view is a
+// narrow part of a distant wall: with few points, a rotation and a sideways step cannot be
+// distinguished well enough for this; with many they can.
 TEST(AlignerTest, RefusesWhatIsTooUncertain) {
   for (const int num_points : {60, 250}) {
     std::mt19937_64 random(9);
@@ -130,7 +131,8 @@ TEST(AlignerTest, RefusesWhatIsTooUncertain) {
   }
 }
 
-// The same wall with near points before it: one alone would decide the pose, right or wrong.
+// The same wall with near points in front of it: one alone would determine the pose, right or
+// wrong.
 TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
@@ -158,8 +160,8 @@ TEST(AlignerTest, RefusesWhatHangsOnOneLandmark) {
   }
 }
 
-// Several near points before the wall, the same in both walks or only vaguely alike: these may be
-// wrong together.
+// Several near points in front of the wall, the same in both walks or only vaguely similar: the
+// latter may all be wrong.
 TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> across(-4.8, 4.8), up(-2.9, 2.9), ahead(12, 12.6);
@@ -193,8 +195,8 @@ TEST(AlignerTest, RefusesWhatHangsOnVagueMatches) {
   }
 }
 
-// Corners a little off, one half of the image up and the other down: each is an inlier, and
-// together they give a pose.
+// Corners are slightly wrong, upwards in one half of the image and downwards in the other: each is
+// an inlier, and together they give a pose.
 TEST(AlignerTest, RefusesHalvesThatDisagree) {
   const auto room = MakeTestRoom({.seed = 9});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));

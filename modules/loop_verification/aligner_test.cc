@@ -12,9 +12,9 @@
 namespace pangea {
 namespace {
 
-// The estimate's covariance must be what its errors are: over many worlds the normalised error
-// squared of 6 degrees of freedom has mean 6. All that the covariance counts is drawn as it claims:
-// pixels, depths, edges, and a scale of each odometry that all its depths and edges share.
+// The covariance must be honest: over many worlds, the NEES with 6 degrees of freedom has the mean
+// 6. All errors are drawn from their stated distributions: pixels, depths, edges, and one scale per
+// odometry, common to its depths and edges.
 TEST(AlignerTest, ErrorsAreWhatTheCovarianceSays) {
   double nees = 0, error_m = 0;
   int accepted = 0;
@@ -57,7 +57,7 @@ TEST(AlignerTest, SameInputSameResult) {
   EXPECT_EQ(first.covariance, second.covariance);
 }
 
-// A handful of corners with a depth is enough: the rest is found by projection.
+// A few corners with a depth are enough: the others are found by projection.
 TEST(AlignerTest, FewCandidateMatchesSuffice) {
   const auto room = MakeTestRoom({.seed = 4});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
@@ -66,8 +66,8 @@ TEST(AlignerTest, FewCandidateMatchesSuffice) {
   EXPECT_TRUE(constraint.accepted) << constraint.reason;
 }
 
-// The images' tilt is weighed by how well they know it about that axis: about the line of sight
-// they know a rotation less well than about the others.
+// The tilt from the images is weighted by its covariance per axis: a rotation about the line of
+// sight is less certain than about the other axes.
 TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   const auto room = MakeTestRoom({.seed = 6});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
@@ -106,7 +106,8 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   EXPECT_GT(std::abs(across.dot(information * across) / chi2 - 1), 0.1) << "then axes would matter";
 }
 
-// Each bar, set out of reach, refuses in its own step what is accepted otherwise.
+// Each limit, set to an impossible value, refuses in its own step a candidate that is accepted
+// otherwise.
 TEST(AlignerTest, EachBarIsObeyed) {
   const auto room = MakeTestRoom({.seed = 4});
   const TestAgent m = RunTestAgent(room, FirstAgent(0));
@@ -175,7 +176,7 @@ TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   EXPECT_EQ(align(no_yaw).reason, "more drift than odometry makes");
 }
 
-// As on real phones, where a keyframe has depths for few of its corners.
+// As on real phones: a keyframe has depths for only a few of its corners.
 TEST(Aligner, FewDepthsAreEnoughWhereCornersAreMatchedBetweenNeighbours) {
   TestAgent m = RunTestAgent(MakeTestRoom({}), {});
   TestAgent c = RunTestAgent(MakeTestRoom({}), SecondAgent(0));

@@ -19,7 +19,7 @@ Matrix6d RandomCovariance(std::mt19937_64& rng) {
   return A * A.transpose();
 }
 
-// What the images tell stays, extrinsics move by offsets in their left frames.
+// The relative pose of the cameras is fixed; the extrinsics are perturbed in their left frames.
 TEST(ExtrinsicsCovariance, IsThatOfTheBodiesWhileTheCamerasStay) {
   std::mt19937_64 rng(1);
   for (int trial = 0; trial < 20; ++trial) {

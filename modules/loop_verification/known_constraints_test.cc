@@ -11,7 +11,7 @@ constexpr double kStep_m = 0.5;
 const MapId kA{1, 1'000'000};
 const MapId kB{2, 2'000'000};
 
-// Keyframes in a row, kStep_m from each to the next.
+// Keyframes in a row, with distances of kStep_m.
 void AddRow(const MapId& map, int count, SubmapStore* store) {
   for (int32_t seq = 0; seq < count; ++seq) {
     Keyframe keyframe;
@@ -77,7 +77,7 @@ TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   EXPECT_FALSE(known_.IsRedundant({kB, 14}, {kA, 14}, store_));
 }
 
-// Else the answer would depend on which of them is verified first.
+// Otherwise the decision would depend on which of them is verified first.
 TEST_F(KnownConstraintsTest, OnlyWhatACandidateRestsOnCounts) {
   known_.Add(Accepted({kA, 10}, {kB, 11}, 0.02));
   EXPECT_TRUE(std::isinf(GainBits({kB, 10}, {kA, 11})));
@@ -87,7 +87,7 @@ TEST_F(KnownConstraintsTest, OnlyWhatACandidateRestsOnCounts) {
   EXPECT_FALSE(std::isinf(GainBits({kA, 13}, {kB, 12}))) << "either may have been the query";
 }
 
-// Whether two maps are one rests on them.
+// The decision to merge two maps depends on them.
 TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
   KnownConstraints known({.min_between_maps = 2});
   known.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
@@ -96,7 +96,7 @@ TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
   EXPECT_TRUE(known.IsRedundant({kB, 11}, {kA, 10}, store_));
 }
 
-// A single one moves the map by whatever it is wrong.
+// A single wrong one displaces the map by its error.
 TEST_F(KnownConstraintsTest, TheFirstAtOnePlaceOfAMapAreNeverRedundant) {
   KnownConstraints known({.min_nearby = 3});
   for (int i = 0; i < 3; ++i) {

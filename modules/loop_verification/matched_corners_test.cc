@@ -15,7 +15,7 @@ constexpr int kNewest = 10;
 
 class MatchedCorners : public testing::Test {
  protected:
-  // Keyframes whose corners are nobody's landmarks.
+  // Keyframes whose corners are not landmarks.
   void Walk(const TestAgentOptions& options) {
     agent_ = RunTestAgent(MakeTestRoom({}), options);
     for (Keyframe& keyframe : agent_.keyframes) {
@@ -29,7 +29,7 @@ class MatchedCorners : public testing::Test {
   Window MakeWindowUpTo(int seq, int count, const WindowOptions& options = {}) {
     return MakeWindow(store_.WindowUpTo(agent_.keyframes[seq].id, count), options);
   }
-  // Squared error of the inverse depth over its variance; nothing for a corner that is no point.
+  // Squared error of the inverse depth / its variance; empty for a corner without a point.
   double SquaredError(const Window& window, const WindowLandmark& landmark) const {
     const auto seq = static_cast<size_t>(window.newest_keyframe().id.seq);
     const int point = agent_.point_of_corner[seq][landmark.host.corner];

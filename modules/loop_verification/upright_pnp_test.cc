@@ -44,7 +44,8 @@ struct Scene {
   std::vector<PointObservation> observations;
 };
 
-// Points of m before a camera of c and the reverse, the first `wrong` of each direction displaced.
+// Points of m in front of a camera of c, and the reverse; the first `wrong` of each direction are
+// displaced.
 Scene MakeScene(int count, int wrong, const Eigen::Vector2d& tilt, Random& random) {
   Scene scene;
   scene.T_m_c = RandomUpright(random);
@@ -103,9 +104,9 @@ TEST(UprightPnp, SameSeedSamePose) {
   EXPECT_EQ(first->inliers, second->inliers);
 }
 
-// Refinement's covariance is what its errors are, 6 degrees of freedom; the tilt prior is drawn
-// too. Cauchy's weights, 0.84 in the mean at the truth, make it that much too large: a wider
-// search.
+// The refinement's covariance is honest (6 degrees of freedom; the tilt prior is drawn too).
+// Cauchy's weights, on average 0.84 at the truth, make it too large by that factor, which only
+// widens the search.
 TEST(UprightPnp, RefinedPoseIsConsistent) {
   Random random(4);
   double nees = 0;
@@ -122,7 +123,7 @@ TEST(UprightPnp, RefinedPoseIsConsistent) {
   EXPECT_NEAR(nees, 0.84 * 6, 0.75);  // three standard deviations of the mean
 }
 
-// What the covariance of pixel, tilt and depth says, without its short cut.
+// Chi-squared with the full covariance of pixel, tilt and depth, without the closed form.
 TEST(PointObservation, Chi2IsTheMahalanobisDistance) {
   Random random(5);
   const Scene scene = MakeScene(20, 5, {0.002, 0.001}, random);
@@ -138,7 +139,7 @@ TEST(PointObservation, Chi2IsTheMahalanobisDistance) {
   }
 }
 
-// More points agree on a wrong pose than on the right one; the matches without a depth decide.
+// More points agree with a wrong pose than with the right one; the matches without a depth decide.
 TEST(UprightPnp, RaysWithoutADepthVote) {
   Random random(6);
   for (int run = 0; run < 10; ++run) {

@@ -9,7 +9,7 @@
 namespace pangea {
 namespace {
 
-// How many keyframes the window has of an agent that walks this far from one to the next.
+// Number of keyframes in the window of an agent with this distance between keyframes.
 size_t NumFrames(double step_m, bool with_points = true, int num_keyframes = 20) {
   TestAgentOptions walk;
   walk.num_keyframes = num_keyframes;

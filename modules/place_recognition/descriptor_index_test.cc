@@ -57,7 +57,7 @@ TEST(DescriptorIndex, AQueryOfFiveThousandKeyframesComparesAFewPostingsPerCorner
     index.Add(world.See({kMap, i}, {0, 0, 1.5}, 0).corners);
   }
   const auto corners = world.See({kMap, 6000}, {0, 0, 1.5}, 0).corners;
-  // Exhaustively it would be all 600,000.
+  // An exhaustive search would compare all 600,000.
   EXPECT_LT(index.CountPostings(corners) / static_cast<int64_t>(corners.size()), 60);
 }
 
@@ -78,7 +78,7 @@ TEST(DescriptorIndex, AKeyframeOf600CornersTakesLessThan20kB) {
       index.Add(corners);
     }
   };
-  // As each table is packed at another time, some of this is still waiting.
+  // Tables are packed at different times, so some postings are still waiting.
   add(500);
   const double before = HeapBytes();
   add(1500);

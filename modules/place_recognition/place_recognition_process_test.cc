@@ -39,7 +39,7 @@ std::vector<KeyframeMessage> Round(test::TestWorld& world, const MapId& map, int
   return keyframes;
 }
 
-// A server bus with the process on it, and all that it publishes.
+// A server bus with the process, and all messages that it publishes.
 struct Server {
   Server() : process(bus, {}) {
     bus.Subscribe("PLACE_MATCH", [this](const std::string&, Bytes data) {
@@ -75,7 +75,7 @@ struct Server {
     PublishMessage(bus, "HAVE", have);
     bus.Drain();
   }
-  // The pose graph: these maps are one.
+  // Publishes a state in which these maps are one group.
   void Fused(const std::vector<MapId>& maps) {
     MapState state;
     state.group = maps.front();
@@ -227,7 +227,7 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   ASSERT_EQ(after.requests.size(), 6u);
   EXPECT_EQ(after.requests[0].channel, "PLACE_MATCH");
   EXPECT_EQ(after.requests[1].channel, "KEYFRAME_1");
-  EXPECT_EQ(after.requests[4].channel, "MAP_STATE");  // who is in a group decides on the kind
+  EXPECT_EQ(after.requests[4].channel, "MAP_STATE");  // the groups decide the kind
   EXPECT_EQ(after.requests[5].channel, "MAP_STATE");
   for (const Payload& match : before.matches) {
     after.Retransmit("PLACE_MATCH", match);
@@ -308,7 +308,7 @@ TEST(PlaceRecognitionProcess, RetransmitsItsMatchesAsTheyWere) {
   EXPECT_EQ(Payload(answers[0].data.begin(), answers[0].data.end()), server.matches[1]);
 }
 
-// Live: what comes meanwhile is heard between two keyframes.
+// Live: messages that arrive meanwhile are handled between two keyframes.
 TEST(PlaceRecognitionProcess, LiveItHearsBeforeItRecognises) {
   test::TestWorld world(8);
   LcmBus bus("memq://");

@@ -21,7 +21,7 @@ Postings Visited(const PostingLists& lists, uint32_t word, size_t most, size_t p
   return visited;
 }
 
-// As plain lists would have it.
+// The expected result, from plain lists.
 Postings Expected(const Postings& list, size_t most, size_t phase) {
   Postings expected;
   const size_t stride = 1 + list.size() / most;

@@ -22,8 +22,8 @@ Keyframe Along(int seq) {
   return keyframe;
 }
 
-// As far off as the steps that nobody has: each one's own error, and its rotation of all that
-// follows.
+// The covariance of a gap is that of the missing steps: each step's own error, and the effect of
+// its rotation on all later ones.
 TEST(OdometryChain, AGapIsAsUncertainAsItsSteps) {
   constexpr int kFrom = 60, kSteps = 9;
   OdometryChain chain;
@@ -46,7 +46,7 @@ TEST(OdometryChain, AGapIsAsUncertainAsItsSteps) {
     variances[3] = kSigmaYaw * kSigmaYaw;
     steps += J * variances.asDiagonal() * J.transpose();
   }
-  // Each rotation is taken at the middle of the gap, not where it was.
+  // The bridge treats every rotation as if it were at the middle of the gap.
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
       EXPECT_NEAR(node.edge.covariance(i, j), steps(i, j),

@@ -1,4 +1,4 @@
-// Large groups: what a solve moves and what it leaves.
+// Large groups: which maps a solve moves, and which stay fixed.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-// Four maps in a row: each has constraints with the one before it alone.
+// Four maps in a row: each has constraints only with the previous one.
 std::vector<Constraint> InARow(const SyntheticWorld& world, int count) {
   std::vector<Constraint> constraints = MakeConstraints(world, count, 0);
   std::erase_if(constraints, [](const Constraint& one) {
@@ -19,7 +19,7 @@ std::vector<Constraint> InARow(const SyntheticWorld& world, int count) {
   return constraints;
 }
 
-// How far the positions of a map moved from one state to another.
+// Displacement of a map's keyframes between two states, m.
 double Moved(const MapState& before, const MapState& after, const MapId& map) {
   double moved = 0;
   for (const KeyframePose& a : before.keyframes) {
@@ -43,7 +43,7 @@ struct Row {
       : world(MakeSyntheticWorld(PosesOnly(4, 60))), graph(Options(local_keyframes)) {
     AddKeyframes(world, &graph);
   }
-  // Those with the last map or without it; at most so many.
+  // The constraints with, or without, the last map; limited in number.
   std::vector<Constraint> OfTheLast(bool last, size_t count) const {
     std::vector<Constraint> constraints = InARow(world, 2000);
     std::erase_if(constraints, [&](const Constraint& one) {
@@ -101,7 +101,7 @@ TEST(LocalSolve, AMapJoinsALargeGroupThatStays) {
   }
 }
 
-// What is far from new loops has its turn when the group has grown by a tenth.
+// Maps far from new loops are solved again when the group's loops have grown by a tenth.
 TEST(LocalSolve, ALargeGroupIsSolvedWholeWhenItHasGrown) {
   Row row(100);
   AddConstraints(row.OfTheLast(false, 150), &row.graph);
@@ -109,7 +109,7 @@ TEST(LocalSolve, ALargeGroupIsSolvedWholeWhenItHasGrown) {
   row.graph.Finish();
   const MapState before = row.graph.States().front();
   ASSERT_EQ(before.maps.size(), 4u);
-  // A fifth would be looked at anew at once.
+  // If the loops grew by a fifth, all would be weighted anew at once.
   const int more = 15 * (before.num_constraints + before.num_switched_off) / 100;
   AddConstraints(row.OfTheLast(true, 20 + more), &row.graph);
   EXPECT_EQ(Moved(before, row.graph.States().front(), row.map(0)), 0);

@@ -1,4 +1,4 @@
-// Which constraints make two maps one, undo it, or join a map after a restart.
+// Merging of maps by constraints, undoing a merge, and maps that join after a restart.
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ TEST(PoseGraph, OneMatchDoesNotMergeThreeViewpointsDo) {
   EXPECT_LT(JointAte(world, states[0]), 0.1);
 }
 
-// The same three matches again and again are one viewpoint, however many keyframes stand there.
+// Repeated matches at the same place are one viewpoint, however many keyframes there are.
 TEST(PoseGraph, ManyMatchesOfOneViewpointDoNotMerge) {
   SyntheticWorldOptions options = PosesOnly(2, 60);
   options.step_m = 0.003;
@@ -41,7 +41,7 @@ TEST(PoseGraph, ManyMatchesOfOneViewpointDoNotMerge) {
   EXPECT_EQ(graph.counters().groups, 2);
 }
 
-// How many viewpoints merge two maps which both see one spot only.
+// Number of viewpoints needed to merge two maps that both see only one spot.
 int ViewpointsAtOneSpot(int num_inliers) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 60));
   PoseGraphOptions options;
@@ -65,7 +65,8 @@ TEST(PoseGraph, AtOneSpotMoreViewpointsAreNeededThoughFewerOfStrongOnes) {
   EXPECT_EQ(ViewpointsAtOneSpot(80), 3);
 }
 
-// Wrong constraints that agree with each other by chance or by a look-alike: too few, or rivalled.
+// Wrong constraints that agree by chance or due to a look-alike: too few, or with a strong rival
+// set.
 TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
   PoseGraph graph({});
@@ -84,7 +85,7 @@ std::vector<KeyframePair> PairsBetweenMaps(const SyntheticWorld& world) {
   return pairs;
 }
 
-// A constraint as it would be if map b lay elsewhere by `T`: all of these agree.
+// A constraint consistent with a displacement `T` of map b: all such constraints agree.
 Constraint Shifted(const SyntheticWorld& world, const KeyframePair& pair, const Rigid3& T) {
   Random random(StableHash(pair.from, pair.to, 1));
   Constraint constraint = MakeTrueConstraint(world, pair.from, pair.to, {}, random);
@@ -108,7 +109,7 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
     const PoseGraphUpdate update = Add(Shifted(world, pairs[i * stride], {}), &graph);
     if (graph.counters().groups == 2 && !update.corrections.empty()) {
       undone = true;
-      // The newer map's agent is told that its odom frame is its own again.
+      // The newer map's agent gets a correction back to its own odom frame.
       EXPECT_EQ(update.corrections.back().map, world.agents[1].map);
       EXPECT_EQ(update.corrections.back().group, world.agents[1].map);
       EXPECT_LT(update.corrections.back().T_map_odom.t.norm(), 1e-12);
@@ -161,7 +162,7 @@ TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
   ByteRecordReader reader(bytes);
   ASSERT_TRUE(restored.Restore(&reader));
   EXPECT_EQ(restored.counters().groups, 1);
-  // A loop within one map has the group solved again; between the maps the derived one is alone.
+  // A loop within one map makes the group be solved again; only the derived loop connects the maps.
   const std::vector<Constraint> constraints = MakeConstraints(world, 60, 0);
   const auto intra = std::ranges::find(constraints, PlaceKind::kIntra, &Constraint::kind);
   ASSERT_NE(intra, constraints.end());
@@ -171,8 +172,8 @@ TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
   EXPECT_EQ(restored.counters().in_force, 2);
 }
 
-// What comes after the restart is laid beside the solution; a solve from the beginning comes later,
-// and is that of a graph which took all at once.
+// A map that comes after the restart is placed beside the restored solution. The later solve from
+// the beginning gives the same as a graph that got everything at once.
 TEST(PoseGraph, AMapThatCameAfterTheCheckpointJoinsItsSolution) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 100));
   const MapId& late = world.agents[2].map;
@@ -249,8 +250,8 @@ TEST(PoseGraph, GroupsThatAreOneAfterTheCheckpointKeepTheirShapes) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.06);
 }
 
-// Three viewpoints that agree as well as odometry is believed between maps, but not as well as this
-// one's loops show it to be; until other loops show that it drifts more.
+// Three viewpoints agree within the minimum drift between maps, but not within the drift that this
+// odometry's loops show, until further loops show a larger drift.
 TEST(PoseGraph, AMergeThatTheSolveDoesNotCarryIsUndoneAndTriedAgainAtTheEnd) {
   constexpr int kNumKeyframes = 23;
   PoseGraph graph({});

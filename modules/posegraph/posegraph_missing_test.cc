@@ -2,7 +2,7 @@
 
 #include "posegraph/test_server.h"
 
-// What has not come: asked for, waited for, or given up.
+// Missing messages: requested, waited for, or given up.
 
 namespace pangea {
 namespace {
@@ -69,7 +69,7 @@ TEST(PoseGraphMissing, RequestsResultsThatWerePromised) {
   ASSERT_EQ(server.verification_requests.size(), 1u);
   EXPECT_EQ(server.verification_requests[0].seq, std::vector<int32_t>{3});
   EXPECT_EQ(server.verification_requests[0].constraint_id, std::vector<int64_t>{refused.Id()});
-  server.Tick(650);  // it may take its time: asked for ever more rarely
+  server.Tick(650);  // verification may be slow: requested at growing intervals
   EXPECT_EQ(server.verification_requests.size(), 5u);
   server.Send(refused);
   server.Tick(700);
@@ -90,7 +90,7 @@ TEST(PoseGraphMissing, AfterARestartItAsksForWhatTheJournalHas) {
   EXPECT_EQ(results, 2);
   EXPECT_EQ(keyframes, 2);
   EXPECT_EQ(server.status.pending, 20 + 2);  // keyframes, and both maps' matches
-  // Half of it says nothing of the whole.
+  // Nothing is published from half of the input.
   for (const Keyframe& keyframe : world.agents[0].keyframes) {
     server.Send(keyframe);
   }
@@ -125,8 +125,7 @@ TEST(PoseGraphMissing, DoesNotWaitForWhatNobodyHas) {
   EXPECT_FALSE(server.states.empty());
 }
 
-// Fusion is behind: its verification results come slowly, one by one, and the journal does not have
-// them.
+// Fusion is behind: its verification results come slowly, one by one, and are not in the journal.
 TEST(PoseGraphMissing, DoesNotWaitForWhatIsStillToBeVerified) {
   const SyntheticWorld world = MakeWorld();
   Server server;
@@ -158,7 +157,7 @@ TEST(PoseGraphMissing, DoesNotWaitForWhatIsStillToBeVerified) {
   EXPECT_LT(seconds, 9);
 }
 
-// It would ask for two thousand million verification results, and never come to an end.
+// Otherwise it would request two thousand million verification results and never end.
 TEST(PoseGraphMissing, AnAbsurdHaveIsRefused) {
   Server server;
   have_t have{};

@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// Ceres brings OpenMP into the process; this is how CHOLMOD's code asks it for four threads.
+// Ceres links OpenMP; CHOLMOD's code requests four threads in this way.
 TEST(Process, SolvesInOneThreadWhateverALibraryAsksFor) {
   using Region = void (*)(void*);
   void* const symbol = dlsym(RTLD_DEFAULT, "GOMP_parallel");
@@ -63,7 +63,7 @@ TEST(PoseGraphProcess, TakesWhatWaitsBeforeItSolves) {
   server.Tick(1);
   EXPECT_EQ(server.process.graph().counters().solves, 1);
   EXPECT_EQ(server.corrections.size(), 2u);
-  // Messages without an end hold nothing up for ever.
+  // An endless stream of messages does not delay a solve for ever.
   server.bus.more_waits = true;
   for (int i = 0; i < 100; ++i) {
     server.Send(constraints.back());

@@ -1,4 +1,4 @@
-// Maps whose odometry does not know its scale, alone and with others.
+// Maps with unobserved scale, alone and with other maps.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,8 @@
 namespace pangea {
 namespace {
 
-// What an odometry makes whose metre is exp(log_scale) true ones, and that claims `sigma`.
+// The keyframes of an odometry with wrong scale: one metre of it is exp(log_scale) true metres, and
+// its sigma of the scale is `sigma`.
 void Unscale(double log_scale, double sigma, SyntheticAgent* agent) {
   const double longer = std::exp(-log_scale);
   for (Keyframe& keyframe : agent->keyframes) {
@@ -25,7 +26,8 @@ void Unscale(double log_scale, double sigma, SyntheticAgent* agent) {
   }
 }
 
-// Within the map both windows are in its metres; between maps verification has weighed the scales.
+// Constraints within the map are in its units; those between maps are metric, because verification
+// has accounted for the scales.
 void Unscale(double log_scale, const MapId& map, std::vector<Constraint>* constraints) {
   const double longer = std::exp(-log_scale);
   for (Constraint& constraint : *constraints) {
@@ -43,7 +45,7 @@ MapState OfMap(const MapState& state, const MapId& map) {
   return part;
 }
 
-// How large a map is told, of what it is.
+// Published size of a map, relative to its true size.
 double Size(const SyntheticWorld& world, const MapState& state) {
   Eigen::Vector3d mean_told = Eigen::Vector3d::Zero(), mean_true = Eigen::Vector3d::Zero();
   const auto count = static_cast<double>(state.keyframes.size());
@@ -73,7 +75,7 @@ TEST(PoseGraphScale, LoopsOfALoneMapDoNotShrinkIt) {
   EXPECT_EQ(graph.counters().not_metric, 1);
 }
 
-// Whichever of the two came first and so gives the map frame.
+// Whichever map came first and therefore defines the map frame.
 TEST(PoseGraphScale, IsFoundWhereMetricMapsOverlap) {
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 120, seed));
@@ -92,7 +94,7 @@ TEST(PoseGraphScale, IsFoundWhereMetricMapsOverlap) {
     EXPECT_EQ(state.maps.size(), 2u) << seed;
     EXPECT_EQ(state.num_switched_off, 0) << seed;
     EXPECT_NEAR(Size(world, OfMap(state, world.agents[unscaled].map)), 1, 0.01) << seed;
-    // The metric map is not bent.
+    // The metric map is not deformed.
     EXPECT_NEAR(Size(world, OfMap(state, metric)), Size(world, OfMap(before, metric)), 0.002);
     EXPECT_LT(JointAte(world, OfMap(state, metric)),
               1.2 * JointAte(world, OfMap(before, metric)) + 0.002);
@@ -100,7 +102,7 @@ TEST(PoseGraphScale, IsFoundWhereMetricMapsOverlap) {
   }
 }
 
-// Keyframes that come after the last loop, and the agent's own pose beside its newest keyframe.
+// Keyframes after the last loop, and the agent's own pose at its newest keyframe.
 TEST(PoseGraphScale, CorrectionHoldsWhereTheAgentIs) {
   SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 120));
   std::vector<Constraint> constraints = BetweenMaps(MakeConstraints(world, 80, 0));
@@ -117,7 +119,8 @@ TEST(PoseGraphScale, CorrectionHoldsWhereTheAgentIs) {
   EXPECT_LT((at - newer.keyframes[correction.seq].T_map_body.t).norm(), 1e-9);
 }
 
-// As posegraph_test.cc has it for metric maps, with a scale that is off as much as it claims.
+// Like the test for metric maps in posegraph_test.cc, with an error of the scale that fits its
+// sigma.
 TEST(PoseGraphScale, RelativePosesAreAsGoodAsTheirCovariance) {
   double sum = 0, sum_scale = 0;
   constexpr int kTrials = 20;

@@ -84,13 +84,13 @@ TEST(PoseGraph, OptimisedRelativePosesAreAsGoodAsTheirCovariance) {
     const Vector4d error = ErrorOfNewest(world, correction);
     sum += error.dot(CovarianceOfNewest(world, correction).ldlt().solve(error));
   }
-  // Four degrees of freedom; the mean of 20 has a standard deviation of 0.63. Tilt errors wander
-  // from edge to edge instead of being independent, hence the wider side below.
+  // Four degrees of freedom; the mean of 20 has a standard deviation of 0.63. Tilt errors are a
+  // random walk along the edges instead of independent, hence the wider lower limit.
   EXPECT_GT(sum / kTrials, 2);
   EXPECT_LT(sum / kTrials, 5.9);
 }
 
-// An odometry ten times worse than it claims: good loops must not be switched off for it.
+// An odometry that is ten times worse than its covariances: good loops must not be switched off.
 TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
   SyntheticWorldOptions options = PosesOnly(1, 300);
   options.edge_sigma_m = 0.02;
@@ -105,8 +105,8 @@ TEST(PoseGraph, OverconfidentOdometryIsNotBelieved) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.5 * OdometryAte(world, 0));
 }
 
-// Odometry drifts four times what it claims. Whether one more constraint is among the results,
-// right but vague, decides neither what the odometry is worth nor which constraints are believed.
+// The odometry drifts four times more than its covariances. One additional constraint, right but
+// uncertain, must change neither the factor on the odometry nor which constraints are in force.
 TEST(PoseGraph, OneVagueConstraintDecidesNothing) {
   SyntheticWorldOptions options = PosesOnly(2, 150);
   options.edge_sigma_m = 0.02;
@@ -209,7 +209,7 @@ TEST(PoseGraph, BridgesAGapThatNobodyFills) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.06);
 }
 
-// As the paper has it, the main map's head stays with its odometry.
+// As in the paper, the start of the main map stays at its odometry's poses.
 TEST(PoseGraph, ScopeOfThePaper) {
   SyntheticWorldOptions options = PosesOnly(2, 120);
   options.start_apart = 0.3;

@@ -13,8 +13,8 @@ using Eigen::MatrixXd;
 
 constexpr int kSize = 13;  // two poses and a scale
 
-// A weak prior, and points of some landmarks that each see one direction: some say little of it,
-// some nearly all that is known.
+// A weak prior, and landmarks with information in one direction each: some contribute little, some
+// nearly all.
 struct Information {
   MatrixXd total;
   std::vector<InformationShare> of_point;
@@ -43,8 +43,7 @@ double PositionTrace(const Matrix6d& covariance) {
   return covariance.topLeftCorner<3, 3>().trace();
 }
 
-// Bounds say which landmarks need not be solved without: the result is that of solving without
-// each.
+// Bounds skip some landmarks; the result is the same as with a solve without each landmark.
 TEST(FrameInformation, WithoutOneIsTheWorstOfAll) {
   for (uint64_t seed = 1; seed <= 200; ++seed) {
     const Information information = RandomInformation(seed);

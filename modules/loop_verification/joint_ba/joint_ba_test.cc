@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-// A match's landmark in both windows: the one of a pair that matches join has the other's name.
+// The common name of a match's landmark in both windows.
 using Joined = std::map<std::pair<Direction, int>, std::set<std::pair<Direction, int>>>;
 
 Joined Partners(const WindowPair& windows, const std::vector<PointMatch>& matches) {
@@ -42,7 +42,7 @@ int LandmarkAt(const Window& window, const CornerRef& corner) {
 
 class JointBaTest : public JointBaTestWindows {
  protected:
-  // Trace of the position's covariance from the matches whose landmarks `keep` lets pass.
+  // Trace of the position's covariance, from the matches whose landmarks satisfy `keep`.
   template <typename Keep>
   double PositionTrace(const Keep& keep) const {
     std::vector<PointMatch> kept;
@@ -56,8 +56,7 @@ class JointBaTest : public JointBaTestWindows {
   }
 };
 
-// What the optimisation says of its covariance without the landmark that says most is what an
-// optimisation without that landmark says.
+// covariance_without_one equals the covariance of an optimisation without that landmark.
 TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
   const auto all = SolveJointBa(windows_, matches_, T_m_c_, options_);
   ASSERT_TRUE(all);
@@ -74,7 +73,7 @@ TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
   EXPECT_NEAR(said / worst, 1, 0.03);
 }
 
-// So with the landmarks that are alike in one match at least: as if there were no others.
+// covariance_of_sure equals the covariance of an optimisation with the sure landmarks alone.
 TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   std::vector<int> distances;
   for (const PointMatch& match : matches_) {
@@ -103,8 +102,7 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
   EXPECT_FALSE(none->covariance_of_sure);
 }
 
-// Where no map knows its scale, nobody knows how far the two are from each other; one that does
-// tells it.
+// If neither map knows its scale, their distance is uncertain; if one does, the distance is known.
 TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
   constexpr double kSigma = 0.3;
   const auto relative_sigma = [&](bool m_is_metric) {
@@ -129,8 +127,8 @@ TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
   EXPECT_LT(relative_sigma(true), 0.2 * kSigma);
 }
 
-// What no number of corners averages out: a rotation, and the step that looks the same at the
-// points' distance, the same in every direction.
+// The systematic error does not average out: a rotation, and the translation with the same effect
+// at the points' distance, equal in all directions.
 TEST_F(JointBaTest, SystematicErrorsAreAdded) {
   options_.systematic_px = 0;
   const auto without = SolveJointBa(windows_, matches_, T_m_c_, options_);
@@ -149,8 +147,8 @@ TEST_F(JointBaTest, SystematicErrorsAreAdded) {
             1e-6 * step * step);
 }
 
-// With noise as it is claimed between one sigma an observation, where the point follows its
-// corners, and both dimensions' full ones.
+// With noise as stated, the rms is between one sigma per observation (if the point follows its
+// corners) and the full noise of both dimensions.
 TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
   options_.pixel_sigma = 0.3;
   const auto result = SolveJointBa(windows_, matches_, T_m_c_, options_);
@@ -159,9 +157,9 @@ TEST_F(JointBaTest, ResidualsHaveTheSizeOfTheNoise) {
   EXPECT_LT(result->rms_px, std::sqrt(2.0) * 0.3);
 }
 
-// Corners that find each other both ways count half each, and yet are as far off as they are. A
-// point is held by its own corner with weight 1 and drawn by the other's with w: of their distance
-// 1/(1 + w) is left, 2/3 where it was 1/2.
+// Mutual matches have half weight each, but their residuals are full. A point is held by its own
+// corner with weight 1 and pulled by the other's with weight w: 1/(1 + w) of their distance
+// remains, which is 2/3 instead of 1/2.
 TEST_F(JointBaTest, CountingHalfDoesNotMakeAResidualSmaller) {
   std::vector<PointMatch> both_ways, one_way;
   for (const PointMatch& forward : matches_) {
@@ -181,7 +179,7 @@ TEST_F(JointBaTest, CountingHalfDoesNotMakeAResidualSmaller) {
   EXPECT_NEAR(both->rms_px / one->rms_px, 4.0 / 3.0, 0.15);
 }
 
-// Pixels that claim six times too much are found out by their residuals.
+// A pixel sigma that is six times too small is revealed by the residuals.
 TEST_F(JointBaTest, TheCovarianceIsNeverSmallerThanTheResidualsSay) {
   options_.systematic_px = 0;
   options_.pixel_sigma = 0.3;

@@ -14,8 +14,8 @@
 namespace pangea {
 namespace {
 
-// The same problem for Ceres, with formulas of its own and numeric derivatives. Poses are tangents
-// about where the state has them.
+// The same problem for Ceres, with independent formulas and numeric derivatives. Poses are
+// parametrised by tangents at the state.
 class Reference {
  public:
   Reference(const JointProblem& problem, const JointState& start, RobustLoss::Kind loss)
@@ -125,7 +125,7 @@ class Reference {
 
 class JointProblemTest : public JointBaTestWindows {
  protected:
-  // From where a guess would be.
+  // Start from a realistic initial guess.
   JointProblemTest() {
     T_m_c_ = Rigid3(ExpSo3({0.004, -0.003, 0.01}), {0.03, -0.02, 0.04}) * T_m_c_;
   }
@@ -148,7 +148,7 @@ TEST_F(JointProblemTest, SolvesAsCeresDoes) {
     const std::vector<bool> all(matches_.size(), true);
     const RobustLoss robust{loss, 2.0};
     ASSERT_TRUE(problem.Solve(matches_, all, robust));
-    // From the start's poses: the points have their start by the problem's own account.
+    // Start from the initial poses; the points start at the problem's own initial values.
     JointProblem start(windows_, T_m_c_, options_);
     JointState state = start.state();
     for (const HostedPoint& point : problem.points()) {

@@ -11,7 +11,7 @@ namespace {
 
 const MapId kMap = RowId(1);
 
-// Uses what is about known keyframes.
+// Uses constraints on known keyframes.
 struct User {
   bool operator()(const Constraint& constraint) {
     const bool known = seqs.contains(constraint.from.seq) && seqs.contains(constraint.to.seq);

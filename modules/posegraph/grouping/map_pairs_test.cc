@@ -9,7 +9,7 @@ namespace {
 
 const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
 
-// Of maps 0 and 1, by three viewpoints.
+// Merges maps 0 and 1 by three viewpoints.
 std::vector<Loop> MergingLoops(const GraphMaps& maps) {
   std::vector<Loop> loops;
   for (const int node : {0, 2, 4}) {
@@ -38,8 +38,8 @@ TEST(MapPairs, AddSaysWhenItMerges) {
   EXPECT_TRUE(pairs.All()[0]->merged());
 }
 
-// A pair is from the map with the smaller id, whichever was first seen and whichever way a loop
-// goes.
+// The first map of a pair is the one with the smaller id, whichever was seen first, and for both
+// directions of a loop.
 TEST(MapPairs, TheDirectionOfALoopDoesNotMatter) {
   GraphMaps maps;
   for (const int agent : {2, 1}) {

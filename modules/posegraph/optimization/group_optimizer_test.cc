@@ -9,7 +9,7 @@ namespace {
 
 const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
 
-// Two maps that are merged and have not been solved yet.
+// Two merged maps that have not been solved yet.
 struct MergedMaps {
   MergedMaps() {
     group.maps = {0, 1};
@@ -37,7 +37,7 @@ struct MergedMaps {
 
 TEST(GroupOptimizer, SolvesNewMapsFromTheBeginning) {
   MergedMaps merged;
-  merged.maps[0].Move({{7, 0, 0}, 1});  // as it lay in another group
+  merged.maps[0].Move({{7, 0, 0}, 1});  // its pose in another group
   merged.Optimizer().Solve(&merged.group, false);
   EXPECT_LT(merged.Off(), 1e-6);
   const SolveSchedule& schedule = merged.group.solve;
@@ -48,7 +48,7 @@ TEST(GroupOptimizer, SolvesNewMapsFromTheBeginning) {
   EXPECT_EQ(merged.maps[1].solved_with, 0);
 }
 
-// Once they are many, one more loop is looked at from the solution.
+// With many loops, one more loop is solved starting from the solution.
 TEST(GroupOptimizer, LooksAtFewNewLoopsFromTheSolution) {
   MergedMaps merged;
   for (int node = 0; node < 9; ++node) {
@@ -70,7 +70,7 @@ TEST(GroupOptimizer, LooksAtFewNewLoopsFromTheSolution) {
 
 TEST(GroupOptimizer, LaysWhatJoinsBesideTheSolution) {
   MergedMaps merged;
-  merged.maps[0].Move({{0, 0, 0.01}, 0});  // as only a solution would have it
+  merged.maps[0].Move({{0, 0, 0.01}, 0});  // a pose that only a solution has
   merged.maps.Add(RowId(3));               // solved with map 1 before
   merged.maps[2].Add(InARow(RowId(3), 0));
   merged.maps[2].solved_with = 1;
@@ -84,7 +84,7 @@ TEST(GroupOptimizer, LaysWhatJoinsBesideTheSolution) {
     const Pose4& joined = merged.maps[number].T_map_odom;
     EXPECT_LT((joined.p - Eigen::Vector3d(0, 0, 0.01) - kT_0_1.p).norm(), 1e-6);
   }
-  EXPECT_TRUE(merged.group.solve.stale);  // from the beginning it is still to be solved
+  EXPECT_TRUE(merged.group.solve.stale);  // the solve from the beginning is still due
   EXPECT_FALSE(merged.group.solve.NewMapsWait());
   EXPECT_EQ(merged.maps[1].solved_with, 0);
 }

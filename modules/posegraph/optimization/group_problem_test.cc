@@ -25,7 +25,7 @@ struct TwoMaps {
     }
     return pointers;
   }
-  // How far the second map is from where the loops have it.
+  // Distance of the second map from its position according to the loops.
   double Off() const { return (maps[1].T_map_odom.p - kT_0_1.p).norm(); }
 
   GraphMaps maps = MakeRows(2, 10);
@@ -43,7 +43,7 @@ TEST(GroupProblem, TheMapsLieAsTheLoopsHaveThem) {
     const GraphMap& map = two.maps[number];
     EXPECT_EQ(map.newest_solved, 6);
     EXPECT_GT(map.covariance(0, 0), 0);
-    // After the last loop odometry alone.
+    // After the last loop, by odometry alone.
     EXPECT_EQ(map.poses[9].p, map.PoseOf(9).p);
   }
 }
@@ -84,7 +84,7 @@ TEST(GroupProblem, InThePapersScopeTheOldestMapIsFreeFromItsFirstLoopOn) {
   paper.scope = PoseGraphOptions::Scope::kPaper;
   for (const bool is_paper : {true, false}) {
     TwoMaps two;
-    // Bent, if anything is: its ends are nearer than its odometry says.
+    // The loop deforms the free part of the map: its ends are nearer than in the odometry.
     two.loops.push_back(LoopBetween({0, 2}, {0, 6}, {{-0.05, 0, 0}, 0}, two.maps));
     GroupProblem(two.group, two.Loops(), {}, is_paper ? paper : PoseGraphOptions(), &two.maps)
         .SolveGraduated();
@@ -93,7 +93,7 @@ TEST(GroupProblem, InThePapersScopeTheOldestMapIsFreeFromItsFirstLoopOn) {
   }
 }
 
-// The more the odometry drifts, the more a loop bends it.
+// The larger the variance of the odometry, the more a loop deforms it.
 TEST(GroupProblem, OdometryCountsAsMuchAsItsVarianceSays) {
   double bent[2];
   for (const int i : {0, 1}) {
@@ -118,7 +118,7 @@ TEST(GroupProblem, AnUnknownScaleIsFound) {
     keyframe.scale_sigma = 0.2;
     maps[1].Add(keyframe);
   }
-  // The second row is a tenth longer than it says.
+  // The second row is a tenth longer than in its odometry.
   std::vector<Loop> loops;
   for (const int node : {0, 3, 6, 9}) {
     loops.push_back(LoopBetween({0, node}, {1, node}, {{0.1 * node, 0, 0}, 0}, maps));

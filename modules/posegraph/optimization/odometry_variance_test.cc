@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// An error of so many standard deviations of the odometry along x.
+// An error along x of this many standard deviations of the odometry.
 PairEvidence::Innovation Off(double sigmas) {
   return {Vector4d(sigmas, 0, 0, 0), Matrix4d::Zero(), Matrix4d::Identity()};
 }

@@ -34,7 +34,7 @@ TEST(FitYawAndShift, OnePairIsAShift) {
   EXPECT_EQ(found.p, Eigen::Vector3d(1, 2, 2));
 }
 
-// Two agents in one group, as the graph solves them.
+// Two agents in one group, solved by the graph.
 struct Server {
   Server() {
     SyntheticWorldOptions options;
@@ -53,7 +53,7 @@ struct Server {
     }
     solved = graph.Finish().states.back();
   }
-  // The truth, in a frame of its own.
+  // The truth, in another frame.
   MapState Truth() const {
     MapState truth = solved;
     const Rigid3 T(YawRotation(1), {5, 6, 7});
@@ -94,7 +94,7 @@ TEST(Refinement, IsToldInTheFrameOfTheSolution) {
     moved += update.states[0].keyframes[i].T_map_body.t - server.solved.keyframes[i].T_map_body.t;
   }
   EXPECT_LT(moved.norm(), 1e-6);  // on the whole it lies on the solution
-  // The agents are told what the map says: the newest solved keyframe through its correction.
+  // The corrections agree with the state at the newest solved keyframe.
   ASSERT_EQ(update.corrections.size(), 2u);
   for (const Correction& correction : update.corrections) {
     const KeyframeId id{correction.map, correction.seq};
@@ -141,7 +141,7 @@ TEST(Refinement, ARepeatOrAnOlderOneChangesNothing) {
   EXPECT_LT(Difference(server.graph.States().back(), truth), 1e-9);
 }
 
-// What the graph decides does not depend on when a refinement comes.
+// The graph's decisions do not depend on when a refinement comes.
 TEST(Refinement, TheSolutionStaysAsItWas) {
   Server with, without;
   with.graph.AddRefinement(with.Truth());

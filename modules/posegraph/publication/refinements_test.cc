@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// Of whole rows, each keyframe twice as far along and the whole elsewhere.
+// A refinement of whole rows: positions stretched by two, and everything displaced.
 MapState Stretched(const std::vector<int>& agents, int64_t revision) {
   MapState refined;
   refined.revision = revision;

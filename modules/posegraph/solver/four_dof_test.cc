@@ -104,8 +104,8 @@ TEST(ScaledPoseCost, JacobiansAgreeWithDifferences) {
   }
 }
 
-// A relative pose between two tilted bodies, as two odometries would have it, has no residual at
-// the truth.
+// The residual of a relative pose between two tilted bodies, with their odometries' poses, is zero
+// at the truth.
 TEST(Residual, IsZeroAtTheTruth) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
@@ -139,7 +139,7 @@ TEST(Whitening, SurvivesExtremes) {
 }
 
 // The 4x4 covariance predicts the scatter of measurements drawn from the 6x6 one, where rotation
-// and translation are correlated and the body is tilted; both ways round.
+// and translation are correlated and the body is tilted; in both directions.
 TEST(MakeRelative4, CovarianceMatchesTheScatter) {
   Random random(4);
   const Rigid3 T_from_to(ExpSo3({0.2, -0.1, 0.5}), {1, -2, 0.4});
@@ -169,8 +169,8 @@ TEST(MakeRelative4, CovarianceMatchesTheScatter) {
   EXPECT_NEAR(sum_inverse / kTrials, 4, 0.2);
 }
 
-// So does what the first keyframe's own tilt adds: the step is known in its body, and goes where
-// that is thought to point.
+// The covariance from the first keyframe's tilt fits the scatter too: the step is measured in its
+// body frame, so a wrong tilt displaces the other keyframe.
 TEST(MakeRelative4, TheTiltOfTheFirstMovesTheStep) {
   Random random(5);
   const Rigid3 T_from_to(ExpSo3({0.2, -0.1, 0.5}), {1, -2, 0.4});

@@ -5,8 +5,8 @@
 namespace pangea {
 namespace {
 
-// A chain of nodes in one place, whose first is fixed, closed by a loop as sure as each edge: like
-// resistors, the two ways from the first node to another are in parallel.
+// A chain of nodes at one place, with a fixed first node, closed by a loop with the covariance of
+// an edge. As with resistors, the two paths from the first node to any other are in parallel.
 TEST(GroupSolver, MarginalsOfAClosedChain) {
   constexpr int kLast = 30;
   Matrix4d root = Matrix4d::Identity();
