@@ -1,4 +1,4 @@
-// Anchors of two agents: alone, fused, while the map moves, when a fusion is undone.
+// Anchors of two agents: alone, fused, while the map moves, and after a fusion is undone.
 
 #include "anchors/anchors.h"
 
@@ -32,7 +32,7 @@ class AnchorsTest : public AnchorsTestWorld {
     return world_.T_hall_body({edit.map, edit.keyframe_seq}) * edit.T_ref_anchor.t;
   }
 
-  // Where an agent has it, in the hall: by its newest keyframe.
+  // Position in the hall at which an agent has the anchor, by its newest keyframe.
   Eigen::Vector3d SeenBy(int agent, const AnchorState& state) const {
     const Keyframe& newest = world_.agents[agent].keyframes.back();
     return world_.T_hall_body(newest.id) * (newest.T_odom_body.Inverse() * state.T_odom_anchor.t);
@@ -174,8 +174,8 @@ Vector6d Sample(const Vector6d& sigmas, std::mt19937_64& random) {
   return sample;
 }
 
-// NEES of an anchor of agent 1 in agent 2's odom frame. The editor is wrong by as much as it says,
-// and the map has agent 2 wrong by as much as its correction says.
+// NEES of an anchor of agent 1 in agent 2's odom frame. The editor's error fits its covariance, and
+// the error of agent 2 in the map fits its correction's covariance.
 double NeesAtTheOther(uint64_t seed) {
   SyntheticWorldOptions options;
   options.seed = seed;

@@ -1,4 +1,4 @@
-// Agents of the synthetic world that see where the others are.
+// Poses of other agents in the synthetic world.
 
 #include "anchors/other_agents.h"
 
@@ -33,7 +33,7 @@ TEST_F(OtherAgentsTest, EachHasTheOthersInItsOwnOdomFrame) {
     EXPECT_EQ(others.map, world_.agents[self].map);
     ASSERT_EQ(others.others.size(), 1u);
     EXPECT_EQ(others.others[0].agent_id, world_.agents[1 - self].map.agent_id);
-    // Seen from where it is itself, the other is where it is in the hall.
+    // The other agent's pose relative to its own is the true one.
     const Rigid3 seen = Newest(self).T_odom_body.Inverse() * others.others[0].T_odom_cam;
     const Rigid3 truth = world_.T_hall_body(Newest(self).id).Inverse() *
                          world_.T_hall_body(Newest(1 - self).id) *

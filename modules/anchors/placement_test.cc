@@ -38,7 +38,7 @@ class PlacementTest : public testing::Test {
     edit.utime = agent().keyframes[seq].utime;
     return edit;
   }
-  // Where the holds have it, by the odometry's poses.
+  // Position of the anchor by its holds and the odometry's poses.
   static std::vector<Eigen::Vector3d> Positions(const OdometryTrack& track,
                                                 const AnchorPlacement& placement) {
     std::vector<Eigen::Vector3d> positions;
@@ -84,7 +84,7 @@ TEST_F(PlacementTest, TheKeyframesThatSeeItHoldIt) {
   }
 }
 
-// On corners that have a map point: where the world has the point.
+// On corners with a map point: the anchor is at the world's point.
 TEST_F(PlacementTest, OnTheSurfaceBehindAPixel) {
   std::vector<double> errors;
   int not_placed = 0;
@@ -160,7 +160,8 @@ TEST_F(PlacementTest, SaysWhyNot) {
   EXPECT_TRUE(std::holds_alternative<NotPlaced>(Place(beyond, track_, 8)));
 }
 
-// What lies in a record store, half of it for lack of room in memory, places it as before.
+// With points in a record store, half of them in memory for lack of room, the placement is the
+// same.
 TEST_F(PlacementTest, TheSameWithPointsSetAside) {
   test::TestRecordStore records(agent().keyframes.size() / 2);
   OdometryTrack track(&records);

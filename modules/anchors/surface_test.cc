@@ -34,7 +34,7 @@ TEST(Surface, ASlantedPlaneIsFoundExactly) {
   EXPECT_NEAR(depth->depth_m, truth, 0.02 * truth);
 }
 
-// Errors are what is claimed: the surface here does not bend, so less than that.
+// Errors are below the stated sigma: the surface is exactly plane here.
 TEST(Surface, ItsSigmaIsNotTooSmall) {
   const Eigen::Vector3d n(0, 0, 1);
   double squares = 0;

@@ -52,7 +52,7 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
   EXPECT_LT(largest[kTimeOffset], 0.001);
 }
 
-// Stamps shift a whole image, so its residuals are no independent witnesses.
+// An error of a stamp shifts a whole image, so its residuals are not independent.
 TEST(Calibrate, StampsThatJitterMakeItLessSure) {
   TestWorldOptions options = Short(3);
   const Result exact = Calibrate(MakeTestWorld(options).input);
@@ -65,8 +65,8 @@ TEST(Calibrate, StampsThatJitterMakeItLessSure) {
   EXPECT_LT(off.cwiseAbs().maxCoeff(), 4);
 }
 
-// A camera that in the dark exposes longer takes fewer images, and its stamps are of the
-// exposure's end: what counts is its middle.
+// In the dark the camera exposes longer and takes fewer images; its stamps are at the end of the
+// exposure, but its middle matters.
 TEST(Calibrate, FindsTheOffsetThatGrowsWithTheInterval) {
   TestWorldOptions options = Short(10);
   options.seconds = 18;
@@ -83,7 +83,7 @@ TEST(Calibrate, FindsTheOffsetThatGrowsWithTheInterval) {
   EXPECT_NEAR(result.time_offset_spread_s, 0.5 / 60 * std::sqrt(0.5), 0.002);
 }
 
-// As real tracks have them: neither do they bend the lens, nor keep the solver from converging.
+// Outliers as in real tracks: they neither bias the lens nor prevent convergence.
 TEST(Calibrate, OutliersMatterLittle) {
   TestWorldOptions options = Short(11);
   options.seconds = 20;
@@ -144,7 +144,7 @@ TEST(Calibrate, RefusesGivenAxesThatAreWrongAndNamesTheRightOnes) {
   }
 }
 
-// With these the solver finds a minimum near them, which explains the points less.
+// From these axes the solver finds a local minimum, which fits the points worse.
 TEST(Calibrate, RefusesGivenAxesWithALocalMinimum) {
   TestWorldOptions options = Short(9);
   options.seconds = 12;
@@ -156,7 +156,7 @@ TEST(Calibrate, RefusesGivenAxesWithALocalMinimum) {
   EXPECT_THAT(Calibrate(world.input).refused, HasSubstr("do not point along the IMU's -z,x,-y"));
 }
 
-// Then the given axes are what tells.
+// Then the given axes decide.
 TEST(Calibrate, TakesGivenAxesWhereTheMotionDoesNotTell) {
   TestWorldOptions options = Short(3);
   options.rotation_rms = {1e-4, 0.6, 1e-4};

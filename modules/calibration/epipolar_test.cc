@@ -23,7 +23,8 @@ TEST(Epipolar, NoResidualAtTheTruth) {
   }
 }
 
-// Sampson's distance of a point moved off its epipolar line is how far, shared by both images.
+// The Sampson distance of a displaced point is its distance from the epipolar line, shared by both
+// images.
 TEST(Epipolar, ResidualsArePixels) {
   TestWorld world = MakeTestWorld({.seconds = 2, .pixel_sigma = 0, .exact_gyro = true});
   world.truth.camera.distortion.setZero();

@@ -107,7 +107,7 @@ TEST(Evaluate, LinesBreakAtHoles) {
   EXPECT_EQ(ErrorOverTime({{0, 1, 0}, {7'000'000, 1, 0}}, 0).size(), 3U);
 }
 
-// One who stands still has a keyframe every five seconds.
+// A stationary agent has a keyframe every five seconds.
 TEST(Evaluate, LinesOfAStationaryBodyDoNotBreak) {
   EXPECT_EQ(TopView({{0, {}}, {5'050'000, {}}, {10'100'000, {}}}, TrajectoryAlignment()).size(),
             3U);

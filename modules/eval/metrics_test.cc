@@ -79,7 +79,7 @@ TEST_F(MetricsTest, OnlySim3RecoversScale) {
     EXPECT_NEAR(sim3->alignment.scale, 1 / scale, 1e-9);
     EXPECT_LT(sim3->position_m.max, 1e-9);
     const auto se3 = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
-    // Without scale what is left is |1 - scale| times the points' spread about their mean.
+    // Without scale the error is |1 - scale| times the points' spread about their mean.
     std::vector<Eigen::Vector3d> points;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const StampedPose& pose : Path()) {
@@ -174,7 +174,7 @@ TEST_F(MetricsTest, AssociationSkipsHolesAndWhatIsOutside) {
 TEST_F(MetricsTest, JointErrorSeesTheTransformBetweenAgentsThatSingleErrorsHide) {
   const Rigid3 T = Transform();
   const Trajectory first = Moved(Path(), 1, T);
-  // The second agent is off by 0.1 m in the same map.
+  // The second agent has an error of 0.1 m in the same map.
   const Trajectory second = Moved(Path(), 1, T * Rigid3({1, 0, 0, 0}, {0.1, 0, 0}));
   const auto a = Associate(first, Path());
   const auto b = Associate(second, Path());

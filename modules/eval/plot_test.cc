@@ -92,7 +92,7 @@ TEST_F(PlotTest, FailuresAreReportedWithTheMend) {
   setenv("PATH", path.c_str(), 1);
 }
 
-// As on a full disk, of which gnuplot says nothing.
+// As on a full disk, which gnuplot does not report.
 TEST_F(PlotTest, APictureThatIsCutOffIsNone) {
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);

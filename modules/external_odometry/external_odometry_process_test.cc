@@ -1,4 +1,4 @@
-// Poses with images of nothing: what becomes a map, and what the agent's bus hears.
+// Poses with blank images: tests when maps begin, and the messages on the agent's bus.
 
 #include "external_odometry/external_odometry_process.h"
 

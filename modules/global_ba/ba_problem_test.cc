@@ -17,7 +17,7 @@ BaWorld Solved(const BaWorld& start, const BaOptions& options = {}) {
   return problem.world();
 }
 
-// So that it is the minimum that shows.
+// Iterate to the minimum.
 BaOptions ToTheEnd() {
   BaOptions options;
   options.function_tolerance = 1e-7;
@@ -39,7 +39,7 @@ double PathLength(const BaWorld& world) {
 TEST(BaProblem, FindsExactTruth) {
   const BaTestWorld world = MakeBaTestWorld({.noise = 0});
   ASSERT_GT(WorstError(world.start, world.truth), 0.05);
-  EXPECT_LT(WorstError(Solved(world.start), world.truth), 5e-4);  // what integration itself errs
+  EXPECT_LT(WorstError(Solved(world.start), world.truth), 5e-4);  // error of the integration itself
 }
 
 TEST(BaProblem, FindsTheScaleThatTheStartHasWrong) {
@@ -51,7 +51,7 @@ TEST(BaProblem, FindsTheScaleThatTheStartHasWrong) {
   }
 }
 
-// Few and coarse rays: what an odometry made of many images more is not lost.
+// Few and inaccurate rays: the information that the odometry has from many more images is kept.
 TEST(BaProblem, KnowsNoLessThanItsOdometry) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     BaTestWorld world =
@@ -64,7 +64,8 @@ TEST(BaProblem, KnowsNoLessThanItsOdometry) {
   }
 }
 
-// An odometry with its scale off has it off in every edge, whatever each of them claims.
+// An odometry with a wrong scale has the same error in all edges, which their covariances do not
+// contain.
 TEST(BaProblem, EdgesThatAreAllTooLongLeaveItsScaleAlone) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const BaTestWorld world =
@@ -74,7 +75,7 @@ TEST(BaProblem, EdgesThatAreAllTooLongLeaveItsScaleAlone) {
   }
 }
 
-// The same where the odometry says so itself, however far it is off.
+// The same if the odometry states its scale's sigma, for any error of the scale.
 TEST(BaProblem, AMapThatIsNotMetricGetsItsScaleFromTheRest) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     BaTestWorld world = MakeBaTestWorld(
@@ -86,7 +87,7 @@ TEST(BaProblem, AMapThatIsNotMetricGetsItsScaleFromTheRest) {
   }
 }
 
-// Coarse edges take half the weight of the IMU, no more.
+// Inaccurate edges take half of the IMU's weight at most.
 TEST(BaProblem, CoarseEdgesDoNoHarm) {
   const BaTestWorld without = MakeBaTestWorld({});
   const BaTestWorld coarse = MakeBaTestWorld({.edge_sigma_m = 0.1});
@@ -104,14 +105,14 @@ TEST(BaProblem, OutliersDoNotMoveIt) {
   EXPECT_LT(WorstError(solved, dirty.truth), 2 * WorstError(Solved(clean.start), clean.truth));
 }
 
-// Twice the cost at the minimum is chi-squared with as many degrees of freedom as there are
-// residuals beyond parameters, when the noise is what the residuals claim.
+// If the noise is as stated, twice the cost at the minimum is chi-squared with (residuals -
+// parameters) degrees of freedom.
 TEST(BaProblem, ResidualsAreWhatTheyClaim) {
   double sum = 0, degrees = 0;
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const BaTestWorld world = MakeBaTestWorld({.seed = seed, .landmarks = 60});
     BaOptions options;
-    options.loss_scale = 1e3;  // no loss: each residual counts in full
+    options.loss_scale = 1e3;  // no robust loss
     options.max_chi2 = 1e6;
     options.function_tolerance = 1e-9;
     BaProblem problem(world.start, options);
@@ -135,7 +136,7 @@ TEST(BaProblem, TheSameStartGivesTheSameBytes) {
   }
 }
 
-// By their rotation; of their position these flights say less than the prior does.
+// Only by their rotation: these flights have less information on their position than the prior.
 TEST(BaProblem, FindsHowTheCamerasAreRotated) {
   BaTestWorld world = MakeBaTestWorld({});
   const Eigen::Quaterniond off = ExpSo3({0.004, -0.003, 0.003});
@@ -149,7 +150,7 @@ TEST(BaProblem, FindsHowTheCamerasAreRotated) {
   }
 }
 
-// So that a part of a large world can be adjusted alone.
+// So a part of a large world can be adjusted alone.
 TEST(BaProblem, WhatMovesReturnsToTheMinimumBesideWhatIsHeld) {
   BaOptions to_the_end;
   to_the_end.function_tolerance = 1e-12;
@@ -182,7 +183,7 @@ TEST(BaProblem, WhatMovesReturnsToTheMinimumBesideWhatIsHeld) {
   }
 }
 
-// Dropping the work in the middle leaves a world that is no worse than the start.
+// If the work is abandoned, the world is not worse than at the start.
 TEST(BaProblem, CanBeLeftAfterAnyPiece) {
   const BaTestWorld world = MakeBaTestWorld({});
   BaProblem problem(world.start, BaOptions{});

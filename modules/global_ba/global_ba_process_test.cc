@@ -130,7 +130,7 @@ TEST(GlobalBaProcess, AsksForWhatItLacks) {
   PublishMessage(server.bus, "HAVE", have);
   server.bus.Drain();
   server.Tick(25);
-  ASSERT_GE(server.requests.size(), 2u);  // and again while nobody answers
+  ASSERT_GE(server.requests.size(), 2u);  // requested again without an answer
   EXPECT_EQ(server.requests[0].channel, "CONSTRAINT");
   EXPECT_EQ(server.requests[1].channel, "KEYFRAME_1");
   EXPECT_EQ(server.requests[1].from_seq, 3);

@@ -55,7 +55,7 @@ TEST(GlobalBa, RefinesAGroup) {
   EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth), 0.2 * before);
 }
 
-// Who has adjusted before begins elsewhere, and finds other landmarks there at first.
+// After an earlier adjustment, the initial poses differ, and so do the landmarks at first.
 TEST(GlobalBa, WhereItBeginsDoesNotMatter) {
   for (const uint64_t seed : {1, 2, 3}) {
     const BaTestWorld world = MakeBaTestWorld({.seed = seed});
@@ -104,7 +104,7 @@ class CountingStore : public RecordStore {
   int num_reads_ = 0;
 };
 
-// Otherwise an adjustment would cost more with each group that the server has.
+// Otherwise the cost of an adjustment would grow with the number of groups on the server.
 TEST(GlobalBa, NothingIsReadOfOtherGroups) {
   const BaTestMessages group = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto alone = std::make_shared<CountingStore>();
@@ -128,8 +128,7 @@ TEST(GlobalBa, NothingIsReadOfOtherGroups) {
   EXPECT_EQ(beside_another->num_reads(), alone->num_reads());
 }
 
-// What was not verified, because constraints beside it tell as much, still adds observations; what
-// was refused does not.
+// A redundant candidate, which was not verified, still adds observations; a refused one does not.
 TEST(GlobalBa, RedundantMatchesTieLandmarks) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto accepted = Server(messages).Finish();
@@ -173,7 +172,7 @@ TEST(GlobalBa, AGroupIsDueAgainWhenItsLoopsOrKeyframesChange) {
   const auto refined = server.Finish();
   ASSERT_TRUE(refined.has_value());
   MapState state = *refined;
-  ++state.revision;  // as the pose graph tells it after the refinement, in a frame of its own
+  ++state.revision;  // as published by the pose graph after the refinement, in another frame
   for (KeyframePose& pose : state.keyframes) {
     pose.T_map_body = Rigid3(YawRotation(1), {1, 2, 3}) * pose.T_map_body;
   }
@@ -201,7 +200,7 @@ TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
   EXPECT_FALSE(Server(messages).ba.HasWork());
 }
 
-// Maps that were taken apart since: the state of both is out of date.
+// The maps have been separated since: the state of both is outdated.
 TEST(GlobalBa, AGroupThatIsNoMoreIsNotDue) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   Server server(messages);

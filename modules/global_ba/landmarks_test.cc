@@ -62,7 +62,7 @@ int CountShared(const BaWorld& world) {
 
 TEST(Landmarks, AreWhereTheirRaysMeet) {
   const BaWorld world = Group().World();
-  ASSERT_GE(world.landmarks.size(), 60u);  // of 40 points two tracks each
+  ASSERT_GE(world.landmarks.size(), 60u);  // two tracks for each of 40 points
   const BaWorld truth = Group().truth.truth;
   for (const Eigen::Vector3d& landmark : world.landmarks) {
     double nearest = 1e3;
@@ -104,7 +104,7 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
   for (Keyframe& keyframe : group.messages.keyframes) {
     for (Corner& corner : keyframe.corners) {
       corner.octave = 2;
-      // Agent 2 tracks nothing: each match is seen once, at the full weight of a corner.
+      // Agent 2 has no tracks: each match is one observation, with the full weight of a corner.
       corner.landmark_id = keyframe.id.map.agent_id == 1 ? corner.landmark_id : kNoLandmark;
     }
   }
@@ -126,8 +126,8 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
   }
 }
 
-// Where both corners are tracked, each track is seen at the other's: one measurement, half the
-// weight each.
+// If both corners are tracked, each landmark is observed at the other's corner: one measurement, so
+// half the weight each.
 TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
   const BaWorld world = Group().World();
   std::map<int, int> owner;  // agent of each landmark: its own track comes first
@@ -150,8 +150,7 @@ TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
   EXPECT_GT(matched, 10);
 }
 
-// Neighbours that follow one track, matched with the same corner of a keyframe that follows
-// nothing.
+// Neighbouring keyframes of one track, matched with the same corner of a keyframe without tracks.
 TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
   Group group;
   std::vector<Keyframe>& keyframes = group.messages.keyframes;
@@ -236,7 +235,7 @@ TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
   }
 }
 
-// An odometry finds where its camera sits on its way: each map has what its last keyframe says.
+// An odometry refines its extrinsics while it runs: each map uses those of its last keyframe.
 TEST(GroupWorld, EachMapHasItsLastCamera) {
   Group group;
   for (Keyframe& keyframe : group.messages.keyframes) {
@@ -251,7 +250,7 @@ TEST(GroupWorld, EachMapHasItsLastCamera) {
   }
 }
 
-// A keyframe that never came: the inertial chain begins anew after it.
+// A missing keyframe: the chain of preintegrations starts again after it.
 TEST(GroupWorld, AMissingKeyframeBreaksTheChain) {
   Group group;
   group.messages.keyframes.erase(group.messages.keyframes.begin() + 2);

@@ -15,7 +15,7 @@ namespace {
 
 using Choice = std::function<bool(const KeyframeId&)>;
 
-// Three agents along a corridor; at its end nobody sees where it began.
+// Three agents along a corridor whose end has no view of its start.
 constexpr int kKeyframes = 40, kNew = 12;
 BaTestWorld Corridor(double step_s = 0.5) {
   return MakeBaTestWorld({.agents = 3,
@@ -29,7 +29,7 @@ BaTestWorld Corridor(double step_s = 0.5) {
 }
 
 bool OfFirstTwo(const KeyframeId& id) { return id.map.agent_id < 3; }
-// And the third comes and goes a part of the way.
+// The third agent comes and walks a part of the way.
 bool Later(const KeyframeId& id) { return OfFirstTwo(id) || id.seq < kNew; }
 
 BaTestMessages Chosen(const BaTestMessages& all, const Choice& is_in) {
@@ -57,7 +57,7 @@ BaTestMessages Chosen(const BaTestMessages& all, const Choice& is_in) {
   return chosen;
 }
 
-// A server, and a pose graph that says what it is told.
+// A server with a pose graph that publishes given poses.
 class Server {
  public:
   explicit Server(const LocalOptions& local) : ba_(Options(local)) {}
@@ -81,7 +81,7 @@ class Server {
     ba_.Take(state);
   }
 
-  // All that is due.
+  // Does all work that is due.
   MapState Finish() {
     MapState refined;
     while (ba_.HasWork()) {
@@ -96,7 +96,7 @@ class Server {
     return refined;
   }
 
-  // Where the whole was adjusted, then what came later.
+  // The whole is adjusted first, then the later keyframes.
   MapState FinishBoth(const BaTestMessages& all) {
     Take(Chosen(all, OfFirstTwo));
     first_ = Finish();
@@ -165,7 +165,7 @@ TEST(LocalBa, APartIsAsGoodAsTheWhole) {
   EXPECT_LT(ErrorOfNew(of_local, world.truth), 1.2 * ErrorOfNew(of_whole, world.truth));
 }
 
-// What is far from the new keyframes stays to the last bit; between that and them nothing jumps.
+// Keyframes far from the new ones are bitwise unchanged; there is no jump in between.
 TEST(LocalBa, TheRestStaysAndTheRimDoesNotJump) {
   Server server(kLocal);
   const MapState after = server.FinishBoth(Messages());
@@ -208,7 +208,7 @@ TEST(LocalBa, TheSameMessagesGiveTheSameBytes) {
   }
 }
 
-// What was redundant has its place behind the refined one before it; it does not come back.
+// A redundant keyframe keeps its pose relative to the refined one before it, and stays left out.
 TEST(LocalBa, WhatWasLeftOutStaysOut) {
   Server server(kLocal);
   BaTestMessages messages = MessagesOf(Corridor(0.2));
@@ -243,7 +243,7 @@ TEST(LocalBa, AGroupThatHasGrownIsAdjustedAsAWhole) {
   EXPECT_EQ(server.counters().finished_local, 0);
 }
 
-// Two groups that were adjusted each by itself.
+// Two groups that were adjusted separately.
 TEST(LocalBa, AFusionIsAdjustedAsAWhole) {
   const BaTestMessages messages = Messages();
   Server server(kLocal);
@@ -258,7 +258,7 @@ TEST(LocalBa, AFusionIsAdjustedAsAWhole) {
   EXPECT_EQ(server.counters().finished_local, 0);
 }
 
-// All of the smaller one moves.
+// The whole smaller group moves.
 TEST(LocalBa, ASmallGroupThatJoinsALargeOneIsAPart) {
   const BaTestMessages messages = Messages();
   Server server(kLocal);

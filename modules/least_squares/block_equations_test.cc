@@ -19,7 +19,7 @@ MatrixXd Random(int rows, int columns, std::mt19937_64* rng) {
   return MatrixXd::NullaryExpr(rows, columns, [&] { return normal(*rng); });
 }
 
-// Residuals of each clique, into the equations and into dense ones.
+// Adds residuals of each clique to the sparse and to dense equations.
 struct Both {
   BlockEquations sparse{kSizes, kCliques};
   MatrixXd H;
@@ -78,7 +78,7 @@ TEST(BlockEquations, DampsTheDiagonal) {
   EXPECT_LT((*x + both.H.llt().solve(both.g)).norm(), 1e-10 * x->norm());
 }
 
-// Eigen stores a matrix of one row by rows.
+// Eigen stores a matrix with one row in row-major order.
 TEST(BlockEquations, TakesABlockOfOneRow) {
   BlockEquations equations({2, 1}, {{0, 1}});
   equations.Add(0, 0, 0, Eigen::Matrix2d::Identity());

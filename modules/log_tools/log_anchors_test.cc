@@ -55,7 +55,7 @@ AnchorState StateOf(const AnchorId& id, const std::string& name, const Eigen::Ve
   return state;
 }
 
-// The sample session, and behind it what its anchors would have said.
+// The sample session, followed by messages as of its anchors process.
 class LogAnchorsTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -148,7 +148,7 @@ TEST_F(LogAnchorsTest, ALogWithoutAnchorsSaysSo) {
   EXPECT_THROW(ToGltf(logged, {}), std::runtime_error);
 }
 
-// What an editor may not do, and what makes no sense, is counted and changes nothing.
+// Edits that the key does not allow, and invalid messages, are counted and change nothing.
 TEST_F(LogAnchorsTest, RefusedEditsAreCounted) {
   const std::string path = Path("refused.lcm");
   {
@@ -198,8 +198,8 @@ std::vector<uint8_t> BufferOf(const json& root) {
   return bytes;
 }
 
-// Every index names something, every view lies in the buffer, every accessor in its view, and
-// positions have the bounds that are said of them.
+// Every index is valid, every view is inside the buffer, every accessor inside its view, and
+// positions are inside their stated bounds.
 void ExpectWellFormed(const json& root) {
   EXPECT_EQ(root["asset"]["version"], "2.0");
   ASSERT_EQ(root["buffers"].size(), 1U);
@@ -287,7 +287,7 @@ TEST_F(LogAnchorsTest, TheGltfHasThePointsOfThePlyAndTheAnchors) {
   EXPECT_THROW(NodeNamed(root, "door"), std::runtime_error);
 }
 
-// A point on the anchor goes the same way, through our frames or through glTF's.
+// A point on the anchor has the same position through our frames and through glTF's.
 TEST_F(LogAnchorsTest, ItsAxesAreYUp) {
   LoggedAnchors logged;
   AnchorState state = StateOf(kKettle, "kettle", {1, 2, 3});

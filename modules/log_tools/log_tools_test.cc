@@ -133,7 +133,7 @@ TEST_F(LogToolsTest, CutsAddUpToTheWhole) {
   EXPECT_TRUE(merged == all);  // too long to print
 }
 
-// By capture time, but within a log its own order stands: its stamps may step back.
+// By capture time, but each log keeps its own order: its stamps may decrease.
 TEST_F(LogToolsTest, MergesByTimeAndKeepsEachLogsOrder) {
   const auto write = [this](const std::string& name, const std::vector<int64_t>& utimes) {
     LogFileWriter log(Path(name));
@@ -179,7 +179,7 @@ TEST_F(LogToolsTest, ARecordingIsOfAnAgentOfTheLog) {
                                  testing::HasSubstr("there are agents 1, 2"))));
 }
 
-// An independent reading of the file has the cost that our own convention gives.
+// An independent parser of the file gives the same cost as our own convention.
 TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   const NamedGraph named = GraphOf(kSample);
   EXPECT_EQ(named.graph.vertices.size(), 63U);
@@ -195,7 +195,7 @@ TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   EXPECT_NEAR(Cost(again) / ours, 1, 1e-5);
 }
 
-// Another solver's poses, here a lift of all by a metre, are what a report of the new log sees.
+// A report of the new log shows the other solver's poses; here all are lifted by one metre.
 TEST_F(LogToolsTest, AG2oFileComesBackIntoTheLog) {
   const NamedGraph named = GraphOf(kSample);
   Graph lifted = named.graph;
@@ -236,7 +236,8 @@ TEST_F(LogToolsTest, AG2oFileOfAnotherLogIsRefused) {
   EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
-// A pose that no message may carry would be refused by who reads the log, and the old ones stand.
+// A pose that is invalid in a message would be refused by readers of the log, which would then use
+// the old ones.
 TEST_F(LogToolsTest, APoseThatNoMessageMayCarryIsNotTaken) {
   Graph graph = GraphOf(kSample).graph;
   graph.vertices.at(5).t.y() = 1e9;
@@ -320,8 +321,8 @@ TEST_F(LogToolsTest, TrajectoriesAndPoints) {
   EXPECT_GT(fs::file_size(Path("map.ply")), 10000U);
 }
 
-// Verification results made again from the log say what the log says, but for some: acceptance was
-// laxer when the sample was captured, and windows had only tracked landmarks.
+// Verification results computed again from the log mostly equal those in the log: acceptance was
+// less strict when the sample was captured, and windows had only tracked landmarks.
 TEST_F(LogToolsTest, ExplainsAcceptedAndRefusedResults) {
   std::istringstream results(ListResults(kSample));
   std::map<std::string, Explanation> same;  // by reason

@@ -19,8 +19,8 @@ using Eigen::Vector3d;
 const MapId kOld{1, 100};
 const MapId kAgent{2, 200};
 
-// A wall of points along y at x = 6, and cameras that pass before it and look at it. The map of
-// agent 1 is of the whole wall; agent 2 is in the same group.
+// A wall of points along y at x = 6, and cameras that pass in front of it. The map of agent 1
+// covers the whole wall; agent 2 is in the same group.
 class MapPointsTest : public ::testing::Test {
  protected:
   MapPointsTest() : camera_(PinholeTestCamera(752, 480, 458)) {
@@ -104,7 +104,8 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
     EXPECT_LT((landmark.p_map - points_[landmark.landmark_id]).norm(), 0.01);
     EXPECT_EQ(landmark.descriptor, descriptors_[landmark.landmark_id]);
     EXPECT_GE(landmark.sigma_along_m, landmark.sigma_across_m);
-    EXPECT_EQ(message->sources[landmark.source].keyframe.map, kOld);  // its own are too new
+    // its own keyframes are too recent
+    EXPECT_EQ(message->sources[landmark.source].keyframe.map, kOld);
   }
   EXPECT_LE(ToMessage(*message).getEncodedSize(), 1200);
 }
@@ -120,7 +121,7 @@ TEST_F(MapPointsTest, DoesNotRepeatItselfAtOnce) {
       EXPECT_TRUE(sent_points.insert(landmark.landmark_id).second);
     }
   }
-  // A map that has moved is sent again.
+  // Landmarks that have moved are sent again.
   for (KeyframePose& pose : state_.keyframes) {
     pose.T_map_body.t.z() += 0.02;
   }

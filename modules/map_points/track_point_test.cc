@@ -35,7 +35,7 @@ std::optional<TrackPoint> PointSeenWith(const std::vector<Eigen::Vector2d>& offs
   return PointOfTrack(poses, *store.Find({kMap, 0}), 0, &store);
 }
 
-// Three degrees of freedom: over many points the mean normalised error squared is three.
+// Three degrees of freedom: over many points the mean NEES is three.
 TEST(TrackPoint, ErrorsAreWhatTheCovarianceSays) {
   std::mt19937_64 rng(5);
   std::normal_distribution<double> pixel(0, kTrackPointSigma_px);

@@ -44,7 +44,7 @@ Constraint MakeConstraint(const KeyframeId& from, const KeyframeId& to,
   return constraint;
 }
 
-// A problem of relative poses, linear in the poses' errors: the reference for what removals leave.
+// A linearised problem of relative poses: the reference for removals.
 class DenseGraph {
  public:
   explicit DenseGraph(std::vector<Rigid3> T_map_body)
@@ -55,9 +55,9 @@ class DenseGraph {
     const Eigen::MatrixXd J = Jacobian(a, b);
     information_ += J.transpose() * covariance.inverse() * J;
   }
-  // Of the pose of b in a, by all that was added, whatever lies between.
+  // Covariance of the pose of b in a, from all factors.
   Matrix6d MarginalOfRelative(int a, int b) const {
-    // The gauge: pose a is held.
+    // The gauge: pose a is fixed.
     Eigen::MatrixXd H = information_;
     H.block<6, 6>(6 * a, 6 * a) += 1e10 * Matrix6d::Identity();
     const Eigen::MatrixXd J = Jacobian(a, b);
@@ -65,7 +65,7 @@ class DenseGraph {
   }
 
  private:
-  // d(T_a_b) by both poses' tangents, numerically.
+  // d(T_a_b)/d(tangents of both poses), numerically.
   Eigen::MatrixXd Jacobian(int a, int b) const {
     constexpr double kStep = 1e-6;
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, information_.cols());
@@ -106,8 +106,8 @@ TEST_F(NodeRemovalTest, OfAChainLeavesTheDenseMarginal) {
   ExpectIs(left.relative, poses[0].Inverse() * poses[5], dense.MarginalOfRelative(0, 5));
 }
 
-// A visit that leaves, tied to the map by three constraints: each pair with the hub is exact, and
-// nothing claims to be known better than it is.
+// A removed visit, connected to the map by three constraints: each pair with the hub is exact, and
+// no covariance is too small.
 TEST_F(NodeRemovalTest, OfAStarLeavesTheMarginalsToTheBestKnown) {
   std::vector<Rigid3> poses;
   for (int i = 0; i < 4; ++i) {
@@ -136,7 +136,7 @@ TEST_F(NodeRemovalTest, OfAStarLeavesTheMarginalsToTheBestKnown) {
   EXPECT_TRUE(of_hub.at(Id(1, 30)).derived);
 }
 
-// Two keyframes that go are both tied to one that stays: what they say of it is one factor.
+// Two removed keyframes are both connected to one that stays: they give a single factor.
 TEST_F(NodeRemovalTest, AveragesWhatIsBetweenTheSameTwo) {
   std::vector<Rigid3> poses;
   for (int i = 0; i < 4; ++i) {
@@ -144,7 +144,8 @@ TEST_F(NodeRemovalTest, AveragesWhatIsBetweenTheSameTwo) {
   }
   NodeRemoval removal;
   DenseGraph dense(poses);
-  // 0 stays in one map, 1 to 3 are of another, of which 3 stays: a chain, so nothing is lost.
+  // 0 stays in one map; 1 to 3 are in another map, of which 3 stays: a chain, so no information is
+  // lost.
   for (int i = 2; i < 4; ++i) {
     const RelativePose edge = Measure(poses[i - 1], poses[i]);
     removal.AddOdometry(Id(2, i - 1), Id(2, i), edge);

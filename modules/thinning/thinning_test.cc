@@ -57,7 +57,7 @@ class ThinningTest : public ::testing::Test {
       return thinned.gone.contains(keyframe.id);
     });
   }
-  // What the pose graph is given afterwards.
+  // The input of the pose graph after the thinning.
   std::vector<Keyframe> Staying(const ThinnedMaps& thinned) const {
     std::vector<Keyframe> staying;
     for (const SyntheticAgent& agent : world_.agents) {
@@ -82,7 +82,7 @@ class ThinningTest : public ::testing::Test {
     all.insert(all.end(), thinned.derived.begin(), thinned.derived.end());
     return all;
   }
-  // What the pose graph makes of it.
+  // The pose graph's solution of it.
   std::vector<MapState> States(const ThinnedMaps& thinned) const {
     PoseGraph graph({});
     for (const Keyframe& keyframe : Staying(thinned)) {
@@ -183,7 +183,7 @@ TEST_F(ThinningTest, DerivedConstraintsAreTrueToTheirCovariance) {
   }
   nees /= static_cast<double>(thinned.derived.size());
   EXPECT_GT(thinned.derived.size(), 20);
-  // Below one: all that was measured went into the poses, only a tree of it into the covariance.
+  // Below one: the poses use all measurements, the covariances only a tree of them.
   EXPECT_GT(nees, 0.1);
   EXPECT_LT(nees, 1.2);
 }
@@ -202,7 +202,7 @@ TEST_F(ThinningTest, AKeyframeGetsOnlySoManyDerivedConstraints) {
     beyond += std::max(0, derived - options.max_derived);
   }
   EXPECT_FALSE(count.empty());
-  // One for each map that would have none otherwise.
+  // One for each map that would otherwise have none.
   EXPECT_LT(beyond, 2 * kVisits);
 }
 

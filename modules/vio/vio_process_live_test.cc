@@ -1,4 +1,4 @@
-// The process with sensors that come live on its bus.
+// The process with live sensors on its bus.
 
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ std::vector<image_t> Chunks(int64_t utime, const cv::Mat& image) {
 
 class VioLiveTest : public VioProcessTest {
  protected:
-  // A sensor stationary.
+  // A stationary sensor.
   void PublishImu(int64_t utime, LocalBus* bus = nullptr) {
     imu_t message{};
     message.utime = utime;
@@ -226,7 +226,7 @@ TEST_F(VioLiveTest, AFirstStampFarOffIsLeftBehind) {
   }
 }
 
-// A sensor that is started again counts from 0: another map, and no end of the odometry.
+// A restarted sensor counts from 0: a new map begins, and the odometry continues.
 TEST_F(VioLiveTest, ALiveStreamThatGoesBackOpensANewMap) {
   VioProcess process(bus_, options_, 0);
   LiveInput live(process, 7, ImuNoise{});
@@ -247,7 +247,7 @@ TEST_F(VioLiveTest, ALiveStreamThatGoesBackOpensANewMap) {
   EXPECT_GE(Refused("imu: not after the last one"), 60);
 }
 
-// Chunks of images that never become whole give way in the order they began, whatever their stamps.
+// Incomplete images are dropped in the order of their first chunks, whatever their stamps.
 TEST_F(VioLiveTest, PiecesOfImagesFarAheadDoNotTakeThePlaceOfOthers) {
   VioProcess process(bus_, options_, 0);
   LiveInput live(process, 7, ImuNoise{});

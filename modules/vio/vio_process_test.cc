@@ -48,7 +48,7 @@ size_t SharedLandmarks(const Keyframe& first, const Keyframe& second) {
       std::ranges::count_if(a, [&b](int32_t landmark_id) { return b.contains(landmark_id); }));
 }
 
-// Driving evenly does not tell it; walking does.
+// Even driving does not make the scale observable; walking does.
 TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
   for (const double drive_mps : {0.0, 1.5}) {
     VioTestWorldOptions motion;
@@ -72,7 +72,7 @@ TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
   }
 }
 
-// So do its keyframes; one with too few depths to tell says what the one before said.
+// Its keyframes state it too; one with too few depths repeats the previous value.
 TEST_F(VioProcessTest, EachKeyframeSaysHowWellItKnowsTheScale) {
   for (const double drive_mps : {0.0, 1.5}) {
     keyframes_.clear();
@@ -170,8 +170,8 @@ TEST_F(VioProcessTest, TheSameRecordingGivesTheSameBytes) {
   EXPECT_EQ(runs[0], runs[1]);
 }
 
-// Landmarks sharpen what is shown; what is published of the odometry must not know of them, or the
-// server would count its own information twice.
+// Landmarks refine the shown pose; published odometry must not depend on them, or the server would
+// count its own information twice.
 TEST_F(VioProcessTest, LandmarksDoNotReachTheOdometry) {
   std::vector<std::vector<uint8_t>> published[2];
   for (const bool with_landmarks : {false, true}) {
@@ -353,7 +353,7 @@ TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
               ::testing::HasSubstr("20.0 rad/s on average: is it in degrees"));
 }
 
-// As somebody sees it who plays a recording of a dead sensor.
+// The output for a recording of a dead sensor.
 TEST_F(VioProcessTest, TheProgramFailsWhenNoPoseComesOfARecording) {
   namespace fs = std::filesystem;
   const fs::path mav0 = fs::path(::testing::TempDir()) / "vio_no_pose" / "mav0";

@@ -1,4 +1,4 @@
-// Edits under way to the journal: changes, conflicts, time-outs.
+// Pending edits: changes, conflicts, timeouts.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -108,7 +108,7 @@ TEST_F(AnchorApiTest, WhoeverLosesToAnotherIsToldSo) {
   EXPECT_THAT(ours->body.value("error", ""), HasSubstr("agent 2"));
   EXPECT_EQ(Get(target).body["name"], "theirs");
 
-  // Another tool on the server drew the same revision.
+  // Another tool on the server used the same revision.
   const auto again = Ask("PUT", target, R"({"name": "again"})");
   AnchorEdit other_tool = requested_.back();
   other_tool.name = "other tool";

@@ -1,4 +1,4 @@
-// Every route, what is placed and what is refused.
+// Tests every route: placements and refusals.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -59,7 +59,7 @@ TEST_F(AnchorApiTest, APoseOfAFusedGroupIsKeptByTheNearestKeyframe) {
   ASSERT_EQ(anchors.size(), 1u);
   EXPECT_LT((PositionOf(anchors[0]) - p).norm(), 0.02);
   EXPECT_EQ(anchors[0]["group_revision"], 1);
-  // The other map is no group of its own any more.
+  // The other map is no longer a group.
   EXPECT_EQ(Get("/v1/anchors?group=" + ToString(map(1))).body["anchors"].size(), 0u);
   const auto refused = Ask("POST", "/v1/anchors", NewBody(1, p));
   EXPECT_EQ(refused->status, 400);

@@ -20,7 +20,7 @@ double SolveOwn(BaWorld* world) {
   return solver.cost();
 }
 
-// Where keyframes are held nothing is left free, and the minimum is one point.
+// With fixed keyframes the gauge is fixed, and the minimum is unique.
 BaWorld HeldWorld(uint64_t seed, bool cameras_held) {
   BaWorld world = MakeBaTestWorld({.seed = seed,
                                    .landmarks = 60,
@@ -59,7 +59,7 @@ TEST(BaSolver, FindsTheMinimumOfCeres) {
   }
 }
 
-// With all keyframes and cameras held each landmark is alone.
+// With all keyframes and cameras fixed, each landmark is independent.
 TEST(BaSolver, MovesLandmarksWhereAllElseIsHeld) {
   BaWorld own = HeldWorld(1, true);
   for (BaKeyframe& keyframe : own.keyframes) {

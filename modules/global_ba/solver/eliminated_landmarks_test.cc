@@ -11,7 +11,7 @@ namespace {
 using Eigen::VectorXd;
 using View = EliminatedLandmarks::View;
 
-// A world whose keyframes and cameras are all free, as errors on the left of where they start.
+// A world with all keyframes and cameras free; errors are left perturbations of the initial values.
 class EliminatedLandmarksTest : public ::testing::Test {
  protected:
   EliminatedLandmarksTest()
@@ -62,8 +62,8 @@ TEST_F(EliminatedLandmarksTest, GradientMatchesDifferencesOfTheCost) {
             1e-6 * numeric.cwiseAbs().maxCoeff());
 }
 
-// With every camera where it is, what is left is a Gauss-Newton step of each landmark, exact where
-// no residual is an outlier.
+// With fixed cameras, the step is a Gauss-Newton step of each landmark, exact if no residual is an
+// outlier.
 TEST_F(EliminatedLandmarksTest, OwnStepsLowerTheCostAsPredicted) {
   const RobustLoss quadratic{.kind = RobustLoss::Kind::kHuber, .scale = 1e6};
   EliminatedLandmarks landmarks = Landmarks();

@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-// The common name of a match's landmark in both windows.
+// By landmark (direction, index): the landmarks of both windows that matches join with it.
 using Joined = std::map<std::pair<Direction, int>, std::set<std::pair<Direction, int>>>;
 
 Joined Partners(const WindowPair& windows, const std::vector<PointMatch>& matches) {

@@ -37,7 +37,7 @@ TEST(ImuBuffer, IntegratesExactlyTheSpan) {
   EXPECT_LT(LogSo3((a.delta_q * b.delta_q).conjugate() * whole.delta_q).norm(), 1e-9);
 }
 
-// A hand that starts to turn: the rate grows while the rows are read out.
+// A hand that starts to rotate: the rate grows during the read-out.
 TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
   constexpr double kReadout_s = 0.03;
   const Vector3d omega(0.2, -0.4, 0.1), alpha(15, -8, 4), bias(0.01, 0.02, -0.01);
@@ -76,7 +76,7 @@ TEST(ImuBuffer, MotionOfAGlobalShutterIsTheRotationRate) {
   EXPECT_EQ(motion.a, Vector3d::Zero());
 }
 
-// Exact where the axis of the rotation stays.
+// Exact if the axis of the rotation is constant.
 TEST(BodyMotion, BegunLaterItIsTheSame) {
   const Vector3d axis(0.6, -0.8, 0);
   const BodyMotion motion{2 * axis, 15 * axis, {0.8, -0.3, 0.5}, {2, 1, -3}};

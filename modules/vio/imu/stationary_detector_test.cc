@@ -96,7 +96,7 @@ TEST(StationaryDetector, FindsItStationaryWhateverThePixelsNoise) {
   }
 }
 
-// Slower than the gyro alone could tell from a bias: 6 pixels in half a second.
+// Too slow for the gyro alone to distinguish from a bias: 6 pixels in half a second.
 TEST(StationaryDetector, ASlowRotationIsNotStationary) {
   for (int axis = 0; axis < 3; ++axis) {
     const Said said = Watch({.omega = 0.03 * Vector3d::Unit(axis)});
@@ -104,14 +104,14 @@ TEST(StationaryDetector, ASlowRotationIsNotStationary) {
   }
 }
 
-// Nothing an IMU could feel: 5 pixels in half a second across, 3 at the rim ahead.
+// Not measurable by an IMU: sideways 5 pixels in half a second; forwards 3 at the image border.
 TEST(StationaryDetector, ASlowMotionIsNotStationary) {
   EXPECT_EQ(Watch({.v = {0, 0.1, 0}}).stationary, 0);
   EXPECT_EQ(Watch({.v = {0, 0, -0.1}}).stationary, 0);
   EXPECT_EQ(Watch({.v = {0.3, 0, 0}}).stationary, 0);
 }
 
-// In half a second it is less than the noise; since it came to a stand it is not.
+// The motion is below the noise within half a second, but not since the body stopped.
 TEST(StationaryDetector, WhatHasMovedSinceItStoodStillIsNotStationary) {
   const Ride creeping{.v = {0, 0.004, 0}};
   EXPECT_EQ(Watch(creeping).stationary, kAll);
@@ -121,7 +121,7 @@ TEST(StationaryDetector, WhatHasMovedSinceItStoodStillIsNotStationary) {
   EXPECT_EQ(standing.early, kSilent) << "being stationary still is told at once";
 }
 
-// The images of a lift's cabin stand while the IMU does not.
+// In a lift the images are stationary, but the IMU is not.
 TEST(StationaryDetector, TheImuMustBeQuietToo) {
   const Said rotating = Watch({.seen_omega = {0, 0.08, 0}});
   EXPECT_EQ(rotating.stationary, 0);

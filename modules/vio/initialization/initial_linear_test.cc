@@ -29,7 +29,7 @@ TEST(SolveTimeOffset, SaysNothingWhenNothingIsGained) {
   EXPECT_FALSE(OffsetOf(Record(Lively, 0.001, kRaySigma)));
 }
 
-// At a constant rotation rate every offset explains the rotations as well.
+// At a constant rotation rate every offset explains the rotations equally well.
 TEST(SolveTimeOffset, SaysNothingWhenTheRotationRateDoesNotVary) {
   EXPECT_FALSE(OffsetOf(Record(RotatingEvenly, 0.03, kRaySigma)));
 }

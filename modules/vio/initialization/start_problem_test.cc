@@ -1,4 +1,4 @@
-// The start's bundle adjustment: its derivatives, its covariance, and where it leads.
+// The start's bundle adjustment: derivatives, covariance, and results.
 
 #include "vio/initialization/start_problem.h"
 
@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 
 constexpr int kStartFrames = 6, kPoints = 12;
 
-// No residual at all: rays without noise, and IMU factors that say what the states do.
+// All residuals are zero: rays without noise, and IMU factors that equal the states.
 StartProblem ExactProblem(double stamp_sigma_s) {
   std::mt19937_64 rng(3);
   StartProblem problem;
@@ -123,8 +123,8 @@ TEST_P(StartProblemTest, GradientMatchesDifferencesOfTheCost) {
             1e-5 * scaled.cwiseAbs().maxCoeff());
 }
 
-// Without residuals Gauss and Newton's matrix is the Hessian, that of the gradient with settled
-// points.
+// Without residuals the Gauss-Newton matrix is the Hessian: the derivative of the gradient with
+// optimised points.
 TEST_P(StartProblemTest, HessianMatchesDifferencesOfTheGradient) {
   const double stamp_sigma_s = GetParam();
   const StartProblem problem = ExactProblem(stamp_sigma_s);
@@ -177,8 +177,8 @@ TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
   EXPECT_NEAR(from_whole->rms_sigma, 1, 0.1);
 }
 
-// Error of the newest velocity over what is claimed of its least certain direction, squared: 1 to 3
-// if the claims are right.
+// Squared error of the newest velocity / variance in its least certain direction: 1 to 3 if the
+// covariance is right.
 double VelocityNees(double late_s, double stamp_sigma_s, const StartSigmas& sigmas) {
   constexpr int kSeeds = 10;
   double sum = 0;
@@ -190,7 +190,7 @@ double VelocityNees(double late_s, double stamp_sigma_s, const StartSigmas& sigm
               : std::nullopt;
     EXPECT_TRUE(refined && !refined->states.empty()) << seed;
     if (refined && !refined->states.empty()) {
-      // In the body: odom's yaw is free.
+      // In the body frame: the yaw of odom is arbitrary.
       const Vector3d error =
           refined->states.back().T_odom_body.q.conjugate() * refined->states.back().v_odom_body -
           Lively(3).q.conjugate() * VelocityAt(Lively, 3);
@@ -228,8 +228,8 @@ Rigid3 Forward(double t) {
   return {T.q, T.t + Vector3d(1.5 * t, 0, 0)};
 }
 
-// A point that the closed form has close before one camera and behind the others counts one ray,
-// and nothing moves it on when that camera moves ahead.
+// A point that the closed form places just in front of one camera and behind the others has only
+// one ray, so it does not move when that camera moves ahead.
 TEST(Refine, APointThatCountsOneRayDoesNotHoldTheScale) {
   StartWorld world = Record(Forward, 0, kRaySigma);
   world.frames.resize(11);
@@ -283,7 +283,7 @@ Rigid3 Gentle(double t) {
   return {T.q, 0.1 * T.t};
 }
 
-// With a large bias and little motion the closed form is several times too large.
+// With a large bias and little motion the closed-form scale is several times too large.
 TEST(Refine, AMinimumOfAnotherScaleIsNotTaken) {
   StartWorld world = Record(Gentle, 0, kRaySigma);
   for (StartFrame& frame : world.frames) {

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-// The time offset was found after the frame had come: its image was taken later than was thought.
+// The time offset has changed since the frame was added: its image was taken later than assumed.
 TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
   constexpr int kFrame = 2;
   constexpr double kLate_s = 0.01;
@@ -25,7 +25,7 @@ TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
   EXPECT_GT((keyframe.T_odom_body.t - frame.imu.T_odom_body.t).norm(), 0.001);
   EXPECT_LT((keyframe.T_odom_body.t - moved.t).norm(), 1e-9);
   EXPECT_LT(keyframe.T_odom_body.q.angularDistance(moved.q), 1e-9);
-  // And moves on as the body did then.
+  // The motion after the image is the body's motion at that time.
   constexpr double kOn_s = 0.02;
   const Rigid3 at_once = frame.imu.T_odom_body * motion.After(kLate_s + kOn_s);
   const Rigid3 later = keyframe.T_odom_body * keyframe.motion.After(kOn_s);
@@ -33,7 +33,7 @@ TEST(FinishKeyframe, IsWhereTheBodyWasAtTheImage) {
   EXPECT_LT(later.q.angularDistance(at_once.q), 1e-4);
 }
 
-// The window has the rotation first, a keyframe the translation.
+// The window has rotation first, a keyframe translation.
 TEST(FinishKeyframe, TellsTheExtrinsicsCovarianceTranslationFirst) {
   const WindowState state = TestWindow({}).state;
   const int size = state.size();

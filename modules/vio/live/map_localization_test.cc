@@ -16,7 +16,7 @@ const MapId kMap{7, 1000};
 const MapId kGroup{3, 500};
 const Rigid3 kTruth{YawRotation(0.4), {2, 1, 0.3}};  // T_map_odom
 
-// Points in front of an agent that stands in its odom frame, some of which the map knows.
+// Points in front of a stationary agent, some of which are landmarks of the map.
 class MapLocalizationTest : public ::testing::Test {
  protected:
   MapLocalizationTest() : camera_(PinholeTestCamera(752, 480, 458)) {
@@ -129,7 +129,7 @@ TEST_F(MapLocalizationTest, MemoryIsBounded) {
     }
     localization_.Take(more);
   }
-  // The newest ten messages are what it still knows.
+  // It only keeps the landmarks of the newest ten messages.
   localization_.AddKeyframe(camera_, corners_, window_);
   EXPECT_LE(localization_.counters().seen, 40);
   EXPECT_EQ(localization_.num_landmarks(), MapLocalization::kMaxLandmarks);

@@ -20,8 +20,8 @@ CameraModel Phone(double readout_s) {
   return camera;
 }
 
-// Where and when the row of a moving camera meets a point fixed in the camera frame of the image's
-// time.
+// Pixel and time at which a row of a moving camera sees a point that is given in the camera frame
+// of the image's time.
 std::optional<Vector2d> SeenByRow(const CameraModel& camera, const BodyMotion& motion,
                                   const Vector3d& p_cam) {
   Vector2d pixel(camera.cx, camera.cy);
@@ -78,7 +78,7 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
   }
 }
 
-// Of a corner that no track gave a depth the map points around it tell how far it is.
+// A corner without depth uses the depth of the map points around it.
 TEST(RollingShutter, CornersWithoutDepthMoveAsTheirNeighboursDo) {
   const BodyMotion motion{Vector3d::Zero(), Vector3d::Zero(), {0.8, -0.3, 0.5}, Vector3d::Zero()};
   Keyframe keyframe;

@@ -43,8 +43,8 @@ TEST(ShownPose, BlendsACorrectionAtABoundedRateAndArrives) {
   EXPECT_LT(last.Minus(drift * kFar).norm(), 1e-9);
 }
 
-// A walk 800 m from the odom origin, 20 images a second, corrected after the first; the largest
-// step, metres, that is not the odometry's own, as a person who carries the phone sees it.
+// A walk 800 m from the odom origin, at 20 images per second, corrected after the first image.
+// Returns the largest step of the shown pose, m, beyond the odometry's own motion.
 double LargestJump(const Rigid3& T_map_odom, Rigid3* last_error) {
   ShownPose shown;
   shown.Reset(kShownMap);
@@ -76,7 +76,7 @@ TEST(ShownPose, ARotationAboutTheBodyDoesNotMoveIt) {
   const Rigid3 to_body{Eigen::Quaterniond::Identity(), {640, 480, 1}};
   const Rigid3 rotation = to_body * Rigid3{YawRotation(0.1), {0, 0, 0}} * to_body.Inverse();
   Rigid3 error;
-  // While it rotates, for a second, the body walks on: 0.1 rad across 6 cm an image.
+  // During the rotation (one second) the body walks on: 0.1 rad over 6 cm per image.
   EXPECT_LE(LargestJump(rotation, &error), 0.1 * 0.06 + 1e-9);
   EXPECT_LT(error.Minus(Rigid3{}).norm(), 1e-6);
 }

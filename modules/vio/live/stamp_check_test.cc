@@ -13,7 +13,7 @@ constexpr int64_t kStep_us = 5'000;
 constexpr int64_t kMaxStep_us = 300'000;
 constexpr int64_t kNow = 1'700'000'000'000'000;
 
-// Stamps at 200 Hz from `begin` on until one is taken; how many were refused before.
+// Passes stamps at 200 Hz from `begin` on until one is accepted; returns how many were refused.
 int RefusedUntilTaken(StampCheck* check, int64_t begin) {
   for (int i = 0; i < 1000; ++i) {
     const Decision result = check->Check(begin + i * kStep_us);
@@ -57,7 +57,7 @@ TEST(StampCheck, SaysWhenTheStreamWentBack) {
   EXPECT_EQ(check.newest(), 61 * kStep_us);
 }
 
-// As a bus may deliver what it delivers twice.
+// A bus may deliver a message twice.
 TEST(StampCheck, RepeatsDoNotHinderNorHelp) {
   StampCheck check(kMaxStep_us);
   check.Check(kNow);
@@ -72,7 +72,7 @@ TEST(StampCheck, RepeatsDoNotHinderNorHelp) {
   }
 }
 
-// Two sources on one channel: the one that was there first stays.
+// Two sources on one channel: the first one is kept.
 TEST(StampCheck, WhatIsBetweenTakenOnesNeverAgrees) {
   StampCheck check(kMaxStep_us);
   for (int i = 0; i < 1000; ++i) {
@@ -82,7 +82,7 @@ TEST(StampCheck, WhatIsBetweenTakenOnesNeverAgrees) {
   }
 }
 
-// One that is ahead by no more than may be bridged costs what it is ahead by, and no new beginning.
+// A stamp that is ahead by no more than the allowed gap causes a loss of that time, but no restart.
 TEST(StampCheck, OneALittleAheadIsCaughtUpWith) {
   StampCheck check(kMaxStep_us);
   check.Check(kNow);

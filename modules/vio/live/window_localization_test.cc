@@ -43,8 +43,8 @@ class World {
     return std::uniform_real_distribution<double>(low, high)(rng_);
   }
 
-  // What the agent has: its odometry drifts away from the truth, step by step, and the prior is off
-  // at the first pose.
+  // The agent's estimate: its odometry drifts step by step, and the prior has an error at the first
+  // pose.
   void MakeEstimate(const LocalizationOptions& options) {
     const Rigid3 T_map_odom{YawRotation(0.7), {3, -2, 0.5}};
     prior_.T_map_odom = T_map_odom;
@@ -53,7 +53,7 @@ class World {
     Rigid3 T = T_map_body_.front();
     T = {(YawRotation(-off[3]) * T.q).normalized(), T.t - off.head<3>()};
     const int n = static_cast<int>(T_map_body_.size());
-    // Steps' errors are independent, right-invariant in odom.
+    // The errors of the steps are independent, and right-invariant in odom.
     Eigen::MatrixXd steps = Eigen::MatrixXd::Zero(6 * n, 6 * n);
     for (int i = 0; i < n; ++i) {
       Vector6d e = Vector6d::Zero();
