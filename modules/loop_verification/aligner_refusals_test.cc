@@ -25,9 +25,9 @@ TEST(AlignerTest, RefusesAnotherRoom) {
   }
 }
 
-// Two rooms with the same dozen objects at different places: the objects match perfectly, their
-// surroundings do not. The candidates are the pairs with most common corners, as from place
-// recognition.
+// Two rooms with the same dozen objects at different places: the objects match perfectly,
+// everything around them does not. The candidates are the pairs with most common corners, as from
+// place recognition.
 TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
   int sharing = 0;
   std::map<std::string, int> reasons;
@@ -56,7 +56,7 @@ TEST(AlignerTest, RefusesIdenticalObjectsAtOtherPlaces) {
 }
 
 // The worst case: one object fills much of the view, from the same side in both rooms, so that it
-// aligns perfectly; only the surroundings reveal the error. The same walks in one room are
+// aligns perfectly; only the scene around it reveals the error. The same walks in one room are
 // accepted.
 TEST(AlignerTest, RefusesOneObjectSeenFromTheSameSide) {
   for (int run = 0; run < 10; ++run) {

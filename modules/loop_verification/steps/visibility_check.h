@@ -3,8 +3,8 @@
 // Negative evidence: points that should be visible in a keyframe if an alignment is right, but are
 // not found.
 //
-// Identical objects at different places align perfectly with each other, but their surroundings do
-// not. A correct alignment finds points all over the common view, at the rate at which corners
+// Identical objects at different places align perfectly with each other, but the scenes around them
+// do not. A correct alignment finds points all over the common view, at the rate at which corners
 // repeat; a wrong one finds points only on the object. So the image is divided into cells, and the
 // numbers of points found in them are modelled as a mixture: in some cells points are found at one
 // common rate, in the others only by chance. The share of cells of the first kind is tested; it
