@@ -23,7 +23,7 @@
 namespace pangea::bench {
 
 struct CityOptions {
-  // in every group of this many halls, the second resembles the first; 0: none
+  // In every group of this many halls, the second resembles the first; 0: none
   int alike_every = 8;
   int alike_cells = 2;  // one in this many cells is alike
   // Halls are rooms of one building: a known constraint connects each to the next.

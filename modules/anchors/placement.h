@@ -31,7 +31,7 @@ struct AnchorPlacement {
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-// a needed keyframe has not arrived: the edit's own, or one at or after its time
+// A needed keyframe has not arrived: the edit's own, or one at or after its time.
 struct AwaitsKeyframe {};
 struct NotPlaced {
   std::string reason;

@@ -9,7 +9,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr int kReweightings = 2;
-// pixel noise, relative to which changes of velocity are weighted
+// Pixel noise, relative to which changes of velocity are weighted
 constexpr double kNoise_px = 0.5;
 
 // Rotation from the camera to the curve's frame, by row of one image: at the mean rate, to second

@@ -14,7 +14,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kRough_px = 1.0;
-// relative to the prior's sigma: above it, the data gave no information
+// Relative to the prior's sigma: above it, the data gave no information
 constexpr double kTold = 0.7;
 constexpr char kAxisNames[] = {'x', 'y', 'z'};
 constexpr const char* kAxes[] = {"up and down (the camera's x axis)",

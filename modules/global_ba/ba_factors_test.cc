@@ -109,7 +109,7 @@ TEST(PreintegrationFactor, IsChiSquaredAtTheTruth) {
         degrees += 15;
       }
     }
-    // the minimum covariances of the integration reduce it slightly
+    // The minimum covariances of the integration reduce it slightly
     EXPECT_NEAR(sum / degrees, 1, 0.1) << step_s;
   }
 }

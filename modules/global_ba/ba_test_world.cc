@@ -186,7 +186,7 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
     if (start.previous >= 0) {
       const Rigid3& T_previous = world.start.keyframes[start.previous].imu.T_odom_body;
       keyframe.edge = {start.id.seq - 1, T_previous.Inverse() * keyframe.T_odom_body,
-                       // the start's error between successive keyframes
+                       // The start's error between successive keyframes
                        1e-3 * Matrix6d::Identity()};
       keyframe.preintegration = start.preintegration;
     } else {

@@ -67,7 +67,7 @@ class Collector {
   }
 
   LoggedAnchors logged_;
-  // the size of the file bounds the number
+  // The size of the file bounds the number
   AnchorRegistry registry_{std::numeric_limits<size_t>::max()};
   std::map<AnchorId, AnchorState> states_;
 };

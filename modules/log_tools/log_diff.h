@@ -18,7 +18,7 @@ struct ChannelDiff {
   int64_t count_a = 0, count_b = 0;
   // The first message that differs, counted from 0 on this channel; empty: all are equal.
   std::optional<int64_t> first;
-  // capture time of that message, since its log's first event: in a, or in b if a has no more
+  // Capture time of that message, since its log's first event: in a, or in b if a has no more
   double seconds = 0;
   std::string how;  // "candidates[0].score: 0.41 | 0.4, and 3 more fields"
 };

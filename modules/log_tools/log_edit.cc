@@ -131,7 +131,7 @@ void CheckNew(const std::string& path) {
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings) {
   CheckNew(out);
-  // created with the first event: an empty file would not be a log
+  // Created with the first event: an empty file would not be a log
   std::optional<LogFileWriter> writer;
   ReadCut(log, cut, readings, WhileReading::kTellProgress, [&](const LogEvent& event, double) {
     if (!writer) {

@@ -104,7 +104,7 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
     EXPECT_LT((landmark.p_map - points_[landmark.landmark_id]).norm(), 0.01);
     EXPECT_EQ(landmark.descriptor, descriptors_[landmark.landmark_id]);
     EXPECT_GE(landmark.sigma_along_m, landmark.sigma_across_m);
-    // its own keyframes are too recent
+    // Its own keyframes are too recent
     EXPECT_EQ(message->sources[landmark.source].keyframe.map, kOld);
   }
   EXPECT_LE(ToMessage(*message).getEncodedSize(), 1200);

@@ -12,9 +12,9 @@
 //   graph/         maps (nodes, odometry), loops, constraints whose keyframes are not here yet
 //   grouping/      pairs of maps and their merges; groups, when to solve and publish them;
 //                  initial placement of a group's maps
-//   optimization/  how a group is solved, its least-squares problem, the scale of its odometry
-//   drift solver/        poses of four degrees of freedom, robust least squares publication/
-//   refinements, and the published state of a group
+//   optimization/  how a group is solved, its least-squares problem, its factor on odometry drift
+//   solver/        poses of four degrees of freedom, robust least squares
+//   publication/   refinements, and the published state of a group
 //
 // Deterministic: the same calls in the same order give the same bytes. When it solves depends only
 // on counts of messages and on the calls of Update and Finish. One thread.

@@ -121,7 +121,7 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
   }
   std::set<KeyframeId> of_maps_that_go;
   for (const auto& [id, map] : stored_) {
-    // if any keyframe of a map stays, the first one does
+    // If any keyframe of a map stays, the first one does
     if (gone.contains(map.keyframes.front().id)) {
       for (const Keyframe& keyframe : map.keyframes) {
         of_maps_that_go.insert(keyframe.id);

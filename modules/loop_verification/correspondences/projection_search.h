@@ -23,7 +23,7 @@ struct Projection {
 };
 
 struct SearchResult {
-  // sorted by landmark; each landmark and each corner at most once
+  // Sorted by landmark; each landmark and each corner at most once
   std::vector<PointMatch> matches;
   std::vector<Projection> projections;
 };

@@ -56,7 +56,7 @@ struct WindowFrame {
   bool is_window_keyframe = false;  // keeps its place; else the next frame replaces it
   bool is_keyframe = false;         // it is, or will be, published
   bool is_published = false;
-  // velocity and biases are marginalised; the pose begins the next odometry edge
+  // Velocity and biases are marginalised; the pose begins the next odometry edge
   bool pose_only = false;
   bool stationary = false;
   bool is_tracked = true;  // its rays are used: they are more than noise

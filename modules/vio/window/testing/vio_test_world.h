@@ -80,7 +80,7 @@ class VioTestWorld {
   struct Input {
     TrackedFrame frame;
     int64_t taken_utime = 0;  // the stamp without its error
-    // since the previous call, up to the first at or after the last row
+    // Since the previous call, up to the first at or after the last row
     std::vector<ImuSample> imu;
   };
   Input Next();
