@@ -72,7 +72,7 @@ struct FinishedKeyframe {
   BodyMotion motion;  // from there on
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-  // About the x and y axes of odom
+  // Covariance of roll and pitch: about the x and y axes of odom
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity();
   // Covariance of the whole state (15), in the window's coordinates (window_state.h).
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
