@@ -90,10 +90,11 @@ bool SubmapStore::Restore(ByteReader* reader) {
                            Stored{Record(offset, size), p_odom_body,
                                   has_edge ? std::optional(edge_from_seq) : std::nullopt, edge_m});
   }
-  if (reader->ok()) {
-    keyframes_ = std::move(keyframes);
+  if (!reader->ok() || !reader->at_end()) {
+    return false;
   }
-  return reader->ok();
+  keyframes_ = std::move(keyframes);
+  return true;
 }
 
 void SubmapStore::Add(Keyframe keyframe) {

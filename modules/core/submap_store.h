@@ -82,8 +82,9 @@ class SubmapStore {
   // A keyframe that is already there stays as it is.
   void Add(Keyframe keyframe);
 
-  // Where the records are, not these themselves, none of which is in memory: whoever restores it
-  // has them at the same places. False, and nothing has changed, if these are not its bytes.
+  // Saves where the records are, not the records, none of which may be in memory: the store that is
+  // restored must have them at the same places. Restore reads to the end, so a caller saves the
+  // store last; it returns false, and changes nothing, if the bytes are not those of a store.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
 

@@ -168,6 +168,30 @@ TEST(SubmapStore, WhatCannotBeReadIsNotThere) {
   EXPECT_EQ(store.WindowUpTo({kMap, 1}, 2).size(), 2u);
 }
 
+TEST(SubmapStore, RestoresAllOfItsBytesOrNothing) {
+  const auto records = std::make_shared<test::TestRecordStore>(100);
+  SubmapStore store({}, records);
+  store.Add(MakeKeyframe(0));
+  store.Add(MakeKeyframe(1));
+  ByteRecordWriter writer;
+  store.Save(&writer);
+  const std::vector<uint8_t> bytes = writer.Take();
+  for (const int off : {-1, 1}) {
+    std::vector<uint8_t> wrong = bytes;
+    wrong.resize(bytes.size() + off);
+    SubmapStore unchanged({}, records);
+    unchanged.Add(MakeKeyframe(7));
+    ByteRecordReader reader(wrong);
+    EXPECT_FALSE(unchanged.Restore(&reader)) << off;
+    EXPECT_EQ(unchanged.size(), 1u) << off;
+    EXPECT_NE(unchanged.Find({kMap, 7}), nullptr) << off;
+  }
+  SubmapStore restored({}, records);
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  EXPECT_EQ(restored.WindowUpTo({kMap, 1}, 2).size(), 2u);
+}
+
 TEST(SubmapStore, IsBounded) {
   SubmapStore store({.max_in_memory = 3, .max_views = 2});
   for (int seq = 0; seq < 5; ++seq) {

@@ -42,6 +42,11 @@ bool ExternalOdometryProcess::GoesOn(const Step& now) const {
 
 std::optional<Keyframe> ExternalOdometryProcess::AddImage(
     int64_t utime, const cv::Mat& image, const std::optional<Rigid3>& T_odom_body) {
+  if (utime <= last_image_utime_) {  // a velocity needs two times
+    node_.Refuse("image: its time does not go forward");
+    return std::nullopt;
+  }
+  last_image_utime_ = utime;
   node_.Count("frames");
   Step now{utime, T_odom_body.value_or(Rigid3{}), Eigen::Vector3d::Zero()};
   if (!T_odom_body) {

@@ -36,13 +36,17 @@ class ExternalOdometryProcess : public Process {
   ExternalOdometryProcess(Bus& bus, int32_t agent_id, const CameraModel& camera,
                           std::function<int64_t()> open_map, int64_t now_utime);
 
-  // `image`: 8-bit grey, with ascending `utime`. `T_odom_body`: the z axis of odom points up; empty
-  // while the odometry is lost. Returns the keyframe if the image became one; it is already
-  // published.
+  // `image`: 8-bit grey; refused unless its `utime` is after that of the image before.
+  // `T_odom_body`: the z axis of odom points up; empty while the odometry is lost. Returns the
+  // keyframe if the image became one; it is already published.
   std::optional<Keyframe> AddImage(int64_t utime, const cv::Mat& image,
                                    const std::optional<Rigid3>& T_odom_body);
-  // The next pose begins a new map.
-  void StartAnew() { maker_.reset(); }
+  // The next pose begins a new map; its clock may start again.
+  void StartAnew() {
+    maker_.reset();
+    last_.reset();
+    last_image_utime_.reset();
+  }
 
   void Tick(int64_t now_utime) override;
 
@@ -67,7 +71,8 @@ class ExternalOdometryProcess : public Process {
   MapId map_;
   std::optional<KeyframeMaker> maker_;  // for this map; empty: the next pose begins one
   std::optional<Step> last_;            // the last pose of this map
-  bool lost_ = false;                   // since last_
+  std::optional<int64_t> last_image_utime_;
+  bool lost_ = false;  // since last_
   int64_t next_status_utime_ = 0;
 };
 

@@ -109,6 +109,30 @@ TEST_F(ExternalOdometryTest, ImagesThatAreLeftOutAreNoLoss) {
   EXPECT_EQ(Maps(), 1);
 }
 
+TEST_F(ExternalOdometryTest, AnImageOfTheSameTimeIsRefused) {
+  Walk(50);
+  const size_t num_keyframes = ids_.size();
+  const pose_t before = pose_;
+  Add(Rigid3{Eigen::Quaterniond::Identity(), {x_m_ + 0.05, 0, 1.5}}, 0);
+  Add(Rigid3{Eigen::Quaterniond::Identity(), {x_m_ + 0.05, 0, 1.5}}, -kPeriod_us);
+  EXPECT_EQ(ids_.size(), num_keyframes);
+  EXPECT_EQ(pose_.utime, before.utime);
+  utime_ += kPeriod_us;
+  Walk(10);
+  EXPECT_GT(ids_.size(), num_keyframes);
+  EXPECT_NEAR(pose_.v_odom_body.x, 1, 1e-6);
+  EXPECT_EQ(Maps(), 1);
+}
+
+TEST_F(ExternalOdometryTest, AfterStartAnewTheClockMayStartAgain) {
+  Walk(50);
+  process_.StartAnew();
+  utime_ = 0;
+  Walk(10);
+  EXPECT_EQ(Maps(), 2);
+  EXPECT_EQ(pose_.utime, utime_);
+}
+
 TEST_F(ExternalOdometryTest, WhatItShowsFollowsTheCorrection) {
   Walk(20);
   Correction correction;

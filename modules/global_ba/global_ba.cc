@@ -111,7 +111,7 @@ bool GlobalBa::Restore(ByteReader* reader) {
     reader->Get(&pair.second);
     pairs.Insert(pair);
   }
-  if (!store_.Restore(reader) || !reader->at_end()) {
+  if (!store_.Restore(reader)) {
     return false;
   }
   matched_ = std::move(matched);

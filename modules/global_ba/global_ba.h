@@ -64,7 +64,8 @@ class GlobalBa {
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
     return SubmapStore::RecordOf(keyframe, kStore);
   }
-  // Saves its input, except states. Restore returns false if the bytes are not those of a GlobalBa.
+  // Saves its input, except states. Restore returns false, and changes nothing, if the bytes are
+  // not those of a GlobalBa.
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
 

@@ -61,7 +61,7 @@ void CandidateProcess::Save(ByteWriter* writer) const {
 bool CandidateProcess::Restore(ByteReader* reader) {
   std::vector<int64_t> verified;
   reader->Get(&verified);
-  if (!verifier_->Restore(reader) || !reader->at_end()) {
+  if (!verifier_->Restore(reader)) {
     return false;
   }
   verified_ = {verified.begin(), verified.end()};

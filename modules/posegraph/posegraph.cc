@@ -193,7 +193,7 @@ void PoseGraph::Save(ByteWriter* writer) {
 
 bool PoseGraph::Restore(ByteReader* reader) {
   PoseGraph graph(options_, publisher_.next_revision());
-  if (!graph.Read(reader)) {
+  if (!graph.Read(reader) || !reader->at_end()) {
     return false;
   }
   graph.restored_ = true;

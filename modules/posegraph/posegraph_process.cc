@@ -58,7 +58,7 @@ bool PoseGraphProcess::Restore(ByteReader* reader) {
   DueResults results;
   reader->Get(&num_arrived);
   results.Restore(reader, now_utime_);
-  if (!graph_.Restore(reader) || !reader->at_end()) {
+  if (!graph_.Restore(reader)) {
     return false;
   }
   results_ = std::move(results);

@@ -46,10 +46,6 @@ class DeviceOdometry : public Odometry {
   void AddImu(const ImuSample&) override {}
   void AddImage(int64_t utime, const cv::Mat& image,
                 const std::optional<Rigid3>& T_odom_body) override {
-    if (utime <= last_utime_) {
-      return process_.node().Refuse("image: its time does not go forward");
-    }
-    last_utime_ = utime;
     process_.AddImage(utime, image, T_odom_body);
   }
   void StartAnew() override { process_.StartAnew(); }
@@ -59,7 +55,6 @@ class DeviceOdometry : public Odometry {
 
  private:
   ExternalOdometryProcess process_;
-  int64_t last_utime_ = 0;
 };
 
 }  // namespace
