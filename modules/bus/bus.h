@@ -1,8 +1,8 @@
 #pragma once
 
-// A message bus, as thin as LCM's: channels of bytes. Three implementations: LcmBus (a real one, by
-// URL), LocalBus (in one process, one thread, first in first out: tests and deterministic replay),
-// and whatever a test needs.
+// A message bus like LCM's: it carries bytes on named channels. Implementations: LcmBus connects
+// processes and is opened by URL. LocalBus stays in one process and one thread, first in first out,
+// for tests and deterministic replay. Tests add their own.
 
 #include <cstdint>
 #include <functional>
@@ -22,29 +22,31 @@ class Bus {
 
   virtual ~Bus() = default;
   virtual void Publish(const std::string& channel, Bytes data) = 0;
-  // `channel_regex` is anchored at both ends (LCM's rule). Lasts as long as the bus.
+  // The handler gets each message whose whole channel name matches `channel_regex` (LCM's rule). A
+  // subscription lasts as long as the bus.
   virtual void Subscribe(const std::string& channel_regex, Handler handler) = 0;
-  // What came and reached nobody who wants it, since the bus was opened.
+  // Counts of what arrived but reached no handler, since the bus was opened.
   struct Undelivered {
-    std::map<std::string, int64_t> refused;  // was no message of LCM's, by reason
-    int64_t no_room = 0;                     // messages that came while too many waited
-    int64_t by_kernel = 0;  // datagrams: there was no room, or the bus' filter kept them out
+    std::map<std::string, int64_t> refused;  // datagrams that are not valid LCM, by reason
+    int64_t no_room = 0;                     // messages that found the queue full
+    int64_t by_kernel = 0;  // datagrams dropped by a full receive buffer or by the packet filter
   };
   virtual Undelivered undelivered() { return {}; }
-  // Whether more messages wait already, so that work which they share may wait for them. A bus that
-  // has each message handled to completion says no.
+  // Whether more messages are waiting. A handler can then postpone work that it would repeat for
+  // each of them. False on a bus without a queue.
   virtual bool MoreWaits() { return false; }
-  // Work that messages brought and that is to wait until no message does, so that whoever works
-  // long still hears and answers: `piece` does a little of it, and says whether some is left. A bus
-  // that has each message handled to completion has all of it done at once. One work for each bus:
-  // what is given while some is left replaces it.
+  // Gives the bus long work to do while no message is waiting, so that the process still answers
+  // messages. `piece` does a little of the work and returns whether some is left. Here, on a bus
+  // without a queue, all of it is done at once. A bus has one such work: a new one replaces what is
+  // left of the former.
   virtual void WorkWhenIdle(const std::function<bool()>& piece) {
     while (piece()) {
     }
   }
 };
 
-// Publish queues; Drain delivers, including what the handlers publish, until nothing is left.
+// Publish only queues a message. Drain delivers all queued messages, and those that the handlers
+// publish meanwhile, until none is left.
 class LocalBus : public Bus {
  public:
   LocalBus();
@@ -58,35 +60,36 @@ class LocalBus : public Bus {
   std::unique_ptr<Impl> impl_;
 };
 
-// Where processes of one host meet unless they are told otherwise. A keyframe is 28 kB, and many
-// come at once: the kernel's own receive buffer would lose some.
+// The bus of all processes of one host, unless they are given another one. Many keyframes of 28 kB
+// may come at once, and the kernel's default receive buffer would lose some of them.
 inline constexpr char kDefaultBusUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
 
-// A bus by LCM URL, e.g. kDefaultBusUrl, or
-// "tcpq://host:7700" where multicast is blocked: LCM's relay, which may come and go, and stop; what
-// is published meanwhile is lost, as on multicast. Subscribe and Handle are for one thread; Publish
-// may be called from any.
+// A bus opened by an LCM URL, e.g. kDefaultBusUrl. Where multicast is blocked, "tcpq://host:7700"
+// connects to LCM's relay. The relay may stop and start at any time; messages published while it is
+// away are lost, as on multicast. Subscribe and Handle must be called by one thread; Publish may be
+// called by any thread.
 class LcmBus : public Bus {
  public:
-  // What becomes of a message in several datagrams (above 65 kB) on multicast. Where strangers can
-  // speak and nobody of ours sends such a one, as on the link, the kernel drops its fragments.
+  // How multicast treats a message of several datagrams (above 65 kB). kRefused: the kernel drops
+  // its fragments. The link uses this, because strangers can send there and we send no such
+  // message.
   enum class Fragments : uint8_t { kJoined, kRefused };
 
-  // Throws std::runtime_error naming the URL and the likely mend when it cannot be opened. No URL:
-  // LCM_DEFAULT_URL of the environment, or LCM's own default, as with all of LCM.
+  // Throws std::runtime_error, with the URL and advice, when the bus cannot be opened. An empty URL
+  // stands for the environment's LCM_DEFAULT_URL, or else for LCM's default.
   explicit LcmBus(const std::string& url, Fragments fragments = Fragments::kJoined);
   ~LcmBus() override;
   void Publish(const std::string& channel, Bytes data) override;
   void Subscribe(const std::string& channel_regex, Handler handler) override;
-  // Delivers what is waiting, at most for `timeout_ms`, or does a piece of work if nothing is
-  // (after kMaxBeforeWork messages in a row one anyway); returns whether there was anything to do.
-  // An exception from a handler comes out here.
+  // Delivers waiting messages; waits for one at most `timeout_ms`. With work left (WorkWhenIdle) it
+  // does not wait, but does a piece of work when there is no message, and after kMaxBeforeWork
+  // messages in any case. Returns whether there was anything to do. Throws what a handler throws.
   bool Handle(int timeout_ms);
   bool MoreWaits() override;
   Undelivered undelivered() override;
   void WorkWhenIdle(const std::function<bool()>& piece) override;
-  // File descriptor to poll on; -1 while there is no connection to a relay, and Handle looks for
-  // one.
+  // File descriptor that is readable when Handle should be called. -1 while there is no connection
+  // to the relay; Handle then tries to connect.
   int fd();
 
  private:
@@ -115,8 +118,8 @@ void PublishMessage(Bus& bus, const std::string& channel, const Message& message
   bus.Publish(channel, EncodeMessage(message));
 }
 
-// Decodes an lcm-gen type; false on a wrong fingerprint, a short or long payload, or absurd counts.
-// (LCM's own typed subscriptions abort the process on these.)
+// Decodes an lcm-gen type. False on a wrong fingerprint, a payload that is too short or too long,
+// or absurd counts. (LCM's own typed subscriptions would abort the process.)
 template <typename Message>
 bool DecodeMessage(Bytes data, Message* message) {
   try {

@@ -23,7 +23,7 @@ namespace {
       url, why));
 }
 
-// As LCM itself finds it.
+// The URL that LCM itself would use.
 std::string GivenOrDefault(const std::string& url) {
   const char* const environment = std::getenv("LCM_DEFAULT_URL");
   if (!url.empty() || environment == nullptr || *environment == 0) {
@@ -34,8 +34,8 @@ std::string GivenOrDefault(const std::string& url) {
 
 }  // namespace
 
-// Three kinds: LCM itself for what comes from this process or a file; multicast, which LCM sends
-// and we receive (udpm_receiver.h); and the relay, with a client of our own (tcpq_connection.h).
+// Three kinds of bus. Library: LCM does all (memq:// and file://). Multicast: LCM sends, and we
+// receive (udpm_receiver.h). Relayed: we have our own client of the relay (tcpq_connection.h).
 struct LcmBus::Impl {
   virtual ~Impl() = default;
   virtual void Publish(const std::string& channel, Bytes data) = 0;
@@ -56,8 +56,8 @@ struct LcmBus::Library : LcmBus::Impl {
   struct Subscription {
     Library* owner;
     Handler handler;
-    // LCM's C interface: built by GCC 12 with -fsanitize=address,undefined, the C++ wrapper called
-    // its member function on the wrong object.
+    // We use LCM's C interface, because the C++ wrapper, built by GCC 12 with
+    // -fsanitize=address,undefined, called its member function on the wrong object.
     static void OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* subscription) {
       auto* self = static_cast<Subscription*>(subscription);
       try {
@@ -103,7 +103,7 @@ struct LcmBus::Multicast : LcmBus::Impl {
       ThrowNotOpened(url, "");
     }
   }
-  // Before LCM looks for the route itself: it gives advice that no longer helps.
+  // We check the route before LCM does, because LCM's advice no longer helps.
   static UdpmAddress WithRoute(const std::string& url) {
     const UdpmAddress address = ParseUdpmUrl(url);
     try {

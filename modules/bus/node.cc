@@ -42,8 +42,7 @@ std::vector<counter_t> ToCounters(const std::map<std::string, int64_t>& from) {
   return to;
 }
 
-// What did not reach the handlers: malformed datagrams among the refused, losses among the
-// counters.
+// Adds what reached no handler: malformed datagrams to `refused`, losses to `counters`.
 void AddUndelivered(const std::vector<Bus*>& buses, std::map<std::string, int64_t>* refused,
                     std::map<std::string, int64_t>* counters) {
   const auto add = [counters](const char* counter, int64_t count) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// What every process on the bus needs once: typed subscriptions that survive bad bytes, counting,
-// and the 1 Hz status message. A process class owns a Node and is otherwise plain code.
+// What every process on the bus needs: typed subscriptions that drop malformed messages, counters,
+// and the status message. A process class owns one Node and uses it on one thread.
 
 #include <cstdint>
 #include <deque>
@@ -20,7 +20,7 @@
 
 namespace pangea {
 
-// A counter of what a process said of itself; nothing if it has none of this name.
+// The counter of this name in a process' status; nothing if the status has none.
 std::optional<int64_t> CounterOf(const status_t& status, std::string_view name);
 
 class Node {
@@ -31,7 +31,7 @@ class Node {
   const std::string& name() const { return name_; }
   Bus& bus() { return bus_; }
 
-  // handler(channel, message). What does not decode is counted and dropped.
+  // Calls handler(channel, message). Messages that do not decode are counted and dropped.
   template <typename Message, typename Handler>
   void Subscribe(const std::string& channel_regex, Handler handler) {
     SubscribeBytes(channel_regex,
@@ -45,8 +45,9 @@ class Node {
                    });
   }
 
-  // handler(value) or handler(value, message), with what messages.h' Parse makes of it. What it
-  // refuses is counted and dropped.
+  // Calls handler(value) or handler(value, message); `value` is the domain type that Parse
+  // (messages/messages.h) makes of the message. Messages that Parse refuses are counted and
+  // dropped.
   template <typename Message, typename Handler>
   void Listen(std::string_view channel_regex, Handler handler) {
     Subscribe<Message>(std::string(channel_regex),
@@ -54,7 +55,7 @@ class Node {
                            const std::string&, const Message& message) { Take(message, handler); });
   }
 
-  // The same, of a message at hand.
+  // Handles a given message as Listen does.
   template <typename Message, typename Handler>
   void Take(const Message& message, const Handler& handler) {
     auto parsed = Parse(message);
@@ -68,7 +69,7 @@ class Node {
     }
   }
 
-  // handler(channel, bytes), for several types at once.
+  // Calls handler(channel, bytes) without decoding, for channels that carry several types.
   template <typename Handler>
   void SubscribeBytes(const std::string& channel_regex, Handler handler) {
     bus_.Subscribe(channel_regex,
@@ -80,7 +81,7 @@ class Node {
                    });
   }
 
-  // Bus::WorkWhenIdle; each piece is counted among the handling times.
+  // As Bus::WorkWhenIdle; the time of each piece is added to the handling times.
   template <typename Piece>
   void WorkWhenIdle(Piece piece) {
     bus_.WorkWhenIdle([this, piece = std::move(piece)] {
@@ -97,17 +98,18 @@ class Node {
     PublishMessage(bus_, channel, message);
   }
 
-  // What another bus of this process keeps from it is told in the status too.
+  // The status then also counts the undelivered messages of this second bus of the process.
   void Watch(Bus& bus) { heard_.push_back(&bus); }
-  // Counts a refused message by its reason; at most 50 distinct reasons are told apart, and the
-  // first of each is logged (status_log.h).
+  // Counts a refused message by its reason. At most 50 reasons are distinguished; the rest count as
+  // "other reasons". The first message of each reason is logged (status_log.h).
   void Refuse(const std::string& reason);
   void Count(const std::string& counter, int64_t by = 1) { counters_[counter] += by; }
   void Set(const std::string& counter, int64_t value) { counters_[counter] = value; }
   void NoteDropped(int64_t count = 1) { dropped_ += count; }
   void NoteResendAsked() { ++resends_asked_; }
 
-  // `pending`: work waiting, 0 when idle. Measures process memory and CPU itself.
+  // `pending`: number of items that wait for this process, 0 when idle. Status adds the process'
+  // memory and CPU time.
   status_t Status(int64_t now_utime, int64_t pending, const std::string& summary) const;
   void PublishStatus(int64_t now_utime, int64_t pending, const std::string& summary);
 
@@ -126,7 +128,7 @@ class Node {
   int64_t resends_asked_ = 0;
   std::map<std::string, int64_t> refused_;
   std::map<std::string, int64_t> counters_;
-  std::deque<float> handling_ms_;  // of the newest 1000 messages and pieces of work
+  std::deque<float> handling_ms_;  // times of the newest 1000 messages and pieces of work
 };
 
 }  // namespace pangea

@@ -1,7 +1,7 @@
 #pragma once
 
-// Tells on the bus with which options a process runs: OPTIONS_<process>, at its start and every
-// 10 s, so that a logger that comes late has them. The agent_handler journals the newest.
+// Publishes the options of a process on OPTIONS_<process>, at its start and every 10 s, so that a
+// logger that starts late also has them. The agent_handler journals the newest ones.
 
 #include <cstdint>
 #include <string>
@@ -14,11 +14,11 @@ class OptionsAnnouncer {
  public:
   static constexpr int64_t kInterval_us = 10'000'000;
 
-  // `yaml`: YamlOptions::PrintWithoutHelp.
+  // `yaml`: the result of YamlOptions::PrintWithoutHelp.
   OptionsAnnouncer(Bus& bus, std::string process, std::string yaml)
       : bus_(bus), process_(std::move(process)), yaml_(std::move(yaml)) {}
 
-  // Wall clock; the first call announces.
+  // `now_utime`: wall clock. The first call publishes.
   void Tick(int64_t now_utime);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bytes of a bus or a log as a domain type, or refused with the reason.
+// Parses bytes from a bus or a log to a domain type, or refuses them with a reason.
 
 #include <optional>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace pangea {
 
-// Of an lcm-gen type for which there is a Parse.
+// `Message`: an lcm-gen type that has a Parse function.
 template <typename Message>
 auto ParseMessage(Bytes data) -> decltype(Parse(Message{})) {
   Message message{};

@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-// A signal interrupts any of the process's threads: the bus's receiver, a test's main.
+// Atomic, because the kernel may deliver a signal on any thread of the process.
 std::atomic<int> stop_signals = 0;
 static_assert(std::atomic<int>::is_always_lock_free, "or a signal's handler may not use it");
 
@@ -23,8 +23,8 @@ void InstallSignalHandlers() {
   action.sa_handler = [](int) { ++stop_signals; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // A file that may not grow (a quota, ulimit -f) is a full disk like any other: an error, no
-  // death.
+  // Writing beyond a limit of the file size (ulimit -f) must fail like a full disk; by default the
+  // signal would end the process.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
@@ -32,8 +32,8 @@ bool StopRequested() { return stop_signals != 0; }
 
 int StopSignals() { return stop_signals; }
 
-// By name: only programs that solve have OpenMP in them. With no level of parallel regions allowed
-// each region runs in one thread.
+// The function is looked up by name, because only programs with solvers link OpenMP. Without any
+// active level of parallel regions, each region runs in one thread.
 void UseOneThread() {
   if (void* const symbol = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
     reinterpret_cast<void (*)(int)>(symbol)(0);

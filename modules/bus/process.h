@@ -1,6 +1,6 @@
 #pragma once
 
-// The loop around a process class: bus, ticks, signals.
+// The main loop around a process class: messages, ticks, signals.
 
 #include <cstdint>
 
@@ -9,31 +9,32 @@
 
 namespace pangea {
 
-// A process without its loop. Handlers run between Ticks, on one thread.
+// A process class, which has no loop of its own. Its message handlers, Tick and BetweenMessages run
+// on one thread.
 class Process {
  public:
   virtual ~Process() = default;
-  // Housekeeping at about 10 Hz: resend requests, time-outs, status. Never called in a replay, so
-  // no result may depend on it.
+  // Housekeeping at about 10 Hz: resend requests, time-outs, status. A replay never calls it, so no
+  // result may depend on it. `now_utime`: wall clock.
   virtual void Tick(int64_t now_utime) = 0;
-  // What else a process serves beside the bus: called after each message, and when none came for
-  // longest_wait_ms.
+  // For a process that serves more than the bus. Called after each message, and when no message
+  // came for longest_wait_ms.
   virtual void BetweenMessages(int64_t) {}
   virtual int longest_wait_ms() const { return 50; }
 };
 
-// Set by SIGINT and SIGTERM once InstallSignalHandlers has run.
+// After InstallSignalHandlers, SIGINT and SIGTERM make StopRequested true.
 void InstallSignalHandlers();
 bool StopRequested();
-int StopSignals();  // how many came
+int StopSignals();  // number of such signals so far
 
-// What is solved is solved in the thread that asks for it. CHOLMOD would start three more, which
-// OMP_NUM_THREADS does not keep it from: it asks OpenMP for four by number. Call it at the start.
+// Makes OpenMP run everything in the calling thread. CHOLMOD would start three more threads even
+// with OMP_NUM_THREADS=1, because it asks OpenMP for four. Call this at the start of a program.
 void UseOneThread();
 
 class JournalFirstBus;
 
-// Handles messages and ticks until a signal. Returns the exit code.
+// Handles messages and ticks until a signal; returns the exit code. `journal_first` may be null.
 int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first = nullptr);
 
 }  // namespace pangea

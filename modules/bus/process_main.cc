@@ -17,7 +17,7 @@
 namespace pangea {
 namespace {
 
-// "pangea-global-ba" is global_ba.
+// For example, the program "pangea-global-ba" is "global_ba" on the bus.
 std::string NameOnTheBus(const std::string& program) {
   std::string name = program.substr(std::string("pangea-").size());
   std::ranges::replace(name, '-', '_');
@@ -43,14 +43,14 @@ void AddCheckpointOptions(CLI::App& app, CheckpointPlace* checkpoint, std::strin
       ->needs(file);
 }
 
-// Of a journal that nobody need be writing.
+// Lets the process read the journal's file and write its checkpoint, without a bus.
 void WriteCheckpoint(const CheckpointPlace& checkpoint, const std::string& journal,
                      const ProcessFactory& factory) {
   JournalState known;
   try {
     known = CheckpointReader(checkpoint.file).head().journal;
   } catch (const std::runtime_error&) {
-    // All of the journal is read.
+    // Without a usable checkpoint all of the journal is read.
   }
   LocalBus bus;
   const auto process = factory(bus);
@@ -60,7 +60,7 @@ void WriteCheckpoint(const CheckpointPlace& checkpoint, const std::string& journ
   bus.Drain();
 }
 
-// A process that tells its options beside what it does.
+// Adds the announcement of its options to a process.
 class WithOptions : public Process {
  public:
   WithOptions(std::unique_ptr<Process> process, OptionsAnnouncer announcer)

@@ -1,6 +1,7 @@
 #pragma once
 
-// main() of a server process: command line, options, bus, messages until a signal.
+// The main() of a server process: it reads command line and options, opens the bus, and handles
+// messages until a signal.
 
 #include <functional>
 #include <memory>
@@ -19,30 +20,29 @@ class App;
 namespace pangea {
 
 struct ProcessDescription {
-  std::string name;                       // "pangea-fusion"; on the bus it is "fusion"
+  std::string name;                       // "pangea-fusion"; its name on the bus is "fusion"
   std::string summary;                    // for --help
-  YamlOptions& options;                   // of --options FILE.yaml
-  ScratchFileOptions* scratch = nullptr;  // of --scratch-mb; null: it sets nothing aside
-  CheckpointPlace* checkpoint = nullptr;  // of --checkpoint; null: it keeps none
-  std::function<void(CLI::App&)> add_arguments = {};  // of this program alone
+  YamlOptions& options;                   // set by --options FILE.yaml
+  ScratchFileOptions* scratch = nullptr;  // set by --scratch-mb; null: no scratch file
+  CheckpointPlace* checkpoint = nullptr;  // set by --checkpoint; null: no checkpoints
+  std::function<void(CLI::App&)> add_arguments = {};  // adds arguments of this program
 };
 
-// Reads the command line (--bus URL, --options FILE.yaml, --print-options, --scratch-mb), then
-// makes the process, whose options are set by now, and runs it: the journal's HAVE first
-// (journal_first.h), messages and ticks until a signal. It tells its options on the bus
-// (options_announcer.h). With --write-checkpoint it reads the journal, writes the checkpoint and
-// ends. Errors become one line and exit code 1.
+// Reads the command line into `description`, then lets `factory` make the process and runs it until
+// a signal. The process hears of the journal before all else (journal_first.h); its options are
+// published (options_announcer.h). With --write-checkpoint, it only reads the journal and writes
+// the checkpoint. An exception becomes one line on stderr and exit code 1. Returns the exit code.
 using ProcessFactory = std::function<std::unique_ptr<Process>(Bus& bus)>;
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory);
 
-// Of a process that lets one choose nothing.
+// The options of a process that has none.
 struct NoOptions {
   template <typename Archive>
   void Visit(Archive& /*archive*/) {}
 };
 
-// The main() of a process that keeps keyframes in a scratch file, has a checkpoint and no arguments
+// The main() of a process that has a scratch file for keyframes and a checkpoint, and no arguments
 // of its own.
 template <typename ServerProcess, typename Options = NoOptions>
 int ServerProcessMain(int argc, char** argv, const std::string& name, const std::string& summary) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a process' status says of keyframes that found no room in its RecordStore.
+// Reports keyframes that found no room in the RecordStore in a process' status.
 
 #include <string>
 
@@ -9,9 +9,9 @@
 
 namespace pangea {
 
-// Sets the counters that are not zero, and returns what the summary ends with: nothing, or
-// "; 12 keyframes in memory: the scratch file in /var/tmp cannot be written: No space left on
-// device". Without a RecordStore memory is where they belong.
+// Sets the node's counters of records, if they are not zero, and returns an end for the status'
+// summary: empty, or "; 12 keyframes in memory: the scratch file in /var/tmp cannot be written: No
+// space left on device". Without a RecordStore, keyframes in memory are normal and not mentioned.
 std::string NoteRecords(const RecordCounters& counters, const RecordStore* records, Node* node);
 
 }  // namespace pangea

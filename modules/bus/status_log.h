@@ -1,8 +1,8 @@
 #pragma once
 
-// What a process tells people on stderr, where a terminal or a file of the session's shows it: one
-// line at its start, one when what its status says changes, and each reason to refuse a message
-// once. Silent until StartLog, so that tests and replays are.
+// The log of a process on stderr, for people: one line at its start, one when the summary of its
+// status changes, and one for each new reason to refuse a message. Before StartLog nothing is
+// written, so tests and replays are silent.
 
 #include <cstdint>
 #include <optional>
@@ -10,13 +10,14 @@
 
 namespace pangea {
 
-// "pangea-fusion: started; bus udpm://..., options fusion.yaml". Turns the log on. From main().
+// Turns the log on and writes "pangea-fusion: started; bus udpm://..., options fusion.yaml" (`with`
+// follows "started; "). Call it from main().
 void StartLog(const std::string& program, const std::string& with);
-// A line of a process' log; nothing before StartLog.
+// Writes "process: line"; nothing before StartLog.
 void Log(const std::string& process, const std::string& line);
 
-// Which of a status' summaries are worth a line: those that differ in more than their numbers, at
-// most one in kInterval_us; what holds by then is told.
+// Decides which status summaries get a line in the log: those that differ from the last logged one
+// in more than numbers, and at most one per kInterval_us.
 class StateChanges {
  public:
   static constexpr int64_t kInterval_us = 5'000'000;
@@ -24,7 +25,7 @@ class StateChanges {
   std::optional<std::string> Take(int64_t now_utime, const std::string& summary);
 
  private:
-  std::string told_;  // without its numbers
+  std::string told_;  // the last logged summary, without its digits
   int64_t next_utime_ = 0;
 };
 

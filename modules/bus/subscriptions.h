@@ -1,7 +1,7 @@
 #pragma once
 
-// Who hears which channel, by LCM's rule: a regular expression that holds for the whole name. What
-// the buses of our own have in common. Knows no threads: the owner locks.
+// The subscriptions of a bus. By LCM's rule, a subscription's regular expression must match the
+// whole channel name. All our own buses use this class. Not thread safe: the owner locks.
 
 #include <cstddef>
 #include <deque>
@@ -16,18 +16,18 @@ namespace pangea {
 
 class Subscriptions {
  public:
-  // Throws std::regex_error. What Matching returned is no longer valid; handlers are.
+  // Throws std::regex_error. Invalidates references that Matching returned, but no handler.
   void Add(const std::string& channel_regex, Bus::Handler handler);
   size_t size() const { return subscriptions_.size(); }
-  // As it was given to Add.
+  // The channel_regex of a subscription.
   const std::string& text(size_t number) const { return subscriptions_[number].text; }
   const Bus::Handler& handler(size_t number) const { return subscriptions_[number].handler; }
-  // The numbers of those that want the channel, in the order of Add. Remembered for the newest
-  // channels: a regular expression costs microseconds.
+  // Numbers of the subscriptions that match the channel, in the order of Add. Results are cached,
+  // because matching a regular expression takes microseconds.
   const std::vector<size_t>& Matching(const std::string& channel);
 
  private:
-  static constexpr size_t kMaxRemembered = 1000;  // channels; strangers can make up any number
+  static constexpr size_t kMaxRemembered = 1000;  // channels; strangers can invent any number
 
   struct Subscription {
     std::string text;

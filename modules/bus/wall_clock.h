@@ -6,10 +6,9 @@
 
 namespace pangea {
 
-// Microseconds since 1970 that never step: the wall clock as it was when the process first asked,
-// and from there as SteadyMicros goes. So what is paced by it goes on as it should when somebody
-// sets the clock; what is stamped by it (statuses, maps, the journal) is of the new time from the
-// next start on.
+// Microseconds since 1970, which never step: the wall clock at the first call, plus the time since
+// then by SteadyMicros. So pacing is not disturbed when somebody sets the clock. Timestamps
+// (statuses, maps, the journal) use the new time only after the next start.
 int64_t WallUtime();
 // Monotonic clock.
 int64_t SteadyMicros();

@@ -1,6 +1,6 @@
 #pragma once
 
-// An anchor: a place in the world that people give a name, and see at the same place.
+// Anchors: an anchor is a named pose in the world, which all agents of a group see at one place.
 
 #include <Eigen/Core>
 #include <compare>
@@ -16,49 +16,50 @@ namespace pangea {
 
 struct AnchorId {
   int32_t agent_id = 0;       // who made it; 0: a tool on the server
-  int64_t created_utime = 0;  // drawn by the maker, microseconds since 1970
+  int64_t created_utime = 0;  // chosen by the maker, microseconds since 1970
   auto operator<=>(const AnchorId&) const = default;
 };
 
-// "2/1700000000000000", as a map's.
+// "2/1700000000000000": the same format as a MapId's.
 std::string ToString(const AnchorId& id);
 
-// What the key of an editor allows.
+// What an editor's key allows the editor to do.
 enum class AnchorRight : int8_t { kUnknown = 0, kRead = 1, kEditOwn = 2, kEditAll = 3 };
 
-// Makes an anchor, or changes one; it stands for the whole anchor. The highest (revision, agent)
-// wins, whatever the order of arrival; an anchor that was deleted stays so.
+// Makes or changes an anchor. An edit states the whole anchor, not only what changed. The edit with
+// the highest (revision, agent) wins, in any order of arrival; a deleted anchor stays deleted.
 struct AnchorEdit {
   enum class Placement : int8_t {
-    kSame = 1,      // stays where it is
+    kSame = 1,      // the anchor stays where it is
     kKeyframe = 2,  // T_ref_anchor in the body frame of keyframe (map, keyframe_seq)
     kBody = 3,      // T_ref_anchor in the body frame of the agent at utime
-    kPixel = 4,     // the surface behind `pixel` in the agent's image of utime, upright
+    kPixel = 4,     // upright, on the surface behind `pixel` of the agent's image at utime
   };
 
   AnchorId anchor;
   int64_t revision = 1;
   int32_t agent_id = 0;  // who edits; 0: a tool on the server
   AnchorRight right = AnchorRight::kUnknown;
-  int64_t seq = -1;  // in the journal, from 0; -1: not yet in it
+  int64_t seq = -1;  // number of the edit in the journal, from 0; -1: not journalled yet
   bool deleted = false;
   std::string name;     // at most kMaxAnchorName bytes
-  std::string payload;  // at most kMaxAnchorPayload bytes, the apps' own
+  std::string payload;  // at most kMaxAnchorPayload bytes; only the apps interpret it
   Placement placement = Placement::kSame;
-  MapId map;  // this and below: not read with kSame
+  MapId map;  // this field and those below are not read with kSame
   int32_t keyframe_seq = 0;
   int64_t utime = 0;  // sensor clock
   Rigid3 T_ref_anchor;
-  // The agent's at utime, as its odometry had it then; else it lies between two keyframes.
+  // Pose of the agent at utime, by its own odometry. Without it the pose is interpolated between
+  // two keyframes.
   std::optional<Rigid3> T_odom_body;
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw
-  std::optional<Matrix6d> covariance;               // of T_ref_anchor, where it is known
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw (distorted)
+  std::optional<Matrix6d> covariance;               // of T_ref_anchor; none: not known
 };
 
 inline constexpr size_t kMaxAnchorName = 50;
 inline constexpr size_t kMaxAnchorPayload = 1000;
 
-// Where an anchor is, for those who show it.
+// The state of an anchor, for one agent or for the whole group.
 struct AnchorState {
   AnchorId anchor;
   int64_t revision = 0;
@@ -66,10 +67,10 @@ struct AnchorState {
   bool gone = false;  // deleted, or no longer in the group of `map`
   std::string name;
   std::string payload;
-  MapId map;  // an agent's; or the group's, whose odom frame is the map frame
+  MapId map;  // an agent's map; or the group's oldest map, whose odom frame is the map frame
   MapId group;
-  int64_t group_revision = 0;  // 0: none yet, the odometry alone
-  Rigid3 T_odom_anchor;        // odom of `map`, valid around the agent's newest keyframe
+  int64_t group_revision = 0;  // 0: not optimised yet, the pose rests on the odometry alone
+  Rigid3 T_odom_anchor;        // odom frame of `map`; valid near the agent's newest keyframe
   Matrix6d covariance = Matrix6d::Identity();
 };
 
@@ -79,7 +80,7 @@ struct ShownAnchor {
   Rigid3 T_odom_anchor;
 };
 
-// What an app draws with the pose of `utime`.
+// The anchors that an app draws together with the agent's pose at `utime`.
 struct ShownAnchors {
   int64_t utime = 0;
   MapId map;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Numbers as LCM has them in its messages, its logs and its relay's protocol: the highest byte
-// first.
+// Big-endian integers (highest byte first), as LCM uses them in messages, in logs and in the
+// protocol of its relay. The caller makes sure that the bytes are there.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +18,7 @@ inline uint64_t GetBigEndian(const uint8_t* in, size_t num_bytes) {
   return value;
 }
 
-// Of the four bytes from there on.
+// The 32-bit number in the four bytes from index `at` on.
 inline uint32_t WordAt(std::span<const uint8_t> bytes, size_t at) {
   return static_cast<uint32_t>(GetBigEndian(bytes.data() + at, sizeof(uint32_t)));
 }

@@ -1,8 +1,8 @@
 #pragma once
 
-// Values one after the other as bytes, exactly as they lie in memory: for records that the same run
-// reads again and for checkpoints, which the same binary on the same machine reads or nobody; never
-// for a message, or a file that people keep.
+// Writes values to bytes exactly as they lie in memory, one after the other, and reads them again.
+// Only for records that the same run reads, and for checkpoints, which only the same binary on the
+// same machine reads. Never for messages or for files that people keep.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -35,7 +35,7 @@ class ByteWriter {
     Put(T.q);
     Put(T.t);
   }
-  // By their fields: what lies between these has no value.
+  // Ids are written field by field, because the padding between the fields is undefined.
   void Put(const MapId& id) {
     Put(id.agent_id);
     Put(id.opened_utime);
@@ -61,7 +61,7 @@ class ByteWriter {
   virtual void PutBytes(const void* data, size_t size) = 0;
 };
 
-// Past the end nothing is read, and ok() is false from then on.
+// A read past the end reads nothing. From then on ok() is false.
 class ByteReader {
  public:
   virtual ~ByteReader() = default;
@@ -86,7 +86,8 @@ class ByteReader {
     Get(&id->map);
     Get(&id->seq);
   }
-  // A count of things that take at least `min_bytes` each; 0 where so many cannot follow.
+  // Reads a count of elements. An element takes at least `min_bytes`; if the bytes left cannot hold
+  // so many elements, the result is 0 and ok() becomes false.
   size_t GetCount(size_t min_bytes) {
     uint32_t count = 0;
     Get(&count);
@@ -110,7 +111,7 @@ class ByteReader {
 
  protected:
   virtual size_t bytes_left() const = 0;
-  // At most bytes_left(); false when they cannot be read.
+  // `size` is at most bytes_left(). Returns false when the bytes cannot be read.
   virtual bool Read(void* data, size_t size) = 0;
 
  private:
@@ -119,7 +120,7 @@ class ByteReader {
   bool ok_ = true;
 };
 
-// In memory.
+// Writer and reader of bytes in memory.
 class ByteRecordWriter final : public ByteWriter {
  public:
   void Reserve(size_t num_bytes) { bytes_.reserve(num_bytes); }

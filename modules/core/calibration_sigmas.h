@@ -1,18 +1,18 @@
 #pragma once
 
-// How well a camera's calibration is known before the images say more: standard deviations.
+// Prior standard deviations of a camera's calibration, before any image was seen.
 
 namespace pangea {
 
 struct CalibrationSigmas {
-  // rad; constraints of walks need it (docs/decisions/imu.md)
+  // rad; constraints measured while walking need this value (docs/decisions/imu.md)
   double rotation = 0.001;
   double position_m = 0.005;
   double time_offset_s = 0.005;
-  double focal = 0.001;   // of the focal length
-  double centre = 0.001;  // of the focal length: half a pixel
-  // Of the first two coefficients. 0: a tenth of a pixel in a corner (0.0003); where all are 0,
-  // nobody measured them, and phones' lenses have up to 0.1.
+  double focal = 0.001;   // share of the focal length
+  double centre = 0.001;  // share of the focal length; this is about half a pixel
+  // Of the first two distortion coefficients. The value 0 stands for 0.0003 (a tenth of a pixel in
+  // an image corner), or for 0.1 when all coefficients are 0: then nobody measured them.
   double distortion = 0;
 
   template <typename Archive>

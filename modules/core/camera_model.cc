@@ -71,8 +71,8 @@ std::optional<Vector2d> UndistortRadtan(const Eigen::Vector4d& k, const Vector2d
   return std::nullopt;
 }
 
-// Newton's method on the angle, where the polynomial is tame; the plane z = 1 ends short of 90
-// degrees.
+// Newton's method on the angle, in which the polynomial is well behaved. Angles near 90 degrees
+// have no point on the plane z = 1.
 std::optional<Vector2d> UndistortEquidistant(const Eigen::Vector4d& k, const Vector2d& target) {
   const double theta_d = target.norm();
   if (theta_d < 1e-9) {
@@ -110,7 +110,7 @@ std::optional<Vector2d> CameraModel::Project(const Eigen::Vector3d& p_cam,
   const Vector2d xy = p_cam.head<2>() * inv_z;
   Matrix2d J_distort;
   const Vector2d d = Distort(kind, distortion, xy, &J_distort);
-  // Where the determinant is not positive the polynomial has folded over: no such light ray.
+  // Where the determinant is not positive, the polynomial folds back: no light ray is there.
   if (!(J_distort.determinant() > 0) || J_distort.trace() <= 0) {
     return std::nullopt;
   }
@@ -150,7 +150,7 @@ std::optional<std::string> CameraModel::Invalid() const {
   if (!(fx > 1 && fx < 1e5 && fy > 1 && fy < 1e5)) {
     return "focal lengths must be between 1 and 1e5 pixels";
   }
-  // A cropped image's may lie outside, by an image at most.
+  // The principal point of a cropped image may lie outside it, by one image size at most.
   if (!(cx > -width && cx < 2 * width && cy > -height && cy < 2 * height)) {
     return fmt::format("the principal point ({:.4g}, {:.4g}) is far outside of {} x {} pixels", cx,
                        cy, width, height);

@@ -16,7 +16,8 @@ namespace pangea {
 
 struct CameraModel {
   enum class Kind { kRadtan, kEquidistant };
-  // From the body to the camera, metres: the largest of vehicles, and a phone's in centimetres.
+  // Largest plausible distance from body to camera, which suffices for vehicles. A larger one is
+  // probably not in metres.
   static constexpr double kMaxLever_m = 10;
 
   Kind kind = Kind::kRadtan;
@@ -27,23 +28,23 @@ struct CameraModel {
   Eigen::Vector4d distortion = Eigen::Vector4d::Zero();
   Rigid3 T_body_cam;         // p_body = T_body_cam * p_cam
   double time_offset_s = 0;  // t_imu = t_image + time_offset_s
-  double readout_s = 0;      // first row to last; 0 = global shutter
+  double readout_s = 0;      // from the first row to the last; 0: global shutter
 
-  // Pixel of a point with z > 0; nothing behind the camera or where the distortion polynomial folds
-  // back. `jacobian`, when given, is d(pixel)/d(p_cam).
+  // Raw pixel of a point with z > 0. Nothing behind the camera, or where the distortion polynomial
+  // folds back. `jacobian` may be null; it is d(pixel)/d(p_cam).
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_cam,
                                          Eigen::Matrix<double, 2, 3>* jacobian = nullptr) const;
-  // (x, y) with the ray (x, y, 1) through a pixel; nothing where the model cannot be inverted.
+  // The (x, y) of the ray (x, y, 1) through a raw pixel; nothing where the model has no inverse.
   std::optional<Eigen::Vector2d> Unproject(const Eigen::Vector2d& pixel) const;
 
-  // d(pixel)/d(the first two coefficients of distortion) of a ray.
+  // For a ray: d(pixel)/d(the first two distortion coefficients).
   Eigen::Matrix2d DistortionJacobian(const Eigen::Vector2d& ray) const;
 
-  // Inside the image with a border, pixels.
+  // Whether the pixel is inside the image and at least `border` pixels from its edge.
   bool Contains(const Eigen::Vector2d& pixel, double border = 0) const;
-  // One pixel as an angle at the image centre, radians.
+  // The angle of one pixel at the image centre, radians.
   double PixelAngle() const { return 2.0 / (fx + fy); }
-  // What is wrong with it, or nothing.
+  // The reason why the model is invalid; nothing when it is valid.
   std::optional<std::string> Invalid() const;
 };
 

@@ -1,9 +1,9 @@
 #pragma once
 
-// What a corner looks like: the descriptor's width, how alike two descriptors of one point are, and
-// the scale of the image pyramid. Another descriptor is other numbers here and the code that makes
-// it (vio/front_end/describer.cc). Messages: keyframe_t takes any width that its 16-bit byte count
-// holds, map_landmark_t has shipped with 32 bytes.
+// Binary descriptors of corners: their width, the distances between two descriptors of one point,
+// and the scale of the image pyramid. To use another descriptor, change the numbers here and the
+// code that computes it (vio/front_end/describer.cc). In messages, keyframe_t allows any width that
+// its 16-bit byte count holds; map_landmark_t is fixed at 32 bytes.
 
 #include <array>
 #include <bit>
@@ -22,15 +22,16 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
   }
   return distance;
 }
-inline constexpr int kNoDistance = kDescriptorBits + 1;  // more than any
+inline constexpr int kNoDistance = kDescriptorBits + 1;  // larger than any distance
 
-// Bits by which two descriptors of one point may differ; those of two points differ in about half.
-inline constexpr int kSureHamming = 56;       // surely one point
-inline constexpr int kAlikeHamming = 64;      // one point, where each match counts
-inline constexpr int kCandidateHamming = 72;  // where one pose has to explain most of the matches
-inline constexpr int kPredictedHamming = 75;  // at a predicted place
+// Largest Hamming distances, in bits, at which two corners may be one point. Descriptors of
+// different points differ in about half of their bits.
+inline constexpr int kSureHamming = 56;       // the two corners are surely one point
+inline constexpr int kAlikeHamming = 64;      // each single match counts
+inline constexpr int kCandidateHamming = 72;  // one pose has to explain most of the matches
+inline constexpr int kPredictedHamming = 75;  // the corner is searched at a predicted place
 
-// From octave to octave of the image pyramid.
+// Scale factor between two neighbouring octaves of the image pyramid.
 inline constexpr double kOctaveScale = 1.2;
 
 }  // namespace pangea

@@ -10,12 +10,14 @@ namespace pangea {
 
 class Drift {
  public:
-  // Of the map's corrections, in any order; false for one that is not newer than all before.
+  // Takes a correction of the map; corrections may come in any order. False, and nothing changes,
+  // unless it is newer than all before.
   bool Take(const Correction& correction) {
     if (newest_ && correction.revision <= newest_->revision) {
       return false;
     }
-    // A lone map starts uncorrected; in a new group the first correction is where the map was put.
+    // The oldest map of a group starts uncorrected. Any other map starts where the first correction
+    // of the new group puts it.
     if (!newest_ || newest_->group != correction.group) {
       T_map_odom_first_ = correction.group == correction.map ? Rigid3() : correction.T_map_odom;
     }
@@ -23,7 +25,7 @@ class Drift {
     return true;
   }
 
-  // Metres by which the point of the odom frame has moved.
+  // Metres by which corrections have moved the point `p_odom`.
   double Moved(const Eigen::Vector3d& p_odom) const {
     return newest_ ? (newest_->T_map_odom * p_odom - T_map_odom_first_ * p_odom).norm() : 0;
   }

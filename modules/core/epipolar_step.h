@@ -5,7 +5,7 @@
 //
 //   e = t . (R a x b) / s,   de/dtheta = ((t . R a) b - (R a . b) t) / s,   de/dt = (R a x b) / s.
 //
-// The scale s, which makes e an angle or leaves it, the weights and the priors are the caller's.
+// The caller chooses the scale s (which can make e an angle), the weights and the priors.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ namespace pangea {
 
 class EpipolarStep {
  public:
-  // Rotation in place leaves t free: `damping` keeps it where it is.
+  // t: of length 1. Pure rotation does not observe t; then `damping` keeps it where it is.
   EpipolarStep(const Eigen::Vector3d& t, double damping) : t_(t) {
     const Eigen::Vector3d u = t.unitOrthogonal();
     tangent_ << u, t.cross(u);
@@ -25,7 +25,7 @@ class EpipolarStep {
     g.setZero();
   }
 
-  // Unit rays; a is rotated into b.
+  // Adds a pair of unit rays. `a_in_b` is R a, the ray of the first view in axes of the second.
   void Add(const Eigen::Vector3d& a_in_b, const Eigen::Vector3d& b, double scale, double weight) {
     const Eigen::Vector3d normal = a_in_b.cross(b);
     const double e = t_.dot(normal) / scale;
@@ -42,7 +42,7 @@ class EpipolarStep {
     *t = (t_ + tangent_ * step.tail<2>()).normalized();
   }
 
-  // The normal equations: rotation, then t's two directions.
+  // The normal equations, in the order (rotation, the two tangent directions of t).
   Eigen::Matrix<double, 5, 5> H;
   Eigen::Matrix<double, 5, 1> g;
 

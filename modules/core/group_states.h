@@ -1,8 +1,8 @@
 #pragma once
 
-// Which maps are fused into which group: the newest state of each group, found by any of its maps.
-// For each map the state with the highest revision counts, in whatever order they come. A map that
-// has left its group keeps the state that named it last, which is current no more.
+// Which maps are fused into which group: finds the newest state of a group by any of its maps.
+// For each map the state with the highest revision counts, in any order of arrival. A map that has
+// left its group keeps the last state that named it, but that state is no longer current.
 
 #include <algorithm>
 #include <cstdint>
@@ -17,13 +17,14 @@
 
 namespace pangea {
 
-// `State`: what is kept of a MapState; it has `revision` and `maps` as that has them.
+// `State` holds the part of a MapState that the user needs. It has MapState's `revision` and
+// `maps`.
 template <typename State>
 class GroupStates {
  public:
   using Pointer = std::shared_ptr<const State>;
 
-  // All maps that it is the newest of share it.
+  // The state becomes the newest one of each of its maps that has no newer state.
   Pointer Take(State state) {
     const auto taken = std::make_shared<const State>(std::move(state));
     for (const MapId& map : taken->maps) {
@@ -41,12 +42,13 @@ class GroupStates {
     return found == newest_.end() ? nullptr : found->second.get();
   }
 
-  // Whether it, which was taken, is the newest of all its maps: none of them has left.
+  // Whether `state`, as returned by Take or Find, is the newest state of all its maps: no map has
+  // left the group since.
   bool IsCurrent(const State& state) const {
     return std::ranges::all_of(state.maps, [&](const MapId& map) { return Find(map) == &state; });
   }
 
-  // Whether the map is one with others.
+  // Whether the map is now in a group with other maps.
   bool IsFused(const MapId& map) const {
     const State* const state = Find(map);
     return state != nullptr && state->maps.size() > 1 && IsCurrent(*state);
@@ -58,7 +60,7 @@ class GroupStates {
   std::map<MapId, Pointer> newest_;
 };
 
-// Where keyframes are in the map frame of their group.
+// T_map_body of keyframes, in the map frame of their group.
 using MapPoses = std::map<KeyframeId, Rigid3>;
 
 inline MapPoses PosesOf(const MapState& state) {
@@ -69,7 +71,7 @@ inline MapPoses PosesOf(const MapState& state) {
   return poses;
 }
 
-// A state as it is kept by who looks for poses.
+// A State for GroupStates that keeps the keyframe poses.
 struct PosedGroup {
   explicit PosedGroup(const MapState& state)
       : id(state.group), revision(state.revision), maps(state.maps), T_map_body(PosesOf(state)) {}

@@ -6,10 +6,10 @@ namespace {
 constexpr size_t kCornerBytes =
     2 * sizeof(float) + sizeof(int8_t) + sizeof(Descriptor) + sizeof(int32_t);
 constexpr size_t kPointBytes = sizeof(int) + 2 * sizeof(float);
-constexpr size_t kOtherBytes = 3000;  // at most, with edge and preintegration
+constexpr size_t kOtherBytes = 3000;  // upper bound of all but the corners and points
 
-// `visit(&part)` for each part that every keyframe has, but for corners and points: the one list
-// for writing and reading.
+// Calls `visit(&part)` for each part that every keyframe has, except corners and points. Writing
+// and reading share this list.
 template <typename KeyframeType, typename Visit>
 void VisitHead(KeyframeType& k, const Visit& visit) {
   visit(&k.id.map.agent_id);

@@ -1,7 +1,7 @@
 #pragma once
 
-// A keyframe as bytes and back, the same to the last bit: 45 bytes a corner. For records that the
-// same run reads again (byte_record.h).
+// Writes a keyframe to bytes (45 for each corner) and reads it again, identical to the last bit.
+// Only for records that the same run reads (byte_record.h).
 
 #include <cstdint>
 #include <optional>
@@ -14,10 +14,10 @@
 namespace pangea {
 
 std::vector<uint8_t> ToRecord(const Keyframe& keyframe);
-// Nothing when these are not the bytes of one.
+// Nothing when `record` does not hold exactly one keyframe.
 std::optional<Keyframe> KeyframeFromRecord(std::span<const uint8_t> record);
 
-// Of a part of it.
+// The same for the corners alone.
 void PutCorners(const std::vector<Corner>& corners, ByteWriter* writer);
 void GetCorners(ByteReader* reader, std::vector<Corner>* corners);
 

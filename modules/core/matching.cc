@@ -9,8 +9,8 @@
 namespace pangea {
 namespace {
 
-// A corner may be described on several octaves: the second best of the ratio test has to be another
-// place of the image, at least this far from the best.
+// A corner may be described on several octaves. So the second best match of the ratio test must be
+// at least this far from the best one in the image.
 constexpr double kOtherCorner_px = 5.0;
 constexpr double kCellPx = 32.0;
 
@@ -25,7 +25,7 @@ constexpr double kCellPx = 32.0;
   }
 }
 
-// With a processor's vector of population counts it takes a quarter of the time.
+// With the processor's vector instructions for population counts, this takes a quarter of the time.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 [[gnu::target("avx512vpopcntdq,avx512vl")]] void VectorHammingDistances(
     const uint64_t* const* words, const Descriptor& descriptor, size_t count, uint64_t* distances) {
@@ -78,7 +78,7 @@ std::vector<CornerMatch> PairsWithin(const std::vector<Corner>& a, const std::ve
     for (size_t begin = 0; begin < b.size(); begin += kBatch) {
       const auto batch = std::span(distances).subspan(begin, std::min(kBatch, b.size() - begin));
       if (kHasVectors && VectorLeast(batch) > up_to) {
-        continue;  // most have none
+        continue;  // no pair in this batch, which is the usual case
       }
       for (size_t j = begin; j < begin + batch.size(); ++j) {
         if (distances[j] <= up_to) {

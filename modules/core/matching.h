@@ -1,8 +1,7 @@
 #pragma once
 
-// Matching of binary descriptors: whole keyframe against whole keyframe, and guided by where a
-// point should appear. Pixels are raw (distorted) pixels throughout. Nothing here is random: equal
-// distances are settled by the lower index.
+// Matching of binary descriptors: one whole keyframe against another, or near a predicted pixel.
+// All pixels are raw (distorted). Nothing here is random: of equal distances the lower index wins.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -27,38 +26,39 @@ struct CornerMatch {
   int distance = 0;
 };
 
-// From a match no rival further away than this can take the ratio test.
+// A rival with a larger distance than this, in bits, cannot make any match fail the ratio test.
 inline int RivalDistance(const MatchingOptions& options) {
   return std::min(kDescriptorBits, static_cast<int>(options.max_distance / options.max_ratio) + 1);
 }
 
-// Descriptors word by word, so that one is compared with many at a time.
+// Descriptors stored word by word, so that one is compared with many at a time.
 class DescriptorList {
  public:
   explicit DescriptorList(const std::vector<Corner>& corners);
 
-  // Of each the Hamming distance to `descriptor`. `distances` has their number.
+  // The Hamming distance of each descriptor to `descriptor`. The caller sizes `distances`: one
+  // element for each descriptor of the list.
   void Distances(const Descriptor& descriptor, std::vector<uint64_t>* distances) const;
 
  private:
   std::array<std::vector<uint64_t>, std::tuple_size_v<Descriptor>> words_;
 };
 
-// All pairs of corners no further apart than that, in the order of a, then of b.
+// All pairs of corners with a Hamming distance of at most `max_distance`, ordered by (a, b).
 std::vector<CornerMatch> PairsWithin(const std::vector<Corner>& a, const std::vector<Corner>& b,
                                      int max_distance);
 
-// Those of `pairs`, which are in that order, that are each other's nearest and pass distance and
-// ratio. They must be there up to RivalDistance.
+// The pairs that are mutual nearest neighbours and pass the distance and ratio tests. `pairs`
+// must be ordered by (a, b) and contain all pairs up to RivalDistance.
 std::vector<CornerMatch> MutualNearest(const std::vector<CornerMatch>& pairs,
                                        const std::vector<Corner>& b,
                                        const MatchingOptions& options);
 
-// Mutual nearest neighbours that pass the ratio test, in the order of a.
+// Mutual nearest neighbours that pass the distance and ratio tests, ordered by a.
 std::vector<CornerMatch> MatchCorners(const std::vector<Corner>& a, const std::vector<Corner>& b,
                                       const MatchingOptions& options);
 
-// Corners by image position, for "the nearest descriptor within r pixels of here".
+// Corners sorted into grid cells of the image, to find those near a pixel quickly.
 class CornerGrid {
  public:
   // Keeps a pointer: `corners` must outlive the grid.
@@ -66,8 +66,8 @@ class CornerGrid {
 
   // Indices of the corners within `radius_px`, ascending.
   std::vector<int> Within(const Eigen::Vector2d& pixel, double radius_px) const;
-  // The one of these with the nearest descriptor (`a` of the result is 0), if it passes distance
-  // and ratio.
+  // The corner within `radius_px` with the nearest descriptor, if it passes the distance and ratio
+  // tests. `a` of the result is 0.
   std::optional<CornerMatch> Nearest(const Eigen::Vector2d& pixel, double radius_px,
                                      const Descriptor& descriptor,
                                      const MatchingOptions& options) const;

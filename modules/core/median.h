@@ -6,7 +6,7 @@
 
 namespace pangea {
 
-// The middle value; of an even number of them the upper of the two. There must be one.
+// The middle value; of an even number of values the upper one of the two. `values` is not empty.
 template <typename T>
 T Median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

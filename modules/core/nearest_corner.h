@@ -1,8 +1,7 @@
 #pragma once
 
-// The search that all matching of descriptors is built of: the nearest corner, and the nearest one
-// somewhere else in the image, which a match must be clearly nearer than. Equal distances are
-// settled by the lower index.
+// The search that all descriptor matching uses. It finds the nearest corner, and, for the ratio
+// test, the nearest corner elsewhere in the image. Of equal distances the first candidate wins.
 
 #include <vector>
 
@@ -11,14 +10,17 @@
 namespace pangea {
 
 struct NearestCorner {
-  int index = -1;  // none is near enough
+  int index = -1;  // -1: no corner is near enough
   int distance = kNoDistance;
-  int second = kNoDistance;  // of a corner elsewhere: one place may be described on several octaves
+  // Distance of the nearest corner elsewhere. A corner at the same place does not count, because
+  // one place may be described on several octaves.
+  int second = kNoDistance;
 
   bool PassesRatio(double max_ratio) const { return distance <= max_ratio * second; }
 };
 
-// Of `corners[i]` with i in `candidates`; `distance_of(i)` may be kNoDistance: that is none.
+// Searches `corners[i]` for each i in `candidates`. An i with distance_of(i) == kNoDistance is
+// ignored. "Elsewhere" means more than `other_corner_px` pixels from the nearest corner.
 template <typename Candidates, typename DistanceOf>
 NearestCorner FindNearest(const std::vector<Corner>& corners, const Candidates& candidates,
                           const DistanceOf& distance_of, int max_distance, double other_corner_px) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where the other agents of an agent's group are now.
+// The current poses of the other agents in an agent's group.
 
 #include <cstdint>
 #include <vector>
@@ -12,13 +12,13 @@ namespace pangea {
 
 struct OtherAgent {
   int32_t agent_id = 0;
-  Rigid3 T_odom_cam;  // its camera, in the odom frame of Others::map
+  Rigid3 T_odom_cam;  // pose of its camera in the odom frame of Others::map
 };
 
 inline constexpr size_t kMaxOthers = 16;
 
 struct Others {
-  MapId map;  // of the agent that they are for
+  MapId map;  // map of the agent that receives this
   std::vector<OtherAgent> others;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// The values used last, at most so many; the one unused for longest makes room. Not thread safe.
+// A least-recently-used cache of at most `max_values` values. Not thread safe.
 
 #include <cstddef>
 #include <list>
@@ -17,7 +17,7 @@ class RecentCache {
 
   explicit RecentCache(size_t max_values) : max_values_(max_values) {}
 
-  // Null when it is not there.
+  // Null when the key is not there.
   Pointer Find(const Key& key) {
     const auto found = entries_.find(key);
     if (found == entries_.end()) {
@@ -26,7 +26,7 @@ class RecentCache {
     uses_.splice(uses_.begin(), uses_, found->second);
     return found->second->second;
   }
-  // Of a key that is not there.
+  // The key must not be there yet.
   void Add(const Key& key, Pointer value) {
     uses_.emplace_front(key, std::move(value));
     entries_.emplace(key, uses_.begin());
@@ -45,7 +45,7 @@ class RecentCache {
   using Uses = std::list<std::pair<Key, Pointer>>;
 
   size_t max_values_;
-  Uses uses_;  // newest first
+  Uses uses_;  // most recently used first
   std::map<Key, typename Uses::iterator> entries_;
 };
 

@@ -27,7 +27,8 @@ Eigen::Vector3d LogSo3(const Eigen::Quaterniond& q);
 Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& omega);
 Eigen::Matrix3d RightJacobianInverse(const Eigen::Vector3d& omega);
 
-// Rotation about z (gravity), radians; yaw in (-pi, pi].
+// Yaw is the rotation about z, the axis of gravity, in radians. YawOf and WrapAngle return angles
+// in (-pi, pi].
 Eigen::Quaterniond YawRotation(double yaw);
 double YawOf(const Eigen::Quaterniond& q_gravity_body);
 double WrapAngle(double angle);
@@ -47,18 +48,18 @@ struct Rigid3 {
   Rigid3 Inverse() const { return {q.conjugate(), -(q.conjugate() * t)}; }
   Eigen::Matrix3d R() const { return q.toRotationMatrix(); }
 
-  // this (+) xi and this (-) other, in the tangent above: a.Plus(b.Minus(a)) == b.
+  // Plus is this (+) xi, Minus is this (-) other, in the tangent above: a.Plus(b.Minus(a)) == b.
   Rigid3 Plus(const Vector6d& xi) const {
     return {(ExpSo3(xi.tail<3>()) * q).normalized(), t + xi.head<3>()};
   }
   Vector6d Minus(const Rigid3& other) const;
 };
 
-// Covariance of T_a_b * T_b_c from those of its independent factors, first order.
+// Covariance of T_a_b * T_b_c to first order; the errors of the two factors are independent.
 Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const Rigid3& T_b_c,
                            const Matrix6d& cov_b_c);
 
-// Covariance of T_b_a from that of T_a_b, first order.
+// Covariance of T_b_a from that of T_a_b, to first order.
 Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance);
 
 }  // namespace pangea

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the server's modules tell each other, as domain types.
+// The messages between the server's modules, as domain types.
 
 #include <cstdint>
 #include <string>
@@ -13,10 +13,10 @@
 namespace pangea {
 
 enum class PlaceKind : int8_t {
-  kIntra = 1,  // both keyframes of one map that is in no group with another
-  kInter = 2,
-  // No candidate has it: a constraint in the place of those whose keyframes were thinned away
-  // (thinning/thinning.h).
+  kIntra = 1,  // both keyframes are of one map, which is not fused with any other
+  kInter = 2,  // any other pair of keyframes
+  // Only constraints have this kind, no candidates: such a constraint replaces those whose
+  // keyframes were thinned away (thinning/thinning.h).
   kDerived = 3,
 };
 
@@ -24,29 +24,30 @@ struct PlaceCandidate {
   KeyframeId match;  // the older keyframe
   PlaceKind kind = PlaceKind::kInter;
   float score = 0;  // retrieval score, 0 .. 1
-  // (query corner, match corner) that passed the epipolar check
+  // Pairs (corner of the query, corner of the match) that passed the epipolar check.
   std::vector<std::pair<int, int>> corner_matches;
 };
 
-// Exactly one per keyframe.
+// The result of place recognition for one keyframe; there is exactly one for each keyframe.
 struct PlaceMatch {
   KeyframeId query;
   std::vector<PlaceCandidate> candidates;
-  std::vector<std::string> rejected;  // dropped before publication, and why: for people
+  // For people: candidates that were dropped before publication, and why.
+  std::vector<std::string> rejected;
 };
 
-// Why a candidate was not verified: constraints beside it tell the relative pose well enough. Its
-// matched corners are good for bundle adjustment.
+// Constraint::reason of a candidate that was not verified, because constraints near it already
+// determine the relative pose well. Its matched corners are still useful for bundle adjustment.
 inline constexpr char kRedundant[] = "redundant";
 
-// Exactly one per candidate.
+// The verification result of a candidate; there is exactly one for each candidate.
 struct Constraint {
   KeyframeId from;  // the candidate's match
   KeyframeId to;    // the query
   PlaceKind kind = PlaceKind::kInter;
   bool accepted = false;
   std::string reason;                          // why it was refused
-  Rigid3 T_from_to;                            // bodies
+  Rigid3 T_from_to;                            // between the two body frames
   Matrix6d covariance = Matrix6d::Identity();  // (translation, rotation) in from's body frame
   int num_inliers = 0;
   double inlier_ratio = 0;
@@ -57,10 +58,10 @@ struct Constraint {
   }
 };
 
-// An agent's drift.
+// The drift of an agent's odometry: T_map_odom of one of its maps.
 struct Correction {
   MapId map;
-  int32_t seq = 0;  // newest keyframe of that map the solve knew
+  int32_t seq = 0;  // newest keyframe of that map in the optimisation
   MapId group;      // the map whose odom frame is the group's map frame
   int64_t revision = 0;
   Rigid3 T_map_odom;
@@ -73,7 +74,7 @@ struct KeyframePose {
   Rigid3 T_map_body;
 };
 
-// One group's optimised keyframe poses; cut into chunks only on the wire.
+// The optimised keyframe poses of one group. On the bus it is cut into several messages.
 struct MapState {
   MapId group;
   int64_t revision = 0;

@@ -18,7 +18,7 @@ std::vector<SeqGap> GapRequests::Due(const std::vector<SeqGap>& gaps, int64_t no
                  is_next_part ? 1 : asked.times + 1};
         due.push_back({gap.map, gap.from_seq, to_seq});
       }
-    } else if (gap.from_seq <= asked.to_seq) {  // answers come
+    } else if (gap.from_seq <= asked.to_seq) {  // a part of the answers has come
       asked = {gap.from_seq, asked.to_seq, now_utime + timeouts::kRequestInterval_us, 0};
     } else {
       asked = {gap.from_seq, kNothing, now_utime + timeouts::kGapWait_us, 0};

@@ -1,7 +1,7 @@
 #pragma once
 
-// When the gaps of numbered streams are asked for: after a moment in which they may close by
-// themselves, a part at a time; the next part once that has come.
+// Decides when the gaps of numbered streams are asked for. A gap is first given time to close by
+// itself. Then it is asked for in parts: each part once the part before it has come (timeouts.h).
 
 #include <cstdint>
 #include <map>
@@ -13,15 +13,16 @@ namespace pangea {
 
 class GapRequests {
  public:
-  // The parts to ask for now, of the first gap of each map.
+  // The parts to ask for now. `gaps`: the first gap of each map.
   std::vector<SeqGap> Due(const std::vector<SeqGap>& gaps, int64_t now_utime);
-  // The map's gap does not close by itself: it is asked for at once.
+  // The first gap of this map will not close by itself, so it is asked for at once.
   void Expect(const MapId& map);
-  // Requests for what the map lacks first, the one that is due among them.
+  // Number of requests so far for the first missing part of the map, with the one that Due
+  // returned.
   int Requests(const MapId& map) const;
 
  private:
-  static constexpr int32_t kNothing = -2;  // no seq, and before none
+  static constexpr int32_t kNothing = -2;  // no seq: neither one of a gap nor the one before it
 
   struct Asked {
     int32_t from_seq = kNothing;  // the first that is missing

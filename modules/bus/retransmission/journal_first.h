@@ -1,12 +1,12 @@
 #pragma once
 
-// A bus on which a server process that starts hears of the journal (JOURNAL_FILE, HAVE) before
-// anything else: what
-// others say meanwhile waits, in order. So a process that comes late knows that it does before the
-// first message that would mislead it, and learns the maps in the journal's order.
+// A bus that delivers the messages about the journal (JOURNAL_FILE, HAVE) first to a server process
+// that starts. All other messages wait, in order, until a HAVE came. So a process that starts late
+// knows this before the first other message, and learns the maps in the journal's order.
 //
-// Without a HAVE for kLongest_us nobody owns a journal here, and all that waits is delivered. At
-// most kMaxWaiting messages wait; later ones are dropped, as if the bus had lost them.
+// If no HAVE comes for kLongest_us, there is no journal here, and all waiting messages are
+// delivered. At most kMaxWaiting messages wait; later ones are dropped, as if the bus had lost
+// them.
 
 #include <cstdint>
 #include <deque>
@@ -21,7 +21,7 @@ namespace pangea {
 class JournalFirstBus : public Bus {
  public:
   static constexpr int64_t kLongest_us = 2'500'000;  // two HAVE intervals
-  static constexpr size_t kMaxWaiting = 2000;        // as a subscription of LcmBus
+  static constexpr size_t kMaxWaiting = 2000;        // the same as for a subscription of LcmBus
 
   // `now_utime`: wall clock.
   JournalFirstBus(Bus& bus, int64_t now_utime) : bus_(bus), begin_utime_(now_utime) {}
@@ -31,7 +31,8 @@ class JournalFirstBus : public Bus {
   bool MoreWaits() override { return bus_.MoreWaits(); }
   Undelivered undelivered() override { return bus_.undelivered(); }
   void WorkWhenIdle(const std::function<bool()>& piece) override { bus_.WorkWhenIdle(piece); }
-  // Delivers what waits if it is time to. Call it between the bus' messages.
+  // Delivers the waiting messages once a HAVE came or kLongest_us has passed. Call it between two
+  // messages of the bus.
   void Poll(int64_t now_utime);
 
  private:

@@ -57,7 +57,7 @@ void JournalFollower::OnKeyframe(Keyframe keyframe) {
 
 void JournalFollower::AddInOrder(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
-  // An edge that begins further back says that what lies between is lost for good.
+  // If the edge begins further back, the keyframes in between are lost for good.
   if (keyframe.edge && keyframe.edge->from_seq < id.seq - 1) {
     Lose({id.map, keyframe.edge->from_seq + 1, id.seq - 1});
   }
@@ -122,7 +122,7 @@ void JournalFollower::OnHave(const Have& have) {
     handlers_.have(have);
   }
   if (reading()) {
-    return;  // it comes again
+    return;  // a later HAVE will say the same
   }
   for (const auto& [map, highest_seq] : have.highest_seq) {
     if (named_.insert(map).second) {
@@ -140,7 +140,7 @@ void JournalFollower::OnHave(const Have& have) {
 }
 
 void JournalFollower::TakeNewMap(const MapId& map, int32_t highest_seq) {
-  // A map we know nothing of, yet the journal does: we are the one who came late.
+  // The journal has a map of which we have no keyframe: this process came late.
   if (keyframes_.next(map) == 0) {
     goal_[map] = highest_seq;
     keyframe_requests_.Expect(map);
@@ -178,7 +178,7 @@ void JournalFollower::Handled() {
   }
 }
 
-// Once: what comes later than the first of these comes over the bus.
+// Only the first JOURNAL_FILE counts; events journalled after it come over the bus.
 void JournalFollower::OnJournalFile(const JournalFile& file) {
   if (std::exchange(file_known_, true)) {
     return;
@@ -200,7 +200,7 @@ void JournalFollower::OnJournalFile(const JournalFile& file) {
   node_.WorkWhenIdle([this] { return ReadPiece(); });
 }
 
-// Whether some of the file is left.
+// Returns whether some of the file is left.
 bool JournalFollower::ReadPiece() {
   const auto take_of_former_runs = [this](const std::string& channel, Bytes data, int64_t) {
     TakeOfFormerRuns(channel, data);
@@ -250,7 +250,7 @@ void JournalFollower::TakeOfFormerRuns(const std::string& channel, Bytes data) {
   }
 }
 
-// Whether it may be part of a checkpoint, where one is made.
+// Returns whether the event was taken. Not if a checkpoint is being made and must end before it.
 bool JournalFollower::TakeOfFile(const std::string& channel, Bytes data, int64_t offset) {
   bool taken = true;
   if (channel.starts_with(channels::kKeyframePrefix)) {
@@ -281,12 +281,12 @@ bool JournalFollower::TakeOfFile(const std::string& channel, Bytes data, int64_t
 
 void JournalFollower::NoteStates(const std::vector<MapId>& maps) {
   states_.Note(maps);
-  if (reading()) {  // the pose graph is faster than we are
+  if (reading()) {  // the pose graph was faster than this process
     early_states_.insert(maps.begin(), maps.end());
   }
 }
 
-// Known from the file: all of it, and its results; but not where it is in the fused map.
+// The file has the map's keyframes and results, but not its place in the fused map.
 void JournalFollower::NoteMapOfFile(const MapId& map) {
   if (named_.insert(map).second && follows_.states && !stopped_ && !early_states_.contains(map)) {
     states_.Announce(map);
@@ -365,7 +365,7 @@ void JournalFollower::AskForKeyframes(int64_t now_utime) {
       Handled();
       continue;
     }
-    // Matches first, so that they are here when the keyframes come.
+    // Ask for the matches first, so that they are here when the keyframes come.
     if (follows_.matches == Which::kOfFormerRuns && catching_up()) {
       RequestRetransmission(node_, std::string(channels::kPlaceMatch), gap);
     }

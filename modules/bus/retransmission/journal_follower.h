@@ -1,32 +1,33 @@
 #pragma once
 
-// What a server process needs to follow the journal: keyframes, PLACE_MATCHes, verification results
-// and edits of anchors reach it once they come, whether they were published, retransmitted, or
-// written before it started. In: KEYFRAME_*, PLACE_MATCH, CONSTRAINT, ANCHOR_EDIT, HAVE,
-// JOURNAL_FILE, AGAIN_<process>. Out: RESEND_REQUEST at ticks, for what a gap or HAVE tells of;
-// once per map for the results of former runs; and for the states of maps that were there before
-// this process. The time-outs: timeouts.h.
+// Lets a server process follow the journal: it gets keyframes, PLACE_MATCHes, verification results
+// and edits of anchors, whether they are published, retransmitted, or were written before the
+// process started. In: KEYFRAME_*, PLACE_MATCH, CONSTRAINT, ANCHOR_EDIT, HAVE, JOURNAL_FILE,
+// AGAIN_<process>. Out: RESEND_REQUEST, for messages that a gap or HAVE shows to be missing, for
+// the results of former runs (once per map), and for the states of maps that are older than this
+// process. timeouts.h has the time-outs.
 //
-// The journal's file, where there is one on this host (journal_reader.h), is read when JOURNAL_FILE
-// first tells of it: first all that a process made itself in former runs, then the rest, in the
-// journal's order. Meanwhile nothing is asked for; what the file did not have is asked for after.
-// It is read in pieces when no message waits (Bus::WorkWhenIdle); until then the process has no
-// such work of its own (`reading`).
+// File: if the journal's file is on this host (journal_reader.h), the first JOURNAL_FILE starts
+// reading it. First come the process' own results of former runs, then the rest in the journal's
+// order. Nothing is asked for until the end of the file. The file is read in pieces while no
+// message waits (Bus::WorkWhenIdle); while `reading`, the process must give no such work itself.
 //
-// A checkpoint (checkpoint/checkpoint_file.h) is what the process and its follower are when they
-// have read the file up to some point, and nothing else: whoever restores it and reads the rest is
-// where whoever read all of the file is. So none is made of a process at work: one that `writes`
-// reads the file, makes the checkpoint and is done. It reads up to the first event that `completes`
-// says no to. A checkpoint that cannot be used is told in one line, and all of the file is read.
+// Checkpoint (checkpoint/checkpoint_file.h): the state of the process and its follower when they
+// have read the file up to some point, and nothing else. Restoring it and reading the rest gives
+// the same state as reading all of the file. So a running process never makes one: a process
+// started with `writes` reads the file, makes the checkpoint and ends. It reads up to the first
+// event that keyframe_is_complete or match_is_complete refuses. If a checkpoint cannot be used, one
+// line of the log says so, and all of the file is read.
 //
-// In order: keyframes come in seq order, map by map. Those that are lost (an edge or HAVE says so)
-// are passed over and counted as dropped; with `gives_up` also those that nobody sends.
+// Order: with `in_order`, keyframes of a map come in seq order. Lost keyframes (an edge or HAVE
+// says so) are skipped and counted as dropped; with `gives_up` also those that nobody sends.
 //
-// A process is catching up while it reads the file, and while keyframes and matches are missing
-// that the journal had of a map when this process knew nothing of it; for these not for longer than
-// kCatchUpSilence_us without progress.
-// When it first is not, the status says so: counter `ready_utime`, wall clock.
-// Bounds: ReorderBuffer's. One thread; lives as long as its node.
+// Catching up: a process catches up while it reads the file, while states are missing, and while
+// keyframes or matches are missing that the journal already had when the process learnt of their
+// map. The latter ends after kCatchUpSilence_us without progress. When the process is first done,
+// its status gets the counter `ready_utime` (wall clock).
+//
+// Memory is bounded by ReorderBuffer. Used on one thread; `node` must outlive it.
 
 #include <cstdint>
 #include <filesystem>
@@ -51,59 +52,60 @@
 
 namespace pangea {
 
-// Where a process has its checkpoint.
+// The place and mode of a process' checkpoint.
 struct CheckpointPlace {
-  std::filesystem::path file;  // empty: nowhere
-  std::string options;         // that the process' state depends on
-  bool writes = false;         // is here to write it
+  std::filesystem::path file;  // empty: no checkpoint
+  std::string options;         // the options on which the process' state depends
+  bool writes = false;         // the process was started only to write the checkpoint
 };
 
-// What a process keeps in a checkpoint.
+// How a process saves its state to a checkpoint, and restores it.
 struct JournalCheckpoint {
   CheckpointPlace place;
-  uint32_t format = 0;                            // of what `save` writes
-  std::function<void(ByteWriter*)> save = {};     // after reading the file, so much of it
-  std::function<bool(ByteReader*)> restore = {};  // all of that or nothing
-  // Whether the process has what it makes of this keyframe or match itself.
+  uint32_t format = 0;                            // version of the format that `save` writes
+  std::function<void(ByteWriter*)> save = {};     // saves the state after reading the file
+  std::function<bool(ByteReader*)> restore = {};  // false: the state is unchanged
+  // Whether the file has the process' own results of this keyframe or match. Null: always.
   std::function<bool(const KeyframeId&)> keyframe_is_complete = {};
   std::function<bool(const PlaceMatch&)> match_is_complete = {};
 };
 
 class JournalFollower {
  public:
-  // Of former runs: the process makes them itself, and is to know what it said before.
+  // Which messages of a kind the process gets. kOfFormerRuns is for messages that the process
+  // itself publishes: it gets those of its former runs.
   enum class Which : uint8_t { kNone, kOfFormerRuns, kAll };
 
   struct Follows {
-    bool in_order = false;  // keyframes
-    bool gives_up = false;  // keyframes that nobody sends, of those in order
+    bool in_order = false;  // keyframes come in seq order
+    bool gives_up = false;  // with in_order: skip keyframes that nobody sends
     Which matches = Which::kNone;
     Which results = Which::kNone;
-    bool states = false;  // the process says by NoteStates which came
+    bool states = false;  // ask for MAP_STATEs; the process calls NoteStates for each that comes
   };
 
-  // Those that are empty are not called.
+  // Empty handlers are not called.
   struct Handlers {
     std::function<void(Keyframe)> keyframe = {};
-    // One came, also where it waits for those before it.
+    // A keyframe arrived; it may still wait for those before it.
     std::function<void(const KeyframeId&)> keyframe_came = {};
-    // Whether it was taken; if not, it is asked for again.
+    // Returns whether the process took the match. If not, the match is asked for again.
     std::function<bool(PlaceMatch)> match = {};
     std::function<void(const Constraint&)> result = {};
-    std::function<void(const Have&)> have = {};  // before what follows from it
+    std::function<void(const Have&)> have = {};  // called before the follower uses the HAVE
     std::function<void(AnchorEdit)> anchor_edit = {};
-    // What else of the journal is still to come, in a catch-up.
+    // In a catch-up: how many more items of the journal the process itself still waits for.
     std::function<int64_t()> more_to_catch_up = {};
-    std::function<void()> handled = {};  // after each message
+    std::function<void()> handled = {};  // called after each message
   };
 
-  // `records`: where the process has the records of keyframes, which those of the file need not;
-  // may be null.
+  // `records`: the process' store of keyframe records; may be null. It gets the file, so that it
+  // need not store the file's keyframes again.
   JournalFollower(Node& node, const Follows& follows, Handlers handlers,
                   JournalCheckpoint checkpoint = {},
                   std::shared_ptr<JournalRecords> records = nullptr);
 
-  // At about 10 Hz. `ask_for_matches`: not while the process has no room for them.
+  // Call it at about 10 Hz. `ask_for_matches`: false while the process has no room for matches.
   void Tick(int64_t now_utime, bool ask_for_matches = true);
   void NoteStates(const std::vector<MapId>& maps);
 
@@ -111,25 +113,26 @@ class JournalFollower {
     return (reading() && !stopped_) || !goal_.empty() || !states_.empty();
   }
   bool reading() const { return reader_ != nullptr; }
-  // Keyframes (of the file about how many), maps' matches and what the process has to add.
+  // How much is still missing in a catch-up: keyframes (an estimate for the file), maps that lack
+  // matches, and what more_to_catch_up adds.
   int64_t num_to_catch_up() const;
-  // The process goes on with what it has; what the file still has comes nevertheless.
+  // Ends the catch-up: the process works with what it has. The rest of the file is still read.
   void StopCatchingUp();
 
-  // The map's first seq that did not come.
+  // The first seq of the map that is still missing.
   int32_t next(const MapId& map) const { return keyframes_.next(map); }
   bool HasMatch(const KeyframeId& query) const { return matches_.Has(query.map, query.seq); }
-  // Up to what seq the journal had the map, in a catch-up.
+  // In a catch-up: the highest seq that the journal had of the map when the process learnt of it.
   std::optional<int32_t> Goal(const MapId& map) const;
-  // Keyframes that wait for those before them.
+  // Number of keyframes that wait for those before them.
   size_t num_buffered() const { return keyframes_.num_buffered(); }
 
  private:
   struct Waiting {
     Keyframe keyframe;
-    std::optional<int64_t> event;  // of the file
+    std::optional<int64_t> event;  // offset in the file, if it came from there
   };
-  // Nothing: a seq that will never come, or that was handed on out of order.
+  // Without value: this seq will never come, or was already handed on out of order.
   using Item = std::optional<Waiting>;
 
   void OnKeyframe(Keyframe keyframe);
@@ -148,7 +151,7 @@ class JournalFollower {
   bool RestoreFollower(ByteReader* reader);
   void WriteCheckpoint();
   void SaveFollower(ByteWriter* writer) const;
-  // If the bytes are such a message and the process takes it.
+  // Calls the handler if the bytes are a valid message of this type.
   template <typename Message, typename Handler>
   void TakeBytes(Bytes data, const Handler& handler);
   void NoteMapOfFile(const MapId& map);
@@ -173,20 +176,20 @@ class JournalFollower {
   GapRequests keyframe_requests_;
   MissingMessages matches_;
   MissingStates states_;
-  std::set<MapId> named_;         // maps that HAVE or the file told of
-  std::set<MapId> early_states_;  // that came before the file's keyframes of these maps
-  // What the journal had of each map when this process came, until that is in.
+  std::set<MapId> named_;         // maps known from HAVE or the file
+  std::set<MapId> early_states_;  // maps whose states came while the file was read
+  // Highest seq that the journal had of each map when this process learnt of it; until all came.
   std::map<MapId, int32_t> goal_;
   int64_t num_to_catch_up_ = 0;
-  int64_t progress_utime_ = 0;             // when that fell last
-  std::unique_ptr<JournalReader> reader_;  // while the file is read
-  bool reads_former_runs_ = false;         // so far
-  std::optional<int64_t> event_;           // of the file, that is being taken
-  JournalState checkpoint_journal_;        // what of the file the checkpoint has
+  int64_t progress_utime_ = 0;             // when num_to_catch_up_ last fell
+  std::unique_ptr<JournalReader> reader_;  // null unless the file is being read
+  bool reads_former_runs_ = false;         // the first of the two passes over the file
+  std::optional<int64_t> event_;           // offset of the file's event that is being handled
+  JournalState checkpoint_journal_;        // state of the journal in the restored checkpoint
   bool file_known_ = false;
   bool stopped_ = false;
   bool have_received_ = false;
-  bool ready_ = false;  // once, at least
+  bool ready_ = false;  // ready_utime is set
 };
 
 }  // namespace pangea

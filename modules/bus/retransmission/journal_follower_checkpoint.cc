@@ -1,4 +1,4 @@
-// How a follower keeps what it made of the journal's file, and has it again.
+// Saving the state of a JournalFollower to a checkpoint, and restoring it.
 
 #include <fmt/format.h>
 
@@ -10,7 +10,8 @@
 
 namespace pangea {
 
-// One behind a gap waits for what may still come: what is kept ends before it.
+// Whether the keyframe may be part of a checkpoint. A keyframe behind a gap may not, because it
+// waits for keyframes that may still come.
 bool JournalFollower::MayBeKept(const Keyframe& keyframe) const {
   const int32_t next = keyframes_.next(keyframe.id.map);
   if (keyframe.id.seq < next) {
@@ -29,7 +30,7 @@ void JournalFollower::RestoreCheckpoint() {
     knows_keyframes |= next > 0 || !waiting.empty();
   });
   if (file.empty() || knows_keyframes || !std::filesystem::exists(file)) {
-    return;  // it would replace what the process has
+    return;  // there is none, or it would replace keyframes that the process already has
   }
   try {
     CheckpointReader reader(file, {node_.name(), checkpoint_.format, checkpoint_.place.options});

@@ -16,7 +16,7 @@ namespace pangea {
 namespace {
 
 int Open(const std::string& path) {
-  // No pipe makes it wait.
+  // With O_NONBLOCK, opening a named pipe does not wait.
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) {
     throw std::runtime_error(std::strerror(errno));
@@ -24,7 +24,7 @@ int Open(const std::string& path) {
   return fd;
 }
 
-// Of the event there, which ends at `end` or before; nothing if there is none.
+// Checksum of the event at `offset`, which ends at `end` or before; nothing if there is no event.
 std::optional<uint32_t> ChecksumAt(int fd, int64_t offset, int64_t end) {
   LogScan scan(fd, offset, end);
   const auto piece = scan.Next();

@@ -1,8 +1,8 @@
 #pragma once
 
-// The journal's events from its file, for a process on the agent_handler's host. The file is only
-// read: what is appended meanwhile, and what another program does to it, is no concern of what was
-// said to be in it. Its owner has checked each event's checksum when it opened it.
+// Reads the journal's events from its file, for a process on the agent_handler's host. It reads
+// only the part that JOURNAL_FILE told of; what is appended later comes over the bus. The
+// agent_handler checked each event's checksum when it opened the file.
 
 #include <cstdint>
 #include <functional>
@@ -15,32 +15,33 @@ namespace pangea {
 
 class JournalReader {
  public:
-  // Throws std::runtime_error that says why it cannot be read: it is not here, no file, or
-  // another journal.
+  // Throws std::runtime_error with the reason when the file cannot be read, is not a regular file,
+  // or is another journal.
   explicit JournalReader(const JournalFile& file);
   ~JournalReader();
   JournalReader(const JournalReader&) = delete;
   JournalReader& operator=(const JournalReader&) = delete;
 
-  // Reads only what comes after this state of the journal, which position() gave. Throws
-  // std::runtime_error when this journal was never in that state.
+  // Start reading behind `state`, which an earlier position() returned. Throws std::runtime_error
+  // when this journal was never in that state.
   void StartBehind(const JournalState& state);
 
-  // Whether it is taken; if not, it is what comes next.
+  // Returns whether it takes the event. If not, reading ends before this event.
   using Handler = std::function<bool(const std::string& channel, Bytes data, int64_t offset)>;
-  // The events of the next kPieceBytes or so; false when there are none left, or one is not taken.
-  // Throws std::runtime_error when the disk refuses.
+  // Gives the events of about the next kPieceBytes to the handler. False when no event is left or
+  // one was not taken. Throws std::runtime_error when the disk cannot be read.
   bool Next(const Handler& handler);
+  // Starts again at the beginning, or behind the state that StartBehind was given.
   void Rewind();
 
   int64_t bytes_left() const { return state_.num_bytes - at_; }
-  // The state of the journal when it had no more than was read. Throws as Next.
+  // The state of the journal when it ended with the last event read. Throws as Next does.
   JournalState position() const;
 
  private:
   static constexpr int64_t kPieceBytes = 250'000;
 
-  // Throws std::runtime_error if there is another event at its end.
+  // Throws std::runtime_error unless the file has the last event of `state` where `state` says.
   void Check(const JournalState& state) const;
 
   int fd_ = -1;
@@ -51,9 +52,9 @@ class JournalReader {
   int64_t last_event_offset_ = -1;  // before at_
 };
 
-// The state of a journal that nobody may be writing: up to its last whole event. The part up to
-// `known`, a state that it may have been in, is not read. Throws std::runtime_error when it cannot
-// be read.
+// The state of a journal's file up to its last whole event, which works without an agent_handler.
+// If the journal was once in the state `known`, it is read only from there on. Throws
+// std::runtime_error when it cannot be read.
 JournalState ReadJournalState(const std::string& path, const JournalState& known);
 
 }  // namespace pangea

@@ -16,7 +16,7 @@
 namespace pangea {
 namespace {
 
-// The data of the event there; empty if there is none.
+// The data of the event at `offset`; empty if there is no event.
 std::vector<uint8_t> ReadEventData(int fd, int64_t offset) {
   std::vector<uint8_t> bytes(LogEventHeader::kBytes);
   if (!ReadFully(fd, offset, bytes.data(), bytes.size())) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// A RecordStore in front of another one: the record of a keyframe that comes from the journal's
-// file is not written a second time, but made anew of its event there when it is read. So it also
-// stands in a checkpoint by its place alone. What comes over the bus goes to the other store.
+// A RecordStore in front of another one. A keyframe from the journal's file is not stored a second
+// time: its record is made again from the event in the file whenever it is read. So a checkpoint
+// needs only the event's offset. Records of keyframes from the bus go to the other store.
 
 #include <cstdint>
 #include <functional>
@@ -19,19 +19,21 @@ namespace pangea {
 
 class JournalRecords : public RecordStore {
  public:
-  // The process' record of a keyframe.
+  // Makes the process' record of a keyframe.
   using Encoder = std::function<std::vector<uint8_t>(const Keyframe&)>;
 
-  // `others` may be null: what comes over the bus finds no room then.
+  // `others` may be null; then keyframes from the bus find no room.
   JournalRecords(std::shared_ptr<RecordStore> others, Encoder encoder)
       : others_(std::move(others)), encoder_(std::move(encoder)) {}
   ~JournalRecords() override;
   JournalRecords(const JournalRecords&) = delete;
   JournalRecords& operator=(const JournalRecords&) = delete;
 
-  // The journal's file: as it is now, also if another one gets its name. Throws std::runtime_error.
+  // Opens the journal's file and keeps it open, even if another file gets its name. Throws
+  // std::runtime_error when it cannot be opened.
   void Open(const std::string& path);
-  // What is appended from now on is of the keyframe of this event of the file; nothing: it is not.
+  // Offset of the event from which the next appended records come; nothing: they are not from the
+  // file.
   void SetEvent(std::optional<int64_t> offset) { event_ = offset; }
 
   std::optional<int64_t> Append(std::span<const uint8_t> record) override;
@@ -39,7 +41,7 @@ class JournalRecords : public RecordStore {
   std::string problem() const override;
 
  private:
-  // An offset from here on is one in the journal.
+  // Offsets of records from here on are kJournal + the event's offset in the journal's file.
   static constexpr int64_t kJournal = int64_t{1} << 62;
 
   std::shared_ptr<RecordStore> others_;

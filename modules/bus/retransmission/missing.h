@@ -1,6 +1,6 @@
 #pragma once
 
-// What a process does about messages that did not come: it asks for them again.
+// Asking for messages that did not come, and answering such requests.
 
 #include <cstdint>
 #include <map>
@@ -17,17 +17,19 @@
 
 namespace pangea {
 
-// RESEND_REQUEST for the gap's messages of a channel; the answers come on AGAIN_<node's name>.
+// Publishes RESEND_REQUEST for the messages of a channel in the gap. The answers come on
+// AGAIN_<node's name>.
 void RequestRetransmission(Node& node, const std::string& channel, const SeqGap& gap);
-// The same for all the messages from a map's first keyframe to its `highest_seq`th, in several
-// requests; for small messages.
+// The same for all messages of a map with seq 0 to `highest_seq`, in several requests. Only for
+// small messages.
 void RequestAllRetransmissions(Node& node, const std::string& channel, const MapId& map,
                                int32_t highest_seq);
 
-// VERDICT_REQUEST for the verification results of these names (at most ResultNames::kMax).
+// Publishes VERDICT_REQUEST for the named verification results (at most ResultNames::kMax).
 void RequestResults(Node& node, const ResultNames& names);
 
-// The answer to such a request.
+// Answers a RESEND_REQUEST or VERDICT_REQUEST: sends `message`, which belongs on `channel`, to the
+// requester.
 template <typename Message>
 void Retransmit(Node& node, const std::string& requester, const std::string& channel,
                 const Message& message) {
@@ -38,8 +40,8 @@ void Retransmit(Node& node, const std::string& requester, const std::string& cha
   node.Publish(channels::Again(requester), again);
 }
 
-// Gives what an answer holds to `handler`, as Node::Listen would, if it is such a message (LCM's
-// fingerprint tells); whether it is.
+// If the answer contains a `Message` (LCM's fingerprint tells), handles it as Node::Listen would.
+// Returns whether it does.
 template <typename Message, typename Handler>
 bool TakeRetransmission(Node& node, const again_t& again, const Handler& handler) {
   Message message{};
@@ -49,17 +51,18 @@ bool TakeRetransmission(Node& node, const again_t& again, const Handler& handler
   }
   return is_one;
 }
-// MAP_STATE of the map's group again, to all, with the corrections of its maps.
+// Asks the pose graph to publish the MAP_STATE of the map's group again, and the corrections of its
+// maps. All processes get them.
 void AskForState(Node& node, const MapId& map);
 
-// Which messages of each map are missing, of a stream whose order does not matter.
+// Which messages of each map are missing, for a stream in which the order does not matter.
 class MissingMessages {
  public:
   void Note(const MapId& map, int32_t seq) { stream_.Add(map, seq, {}); }
-  // What exists, and what nobody has any more.
+  // Takes from HAVE which messages exist, and which are lost.
   void Announce(const Have& have);
   bool Has(const MapId& map, int32_t seq) const { return stream_.Has(map, seq); }
-  // Up to the map's `highest_seq`.
+  // Whether a message of the map up to `highest_seq` is missing.
   bool Lacks(const MapId& map, int32_t highest_seq) const {
     return stream_.next(map) <= highest_seq;
   }
@@ -67,7 +70,7 @@ class MissingMessages {
   void Restore(const MapId& map, int32_t next, const std::vector<int32_t>& waiting) {
     stream_.Restore(map, next, waiting);
   }
-  // What is to be asked for now (gap_requests.h).
+  // The gaps to ask for now (gap_requests.h).
   std::vector<SeqGap> Due(int64_t now_utime) { return requests_.Due(stream_.Gaps(), now_utime); }
 
  private:
@@ -75,23 +78,23 @@ class MissingMessages {
   GapRequests requests_;
 };
 
-// Which of the maps that were there before this process no MAP_STATE has named since: whoever comes
-// late asks the pose graph for them, and it says them again to all. Bound: kMaxAsked maps are asked
-// for at once, each at most kMaxStateRequests times (a pose graph that comes later says its states
-// itself).
+// The maps that are older than this process and that no MAP_STATE has named since it started. A
+// process that starts late asks the pose graph for them. At most kMaxAsked maps are asked for at
+// once, and each at most kMaxStateRequests times; a pose graph that starts later publishes its
+// states without being asked.
 class MissingStates {
  public:
   void Announce(const MapId& map) { times_asked_.try_emplace(map, 0); }
   void Note(const std::vector<MapId>& maps);
   std::vector<MapId> Due(int64_t now_utime);
-  // None is missing, or none that anybody would still be asked for.
+  // No state is missing, or all were asked for often enough.
   bool empty() const { return times_asked_.empty(); }
   void Forget() { times_asked_.clear(); }
 
  private:
   static constexpr size_t kMaxAsked = 20;
 
-  std::map<MapId, int> times_asked_;  // of those that are missing
+  std::map<MapId, int> times_asked_;  // only of maps whose state is missing
   int64_t next_utime_ = 0;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The waiting of a process that plays something recorded onto an agent's bus: until it is time for
-// the next item, or until the server keeps up; the bus is served meanwhile.
+// Lets a process that plays a recording onto an agent's bus wait: until the next item is due, or
+// until the server has caught up. Meanwhile it handles messages and ticks.
 
 #include <cstdint>
 
@@ -14,20 +14,22 @@ class PlaybackPace {
  public:
   static constexpr int64_t kMaxAhead = 30;  // unacknowledged keyframes
   static constexpr int64_t kUplinkSilence_us = 5'000'000;
-  // An uplink that is there but makes no progress for this long has no server behind it, and an
-  // agent does not wait for a server.
+  // If the uplink runs but makes no progress for this long, it reaches no server; an agent does not
+  // wait for one.
   static constexpr int64_t kNoProgress_us = 20'000'000;
 
-  // `bus` may be null: nothing to listen to.
+  // `bus` may be null; then no messages are handled.
   PlaybackPace(LcmBus* bus, Process& process, const ReliableKeyframePublisher& publisher)
       : bus_(bus), process_(process), publisher_(publisher) {}
 
-  // Handles what has arrived, waiting for the first message at most `timeout_ms`.
+  // Handles the messages that have arrived. Waits for the first one at most `timeout_ms`.
   void Serve(int timeout_ms);
   void WaitUntil(int64_t wall_utime);
-  // While there is an uplink that makes progress: until no more than kMaxAhead are unacknowledged.
+  // Waits until at most kMaxAhead keyframes are unacknowledged, but only while there is an uplink
+  // that makes progress.
   void WaitForAcknowledgements();
-  // Until every keyframe is acknowledged, or nobody will.
+  // Waits until every keyframe is acknowledged, at most 20 s; at most 1 s if no uplink was ever
+  // seen.
   void WaitAtTheEnd();
 
  private:

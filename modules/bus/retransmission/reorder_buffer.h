@@ -1,8 +1,8 @@
 #pragma once
 
-// Puts one numbered stream per map back in order, drops repeats, and knows what is missing.
-// Bounded: at most kMaxBuffered items wait per map; beyond that the newest are dropped (they will
-// be asked for again).
+// Puts the numbered items of each map in order, drops repeats, and knows which are missing. At most
+// kMaxBuffered items per map wait for earlier ones; beyond that, new ones are dropped, and will be
+// asked for again.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@ class ReorderBuffer {
  public:
   static constexpr size_t kMaxBuffered = 1000;
 
-  // The items that are now in order (empty for a repeat or an item after a gap).
+  // Adds an item and returns the items that are now in order: none for a repeat or behind a gap.
   std::vector<T> Add(const MapId& map, int32_t seq, T item) {
     Stream& stream = streams_[map];
     std::vector<T> ready;
@@ -35,8 +35,8 @@ class ReorderBuffer {
     return ready;
   }
 
-  // Nobody has these any more (the gaps in HAVE): the stream goes on after them. The items that are
-  // now in order.
+  // These items are lost: nobody has them any more (HAVE names such gaps). The stream goes on
+  // behind them. Returns the items that are now in order.
   std::vector<T> Skip(const SeqGap& gap) {
     Stream& stream = streams_[gap.map];
     std::vector<T> ready;
@@ -48,7 +48,7 @@ class ReorderBuffer {
     return ready;
   }
 
-  // Somebody says this much exists (HAVE), so that a lost tail shows.
+  // Items up to `highest_seq` exist, as HAVE says. So also lost items at the end are known missing.
   void Announce(const MapId& map, int32_t highest_seq) {
     Stream& stream = streams_[map];
     stream.highest = std::max(stream.highest, highest_seq);
@@ -67,7 +67,7 @@ class ReorderBuffer {
     return gaps;
   }
 
-  // Whether it came already, or nobody has it any more.
+  // Whether the item came already or is lost.
   bool Has(const MapId& map, int32_t seq) const {
     const auto it = streams_.find(map);
     return it != streams_.end() && (seq < it->second.next || it->second.buffered.contains(seq));
@@ -84,7 +84,7 @@ class ReorderBuffer {
     return count;
   }
 
-  // visit(map, next, the seqs that wait behind a gap) for each map.
+  // Calls visit(map, next seq, seqs that wait behind a gap) for each map.
   template <typename Visit>
   void VisitStreams(Visit visit) const {
     for (const auto& [map, stream] : streams_) {
@@ -95,7 +95,7 @@ class ReorderBuffer {
       visit(map, stream.next, waiting);
     }
   }
-  // As it was visited, of items that have no value of their own.
+  // Restores a stream as VisitStreams gave it. The waiting items get the value T{}.
   void Restore(const MapId& map, int32_t next, const std::vector<int32_t>& waiting) {
     Stream& stream = streams_[map];
     stream.next = next;

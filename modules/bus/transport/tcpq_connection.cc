@@ -29,7 +29,7 @@ constexpr uint32_t kPublish = 1;
 constexpr uint32_t kSubscribe = 2;
 constexpr size_t kMaxChannel = 255;
 constexpr size_t kReadBytes = 1 << 16;
-// A relay whose host has vanished, or that takes nothing for so long, is left.
+// The connection is closed when the relay has not acknowledged sent bytes for this time.
 constexpr unsigned kUnansweredTimeout_ms = 10'000;
 
 sockaddr_in Resolve(const std::string& url) {
@@ -142,7 +142,7 @@ void TcpqConnection::Disconnect(const char* why) {
   fd_ = -1;
   state_ = State::kAway;
   unsent_.clear();
-  taken_ = received_.size();  // kept: a handler may be reading it
+  taken_ = received_.size();  // the bytes are kept, because a handler may be reading them
 }
 
 int TcpqConnection::fd() {
@@ -242,7 +242,7 @@ std::optional<TcpqConnection::Frame> TcpqConnection::FirstFrame() {
       {name.begin(), name.end()}, rest.subspan(data_at, data_bytes), taken_ + data_at + data_bytes};
 }
 
-// The mutex is held but while a handler runs: it may publish.
+// The mutex is not held while a handler runs, because a handler may publish.
 bool TcpqConnection::DeliverOne() {
   std::unique_lock<std::mutex> lock(mutex_);
   const std::optional<Frame> frame = FirstFrame();

@@ -1,12 +1,13 @@
 #pragma once
 
-// A connection to LCM's TCP relay (tcpq://host:port; `java -cp lcm.jar lcm.lcm.TCPService PORT`)
-// that never blocks and never gives up: for networks without multicast. LCM's own waits for ever in
-// a read or write when the relay is stopped, and aborts when it is gone; so the protocol, three
-// kinds of message, is spoken here.
+// A connection to LCM's TCP relay (tcpq://host:port; `java -cp lcm.jar lcm.lcm.TCPService PORT`),
+// for networks without multicast. It never blocks, and reconnects for ever. LCM's own client hangs
+// in a read or write when the relay is stopped, and aborts when it is gone. So this class
+// implements the protocol, which has three kinds of message.
 //
-// What is published while there is no relay, or more than kMaxUnsent bytes behind it, is dropped,
-// as multicast would; who needs it requests it. One thread, but Publish from any.
+// A message is dropped if there is no relay, or if more than kMaxUnsent bytes are unsent. This is
+// as on multicast: whoever needs the message asks for it again. Publish may be called by any
+// thread, all else by one thread.
 
 #include <netinet/in.h>
 
@@ -24,15 +25,15 @@ namespace pangea {
 class TcpqConnection {
  public:
   static constexpr size_t kMaxUnsent = 4 << 20;
-  static constexpr size_t kMaxMessage = 1 << 20;  // a larger one is no message of ours
+  static constexpr size_t kMaxMessage = 1 << 20;  // bytes; we have no larger messages
   static constexpr int64_t kRetry_us = 500'000;
-  // A relay that does not answer for so long is complained of: in one line, on stderr, and in
-  // another one when it is there.
+  // When the relay has not answered for this time, one line on stderr says so, and another one when
+  // it answers again.
   static constexpr int64_t kPatience_us = 2'000'000;
-  // A connection that is not made in this time is tried anew; the kernel would wait ever longer.
+  // A connection attempt that takes longer is started anew; the kernel would wait ever longer.
   static constexpr int64_t kConnecting_us = 5'000'000;
 
-  // Throws std::runtime_error if the address makes no sense. The relay need not be there yet.
+  // Throws std::runtime_error if the URL's address cannot be resolved. The relay may start later.
   explicit TcpqConnection(const std::string& url);
   ~TcpqConnection();
   TcpqConnection(const TcpqConnection&) = delete;
@@ -40,16 +41,17 @@ class TcpqConnection {
 
   void Publish(const std::string& channel, Bytes data);
   void Subscribe(const std::string& channel_regex, Bus::Handler handler);
-  // Connects if need be and sends what waits; delivers one message, waiting for it at most so long.
+  // Delivers one message, for which it waits at most `timeout_ms`. While it waits, it connects if
+  // needed and sends unsent bytes. Returns whether a message was delivered.
   bool Handle(int timeout_ms);
-  // Whether Handle would deliver one at once.
+  // Whether Handle would deliver a message at once.
   bool MoreWaits();
   // -1 while there is no connection.
   int fd();
 
  private:
   enum class State : uint8_t { kAway, kConnecting, kConnected };
-  // Where the first whole message lies in received_.
+  // The first whole message in received_, and the index where it ends.
   struct Frame {
     std::string channel;
     Bytes data;
@@ -72,15 +74,15 @@ class TcpqConnection {
 
   const std::string url_;
   sockaddr_in address_{};
-  std::mutex mutex_;  // fd_, state_, unsent_
+  std::mutex mutex_;  // guards fd_, state_, unsent_
   int fd_ = -1;
   State state_ = State::kAway;
   int64_t tried_us_ = 0;
   std::vector<uint8_t> unsent_;
   std::vector<uint8_t> received_;
-  size_t taken_ = 0;  // of received_
+  size_t taken_ = 0;  // bytes of received_ that are already delivered
   bool greeted_ = false;
-  int64_t waits_since_us_ = 0;  // for a greeting
+  int64_t waits_since_us_ = 0;  // since when it waits for the relay's greeting
   std::string last_error_ = "no answer";
   bool complained_ = false;
   Subscriptions subscriptions_;

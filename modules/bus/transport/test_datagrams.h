@@ -1,6 +1,6 @@
 #pragma once
 
-// Raw datagrams on an LCM multicast bus, as anybody may send them. For tests.
+// For tests: sends raw datagrams to an LCM multicast bus, as any program could.
 
 #include <sys/socket.h>
 #include <unistd.h>
@@ -22,7 +22,7 @@ inline void Append(const std::string& text, Datagram* datagram) {
   datagram->insert(datagram->end(), text.begin(), text.end());
 }
 
-// `rest`: the channel, its 0 and the data.
+// `rest`: the channel, a 0 byte and the data.
 inline Datagram ShortDatagram(const std::string& rest) {
   Datagram datagram;
   PutBigEndian(kUdpmShortMagic, 4, &datagram);
@@ -39,7 +39,7 @@ struct FragmentHeader {
   uint16_t count = 0;
 };
 
-// `rest`: with number 0 the channel and its 0; the data.
+// `rest`: the data; in fragment number 0 the channel and a 0 byte come first.
 inline Datagram FragmentDatagram(const FragmentHeader& header, const std::string& rest) {
   Datagram datagram;
   PutBigEndian(kUdpmFragmentMagic, 4, &datagram);
@@ -52,7 +52,7 @@ inline Datagram FragmentDatagram(const FragmentHeader& header, const std::string
   return datagram;
 }
 
-// What LCM 1.3.1's own receiver writes or reads beyond its buffers for, and its neighbours.
+// Datagrams that make LCM 1.3.1's own receiver write or read beyond its buffers, and similar ones.
 inline std::vector<Datagram> MalformedDatagrams(const std::string& channel) {
   const std::string name = channel + std::string(1, '\0'), data(900, 'x');
   return {
@@ -68,7 +68,7 @@ inline std::vector<Datagram> MalformedDatagrams(const std::string& channel) {
       FragmentDatagram({18, 900, 0, 0, 2}, data),  // no channel
       FragmentDatagram({19, 900, 0, 0, 1}, channel),
       FragmentDatagram({20, 0, 0, 0, 1}, name),
-      ShortDatagram(channel),  // without its 0
+      ShortDatagram(channel),  // without the 0 byte
       ShortDatagram(std::string(64, 'A') + name),
       ShortDatagram(name.substr(channel.size()) + data),
       ShortDatagram(""),
@@ -104,8 +104,8 @@ class DatagramSender {
   sockaddr_in to_{};
 };
 
-// A multicast group and port of this run's own, which stays on this host; below the ports that the
-// kernel gives to sockets without one, as every LCM sender's is.
+// A random multicast group and port for this run; the messages stay on this host. The port is below
+// those that the kernel gives to unbound sockets, which LCM's senders use.
 inline std::string OwnBusUrl() {
   static std::random_device device;
   return "udpm://239." + std::to_string(192 + device() % 60) + "." +

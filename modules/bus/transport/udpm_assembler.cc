@@ -9,11 +9,11 @@ namespace {
 
 constexpr size_t kShortHeader = 8;
 constexpr size_t kFragmentHeader = 20;
-// What a piece and a partial message cost beside their bytes, at least.
+// Least memory of a piece and of an incomplete message, beside their data.
 constexpr size_t kPieceOverhead = 128;
 constexpr size_t kPartialOverhead = 256;
 
-// The largest message in as many pieces as there can be is not pushed out by itself.
+// Even the largest message, in the largest number of pieces, stays within the bound by itself.
 static_assert(UdpmAssembler::kMaxMessage + 65'535 * kPieceOverhead + kPartialOverhead <=
               UdpmAssembler::kMaxPartialBytes);
 
@@ -21,7 +21,7 @@ uint16_t HalfAt(Bytes bytes, size_t at) {
   return static_cast<uint16_t>(GetBigEndian(bytes.data() + at, 2));
 }
 
-// The channel that ends with a 0 within these bytes; empty if there is none.
+// The channel name at the beginning of the bytes, up to a 0 byte; empty if there is none.
 std::string ChannelIn(Bytes bytes) {
   const Bytes name = bytes.first(std::min(bytes.size(), UdpmAssembler::kMaxChannel + 1));
   const auto end = std::find(name.begin(), name.end(), 0);
@@ -93,7 +93,7 @@ std::optional<UdpmAssembler::Fragment> UdpmAssembler::ParseFragment(Bytes datagr
   return fragment;
 }
 
-// A sender that was started anew may use a number again.
+// Whether the fragment is of another message. A restarted sender may use a message number again.
 bool UdpmAssembler::Contradicts(const Partial& partial, const Fragment& fragment) {
   if (partial.message_bytes != fragment.message_bytes || partial.count != fragment.count) {
     return true;
@@ -105,7 +105,7 @@ bool UdpmAssembler::Contradicts(const Partial& partial, const Fragment& fragment
           (fragment.number == 0 && partial.channel != fragment.channel));
 }
 
-// Comes to stand last: it has waited shortest.
+// Finds or begins the incomplete message, and moves it to the end of the list.
 UdpmAssembler::Partials::iterator UdpmAssembler::PartialOf(const Key& key,
                                                            const Fragment& fragment) {
   const auto known = by_key_.find(key);
@@ -141,7 +141,7 @@ void UdpmAssembler::Add(const Fragment& fragment, Partial* partial) {
   partial_bytes_ += cost;
 }
 
-// All pieces are there; they must follow one another without a gap.
+// All pieces are there. They must follow one another without a gap or overlap.
 std::optional<UdpmAssembler::Message> UdpmAssembler::Join(const Partial& partial) {
   joined_.reserve(partial.received_bytes);
   for (const auto& [number, piece] : partial.pieces) {

@@ -1,14 +1,15 @@
 #pragma once
 
-// Messages out of the datagrams of an LCM multicast bus (udpm://), whoever sent them. LCM's own
-// reassembly (1.3.1) writes where a header tells it to; so the two kinds of datagram are read here:
+// Assembles messages from the datagrams of an LCM multicast bus (udpm://), which anybody may send.
+// LCM's own reassembly (1.3.1) writes to offsets that it did not check, so this class replaces it.
+// There are two kinds of datagram:
 //   short:    "LC02", number; channel, 0, data
 //   fragment: "LC03", number, bytes of the message, offset of this piece, number of the fragment,
 //             number of fragments; channel, 0 before the data of fragment 0
-// Numbers are big-endian: 32 bits, the fragment's two 16 bits.
+// Numbers are big-endian and have 32 bits; number and count of fragments have 16 bits.
 //
-// Every field is checked before it is used. A fragment takes the memory of what it brings, never of
-// what it announces. Knows no socket, thread or clock.
+// Every field is checked before it is used. A fragment takes as much memory as its own data,
+// whatever size its header announces. Knows no socket, thread or clock.
 
 #include <cstdint>
 #include <list>
@@ -24,29 +25,30 @@ namespace pangea {
 
 inline constexpr uint32_t kUdpmShortMagic = 0x4c433032;     // "LC02"
 inline constexpr uint32_t kUdpmFragmentMagic = 0x4c433033;  // "LC03"
-// What LCM still sends as a short message: a channel, its 0, and the data.
+// Largest size of a short message: channel, 0 byte and data. LCM fragments larger messages.
 inline constexpr size_t kMaxUdpmShortBytes = 65'499;
 
 class UdpmAssembler {
  public:
-  static constexpr size_t kMaxChannel = 63;  // LCM's
+  static constexpr size_t kMaxChannel = 63;  // bytes, LCM's limit
   static constexpr size_t kMaxMessage = 16 << 20;
-  // Of messages that lack fragments, of all senders together; beyond it the one goes that has
-  // waited longest for a fragment.
+  // Bounds on the incomplete messages of all senders together. Beyond them, the message that got no
+  // fragment for the longest time is dropped.
   static constexpr size_t kMaxPartials = 1000;
   static constexpr size_t kMaxPartialBytes = 32 << 20;
 
   struct Message {
     std::string channel;
-    Bytes data;  // lies in the datagram or the assembler: valid until the next Take
+    Bytes data;  // points into the datagram or the assembler: valid until the next Take
   };
 
-  // The message that the datagram is, or completes. `sender`: the same for the same socket.
+  // Returns the message that the datagram contains or completes, if any. `sender` identifies the
+  // socket of the sender.
   std::optional<Message> Take(Bytes datagram, uint64_t sender);
 
-  // What was refused, by reason.
+  // Number of refused datagrams and messages, by reason.
   const std::map<std::string, int64_t>& refused() const { return refused_; }
-  // Of messages that lack fragments.
+  // Number and memory of the incomplete messages.
   size_t partials() const { return partials_.size(); }
   size_t partial_bytes() const { return partial_bytes_; }
 
@@ -58,7 +60,7 @@ class UdpmAssembler {
     uint32_t offset = 0;
     uint16_t number = 0;
     uint16_t count = 0;
-    std::string channel;  // of fragment 0
+    std::string channel;  // only in fragment 0
     Bytes data;
   };
   struct Piece {
@@ -71,10 +73,10 @@ class UdpmAssembler {
     uint16_t count = 0;
     std::string channel;
     size_t received_bytes = 0;
-    size_t cost_bytes = 0;  // what it takes of kMaxPartialBytes
+    size_t cost_bytes = 0;  // its share of kMaxPartialBytes
     std::map<uint16_t, Piece> pieces;
   };
-  using Partials = std::list<Partial>;  // the one that waits longest first
+  using Partials = std::list<Partial>;  // the one without new fragment for the longest time first
 
   std::nullopt_t Refuse(const char* reason);
   std::optional<Message> TakeShort(Bytes datagram);

@@ -16,9 +16,9 @@ namespace pangea {
 namespace {
 
 constexpr size_t kMaxDatagram = 1 << 16;
-// Then it is looked whether to stop, however many more come.
+// After this many datagrams the thread checks whether to stop, even if more are waiting.
 constexpr int kAtOnce = 64;
-// What a message costs beside its bytes, about.
+// Approximate memory of a message, beside its data.
 constexpr size_t kMessageOverhead = 200;
 
 int EventFd() {
@@ -44,7 +44,7 @@ UdpmReceiver::~UdpmReceiver() {
   close(waits_fd_);
 }
 
-// Signals are for the thread that handles messages: it looks whether to stop.
+// The reader thread blocks all signals, so that they interrupt the thread that handles messages.
 void UdpmReceiver::Start() {
   socket_ = OpenUdpmSocket(address_, fragments_);
   sigset_t all, before;
@@ -80,7 +80,7 @@ void UdpmReceiver::ReadSome(std::vector<uint8_t>* buffer) {
     socklen_t from_size = sizeof(from);
     const ssize_t size = recvfrom(socket_, buffer->data(), buffer->size(), 0,
                                   reinterpret_cast<sockaddr*>(&from), &from_size);
-    if (size < 0) {  // none is left, or an error of one datagram, which recvfrom took away
+    if (size < 0) {  // no datagram is left, or one had an error, which recvfrom has cleared
       return;
     }
     const uint64_t sender = uint64_t{from.sin_addr.s_addr} << 16 | from.sin_port;
@@ -95,7 +95,7 @@ void UdpmReceiver::Take(Bytes datagram, uint64_t sender) {
   if (!message || !Enqueue(*message)) {
     return;
   }
-  lock.unlock();  // or who is woken would wait for it
+  lock.unlock();  // first, or the thread that is woken would wait for the mutex
   if (was_empty) {
     eventfd_write(waits_fd_, 1);
   }
@@ -138,7 +138,7 @@ void UdpmReceiver::ClearFd() const {
 bool UdpmReceiver::DeliverOne() {
   std::unique_lock<std::mutex> lock(mutex_);
   if (queue_.empty()) {
-    ClearFd();  // it was written late
+    ClearFd();  // the reader thread wrote it after the message was delivered
     return false;
   }
   const Message message = std::move(queue_.front());
@@ -151,7 +151,7 @@ bool UdpmReceiver::DeliverOne() {
     ClearFd();
   }
   lock.unlock();
-  // Only this thread adds subscriptions, and none is ever moved.
+  // Without the mutex: only this thread adds subscriptions, and they are never moved in memory.
   for (const size_t subscription : message.to) {
     subscriptions_.handler(subscription)(message.channel, message.data);
   }

@@ -1,15 +1,16 @@
 #pragma once
 
-// What comes over an LCM multicast bus (udpm://). A thread takes the datagrams from the socket as
-// they come, for the kernel keeps few (212 kB unless its administrator allows more) and a process
-// may solve for seconds; messages that somebody subscribed to wait here, and Handle delivers them
-// on the thread that calls it.
+// Receives the messages of an LCM multicast bus (udpm://). Its own thread takes the datagrams from
+// the socket at once, because the kernel buffers little (212 kB unless the administrator allows
+// more) and a process may compute for seconds. Messages with a subscription wait in a queue. Handle
+// delivers them on the thread that calls it.
 //
-// Bounds: a subscription has at most kMaxWaiting messages waiting, all together kMaxWaitingBytes;
-// beyond that the newest are dropped, and counted. What arrives is checked (udpm_assembler.h).
+// Bounds: at most kMaxWaiting messages wait per subscription, and kMaxWaitingBytes in all. Beyond
+// that, new messages are dropped and counted. Datagrams are checked (udpm_assembler.h).
 //
-// Threads: one mutex holds all that both threads touch: subscriptions, assembler, queue and counts.
-// It is not held while a handler runs or anybody waits. Subscribe and Handle are for one thread.
+// Threads: one mutex guards all that both threads use: subscriptions, assembler, queue and counts.
+// It is not held while a handler runs or a thread waits. Subscribe and Handle must be called by one
+// thread.
 
 #include <cstdint>
 #include <deque>
@@ -26,12 +27,12 @@ namespace pangea {
 
 class UdpmReceiver {
  public:
-  // As LCM's subscriptions were given. Keyframes are the largest (28 kB): 56 MB of them. What is
-  // lost beyond that is asked for again.
+  // Keyframes are the largest messages (28 kB), so kMaxWaiting of them take 56 MB. Messages dropped
+  // beyond that are asked for again.
   static constexpr size_t kMaxWaiting = 2000;
   static constexpr size_t kMaxWaitingBytes = 64 << 20;
 
-  // The socket is opened by the first Subscribe: who only publishes hears nothing.
+  // Opens no socket; the first Subscribe does. A process that only publishes needs none.
   UdpmReceiver(const UdpmAddress& address, LcmBus::Fragments fragments);
   ~UdpmReceiver();
   UdpmReceiver(const UdpmReceiver&) = delete;
@@ -39,10 +40,11 @@ class UdpmReceiver {
 
   // Throws std::system_error if the socket cannot be opened.
   void Subscribe(const std::string& channel_regex, Bus::Handler handler);
-  // Delivers one message, waiting for it at most so long; less if a signal comes.
+  // Delivers one message, for which it waits at most `timeout_ms`; a signal ends the wait. Returns
+  // whether a message was delivered.
   bool Handle(int timeout_ms);
   bool MoreWaits();
-  // Readable while a message waits; Handle makes it unreadable when none does.
+  // A file descriptor that is readable while messages wait.
   int fd() const { return waits_fd_; }
   Bus::Undelivered undelivered();
 
@@ -50,7 +52,7 @@ class UdpmReceiver {
   struct Message {
     std::string channel;
     std::vector<uint8_t> data;
-    std::vector<size_t> to;  // subscriptions
+    std::vector<size_t> to;  // numbers of the subscriptions
   };
 
   void Start();
@@ -67,12 +69,12 @@ class UdpmReceiver {
   const LcmBus::Fragments fragments_;
   const int waits_fd_;
   const int stop_fd_;
-  int socket_ = -1;  // set before the thread begins
+  int socket_ = -1;  // set before the thread starts
   std::thread reader_;
 
-  std::mutex mutex_;  // all below
+  std::mutex mutex_;  // guards all members below
   Subscriptions subscriptions_;
-  std::vector<size_t> waiting_;  // messages, by subscription
+  std::vector<size_t> waiting_;  // number of waiting messages of each subscription
   std::deque<Message> queue_;
   size_t queue_bytes_ = 0;
   int64_t no_room_ = 0;

@@ -37,7 +37,7 @@ int Number(std::string_view text, int smallest, int largest, const char* what) {
   return value;
 }
 
-// What stands before the separator; it and the separator are taken off.
+// Returns the text before the first separator, and removes it and the separator from `rest`.
 std::string_view TakeUntil(std::string_view separators, std::string_view* rest) {
   const size_t end = std::min(rest->find_first_of(separators), rest->size());
   const std::string_view part = rest->substr(0, end);
@@ -57,7 +57,7 @@ void ParseHost(std::string_view host, UdpmAddress* address) {
   }
 }
 
-// LCM itself complains of arguments that it does not know.
+// Unknown arguments are ignored here; LCM itself complains about them.
 void ParseArgument(std::string_view argument, UdpmAddress* address) {
   const std::string_view key = TakeUntil("=", &argument);
   if (key == "ttl") {
@@ -67,7 +67,7 @@ void ParseArgument(std::string_view argument, UdpmAddress* address) {
   }
 }
 
-// The kernel's own notes on a packet, beside its bytes (linux/filter.h).
+// Offset by which a filter reads metadata that the kernel has about a packet (linux/filter.h).
 constexpr uint32_t Note(int which) { return static_cast<uint32_t>(SKF_AD_OFF + which); }
 
 constexpr sock_filter kTake = BPF_STMT(BPF_RET | BPF_K, UINT32_MAX);
@@ -80,7 +80,7 @@ void AppendHostOnly(std::vector<sock_filter>* code) {
                              BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, PACKET_LOOPBACK, 1, 0), kDrop});
 }
 
-// A datagram that ends before its magic does is dropped by the kernel: the load fails.
+// If a datagram is too short for the magic number, the load fails, and the kernel drops it.
 void AppendMagic(LcmBus::Fragments fragments, std::vector<sock_filter>* code) {
   constexpr uint32_t kUdpHeader = 8;
   code->push_back(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kUdpHeader));
@@ -125,7 +125,7 @@ class Socket {
     const sockaddr_in address = Inet(host, port);
     Check(connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), "the group");
   }
-  // Of what the kernel gives, half is for its own bookkeeping.
+  // The kernel reports twice the size; half of it is for its own bookkeeping.
   int ReceiveBuffer() const {
     int bytes = 0;
     socklen_t size = sizeof(bytes);

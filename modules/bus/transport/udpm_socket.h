@@ -1,12 +1,12 @@
 #pragma once
 
-// The receiving socket of an LCM multicast bus (udpm://), as LCM has it: bound to the port at every
-// address, a member of the group on the interface that the multicast route names. And a packet
-// filter in the kernel from before it is bound:
-// - A bus of this host alone (ttl=0: nothing published on it leaves the host) takes nothing from
-//   other hosts either, by multicast or straight to the port: only what came over the loopback
-//   interface or is the host's own multicast, looped back.
-// - What does not begin as an LCM datagram is dropped, and fragments too where they are not wanted.
+// The receiving socket of an LCM multicast bus (udpm://). As LCM's, it is bound to the port at
+// every address, and is a member of the group on the interface of the multicast route. In addition
+// it has a packet filter in the kernel, set before it is bound:
+// - With ttl=0, no message leaves this host, and the filter also drops all datagrams from other
+//   hosts, both multicast and unicast. Only datagrams over the loopback interface pass, and the
+//   host's own multicast, looped back.
+// - Datagrams that do not begin as LCM's are dropped, and fragments too if they are not wanted.
 
 #include <netinet/in.h>
 
@@ -17,8 +17,8 @@
 
 namespace pangea {
 
-// "udpm://GROUP:PORT?ttl=N&recv_buf_size=N", each with LCM's default but the last: the kernel's
-// 200 kB, which LCM leaves as they are, lose bursts of keyframes.
+// "udpm://GROUP:PORT?ttl=N&recv_buf_size=N", with LCM's defaults except for recv_buf_size: LCM
+// would leave the kernel's 200 kB, which lose keyframes when many come at once.
 struct UdpmAddress {
   in_addr group{};
   uint16_t port = 7667;
@@ -26,14 +26,15 @@ struct UdpmAddress {
   int recv_buf_size = 4 << 20;  // bytes; 0: the kernel's default
 };
 
-// Throws std::runtime_error naming the URL and what is wrong with it.
+// Throws std::runtime_error with the URL and what is wrong with it.
 UdpmAddress ParseUdpmUrl(const std::string& url);
 
 // Throws std::system_error when this machine has no route to the group.
 void CheckRoute(const UdpmAddress& address);
 
-// Opens the socket, non-blocking; throws std::system_error. Says on stderr when the kernel gives it
-// a smaller receive buffer than asked for, and what to do.
+// Opens the socket, non-blocking, and returns its file descriptor, which the caller closes. Throws
+// std::system_error. If the kernel gives it a smaller receive buffer than asked for, says on stderr
+// what to do.
 int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments);
 
 }  // namespace pangea

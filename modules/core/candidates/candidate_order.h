@@ -1,10 +1,10 @@
 #pragma once
 
-// The order that candidates of place recognition have among each other. Which of them are redundant
-// rests on the results before (loop_verification/known_constraints.h); so that it is the same
-// whenever they come and whoever verifies them, a candidate rests on all candidates whose query is,
-// in its map, before this one's query or before its match, and waits for their results. All of
-// these keyframes came before this one's query: no two candidates wait for each other.
+// The order in which candidates of place recognition are decided. Whether a candidate is redundant
+// depends on earlier results (loop_verification/known_constraints.h). To make this independent of
+// arrival times and of who verifies, a candidate waits for the results of all candidates whose
+// query precedes, in the same map, this candidate's query or its match. All these keyframes came
+// before this candidate's query, so no two candidates wait for each other.
 
 #include <algorithm>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace pangea {
 
-// Whether a candidate rests on those of `earlier_query`.
+// Whether the candidate (query, match) waits for the results of the candidates of `earlier_query`.
 inline bool RestsOn(const KeyframeId& query, const KeyframeId& match,
                     const KeyframeId& earlier_query) {
   const auto before = [&](const KeyframeId& id) {
@@ -23,14 +23,14 @@ inline bool RestsOn(const KeyframeId& query, const KeyframeId& match,
   return before(query) || before(match);
 }
 
-// Queries with candidates that lack a result.
+// The queries that have candidates without a result. Only the first one of each map is kept.
 class PendingQueries {
  public:
   void Add(const KeyframeId& query) {
     const auto [first, is_new] = first_seq_.emplace(query.map, query.seq);
     first->second = std::min(first->second, query.seq);
   }
-  // Whether this candidate rests on any of theirs.
+  // Whether the candidate (query, match) waits for any candidate of these queries.
   bool Precede(const KeyframeId& query, const KeyframeId& match) const {
     return std::ranges::any_of(first_seq_, [&](const auto& first) {
       return RestsOn(query, match, {first.first, first.second});

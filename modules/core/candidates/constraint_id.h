@@ -1,6 +1,6 @@
 #pragma once
 
-// The id of the verification result on a candidate, before there is one.
+// The id that the verification result of a candidate will have, before the result exists.
 
 #include <cstdint>
 

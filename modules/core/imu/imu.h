@@ -1,6 +1,6 @@
 #pragma once
 
-// Inertial samples and the sensor's errors, as in EuRoC's sensor.yaml.
+// Inertial samples, and the noise parameters of the sensor as in EuRoC's sensor.yaml.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -13,11 +13,12 @@ constexpr double kGravity = 9.81;
 struct ImuSample {
   int64_t utime = 0;                               // microseconds, sensor clock
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  // rad/s, body
-  // Specific force, m/s^2, body: of a stationary one it points up with length kGravity.
+  // Specific force, m/s^2, in the body frame. When the body is stationary it points up, with length
+  // kGravity.
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 };
 
-// Any more is a broken sensor or another unit, not a phone in a hand.
+// Larger values come from a broken sensor or a wrong unit, not from a phone in a hand.
 inline constexpr double kMostGyro = 100;   // rad/s
 inline constexpr double kMostAccel = 500;  // m/s^2
 inline bool IsPlausible(const ImuSample& sample) {
@@ -31,8 +32,8 @@ struct ImuNoise {
   double accel_noise_density = 2.0000e-3;  // m/s^2/sqrt(Hz)
   double accel_random_walk = 3.0000e-3;    // m/s^3/sqrt(Hz)
   double rate_hz = 200;
-  // What calibration leaves of scale factors (a share) and axes (rad), standard deviations. 0: it
-  // is exact.
+  // Standard deviations of the scale factors (a share) and of the axes (rad) after calibration. 0:
+  // exact.
   double gyro_scale_sigma = 0.002;
   double accel_scale_sigma = 0.001;
   double axes_sigma = 0.002;

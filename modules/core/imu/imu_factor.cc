@@ -15,7 +15,7 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 constexpr int kRowTheta = 0, kRowVelocity = 3, kRowPosition = 6, kRowBias = 9;
 const Vector3d kGravityVector(0, 0, -kGravity);
 
-// Integration itself is not exact: a floor of 10 microradians, 0.1 mm/s and 10 micrometres.
+// Integration itself is not exact, so the standard deviations are at least these: rad, m/s, m.
 constexpr double kFloorTheta = 1e-5, kFloorVelocity = 1e-4, kFloorPosition = 1e-5;
 
 }  // namespace
@@ -59,7 +59,7 @@ InertialResidual ComputeInertialResidual(const Preintegration& measured, const I
   out.J_to.block<3, 3>(kRowPosition, kPosition) = R_from_odom;
   out.J_from.block<3, 3>(kRowPosition, kVelocity) = -dt * R_from_odom;
 
-  // The measured motion moves with the biases of the first frame.
+  // The measured motion depends on the biases of the first frame.
   const Vector3d rotated_by_bias =
       measured.bias_jacobian.topLeftCorner<3, 3>() * (from.gyro_bias - measured.gyro_bias);
   out.J_from.block<3, 3>(kRowTheta, kGyroBias) =
@@ -79,7 +79,8 @@ Matrix15d InertialInformation(const Preintegration& measured, const ImuNoise& no
   floor << Vector3d::Constant(kFloorTheta), Vector3d::Constant(kFloorVelocity),
       Vector3d::Constant(kFloorPosition);
   covariance.diagonal() += floor.cwiseAbs2();
-  // The biases wander within the span as well, which shows in long ones (of a stationary body).
+  // The biases also change between the two frames, which matters when that time is long (a
+  // stationary body).
   const double dt = measured.duration_s;
   const double gyro_walk = noise.gyro_random_walk * noise.gyro_random_walk * dt;
   const double accel_walk = noise.accel_random_walk * noise.accel_random_walk * dt;

@@ -1,10 +1,10 @@
 #pragma once
 
-// What the IMU says of two frames: a preintegrated motion, and biases that wander (Forster et al.,
-// TRO 2017, with right-invariant errors; docs/maths_vio.md).
+// The IMU factor between two frames: preintegrated motion and random walk of the biases (Forster et
+// al., TRO 2017, with right-invariant errors; docs/maths_vio.md).
 //
-// Errors are right-invariant: a rotation error dtheta is on the LEFT (R = Exp(dtheta) R^) and every
-// vector that lives in odom is carried along by it (p = Exp(dtheta) p^ + xi).
+// Errors are right-invariant: the rotation error dtheta is on the LEFT (R = Exp(dtheta) R^), and it
+// also rotates every vector in the odom frame (p = Exp(dtheta) p^ + xi; velocity alike).
 
 #include <Eigen/Core>
 
@@ -14,7 +14,7 @@
 
 namespace pangea {
 
-// Layout of one frame's error.
+// First index of each part in the error vector of one frame.
 inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
 inline constexpr int kFrameSize = 15;
 
@@ -25,8 +25,9 @@ struct ImuState {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();   // m/s^2
 };
 
-// r = r(x^) + J_from e_from + J_to e_to, rows (rotation, velocity, position, gyro bias, accel
-// bias); its information matrix is that of InertialInformation.
+// First-order residual r(x^) + J_from e_from + J_to e_to, e being the errors of the two frames.
+// Rows: (rotation, velocity, position, gyro bias, accel bias). InertialInformation gives its
+// information matrix.
 struct InertialResidual {
   Eigen::Matrix<double, 15, 1> r;
   Eigen::Matrix<double, 15, 15> J_from, J_to;
@@ -34,13 +35,13 @@ struct InertialResidual {
 InertialResidual ComputeInertialResidual(const Preintegration& measured, const ImuState& from,
                                          const ImuState& to);
 
-// `unmodelled_accel_sigma`: m/s^2, of an acceleration that only the IMU feels, constant in the
-// span.
+// `unmodelled_accel_sigma`: standard deviation, m/s^2, of an acceleration error that is constant
+// between the two frames.
 Eigen::Matrix<double, 15, 15> InertialInformation(const Preintegration& measured,
                                                   const ImuNoise& noise,
                                                   double unmodelled_accel_sigma = 0);
 
-// Where the measured motion leads.
+// The state that follows from `from` by the measured motion.
 ImuState Predict(const Preintegration& measured, const ImuState& from);
 
 }  // namespace pangea

@@ -21,7 +21,7 @@ Preintegrator::Step Preintegrator::Add(const ImuSample& a, const ImuSample& b) {
   }
   Preintegration& p = result_;
   const Eigen::Vector3d omega = 0.5 * (a.gyro + b.gyro) - p.gyro_bias;
-  // Specific force at the middle of the interval, rotated by half of its rotation.
+  // The specific force at the middle of the interval, rotated by half of the interval's rotation.
   const Eigen::Vector3d accel = 0.5 * (a.accel + b.accel) - p.accel_bias;
   const Eigen::Quaterniond half = ExpSo3(0.5 * dt * omega);
   const Eigen::Matrix3d R_mid = (p.delta_q * half).toRotationMatrix();
@@ -85,7 +85,7 @@ Preintegration Compose(const Preintegration& first, const Preintegration& second
   both.delta_q = (first.delta_q * next.q).normalized();
   both.delta_v += R * next.v;
   both.delta_p += second.duration_s * first.delta_v + R * next.p;
-  // What the errors of each do to those of both, order (rotation, velocity, position).
+  // How the errors of each part act on the composed motion, order (rotation, velocity, position).
   Eigen::Matrix<double, 9, 9> of_first = Eigen::Matrix<double, 9, 9>::Identity();
   of_first.block<3, 3>(0, 0) = next.q.toRotationMatrix().transpose();
   of_first.block<3, 3>(3, 0) = -R * Hat(next.v);

@@ -11,9 +11,9 @@
 
 namespace pangea {
 
-// In the body frame of the first of the two frames, gravity not included. Error-state order of
-// covariance and Jacobian rows: (rotation, velocity, position), rotation perturbed on the right;
-// columns of the Jacobian: (gyro bias, accel bias).
+// The motion between two frames, in the body frame of the first one, without gravity. Covariance
+// and Jacobian rows have the order (rotation, velocity, position), with the rotation perturbed on
+// the right. Columns of the Jacobian: (gyro bias, accel bias).
 struct Preintegration {
   double duration_s = 0;
   Eigen::Quaterniond delta_q = Eigen::Quaterniond::Identity();
@@ -22,20 +22,21 @@ struct Preintegration {
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
   Eigen::Matrix<double, 9, 6> bias_jacobian = Eigen::Matrix<double, 9, 6>::Zero();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   // rad/s, linearisation point
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  // m/s^2
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  // m/s^2, linearisation point
 };
 
-// Builds one from consecutive samples.
+// Builds a Preintegration from consecutive samples.
 class Preintegrator {
  public:
   Preintegrator(const ImuNoise& noise, const Eigen::Vector3d& gyro_bias,
                 const Eigen::Vector3d& accel_bias);
-  // What a step does to the errors before it, and what errors of gyro and accelerometer in it do.
+  // Error propagation of one step: A acts on the error before the step, B on the errors of gyro and
+  // accelerometer during the step.
   struct Step {
     Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
     Eigen::Matrix<double, 9, 6> B = Eigen::Matrix<double, 9, 6>::Zero();
 
-    // A M, without the zeros and ones of A.
+    // The product A M, computed without the known zeros and ones of A.
     template <int kColumns>
     Eigen::Matrix<double, 9, kColumns> Propagate(
         const Eigen::Matrix<double, 9, kColumns>& M) const {
@@ -48,9 +49,10 @@ class Preintegrator {
       return out;
     }
   };
-  // Motion from `a` to `b`: the mean of the two samples holds in between. Samples must be in order.
+  // Adds the motion from `a` to `b`; the mean of the two samples holds in between. Samples must be
+  // in order of time.
   Step Add(const ImuSample& a, const ImuSample& b);
-  // Motion from the first of them to the last.
+  // Adds the motion from the first sample to the last one.
   void Add(std::span<const ImuSample> samples);
   const Preintegration& result() const { return result_; }
 
@@ -59,7 +61,8 @@ class Preintegrator {
   Preintegration result_;
 };
 
-// First-order change of the measurement when the biases move away from where it was linearised.
+// The measured motion, corrected to first order for biases that differ from the linearisation
+// point.
 struct CorrectedDelta {
   Eigen::Quaterniond q;
   Eigen::Vector3d v;
@@ -68,14 +71,14 @@ struct CorrectedDelta {
 CorrectedDelta CorrectForBias(const Preintegration& preintegration,
                               const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias);
 
-// The motion of `first` and then of `second`, linearised at the biases of `first`.
+// The motion of `first` followed by that of `second`, linearised at the biases of `first`.
 Preintegration Compose(const Preintegration& first, const Preintegration& second);
 
-// The sample at `utime` between two others, linear.
+// The sample at `utime`, interpolated linearly between two others.
 ImuSample InterpolateImu(const ImuSample& a, const ImuSample& b, int64_t utime);
 
-// The samples of a span of time, its ends interpolated. The last one holds when they end too early;
-// when they begin too late, so does the span.
+// The samples from `from_utime` to `to_utime`, with interpolated ones at both ends. If the samples
+// end too early, the last one is repeated at the end. If they begin too late, the result does too.
 std::vector<ImuSample> SamplesBetween(std::span<const ImuSample> samples, int64_t from_utime,
                                       int64_t to_utime);
 

@@ -1,12 +1,12 @@
 #pragma once
 
-// An odometry edge in a bundle adjustment, with analytic Jacobians by the project's tangent
-// (dp, dtheta) in the left frame. Covariance L L^T in from's body frame, kappa the log scale of the
-// odometry's metres:
+// Residual of an odometry edge in a bundle adjustment, with analytic Jacobians for the tangent
+// (dp, dtheta) in the left frame (core/rigid3.h). (t, R) is the measured edge, (t_rel, R_rel) the
+// relative pose of the estimate, L L^T the covariance in from's body frame, kappa the log scale of
+// the odometry's lengths:
 //   kWorld:    r = L^-1 [t_rel - exp(kappa) t; Log(R_rel R^T)]
 //   kOdometry: r = L^-1 [exp(-kappa) t_rel - t; Log(R_rel R^T)]
-// In the world's metres a scale that only its prior holds would shrink until the residuals are
-// nothing.
+// With kWorld, a scale that only its prior determines would shrink until the residuals vanish.
 
 #include "core/rigid3.h"
 
@@ -17,8 +17,8 @@ class EdgeResidual {
   enum class Metres { kWorld, kOdometry };
 
   struct Jacobians {
-    Matrix6d from, to;  // by the poses
-    Vector6d scale;     // by kappa
+    Matrix6d from, to;  // d(r)/d(pose)
+    Vector6d scale;     // d(r)/d(kappa)
   };
 
   EdgeResidual(const Rigid3& T_from_to, const Matrix6d& covariance, Metres metres = Metres::kWorld);

@@ -12,7 +12,7 @@ Eigen::MatrixXd SolveScaled(const Eigen::MatrixXd& H, const Eigen::MatrixXd& b) 
   if (llt.info() == Eigen::Success) {
     llt.solveInPlace(y);
   } else {
-    y = S.ldlt().solve(y).eval();  // pivots, for what is not quite positive
+    y = S.ldlt().solve(y).eval();  // LDLT pivots: S may be only semidefinite
   }
   return scale.asDiagonal() * y;
 }

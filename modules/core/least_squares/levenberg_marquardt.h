@@ -1,7 +1,7 @@
 #pragma once
 
-// Levenberg-Marquardt on dense normal equations, with Marquardt's damping: a share of the diagonal
-// (Marquardt 1963). What is eliminated beforehand (landmarks) is damped by who eliminates it.
+// Levenberg-Marquardt on dense normal equations. The damping is a share of the diagonal
+// (Marquardt 1963). Whoever eliminates variables beforehand (landmarks) has to damp them.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -9,28 +9,28 @@
 
 namespace pangea {
 
-// The solution x of H x = b, H symmetric and positive semidefinite, scaled to a unit diagonal
-// first: the units differ by orders of magnitude. Columns of b are solved together.
+// Solves H x = b for a symmetric, positive semidefinite H and any number of columns b. H is first
+// scaled to a unit diagonal, because the units of its rows differ by orders of magnitude.
 Eigen::MatrixXd SolveScaled(const Eigen::MatrixXd& H, const Eigen::MatrixXd& b);
 
 struct LevenbergMarquardtOptions {
   int max_iterations = 0;
-  int max_retries = 0;      // each with ten times the damping
-  double min_decrease = 0;  // an undamped step that should lower the cost by less is the last
-  double tolerance = 0;     // rise of the cost, as a share of it, that rounding may make
+  int max_retries = 0;      // per iteration; each one has ten times the damping
+  double min_decrease = 0;  // stops after an undamped step with a smaller predicted decrease
+  double tolerance = 0;     // share by which rounding may raise the cost of an accepted step
 };
 
 struct LevenbergMarquardtResult {
   double cost = 0;
-  bool converged = false;  // false: no step made it better, though one should
+  bool converged = false;  // false: in some iteration no step lowered the cost
 };
 
-// Minimises the cost of `problem` in place.
-//   linearise(problem, damping): equations with members cost, H, g
-//   solve(problem, equations): x of H x = g
-//   retract(equations, step, &problem)
-//   cost(problem)
-// What a step moves: problem.Estimate(), problem.SetEstimate().
+// Minimises the cost of `problem` in place. The caller provides:
+//   linearise(problem, damping): returns equations with members cost, H, g
+//   solve(problem, equations): returns x with H x = g
+//   retract(equations, step, &problem): applies the step
+//   cost(problem): returns the cost
+// problem.Estimate() and problem.SetEstimate() save and restore the variables that a step changes.
 template <typename Problem, typename Linearise, typename Solve, typename Retract, typename Cost>
 LevenbergMarquardtResult LevenbergMarquardt(const LevenbergMarquardtOptions& options,
                                             const Linearise& linearise, const Solve& solve,

@@ -2,11 +2,12 @@
 
 namespace pangea {
 
-// rho(|r|^2) / 2, and the weight rho' of iterated reweighting (Huber 1964; Cauchy's).
+// A robust loss: the cost rho(|r|^2) / 2, and the weight rho' for iteratively reweighted least
+// squares. Huber (1964) or Cauchy.
 struct RobustLoss {
   enum class Kind { kNone, kHuber, kCauchy };
   Kind kind = Kind::kNone;
-  double scale = 1;  // sigmas
+  double scale = 1;  // residual from which the loss grows slower, in sigmas
 
   double Cost(double squared_residual) const;
   double Weight(double squared_residual) const;

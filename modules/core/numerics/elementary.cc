@@ -8,7 +8,7 @@ namespace pangea {
 namespace {
 
 constexpr double kHalfPi = std::numbers::pi / 2;
-// The half of pi in parts: a whole number of the first is exact.
+// Pi / 2 as a sum of parts. A product of the first part with a small integer is exact.
 constexpr double kHalfPiHigh = 0x1.921fb544p+0;
 constexpr double kHalfPiLow = 0x1.0b4611a626331p-34;
 
@@ -22,7 +22,7 @@ double Polynomial(const std::array<double, kCount>& c, double x) {
   return sum;
 }
 
-// Of |r| up to a quarter of pi; coefficients of FreeBSD's k_sin.c and k_cos.c.
+// For |r| up to pi / 4; coefficients of FreeBSD's k_sin.c and k_cos.c.
 double SinNear0(double r) {
   constexpr std::array<double, 6> kSin = {-1.66666666666666324348e-01, 8.33333333332248946124e-03,
                                           -1.98412698298579493134e-04, 2.75573137070700676789e-06,
@@ -40,7 +40,7 @@ double CosNear0(double r) {
   return one_less + (((1 - one_less) - half) + r2 * r2 * Polynomial(kCos, r2));
 }
 
-// Of |x| up to tan(pi / 8); coefficients of FreeBSD's s_atan.c.
+// For |x| up to tan(pi / 8); coefficients of FreeBSD's s_atan.c.
 double AtanNear0(double x) {
   constexpr std::array<double, 11> kAtan = {
       3.33333333333329318027e-01,  -1.99999999998764832476e-01, 1.42857142725034663711e-01,
@@ -54,7 +54,7 @@ double AtanNear0(double x) {
 }  // namespace
 
 SinCos SinCosOf(double angle) {
-  constexpr double kFar = 1e5;  // beyond it a product with the first part is not exact
+  constexpr double kFar = 1e5;  // beyond this, the product with the first part is not exact
   const double near = std::abs(angle) < kFar ? angle : std::remainder(angle, 4 * kHalfPi);
   const double quarters = std::nearbyint(near / kHalfPi);
   const double r = (near - quarters * kHalfPiHigh) - quarters * kHalfPiLow;
@@ -78,7 +78,7 @@ double Tan(double angle) {
 }
 
 double Atan(double x) {
-  constexpr double kTanOfEighth = 0.41421356237309503;  // of pi / 8
+  constexpr double kTanOfEighth = 0.41421356237309503;  // tan(pi / 8)
   const double size = std::abs(x);
   double angle = 0;
   if (size <= kTanOfEighth) {

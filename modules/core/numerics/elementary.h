@@ -1,8 +1,8 @@
 #pragma once
 
-// The elementary functions that the odometry takes, from sums and products alone: C libraries
-// differ in the last bit, and one bit makes a run another run within seconds. With these a phone's
-// browser computes what this machine does.
+// The elementary functions of the odometry (angles in radians), computed with sums and products
+// alone. C libraries differ in the last bit, and one bit makes a run differ visibly within seconds.
+// With these functions a phone's browser computes the same bits as this machine.
 
 namespace pangea {
 

@@ -8,7 +8,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 std::optional<Vector3d> TriangulateMidpoint(std::span<const LineOfSight> lines) {
-  constexpr double kLeastPivot = 1e-9;  // below it all directions are the same to 1e-5 radians
+  constexpr double kLeastPivot = 1e-9;  // below this, all directions agree to about 1e-5 rad
   Matrix3d A = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
   for (const auto& [origin, direction] : lines) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where rays of several views meet.
+// Triangulation of a point from the rays of several views.
 
 #include <Eigen/Core>
 #include <optional>
@@ -13,8 +13,8 @@ struct LineOfSight {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // of length 1
 };
 
-// The midpoint method for any number of views: the point whose squared distances to all lines have
-// the least sum. Nothing when the lines are parallel.
+// The midpoint method for any number of views: the point with the least sum of squared distances
+// to all lines. Nothing when the lines are parallel.
 std::optional<Eigen::Vector3d> TriangulateMidpoint(std::span<const LineOfSight> lines);
 
 }  // namespace pangea

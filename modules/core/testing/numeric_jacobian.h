@@ -1,7 +1,7 @@
 #pragma once
 
-// The Jacobian of f by central differences, for tests of analytic ones. f takes an offset, a vector
-// of `size`, in whatever tangent the analytic Jacobian means, and gives a vector.
+// The Jacobian of f by central differences, to test analytic Jacobians. f takes an offset, a vector
+// of `size` elements in the tangent of the analytic Jacobian, and returns a vector.
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// A program that a test runs beside itself.
+// A program that a test runs as a child process.
 
 #include <signal.h>
 #include <sys/wait.h>
@@ -31,7 +31,7 @@ class Program {
   Program& operator=(const Program&) = delete;
 
   pid_t pid() const { return pid_; }
-  // What waitpid says of it.
+  // The status that waitpid returned.
   int End(int signal) {
     if (pid_ <= 0) {
       return 0;

@@ -38,7 +38,7 @@ Eigen::Vector3d RandomSurfacePoint(const SyntheticWorldOptions& options, Random&
   const double x = Uniform(random, -0.5, 0.5) * options.length_m;
   const double y = Uniform(random, -0.5, 0.5) * options.width_m;
   const double z = Uniform(random, 0, options.height_m);
-  constexpr double kInside = 0.85;  // where boxes stand, of the way to the wall
+  constexpr double kInside = 0.85;  // boxes stand within this share of the way to the wall
   switch (random() % 6) {
     case 0:
       return {std::copysign(0.5 * options.length_m, x), y, z};
@@ -126,7 +126,7 @@ class AgentWalk {
   // Position and yaw drift by a random walk; the tilt error wanders but stays bounded.
   void Odometry(int k, Keyframe* keyframe) {
     const Rigid3& T_hall_body = agent_.T_hall_body[k];
-    constexpr double kKept = 0.95;  // of the tilt error from keyframe to keyframe
+    constexpr double kKept = 0.95;  // share of the tilt error that the next keyframe keeps
     const Eigen::Vector3d fresh(Normal(random_, options_.tilt_sigma),
                                 Normal(random_, options_.tilt_sigma), 0);
     Eigen::Vector3d p_odom(Uniform(random_, -9, 9), Uniform(random_, -9, 9), 0.4);
@@ -204,7 +204,7 @@ class AgentWalk {
     return point_of_corner;
   }
 
-  // Near points are described on coarser levels, where a pixel is worth less.
+  // Near points are described on coarser octaves, where pixels are less accurate.
   Corner NoisyCorner(const Eigen::Vector2d& pixel, double depth) {
     constexpr double kFarDepth = 8;
     Corner corner;
@@ -285,7 +285,7 @@ Constraint MakeFalseConstraint(const SyntheticWorld& world, const KeyframeId& fr
   const double bearing = Uniform(random, -pi, pi);
   const Eigen::Vector3d off(std::cos(bearing), std::sin(bearing), 0.1);
   constraint.T_from_to.t += Uniform(random, 2, 6) * off;
-  // About gravity, or any check of roll and pitch would see it.
+  // The rotation error is about gravity; otherwise a check of roll and pitch would find it.
   const Eigen::Vector3d up = world.T_hall_body(from).q.conjugate() * Eigen::Vector3d::UnitZ();
   constraint.T_from_to.q =
       (ExpSo3(Uniform(random, -0.6, 0.6) * up) * constraint.T_from_to.q).normalized();

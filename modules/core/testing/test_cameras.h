@@ -16,7 +16,7 @@ inline Eigen::Quaterniond LookingAhead() {
   return Eigen::Quaterniond(R_body_cam);
 }
 
-// Without distortion, the principal point in the middle.
+// A camera without distortion, with the principal point in the middle.
 inline CameraModel PinholeTestCamera(int width, int height, double focal_px) {
   CameraModel camera;
   camera.width = width;

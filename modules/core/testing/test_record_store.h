@@ -1,6 +1,6 @@
 #pragma once
 
-// A RecordStore for tests: takes so many records, and can be told to lose them.
+// A RecordStore for tests. It takes at most `max_records`, and cannot read any while `broken`.
 
 #include <algorithm>
 #include <cstddef>
