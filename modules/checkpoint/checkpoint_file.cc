@@ -21,14 +21,14 @@ namespace fs = std::filesystem;
 constexpr uint64_t kMagic = 0x54504b4341474e50;  // "PNGACKPT"
 constexpr uint32_t kFileFormat = 1;
 constexpr size_t kBufferBytes = 1 << 20;
-// The number of bytes before it, and their CRC-32.
+// The tail of the file: the number of bytes before it, and their CRC-32.
 constexpr int64_t kTailBytes = sizeof(int64_t) + sizeof(uint32_t);
 
 uint32_t Checksum(uint32_t of_bytes_before, const std::vector<uint8_t>& bytes) {
   return static_cast<uint32_t>(crc32_z(of_bytes_before, bytes.data(), bytes.size()));
 }
 
-// All of it; false with errno set, 0 for the end of the file.
+// Reads all `size` bytes. False with errno set; errno 0 means the end of the file.
 bool ReadAt(int fd, int64_t offset, void* data, size_t size) {
   for (auto* at = static_cast<uint8_t*>(data); size > 0;) {
     const ssize_t count = pread(fd, at, size, offset);

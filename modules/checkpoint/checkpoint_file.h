@@ -1,13 +1,15 @@
 #pragma once
 
-// The file in which a process keeps what it made of the journal, so that its next start reads the
-// journal's rest alone. The journal stays the truth: a checkpoint that is missing, torn, damaged,
-// of another version, of other options or of another journal is not used, and is written anew.
+// A checkpoint file: it keeps a process' state after reading the journal up to some point, so that
+// its next start reads only the rest of the journal. The journal remains the only truth: a
+// checkpoint that is missing, torn, damaged, or of another version, other options or another
+// journal is not used, and is written anew.
 //
-// In it: what it is of (CheckpointKey), up to where in the journal (JournalState), and the process'
-// own bytes; behind them their number and a checksum of it all. Written beside its place and
-// renamed once it is on the disk: a process that is killed, or a disk that is full, leaves the one
-// before. Bytes are as this machine has them in memory (core/byte_record.h). One thread.
+// The file has a head (CheckpointKey, and the JournalState up to which the journal was read), the
+// process' own bytes, then the number of all these bytes and their CRC-32. It is written under a
+// temporary name and renamed once it is on the disk; so if the process is killed, or the disk is
+// full, the former checkpoint remains. Values are as in this machine's memory
+// (core/byte_record.h). Not thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -19,25 +21,25 @@
 
 namespace pangea {
 
-// What must agree.
+// A checkpoint is used only if its key is equal to that of the process which reads it.
 struct CheckpointKey {
-  std::string process;  // on the bus: "posegraph"
-  uint32_t format = 0;  // of the process' bytes: counted on when these, or what they mean, change
-  std::string options;  // that the state depends on
+  std::string process;  // its name on the bus, e.g. "posegraph"
+  uint32_t format = 0;  // version of the process' own bytes; increased when their meaning changes
+  std::string options;  // the options on which the state depends
 };
 
 class CheckpointWriter final : public ByteWriter {
  public:
-  // Throws std::runtime_error naming the file when the disk refuses; so does all that follows. The
-  // folder is made if there is none.
+  // Makes the folder if it does not exist. This and all other functions throw std::runtime_error,
+  // with the file's name, when the file cannot be written.
   CheckpointWriter(const std::filesystem::path& file, const CheckpointKey& key,
                    const JournalState& journal);
-  // What was not committed is removed.
+  // Without Commit, the temporary file is removed.
   ~CheckpointWriter() override;
   CheckpointWriter(const CheckpointWriter&) = delete;
   CheckpointWriter& operator=(const CheckpointWriter&) = delete;
 
-  // The file is under its name, and on the disk, when this returns.
+  // Returns when the file has its final name and is on the disk.
   void Commit();
 
  protected:
@@ -48,14 +50,14 @@ class CheckpointWriter final : public ByteWriter {
   [[noreturn]] void Fail() const;
 
   const std::filesystem::path file_;
-  const std::filesystem::path made_;  // what it is called until it is whole
+  const std::filesystem::path made_;  // the temporary name until Commit
   int fd_ = -1;
   int64_t num_bytes_ = 0;
   std::vector<uint8_t> buffer_;
-  uint32_t crc32_ = 0;  // of these
+  uint32_t crc32_ = 0;  // of the first num_bytes_ bytes
 };
 
-// What a checkpoint is of.
+// The head of a checkpoint.
 struct CheckpointHead {
   CheckpointKey key;
   JournalState journal;
@@ -63,10 +65,10 @@ struct CheckpointHead {
 
 class CheckpointReader final : public ByteReader {
  public:
-  // Has read all of it once when it returns: it is whole. Throws std::runtime_error that says why
-  // it is not to be used.
+  // Opens a checkpoint and reads it once to verify its checksum. Throws std::runtime_error with the
+  // reason when it cannot be used.
   CheckpointReader(const std::filesystem::path& file, const CheckpointKey& key);
-  // Of whatever process, format and options.
+  // The same, but accepts any key: those of any process, format and options.
   explicit CheckpointReader(const std::filesystem::path& file);
   ~CheckpointReader() override;
   CheckpointReader(const CheckpointReader&) = delete;
@@ -83,10 +85,10 @@ class CheckpointReader final : public ByteReader {
   void ReadHead();
 
   int fd_ = -1;
-  int64_t at_ = 0;   // what is read next
-  int64_t end_ = 0;  // of the process' bytes
+  int64_t at_ = 0;   // offset of the next byte to read
+  int64_t end_ = 0;  // offset behind the process' bytes
   std::vector<uint8_t> buffer_;
-  int64_t buffer_at_ = 0;  // of its first byte in the file
+  int64_t buffer_at_ = 0;  // offset of the buffer's first byte in the file
   CheckpointHead head_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// Rows of numbers from text files (EuRoC csv, TUM): strict, and each complaint names file and line.
+// Reads rows of numbers from text files (EuRoC csv, TUM). Strict: each complaint names file and
+// line.
 
 #include <cstdint>
 #include <string>
@@ -12,30 +13,30 @@ namespace pangea {
 struct CsvRow {
   int line = 0;                     // from 1
   std::vector<std::string> fields;  // trimmed
-  bool line_ended = true;           // false: the file stops without a newline behind this row
+  bool line_ended = true;           // false: the file ends without a newline after this row
 };
 
-// Splits at commas or, when a line has none, at blanks; skips empty lines and those that begin with
-// '#' or are a header (first field not a number and no row before it).
-// Throws as OpenFile (text_file.h).
+// Splits each line at commas or, if it has none, at blanks. Skips empty lines, lines that begin
+// with
+// '#', and a header: line 1, if its first field is not a number. Throws as OpenFile (text_file.h).
 std::vector<CsvRow> ReadCsv(const std::string& path);
 
-// Whole-field conversions; false on anything left over, on overflow, and on NaN or infinity.
+// Converts a whole field. False if something is left over, on overflow, and for NaN or infinity.
 bool ParseNumber(std::string_view field, double* value);
 bool ParseNumber(std::string_view field, int64_t* value);
-// "nan", "-inf", "1e400": a number to its writer, and none to reckon with.
+// Whether the field is a number that is not finite: "nan", "-inf" or "1e400".
 bool IsNotFinite(const std::string& field);
 
-// Gathers what was wrong with the rows of one file without flooding: the first few in full, then a
-// count.
+// Collects the malformed rows of one file: the first few with their text, then only a count.
 class RowComplaints {
  public:
   explicit RowComplaints(std::string path) : path_(std::move(path)) {}
   void Add(int line, const std::string& what);
   // One line of text per kept complaint, and "... and n more".
   std::vector<std::string> Lines() const;
-  // Throws when more than one row and a tenth of all are malformed: then it is another format, and
-  // dropping rows would hide that.
+  // Throws std::runtime_error when more than one row and more than a tenth of all rows are
+  // malformed. The file then probably has another format, which dropping rows would hide.
+  // `expected` names the right format.
   void ThrowIfTooMany(size_t num_rows, const std::string& expected) const;
 
  private:

@@ -4,11 +4,11 @@
 
 namespace pangea {
 
-// A folder that somebody named, and those above it. Throws std::runtime_error with its path and the
-// cause.
+// Makes the folder and its parents if they do not exist. Throws std::runtime_error with the path
+// and the cause.
 void MakeFolder(const std::filesystem::path& path);
 
-// As its name: without the slash that a shell completes it with.
+// The folder's path without a trailing slash, such as a shell's completion adds.
 std::filesystem::path WithoutSlash(const std::filesystem::path& folder);
 
 }  // namespace pangea

@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-// A command that is done by then says nothing.
+// Nothing is shown before this time, so a quick command shows nothing.
 constexpr double kFirst_s = 2;
 constexpr double kTerminalInterval_s = 0.2;
 constexpr double kFileInterval_s = 10;

@@ -1,8 +1,8 @@
 #pragma once
 
-// How far a command is that takes more than a few seconds, on stderr: one line that is redrawn on a
-// terminal, a line now and then in a file. For one thread; knows the clock, so nothing may follow
-// from it.
+// Shows on stderr how far a command is that takes more than a few seconds: on a terminal one line
+// that is redrawn, in a file a line from time to time. Not thread safe. It uses the clock, so no
+// result may depend on it.
 
 #include <cstdint>
 #include <functional>
@@ -13,16 +13,16 @@ namespace pangea {
 
 class Progress {
  public:
-  // `what` stands before the count: a program's name.
+  // `what`: the text before the count, such as the program's name.
   explicit Progress(std::string what);
-  // With another stream and clock, seconds, for tests.
+  // For tests: with another stream, and a clock in seconds.
   Progress(std::string what, std::ostream& out, bool is_terminal, std::function<double()> clock);
-  // Takes the line off the terminal: what follows stands alone.
+  // Removes the line from the terminal.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // "pangea-vio: 340 of 3638 images". Cheap: call it at each one.
+  // Shows for example "pangea-vio: 340 of 3638 images". It is cheap: call it for each item.
   void Update(int64_t done, int64_t all, const char* units);
 
  private:

@@ -23,7 +23,8 @@ std::string FolderOf(const ScratchFileOptions& options) {
 
 std::string Reason() { return std::generic_category().message(errno); }
 
-// Without a name from the start where the file system can, else from the next moment on.
+// The file has no name from the start if the file system supports that; else its name is removed at
+// once.
 int OpenWithoutName(const std::string& folder) {
   const int file = open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) {
@@ -37,7 +38,8 @@ int OpenWithoutName(const std::string& folder) {
   return named;
 }
 
-// All of it with pwrite or pread; false with errno set, 0 for the end of the file.
+// Transfers all bytes with pwrite or pread. False with errno set; errno 0 means the end of the
+// file.
 template <typename Operation, typename Byte>
 bool Transfer(Operation operation, int file, int64_t offset, std::span<Byte> bytes) {
   while (!bytes.empty()) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// A file without a name for what a run sets aside, gone when the run is, however it ends. It lies
-// in $TMPDIR, else /var/tmp, which unlike /tmp is on a disk.
+// A RecordStore in a file without a name, which disappears when the process ends, however it ends.
+// The file is in $TMPDIR, or else in /var/tmp, which unlike /tmp is on a disk.
 
 #include <cstdint>
 #include <optional>
@@ -13,19 +13,19 @@
 namespace pangea {
 
 struct ScratchFileOptions {
-  std::string folder;                  // empty: as above
-  int64_t max_bytes = 20'000'000'000;  // some 700,000 keyframes
+  std::string folder;                  // empty: $TMPDIR or /var/tmp
+  int64_t max_bytes = 20'000'000'000;  // about 700,000 keyframes
 };
 
 class ScratchFile : public RecordStore {
  public:
-  // Throws std::runtime_error naming the folder when there can be no file.
+  // Throws std::runtime_error with the folder when no file can be made there.
   explicit ScratchFile(const ScratchFileOptions& options = {});
   ~ScratchFile() override;
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;
 
-  // Tried anew each time: a disk that was full may have room again.
+  // A failure does not prevent later calls: a full disk may have room again.
   std::optional<int64_t> Append(std::span<const uint8_t> record) override;
   bool Read(int64_t offset, std::span<uint8_t> record) override;
   std::string problem() const override { return problem_; }

@@ -32,7 +32,7 @@ std::string NameOf(fs::file_type type) {
 
 }  // namespace
 
-// Looked at before it is opened: to open a FIFO is to wait already, to open a device may do things.
+// The type is checked before opening: opening a FIFO already waits, and opening a device may act.
 std::ifstream OpenFile(const std::string& path) {
   std::error_code error;
   const fs::file_type type = fs::status(path, error).type();

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 fs::path FolderOf(const fs::path& file) { return fs::absolute(file).parent_path(); }
 
-// Beside the file, under a name that nobody looks for; gone at the end.
+// A temporary file beside the final one. The destructor removes the temporary name.
 class FileInTheMaking {
  public:
   FileInTheMaking(const fs::path& file, std::string_view text, mode_t mode)

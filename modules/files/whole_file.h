@@ -1,7 +1,7 @@
 #pragma once
 
-// Files that appear under their names whole, and on the disk, or not at all: also when the process
-// is killed or the power goes meanwhile.
+// Atomic writing of files: the file appears under its name whole, and safe on the disk, or not at
+// all, even if the process is killed or the power fails.
 
 #include <sys/types.h>
 
@@ -10,8 +10,8 @@
 
 namespace pangea {
 
-// All that was written to the file or folder is on the disk when this returns. Throws
-// std::runtime_error.
+// Returns when all that was written to the file or folder is on the disk. Throws std::runtime_error
+// when it fails.
 void SyncToDisk(const std::filesystem::path& path);
 
 inline constexpr mode_t kOwnerOnly = 0600;  // of keys, invites, images of people
@@ -19,11 +19,11 @@ inline constexpr mode_t kOwnerOnly = 0600;  // of keys, invites, images of peopl
 // A new file with this mode. False, and nothing is changed, if there is one of that name. Throws
 // std::runtime_error when it cannot be written.
 bool WriteNewFile(const std::filesystem::path& file, std::string_view text, mode_t mode);
-// ... or in place of one that is there.
+// The same, but replaces a file that exists already.
 void ReplaceFile(const std::filesystem::path& file, std::string_view text, mode_t mode);
 
-// False if there was none: of several who remove a file, one is told true. Throws
-// std::runtime_error when it cannot be removed.
+// Removes a file. False if there is none: of several processes that remove the same file, exactly
+// one gets true. Throws std::runtime_error when it cannot be removed.
 bool RemoveFile(const std::filesystem::path& file);
 
 }  // namespace pangea

@@ -28,7 +28,7 @@ const CheckedScan::Piece* CheckedScan::Next() {
   return &current_.piece;
 }
 
-// One more piece; false when there is none, and none waits.
+// Reads one more piece. False at the end of the file if no piece is waiting.
 bool CheckedScan::Read() {
   const auto read = scan_.Next();
   if (!read) {
@@ -51,15 +51,15 @@ bool CheckedScan::Read() {
   return true;
 }
 
-// Repeated while it finds damage: the mended file no longer says which event that was, and whoever
-// reads it must come to the same.
+// Repeated while it finds damage, because a mended file no longer says which event was damaged, and
+// reading it must give the same result.
 void CheckedScan::Verify(const Checksums& checksums) {
   while (FindDamage(checksums)) {
   }
 }
 
-// From the list backwards. Which of its events another is, its place says, and behind damage, which
-// may have taken any number of events, the event itself.
+// Goes backwards from the CHECKSUMS event. The number of an event follows from its place. Beyond
+// damage, which may have destroyed any number of events, the event's own header tells the number.
 bool CheckedScan::FindDamage(const Checksums& checksums) {
   int64_t expected = checksums.event_number() - 1;
   bool in_place = true;
@@ -73,7 +73,7 @@ bool CheckedScan::FindDamage(const Checksums& checksums) {
     }
     const int64_t number = in_place ? expected : piece.header.number;
     if (number < checksums.first_event || number > expected) {
-      continue;  // it was there before those of the list, or who can say which it is
+      continue;  // the event is older than those of the list, or its number is not credible
     }
     const auto index = static_cast<size_t>(number - checksums.first_event);
     if (piece.crc32() != checksums.crc32[index]) {

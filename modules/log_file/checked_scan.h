@@ -1,11 +1,11 @@
 #pragma once
 
-// LogScan with the checksums in the log: an event whose own is another than it was written with
-// comes out as damage.
+// A LogScan that verifies the checksums in the log: an event whose checksum differs from the one in
+// the log is returned as damage.
 //
-// Events wait for the CHECKSUMS event behind them; those of a log that has none (an older
-// version's, a capture) come out unchecked once kMaxWaitingBytes wait. In what order events come
-// does not change. One thread.
+// Events wait for the CHECKSUMS event that follows them. In a log without CHECKSUMS (of an older
+// version, or a capture), events are returned unchecked once kMaxWaitingBytes are waiting. The
+// order of the events stays the same. Not thread safe.
 
 #include <deque>
 
@@ -14,8 +14,8 @@
 
 namespace pangea {
 
-// Whether an event only fills the place of damage: on DAMAGED, or so many of its letters as there
-// was room for.
+// Whether an event only fills the place of damage. Its channel is DAMAGED, or as many of the first
+// letters of this name as there was room for.
 bool FillsDamage(const LogPiece& event);
 
 class CheckedScan {
@@ -23,8 +23,8 @@ class CheckedScan {
   static constexpr size_t kMaxWaitingBytes = 4 << 20;
 
   struct Piece : LogPiece {
-    // Of an event, as it is in the file. Computed when asked for: most logs have nothing to compare
-    // it with.
+    // Checksum of the event's bytes in the file. Computed only on demand, because most logs have no
+    // checksums to compare it with.
     uint32_t crc32() const;
 
    private:
@@ -33,24 +33,24 @@ class CheckedScan {
 
   explicit CheckedScan(int fd) : scan_(fd) {}
 
-  // As LogScan's.
+  // As LogScan::Next: the next piece, null at the end. Valid until the next call.
   const Piece* Next();
   int64_t file_bytes() const { return scan_.file_bytes(); }
 
  private:
   struct Waiting {
     Piece piece;
-    std::vector<uint8_t> bytes;  // what `piece` looks into
+    std::vector<uint8_t> bytes;  // the bytes that `piece` points to
   };
   bool Read();
   void Verify(const Checksums& checksums);
-  // Whether there was any that was not known yet.
+  // Marks events that the checksums contradict as damage. Returns whether it marked any.
   bool FindDamage(const Checksums& checksums);
 
   LogScan scan_;
   std::deque<Waiting> waiting_;
   size_t waiting_bytes_ = 0;
-  size_t num_ready_ = 0;  // of the first that wait
+  size_t num_ready_ = 0;  // how many of the first waiting pieces can be returned
   Waiting current_;
 };
 

@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-constexpr std::ptrdiff_t kOwnBytes = 4;  // the message's last field
+constexpr std::ptrdiff_t kOwnBytes = 4;  // size of own_crc32, the message's last field
 
 }  // namespace
 

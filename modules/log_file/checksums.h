@@ -1,9 +1,9 @@
 #pragma once
 
-// Checksums of a log's events, written into the same log as events of their own (CHECKSUMS,
-// checksums_t) behind those they are of: any LCM tool still reads the file, and whoever copies it
-// takes them along. A list is of the events right before it, by their numbers, and has a checksum
-// of its own: one that is damaged, or that was copied into another log, counts for nothing.
+// Checksums of a log's events. They are events in the same log (CHECKSUMS, checksums_t), so any LCM
+// tool can still read the file, and a copy contains them. A CHECKSUMS event is for the events right
+// before it, by their numbers, and has a checksum of its own. It is ignored if it is damaged or was
+// copied into another log.
 
 #include <cstdint>
 #include <optional>
@@ -14,21 +14,22 @@
 namespace pangea {
 
 struct Checksums {
-  // An event has this many others' at most.
+  // Largest number of checksums in one event.
   static constexpr size_t kMax = 100'000;
-  int64_t first_event = 0;      // its number
-  std::vector<uint32_t> crc32;  // of it and those that follow
+  int64_t first_event = 0;      // number of the first event that has a checksum here
+  std::vector<uint32_t> crc32;  // of that event and those that follow it
 
   // The number of the CHECKSUMS event.
   int64_t event_number() const { return first_event + static_cast<int64_t>(crc32.size()); }
 };
 
-// Of a whole event: header, channel and data.
+// CRC-32 of a whole event: header, channel and data.
 uint32_t EventChecksum(Bytes event);
 
-// The CHECKSUMS event of these.
+// Appends the bytes of the CHECKSUMS event with these checksums to `out`.
 void AppendChecksumsEvent(const Checksums& checksums, int64_t utime, std::vector<uint8_t>* out);
-// What a whole event says if it is one, and in its place.
+// Parses a whole CHECKSUMS event. Nothing if it is not one, is damaged, or has another number than
+// its place in the log requires.
 std::optional<Checksums> ChecksumsOf(Bytes event);
 
 }  // namespace pangea

@@ -1,7 +1,6 @@
 #pragma once
 
-// Where damaged parts of a file are kept before the file is mended: beside it, under a name of
-// their own.
+// Copies the damaged parts of a file to a new file beside it, before the file is mended.
 
 #include <cstdint>
 #include <string>
@@ -14,12 +13,13 @@ struct FileRange {
   int64_t end = 0;  // the first byte behind it
 };
 
-// "journal.lcm.damaged-20261123T055342Z", with "-2" and so on behind it where that exists.
+// The name for the copy, "journal.lcm.damaged-20261123T055342Z"; "-2" and so on follows if that
+// name exists.
 std::string DamagedName(const std::string& file);
 
-// Writes these parts of the open file `fd`, one behind the other, to a new file of that name, which
-// is on the disk when this returns; its name. Throws std::runtime_error if it cannot be; then no
-// part of it is left.
+// Writes these parts of the open file `fd`, one after the other, to a new file DamagedName(file).
+// Returns its name when it is on the disk. Throws std::runtime_error if it cannot be written; then
+// the new file is removed.
 std::string KeepDamaged(const std::string& file, int fd, const std::vector<FileRange>& parts);
 
 }  // namespace pangea

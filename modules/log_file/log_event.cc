@@ -11,7 +11,8 @@
 namespace pangea {
 namespace {
 
-// Big-endian: magic, event number, time stamp, length of the channel's name and of the data.
+// The header is big-endian: magic, event number, time stamp, length of the channel's name, length
+// of the data.
 constexpr uint32_t kMaxChannelName = 63;
 
 }  // namespace

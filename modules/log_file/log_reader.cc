@@ -53,7 +53,7 @@ const LogEvent* LogReader::Next() {
   return nullptr;
 }
 
-// Whether it is an event to be handed on.
+// Counts the piece. Returns whether it is an event for the caller of Next.
 bool LogReader::Take(const LogPiece& piece) {
   if (piece.kind == LogPiece::Kind::kTornTail) {
     reading_.torn_bytes = piece.bytes;
@@ -95,7 +95,8 @@ void LogReader::See(const LogPiece& event) {
   }
 }
 
-// A log may be cut anywhere, but begins as one unless it holds an event further on.
+// A file without any whole event counts as a log only if it begins as an event does, because a log
+// may be cut anywhere.
 void LogReader::CheckIsLog() const {
   const int64_t bytes = scan_.file_bytes();
   if (bytes > 0 && !last_ && !BeginsAsLogEvent(fd_, 0, bytes)) {

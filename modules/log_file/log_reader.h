@@ -1,7 +1,7 @@
 #pragma once
 
-// LCM log files, event by event; behind damage it goes on with the next whole event. CHECKSUMS,
-// where a log has them, are verified, and an event that they contradict is damage too.
+// Reads LCM log files event by event. After damage it continues with the next whole event. If a log
+// has CHECKSUMS, they are verified, and an event that they contradict counts as damage.
 
 #include <cstdint>
 #include <functional>
@@ -17,11 +17,11 @@ namespace pangea {
 struct LogEvent {
   int64_t utime = 0;  // when the event was captured, wall clock, microseconds
   std::string channel;
-  Bytes data;          // valid during the call
-  int64_t number = 0;  // as the log counts
+  Bytes data;          // valid until the next event is read
+  int64_t number = 0;  // the event number in the log
 };
 
-// One thread.
+// Not thread safe.
 class LogReader {
  public:
   // Throws std::runtime_error when the file cannot be opened.
@@ -30,12 +30,13 @@ class LogReader {
   LogReader& operator=(const LogReader&) = delete;
   ~LogReader();
 
-  // In file order, without CHECKSUMS and DAMAGED; null at the end. Valid until the next call.
-  // Throws std::runtime_error when the file cannot be read, and at its end when it is no LCM log.
+  // The next event in the file, without CHECKSUMS and DAMAGED; null at the end. Valid until the
+  // next call. Throws std::runtime_error when the file cannot be read, and at its end when the file
+  // is not an LCM log.
   const LogEvent* Next();
-  // Of what was read so far.
+  // What was read and lost so far.
   const LogReading& reading() const { return reading_; }
-  // How far it is: the end of the last event, and the file's.
+  // Progress: the end of the last piece read, and the size of the file, bytes.
   int64_t read_bytes() const { return read_bytes_; }
   int64_t file_bytes() const { return scan_.file_bytes(); }
 
@@ -54,16 +55,16 @@ class LogReader {
   int64_t read_bytes_ = 0;
   std::optional<int64_t> first_utime_;
   std::optional<LostPlace::Event> last_;
-  int64_t lost_end_ = -1;   // of the last place
-  bool lost_open_ = false;  // what comes behind it is not yet known
+  int64_t lost_end_ = -1;   // end of the last lost place
+  bool lost_open_ = false;  // the event after the last lost place is not yet known
 };
 
-// Whether how far it is stands on stderr (files/progress.h). Not where the handler prints: on a
-// terminal the two would be one line.
+// Whether progress is shown on stderr (files/progress.h). Use kTellNothing if the handler prints,
+// because on a terminal both would be on one line.
 enum class WhileReading : uint8_t { kTellProgress, kTellNothing };
 
-// All of the log. What could not be read of it is noted in `readings`; without them a log that is
-// not whole throws std::runtime_error too, when the handler has had what there is.
+// Gives all events of the log to the handler. `readings` gets what could not be read. If `readings`
+// is null, a log with losses throws std::runtime_error after its last event. Throws as LogReader.
 void ReadLog(const std::string& path, const std::function<void(const LogEvent&)>& handler,
              LogReadings* readings = nullptr,
              WhileReading while_reading = WhileReading::kTellProgress);

@@ -99,7 +99,7 @@ LogPiece LogScan::Event(const LogEventHeader& header) {
   return piece;
 }
 
-// What is no event, up to the next one.
+// The bytes from here to the next event, or to the end of the file.
 LogPiece LogScan::Gap() {
   LogPiece piece;
   piece.offset = at_;

@@ -1,14 +1,14 @@
 #pragma once
 
-// Reads a file in LCM's log format event by event, and goes on behind damage.
+// Reads a file in LCM's log format event by event, and continues after damage.
 //
-// An event is taken when its header makes sense and the next event, or the end of the file, follows
-// it. If neither does, one of the two headers is damaged: it is the first if an event begins inside
-// what it claims to be long, else the second. Damage ends at the next whole event. What stands
-// behind the last whole event is a torn tail, as a crash leaves it, only if no event's magic number
-// is in it.
+// An event is accepted when its header makes sense and the next event, or the end of the file,
+// follows it. If neither follows, one of two headers is damaged: this event's, if another event
+// begins within its claimed length, else that of the next event. Damage ends at the next whole
+// event. Bytes after the last whole event are a torn tail, as a crash leaves it, only if no magic
+// number is among them.
 //
-// What a flipped bit did to a payload no header tells: checksums.h. One thread.
+// A flipped bit in a payload cannot be found this way; see checksums.h. Not thread safe.
 
 #include <cstdint>
 #include <optional>
@@ -25,7 +25,7 @@ struct LogPiece {
   Kind kind = Kind::kEvent;
   int64_t offset = 0;  // in the file
   int64_t bytes = 0;
-  // Of an event, valid until the next call:
+  // Only for an event; valid until the next call:
   LogEventHeader header;
   std::string channel;
   Bytes whole;  // header, channel and data
@@ -37,24 +37,25 @@ struct LogPiece {
 
 class LogScan {
  public:
-  // `fd`: open for reading, and stays the caller's. Its length is what it is now.
+  // `fd`: a file open for reading; the caller closes it. Reads up to the file's current size.
   explicit LogScan(int fd);
-  // The part of it from `begin`, where an event begins, to `end`, where one ends.
+  // Reads only the part from `begin`, where an event begins, to `end`, where an event ends.
   LogScan(int fd, int64_t begin, int64_t end) : fd_(fd), file_bytes_(end), at_(begin) {}
 
-  // The pieces of the file in order, without gaps; nothing at its end. Throws std::runtime_error
-  // if the file cannot be read.
+  // The next piece of the file; the pieces follow one another without gaps. Nothing at the end.
+  // Throws std::runtime_error if the file cannot be read.
   std::optional<LogPiece> Next();
-  int64_t file_bytes() const { return file_bytes_; }  // or the part's end
+  int64_t file_bytes() const { return file_bytes_; }  // size of the file, or `end` of the part
 
  private:
-  // The file from there on, at least `size` bytes of it but at its end. Valid until the next call.
+  // The file's bytes from `offset` on: at least `size`, or fewer at its end. Valid until the next
+  // call.
   Bytes Peek(int64_t offset, size_t size);
   // The header at `offset`, if a whole event seems to begin there.
   std::optional<LogEventHeader> EventAt(int64_t offset);
-  // Where the first of them begins in [from, to); -1 for nowhere.
+  // Offset of the first event that begins in [from, to); -1: none.
   int64_t NextEvent(int64_t from, int64_t to);
-  // Where the magic number stands next in [from, to); -1 for nowhere.
+  // Offset of the first magic number that begins in [from, to); -1: none.
   int64_t NextMagic(int64_t from, int64_t to);
   bool IsWhole(int64_t offset, const LogEventHeader& header);
   LogPiece Event(const LogEventHeader& header);

@@ -1,6 +1,6 @@
 #pragma once
 
-// A new LCM log, event by event.
+// Writes a new LCM log event by event.
 
 #include <cstdint>
 #include <fstream>
@@ -13,10 +13,11 @@ namespace pangea {
 
 class LogFileWriter {
  public:
-  // Overwrites. Throws std::runtime_error when the file cannot be written.
+  // Overwrites an existing file. Throws std::runtime_error when the file cannot be written.
   explicit LogFileWriter(const std::string& path);
 
-  void Write(int64_t utime, const std::string& channel, Bytes data);  // throws the same
+  // Throws std::runtime_error as well. `utime`: wall clock, microseconds.
+  void Write(int64_t utime, const std::string& channel, Bytes data);
   int64_t count() const { return count_; }
 
  private:

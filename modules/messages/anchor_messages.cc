@@ -16,7 +16,7 @@ constexpr int64_t kMaxUtime = 1LL << 60;
 constexpr int64_t kMaxRevision = 1LL << 60;
 constexpr double kMaxPixel = 1e5;
 
-// As a text for people: without control characters.
+// Whether the text can be shown to people: it has no control characters and is short enough.
 bool IsName(const std::string& name) {
   return name.size() <= kMaxAnchorName &&
          std::none_of(name.begin(), name.end(),
@@ -41,7 +41,7 @@ bool IsZero(const float* values) {
   return std::all_of(values, values + 36, [](float v) { return v == 0; });
 }
 
-// What it says of the place; why it is refused, or an empty string.
+// Parses the fields about the place. Returns why they are refused, or an empty string.
 std::string ParsePlace(const anchor_edit_t& m, AnchorEdit* edit) {
   const auto map = Parse(m.map);
   const auto T_ref_anchor = Parse(m.T_ref_anchor);

@@ -1,6 +1,7 @@
 #pragma once
 
-// The border for anchors. As in messages.h, past Parse every field is bounded.
+// Messages about anchors to domain types and back. As in messages.h, after Parse every field is
+// within bounds.
 
 #include "core/anchor.h"
 #include "messages/messages.h"

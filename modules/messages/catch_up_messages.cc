@@ -75,7 +75,7 @@ journal_file_t ToMessage(const JournalFile& file) {
   return message;
 }
 
-// "Up to the end" may be said with any number.
+// to_seq may be any large number: it then means "up to the end".
 Parsed<ResendRequest> Parse(const resend_request_t& m) {
   const auto map = Parse(m.map);
   if (!IsProcessName(m.requester) || !map.value || m.from_seq < 0 || m.to_seq < m.from_seq) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// The border for what processes tell each other to catch up: what exists (have_t), in what file
-// (journal_file_t), and what is to be sent again (resend_request_t, verdict_request_t). As in
-// messages.h, past Parse every field is bounded.
+// Messages by which processes catch up, to domain types and back: which keyframes exist (have_t),
+// in which file (journal_file_t), and what is to be sent again (resend_request_t,
+// verdict_request_t). As in messages.h, after Parse every field is within bounds.
 
 #include <string>
 #include <utility>
@@ -18,14 +18,14 @@
 namespace pangea {
 
 struct Have {
-  std::vector<std::pair<MapId, int32_t>> highest_seq;  // of each map
-  std::vector<SeqGap> gaps;                            // lost for good
+  std::vector<std::pair<MapId, int32_t>> highest_seq;  // for each map
+  std::vector<SeqGap> gaps;                            // keyframes that are lost for good
 };
 
-// A state of the journal: two journals that agree in it are one, up to there.
+// A state of the journal. Two files with an equal state are the same journal up to that point.
 struct JournalState {
   int64_t num_bytes = 0;
-  int64_t last_event_offset = -1;  // of the last whole event in them; -1 for none
+  int64_t last_event_offset = -1;  // of the last whole event within num_bytes; -1: none
   uint32_t last_event_crc32 = 0;
 
   bool operator==(const JournalState&) const = default;
@@ -42,8 +42,8 @@ struct ResendRequest {
   SeqGap range;
 };
 
-// Verification results on candidates of one map's keyframes: the keyframe's seq, the constraint's
-// id.
+// Names of verification results on candidates whose queries are keyframes of one map: the query's
+// seq and the constraint's id.
 struct ResultNames {
   static constexpr size_t kMax = 500;
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Channel names, built in this one place. docs/bus.md is their table.
+// All channel names are built here. docs/bus.md has a table of them.
 
 #include <fmt/format.h>
 
@@ -19,11 +19,11 @@ inline constexpr std::string_view kJournalFile = "JOURNAL_FILE";
 inline constexpr std::string_view kJournalReplicated = "JOURNAL_REPLICATED";
 inline constexpr std::string_view kResendRequest = "RESEND_REQUEST";
 inline constexpr std::string_view kVerificationRequest = "VERDICT_REQUEST";
-// From the journal; what apps and tools ask for is kAnchorRequestPrefix.
+// Edits that are in the journal. Apps and tools ask for edits on kAnchorRequestPrefix.
 inline constexpr std::string_view kAnchorEdit = "ANCHOR_EDIT";
 // Anchors in their group's frame.
 inline constexpr std::string_view kAnchor = "ANCHOR";
-// In files alone.
+// Only in log files, never on a bus.
 inline constexpr std::string_view kChecksums = "CHECKSUMS";
 inline constexpr std::string_view kDamaged = "DAMAGED";
 
@@ -54,7 +54,7 @@ inline constexpr std::string_view kAnchorRequestPrefix = "ANCHOR_REQUEST_";
 inline constexpr std::string_view kShownAnchorsPrefix = "SHOWN_ANCHORS_";
 inline constexpr std::string_view kLinkUpPrefix = "LINK_UP_";
 inline constexpr std::string_view kLinkDownPrefix = "LINK_DOWN_";
-// And each process.
+// Each process has a channel of its own: the prefix and its name.
 inline constexpr std::string_view kStatusPrefix = "STATUS_";
 inline constexpr std::string_view kAgainPrefix = "AGAIN_";
 inline constexpr std::string_view kOptionsPrefix = "OPTIONS_";
@@ -71,7 +71,7 @@ inline std::string Correction(int32_t agent_id) { return OfAgent(kCorrectionPref
 inline std::string Landmarks(int32_t agent_id) { return OfAgent(kLandmarksPrefix, agent_id); }
 inline std::string Others(int32_t agent_id) { return OfAgent(kOthersPrefix, agent_id); }
 inline std::string Anchor(int32_t agent_id) { return OfAgent(kAnchorPrefix, agent_id); }
-// 0: a tool on the server's bus.
+// Agent 0 is a tool on the server's bus.
 inline std::string AnchorRequest(int32_t agent_id) {
   return OfAgent(kAnchorRequestPrefix, agent_id);
 }
@@ -88,8 +88,8 @@ inline std::string Again(std::string_view process) {
   return fmt::format("{}{}", kAgainPrefix, process);
 }
 
-// The agent of "KEYFRAME_7" and its like, by the digits after `prefix`; 0 if there is anything
-// else.
+// The agent id in a channel name such as "KEYFRAME_7": the digits after `prefix`. 0 if the name has
+// another form.
 inline int32_t AgentOf(std::string_view channel, std::string_view prefix) {
   if (!channel.starts_with(prefix) || channel.size() > prefix.size() + 5) {
     return 0;

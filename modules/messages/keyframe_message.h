@@ -1,8 +1,8 @@
 #pragma once
 
-// KEYFRAME_k's two types as one: keyframe_t, and keyframe_2_t where there is something to say that
-// the former cannot. Decodes both; encodes the former where that is enough, so that what was
-// written before keeps its bytes.
+// The two message types of KEYFRAME_k as one: keyframe_t, and keyframe_2_t, which has more fields.
+// Decodes both. Encodes keyframe_t unless one of the additional fields is set, so that keyframes
+// without them keep the bytes of earlier versions.
 
 #include <cstdint>
 
@@ -10,13 +10,13 @@
 
 namespace pangea {
 
-// With the functions of an lcm-gen type.
+// Has the functions of an lcm-gen type.
 struct KeyframeMessage : keyframe_t {
-  // As in keyframe_2_t.
+  // The additional fields of keyframe_2_t.
   double scale_sigma = 0;
   double T_body_cam_covariance[36] = {};
 
-  // Whether the bytes begin as one of the two does.
+  // Whether the eight bytes from `begin` on are the fingerprint of one of the two types.
   static bool BeginsOne(const uint8_t* begin);
 
   int encode(void* buf, int offset, int maxlen) const;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The border: LCM messages become domain types here, bounded and finite, or are refused with a
-// reason. Past it nothing checks again.
+// LCM messages become domain types here, and back. Parse checks that every field is finite and
+// within bounds, or refuses the message with a reason. After it, no code checks again.
 
 #include <optional>
 #include <string>
@@ -30,7 +30,8 @@ struct Parsed {
   std::string refused;  // why there is no value
 };
 
-// What a process runs with: the text is read as options, and checked, by who knows them.
+// The options of a running process. The text is not parsed here, because only the process' own
+// module knows the keys.
 struct ProcessOptions {
   std::string process;
   int64_t utime = 0;  // wall clock of the process' start
@@ -48,7 +49,7 @@ constraint_t ToMessage(const Constraint& constraint);
 correction_t ToMessage(const Correction& correction);
 landmarks_t ToMessage(const MapLandmarks& landmarks);
 others_t ToMessage(const Others& others);
-// At most 500 keyframes a chunk.
+// Cuts the state into chunks of at most 500 keyframes, for state_chunks.h to join.
 std::vector<map_state_t> ToMessages(const MapState& state);
 
 Parsed<MapId> Parse(const map_id_t& message);
@@ -62,7 +63,7 @@ Parsed<Correction> Parse(const correction_t& message);
 Parsed<MapLandmarks> Parse(const landmarks_t& message);
 Parsed<Others> Parse(const others_t& message);
 Parsed<ProcessOptions> Parse(const options_t& message);
-// One chunk as a MapState of its own.
+// Returns one chunk as a MapState.
 Parsed<MapState> Parse(const map_state_t& message);
 
 }  // namespace pangea

@@ -1,6 +1,6 @@
 #pragma once
 
-// Range checks and conversions that the two halves of messages (keyframes, the rest) share.
+// Range checks and conversions that the files of this module share.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -13,9 +13,9 @@
 
 namespace pangea::messages_checks {
 
-// Nothing in a building is further than this from where its agent started, metres.
+// Largest coordinate of a position, metres: no building is larger.
 inline constexpr double kMaxDistance = 1e5;
-// Keyframes of one map: months of walking.
+// Largest seq of a keyframe: this would take months of walking.
 inline constexpr int32_t kMaxSeq = 10'000'000;
 
 template <typename T>
@@ -29,7 +29,8 @@ inline bool Bounded(const Eigen::Vector3d& v, double limit) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= limit;
 }
 
-// Symmetric with a positive diagonal is checked here; positive definiteness by Cholesky.
+// Parses a row-major covariance. Nothing unless it is finite, bounded, symmetric and, by Cholesky,
+// positive definite.
 template <int N>
 std::optional<Eigen::Matrix<double, N, N>> ToCovariance(const double* values) {
   const Eigen::Matrix<double, N, N> m =

@@ -15,7 +15,8 @@ using namespace messages_checks;
 namespace {
 
 constexpr double kPixelScale = 16.0;
-// Of position to accelerometer bias, half the duration squared, after an hour.
+// The largest entry is d(position)/d(accelerometer bias), half the duration squared; after an hour
+// this is 6.5e6 s^2.
 constexpr double kMaxBiasJacobian = 1e7;
 
 using Vector36 = Eigen::Matrix<double, 36, 1>;
@@ -80,7 +81,7 @@ void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
   m->num_tracked = static_cast<int16_t>(m->tracked_corner.size());
 }
 
-// Returns what is wrong, or an empty string.
+// Returns why the corners are refused, or an empty string.
 std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
   if (m.num_corners < 0 || m.num_corners > kMaxCorners) {
     return fmt::format("num_corners {} out of 0 to {}", m.num_corners, kMaxCorners);

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMaxSources = 8;
 constexpr int kMaxLandmarks = 64;
 constexpr double kMaxSigma_m = 100;
-constexpr double kMinDistance_m = 0.01;  // from its source
+constexpr double kMinDistance_m = 0.01;  // of a landmark from its source's camera
 static_assert(sizeof(map_landmark_t::descriptor) == sizeof(Descriptor));
 
 Eigen::Vector3d ToVector(const float* v) { return Eigen::Vector3f::Map(v).cast<double>(); }

@@ -1,9 +1,9 @@
 #pragma once
 
-// Puts a group's state, which crosses the bus in chunks (map_state_t), together again.
+// Joins the chunks (map_state_t) in which a group's state crosses the bus.
 //
-// In: chunks in any order, repeats allowed. Out: each whole state once. Bounded: of more than
-// kMaxPending states that lack a chunk, or kMaxChunks of their chunks, the one with the lowest
+// In: chunks in any order, repeats allowed. Out: whole states. Bounded: at most kMaxPending states
+// that lack a chunk, with at most kMaxChunks chunks in all; beyond that, the state with the lowest
 // revision is dropped.
 
 #include <map>
@@ -19,13 +19,14 @@ class StateChunks {
   static constexpr size_t kMaxPending = 100;
   static constexpr size_t kMaxChunks = 5000;  // 200 MB
 
-  // The whole state when this was the last chunk it lacked; keyframes in the order of the chunks.
+  // Adds a chunk. Returns the whole state if no other chunk is missing; its keyframes are in the
+  // order of the chunks.
   std::optional<MapState> Add(int chunk, int num_chunks, MapState part);
 
   size_t pending() const { return pending_.size(); }
 
  private:
-  // Revisions increase over all groups, so one names a state.
+  // Revisions increase over all groups, so a revision identifies a state.
   std::map<std::pair<int64_t, MapId>, std::map<int, MapState>> pending_;
   size_t num_chunks_ = 0;
 };

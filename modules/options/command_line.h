@@ -5,20 +5,20 @@
 
 namespace pangea {
 
-// Parses the command line, which runs its subcommand (a callback of CLI11). What that throws
-// becomes one line on stderr, behind the program's name. The exit code: 0, 1, or CLI11's (above
-// 100).
+// Parses the command line and runs the subcommand (a callback of CLI11). An exception becomes one
+// line on stderr, after the program's name. Returns the exit code: 0, 1, or that of CLI11 (above
+// 100) for a wrong command line.
 int RunSubcommand(CLI::App& app, int argc, char** argv);
 
-// Whether all that was printed is written, as a full disk does not let it; else a line on stderr,
-// behind the program's name.
+// Flushes stdout. False, with a line on stderr, if not all output could be written (a full disk).
 bool OutputIsWritten(const std::string& program);
 
-// Throws std::runtime_error where two options name one LCM URL: what is relayed would come back.
+// Throws std::runtime_error if two options have the same LCM URL: what is relayed from one bus to
+// the other would come back.
 void RequireTwoUrls(const std::string& option, const std::string& url,
                     const std::string& other_option, const std::string& other_url);
 
-// For an option's check(): finite, and above 0; or not below. CLI11's own let nan pass.
+// For an option's check(): a finite number that is > 0, or >= 0. CLI11's own validators accept NaN.
 CLI::Validator Positive();
 CLI::Validator NotNegative();
 

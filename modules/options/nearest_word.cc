@@ -34,7 +34,7 @@ std::optional<std::string> NearestWord(const std::string& word,
                                         [&word](const std::string& a, const std::string& b) {
                                           return EditDistance(a, word) < EditDistance(b, word);
                                         });
-  // Half of a short word, or two slips of a long one, may be wrong.
+  // Two edits, or edits of half the word's length if that is more, still count as near.
   const bool is_near = nearest != known.end() &&
                        EditDistance(*nearest, word) <= std::max<size_t>(2, word.size() / 2);
   return is_near ? std::optional(*nearest) : std::nullopt;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which known word did they mean? For messages about keys and names that are not known.
+// Finds the known word that a person probably meant, for messages about unknown keys and names.
 
 #include <optional>
 #include <string>
@@ -8,13 +8,12 @@
 
 namespace pangea {
 
-// Nothing when none is near.
+// The known word with the smallest edit distance; nothing if none is near.
 std::optional<std::string> NearestWord(const std::string& word,
                                        const std::vector<std::string>& known);
 
-// "; did you mean 'faults'?" when a known word is near, with `prefix` before it ("agents[0]."),
-// else
-// "; known are a, b, c".
+// "; did you mean 'faults'?" if a known word is near, else "; known are a, b, c". `prefix`, such as
+// "agents[0].", comes before the suggested word.
 std::string NearestWordHint(const std::string& word, const std::vector<std::string>& known,
                             const std::string& prefix = "");
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// --options FILE and --print-options of a program.
+// The arguments --options FILE and --print-options of a program.
 
 #include <CLI/CLI.hpp>
 #include <string>
@@ -11,14 +11,14 @@ namespace pangea {
 
 class OptionsArguments {
  public:
-  // Must outlive the parsing of the command line.
+  // Adds the arguments to `app`. This object must outlive the parsing of the command line.
   explicit OptionsArguments(CLI::App& app);
 
-  // The file, if one was given. Throws std::runtime_error.
+  // Reads the file into `yaml` if one was given. Throws std::runtime_error.
   void Read(YamlOptions* yaml) const;
-  // Whether the options were to be printed, and are: then the program has done its work.
+  // If --print-options was given, prints the options and returns true: the program should then end.
   bool Printed(const YamlOptions& yaml) const;
-  // Where they are from, for people: "options as compiled in".
+  // Where the options come from, for people; for example "options as compiled in".
   std::string Source() const;
 
  private:

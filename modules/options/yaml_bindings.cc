@@ -1,4 +1,4 @@
-// What YamlOptions binds: how each kind of value is read and printed.
+// The part of YamlOptions that binds values: how each kind of value is read and printed.
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -18,7 +18,7 @@ std::string RangeText(const std::string& of, double low, double high) {
   return fmt::format("{} from {} to {}", of, low, high);
 }
 
-// "0.001 to 100 m: of the worst direction".
+// For example "0.001 to 100 m: of the worst direction".
 std::string HelpText(const OptionBounds& bounds, const std::string& unit, const std::string& help) {
   return fmt::format("{} to {}{}{}{}{}", bounds.low, bounds.high, unit.empty() ? "" : " ", unit,
                      help.empty() ? "" : ": ", help);

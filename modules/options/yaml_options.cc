@@ -15,7 +15,8 @@
 namespace pangea {
 namespace {
 
-// The right name in the wrong section is the likeliest slip; else a slip in the name itself.
+// Suggests a known path. The most likely mistake is the right name in the wrong section, the next
+// one a misspelt name.
 std::string PathHint(const std::string& path, const std::string& key, const std::string& above,
                      const std::vector<std::string>& keys,
                      const std::map<std::string, std::string>& values) {
@@ -129,7 +130,7 @@ std::vector<std::string> YamlOptions::ReadKnown(const std::string& text, const s
   return unknown;
 }
 
-// Of this node, which changes, and its sections.
+// Removes the unknown keys from the node and its sections, and appends them to `unknown`.
 void YamlOptions::TakeUnknown(YAML::Node node, const std::string& path,
                               std::vector<std::string>* unknown) const {
   if (!node.IsMap()) {

@@ -1,11 +1,11 @@
 #pragma once
 
-// Options on disk: YAML keys bound to the members of plain structs, strictly. An unknown or doubled
-// key, a wrong type, a value out of its bounds and a missing required key are errors that name
-// file, line and key, and for an unknown key the nearest known one.
+// Reads options from YAML files: keys are bound to the members of plain structs. Reading is strict:
+// an unknown or repeated key, a wrong type, a value out of bounds and a missing required key are
+// errors. The message names file, line and key, and for an unknown key the nearest known one.
 //
-// An options struct is described once, by its Visit: key, bounds, unit, a line of help. Visit is a
-// template, so that the struct need not know this file:
+// An options struct describes its members in its Visit: key, bounds, unit, a line of help. Visit is
+// a template, so that the struct need not include this file:
 //
 //   struct FusionOptions {
 //     int min_inliers = 16;
@@ -41,7 +41,7 @@ class Node;
 
 namespace pangea {
 
-// Both are taken.
+// The allowed range of a value; both ends are allowed.
 struct OptionBounds {
   double low = 0;
   double high = 0;
@@ -54,7 +54,7 @@ class YamlOptions {
   YamlOptions(YamlOptions&&) noexcept;
   YamlOptions& operator=(YamlOptions&&) noexcept;
 
-  // With what people are told beside the value: `unit` (empty for a count or a share), `help`.
+  // Bind a key to a value. `unit` (empty for a count or a share) and `help` are printed for people.
   void Add(const std::string& key, int32_t* value, const OptionBounds& bounds,
            const std::string& unit, const std::string& help);
   void Add(const std::string& key, int64_t* value, const OptionBounds& bounds,
@@ -66,18 +66,18 @@ class YamlOptions {
   void Add(const std::string& key, uint64_t* value);
   void Add(const std::string& key, std::string* value);
 
-  // From `low` to `high`, both taken.
+  // Values from `low` to `high`, both ends allowed.
   void AddBetween(const std::string& key, double low, double high, double* value);
   void AddBetween(const std::string& key, int32_t low, int32_t high, int32_t* value);
   void AddBetween(const std::string& key, double low, double high,
-                  std::optional<double>* value);  // "~": none
+                  std::optional<double>* value);  // "~" in the file: no value
   // A list of two numbers, both from `low` to `high`.
   void AddPairBetween(const std::string& key, double low, double high, double* first,
                       double* second);
-  // At most so many bytes.
+  // A text of at most `max_bytes` bytes.
   void AddText(const std::string& key, size_t max_bytes, std::string* value);
 
-  // An enum by names.
+  // An enum; the file has the names of its values.
   template <typename Enum>
   void AddChoice(const std::string& key, Enum* value,
                  std::vector<std::pair<std::string, Enum>> choices, const std::string& help = "") {
@@ -98,15 +98,16 @@ class YamlOptions {
         help);
   }
 
-  // A nested struct: bind its members to what this returns (valid as long as *this).
+  // A nested struct: bind its members to the returned section, which is valid as long as *this.
   YamlOptions& Section(const std::string& key, const std::string& help = "");
-  // One that describes itself.
+  // A nested struct that has a Visit.
   template <typename T>
   void Section(const std::string& key, T* value, const std::string& help) {
     value->Visit(Section(key, help));
   }
 
-  // A list of structs, each bound by `bind(yaml, item)`; the file's list replaces the default.
+  // A list of structs; `bind(yaml, item)` binds the members of an item. A list in the file replaces
+  // the default list.
   template <typename T, typename BindItem>
   void AddList(const std::string& key, std::vector<T>* items, BindItem bind) {
     AddSequence(
@@ -118,7 +119,8 @@ class YamlOptions {
         [items, bind] { return BindAll(items, bind); });
   }
 
-  // A struct that need not be there: a section bound by `bind(yaml, value)`, or no value.
+  // An optional struct: if the file has its section, `bind(yaml, value)` binds the members; else it
+  // has no value.
   template <typename T, typename BindValue>
   void AddOptional(const std::string& key, std::optional<T>* value, BindValue bind) {
     AddOptionalSection(
@@ -147,17 +149,17 @@ class YamlOptions {
   // them with their values, "window.size 5".
   std::vector<std::string> ReadKnown(const std::string& text, const std::string& name);
 
-  // One value by its path, "window.num_keyframes"; the text is as in a file. Throws
-  // std::runtime_error, and names the nearest path that is known.
+  // Sets one value by its path, such as "window.num_keyframes", from a text as in a file. Throws
+  // std::runtime_error; for an unknown path the message names the nearest known one.
   void Set(const std::string& path, const std::string& text);
-  // The section of that key; nullptr if there is none.
+  // The section with this key; null if there is none.
   YamlOptions* FindSection(const std::string& key);
 
-  // All keys with their values now, as YAML; bounds, unit and help stand beside them as comments.
+  // All keys with their current values, as YAML, with bounds, unit and help as comments.
   std::string Print() const;
   std::string PrintWithoutHelp() const;
   std::vector<std::string> Keys() const;
-  // By path, those of sections included.
+  // The text of all values by path, with those of sections.
   std::map<std::string, std::string> Values() const;
 
  private:
@@ -181,7 +183,7 @@ class YamlOptions {
                           std::function<std::optional<YamlOptions>()> current);
   template <typename T>
   void AddScalar(const std::string& key, const std::string& type, T* value);
-  // `of`: "a number", for messages.
+  // `of`: the kind of value, such as "a number", for messages.
   template <typename T>
   void AddNumber(const std::string& key, const std::string& of, T low, T high, T* value);
   Entry& NewEntry(const std::string& key);

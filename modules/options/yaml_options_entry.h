@@ -1,6 +1,6 @@
 #pragma once
 
-// One bound key. For yaml_options only.
+// One bound key of YamlOptions. Private to yaml_options.
 
 #include <functional>
 #include <memory>
@@ -13,11 +13,11 @@ namespace pangea {
 struct YamlOptions::Entry {
   std::string key;
   bool required = false;
-  // (node, file, path of the key for messages)
+  // Called with (node, file name, path of the key); the latter two are for messages.
   std::function<void(const YAML::Node&, const std::string&, const std::string&)> read;
-  // What stands behind "key:", newline included; " # help" comes before the first newline.
+  // Returns the text after "key:", with its newline; " # help" comes before the first newline.
   std::function<std::string(const Style&)> print;
-  std::string help;  // with bounds and unit; empty for none
+  std::string help;  // includes bounds and unit; empty: no help
   std::unique_ptr<YamlOptions> section;
 };
 

@@ -25,7 +25,7 @@ std::string ScalarText(int32_t value) { return fmt::format("{}", value); }
 std::string ScalarText(int64_t value) { return fmt::format("{}", value); }
 std::string ScalarText(uint64_t value) { return fmt::format("{}", value); }
 
-// The shortest text that reads back the same, and always a float to the eye.
+// The shortest text that reads back the same. It always looks like a floating-point number.
 std::string ScalarText(double value) {
   std::string text = fmt::format("{}", value);
   if (text == "inf") {

@@ -1,7 +1,7 @@
 #pragma once
 
-// One value of a YAML file, read strictly and printed so that it reads back the same. For
-// yaml_options only.
+// Reads one value of a YAML file strictly, and prints it so that it reads back the same. Private to
+// yaml_options.
 
 #include <yaml-cpp/yaml.h>
 
@@ -11,10 +11,10 @@
 
 namespace pangea {
 
-// "file:line", as far as known.
+// "file:line", as far as they are known.
 std::string Where(const std::string& file, const YAML::Node& node);
 
-// std::runtime_error: the key at `path` must be what is expected.
+// Throws a std::runtime_error which says that the key at `path` must be `expected`.
 [[noreturn]] void ThrowType(const YAML::Node& node, const std::string& file,
                             const std::string& path, const std::string& expected);
 
@@ -25,12 +25,12 @@ std::string ScalarText(uint64_t value);
 std::string ScalarText(double value);
 std::string ScalarText(const std::string& value);
 
-// `type` tells people what is expected.
+// Throws as ThrowType unless the node is a T. `type`: the expected kind of value, for the message.
 template <typename T>
 T ScalarValue(const YAML::Node& node, const std::string& file, const std::string& path,
               const std::string& type) {
   T value{};
-  // yaml-cpp tags quoted scalars "!": a quoted number is a string.
+  // yaml-cpp gives quoted scalars the tag "!": a quoted number is a string.
   const bool quoted_number = !std::is_same_v<T, std::string> && node.Tag() == "!";
   if (!node.IsScalar() || quoted_number || !YAML::convert<T>::decode(node, value)) {
     ThrowType(node, file, path, type);
@@ -38,7 +38,7 @@ T ScalarValue(const YAML::Node& node, const std::string& file, const std::string
   return value;
 }
 
-// Finite, and from `low` to `high`.
+// The same, and the value must be finite and from `low` to `high`.
 template <typename T>
 T ValueBetween(const YAML::Node& node, const std::string& file, const std::string& path,
                const std::string& type, T low, T high) {

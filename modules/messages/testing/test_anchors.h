@@ -1,6 +1,6 @@
 #pragma once
 
-// Anchors for tests: valid, the same for the same arguments.
+// Valid anchors for tests. The same arguments give the same anchor.
 
 #include "messages/anchor_messages.h"
 

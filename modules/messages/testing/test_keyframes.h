@@ -1,6 +1,6 @@
 #pragma once
 
-// Keyframes for tests: valid, of realistic size, the same for the same id.
+// Valid keyframes of realistic size for tests. The same id gives the same keyframe.
 
 #include <random>
 
