@@ -14,10 +14,10 @@ namespace pangea {
 // when it fails.
 void SyncToDisk(const std::filesystem::path& path);
 
-inline constexpr mode_t kOwnerOnly = 0600;  // of keys, invites, images of people
+inline constexpr mode_t kOwnerOnly = 0600;  // for keys, invites, images of people
 
-// A new file with this mode. False, and nothing is changed, if there is one of that name. Throws
-// std::runtime_error when it cannot be written.
+// Writes a new file with this mode. False, and nothing is changed, if the name exists already.
+// Throws std::runtime_error when it cannot be written.
 bool WriteNewFile(const std::filesystem::path& file, std::string_view text, mode_t mode);
 // The same, but replaces a file that exists already.
 void ReplaceFile(const std::filesystem::path& file, std::string_view text, mode_t mode);

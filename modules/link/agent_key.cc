@@ -52,7 +52,7 @@ struct OpenFile {
   const int fd;
 };
 
-// Of an open file, so that what is checked is what is read.
+// Checks the open file and not its path, so that the file which is checked is the one that is read.
 void Check(const fs::path& file, int fd) {
   struct stat info {};
   if (fd < 0 || fstat(fd, &info) != 0) {
@@ -69,7 +69,7 @@ void Check(const fs::path& file, int fd) {
   }
 }
 
-// A text that is wiped when it goes.
+// A text that is wiped from memory when it is destroyed.
 struct SecretText {
   ~SecretText() { sodium_memzero(bytes.data(), bytes.size()); }
   std::string_view view() const { return {bytes.data(), size}; }
@@ -99,7 +99,7 @@ std::optional<SecretKey> FromHex(std::string_view text) {
   return key;
 }
 
-// What follows "name:" and blanks in the line, if it is of that name.
+// If the line begins with "name:", the text after it, without blanks around it.
 std::optional<std::string_view> ValueOf(std::string_view line, std::string_view name) {
   if (!line.starts_with(name) || line.substr(name.size()).substr(0, 1) != ":") {
     return std::nullopt;
@@ -110,7 +110,7 @@ std::optional<std::string_view> ValueOf(std::string_view line, std::string_view 
   return line;
 }
 
-// Of the line "anchors: WORD".
+// The right that the line "anchors: WORD" gives.
 AnchorRight ReadRight(const fs::path& file, std::string_view word) {
   const auto right = AnchorRightOf(word);
   if (!right) {
@@ -139,7 +139,7 @@ std::string WordOf(AnchorRight right) {
 }
 
 std::string ToHex(const SecretKey& key) {
-  std::string hex(kHexBytes + 1, '\0');  // with the end that C wants
+  std::string hex(kHexBytes + 1, '\0');  // sodium_bin2hex also writes a final 0
   sodium_bin2hex(hex.data(), hex.size(), key.bytes().data(), key.bytes().size());
   hex.resize(kHexBytes);
   return hex;
@@ -246,7 +246,8 @@ std::optional<AgentKey> KeyFolder::ReadOrLast(const fs::path& file) {
   return last == nullptr ? std::nullopt : std::optional(*last);
 }
 
-// Of two keys of an agent the one that counted last counts, then the one of the usual name.
+// Of two keys of an agent, the one that the last Read returned is preferred, then the one with the
+// usual file name.
 int KeyFolder::Rank(const fs::path& file, int32_t agent_id) const {
   const auto last = files_.find(agent_id);
   return last != files_.end() && last->second == file         ? 2

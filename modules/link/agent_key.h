@@ -1,9 +1,9 @@
 #pragma once
 
-// An agent's pre-shared key as a file: text, mode 0600, made by `pangea-agent-handler keygen`. The
-// agent has one, the server a folder of them. The server's copy also says what its agent may do
-// with anchors, `anchors: read | own | write`: see them, edit those it made (also without the
-// line), edit all.
+// An agent's pre-shared key in a text file (mode 0600), made by `pangea-agent-handler keygen`. The
+// agent has its own key file, the server a folder with those of all agents. The server's copy also
+// says what the agent may do with anchors: `anchors: read` (only see them), `own` (edit those that
+// it made; also the default) or `write` (edit all).
 
 #include <cstdint>
 #include <filesystem>
@@ -24,50 +24,51 @@ struct AgentKey {
   AnchorRight anchors = AnchorRight::kEditOwn;
 };
 
-// "read", "own" or "write"; nothing of another word.
+// The right for "read", "own" or "write"; nothing for another word.
 std::optional<AnchorRight> AnchorRightOf(std::string_view word);
 std::string WordOf(AnchorRight right);
 
-// 64 hexadecimal digits, as in the file.
+// The key as 64 hexadecimal digits, as in the file.
 std::string ToHex(const SecretKey& key);
 
 // "agent_4.key"
 std::string KeyFileName(int32_t agent_id);
 
-// A new random key; the file is there whole or not at all. Throws std::runtime_error if it exists
-// or cannot be written.
+// Writes a file with a new random key, atomically. Throws std::runtime_error if the file exists or
+// cannot be written.
 void MakeKeyFile(const std::filesystem::path& file, int32_t agent_id,
                  AnchorRight anchors = AnchorRight::kEditOwn);
 
-// Throws std::runtime_error that names the file and the mend: missing, readable by others,
-// malformed.
+// Throws std::runtime_error if the file is missing, readable by others or malformed. The message
+// names the file and says what to do.
 AgentKey ReadKeyFile(const std::filesystem::path& file);
-// ... or another agent's.
+// The same; also throws if the key is another agent's.
 SecretKey ReadKeyFileOf(const std::filesystem::path& file, int32_t agent_id);
 
-// The *.key files of a folder. Looked at again, it says whether anything has changed, so that
-// agents can be let in and shut out while the server runs.
+// The *.key files of a folder. It can be checked for changes, so that agents are admitted and
+// removed while the server runs.
 class KeyFolder {
  public:
-  static constexpr size_t kMaxKeys = 1000;  // that a server takes
+  static constexpr size_t kMaxKeys = 1000;  // a server accepts no more
 
   explicit KeyFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  // Throws std::runtime_error: no such folder. A file that cannot be used lets nobody in, and its
-  // agent not out: it may be half written. Of two keys of an agent the one that it has counts.
+  // Returns the keys by agent. Throws std::runtime_error if there is no such folder. A file that
+  // cannot be used may be half written: its key from the last Read, if any, stays valid. If an
+  // agent has two keys, the one that the last Read returned stays valid.
   std::map<int32_t, AgentKey> Read();
-  // For people: each file that the last Read could not use, a second key of an agent too, and the
-  // mend.
+  // For people: each file that the last Read could not use, also a second key of an agent, and what
+  // to do.
   const std::vector<std::string>& unusable() const { return unusable_; }
-  // Whether files have come, gone or changed since the last Read, or wait to be mended.
+  // Whether files were added, removed or changed since the last Read, or some were not usable.
   bool Changed() const;
-  // Whether the file is gone that the last Read had the agent's key from.
+  // Whether the file from which the last Read took the agent's key no longer exists.
   bool IsGone(int32_t agent_id) const;
 
  private:
   using Stamps = std::map<std::filesystem::path, std::filesystem::file_time_type>;
   Stamps Look() const;
-  // Null where the last Read had none from this file.
+  // The key that the last Read took from this file; null if none.
   const AgentKey* LastOf(const std::filesystem::path& file) const;
   std::optional<AgentKey> ReadOrLast(const std::filesystem::path& file);
   int Rank(const std::filesystem::path& file, int32_t agent_id) const;
@@ -75,7 +76,7 @@ class KeyFolder {
   std::filesystem::path folder_;
   Stamps seen_;
   std::map<int32_t, std::filesystem::path> files_;
-  std::map<int32_t, AgentKey> keys_;  // as last read
+  std::map<int32_t, AgentKey> keys_;  // the result of the last Read
   std::vector<std::string> unusable_;
 };
 

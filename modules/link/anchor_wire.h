@@ -1,7 +1,7 @@
 #pragma once
 
-// What crosses the agent link of anchors: bodies of packets, laid out as wire.h says. Past Parse
-// every field is bounded. Each body fits one Ethernet frame.
+// The bodies of link packets about anchors; wire.h describes their layout. After Parse every field
+// is within bounds. Each body fits one Ethernet frame.
 
 #include <cstdint>
 #include <vector>
@@ -11,26 +11,27 @@
 
 namespace pangea {
 
-// Of an encoded anchor_edit_t or anchor_t with the longest name and payload there may be.
+// Bound for an encoded anchor_edit_t or anchor_t with the longest allowed name and payload.
 inline constexpr int kMaxAnchorBytes = 1400;
 inline constexpr int kMaxAnchorNumberBytes = 9;
 static_assert(kMaxAnchorBytes + kMaxAnchorNumberBytes < kFramePayloadBytes);
 inline constexpr size_t kMaxAnchorsReceived = 128;
 inline constexpr size_t kMaxAnchorEditAnswers = 60;
-// Edits up, and anchors down, at most: bytes on the wire per second, repeats included.
+// Largest rate of edits up, and of anchors down, per agent: bytes per second on the wire, with
+// repeats.
 inline constexpr double kAnchorBytesPerSecond = 4000;
 
-// Where an anchor is, as the number-th content that this agent's anchors had.
+// The state of an anchor, with a number that counts the states sent to this agent.
 struct LinkAnchor {
-  int64_t number = 0;  // from 1; the highest of an anchor counts
+  int64_t number = 0;  // from 1; of two states of an anchor, the one with the higher number counts
   AnchorState state;
 };
 
-// What became of an edit.
+// The server's answer to an edit.
 struct AnchorEditAnswer {
   AnchorId anchor;
   int64_t revision = 0;
-  bool journalled = false;  // false: refused, and not to be sent again
+  bool journalled = false;  // false: the edit was refused and must not be sent again
 };
 
 std::vector<uint8_t> EncodeAnchorEdit(const AnchorEdit& edit);
@@ -39,7 +40,7 @@ std::vector<uint8_t> EncodeAnchor(int64_t number, Bytes message);
 std::vector<uint8_t> EncodeAnchorsReceived(const std::vector<int64_t>& numbers);
 std::vector<uint8_t> EncodeAnchorEditAnswers(const std::vector<AnchorEditAnswer>& answers);
 
-// `agent_id`: whose link it came over, and whose edit, or map, it has to be.
+// `agent_id`: the agent of the link. The edit, or the anchor's map, must be this agent's.
 Parsed<AnchorEdit> ParseAnchorEdit(int32_t agent_id, Bytes body);
 Parsed<LinkAnchor> ParseAnchor(int32_t agent_id, Bytes body);
 Parsed<std::vector<int64_t>> ParseAnchorsReceived(Bytes body);

@@ -1,8 +1,8 @@
 #pragma once
 
-// Compact bodies of link packets: fixed-size little-endian values and variable-length integers.
-// The reader never throws and never reads past the end: after an error everything is zero or
-// empty, and ok() is false.
+// Writes and reads compact bodies of link packets: fixed-size little-endian values and
+// variable-length integers. The reader never throws and never reads past the end: after an error
+// all values are zero or empty, and ok() is false.
 
 #include <bit>
 #include <concepts>
@@ -26,7 +26,7 @@ class WireWriter {
     const auto* begin = reinterpret_cast<const uint8_t*>(&value);
     bytes_.insert(bytes_.end(), begin, begin + sizeof(T));
   }
-  // Seven bits a byte, the lowest first.
+  // Seven bits per byte, the lowest bits first.
   void Varint(uint64_t value) {
     for (; value >= 0x80; value >>= 7) {
       bytes_.push_back(static_cast<uint8_t>(value | 0x80));
@@ -60,7 +60,7 @@ class WireReader {
     }
     return value;
   }
-  // At most `max`; more is an error.
+  // A value above `max` is an error.
   uint64_t Varint(uint64_t max) {
     uint64_t value = 0;
     for (int shift = 0; shift < 64; shift += 7) {
@@ -91,7 +91,7 @@ class WireReader {
   Bytes Rest() { return Raw(rest_.size()); }
 
   bool ok() const { return ok_; }
-  // Everything was read, and nothing but what is there.
+  // All bytes were read, without an error.
   bool AtEnd() const { return ok_ && rest_.empty(); }
 
  private:

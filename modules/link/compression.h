@@ -1,7 +1,7 @@
 #pragma once
 
-// Keyframes on the link, compressed by zstd. Descriptors, three quarters of a keyframe, hardly give
-// way; the rest halves (docs/decisions/link_security.md).
+// Compression of keyframes on the link, by zstd. Descriptors, three quarters of a keyframe, hardly
+// compress; the rest shrinks to half its size (docs/decisions/link_security.md).
 
 #include <cstdint>
 #include <optional>
@@ -12,8 +12,8 @@
 namespace pangea {
 
 std::vector<uint8_t> Compress(Bytes data);
-// Nothing if it is damaged, or would be larger than `max_bytes`; no memory is taken before that is
-// known.
+// Nothing if the data are damaged or would be larger than `max_bytes`. The size is checked before
+// any memory is allocated.
 std::optional<std::vector<uint8_t>> Decompress(Bytes compressed, size_t max_bytes);
 
 }  // namespace pangea

@@ -28,7 +28,7 @@ SealNonce NonceOf(int64_t number) {
   return nonce;
 }
 
-// Hellos and welcomes: few, and not numbered in a session; so each has a random nonce.
+// Hellos and welcomes have random nonces, because they are few and have no number in a session.
 std::vector<uint8_t> SealHandshake(const SecretKey& key, LinkKind kind, Bytes body) {
   const SealNonce nonce = RandomNonce();
   WireWriter clear;
@@ -68,7 +68,7 @@ std::optional<LinkPacket> SessionKey::Open(Bytes bytes, std::string* refused) {
   }
   const int64_t number =
       window.Expand(static_cast<uint32_t>(bytes[1] | (bytes[2] << 8) | (bytes[3] << 16)));
-  // Looked at first, as it costs nothing; believed only of what opens.
+  // Freshness is checked first, because this is cheap; the number is trusted only after opening.
   const bool fresh = window.IsFresh(number);
   auto body = fresh ? OpenSealed(key, NonceOf(number), bytes, kSessionClearBytes) : std::nullopt;
   if (!body) {
@@ -134,7 +134,7 @@ UplinkSession::Opened UplinkSession::OnWelcome(Bytes bytes) {
   if (handler_run == handler_run_) {
     return {};
   }
-  // Hellos still under way do not name the new run; what answers them comes too late.
+  // Hellos that are still under way do not have the new run; welcomes to them must be refused.
   answered_hello_ = last_hello_;
   handler_run_ = handler_run;
   up_ = KeyOf(agent_key_, "up", agent_id_, run_, handler_run_);

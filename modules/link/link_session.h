@@ -1,15 +1,17 @@
 #pragma once
 
-// Both ends' sessions of the agent link: which packets are opened, and under which key.
+// The sessions of both ends of the agent link: which packets are accepted, and under which key.
 //
-// A hello is sealed under the agent's pre-shared key. It carries the uplink's run, drawn at random
-// at its start, and the handler's run it believes in. A handler that does not know this pair
-// answers with a welcome: a random run it has never used, and the number of the hello, so that only
-// a fresh welcome counts. A hello that names this new run proves that its uplink is alive now:
-// from then on everything else is sealed under keys derived from both runs, each packet with a
-// number of its own. Nothing recorded before can be opened any more, after restarts neither.
+// A hello is sealed under a key derived from the agent's pre-shared key. It has the uplink's run (a
+// random number drawn at its start) and the handler's run that the uplink last learnt. If the
+// handler does not know this pair, it answers with a welcome: a new random run, and the number of
+// the hello, so that the uplink accepts only fresh welcomes. A hello with this new run proves that
+// its uplink is alive now. From then on all other packets are sealed under keys derived from both
+// runs, each with its own number. So packets recorded earlier can never be replayed, also not after
+// restarts.
 //
-// State machines: bytes in, bytes out; no clock, no bus, one thread. Randomness is libsodium's.
+// State machines: bytes in, bytes out; no clock, no bus; not thread safe. Random numbers are
+// libsodium's.
 
 #include <cstdint>
 #include <optional>
@@ -20,11 +22,11 @@
 
 namespace pangea {
 
-// First byte of a packet. Up: to 15; down: from 16.
+// The first byte of a packet: up to 15 from the uplink, from 16 on from the handler.
 enum class LinkKind : uint8_t {
   kHello = 1,
-  kPiece = 2,      // of a keyframe
-  kLastPiece = 3,  // of a keyframe: its index says how many there are
+  kPiece = 2,      // a piece of a keyframe
+  kLastPiece = 3,  // the last piece of a keyframe: its index tells the number of pieces
   kPose = 4,
   kAnchorEdit = 5,
   kAnchorsReceived = 6,
@@ -38,27 +40,27 @@ enum class LinkKind : uint8_t {
 
 struct LinkPacket {
   LinkKind kind = LinkKind::kHello;
-  int64_t number =
-      0;  // of this transmission, from 1; up: in the uplink's run, down: in the session
+  // Number of this transmission, from 1: counts in the uplink's run (up) or in the session (down).
+  int64_t number = 0;
   std::vector<uint8_t> body;
 };
 
-// Of a packet in a session: kind, low bits of the number, tag.
+// Overhead of a packet in a session: kind, low bits of the number, tag.
 inline constexpr int kSessionOverheadBytes = 1 + 3 + kSealTagBytes;
 
-// What is larger is none of ours, and is not even opened.
+// Larger packets are not ours and are refused without opening them.
 inline constexpr size_t kMaxLinkPacketBytes = 40'000;
 
-// Why a hello is refused: it was sealed under another key, or changed on its way.
+// The reason when a hello cannot be opened: it was sealed under another key, or changed on its way.
 inline constexpr char kHelloNotOpened[] = "hello is forged or damaged";
 
-// One direction of a session.
+// The key of one direction of a session, and the numbers already received.
 struct SessionKey {
   SecretKey key;
   ReplayWindow window;
 
   std::vector<uint8_t> Seal(const LinkPacket& packet) const;
-  // Nothing, and why, unless it is whole, fresh and sealed under this key.
+  // Nothing, with the reason in `refused`, unless the packet is fresh and sealed under this key.
   std::optional<LinkPacket> Open(Bytes bytes, std::string* refused);
 };
 
@@ -67,12 +69,12 @@ class UplinkSession {
   UplinkSession(int32_t agent_id, const SecretKey& agent_key);
 
   struct Opened {
-    std::optional<LinkPacket> packet;  // of the session
-    bool new_session = false;          // what was said before may never have been heard
+    std::optional<LinkPacket> packet;  // a packet of the session
+    bool new_session = false;          // the handler may not have received what was sent before
     std::string refused;
   };
   Opened Open(Bytes bytes);
-  // A hello always; anything else once there is a session.
+  // A hello can always be sealed, other packets only in a session; else throws std::logic_error.
   std::vector<uint8_t> Seal(const LinkPacket& packet);
 
  private:
@@ -85,7 +87,7 @@ class UplinkSession {
   const uint64_t run_;
   uint64_t handler_run_ = 0;
   int64_t last_hello_ = 0;
-  int64_t answered_hello_ = 0;  // a welcome counts if it answers a later one
+  int64_t answered_hello_ = 0;  // only welcomes to later hellos are accepted
   std::optional<SessionKey> up_, down_;
 };
 
@@ -95,15 +97,15 @@ class HandlerSession {
 
   struct Opened {
     std::optional<LinkPacket> packet;
-    bool new_uplink = false;       // another run of the uplink than before
-    bool two_uplinks = false;      // ... which an earlier session was with: both are alive
-    std::vector<uint8_t> welcome;  // to be sent back, unless it is empty
+    bool new_uplink = false;       // the session is with another run of the uplink than before
+    bool two_uplinks = false;      // this run had an earlier session: two uplinks are alive
+    std::vector<uint8_t> welcome;  // to be sent back if not empty
     std::string refused;
   };
   Opened Open(Bytes bytes);
 
   bool HasUplink() const { return up_.has_value(); }
-  // Numbers the packets itself. Only with an uplink.
+  // Gives the packet its number. Throws std::logic_error without an uplink.
   std::vector<uint8_t> Seal(LinkKind kind, std::vector<uint8_t> body);
   const SecretKey& agent_key() const { return agent_key_; }
 
@@ -124,7 +126,7 @@ class HandlerSession {
   uint64_t uplink_run_ = 0;
   uint64_t earlier_uplink_run_ = 0;
   uint64_t run_ = 0;
-  uint64_t next_run_ = RandomNumber();  // offered in welcomes; used up by a session
+  uint64_t next_run_ = RandomNumber();  // offered in welcomes; each session uses a new one
   std::optional<SessionKey> up_, down_;
   int64_t last_number_ = 0;
 };

@@ -5,11 +5,11 @@
 namespace pangea {
 namespace {
 
-// Each keyframe carries the camera of its moment. Odometries refine extrinsics, time offset, focal
-// length, centre and radial distortion as they go, and a focusing lens moves focal length and
-// centre: from infinity to 10 cm, a phone's 7 mm lens by 7 per cent. Another lens, another size of
-// image or a zoom is another camera.
-constexpr double kMaxChange = 0.1;            // of the focal length
+// Each keyframe has the camera calibration at its time. An odometry refines extrinsics, time
+// offset, focal length, centre and radial distortion, and focusing changes focal length and centre:
+// by 7 per cent for a phone's 7 mm lens from infinity to 10 cm. Another lens, image size or zoom
+// counts as another camera.
+constexpr double kMaxChange = 0.1;            // share of the focal length
 constexpr double kMaxDistortionChange = 0.5;  // of the first two coefficients: five sigmas
 
 bool SameCamera(const CameraModel& a, const CameraModel& b) {

@@ -1,9 +1,9 @@
 #pragma once
 
-// What makes keyframes of one map a sequence, whatever order they come in: one camera, whose focal
-// length, centre and distortion may move a little, and time that goes forward with seq. A keyframe
-// that breaks it is from a broken or hostile agent. Bounded: the newest maps, and of each the
-// newest keyframes, are remembered.
+// Checks that keyframes of one map belong together, in any order of arrival: they have the same
+// camera, whose focal length, centre and distortion may change a little, and time increases with
+// seq. A keyframe that fails comes from a broken or hostile agent. Bounded: only the newest
+// kMaxMaps maps, and the newest kMaxKeyframes keyframes of each, are remembered.
 
 #include <cstdint>
 #include <map>
@@ -18,8 +18,8 @@ class MapContinuity {
   static constexpr size_t kMaxMaps = 200;
   static constexpr size_t kMaxKeyframes = 200;
 
-  // Why the keyframe cannot be of its map, or an empty string; then it is remembered. `contents`: a
-  // checksum of the bytes where a repeat has to be the same as before, 0 where it may differ.
+  // Returns why the keyframe cannot belong to its map; or an empty string, and then remembers it.
+  // `contents`: a checksum of its bytes if a repeat must be identical, 0 if it may differ.
   std::string Check(const Keyframe& keyframe, size_t contents);
 
  private:

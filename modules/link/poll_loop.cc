@@ -6,8 +6,8 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kTickInterval_us = 100'000;
-// Messages of one bus are handled for so long before the other has its turn and Poll may send: a
-// flood of them must not take the time between two Polls, which send no more than a burst each.
+// Messages of one bus are handled for at most this time, then it is the turn of the other bus and
+// of Poll. A flood of messages must not delay Poll, which sends at most one burst per call.
 constexpr int64_t kBatch_us = 2'000;
 
 void HandleWaiting(LcmBus& bus) {
@@ -23,7 +23,7 @@ int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process, OptionsAnnoun
   int64_t next_tick = 0;
   int timeout_ms = 0;
   while (!StopRequested()) {
-    pollfd fds[2] = {{a.fd(), POLLIN, 0}, {b.fd(), POLLIN, 0}};  // poll leaves out negative ones
+    pollfd fds[2] = {{a.fd(), POLLIN, 0}, {b.fd(), POLLIN, 0}};  // poll ignores fd -1
     poll(fds, 2, a.MoreWaits() || b.MoreWaits() ? 0 : timeout_ms);
     HandleWaiting(a);
     HandleWaiting(b);

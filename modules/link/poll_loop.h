@@ -1,7 +1,7 @@
 #pragma once
 
-// The loop of a process that joins two buses and paces what it sends: it waits on both buses' file
-// descriptors, and calls Poll as often as the process asks.
+// The main loop of a process that joins two buses and paces what it sends. It waits for messages of
+// both buses, and calls Poll as often as the process asks.
 
 #include <cstdint>
 
@@ -12,13 +12,13 @@ namespace pangea {
 
 class PolledProcess : public Process {
  public:
-  // `steady_us`: a clock that never steps. Returns after how many milliseconds it wants to be
-  // called again, if nothing arrives before.
+  // `steady_us`: monotonic clock. Returns the milliseconds after which it must be called again if
+  // no message arrives before.
   virtual int Poll(int64_t steady_us) = 0;
 };
 
-// Handles messages, polls and ticks until a signal; tells the process' options. Returns the exit
-// code.
+// Handles messages, polls and ticks until a signal, and publishes the process' options. Returns the
+// exit code.
 int RunPolledProcess(LcmBus& a, LcmBus& b, PolledProcess& process, OptionsAnnouncer& options);
 
 }  // namespace pangea

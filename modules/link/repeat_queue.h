@@ -1,12 +1,12 @@
 #pragma once
 
-// Which of many small messages, one for each anchor, goes out next, of those that the other end has
-// not confirmed: each at once when it is new, then again every 300 ms, all together within a rate.
-// First come, first served, and what was sent goes to the end: none waits for ever because others
-// change often.
+// Decides which of many small messages, one for each anchor, is sent next. Messages that the other
+// end has not confirmed are sent at once when they are new, then again every 300 ms, all together
+// within a rate. The queue is first in, first out, and a sent message goes to its end; so no
+// message waits for ever because others change often.
 //
-// A state machine: monotonic microseconds go in; no clock, no bus, one thread. As large as what is
-// in it.
+// A state machine: monotonic microseconds go in; no clock, no bus; not thread safe. The caller
+// bounds the number of anchors.
 
 #include <cstdint>
 #include <map>
@@ -19,18 +19,18 @@ namespace pangea {
 
 class RepeatQueue {
  public:
-  // `bytes_per_s`: on the wire.
+  // `bytes_per_s`: largest rate, in bytes on the wire.
   explicit RepeatQueue(double bytes_per_s) : pacer_(bytes_per_s, kBurstBytes) {}
 
-  // The anchor has something new to say.
+  // There is a new message for this anchor.
   void Add(const AnchorId& id);
-  // The other end has it.
+  // The other end has confirmed the anchor's message.
   void Remove(const AnchorId& id);
-  // Another session: as if nothing had been sent.
+  // In a new session, all messages become due, as if none had been sent.
   void SendAllAgain();
 
-  // The next one due, which then counts as sent; nothing if none is, or the rate is used up. Say
-  // with Charge what it took.
+  // The anchor whose message is due next; it then counts as sent. Nothing if none is due or the
+  // rate is used up. After sending, call Charge with the size of the message.
   std::optional<AnchorId> Next(int64_t now_us);
   void Charge(int64_t bytes_on_the_wire) { pacer_.Take(bytes_on_the_wire); }
 
@@ -40,7 +40,7 @@ class RepeatQueue {
   static constexpr double kBurstBytes = 4000;
   struct Waiting {
     AnchorId id;
-    std::optional<int64_t> sent_us;  // what it says now
+    std::optional<int64_t> sent_us;  // when the current message was last sent
   };
 
   Pacer pacer_;

@@ -1,8 +1,8 @@
 #pragma once
 
-// Authenticated encryption of link packets: XChaCha20-Poly1305 (libsodium), keys derived by keyed
-// BLAKE2b, and the window that lets each numbered packet in once. What is sealed under which key,
-// and why: docs/decisions/link_security.md.
+// Authenticated encryption of link packets: XChaCha20-Poly1305 (libsodium), key derivation by keyed
+// BLAKE2b, and a replay window that accepts each numbered packet once.
+// docs/decisions/link_security.md says what is sealed under which key, and why.
 
 #include <array>
 #include <bitset>
@@ -15,7 +15,7 @@
 
 namespace pangea {
 
-// 32 secret bytes; each copy is wiped when it goes.
+// 32 secret bytes; each copy is wiped from memory when it is destroyed.
 class SecretKey {
  public:
   static constexpr size_t kBytes = 32;
@@ -28,7 +28,8 @@ class SecretKey {
 
   const std::array<uint8_t, kBytes>& bytes() const { return bytes_; }
   bool operator==(const SecretKey& other) const;
-  // A key for one purpose, agent and session; tells nothing of this one or of its other children.
+  // Derives a key for one purpose, agent and session. It reveals nothing about this key or about
+  // other derived keys.
   SecretKey Derive(std::string_view purpose, int32_t agent_id, uint64_t uplink_run = 0,
                    uint64_t handler_run = 0) const;
 
@@ -45,26 +46,26 @@ using SealNonce = std::array<uint8_t, kSealNonceBytes>;
 
 SealNonce RandomNonce();
 
-// `clear`, then `body` encrypted, then a tag over both. A nonce must never be used twice with one
-// key.
+// Returns `clear` as it is, then `body` encrypted, then a tag that authenticates both. A nonce must
+// never be used twice with one key.
 std::vector<uint8_t> Seal(const SecretKey& key, const SealNonce& nonce, Bytes clear, Bytes body);
-// The body of what follows the first `clear_bytes` of a packet; nothing unless every bit is as
-// sealed.
+// Decrypts the body of a packet whose first `clear_bytes` are not encrypted. Nothing if any bit was
+// changed, or key or nonce are wrong.
 std::optional<std::vector<uint8_t>> OpenSealed(const SecretKey& key, const SealNonce& nonce,
                                                Bytes packet, size_t clear_bytes);
 
-// Which numbers of a stream have been taken. Only the low 24 bits of a number travel; the window
-// knows the rest, because it moves with the highest one taken.
+// Which packet numbers of a stream were already received. A packet has only the low 24 bits of its
+// number; the window knows the rest, because it follows the highest number received.
 class ReplayWindow {
  public:
-  // As many packets may overtake one before it counts as too old: a second of 4 MB/s.
+  // A packet that so many others have overtaken counts as too old: about one second at 4 MB/s.
   static constexpr int64_t kSize = 4096;
 
   explicit ReplayWindow(int64_t highest = 0) : highest_(highest) {}
 
-  // The number with these low bits that is nearest to the next one.
+  // The full number with these low bits that is nearest to the next expected number.
   int64_t Expand(uint32_t low_24_bits) const;
-  // Neither taken already nor too old to tell.
+  // Whether the number was not received yet and is not too old.
   bool IsFresh(int64_t number) const;
   void Take(int64_t number);
 

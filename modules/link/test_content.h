@@ -1,6 +1,6 @@
 #pragma once
 
-// Keyframes for tests of the link: bytes that follow from the id.
+// Random bytes as keyframes for tests of the link. The same id gives the same bytes.
 
 #include <algorithm>
 #include <cstdint>

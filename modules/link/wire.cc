@@ -20,7 +20,7 @@ constexpr double kMaxSpeed = 1000;  // m/s
 
 using messages_checks::Refused;
 
-// For people: nothing that moves a terminal's cursor.
+// Whether the text can be shown to people: it cannot control a terminal.
 bool Printable(const std::string& text) {
   return std::all_of(text.begin(), text.end(),
                      [](char c) { return static_cast<uint8_t>(c) >= ' ' && c != 0x7F; });
@@ -175,7 +175,7 @@ Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
   if (!Printable(pose.reason)) {
     return Refused<pose_t>("pose: reason is not printable");
   }
-  if (pose.state != pose_t::STATE_TRACKING) {  // it is nowhere
+  if (pose.state != pose_t::STATE_TRACKING) {  // then there is no pose
     pose.T_odom_body = pose.T_map_body = {};
     pose.v_odom_body = {};
     return {std::move(pose), ""};
@@ -187,7 +187,7 @@ Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body) {
   if (!messages_checks::Bounded(messages_checks::ToVector(pose.v_odom_body), kMaxSpeed)) {
     return Refused<pose_t>("pose: velocity out of range");
   }
-  pose.T_odom_body = ToMessage(*T_odom_body.value);  // of unit norm in double precision again
+  pose.T_odom_body = ToMessage(*T_odom_body.value);  // quaternions are again of unit norm
   pose.T_map_body = ToMessage(*T_map_body.value);
   return {std::move(pose), ""};
 }

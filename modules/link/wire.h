@@ -1,20 +1,19 @@
 #pragma once
 
-// What crosses the agent link, as domain types, and as the compact bodies of packets
-// (link_session.h seals those). Like messages/messages.h, this is a border: past Parse every field
-// is bounded.
+// The packets of the agent link: domain types, and their compact bodies (link_session.h seals
+// these). As in messages/messages.h, after Parse every field is within bounds.
 //
-// A keyframe's encoded bytes are compressed and cut into pieces, each a packet of its own (paper,
+// A keyframe's encoded bytes are compressed and cut into pieces, each in its own packet (paper,
 // IV.B: "we divide the packet ... artificially"; 4 KiB there, one Ethernet frame by default here).
 //   hello: software, count, and of each map: slot, opened_utime, first_seq, correction_revision
-//   piece: slot of the map, low byte of seq, index; the rest is keyframe
+//   piece: slot of the map, low byte of seq, index; the rest is a piece of the keyframe
 //   pose:  a pose_t in single precision
 //   ack:   highest_number, cache_bytes; count, and of each map: opened_utime, journalled_seq + 1;
 //          count, and of each keyframe in the cache: index of its map, seq, bits of its pieces;
 //          count, and of each correction: an encoded correction_t
-//   landmarks: an encoded landmarks_t; best effort
-//   others: an encoded others_t; best effort, the newest counts
-// Anchors (anchor_wire.h), each sent again until the other side says that it has it:
+//   landmarks: an encoded landmarks_t; never sent again if it is lost
+//   others: an encoded others_t; never sent again if it is lost, the newest counts
+// Anchors (anchor_wire.h); edits and anchors are sent again until the other end confirms them:
 //   anchor edit (up):          an encoded anchor_edit_t
 //   anchor edit answers (down): count, and of each: agent_id and created_utime of the anchor,
 //                              revision, 1 if it is in the journal or 0 if it was refused
@@ -34,10 +33,10 @@
 
 namespace pangea {
 
-// Where agents and server meet unless they are told otherwise.
+// The bus of the link unless uplink and agent handler are given another one.
 inline constexpr char kDefaultLinkUrl[] = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304";
 
-// A keyframe has to fit one LCM datagram; compressed it may come out a little larger.
+// A keyframe must fit one LCM datagram. Compression may make it a little larger.
 inline constexpr int kMaxKeyframeBytes = 60'000;
 inline constexpr int kMaxCompressedBytes = kMaxKeyframeBytes + kMaxKeyframeBytes / 128;
 inline constexpr int kMinPayloadBytes = 256;
@@ -45,21 +44,22 @@ inline constexpr int kMaxPayloadBytes = 30'000;
 inline constexpr int kMaxPieces = kMaxCompressedBytes / kMinPayloadBytes + 1;
 static_assert(kMaxPieces <= 256);
 static_assert(kMaxPayloadBytes + 1000 < kMaxLinkPacketBytes);
-// Nothing of ours on the link comes in fragments, so that its buses refuse them.
+// None of our link packets needs LCM fragments, so the link's buses can refuse fragments.
 static_assert(kMaxLinkPacketBytes + UdpmAssembler::kMaxChannel + 1 <= kMaxUdpmShortBytes);
-// Keyframes one agent may have in the receive cache, and maps a hello or an acknowledgement names:
-// so that both fit one Ethernet frame.
+// Bounds that let a hello and an acknowledgement fit one Ethernet frame. kMaxPartialKeyframes is
+// the number of incomplete keyframes of one agent in the receive cache.
 inline constexpr int kMaxPartialKeyframes = 16;
 inline constexpr int kMaxLinkMaps = 20;
 inline constexpr size_t kMaxSoftwareName = 40;
 inline constexpr int kMaxAckMaps = 40;
 inline constexpr int kMaxLinkCorrections = 1;
-// An encoded landmarks_t or others_t: fits one Ethernet frame.
+// Bounds for an encoded landmarks_t or others_t, so that it fits one Ethernet frame.
 inline constexpr int kMaxLandmarksBytes = 1300;
 inline constexpr int kMaxOthersBytes = 1300;
 
-// UDP, IP and LCM's small-message header (8 bytes, the channel, 0): a packet's bytes on the wire.
-// What is larger than an Ethernet frame is cut by IP, each part with a header of its own.
+// A packet's bytes on the wire include the headers of IP, UDP and LCM's short messages (8 bytes,
+// the channel, a 0 byte). IP fragments what is larger than an Ethernet frame, and each fragment has
+// its own IP header.
 inline constexpr int kIpBytes = 20;
 inline constexpr int kUdpIpBytes = kIpBytes + 8;
 inline constexpr int kLcmHeaderBytes = 8;
@@ -70,7 +70,7 @@ inline int BytesOnTheWire(const std::string& channel, Bytes packet) {
                         static_cast<int>(channel.size()) + 1 + static_cast<int>(packet.size());
   return udp_bytes + kIpBytes * ((udp_bytes + kFragmentBytes - 1) / kFragmentBytes);
 }
-// Keyframe bytes in a packet that fills an Ethernet frame, whatever the agent's id.
+// Keyframe bytes in a packet that fills an Ethernet frame, for the longest agent id.
 inline constexpr int kPieceHeaderBytes = 3;
 inline constexpr int kFramePayloadBytes = kFrameBytes - kUdpIpBytes - kLcmHeaderBytes -
                                           static_cast<int>(sizeof("LINK_UP_65535")) -
@@ -78,12 +78,12 @@ inline constexpr int kFramePayloadBytes = kFrameBytes - kUdpIpBytes - kLcmHeader
 
 struct LinkMap {
   MapId map;
-  int32_t first_seq = 0;  // keyframes before are lost for good, unless they are journalled
+  int32_t first_seq = 0;  // keyframes before this are lost for good, unless they are journalled
   int64_t correction_revision = 0;
-  uint8_t slot = 0;  // pieces name the map by it; each in the hello has another
+  uint8_t slot = 0;  // names the map in pieces; unique in the hello
 };
 
-// This program's name and version, as a hello says it.
+// This program's name and version, for the hello.
 std::string OurSoftware();
 
 struct LinkHello {
@@ -93,18 +93,18 @@ struct LinkHello {
 
 struct LinkPiece {
   uint8_t slot = 0;
-  uint8_t seq_low = 0;  // the few keyframes under way differ in it
+  uint8_t seq_low = 0;  // low byte of seq; the few keyframes under way all differ in it
   int index = 0;
   bool last = false;
   Bytes data;
 };
 
 struct LinkAck {
-  int64_t number = 0;          // of the packet; the newest counts
-  int64_t highest_number = 0;  // of the uplink's packets
+  int64_t number = 0;          // of this packet; the acknowledgement with the highest counts
+  int64_t highest_number = 0;  // highest number of the uplink's packets that was received
   int cache_bytes = 0;
   std::map<MapId, int32_t> journalled_seq;             // -1: none
-  std::map<KeyframeId, std::vector<uint8_t>> partial;  // bit i: piece i is there
+  std::map<KeyframeId, std::vector<uint8_t>> partial;  // bit i: piece i was received
   std::vector<Correction> corrections;
 };
 
@@ -113,13 +113,13 @@ std::vector<uint8_t> Encode(const LinkPiece& piece);
 std::vector<uint8_t> Encode(const LinkAck& ack);
 std::vector<uint8_t> EncodePose(const pose_t& pose);
 
-// `agent_id`: whose link it came over; all ids in it are that agent's.
+// `agent_id`: the agent of the link; all ids in the packet become that agent's.
 Parsed<LinkHello> ParseHello(int32_t agent_id, Bytes body);
-Parsed<LinkPiece> ParsePiece(const LinkPacket& packet);  // points into the packet
+Parsed<LinkPiece> ParsePiece(const LinkPacket& packet);  // its data points into the packet
 Parsed<LinkAck> ParseAck(int32_t agent_id, const LinkPacket& packet);
 Parsed<pose_t> ParsePose(int32_t agent_id, Bytes body);
 
-// A message of `total_bytes` cut into pieces of `payload_bytes`.
+// Cutting a message into pieces of `payload_bytes` (the last one may be shorter).
 int NumPieces(int total_bytes, int payload_bytes);
 Bytes Piece(Bytes message, int payload_bytes, int index);
 

@@ -139,14 +139,14 @@ class YamlOptions {
         });
   }
 
-  // This key must be in the file.
+  // The key must be in the file.
   void Require(const std::string& key);
 
+  // Both throw std::runtime_error. `name`: the file's name for messages.
   void ReadFile(const std::string& path);
-  // `name` stands for the file in messages.
   void ReadText(const std::string& text, const std::string& name);
-  // Of what another version may have written: leaves out the keys that are not known, and returns
-  // them with their values, "window.size 5".
+  // Reads a text that another version may have written: ignores unknown keys, and returns them with
+  // their values, for example "window.size 5".
   std::vector<std::string> ReadKnown(const std::string& text, const std::string& name);
 
   // Sets one value by its path, such as "window.num_keyframes", from a text as in a file. Throws
