@@ -31,7 +31,7 @@ std::optional<std::string> Mav0In(const fs::path& folder) {
   return std::nullopt;
 }
 
-// What else it may be that somebody took for a recording.
+// Advice for a path that is not a recording: what else it probably is.
 std::string Hint(const fs::path& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) {
@@ -61,7 +61,7 @@ std::string FindMav0(const std::string& folder) {
       fmt::format("{}: not a recording in EuRoC's format; {}", folder, Hint(folder)));
 }
 
-// Files that the table of stamps does not name are as good as lost.
+// Warns of image files that the csv does not name: they are not used.
 void NameImagesWithoutStamp(const std::string& mav0, const std::vector<CsvRow>& rows,
                             std::vector<std::string>* warnings) {
   std::set<std::string> named;
@@ -86,7 +86,7 @@ void NameImagesWithoutStamp(const std::string& mav0, const std::vector<CsvRow>& 
   }
 }
 
-// A row the file was cut off in: its last number may be cut too.
+// Drops the last row if the file was cut off in it, because its last number may be incomplete.
 void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
                   std::vector<std::string>* warnings) {
   if (!rows->empty() && !rows->back().line_ended) {
@@ -97,8 +97,8 @@ void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
   }
 }
 
-// A recording lasts minutes, hours at most. What is stamped further than a day from the middle of
-// it is a slip, and would stand for its beginning or its end.
+// A recording lasts minutes or hours. A time stamp more than a day from its middle is an error, and
+// would be taken for the recording's beginning or end.
 template <typename T>
 void DropFarStamps(std::vector<T>* items, const std::string& path,
                    std::vector<std::string>* warnings) {
@@ -116,7 +116,7 @@ void DropFarStamps(std::vector<T>* items, const std::string& path,
   }
 }
 
-// Names the gaps that are well above the median period.
+// Warns of gaps that are much longer than the median period.
 template <typename T>
 void NameGaps(const std::vector<T>& items, double factor, const std::string& path,
               std::vector<std::string>* warnings) {
@@ -152,7 +152,7 @@ void Append(const std::vector<std::string>& more, std::vector<std::string>* warn
   warnings->insert(warnings->end(), more.begin(), more.end());
 }
 
-// Nanoseconds they must be: images of other units stand within a thousandth of a second.
+// Time stamps must be nanoseconds. In other units, images seem to be less than a millisecond apart.
 void CheckUnitOfStamps(const std::vector<EurocImage>& images, const std::string& csv) {
   constexpr double kShortest_us = 1000;
   constexpr size_t kEnough = 10;
@@ -319,9 +319,9 @@ void EurocRecording::DropImagesOutsideImu() {
   }
 }
 
-// A single one of another size is skipped when its turn comes, as one that is corrupt.
+// Throws if many images have another size. A single such image is skipped later, as a corrupt one.
 void EurocRecording::CheckImages() const {
-  constexpr int kOfAnotherSize = 20;  // so many in a row are no accident
+  constexpr int kOfAnotherSize = 20;  // so many in a row are not accidental
   const cv::Size expected(camera_.width, camera_.height);
   std::string last;
   int of_another_size = 0;

@@ -1,13 +1,12 @@
 #pragma once
 
-// A recording in EuRoC's on-disk format, read as it is: mav0/cam0 (images, sensor.yaml), mav0/imu0,
-// and, where there is one, mav0/state_groundtruth_estimate0 (or TUM-VI's mocap0).
-// Times become microseconds, rounded down; file names keep their nanoseconds. `body` is the IMU.
-// Images are read when asked for.
+// A recording in EuRoC's on-disk format: mav0/cam0 (images, sensor.yaml), mav0/imu0 and, if there
+// is one, mav0/state_groundtruth_estimate0 (or TUM-VI's mocap0). Times become microseconds, rounded
+// down; file names keep their nanoseconds. `body` is the IMU. Images are loaded only by LoadImage.
 //
-// What is wrong with a recording either makes it unusable (the constructor throws, naming file,
-// line or field, and the mend) or is mended and named in warnings(): docs/recordings.md has the
-// table, and the optional keys of sensor.yaml.
+// A fault either makes the recording unusable, and the constructor throws an error that names file,
+// line or field and says what to do; or it is repaired and named in warnings(). docs/recordings.md
+// lists the faults and the optional keys of sensor.yaml.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -24,28 +23,29 @@ namespace pangea {
 
 struct EurocImage {
   int64_t utime = 0;     // microseconds
-  int64_t stamp_ns = 0;  // as in the csv
+  int64_t stamp_ns = 0;  // nanoseconds, as in the csv
   std::string path;
 };
 
 class EurocRecording {
  public:
-  // `folder` holds mav0 or is mav0. Throws std::runtime_error as in that table.
+  // `folder` contains mav0 or is mav0 itself. Throws std::runtime_error if the recording is
+  // unusable.
   explicit EurocRecording(const std::string& folder);
 
   const std::string& mav0() const { return mav0_; }
   const CameraModel& camera() const { return camera_; }
-  // Where sensor.yaml says it.
+  // Nothing if sensor.yaml has no such keys.
   const std::optional<CalibrationSigmas>& calibration_sigmas() const { return calibration_sigmas_; }
   const ImuNoise& imu_noise() const { return imu_noise_; }
   const std::vector<EurocImage>& images() const { return images_; }
   const std::vector<ImuSample>& imu() const { return imu_; }
-  // T_reference_body; empty when there is none.
+  // Poses T_reference_body; empty when there is no ground truth.
   const Trajectory& ground_truth() const { return ground_truth_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
-  // 8-bit grey, of the calibration's size; empty, with the reason in `why`, when the file cannot be
-  // read, is neither PNG nor JPEG, is corrupt or of another size (grey_image.h).
+  // Loads an image as 8-bit grey of the calibration's size. Empty, with the reason in `why`, when
+  // the file cannot be read, is not PNG or JPEG, is corrupt, or has another size (grey_image.h).
   cv::Mat LoadImage(size_t index, std::string* why) const;
 
  private:
@@ -66,9 +66,9 @@ class EurocRecording {
   std::vector<std::string> warnings_;
 };
 
-// The ground truth alone, without opening the rest: empty when the recording has none.
+// Reads only the ground truth; empty when the recording has none.
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings);
-// Stamp of the first image in the csv; nothing when there is none to be read.
+// Time stamp of the first image in the csv, microseconds; nothing when it cannot be read.
 std::optional<int64_t> FirstImageUtimeOf(const std::string& folder);
 
 }  // namespace pangea

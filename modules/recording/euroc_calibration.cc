@@ -43,7 +43,7 @@ std::vector<double> Numbers(const YAML::Node& root, const std::string& file, con
   return values;
 }
 
-// Row by row: of EuRoC's `data`, or of Kalibr's list of rows.
+// A 4x4 matrix, row by row: EuRoC's `data`, or Kalibr's list of rows.
 std::vector<double> Matrix4(const YAML::Node& root, const std::string& file,
                             const std::string& key) {
   const YAML::Node node = root[key];
@@ -83,7 +83,7 @@ Rigid3 Transform(const YAML::Node& root, const std::string& file, const std::str
   return {Eigen::Quaterniond(R).normalized(), t};
 }
 
-// EuRoC's T_BS of a camera, or Kalibr's T_cam_imu, which is its inverse.
+// EuRoC's T_BS of a camera, or the inverse of Kalibr's T_cam_imu.
 Rigid3 CameraExtrinsics(const YAML::Node& root, const std::string& file) {
   if (root["T_BS"]) {
     return Transform(root, file, "T_BS");
@@ -113,7 +113,7 @@ CameraModel::Kind Distortion(const YAML::Node& root, const std::string& file) {
                           name));
 }
 
-// Four: k1, k2, p1, p2, or the four of the equidistant model. A fifth, k3, must be 0.
+// Four coefficients: k1, k2, p1, p2, or those of the equidistant model. A fifth, k3, must be 0.
 std::vector<double> Coefficients(const YAML::Node& root, const std::string& file) {
   const std::string key = root["distortion_coeffs"] ? "distortion_coeffs"  // Kalibr's name
                                                     : "distortion_coefficients";
@@ -136,8 +136,8 @@ double OptionalNumber(const YAML::Node& root, const std::string& file, const std
   return node ? Number(node, file, key) : otherwise;
 }
 
-// The share of the read-out that has passed when the row is exposed whose time a stamp plus the
-// offset is.
+// A time stamp plus the time offset is the exposure time of one row. Returns the share of the
+// read-out that has passed at that row.
 double StampedRow(const YAML::Node& root, const std::string& file, const std::string& otherwise) {
   const YAML::Node node = root["stamp_row"];
   const std::string row = !node ? otherwise : node.IsScalar() ? node.Scalar() : "";
@@ -150,7 +150,7 @@ double StampedRow(const YAML::Node& root, const std::string& file, const std::st
   Throw(file, fmt::format("'stamp_row: {}' is not known; known: first, middle, last", row));
 }
 
-// Of the first row. Kalibr fits one time to a whole image, which is that of its middle row.
+// The time offset of the first row. Kalibr fits one time to a whole image: that of its middle row.
 double TimeOffset(const YAML::Node& root, const std::string& file, double readout_s) {
   const bool is_ours = !root["timeshift_cam_imu"] || root["time_offset_s"];
   const double offset_s =
@@ -225,8 +225,8 @@ std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& s
 std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
                                                              const std::string& sensor_yaml) {
   const YAML::Node root = LoadSensorFile(text, sensor_yaml, "cam0");
-  // The largest of `count` numbers from `first` on of a list of `size`, or of a number alone (0),
-  // as a share of `unit`.
+  // The value of `key` is a list of `size` numbers, or one number if `size` is 0. Reads the largest
+  // of `count` numbers from `first` on, divided by `unit`.
   const auto read = [&](const char* key, size_t size, size_t first, size_t count, double unit,
                         double* sigma) {
     if (!root[key]) {
@@ -271,7 +271,7 @@ EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
     calibration.T_s_body = Transform(root, sensor_yaml, "T_BS");
   }
   ImuNoise& noise = calibration.noise;
-  // In SI units; beyond the bounds the unit is another one.
+  // Values are in SI units; those beyond the bounds are probably in another unit.
   const std::tuple<const char*, double*, double> fields[] = {
       {"gyroscope_noise_density", &noise.gyro_noise_density, 10},
       {"gyroscope_random_walk", &noise.gyro_random_walk, 10},

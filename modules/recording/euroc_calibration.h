@@ -1,7 +1,7 @@
 #pragma once
 
-// EuRoC's sensor.yaml files, or Kalibr's camchain and IMU files in their place (of which cam0 and
-// imu0 count).
+// Reads EuRoC's sensor.yaml files, or Kalibr's camchain and IMU files in their place (of these only
+// cam0 and imu0 are used).
 
 #include <optional>
 #include <string>
@@ -14,25 +14,25 @@ namespace pangea {
 
 struct EurocImuCalibration {
   ImuNoise noise;
-  Rigid3 T_s_body;  // EuRoC's T_BS of the IMU: rig frame from IMU
+  Rigid3 T_s_body;  // T_BS of the IMU: from the IMU (body) to EuRoC's rig frame s
 };
 
-// Where the calibration of "cam0" or "imu0" is: sensor.yaml, or as TUM-VI has it, beside mav0 in
-// dso/. Throws std::runtime_error when there is neither.
+// Path of the calibration of "cam0" or "imu0": sensor.yaml or, as in TUM-VI, in dso/ beside mav0.
+// Throws std::runtime_error when there is neither.
 std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor);
-// T_body_cam of the result is the file's T_BS: rig frame from camera.
-// All throw std::runtime_error naming file and field.
+// Note: T_body_cam of the result is the file's T_BS, from the camera to the rig frame.
+// All functions throw std::runtime_error with file and field.
 CameraModel ReadEurocCamera(const std::string& sensor_yaml);
-// Nothing when the file says none of them (docs/recordings.md); those it does not say are as usual.
+// Nothing when the file has none of the keys (docs/recordings.md); a missing key gives the default.
 std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml);
 EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml);
-// The same of a text at hand; `sensor_yaml` stands for it in messages.
+// The same for a text; `sensor_yaml` is its name in error messages.
 CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml);
 std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
                                                              const std::string& sensor_yaml);
 EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
                                              const std::string& sensor_yaml);
-// T_BS of any sensor; identity when the file or the key is missing.
+// T_BS of any sensor; the identity when the file or the key is missing.
 Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml);
 
 }  // namespace pangea

@@ -22,7 +22,7 @@ struct Signature {
 };
 constexpr std::string_view kPng{"\x89PNG\r\n\x1a\n", 8};
 constexpr std::string_view kJpeg{"\xff\xd8\xff", 3};
-// The others that OpenCV would open, whatever the file is called.
+// Other formats that OpenCV would open, whatever the file's name is.
 constexpr std::array kOthers = {Signature{"BMP", "BM"},
                                 Signature{"GIF", "GIF8"},
                                 Signature{"TIFF", {"II*\0", 4}},
@@ -49,19 +49,21 @@ cv::Size SizeOf(uint32_t width, uint32_t height) {
   return fits ? cv::Size(static_cast<int>(width), static_cast<int>(height)) : cv::Size();
 }
 
-// Signature, length and name of the first chunk, width, height: RFC 2083, sections 3.1 and 4.1.1.
+// A PNG begins with signature, length and name of the first chunk, width, height: RFC 2083,
+// sections 3.1 and 4.1.1.
 cv::Size PngSize(std::span<const uint8_t> bytes) {
   const bool whole = bytes.size() >= 24 && BigEndian(bytes.subspan(12, 4)) == 0x49484452;  // IHDR
   return whole ? SizeOf(BigEndian(bytes.subspan(16, 4)), BigEndian(bytes.subspan(20, 4)))
                : cv::Size();
 }
 
-// The segment that begins a frame: ITU-T T.81, table B.1. C4, C8 and CC are none.
+// Whether the marker begins a frame: ITU-T T.81, table B.1. C4, C8 and CC do not.
 bool BeginsFrame(uint8_t marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
 
-// From segment to segment, each with its length behind its marker, to the one that begins a frame.
+// Goes from segment to segment, each with its length after its marker, to the one that begins a
+// frame.
 cv::Size JpegSize(std::span<const uint8_t> bytes) {
   for (size_t at = 2; at + 9 <= bytes.size() && bytes[at] == 0xff;) {
     const uint8_t marker = bytes[at + 1];
@@ -73,12 +75,13 @@ cv::Size JpegSize(std::span<const uint8_t> bytes) {
   return {};
 }
 
-// PBM, PGM, PPM, PAM: P and a digit.
+// PBM, PGM, PPM and PAM begin with P and a digit.
 bool IsNetpbm(std::string_view text) {
   return text.size() > 2 && text[0] == 'P' && text[1] >= '1' && text[1] <= '7';
 }
 
-// Uncompressed, 16 bits of red, green, blue, alpha, and room for what else a file may carry.
+// Largest plausible file: uncompressed, with 16 bits each of red, green, blue and alpha, and 1 MB
+// for all else.
 size_t MaxBytes(cv::Size size) { return 8 * static_cast<size_t>(size.area()) + (1 << 20); }
 
 std::string Text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
@@ -129,7 +132,7 @@ GreyImage ReadGrey(const std::string& path, cv::Size expected) {
   try {
     std::ifstream file = OpenFile(path);
     file.seekg(0, std::ios::end);
-    // One byte more than is taken shows that there are too many.
+    // One byte more than allowed is read, to find out whether the file is too large.
     std::vector<uint8_t> bytes(std::min(static_cast<size_t>(file.tellg()), MaxBytes(expected) + 1));
     file.seekg(0);
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));

@@ -1,8 +1,8 @@
 #pragma once
 
-// Images that come from outside, PNG or JPEG, as 8-bit grey. Nothing in one is trusted: the size
-// that its header says is compared with the calibration's before a pixel is decoded, so that what
-// an image may cost is known, and whatever a decoder finds wrong is a reason like any other.
+// Decodes PNG and JPEG images from outside to 8-bit grey. They are not trusted: the size in the
+// header is compared with the calibration's before any pixel is decoded, which bounds memory and
+// time. An error of a decoder is returned as a reason, like any other fault.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -11,22 +11,22 @@
 
 namespace pangea {
 
-// What the header alone says.
+// The content of an image's header.
 struct ImageHeader {
-  std::string format;  // "PNG", "JPEG", "BMP", ...; empty: none that is known
-  cv::Size size;       // of a PNG or JPEG; 0x0: it does not say
+  std::string format;  // "PNG", "JPEG", "BMP", ...; empty: unknown
+  cv::Size size;       // only of a PNG or JPEG; 0x0: unknown
 };
 ImageHeader ReadImageHeader(std::span<const uint8_t> bytes);
 
 struct GreyImage {
   cv::Mat pixels;   // empty when it could not be decoded
-  std::string why;  // then: the reason
-  cv::Size size;    // what the header says, also of one that is refused for it
+  std::string why;  // the reason when `pixels` is empty
+  cv::Size size;    // the size in the header, also when it is the reason
 };
 
 // `expected`: the calibration's size, pixels.
 GreyImage DecodeGrey(std::span<const uint8_t> bytes, cv::Size expected);
-// The same of a file, and no exception either when it cannot be read.
+// The same for a file. If it cannot be read, this is a reason too, and not an exception.
 GreyImage ReadGrey(const std::string& path, cv::Size expected);
 
 }  // namespace pangea

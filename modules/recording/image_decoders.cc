@@ -11,8 +11,8 @@
 #include <png.h>
 // clang-format on
 
-// Both libraries report errors by longjmp: what lives across one is made before setjmp, and
-// freed after it.
+// Both libraries report errors by longjmp. So an object that must survive the jump is created
+// before setjmp and freed after it.
 
 namespace pangea {
 namespace {
@@ -29,7 +29,7 @@ void ReadPng(png_structp png, png_bytep to, size_t size) {
 [[noreturn]] void OnPngError(png_structp png, png_const_charp) { png_longjmp(png, 1); }
 void OnPngWarning(png_structp, png_const_charp) {}
 
-// Rec. 601, as cv::imread has it.
+// Grey by Rec. 601, as cv::imread computes it.
 void AskForGrey(png_structp png, png_infop info) {
   const auto type = png_get_color_type(png, info);
   png_set_strip_16(png);
@@ -45,7 +45,7 @@ void AskForGrey(png_structp png, png_infop info) {
   png_read_update_info(png, info);
 }
 
-// A camera writes ten. Each costs a pass over the whole image, however short it is.
+// A camera writes ten scans. Each scan, however short, costs a pass over the whole image.
 constexpr int kMaxScans = 100;
 
 struct JpegErrors {
@@ -57,7 +57,7 @@ struct JpegErrors {
   std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->leave, 1);
 }
 
-// What was cut off would be grey.
+// A truncated image is an error; libjpeg would fill the missing part with grey.
 void OnJpegMessage(j_common_ptr info, int level) {
   if (level < 0 && info->err->msg_code == JWRN_JPEG_EOF) {
     OnJpegError(info);
@@ -89,7 +89,7 @@ cv::Mat DecodePng(std::span<const uint8_t> bytes, cv::Size size) {
     png_destroy_read_struct(&png, &info, nullptr);
     return {};
   }
-  // Keeps none of the texts, each of which may unpack to 8 MB.
+  // Text chunks are dropped, because each of them may unpack to 8 MB.
   png_set_chunk_cache_max(png, 1);
   png_set_read_fn(png, &bytes, ReadPng);
   png_read_info(png, info);

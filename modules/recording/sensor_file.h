@@ -1,7 +1,6 @@
 #pragma once
 
-// A sensor.yaml as text: EuRoC's, which is of one sensor, or Kalibr's with several below their
-// names.
+// Parses a sensor.yaml: EuRoC's with one sensor, or Kalibr's with several sensors by name.
 
 #include <yaml-cpp/yaml.h>
 
@@ -10,12 +9,12 @@
 
 namespace pangea {
 
-// The fields of "cam0" or "imu0". Throws std::runtime_error naming `path`: not YAML, a field twice,
-// or other sensors only.
+// The fields of "cam0" or "imu0". Throws std::runtime_error with `path` if the text is not YAML,
+// has a field twice, or has only other sensors.
 YAML::Node LoadSensorFile(std::string text, const std::string& path, const std::string& sensor);
 
-// A warning for each field of the file that nothing reads, with what was probably meant. Those that
-// EuRoC and Kalibr write for people pass.
+// A warning for each field of the file that nothing reads, with the field that was probably meant.
+// There is no warning for fields that EuRoC and Kalibr write for people.
 std::vector<std::string> UnreadFields(const std::string& path, const std::string& sensor);
 
 }  // namespace pangea

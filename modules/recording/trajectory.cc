@@ -22,7 +22,7 @@ constexpr double kMaxStamp_s = 4e12;  // so that differences of stamps fit 64 bi
                                        row.fields[column], why));
 }
 
-// Of the stamp and the pose.
+// Throws unless the row's time stamp and pose are finite and within bounds.
 void CheckFinite(const std::string& path, const CsvRow& row) {
   constexpr size_t kColumns = 8;
   for (size_t i = 0; i < std::min(row.fields.size(), kColumns); ++i) {
@@ -37,7 +37,8 @@ void CheckFinite(const std::string& path, const CsvRow& row) {
   }
 }
 
-// Seven numbers from fields[1] on; quaternion order by the format. False with a reason.
+// Parses seven numbers from fields[1] on; the format decides the quaternion's order. False, with a
+// reason, if they are malformed.
 bool ParsePose(const CsvRow& row, bool quaternion_w_first, Rigid3* pose, std::string* why) {
   double v[7];
   for (int i = 0; i < 7; ++i) {
@@ -74,7 +75,7 @@ void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::
 
 namespace {
 
-// A row's stamp and pose. False, with a reason, when it is malformed.
+// Parses a row's time stamp and pose. False, with a reason, when it is malformed.
 using RowParser = std::function<bool(const CsvRow& row, StampedPose* pose, std::string* why)>;
 
 Trajectory ReadRows(const std::string& path, const std::string& expected, const RowParser& parse,

@@ -1,8 +1,8 @@
 #pragma once
 
-// Trajectories read from the two text formats they live in: TUM (tum.h) and EuRoC's ground-truth
-// csv ("nanoseconds, p (3), q w x y z" and, in 17 columns, velocity and biases). Readers sort by
-// time, drop duplicates and malformed rows, and say so.
+// Reads trajectories from two text formats: TUM (tum.h) and EuRoC's ground-truth csv ("nanoseconds,
+// p (3), q w x y z" and, in 17 columns, velocity and biases). The readers sort by time, and drop
+// duplicates and malformed rows with a warning.
 
 #include <algorithm>
 #include <cstdint>
@@ -17,8 +17,8 @@ namespace pangea {
 // Nanoseconds to microseconds, rounded down (also below zero).
 int64_t UtimeFromNs(int64_t ns);
 
-// Sorts by `utime` and keeps the first of equal stamps; returns how many rows were out of order and
-// how many dropped.
+// Sorts by `utime` and keeps the first of equal time stamps. Returns the number of rows that were
+// out of order, and of rows dropped.
 struct SortOutcome {
   int out_of_order = 0;
   int duplicates = 0;
@@ -37,21 +37,22 @@ SortOutcome SortByTime(std::vector<Stamped>* rows) {
   rows->erase(repeated, rows->end());
   return outcome;
 }
-// The same for the rows of a file; what it mended is added to `warnings`.
+// Adds a warning about the outcome, if there is a reason, for the file `path`.
 void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings);
 
-// The readers throw std::runtime_error when nothing usable is in the file, and, by line, at a stamp
-// or pose that is not finite or further away than 1e9 m: what wrote it had failed, and an error
-// without that row would hide it. What they mended is added to `warnings`.
+// The readers throw std::runtime_error when the file has nothing usable. They also throw, with the
+// line, for a time stamp or pose that is not finite or beyond 1e9 m: the program that wrote it had
+// failed, and an accuracy computed without that row would hide this. Repairs are added to
+// `warnings`.
 Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings);
 Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string>* warnings);
-// Either format, told apart by the first row: EuRoC's has commas.
+// Reads either format; the first row decides: EuRoC's has commas.
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings);
 
 void WriteTum(const std::string& path, const Trajectory& trajectory);
 
-// Position linear, rotation slerp; nothing outside the trajectory, or when the two poses around
-// `utime` are further apart than max_gap_us.
+// Interpolates the position linearly and the rotation by slerp. Nothing outside the trajectory, or
+// when the two poses around `utime` are more than max_gap_us apart.
 std::optional<Rigid3> Interpolate(const Trajectory& trajectory, int64_t utime, int64_t max_gap_us);
 
 // Sum of the distances between consecutive positions, metres.

@@ -1,6 +1,6 @@
 #pragma once
 
-// Timed poses, and their text format TUM: "seconds tx ty tz qx qy qz qw".
+// Poses with times, and their text format TUM: "seconds tx ty tz qx qy qz qw".
 
 #include <cstdint>
 #include <string>
@@ -12,13 +12,13 @@ namespace pangea {
 
 struct StampedPose {
   int64_t utime = 0;  // microseconds
-  Rigid3 T;           // e.g. T_odom_body, T_map_body: as the user says
+  Rigid3 T;           // the user decides on the frames, e.g. T_odom_body or T_map_body
 };
 
 // Strictly ascending in time.
 using Trajectory = std::vector<StampedPose>;
 
-// Stamps with six decimals, the rest with nine; the same poses give the same bytes.
+// Time stamps have six decimals, the other numbers nine. The same poses give the same bytes.
 std::string ToTum(const Trajectory& trajectory);
 
 }  // namespace pangea

@@ -31,7 +31,7 @@ std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorId& id) {
 AgentAnchors::Taken AgentAnchors::Take(const LinkAnchor& anchor, int64_t now_us) {
   const AnchorId& id = anchor.state.anchor;
   if (!anchors_.contains(id) && anchors_.size() >= kMaxAnchors) {
-    return Taken::kFull;  // not confirmed: it comes again
+    return Taken::kFull;  // not confirmed, so the server sends it again
   }
   if (received_.size() < kMaxAnchorsReceived) {
     received_.push_back(anchor.number);

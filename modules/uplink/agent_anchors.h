@@ -1,8 +1,8 @@
 #pragma once
 
-// What an agent knows of anchors: of each the newest state that the server has sent, and what of it
-// has still to be confirmed. A state machine: monotonic microseconds go in; no clock, no bus, one
-// thread. Bound: kMaxAnchors.
+// The anchors that an agent knows: the newest state of each from the server, and which states must
+// still be confirmed to the server. A state machine: monotonic microseconds go in; no clock, no
+// bus; not thread safe. Bound: kMaxAnchors.
 
 #include <cstdint>
 #include <map>
@@ -17,18 +17,20 @@ class AgentAnchors {
  public:
   static constexpr size_t kMaxAnchors = 256;
 
-  // If another anchor finds no room: the one that goes for it, if one may: one that is gone, or
-  // else one that this session has not spoken of.
+  // If there is no room for this anchor, removes another one and returns it: a gone one, or else
+  // one that the server has not sent in this session. Nothing if there is room, or none can be
+  // removed.
   std::optional<AnchorState> MakeRoomFor(const AnchorId& id);
 
   enum class Taken { kNew, kKnown, kFull };
-  // kNew: tell the apps.
+  // kNew: the caller must tell the apps. kFull: there is no room, and the state is not confirmed.
   Taken Take(const LinkAnchor& anchor, int64_t now_us);
-  // The server numbers anew, and sends all anew.
+  // In a new session, the server starts new numbers and sends all anchors again.
   void OnNewSession();
-  // Numbers to confirm, each once for each time that it came; at most kMaxAnchorsReceived.
+  // The numbers to confirm, one for each state received since the last call; at most
+  // kMaxAnchorsReceived.
   std::vector<int64_t> TakeReceived() { return std::exchange(received_, {}); }
-  // What the apps were last told of ten seconds ago.
+  // The anchors that the apps were last told of ten seconds ago or earlier; they count as told now.
   std::vector<AnchorState> DueAgain(int64_t now_us);
 
   size_t size() const { return anchors_.size(); }
@@ -36,7 +38,7 @@ class AgentAnchors {
  private:
   struct Entry {
     AnchorState state;
-    int64_t number = 0;  // 0: of an earlier session
+    int64_t number = 0;  // 0: from an earlier session
     int64_t told_us = 0;
   };
   std::map<AnchorId, Entry> anchors_;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The agent's edits of anchors until the journal has them. A state machine: monotonic microseconds
-// go in; no clock, no bus, one thread. Bounds: kMaxEdits anchors, and a rate.
+// The agent's edits of anchors that the server has not answered yet. A state machine: monotonic
+// microseconds go in; no clock, no bus; not thread safe. Bounds: kMaxEdits anchors, and a rate.
 
 #include <cstdint>
 #include <map>
@@ -20,17 +20,17 @@ class EditQueue {
   explicit EditQueue(double bytes_per_s) : queue_(bytes_per_s) {}
 
   enum class Taken { kNew, kOutdated, kFull };
-  // In place of an older edit of the anchor: the newer stands for both, also for where the older
-  // put it, if the newer leaves it there.
+  // Replaces a waiting older edit of the same anchor. If the newer edit does not move the anchor,
+  // it takes over the older one's placement.
   Taken Add(AnchorEdit edit);
-  // This edit of the anchor, or a newer one.
+  // Whether this edit of the anchor, or a newer one, is waiting.
   bool Has(const AnchorId& anchor, int64_t revision) const;
-  // The one that waits of this anchor; there must be one.
+  // The waiting edit of this anchor; there must be one.
   const AnchorEdit& Waiting(const AnchorId& anchor) const { return edits_.at(anchor); }
-  // Whether it was waiting for it.
+  // Removes the answered edit. False if no such edit was waiting.
   bool OnAnswer(const AnchorEditAnswer& answer);
   void OnNewSession() { queue_.SendAllAgain(); }
-  // The next one due, if one is; say with Charge what its packet took.
+  // The edit that is due next, if any. After sending, call Charge with the size of its packet.
   std::optional<AnchorEdit> Next(int64_t now_us);
   void Charge(int64_t bytes_on_the_wire) { queue_.Charge(bytes_on_the_wire); }
 

@@ -1,12 +1,13 @@
 #pragma once
 
-// The agent's edits of anchors that the journal does not have yet, on disk beside the keyframes
-// (spool.h): an uplink that is killed loses none.
+// Keeps the agent's edits of anchors on disk, beside the keyframes (spool.h), until the server has
+// answered them; so an uplink that is killed loses none.
 //
-// A file for each anchor: an ordinary LCM log of its newest ANCHOR_REQUEST_k, and the checksum of
-// that. It appears whole, in place of the one before, and goes when the server has answered. What
-// the page cache has survives the process; Sync makes it survive a power cut. A damaged file is
-// said, and kept under another name. Bounded by whoever puts edits in. One thread.
+// There is one file for each anchor: an ordinary LCM log with its newest ANCHOR_REQUEST_k and the
+// checksum of that. A new file replaces the old one atomically, and is removed when the server has
+// answered. The page cache survives the death of the process; Sync makes the files survive a power
+// cut. A damaged file is reported on stderr and renamed. The caller bounds the number of edits. Not
+// thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -22,18 +23,18 @@ namespace pangea {
 
 class EditSpool {
  public:
-  // `folder`: the spool's, which is there, and whose lock we have.
+  // `folder`: the folder of the Spool, which exists and which this process has locked.
   EditSpool(std::filesystem::path folder, int32_t agent_id);
 
-  // What an earlier run left: once, by anchor.
+  // The edits of an earlier run, in the order of their anchors. Call it once, at the start.
   std::vector<AnchorEdit> TakeLeft();
-  // In place of what is kept of the anchor.
+  // Keeps the edit in place of an older one of the anchor. On an error, refuses() becomes true.
   void Put(const AnchorEdit& edit);
-  // The server has answered this revision: what is kept of the anchor goes, unless it is newer.
+  // The server has answered this revision: removes the anchor's edit unless it is newer.
   void Remove(const AnchorId& anchor, int64_t revision);
   void Sync();
 
-  // The disk refused the last one.
+  // Whether the last Put could not be written.
   bool refuses() const { return refuses_; }
 
  private:
@@ -43,7 +44,7 @@ class EditSpool {
 
   const std::filesystem::path folder_;
   const std::string channel_;
-  std::map<AnchorId, int64_t> revisions_;  // of those that are kept
+  std::map<AnchorId, int64_t> revisions_;  // of the edits that are kept
   std::set<AnchorId> unsynced_;
   bool refuses_ = false;
 };

@@ -7,8 +7,8 @@
 namespace pangea {
 namespace {
 
-// A full keyframe has some 100 tracked corners and 450 others, 24 kB compressed, and a bare
-// one 1.5.
+// A full keyframe has about 100 tracked corners and 450 others, and 24 kB when compressed. A bare
+// one has 1.5 kB.
 constexpr std::array<LadderRung, RateLadder::kNumRungs> kRungs = {{
     {std::numeric_limits<int>::max(), 1},
     {300, 1},
@@ -21,9 +21,10 @@ constexpr std::array<LadderRung, RateLadder::kNumRungs> kRungs = {{
 
 constexpr double kUp_s = 2;
 constexpr int kHold = 6;  // keyframes
-// Of the budget: packets add 5 %, poses another 5 %, and something may be lost.
+// Share of the budget for keyframes: packets add 5 %, poses another 5 %, and packets may be lost.
 constexpr double kShare = 0.85;
-// While more than so many seconds of budget wait (after a time without a link), these go first.
+// While more than this many seconds of budget are waiting (after a time without a link), new
+// keyframes get a smaller share, so that the waiting ones are sent.
 constexpr double kMuchWaiting_s = 10;
 constexpr double kShareWhileMuchWaits = 0.6;
 

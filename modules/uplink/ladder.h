@@ -1,21 +1,21 @@
 #pragma once
 
-// What an agent leaves out of its keyframes so that they fit a budget of bytes a second: first
-// corners of each keyframe, then all corners of every second, third, fourth one. Never a keyframe:
-// the chain of poses has no gap.
+// Decides what an agent leaves out of its keyframes so that they fit a budget in bytes per second.
+// First corners of each keyframe are left out; then only every second, third or fourth keyframe has
+// corners. No keyframe is left out, so the chain of poses has no gap.
 //
-// An account rather than a measurement of the link: bytes sent are a debt, paid off at the budget's
-// rate. A debt of more than two seconds of budget that this rung does not pay off is a rung up;
-// none at all, after six keyframes, a rung down. Between two rungs of which one is too dear it so
-// goes back and forth, and the budget is used up. Time goes in; no clock.
+// The rate of the link is not measured. Bytes sent are a debt, which is paid off at the budget's
+// rate. If the debt is more than two seconds of budget and does not shrink on this rung, the ladder
+// goes up one rung; if there is no debt after six keyframes, it goes down one. So it alternates
+// between two rungs and uses the whole budget. Time goes in; no clock.
 
 #include <cstdint>
 
 namespace pangea {
 
 struct LadderRung {
-  int untracked = 0;  // corners kept beside tracked ones and map points
-  int every = 1;      // of so many keyframes one has corners
+  int untracked = 0;  // number of corners kept beside tracked ones and map points
+  int every = 1;      // one of `every` keyframes has corners
 };
 
 class RateLadder {
@@ -25,14 +25,14 @@ class RateLadder {
 
   explicit RateLadder(double budget_bytes_per_s);
 
-  // Before each new keyframe: whether this one has corners, and how many; from the debt, and from
-  // the bytes that wait to be sent.
+  // Call it before each new keyframe: it decides how many corners this one has. `now_us`:
+  // monotonic; `waiting_bytes`: bytes that wait to be sent.
   struct Choice {
-    bool bare = false;
-    int untracked = 0;
+    bool bare = false;  // no corners at all
+    int untracked = 0;  // as in LadderRung
   };
   Choice Next(int64_t now_us, int64_t waiting_bytes);
-  // The keyframe was taken, at so many bytes.
+  // The keyframe will be sent and has so many bytes.
   void Charge(int64_t bytes) { debt_bytes_ += static_cast<double>(bytes); }
 
   int rung() const { return rung_; }
@@ -45,9 +45,9 @@ class RateLadder {
   double debt_bytes_ = 0;
   int64_t last_us_ = 0;
   int rung_ = 0;
-  int since_change_ = 0;  // keyframes
+  int since_change_ = 0;  // keyframes since the last change of rung
   double debt_at_change_ = 0;
-  int since_corners_ = 1000;  // keyframes; the first has corners
+  int since_corners_ = 1000;  // keyframes since the last one with corners; the first one has some
 };
 
 }  // namespace pangea

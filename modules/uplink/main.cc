@@ -1,4 +1,4 @@
-// pangea-uplink: joins one agent's bus and the link bus.
+// pangea-uplink: connects one agent's bus to the link bus.
 
 #include <fmt/format.h>
 

@@ -14,7 +14,7 @@ double Share(int64_t utime, int64_t from, int64_t to) {
   return static_cast<double>(utime - from) / static_cast<double>(to - from);
 }
 
-// The first at or after that time.
+// The first item at or after that time.
 template <typename Stamped>
 typename std::deque<Stamped>::const_iterator FirstFrom(const std::deque<Stamped>& items,
                                                        int64_t utime) {
@@ -46,7 +46,7 @@ void PoseHistory::AddPose(int64_t utime, const MapId& map, const Rigid3& T_odom_
 void PoseHistory::AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body) {
   auto live = map == map_ ? Live(utime) : std::nullopt;
   if (!live || (!corrections_.empty() && utime <= corrections_.back().utime)) {
-    return;  // a repeat, or one from before the poses that are kept
+    return;  // a repeat, or older than the poses that are kept
   }
   corrections_.push_back({utime, T_odom_body * live->Inverse()});
   while (utime - corrections_.front().utime > kLength_us) {

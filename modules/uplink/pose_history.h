@@ -1,12 +1,14 @@
 #pragma once
 
-// Where the agent was in the newest seconds, so that an app may say "in front of me, then", and the
-// server need not interpolate between keyframes, in whose intervals a hand turns by degrees.
+// The agent's poses of the last seconds. With them an app can place an anchor "in front of me at
+// that time", and the server need not interpolate between keyframes, between which a hand rotates
+// by degrees.
 //
-// In: POSE_k while it tracks, and the agent's keyframes. Out: the pose at a time. The odometry
-// knows a keyframe better when it leaves the window than it knew the pose live (seconds later; half
-// a degree soon after the start). So between two keyframes the live poses say how it moved, and the
-// keyframes say where it was. Bounded: kLength_us of one map, kMaxPoses.
+// In: POSE_k while the odometry tracks, and the agent's keyframes. Out: the pose at a given time.
+// The pose of a keyframe, which leaves the window seconds later, is more accurate than the live
+// pose was (by half a degree soon after the start). So the result follows the live poses between
+// two keyframes, but is corrected to agree with the keyframes. Bounded: kLength_us of one map,
+// kMaxPoses.
 
 #include <cstdint>
 #include <deque>
@@ -20,14 +22,14 @@ namespace pangea {
 class PoseHistory {
  public:
   static constexpr int64_t kLength_us = 20'000'000;
-  static constexpr int64_t kMaxGap_us = 200'000;  // interpolated over
+  static constexpr int64_t kMaxGap_us = 200'000;  // longest gap to interpolate over
   static constexpr size_t kMaxPoses = 4000;
 
   void AddPose(int64_t utime, const MapId& map, const Rigid3& T_odom_body);
   void AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body);
-  // T_odom_body; nothing where there are no poses around that time.
+  // T_odom_body at `utime`; nothing if there are no poses around that time.
   std::optional<Rigid3> At(int64_t utime, const MapId& map) const;
-  // A keyframe at or after that time has come: At will not get better.
+  // Whether a keyframe at or after that time has come; the result of At will not improve any more.
   bool IsSettled(int64_t utime, const MapId& map) const;
 
  private:
@@ -35,7 +37,7 @@ class PoseHistory {
     int64_t utime = 0;
     Rigid3 T_odom_body;
   };
-  // Of a keyframe: from the live pose to its own.
+  // For a keyframe: its pose is T_odom_live times the live pose at its time.
   struct Correction {
     int64_t utime = 0;
     Rigid3 T_odom_live;

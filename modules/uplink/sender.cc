@@ -8,11 +8,12 @@
 namespace pangea {
 namespace {
 
-// A packet this many numbers behind one that arrived is taken for lost, not late.
+// A packet this many numbers behind one that arrived counts as lost, not late.
 constexpr int64_t kReordering = 24;
 constexpr size_t kRecent = 512;
 constexpr double kBurstBytes = 24'000;
-// After this many tries a piece waits for its time-out: somebody refuses the keyframe.
+// After this many tries a piece always waits for its time-out: the receiver probably refuses the
+// keyframe.
 constexpr int kQuickTries = 6;
 constexpr double kMinTimeout_us = 100e3;
 constexpr double kMaxTimeout_us = 10e6;
@@ -61,7 +62,7 @@ void Sender::SetStored(const KeyframeId& id) {
   item.stored = true;
   if (item.pieces.empty() && spooled_bytes_ > kMaxStoredInMemory) {
     spooled_bytes_ -= static_cast<int64_t>(item.bytes.size());
-    item.bytes = std::vector<uint8_t>();  // "= {}" would empty it and keep its memory
+    item.bytes = std::vector<uint8_t>();  // "= {}" would keep the memory
   }
 }
 
@@ -139,7 +140,8 @@ void Sender::OnAck(const LinkAck& ack, int64_t now_us) {
     Item& item = spool_.at(id);
     const auto partial = ack.partial.find(id);
     for (size_t i = 0; i < item.pieces.size(); ++i) {
-      // What was there may be gone again: the cache may drop what it has not journalled.
+      // A received piece may be lost again: the receiver's cache may drop pieces before
+      // journalling.
       item.pieces[i].received = partial != ack.partial.end() && i / 8 < partial->second.size() &&
                                 ((partial->second[i / 8] >> (i % 8)) & 1) != 0;
       if (item.pieces[i].received) {
@@ -190,8 +192,8 @@ void Sender::FindLost(int64_t highest_number, int64_t now_us) {
   }
 }
 
-// In each map the unbroken run from the next seq on, the newest map first; all together within the
-// receiver's cache.
+// The keyframes to send: in each map those from the next seq up to the first gap, the newest map
+// first, as far as the receiver's cache can hold them.
 std::vector<KeyframeId> Sender::UnderWay() const {
   std::vector<KeyframeId> ids;
   int64_t bytes = 0;
@@ -202,7 +204,7 @@ std::vector<KeyframeId> Sender::UnderWay() const {
       if (it->first != KeyframeId{map, seq}) {
         break;
       }
-      // What is not loaded yet is taken for as large as it may be.
+      // A keyframe that is not loaded yet counts with the largest possible size.
       bytes += it->second.bytes.empty() ? kMaxCompressedBytes
                                         : static_cast<int64_t>(it->second.bytes.size());
       if (!ids.empty() && (ids.size() >= kMaxPartialKeyframes || bytes > cache_bytes_)) {

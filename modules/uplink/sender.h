@@ -1,21 +1,20 @@
 #pragma once
 
-// The agent's half of the link: keeps keyframes until they are acknowledged, cuts them into
-// packets, paces them, and sends again what is missing. A state machine: time goes in, packets come
-// out; no clock, no bus, one thread.
+// The agent's half of the link: it keeps keyframes until they are acknowledged, cuts them into
+// packets, paces them, and sends lost packets again. A state machine: time goes in, packets come
+// out; no clock, no bus; not thread safe.
 //
-// In each map keyframes go out in seq order without gaps, so the other side never has to hold more
-// than the few that are under way. What is lost is seen in the order of transmission numbers (a
-// packet sent 24 numbers before one that arrived is gone), or after a time-out that follows the
-// measured round trip (RFC 6298's estimator) and doubles with each try.
+// The keyframes of a map are sent in seq order without gaps, so the receiver holds only the few
+// that are under way. A packet counts as lost if one sent 24 numbers later has arrived, or after a
+// time-out, which follows the measured round trip (RFC 6298's estimator) and doubles with each try.
 //
-// Of several maps the newest goes first: what it brings is new to the server, and loops it closes
-// are of use to the agent now. The history of older maps takes what room is left.
+// Of several maps the newest is sent first, because its keyframes show new places, and its loop
+// closures help the agent now. Older maps use the bandwidth that is left.
 //
-// Bounds: memory (options); beyond it new keyframes are refused: the oldest are the ones the pose
-// chain hangs on, and the newest can still be asked from the odometry. Keyframes that are stored
-// elsewhere (SetStored) are held in memory up to kMaxStoredInMemory only, and read again when their
-// turn comes. In flight: options.
+// Bounds: bytes in flight, and memory (SenderOptions). When the memory is full, new keyframes are
+// refused, not old ones dropped: the chain of poses depends on the oldest, and the odometry can
+// still resend the newest. Of keyframes that are also stored on disk (SetStored), only
+// kMaxStoredInMemory bytes stay in memory; the others are loaded when they are sent.
 
 #include <cstdint>
 #include <deque>
@@ -32,14 +31,14 @@
 namespace pangea {
 
 struct SenderOptions {
-  // Keyframe bytes per packet: by default what fills one Ethernet frame; the paper has 4096.
+  // Keyframe bytes per packet. By default a packet fills one Ethernet frame; the paper uses 4096.
   int payload_bytes = kFramePayloadBytes;
-  double bandwidth_kb_per_s = 4000;  // keyframes' packets, repeats included, at most
-  // Sent, neither arrived nor given up: what the receiver's cache takes (the paper, section IV.B).
-  // A smaller window would hold keyframes back on a long way: at a round trip of 4 s 50 kB/s take
-  // 200 kB.
+  double bandwidth_kb_per_s = 4000;  // at most, for keyframe packets and their repeats
+  // Bytes sent and neither received nor lost: at most the size of the receiver's cache (the paper,
+  // section IV.B). A smaller window would slow down links with a long round trip: 50 kB/s at 4 s
+  // need 200 kB.
   int max_in_flight_bytes = 210 * 1024;
-  int64_t max_spool_bytes = 256 << 20;  // in memory; about 9,000 keyframes, an hour's walk
+  int64_t max_spool_bytes = 256 << 20;  // in memory; about 9,000 keyframes, an hour of walking
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;
 };
@@ -47,40 +46,42 @@ struct SenderOptions {
 class Sender {
  public:
   static constexpr int64_t kMaxStoredInMemory = 8 << 20;
-  // A stored keyframe, compressed; empty if it is lost.
+  // Loads a stored keyframe, compressed; empty if it is lost.
   using Load = std::function<std::vector<uint8_t>(const KeyframeId&)>;
 
   explicit Sender(const SenderOptions& options, Load load = nullptr);
 
-  // Takes a compressed keyframe. False if the spool is full.
+  // Adds a compressed keyframe. False if the memory is full.
   bool Add(const KeyframeId& id, std::vector<uint8_t> bytes);
   bool Has(const KeyframeId& id) const { return spool_.contains(id); }
-  // It is stored from now on, and can be loaded; also one that an earlier run has stored.
+  // From now on the keyframe can be loaded with `load`; also used for those of an earlier run.
   void SetStored(const KeyframeId& id);
-  // The first spooled keyframe of the map at or after `seq`; the first seq that is none.
+  // FirstSeqFrom: the first spooled keyframe of the map at or after `seq`. FirstMissingFrom: the
+  // first seq at or after `seq` that is not spooled.
   std::optional<int32_t> FirstSeqFrom(const MapId& map, int32_t seq) const;
   int32_t FirstMissingFrom(const MapId& map, int32_t seq) const;
-  // Only maps that the other side knows are sent, from this seq on; before it all is acknowledged.
+  // The handler knows the map: keyframes are sent from this seq on, earlier ones are acknowledged.
+  // A map without SetNext is not sent.
   void SetNext(const MapId& map, int32_t next_seq);
   void Release(const MapId& map, int32_t journalled_seq);  // acknowledged up to this seq
-  // The map is done with; nothing of it may be in the spool.
+  // The map is finished. None of its keyframes may be in the spool.
   void Forget(const MapId& map) { next_.erase(map); }
 
   void OnAck(const LinkAck& ack, int64_t now_us);
   struct Sent {
     int64_t number = 0;
     KeyframeId keyframe;
-    LinkPiece piece;  // its slot is the caller's to fill in; valid until the next call
+    LinkPiece piece;  // valid until the next call; the caller must set its slot
   };
-  // The pieces due now. Call it every few milliseconds while there is something to send.
+  // The pieces to send now. Call it every few milliseconds while keyframes are spooled.
   std::vector<Sent> Poll(int64_t now_us);
-  // The number of a packet of another kind, which is neither kept nor repeated. Its acknowledgement
-  // measures the round trip too, so that the first keyframes already wait as long as they have to.
+  // The number for a packet of another kind, which the sender neither keeps nor repeats. Its
+  // acknowledgement also measures the round trip, so the time-out is right from the first keyframe.
   int64_t NextNumber(int64_t now_us);
 
   size_t spooled() const { return spool_.size(); }
   int spooled(const MapId& map) const;
-  // In memory.
+  // Bytes of keyframes in memory.
   int64_t spooled_bytes() const { return spooled_bytes_; }
   bool Full() const { return spooled_bytes_ + kMaxCompressedBytes > options_.max_spool_bytes; }
   int64_t resent() const { return resent_; }
@@ -95,9 +96,9 @@ class Sender {
     bool received = false;
   };
   struct Item {
-    std::vector<uint8_t> bytes;  // empty while it is only stored
+    std::vector<uint8_t> bytes;  // empty while the keyframe is only on disk
     bool stored = false;
-    std::vector<Piece> pieces;  // empty until it is under way
+    std::vector<Piece> pieces;  // empty until the keyframe is being sent
   };
   struct Transmission {
     int64_t number;
@@ -119,12 +120,12 @@ class Sender {
   const Load load_;
   Pacer pacer_;
   std::map<KeyframeId, Item> spool_;
-  std::map<MapId, int> spooled_of_;  // keyframes of each map that has any
+  std::map<MapId, int> spooled_of_;  // number of spooled keyframes of each map that has any
   std::set<KeyframeId> started_;     // those with pieces
   std::map<MapId, int32_t> next_;
   int64_t spooled_bytes_ = 0;
   int in_flight_bytes_ = 0;
-  int cache_bytes_ = 0;  // the receiver's
+  int cache_bytes_ = 0;  // size of the receiver's cache
   int64_t last_number_ = 0;
   int64_t highest_acked_ = 0;
   int64_t resent_ = 0;

@@ -9,7 +9,7 @@ constexpr int64_t kMovingInterval_us = 50'000;
 constexpr int64_t kIdleInterval_us = 1'000'000;
 constexpr double kSpeed = 0.1, kMaxSpeed = 0.25;  // m/s
 constexpr double kRotationSpeed = 0.2;            // rad/s
-// Below 3 s: a step stands for 50 ms also where Poll came a little later.
+// Less than 3 s, because a step always counts as 50 ms, even if Poll was called a little later.
 constexpr double kWay_s = 2.7;
 
 bool Same(const Rigid3& a, const Rigid3& b) { return a.t == b.t && a.q.coeffs() == b.q.coeffs(); }
@@ -32,7 +32,7 @@ void ShownAnchorsBlend::Set(const AnchorState& state) {
   } else if (!Same(entry.T_odom_anchor, state.T_odom_anchor)) {
     entry.T_odom_anchor = state.T_odom_anchor;
     const double way = (entry.T_odom_anchor.t - entry.T_odom_shown.t).norm();
-    // Not slower for being corrected again on its way.
+    // A further correction must not slow it down.
     entry.speed = std::max(entry.speed, std::clamp(way / kWay_s, kSpeed, kMaxSpeed));
   }
   Look();
@@ -65,7 +65,7 @@ void ShownAnchorsBlend::Look() {
   });
 }
 
-// Whether it is still on its way.
+// Moves the shown pose by one step. Returns whether it still differs from the true pose.
 bool ShownAnchorsBlend::Step(double seconds, Entry* entry) {
   const Rigid3& target = entry->T_odom_anchor;
   Rigid3* shown = &entry->T_odom_shown;

@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kPrefix[] = "keyframes_";
-// A keyframe begins with its fingerprint and its id (agent, map, seq).
+// An encoded keyframe begins with its fingerprint and its id (agent, map, seq).
 constexpr size_t kIdBytes = 4 + 8 + 4;
 using Begin8 = std::array<uint8_t, 8>;
 
@@ -174,7 +174,7 @@ bool Spool::Write(const KeyframeId& id, Bytes data, int64_t utime) {
   const Place place{newest_, segment.bytes, static_cast<int32_t>(bytes.size()),
                     EventChecksum(bytes)};
   AppendChecksumsEvent({next_event_, {place.crc32}}, utime, &bytes);
-  // A part that was written before the disk refused is written over by the next keyframe.
+  // If the disk fails in the middle, the next keyframe overwrites the part that was written.
   if (!WriteFully(fd_, segment.bytes, bytes.data(), bytes.size())) {
     return false;
   }
@@ -205,7 +205,7 @@ std::vector<uint8_t> Spool::Read(const KeyframeId& id) {
   return {};
 }
 
-// Empty if it is not what was written.
+// The data of the event; empty if it cannot be read or its checksum is wrong.
 std::vector<uint8_t> Spool::ReadData(const Place& place) const {
   std::vector<uint8_t> event(static_cast<size_t>(place.size));
   const int fd = open(File(place.segment).c_str(), O_RDONLY | O_CLOEXEC);

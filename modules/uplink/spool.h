@@ -1,21 +1,21 @@
 #pragma once
 
-// Keyframes that are not acknowledged yet, on disk: hours without a server cost disk and not
-// memory, and an uplink that is killed loses none.
+// Keeps keyframes that are not acknowledged yet on disk. So hours without a server need disk space
+// and not memory, and an uplink that is killed loses no keyframe.
 //
-// A folder of segments, ordinary LCM logs of KEYFRAME_k (keyframes_000001.lcm, ...), which are only
-// appended to; one goes when all in it is acknowledged. Every run begins a segment of its own, so a
-// tail torn by a crash is never written behind, and ignored. What the page cache has survives the
-// process; Sync makes it survive a power cut.
+// The spool is a folder of segments: ordinary LCM logs of KEYFRAME_k (keyframes_000001.lcm, ...). A
+// segment is only appended to, and removed when all its keyframes are acknowledged. Every run
+// begins a new segment, so nothing is ever written after a tail torn by a crash; torn tails are
+// ignored. The page cache survives the death of the process; Sync makes the files survive a power
+// cut.
 //
-// A CHECKSUMS event (checksums.h) behind each keyframe shows when it is read whether it is still
-// what was written. What is damaged costs no other keyframe; a segment with damage is not removed
-// when its time has come, but kept under another name (keyframes_000001.lcm.damaged-<UTC time>)
-// until somebody takes it away.
+// Each keyframe is followed by a CHECKSUMS event (checksums.h), which is verified on reading.
+// Damage costs only the damaged keyframes. A segment with damage is renamed instead of removed
+// (keyframes_000001.lcm.damaged-<UTC time>), and stays until somebody removes it.
 //
-// Bound: `max_bytes` of segments, those with damage included. Then, or when the disk refuses, Add
-// says no, and the keyframe has to stay in memory. The index takes some 100 bytes of memory per
-// keyframe. One thread.
+// Bound: `max_bytes` of segments, with damaged ones. When it is reached, or the disk refuses, Add
+// returns false, and the keyframe has to stay in memory. The index needs about 100 bytes of memory
+// per keyframe. Not thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -32,48 +32,48 @@ namespace pangea {
 class Spool {
  public:
   static constexpr int64_t kSegmentBytes = 16 << 20;
-  // A segment that is read to its end is not removed before it has this size: else a connected
-  // agent would make a file per keyframe.
+  // The segment that is being written is not removed before it has this size, even if all its
+  // keyframes are acknowledged; else a connected agent would make one file per keyframe.
   static constexpr int64_t kLeastSegmentBytes = 1 << 20;
 
-  // Creates the folder, or finds what an earlier run left. Throws std::runtime_error: cannot be
-  // used, in use by another process, another agent's.
+  // Creates the folder, or finds the keyframes of an earlier run. Throws std::runtime_error if the
+  // folder cannot be used, is used by another process, or has keyframes of another agent.
   Spool(std::filesystem::path folder, int32_t agent_id, int64_t max_bytes);
   ~Spool();
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
 
-  // An encoded keyframe_t; false if it was not written. A repeat changes nothing.
+  // `data`: an encoded keyframe_t. False if it was not written. A repeat changes nothing.
   bool Add(const KeyframeId& id, Bytes data, int64_t utime);
-  // Empty if it is not there, or is damaged: then it is not kept any more.
+  // The encoded keyframe. Empty if it is not there, or is damaged; a damaged one is also dropped.
   std::vector<uint8_t> Read(const KeyframeId& id);
-  // All of the map up to `seq` is acknowledged.
+  // All keyframes of the map up to `seq` are acknowledged.
   void Release(const MapId& map, int32_t seq);
   void Sync();
 
   std::vector<KeyframeId> Kept() const;
   int64_t bytes() const { return bytes_; }
-  // Of segments with damage that are done with.
+  // Bytes of the renamed segments with damage.
   int64_t damaged_bytes() const { return damaged_bytes_; }
-  // Pieces that are no events, and keyframes that are not what was written, since the start.
+  // Number of damaged places and keyframes found since the start.
   int64_t num_damaged() const { return num_damaged_; }
-  // The last write was refused, by the disk or by the bound.
+  // Whether the last Add failed, because of the disk or the bound.
   bool refuses() const { return refuses_; }
 
  private:
   struct Segment {
     int64_t bytes = 0;
-    int kept = 0;  // keyframes
+    int kept = 0;  // number of keyframes not acknowledged yet
     bool damaged = false;
   };
   struct Place {
     int64_t segment = 0;
-    int64_t offset = 0;  // of the event
+    int64_t offset = 0;  // of the event in its segment
     int32_t size = 0;
     uint32_t crc32 = 0;
   };
 
-  [[noreturn]] void Refuse(const std::string& reason) const;  // in the constructor
+  [[noreturn]] void Refuse(const std::string& reason) const;  // only for the constructor
   std::filesystem::path File(int64_t segment) const;
   void FindFiles();
   void Load(int64_t segment);
@@ -95,8 +95,8 @@ class Spool {
   int64_t bytes_ = 0;
   int64_t damaged_bytes_ = 0;
   int64_t num_damaged_ = 0;
-  int64_t newest_ = 0;  // segment
-  int fd_ = -1;         // of the newest, while it is written to
+  int64_t newest_ = 0;  // number of the newest segment
+  int fd_ = -1;         // of the newest segment while it is being written
   int64_t next_event_ = 0;
   bool unsynced_ = false;
   bool refuses_ = false;

@@ -1,17 +1,18 @@
 #pragma once
 
-// A keyframe with fewer corners, for a link that must not carry them all. Pose, edge and
-// preintegration stay as they are, so the chain of poses has no gap.
+// Reduces the corners of a keyframe, for a link with a budget. Pose, edge and preintegration stay
+// as they are, so the chain of poses has no gap.
 
 #include "core/keyframe.h"
 
 namespace pangea {
 
-// Keeps the corners that are tracked or map points, and of the others at most `untracked`: the same
-// share of each octave, from its front, where the describer puts the strongest, well spread.
+// Keeps the corners that are tracked or are map points, and at most `untracked` of the others: the
+// same share of each octave. The first ones of an octave are kept, because the describer puts
+// strong and well distributed corners first.
 Keyframe Thinned(Keyframe keyframe, int untracked);
 
-// No corner, no map point.
+// The keyframe without corners and map points.
 Keyframe Bare(Keyframe keyframe);
 
 }  // namespace pangea

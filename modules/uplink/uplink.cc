@@ -10,24 +10,25 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
-// No acknowledgement for this long: the handler is away, only hellos are sent.
+// Without an acknowledgement for this long, the handler is away, and only hellos are sent.
 constexpr int64_t kConnected_us = 3 * kSecond_us;
 constexpr int64_t kHelloInterval_us = kSecond_us;
 constexpr int64_t kHelloUrgent_us = kSecond_us / 4;
-// Asking the odometry for what is missing, and for what may exist beyond the newest known.
+// How often the odometry is asked for missing keyframes, and for those beyond the newest known one.
 constexpr int64_t kAskInterval_us = 3 * kSecond_us / 10;
 constexpr int64_t kProbeInterval_us = kSecond_us;
 constexpr int32_t kMaxAsked = 50;
-// An odometry that opened a new map while nobody listened answers the first time; it may be away.
+// One probe would be enough for an odometry that opened a map while the uplink was away, but the
+// odometry may be away itself.
 constexpr int kMaxProbes = 3;
 constexpr int64_t kProbeOlderInterval_us = kSecond_us / 5;
-// A gap the odometry has not filled after so many asks is lost for good.
+// A gap that the odometry has not filled after this many requests is lost for good.
 constexpr int kMaxUnanswered = 30;
-// An agent opens a map each time its odometry starts anew; the oldest that are done are
-// forgotten.
+// An agent opens a map each time its odometry restarts. Beyond this number, the oldest finished
+// maps are forgotten.
 constexpr size_t kMaxMaps = 200;
 
-// A pose's packet on the wire, and what poses may take of a budget.
+// Size of a pose's packet on the wire, and the shares of a budget for poses and anchors.
 constexpr double kPoseBytes = 180;
 constexpr double kPoseShare = 0.05;
 constexpr double kAnchorShare = 0.05;
@@ -99,7 +100,7 @@ Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> byt
 
 void Uplink::AddPose(const MapId& map_id, int64_t group_revision, std::vector<uint8_t> bytes) {
   pose_ = std::move(bytes);
-  // The pose names the map even if every keyframe of it was missed.
+  // A pose makes the map known even if all its keyframes were missed.
   FindOrAdd(map_id).applied_revision = group_revision;
 }
 
@@ -124,7 +125,7 @@ void Uplink::OnNewSession() {
 
 void Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
   if (ack.number <= newest_ack_) {
-    return;  // overtaken
+    return;  // a newer acknowledgement came before
   }
   newest_ack_ = ack.number;
   last_ack_us_ = now_us;
@@ -142,7 +143,7 @@ void Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
       map.correction = correction;
       map.sent_us = 0;
     }
-    hello_due_ = true;  // confirms it
+    hello_due_ = true;  // a hello confirms the correction
   }
 }
 
@@ -150,7 +151,7 @@ bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-// The newest, and of the others the newest with something to send.
+// The newest map, and the newest of the other maps that have keyframes to send.
 std::vector<MapId> Uplink::Announced() const {
   std::vector<MapId> announced;
   for (auto it = maps_.rbegin(); it != maps_.rend() && announced.size() < kMaxLinkMaps; ++it) {
@@ -181,7 +182,7 @@ void Uplink::GiveSlots(const std::vector<MapId>& announced) {
   }
 }
 
-// The journal knew the map before a hello of this run named it.
+// This happens when the journal knew the map before a hello of this run named it.
 bool Uplink::LacksSlot() const {
   const std::vector<MapId> announced = Announced();
   return std::any_of(announced.begin(), announced.end(), [&](const MapId& id) {
@@ -236,10 +237,10 @@ std::vector<LinkPacket> Uplink::Poll(int64_t now_us) {
   return packets;
 }
 
-// The first seqs of a map that were published but are neither acknowledged nor in the spool.
+// The first gap of a map: seqs that were published but are neither acknowledged nor in the spool.
 std::optional<SeqGap> Uplink::Missing(const MapId& id, const OutgoingMap& map) const {
   if (sender_.spooled(id) == map.highest + 1 - map.next) {
-    return std::nullopt;  // none is lost: all that are spooled lie between these two
+    return std::nullopt;  // no gap: the spool has all keyframes from `next` to `highest`
   }
   const int32_t from = sender_.FirstMissingFrom(id, map.next);
   if (from > map.highest) {
@@ -272,8 +273,8 @@ std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
     }
     auto gap = Missing(id, map);
     if (!gap && newest && now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us) {
-      // Nothing is known to be missing; but after a restart, or a lost last datagram, nothing
-      // would be known. Silence is the usual answer.
+      // No keyframe is known to be missing. But after a restart, or if the last datagram was lost,
+      // it would not be known. Usually there is no answer.
       map.asked_us = now_us;
       asks.push_back({{id, map.highest + 1, map.highest + kMaxAsked}, false});
       continue;

@@ -1,10 +1,11 @@
 #pragma once
 
-// One agent's end of the link: keyframes and poses in, packets out; acknowledgements in,
-// corrections and "have up to" out. Asks the odometry for keyframes it missed, so a restarted
-// uplink or a lost datagram on the agent's bus costs nothing the odometry still has.
+// One agent's end of the link. Keyframes and poses go in, packets come out; acknowledgements go in,
+// corrections and the acknowledged seqs come out. It asks the odometry for keyframes that it
+// missed, so a restart of the uplink or a lost datagram on the agent's bus loses no keyframe that
+// the odometry still has.
 //
-// A state machine: time goes in (monotonic microseconds); no clock, no bus, one thread.
+// A state machine: monotonic microseconds go in; no clock, no bus; not thread safe.
 
 #include <cstdint>
 #include <map>
@@ -19,9 +20,9 @@ namespace pangea {
 
 struct UplinkOptions {
   SenderOptions sender;
-  double pose_hz = 10;  // poses sent up at most this often; 0 for none
-  // What the agent may send, packets and repeats included; 0 for no bound. Keyframes are thinned to
-  // fit (ladder.h), poses sent more seldom.
+  double pose_hz = 10;  // largest rate of poses sent to the server; 0: none
+  // Bound for all that the agent sends, with packet overhead and repeats; 0: no bound. To fit,
+  // keyframes are thinned (ladder.h), and poses are sent less often.
   double budget_kb_per_s = 0;
   int64_t spool_disk_bytes = 4'000'000'000;  // 40 hours of walking
 
@@ -46,42 +47,45 @@ struct UplinkOptions {
   }
 };
 
-// With the pace and the poses that the budget allows.
+// The options with bandwidth and pose rate reduced to fit the budget.
 UplinkOptions WithinBudget(UplinkOptions options);
-// What it leaves for edits of anchors, bytes on the wire per second.
+// The share of the budget for edits of anchors, bytes on the wire per second.
 double AnchorBytesPerSecond(const UplinkOptions& options);
 
 class Uplink {
  public:
-  // `load` gives what SetStored was told of.
+  // `load` loads the keyframes for which SetStored was called.
   explicit Uplink(const UplinkOptions& options, Sender::Load load = nullptr);
 
-  // The agent has published it; whether it is still to be taken.
+  // The agent has published this keyframe. Returns whether it must still be added.
   bool NoteReceived(const KeyframeId& id, int64_t now_us);
   enum class Taken { kNew, kRepeat, kSpoolFull };
-  // A keyframe_t that has passed Parse, encoded and compressed.
+  // `bytes`: a keyframe_t that Parse has accepted, encoded and compressed.
   Taken AddKeyframe(const KeyframeId& id, std::vector<uint8_t> bytes, int64_t now_us);
-  // The keyframe can be loaded from now on; also one of an earlier run.
+  // From now on the keyframe can be loaded with `load`; also used for those of an earlier run.
   void SetStored(const KeyframeId& id);
-  // A pose in EncodePose's form; its map, and the revision of the correction it had applied.
+  // `bytes`: the result of EncodePose. `group_revision`: of the correction applied to the pose.
   void AddPose(const MapId& map, int64_t group_revision, std::vector<uint8_t> bytes);
-  // Perhaps with a handler that has another journal: what it has, it says anew, and it may be less.
+  // The new session may be with a handler that has another journal, with fewer keyframes. So what
+  // the handler has is learnt again.
   void OnNewSession();
   void OnAck(const LinkAck& ack, int64_t now_us);
 
-  // Only hellos until the session's first acknowledgement.
+  // The packets to send now: only hellos until the first acknowledgement of the session.
   std::vector<LinkPacket> Poll(int64_t now_us);
   struct Ask {
     SeqGap gap;
-    bool known = true;  // false: only looking whether there is more than was heard of
+    bool known = true;  // false: a probe whether there are keyframes that were never heard of
   };
-  // What to ask of the odometry now; each gap is repeated until it is filled or given up.
+  // The keyframes to ask the odometry for now. Each gap is asked for until it is filled or given
+  // up.
   std::vector<Ask> Asks(int64_t now_us);
-  // The number of a packet of anchors, which others make; only when connected.
+  // The number for a packet about anchors (uplink_anchors.h). Only while connected.
   int64_t NextNumber(int64_t now_us) { return sender_.NextNumber(now_us); }
-  // Corrections the agent has to be told now: new ones, and one per second it has not applied.
+  // The corrections to publish now: new ones, and once per second the newest map's, until the agent
+  // has applied it.
   std::vector<Correction> TakeCorrections(int64_t now_us);
-  // The highest acknowledged seq of each map; -1 for none.
+  // The highest acknowledged seq of each map; -1: none.
   std::map<MapId, int32_t> Acknowledged() const;
 
   bool Connected(int64_t now_us) const;
@@ -92,34 +96,34 @@ class Uplink {
 
  private:
   struct OutgoingMap {
-    int32_t next = 0;             // the first that is not journalled (or given up)
-    int32_t given_up = 0;         // those before are lost for good, unless they are journalled
-    int32_t highest = -1;         // the highest the agent is known to have published
+    int32_t next = 0;             // the first seq that is neither journalled nor given up
+    int32_t given_up = 0;         // earlier seqs are lost for good, unless they are journalled
+    int32_t highest = -1;         // the highest seq that the agent is known to have published
     bool listed = false;          // the handler knows the map
-    std::optional<uint8_t> slot;  // in hellos and pieces, since it was first in a hello
+    std::optional<uint8_t> slot;  // for hellos and pieces; set when the map is first in a hello
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
-    int probes = 0;           // since it was last heard of, while there is a newer one
+    int probes = 0;           // since its last new keyframe, while there is a newer map
     int64_t received_us = 0;  // when the newest keyframe came
     std::optional<Correction> correction;
-    int64_t applied_revision = 0;  // as the agent's poses say
+    int64_t applied_revision = 0;  // from the agent's poses
     int64_t sent_us = 0;
   };
 
   OutgoingMap& FindOrAdd(const MapId& id);
   void SetNext(const MapId& id, OutgoingMap* map, int32_t next);
   std::optional<SeqGap> Missing(const MapId& id, const OutgoingMap& map) const;
-  // What may have come after the last known keyframe of a map that is not the newest, or before the
-  // first known map; now and then, a few times.
+  // A probe for keyframes after the last known one of an older map, or of maps before the first
+  // known one. Each is probed a few times, with pauses.
   std::optional<SeqGap> ProbeOlder(int64_t now_us);
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, OutgoingMap* map, const SeqGap& gap);
   // The maps of the next hello, the newest last.
   std::vector<MapId> Announced() const;
-  // Those that have no slot yet, or one that another of them has, get one.
+  // Gives a slot to each map that has none, or that has the same as another one of these.
   void GiveSlots(const std::vector<MapId>& announced);
-  // The handler knows a map, but has still to be told its slot.
+  // Whether the handler knows a map but not yet its slot.
   bool LacksSlot() const;
   std::vector<uint8_t> Hello();
 

@@ -8,7 +8,8 @@
 namespace pangea {
 namespace {
 
-// Keyframes leave the odometry's window within seconds; one that stands still makes one in five.
+// Keyframes leave the odometry's window within seconds; a stationary agent makes one every five
+// seconds.
 constexpr int64_t kMaxHeld_us = 10'000'000;
 
 }  // namespace
@@ -52,7 +53,7 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   if (held != held_.end() && held->second.edit.revision >= edit.revision) {
     return node_.Count("anchor_edits_repeated");
   }
-  Release(edit.anchor);  // the queue makes one edit of the two
+  Release(edit.anchor);  // the queue merges the two edits
   if (by_pose && !edit.T_odom_body && held_.size() < EditQueue::kMaxEdits &&
       !edits_.Has(edit.anchor, edit.revision)) {
     return Hold(std::move(edit));
@@ -60,7 +61,7 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   Queue(std::move(edit));
 }
 
-// Killed meanwhile, it goes with the pose that is known by now.
+// If the process is killed meanwhile, the next run sends the edit with the pose known by now.
 void UplinkAnchors::Hold(AnchorEdit edit) {
   if (spool_ != nullptr) {
     AnchorEdit by_now = edit;
@@ -98,7 +99,7 @@ void UplinkAnchors::Queue(AnchorEdit edit) {
   switch (edits_.Add(std::move(edit))) {
     case EditQueue::Taken::kNew:
       if (spool_ != nullptr) {
-        spool_->Put(edits_.Waiting(id));  // with the place of the one that it replaced
+        spool_->Put(edits_.Waiting(id));  // the merged edit: it may have the older one's placement
       }
       return node_.Count("anchor_edits");
     case EditQueue::Taken::kOutdated:

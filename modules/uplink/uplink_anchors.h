@@ -1,6 +1,6 @@
 #pragma once
 
-// Anchors between the agent's bus and the link.
+// Relays anchors and edits of anchors between the agent's bus and the link.
 //   agent bus: ANCHOR_REQUEST_k in; ANCHOR_k, SHOWN_ANCHORS_k out
 
 #include <cstdint>
@@ -21,10 +21,10 @@ namespace pangea {
 
 class UplinkAnchors {
  public:
-  // Seals and sends a packet; its bytes on the wire.
+  // Seals and sends a packet; returns its bytes on the wire.
   using Send = std::function<int64_t(LinkKind kind, std::vector<uint8_t> body)>;
 
-  // `edit_bytes_per_s`: for edits on their way up, at most. `spool`: may be null.
+  // `edit_bytes_per_s`: largest rate for edits to the server. `spool` may be null.
   UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s, EditSpool* spool = nullptr);
 
   static bool IsOfAnchors(LinkKind kind) {
@@ -32,14 +32,14 @@ class UplinkAnchors {
   }
   void OnPacket(const LinkPacket& packet, int64_t now_us);
   void OnNewSession();
-  // `T_odom_body`: none while it does not track.
+  // `T_odom_body`: nothing while the odometry does not track.
   void OnPose(int64_t utime, const MapId& map, const std::optional<Rigid3>& T_odom_body);
   void OnKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body);
-  // What is due to the server; only in a session.
+  // Sends what is due to the server. Only in a session.
   void SendDue(int64_t now_us, const Send& send);
-  // What is due on the agent's bus.
+  // Publishes what is due on the agent's bus.
   void Publish(int64_t now_us);
-  // Publish wants to be called every few milliseconds.
+  // If true, Publish must be called every few milliseconds.
   bool moving() const { return shown_.moving(); }
   size_t edits_waiting() const { return edits_.waiting() + held_.size(); }
   void SyncSpool() {
@@ -47,11 +47,12 @@ class UplinkAnchors {
       spool_->Sync();
     }
   }
-  // An edit that would not survive this process.
+  // Whether the last edit could not be stored, so that it would not survive this process.
   bool spool_refuses() const { return spool_ != nullptr && spool_->refuses(); }
 
  private:
-  // One that says "where I was then", until the keyframe after it says better where that was.
+  // An edit relative to the agent's pose at some time. It is held until the next keyframe after
+  // that time makes that pose more accurate.
   struct Held {
     AnchorEdit edit;
     int64_t until_us = 0;
@@ -70,7 +71,7 @@ class UplinkAnchors {
   const int32_t agent_id_;
   EditSpool* const spool_;
   int64_t now_us_ = 0;
-  std::map<AnchorId, Held> held_;  // at most kMaxEdits
+  std::map<AnchorId, Held> held_;  // at most EditQueue::kMaxEdits
   EditQueue edits_;
   AgentAnchors anchors_;
   ShownAnchorsBlend shown_;

@@ -67,7 +67,8 @@ UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, co
                       [this](const std::string&, Bytes data) { OnPose(data); });
   link_bus.Subscribe(channels::LinkDown(agent_id),
                      [this](const std::string&, Bytes data) { OnLinkDown(data); });
-  // On one bus the server would take each keyframe from the odometry too, before it is journalled.
+  // If agent and server shared a bus, the server would get keyframes directly from the odometry,
+  // before they are journalled.
   agent_bus.Subscribe(channels::Status("agent_handler"), [this](const std::string&, Bytes) {
     node_.Refuse("the server is on this bus too: give the agent's processes another one (--bus)");
   });
@@ -149,7 +150,7 @@ void UplinkProcess::OnPose(Bytes data) {
     return node_.Refuse("pose_t does not decode");
   }
   const auto map = Parse(message.map);
-  // While it initialises there is no map yet.
+  // While the odometry initialises, the pose has no map yet.
   if (map.value && map.value->agent_id == agent_id_) {
     uplink_.AddPose(*map.value, message.group_revision, EncodePose(message));
     const auto T_odom_body = Parse(message.T_odom_body).value;
@@ -213,7 +214,7 @@ void UplinkProcess::OnOthers(const LinkPacket& packet) {
   if (!others.value || others.value->map.agent_id != agent_id_) {
     return node_.Refuse(others.value ? "others: for another agent" : others.refused);
   }
-  if (packet.number > last_others_) {  // it was not overtaken
+  if (packet.number > last_others_) {  // no newer one came before
     last_others_ = packet.number;
     node_.Publish(channels::Others(agent_id_), message);
   }
@@ -293,7 +294,7 @@ void UplinkProcess::PublishCorrections() {
   }
 }
 
-// Called once a second.
+// Must be called once per second, because it also computes the rate.
 std::string UplinkProcess::RateForPeople() {
   constexpr double kSmoothing = 0.1;
   const auto last_s = static_cast<double>(bytes_up_ - bytes_up_at_status_);
@@ -338,7 +339,7 @@ void UplinkProcess::Tick(int64_t now_utime) {
                   uplink_.keyframes_acked(), spooled, RateForPeople(), SpoolForPeople()));
 }
 
-// A handler does not answer who has another key.
+// If the keys differ, the handler does not answer, so this is one of the reasons named here.
 std::string UplinkProcess::StateForPeople() {
   if (uplink_.Connected(now_us_)) {
     was_connected_ = true;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The uplink between its agent's bus and the link bus.
+// The uplink process, between its agent's bus and the link bus.
 //   agent bus: KEYFRAME_k, AGAIN_uplink_k, POSE_k in; HAVE, CORRECTION_k, LANDMARKS_k, OTHERS_k,
 //              RESEND_REQUEST, STATUS_uplink_k out; and what uplink_anchors.h says
 //   link bus:  LINK_DOWN_k in, LINK_UP_k out
@@ -27,18 +27,18 @@ class UplinkProcess : public PolledProcess {
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
-  // Keyframes that the server has yet to acknowledge.
+  // Number of keyframes that the server has not acknowledged yet.
   int64_t num_waiting() const { return static_cast<int64_t>(uplink_.sender().spooled()); }
 
  private:
   void OnKeyframe(Bytes data);
   void OnPose(Bytes data);
   void OnLinkDown(Bytes data);
-  // The keyframe's bytes as they are sent: all of them, or what the budget leaves.
+  // The keyframe's bytes to send: `data`, or those of a thinned keyframe that fits the budget.
   std::vector<uint8_t> FitBudget(const Keyframe& keyframe, Bytes data);
   void OnLandmarks(Bytes body);
   void OnOthers(const LinkPacket& packet);
-  // The bytes on the wire.
+  // Returns the packet's bytes on the wire.
   int64_t Send(const LinkPacket& packet);
   std::vector<uint8_t> Load(const KeyframeId& id);
   void PublishHave();
@@ -60,11 +60,11 @@ class UplinkProcess : public PolledProcess {
   bool was_connected_ = false;
   int64_t bytes_up_ = 0;
   int64_t bytes_up_at_status_ = 0;
-  double bytes_per_s_ = 0;  // sent, over the last ten seconds or so
+  double bytes_per_s_ = 0;  // rate of sending, smoothed over about ten seconds
   int64_t now_us_ = 0;
   int64_t now_utime_ = 0;
   int64_t next_have_us_ = 0;
-  int64_t last_others_ = 0;  // number of the newest packet of this session
+  int64_t last_others_ = 0;  // number of the newest OTHERS packet of this session
   int64_t next_status_utime_ = 0;
   std::map<MapId, int32_t> last_have_;
 };

@@ -33,7 +33,7 @@ std::shared_ptr<const std::string> ReadFile(const fs::path& file) {
                                              std::istreambuf_iterator<char>());
 }
 
-// Of "index.js.gz", if there is an index.js.
+// Whether the file is for example "index.js.gz" and there is also an index.js.
 bool IsCompressedCopy(const fs::path& file) {
   return file.extension() == ".gz" && fs::is_regular_file(fs::path(file).replace_extension());
 }

@@ -1,6 +1,7 @@
 #pragma once
 
-// A built web page as files in memory, read once, so that nothing but these can be asked for.
+// The files of a built web page in memory. They are read once, so that no other file can be asked
+// for.
 
 #include <filesystem>
 #include <map>
@@ -14,16 +15,16 @@ namespace pangea::web {
 struct PageFile {
   std::string type;  // MIME
   std::shared_ptr<const std::string> body;
-  std::shared_ptr<const std::string> gzip;  // the same as <name>.gz, where the folder has that
+  std::shared_ptr<const std::string> gzip;  // content of <name>.gz; null if there is none
 };
 
-// By request target: "/", which is "/index.html", "/assets/index.js".
+// Files by request target, such as "/assets/index.js"; "/" is "/index.html".
 using Page = std::map<std::string, PageFile>;
 
-// Throws std::runtime_error, which ends with `mend`, when the folder holds no page.
+// Throws std::runtime_error when the folder has no page; the message ends with the advice `mend`.
 Page ReadPage(const std::filesystem::path& folder, const std::string& mend);
 
-// The file that a GET asks for, with this policy for what it may load and do; 404, 405 else.
+// Answers a GET with the file, with `policy` as its Content-Security-Policy; else with 404 or 405.
 WebAnswer AnswerFile(const Page& page, const WebRequest& request, const std::string& policy);
 
 }  // namespace pangea::web

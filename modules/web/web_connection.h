@@ -1,6 +1,6 @@
 #pragma once
 
-// One connection that asks, with or without TLS, until it wants to be a WebSocket.
+// One HTTP connection, with or without TLS, until it becomes a WebSocket.
 
 #include <fmt/format.h>
 
@@ -46,7 +46,8 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     }
   }
 
-  // For another's sake. It goes once its handler has heard of it, and is not chosen until then.
+  // Called to make room for another connection. This object lives until its pending handler has
+  // run; it moves to the end of the list, so that it is not chosen again.
   void Close() override {
     asked_ = std::nullopt;
     timer_.cancel();
@@ -55,13 +56,13 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
   }
 
  private:
-  // What the answer needs of its request.
+  // The properties of a request that its answer needs.
   struct Asked {
     int64_t number = 0;
     unsigned version = 11;
     bool keep_alive = false;
     bool is_head = false;
-    std::string page;  // the origin that the answer is for, if it is another's
+    std::string page;  // the request's Origin, if it is known and allowed
   };
 
   beast::tcp_stream& tcp_stream() { return beast::get_lowest_layer(stream_); }
@@ -86,7 +87,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
                      });
   }
 
-  // An end between two requests is none.
+  // The end of the connection between two requests is not an error.
   void OnReadError(beast::error_code error) {
     if (error == http::error::body_limit) {
       RefuseUnread(413, fmt::format("The body has more than {} bytes.", WebServer::kMaxBody));
@@ -132,8 +133,8 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     return OriginAllowed(origin, host) || std::ranges::count(server_.options.origins, origin) > 0;
   }
 
-  // A browser names the origin, or, of what a page merely embeds, that it is another's. Whoever
-  // follows a link leaves that page.
+  // Whether a web page of another origin made the request. A browser sends an Origin header, or
+  // Sec-Fetch-Site for what a page embeds. A followed link does not count: it leaves the page.
   static bool IsOfAPage(const Request& request) {
     const std::string from = Text(request["Sec-Fetch-Site"]);
     const bool follows_link =
@@ -155,7 +156,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
             takes_gzip};
   }
 
-  // The timer holds this connection until there is an answer.
+  // Passes the request to the site. The timer keeps this connection alive until there is an answer.
   void Ask(const WebRequest& request) {
     const int64_t number = number_;
     timer_.expires_after(kAnswering);
@@ -195,7 +196,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     }
   }
 
-  // The rest of the request is not read, so nothing more can come on this connection.
+  // Refuses a request without reading the rest of it; so the connection cannot be used any more.
   void RefuseUnread(int status, const std::string& why) {
     asked_ = Asked{++number_, 11, false, false, ""};
     has_unread_ = true;
@@ -207,7 +208,7 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     Send(Refusal(status, why));
   }
 
-  // As the site's own errors are; `why` has nothing that JSON would escape.
+  // An error in the format of the site's own errors. `why` must need no escapes in JSON.
   WebAnswer Refusal(int status, const std::string& why) const {
     if (server_.options.for_programs) {
       return {status, "application/json", fmt::format("{{\"error\":\"{}\"}}\n", why)};
@@ -215,7 +216,8 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
     return {status, "text/plain; charset=utf-8", why + "\n"};
   }
 
-  // To close at once what still sends would reset it, and the answer with it.
+  // Reads and discards the rest of the request: closing the connection while the client still sends
+  // would reset it, and the client might not get the answer.
   void EndUnread() {
     beast::error_code gone;
     tcp_stream().socket().shutdown(tcp::socket::shutdown_send, gone);
@@ -286,8 +288,8 @@ class Connection : public AnyConnection, public std::enable_shared_from_this<Con
   std::optional<http::request_parser<http::string_body>> parser_;
   int64_t number_ = 0;          // requests so far
   std::optional<Asked> asked_;  // until it is answered
-  bool has_unread_ = false;     // the rest of the last request
-  WebAnswer answer_;            // what the response points into
+  bool has_unread_ = false;     // the rest of the last request was not read
+  WebAnswer answer_;            // the response points into it
   std::optional<http::response<http::span_body<const char>>> response_;
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// Whom the server answers. It listens on this machine only, but every web page the user has open
-// could still reach it: one whose name was pointed at 127.0.0.1 (DNS rebinding) gives that name as
-// the host, and one from elsewhere that opens a socket here gives its own origin.
+// Which requests the server answers. Even a server that listens only on this machine can be reached
+// by every web page that the user has open. A page whose name was pointed at 127.0.0.1 (DNS
+// rebinding) is recognised by its Host header, any other foreign page by its Origin header.
 
 #include <string>
 #include <string_view>
@@ -10,18 +10,18 @@
 
 namespace pangea::web {
 
-// The Host header names an address, "localhost", or one of `names`; with a port, 1 to 65535 in
-// digits, or without. So nothing else of it gets into the answer's headers.
+// Whether the Host header is an address, "localhost" or one of `names`, with or without a port (1
+// to 65535 in digits). So no other text from it gets into the answer's headers.
 bool HostAllowed(std::string_view host, const std::vector<std::string>& names);
 
-// The Origin header is of a page that this server itself gave out under `host`.
+// Whether the Origin header is that of a page which this server itself served under `host`.
 bool OriginAllowed(std::string_view origin, std::string_view host);
 
-// What a browser may give as its page's origin: "https://app.example" or "http://10.0.0.7:5173",
-// without a path.
+// Whether the text is an origin as browsers send it, without a path: "https://app.example" or
+// "http://10.0.0.7:5173".
 bool IsOrigin(std::string_view text);
 
-// Throws std::runtime_error, naming --allow-origin, for one that is none.
+// Throws std::runtime_error, with the option's name --allow-origin, if a text is not an origin.
 void CheckOrigins(const std::vector<std::string>& origins);
 
 }  // namespace pangea::web

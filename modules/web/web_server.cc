@@ -27,7 +27,7 @@ struct WebServer::Impl : ServerState {
 void WebServer::Impl::UseTls(const TlsIdentity& identity) {
   tls.emplace(asio::ssl::context::tls_server);
   SSL_CTX_set_min_proto_version(tls->native_handle(), TLS1_2_VERSION);
-  // Nobody of ours renegotiates or resumes; a connection that waits gives its buffers back.
+  // Our clients neither renegotiate nor resume sessions. Idle connections release their buffers.
   tls->set_options(SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_TICKET);
   SSL_CTX_set_session_cache_mode(tls->native_handle(), SSL_SESS_CACHE_OFF);
   SSL_CTX_set_mode(tls->native_handle(), SSL_MODE_RELEASE_BUFFERS);

@@ -1,12 +1,14 @@
 #pragma once
 
-// Gives out a site over HTTP or HTTPS and keeps WebSockets to those that want one, on one thread:
-// nothing runs outside Serve. Bounded: kMaxConnections at once that ask (a further one takes the
-// place of the one that has asked for or taken nothing for longest), WebOptions::max_peers with a
-// socket (more are told so), headers of 8 kB, bodies of kMaxBody, socket messages of
-// WebPeer::max_message_bytes, one message under way per peer. Closed is who takes more than 5 s for
-// a TLS handshake or to ask, 30 s to take an answer or a message, or has a socket and is silent for
-// 30 s (it is pinged before). A site that has not answered within 10 s has its asker told 503.
+// Serves a WebSite over HTTP or HTTPS, with WebSockets, on one thread: nothing runs outside Serve.
+//
+// Bounds: kMaxConnections HTTP connections (a further one replaces the one that has been idle for
+// longest), WebOptions::max_peers WebSockets (more are refused), headers of 8 kB, bodies of
+// kMaxBody, WebSocket messages of WebPeer::max_message_bytes, one outgoing message per peer.
+//
+// Time-outs: a connection is closed if a TLS handshake or a request takes more than 5 s, or if
+// taking an answer or a message takes more than 30 s. A WebSocket is closed after 30 s of silence,
+// after a ping. If the site does not answer within 10 s, the client gets 503.
 
 #include <cstdint>
 #include <memory>
@@ -18,7 +20,7 @@
 
 namespace pangea::web {
 
-// As PEM texts: the server's certificate, then those that vouch for it; and its key.
+// PEM texts: the server's certificate followed by its chain of issuers, and the private key.
 struct TlsIdentity {
   std::string certificate_chain_pem;
   std::string private_key_pem;
@@ -26,15 +28,15 @@ struct TlsIdentity {
 
 struct WebOptions {
   std::string listen = "127.0.0.1";
-  uint16_t port = 8080;            // 0: a free one
-  std::vector<std::string> names;  // of this machine, as those who ask may call it
-  // An interface for programs: they need no Origin header to open a WebSocket; and pages of other
-  // origins get no answer to anything. Else these may ask (and their browsers keep the answer from
-  // them), but open no WebSocket.
+  uint16_t port = 8080;            // 0: any free port
+  std::vector<std::string> names;  // host names of this machine that clients may use
+  // True for an interface for programs: a client without Origin header may open a WebSocket, and
+  // all requests of pages of other origins are refused. False: such pages get answers (which
+  // browsers hide from them), but cannot open a WebSocket.
   bool for_programs = false;
-  std::vector<std::string> origins = {};  // whose pages may use it as this server's own (CORS)
+  std::vector<std::string> origins = {};  // their pages may use the server as its own (CORS)
   int max_peers = 16;
-  std::optional<TlsIdentity> tls = {};  // HTTPS, and nothing else
+  std::optional<TlsIdentity> tls = {};  // if set, HTTPS only
 };
 
 class WebServer {
@@ -42,14 +44,14 @@ class WebServer {
   static constexpr int kMaxConnections = 100;
   static constexpr size_t kMaxBody = 16'384;
 
-  // `site` outlives it. Throws std::runtime_error when it cannot listen there, for an origin that
-  // is none, or a certificate that cannot be used.
+  // `site` must outlive the server. Throws std::runtime_error when the server cannot listen, an
+  // origin is malformed, or the certificate cannot be used.
   WebServer(const WebOptions& options, WebSite& site);
   ~WebServer();
 
   uint16_t port() const;
-  // Sends every peer what there is for it and handles what is asked, for `timeout_ms`; 0: what is
-  // there already.
+  // Sends messages to the peers and handles requests for `timeout_ms`; with 0, only what is already
+  // there.
   void Serve(int timeout_ms);
 
   struct Impl;

@@ -22,7 +22,7 @@ class Socket : public AnySocket, public std::enable_shared_from_this<Socket<Stre
 
   void Open(Request request) {
     auto timeout = websocket::stream_base::timeout::suggested(beast::role_type::server);
-    timeout.handshake_timeout = kAsking;  // to say goodbye too
+    timeout.handshake_timeout = kAsking;  // also for the closing handshake
     timeout.idle_timeout = kSilence;
     socket_.set_option(timeout);
     socket_.read_message_max(peer_->max_message_bytes());
@@ -101,7 +101,7 @@ class Socket : public AnySocket, public std::enable_shared_from_this<Socket<Stre
     }
   }
 
-  // It has not taken a message.
+  // Closes the connection at once, because the client has not taken a message in time.
   void CutOff() {
     site_.Refused("socket: takes nothing for 30 s");
     open_ = false;

@@ -1,6 +1,7 @@
 #pragma once
 
-// What the server's parts share: its streams, with and without TLS, and the state of one server.
+// Shared by the parts of the server: its streams, with and without TLS, and the state of one
+// server.
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/context.hpp>
@@ -30,12 +31,13 @@ template <typename Stream>
 inline constexpr bool kIsTls = std::is_same_v<Stream, TlsStream>;
 
 constexpr uint32_t kMaxHeader = 8192;
-constexpr std::chrono::seconds kAsking{5};      // a TLS handshake; a whole request
-constexpr std::chrono::seconds kAnswering{10};  // the site
-constexpr std::chrono::seconds kTaking{30};     // a whole answer; a message on a socket
-constexpr std::chrono::seconds kSilence{30};
+// Time-outs.
+constexpr std::chrono::seconds kAsking{5};      // for a TLS handshake; for a whole request
+constexpr std::chrono::seconds kAnswering{10};  // for the site's answer
+constexpr std::chrono::seconds kTaking{30};     // for sending an answer, or a WebSocket message
+constexpr std::chrono::seconds kSilence{30};    // of a WebSocket's client
 
-// Of either stream.
+// A Connection over either kind of stream.
 class AnyConnection {
  public:
   virtual ~AnyConnection() = default;
@@ -44,7 +46,7 @@ class AnyConnection {
 class AnySocket {
  public:
   virtual ~AnySocket() = default;
-  // What there is to send, and whether the conversation is over.
+  // Sends the peer's next message, or closes the WebSocket if the peer is done.
   virtual void SendNext() = 0;
 };
 
@@ -54,8 +56,8 @@ struct ServerState {
 
   WebOptions options;
   WebSite& site;
-  // That ask; first the one whose request or answer has been under way for longest. They live as
-  // long as `io`.
+  // The HTTP connections; the first one has been busy with a request or answer, or idle, for
+  // longest. They live at most as long as `io`.
   std::list<AnyConnection*> connections;
   asio::io_context io{1};
   std::list<std::weak_ptr<AnySocket>> sockets;

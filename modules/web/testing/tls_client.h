@@ -1,7 +1,7 @@
 #pragma once
 
-// For tests of web servers: as WebClient, over TLS; and what WebSocket frames a server sent.
-// Nothing blocks: a server on the same thread has its turn between the calls.
+// For tests of web servers: a WebClient over TLS, and parsing of the WebSocket frames that a server
+// sent. No call blocks, so a server on the same thread can run between the calls.
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -23,7 +23,8 @@ namespace pangea::web {
 
 class TlsClient {
  public:
-  // With a certificate it trusts that authority alone, and only as 127.0.0.1; else anybody.
+  // With a certificate, the client trusts only this authority, and only for 127.0.0.1. Without one,
+  // it trusts any server.
   explicit TlsClient(uint16_t port, const std::string& authority_pem = "")
       : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)),
         context_(SSL_CTX_new(TLS_client_method()), SSL_CTX_free) {
@@ -57,7 +58,7 @@ class TlsClient {
     to_send_ += bytes;
     Pump();
   }
-  // What has come since the last call.
+  // The bytes received since the last call.
   std::string Received() {
     Pump();
     return std::exchange(received_, {});
@@ -83,7 +84,7 @@ class TlsClient {
   }
 
   void Pump() {
-    ERR_clear_error();  // what another client left: the queue is the thread's
+    ERR_clear_error();  // the error queue is the thread's: another client may have left errors
     if (closed_ || !Done(SSL_do_handshake(ssl_.get()))) {
       return;
     }
@@ -128,7 +129,7 @@ struct Frame {
   int opcode = 0;
   std::string payload;
 };
-// Takes the whole frames off the front.
+// Removes the complete frames from the front of `received` and returns them.
 inline std::vector<Frame> TakeFrames(std::string* received) {
   std::vector<Frame> frames;
   const auto byte = [&](size_t at) { return static_cast<uint8_t>((*received)[at]); };

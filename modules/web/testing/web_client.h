@@ -1,6 +1,6 @@
 #pragma once
 
-// For tests of web servers: a connection of a browser that a test writes by hand.
+// For tests of web servers: a connection on which a test plays the browser.
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ class WebClient {
 
   void Send(const std::string& text) { send(fd_, text.data(), text.size(), MSG_NOSIGNAL); }
 
-  // What has come; `closed` when the server hung up.
+  // The bytes received so far; `closed` becomes whether the server closed the connection.
   std::string Received(bool* closed = nullptr) {
     std::string all;
     char bytes[65536];
@@ -50,14 +50,14 @@ class WebClient {
   int fd_;
 };
 
-// Some turns of a server in the test's own thread: enough for it to take a request and answer.
+// Runs the server in the test's thread, long enough to take a request and answer it.
 inline void ServeSome(WebServer* server) {
   for (int i = 0; i < 5; ++i) {
     server->Serve(10);
   }
 }
 
-// The server's whole answer to a request, over a connection of its own.
+// Sends a request on a new connection and returns the server's whole answer.
 inline std::string Ask(WebServer* server, const std::string& request) {
   WebClient client(server->port());
   client.Send(request);
@@ -65,7 +65,7 @@ inline std::string Ask(WebServer* server, const std::string& request) {
   return client.Received();
 }
 
-// A request for a WebSocket; `origin`: its header's line or nothing.
+// A request for a WebSocket; `origin`: the value of its Origin header; empty: no such header.
 inline std::string UpgradeRequest(const std::string& target, const std::string& origin) {
   return "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:1\r\n" +
          (origin.empty() ? "" : "Origin: " + origin + "\r\n") +
@@ -73,7 +73,7 @@ inline std::string UpgradeRequest(const std::string& target, const std::string& 
          "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
 }
 
-// A text frame as a browser masks it, here with zeros; or a binary one, of opcode 2.
+// A frame as a browser sends it, masked (here with zeros): text, or binary with opcode 2.
 inline std::string MaskedFrame(const std::string& text, char opcode = 1) {
   std::string frame(1, static_cast<char>(0x80 | opcode));
   if (text.size() < 126) {
