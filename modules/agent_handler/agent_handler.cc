@@ -12,10 +12,10 @@ constexpr int64_t kAckSpacing_us = 4'000;
 constexpr int64_t kAckDelay_us = 20'000;
 constexpr int kAckPieces = 16;
 constexpr int64_t kCorrectionRepeat_us = 300'000;
-// Corrections are remembered for the newest submaps only; an agent drives one at a time.
+// Corrections are kept only for the newest maps; an agent works in one map at a time.
 constexpr size_t kMaxCorrections = kMaxLinkMaps;
 
-// A repeat may differ: an uplink that was restarted may have thinned the keyframe otherwise.
+// A repeat may differ, because a restarted uplink may have thinned the keyframe differently.
 std::string CheckKeyframe(const KeyframeId& id, Bytes compressed, MapContinuity* continuity) {
   const auto bytes = Decompress(compressed, kMaxKeyframeBytes);
   if (!bytes) {
@@ -104,7 +104,8 @@ std::string AgentHandler::OnPose(const LinkPacket& packet) {
 std::vector<Receiver::Keyframe> AgentHandler::TakeReady() {
   std::vector<Receiver::Keyframe> ready = receiver_.TakeReady();
   for (Receiver::Keyframe& keyframe : ready) {
-    keyframe.bytes = *Decompress(keyframe.bytes, kMaxKeyframeBytes);  // it has been checked
+    keyframe.bytes =
+        *Decompress(keyframe.bytes, kMaxKeyframeBytes);  // valid: it was checked before
   }
   return ready;
 }
@@ -125,7 +126,7 @@ void AgentHandler::OnCorrection(const Correction& correction) {
   }
 }
 
-// The newest submap's first: it is the one the agent is in.
+// The newest map comes first, because the agent is in it.
 const Correction* AgentHandler::Unconfirmed() const {
   for (auto it = corrections_.rbegin(); it != corrections_.rend(); ++it) {
     if (it->second.confirmed_revision < it->second.correction.revision) {

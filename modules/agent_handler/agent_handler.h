@@ -1,10 +1,10 @@
 #pragma once
 
-// The server's side of one agent (the paper, section IV.B): its communication module (receive
-// cache, acknowledgements), its parser, and the manager of its submaps. Created by the agent's
-// first session; packets come here once they are opened.
+// The server's side of one agent (the paper, section IV.B): communication (receive cache,
+// acknowledgements), parsing, and management of the agent's maps (the paper's submaps). It is
+// created by the agent's first session, and gets packets after they are decrypted.
 //
-// A state machine: time goes in (monotonic microseconds); no clock, no bus, no file, one thread.
+// A state machine: monotonic microseconds go in; no clock, no bus, no file; not thread safe.
 
 #include <array>
 #include <cstdint>
@@ -23,23 +23,25 @@ class AgentHandler {
  public:
   AgentHandler(int32_t agent_id, const ReceiverOptions& options);
 
-  // The journal already has this submap up to `journalled_seq`, but for `gaps`. What follows has to
-  // go on from `newest`, which may be left out of an old one.
+  // The journal already has this map up to `journalled_seq`, except for `gaps`. New keyframes must
+  // continue `newest` (MapContinuity), which may be missing for an old map.
   void Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps = {},
               const std::optional<Keyframe>& newest = std::nullopt);
 
-  // The packets that follow are another run's of the uplink.
+  // The packets that follow come from another run of the uplink.
   void OnNewUplink();
-  // Why it was refused, or an empty string.
+  // Returns why the packet was refused, or an empty string.
   std::string OnPacket(const LinkPacket& packet);
-  // Keyframes that are valid and next in their submap; say when the journal's disk has them.
+  // The keyframes that are valid and next in their map. Call Journalled for each of them when it is
+  // on the journal's disk.
   std::vector<Receiver::Keyframe> TakeReady();
   void Journalled(const KeyframeId& id);
-  // The newest pose since the last call.
+  // The newest pose received since the last call.
   std::optional<pose_t> TakePose() { return std::exchange(pose_, std::nullopt); }
-  // Sent to the agent until it confirms; the highest revision of each submap wins.
+  // The correction is sent to the agent until it confirms it. Of two corrections of a map the one
+  // with the higher revision is used.
   void OnCorrection(const Correction& correction);
-  // The acknowledgement due now, if one is. Its number is the session's to give.
+  // The acknowledgement to send now, if one is due. The session gives it its number.
   std::optional<LinkAck> TakeAck(int64_t now_us);
 
   const std::string& software() const { return software_; }
@@ -58,11 +60,11 @@ class AgentHandler {
 
   const int32_t agent_id_;
   std::shared_ptr<MapContinuity> continuity_ = std::make_shared<MapContinuity>();
-  Receiver receiver_;  // asks it
+  Receiver receiver_;  // uses continuity_
   std::string software_;
   bool has_uplink_ = false;
   int64_t highest_number_ = 0;
-  std::array<std::optional<MapId>, 256> slots_;  // of this run's hellos
+  std::array<std::optional<MapId>, 256> slots_;  // from the hellos of the current uplink run
   std::optional<pose_t> pose_;
   std::map<MapId, SentCorrection> corrections_;
   int64_t last_ack_us_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The agent_handler's options as they stand in a file: `pangea-agent-handler --print-options`.
+// The options of the agent_handler in an options file (`pangea-agent-handler --print-options`).
 
 #include "agent_handler/receiver.h"
 
@@ -8,7 +8,7 @@ namespace pangea {
 
 struct AgentHandlerOptions {
   ReceiverOptions receiver;
-  // Of the command line: what other hosts do not have too is not acknowledged.
+  // Set on the command line: acknowledge only what other hosts also have (journal/replication.h).
   bool replicated = false;
 
   template <typename Archive>

@@ -17,9 +17,9 @@ namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr size_t kMaxCorrections = 16 * AgentHandlerProcess::kMaxAgents;
-// So many in a row were not damaged on their way.
+// If this many hellos in a row are refused, the reason is another key and not damage on the way.
 constexpr int kManyHellos = 3;
-// An uplink that is there says hello each second.
+// After this time without a hello the uplink counts as away: it sends one every second.
 constexpr int64_t kAway_us = 3 * kSecond_us;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
@@ -53,7 +53,7 @@ AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
 }
 
 void AgentHandlerProcess::OnCorrection(const Correction& correction) {
-  // Kept for an agent whose hello is still to come: after a restart, it is.
+  // Also kept for an agent whose hello has not come yet, as after a restart.
   missing_corrections_.Note({correction.map});
   Correction& newest = corrections_[correction.map];
   if (newest.revision < correction.revision) {
@@ -79,7 +79,7 @@ void AgentHandlerProcess::OnOthers(const Others& others, const others_t& message
   SendBestEffort(others.map.agent_id, LinkKind::kOthers, EncodeMessage(message));
 }
 
-// An agent that is away misses it.
+// The packet is sent once; an agent that is away does not get it.
 void AgentHandlerProcess::SendBestEffort(int32_t agent_id, LinkKind kind,
                                          std::vector<uint8_t> body) {
   const auto agent = agents_.find(agent_id);
@@ -88,8 +88,8 @@ void AgentHandlerProcess::SendBestEffort(int32_t agent_id, LinkKind kind,
   }
 }
 
-// An agent whose key has gone is shut out; what it sent stays. One whose key has changed begins a
-// new session.
+// An agent whose key was removed is shut out; its keyframes stay in the journal. An agent whose key
+// has changed begins a new session.
 void AgentHandlerProcess::ReadKeys() {
   const std::map<int32_t, AgentKey> keys = key_folder_.Read();
   for (const std::string& file : key_folder_.unusable()) {
@@ -117,7 +117,7 @@ void AgentHandlerProcess::ReadKeys() {
 
 AgentHandler AgentHandlerProcess::MakeHandler(int32_t agent_id) const {
   AgentHandler handler(agent_id, options_.receiver);
-  // The newest maps first: only those that a hello may name are looked into.
+  // The newest maps come first. Only as many are read from the disk as a hello can name.
   const auto& on_disk = archive_.have();
   auto have = std::make_reverse_iterator(on_disk.lower_bound({agent_id + 1, 0}));
   for (int i = 0; have != on_disk.rend() && have->first.agent_id == agent_id; ++have, ++i) {
@@ -166,7 +166,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   ++agent.packets;
   agent.heard_us = now_us_;
   if (!agent.handler && !archive_.MayJoin(agent_id)) {
-    return;  // it would be told that all of the journal is kept
+    return;  // else the agent would be told that keyframes are kept which are not yet
   }
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));
@@ -194,7 +194,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
 
 void AgentHandlerProcess::JournalReady(Agent* agent) {
   if (archive_.Full() || !agent->handler) {
-    return;  // what is ready stays in the receive cache
+    return;  // keyframes that are ready stay in the receive cache
   }
   for (Receiver::Keyframe& keyframe : agent->handler->TakeReady()) {
     archive_.Append(keyframe.id, std::move(keyframe.bytes));
@@ -256,7 +256,7 @@ void AgentHandlerProcess::LookForKeys() {
     }
   } catch (const std::exception& error) {
     node_.Refuse(error.what());
-    // The keys stay as they were, but none keeps in whose own file was taken away.
+    // All other keys stay valid, but an agent whose own key file was removed is shut out.
     std::erase_if(agents_, [&](const auto& item) { return key_folder_.IsGone(item.first); });
   }
 }

@@ -1,13 +1,12 @@
 #pragma once
 
-// The agent_handler between the link bus and the server bus.
+// The agent_handler process, between the link bus and the server bus.
 //   link bus:   LINK_UP_* in; LINK_DOWN_k out
 //   server bus: POSE_k, STATUS_agent_handler and what archive.h says out; CORRECTION_k,
 //               LANDMARKS_k, OTHERS_k and what archive.h and anchor_relay.h say in
-// Keyframes are published once the journal's disk has them, and acknowledged once they are kept
-// (journal/replication.h). What does not open
-// under the key of the agent it claims to be from is dropped and counted; it costs one attempt to
-// open it, and leaves nothing behind.
+// A keyframe is published when it is on the journal's disk, and acknowledged when it is kept
+// (journal/replication.h). A packet that cannot be decrypted with the key of the agent on whose
+// channel it came is counted and dropped; it costs one attempt and changes no state.
 
 #include <map>
 #include <optional>
@@ -26,10 +25,11 @@ namespace pangea {
 
 class AgentHandlerProcess : public PolledProcess {
  public:
-  // Beyond it, keys are refused: 210 MB of receive caches when all are full.
+  // Further keys are refused. The receive caches of all agents take at most 210 MB.
   static constexpr size_t kMaxAgents = KeyFolder::kMaxKeys;
 
-  // `now_utime`: wall clock. Throws if the journal or a key cannot be used.
+  // `now_utime`: wall clock. Throws std::runtime_error if the journal or the folder of keys cannot
+  // be used.
   AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path,
                       const std::string& key_folder, int64_t now_utime,
                       const AgentHandlerOptions& options);
@@ -37,22 +37,22 @@ class AgentHandlerProcess : public PolledProcess {
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
 
-  // When it was opened.
+  // Whether the journal was damaged when this process opened it.
   bool journal_was_damaged() const { return !archive_.Damage().empty(); }
 
  private:
   struct Agent {
     HandlerSession session;
-    std::optional<AgentHandler> handler;  // since its first session
-    int64_t packets = 0;                  // opened
-    int64_t heard_us = 0;                 // the newest of them
-    int hellos_refused = 0;               // since one was opened
+    std::optional<AgentHandler> handler;  // made by the first session
+    int64_t packets = 0;                  // number of packets that were decrypted
+    int64_t heard_us = 0;                 // when the newest of them came
+    int hellos_refused = 0;               // hellos refused since the last packet was decrypted
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;
     int64_t keyframes = 0;
   };
   void OnLinkUp(const std::string& channel, Bytes data);
-  // The bytes on the wire.
+  // Returns the packet's bytes on the wire.
   int64_t SendDown(int32_t agent_id, Agent* agent, Bytes packet);
   void ReadKeys();
   void LookForKeys();
@@ -64,11 +64,11 @@ class AgentHandlerProcess : public PolledProcess {
   void JournalReady(Agent* agent);
   void SendAcks();
   void SendAnchors();
-  // For people: agents whose software is not of this version.
+  // For people: the agents whose software has another version than this program.
   std::string OtherSoftware() const;
-  // For people: the files in the folder of keys that let nobody in.
+  // For people: the files in the folder of keys that cannot be used.
   std::string UnusableKeys() const;
-  // For people: agents who say hello under another key.
+  // For people: the agents whose hellos are sealed under another key.
   std::string OtherKeys() const;
   void PublishStatus(int64_t now_utime);
 
@@ -79,9 +79,9 @@ class AgentHandlerProcess : public PolledProcess {
   Node node_;
   Archive archive_;
   AnchorRelay anchors_;
-  std::map<int32_t, Agent> agents_;          // those with a key
-  std::map<MapId, Correction> corrections_;  // the newest of each map, at most 16,000
-  MissingStates missing_corrections_;        // of the maps that were in the journal at the start
+  std::map<int32_t, Agent> agents_;          // all agents with a key
+  std::map<MapId, Correction> corrections_;  // the newest one of each map, at most 16,000
+  MissingStates missing_corrections_;        // for maps that were in the journal at the start
   int64_t now_us_ = 0;
   int64_t next_have_utime_ = 0;
   int64_t next_status_utime_ = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
-// Anchors between apps of agent 1 and the server's bus, over the link of link_test_world.h.
+// For tests: anchors between the apps of agent 1 and the server's bus, over the link of
+// link_test_world.h.
 
 #include <gtest/gtest.h>
 
@@ -80,7 +81,7 @@ class AnchorLink : public LinkWorld {
     link_bus.doubled = 0.2;
     link_bus.held = 0.2;
   }
-  // One may come again, and is then the same.
+  // An edit may come more than once; then it must be identical.
   void OnJournalled(Bytes data) {
     anchor_edit_t message{};
     ASSERT_TRUE(DecodeMessage(data, &message));
@@ -89,7 +90,8 @@ class AnchorLink : public LinkWorld {
     const std::vector<uint8_t> bytes(data.begin(), data.end());
     EXPECT_EQ(journalled_bytes.emplace(edit.seq, bytes).first->second, bytes);
   }
-  // As a follower does: what was on the disk when the server was killed has not been published.
+  // Asks for missing edits, as a follower does: edits that were on the disk but not yet published
+  // when the server was killed.
   void FillGaps() {
     int32_t seq = 0;
     for (; journalled.contains(seq); ++seq) {
@@ -105,7 +107,7 @@ class AnchorLink : public LinkWorld {
       Run(1);
     }
   }
-  // Seqs without a gap; (anchor, revision, editor) once each.
+  // Expects `count` edits, with seqs without a gap and each (anchor, revision, editor) only once.
   void ExpectOnceEach(size_t count) {
     FillGaps();
     std::set<std::tuple<AnchorId, int64_t, int32_t>> keys;
@@ -117,7 +119,7 @@ class AnchorLink : public LinkWorld {
     EXPECT_EQ(journalled.size(), count);
   }
 
-  // By revision, of each anchor.
+  // Of each anchor, the journalled edit with the highest revision.
   std::map<AnchorId, AnchorEdit> NewestJournalled() const {
     std::map<AnchorId, AnchorEdit> newest;
     for (const auto& [seq, edit] : journalled) {
@@ -127,7 +129,7 @@ class AnchorLink : public LinkWorld {
     }
     return newest;
   }
-  // A tap on an image between two poses, of an x of 0.25 m.
+  // Publishes poses, and a tap on an image between two of them, at which x is 0.25 m.
   void RequestTap() {
     for (int i = 0; i < 5; ++i) {
       PublishPose(1'000'000 + 50'000 * i, {0.1 * i, 0, 0});

@@ -91,7 +91,7 @@ void AnchorRelay::OnEdit(int32_t agent_id, Agent* agent, AnchorEdit edit) {
   }
 }
 
-// One that finds no room is made again when the edit comes again.
+// If there is no room for the answer, it is given when the agent sends the edit again.
 void AnchorRelay::Answer(Agent* agent, const AnchorEdit& edit, bool journalled) {
   if (agent->answers.size() < kMaxAnchorEditAnswers) {
     agent->answers.push_back({edit.anchor, edit.revision, journalled});

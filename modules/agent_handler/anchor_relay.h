@@ -1,10 +1,11 @@
 #pragma once
 
-// Anchors between the agents and the server: edits up into the journal, states down to the agents.
+// Relays anchors between the agents and the server: edits go up into the journal, states go down to
+// the agents.
 //   server bus: ANCHOR_REQUEST_0, ANCHOR_k in; ANCHOR_EDIT out (journal/anchor_edits.h)
-// An edit is checked against what its editor's key allows as far as the edit alone tells: one who
-// may edit its own only gives the anchor's maker. What is refused is answered too, so that it is
-// not sent for ever.
+// An edit is checked against the right of its editor's key, as far as the edit alone tells: with
+// kEditOwn, the editor must be the maker in the anchor's id. Refused edits are answered too, so
+// that the agent stops sending them.
 
 #include <cstdint>
 #include <deque>
@@ -23,23 +24,23 @@ namespace pangea {
 class AnchorRelay {
  public:
   static constexpr size_t kMaxFromTools = 200;
-  // Seals and sends a packet; its bytes on the wire.
+  // Seals and sends a packet; returns its bytes on the wire.
   using Send = std::function<int64_t(LinkKind kind, std::vector<uint8_t> body)>;
 
   AnchorRelay(Node& node, Archive& archive);
 
-  // Those that have a key, and what it allows; others are forgotten.
+  // The agents that have a key, with the right that it gives. Other agents are forgotten.
   void SetRights(const std::map<int32_t, AnchorRight>& rights);
   static bool IsOfAnchors(LinkKind kind) {
     return kind == LinkKind::kAnchorEdit || kind == LinkKind::kAnchorsReceived;
   }
-  // Why it is refused, or an empty string.
+  // Returns why the packet is refused, or an empty string.
   std::string OnPacket(int32_t agent_id, const LinkPacket& packet);
   void OnNewSession(int32_t agent_id);
-  // After the journal was synced.
+  // These edits are kept now (Archive::TakeJournalledEdits): their editors are answered.
   void OnJournalled(const std::vector<AnchorEdit>& edits);
   void Poll();
-  // What is due to the agent.
+  // Sends what is due to the agent.
   void SendDue(int32_t agent_id, int64_t now_us, const Send& send);
   void SetCounters();
 
@@ -47,7 +48,7 @@ class AnchorRelay {
   struct Agent {
     AnchorRight right = AnchorRight::kUnknown;
     AnchorTable table;
-    std::vector<AnchorEditAnswer> answers;  // not yet sent; at most kMaxAnchorEditAnswers
+    std::vector<AnchorEditAnswer> answers;  // to be sent; at most kMaxAnchorEditAnswers
   };
   void OnAnchor(const std::string& channel, const anchor_t& message);
   void OnEdit(int32_t agent_id, Agent* agent, AnchorEdit edit);
@@ -57,7 +58,7 @@ class AnchorRelay {
   Node& node_;
   Archive& archive_;
   std::map<int32_t, Agent> agents_;
-  std::deque<AnchorEdit> from_tools_;  // while the disk is behind
+  std::deque<AnchorEdit> from_tools_;  // edits by tools that wait for the disk
 };
 
 }  // namespace pangea

@@ -1,8 +1,8 @@
 #pragma once
 
-// One agent's anchors on their way down: of each the newest state, sent until the agent says that
-// it has it. A state machine: monotonic microseconds go in, bodies of packets come out; no clock,
-// no bus, one thread. Bounds: kMaxAnchors, kAnchorBytesPerSecond.
+// The anchors to send to one agent: of each the newest state, sent until the agent confirms it. A
+// state machine: monotonic microseconds go in, bodies of packets come out; no clock, no bus; not
+// thread safe. Bounds: kMaxAnchors, kAnchorBytesPerSecond.
 
 #include <cstdint>
 #include <map>
@@ -18,13 +18,13 @@ class AnchorTable {
  public:
   static constexpr size_t kMaxAnchors = 256;
 
-  // `message`: an encoded anchor_t; `gone`: what it says. False if it is one too many: one that is
-  // gone, and that the agent knows to be gone, makes room.
+  // `message`: an encoded anchor_t; `gone`: its field of that name. False if there is no room. A
+  // gone anchor makes room for another one once the agent has confirmed that it is gone.
   bool Set(const AnchorId& id, bool gone, std::vector<uint8_t> message);
-  // The agent knows nothing any more.
+  // In a new session, all anchors are sent again.
   void OnNewSession();
   void OnReceived(const std::vector<int64_t>& numbers);
-  // The next body due, if one is; say with Charge what its packet took.
+  // The body that is due next, if any. After sending, call Charge with the size of its packet.
   std::optional<std::vector<uint8_t>> Next(int64_t now_us);
   void Charge(int64_t bytes_on_the_wire) { queue_.Charge(bytes_on_the_wire); }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// `pangea-agent-handler keygen`: makes the key that lets an agent in.
+// `pangea-agent-handler keygen`: makes an agent's key.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -10,11 +10,11 @@ namespace pangea {
 
 struct KeygenArguments {
   int32_t agent_id = 0;
-  std::string file;  // empty: agent_ID.key here
+  std::string file;  // empty: agent_ID.key in the current folder
   std::string anchors = "own";
 };
 
-// The subcommand, which fills in the arguments.
+// Adds the subcommand, which fills in the arguments when it is parsed.
 CLI::App* AddKeygen(CLI::App& app, KeygenArguments* arguments);
 
 // Returns the exit code; throws std::runtime_error if the file exists or cannot be written.

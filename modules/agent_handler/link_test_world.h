@@ -1,6 +1,7 @@
 #pragma once
 
-// Uplink and agent_handler together on in-process buses, with an odometry and a lossy link between.
+// For tests: an uplink and an agent_handler on in-process buses, with an odometry, and a lossy link
+// between them.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ namespace pangea {
 inline constexpr int64_t kSecond = 1'000'000;
 inline const MapId kMap{1, 1000};
 
-// Loses, doubles, and holds back until others have overtaken.
+// Loses messages, doubles them, and holds them back until others have overtaken them.
 class LossyBus : public Bus {
  public:
   void Publish(const std::string& channel, Bytes data) override;
@@ -38,8 +39,8 @@ class LossyBus : public Bus {
   static constexpr size_t kMaxHeld = 10;
 };
 
-// Fresh buses at each restart of a process would be the true thing; here a bus lets go of a process
-// that dies.
+// Stands between a bus and a process: after Off, the bus no longer reaches the process. This
+// replaces fresh buses at each restart of a process.
 class SwitchedBus : public Bus {
  public:
   explicit SwitchedBus(Bus& bus) : bus_(bus) {}
@@ -60,7 +61,8 @@ class LinkWorld : public testing::Test {
   std::filesystem::path KeyFile(int32_t agent_id) const {
     return folder / "keys" / KeyFileName(agent_id);
   }
-  // Lets the agent in again, with this right; from the handler's next look at the keys on.
+  // Writes the agent's key file with this right. The handler uses it from its next look at the
+  // keys.
   void SetAnchorRight(const std::string& word) const;
   void StartUplink();
   void KillUplink();
@@ -68,7 +70,7 @@ class LinkWorld : public testing::Test {
   void KillHandler();
   void PublishKeyframes(int count);
   void Run(double seconds);
-  // Keyframes 0 to count - 1, in order, byte for byte.
+  // Expects that keyframes 0 to count - 1 were delivered in order, byte for byte.
   void ExpectDelivered(int count) const;
 
   static constexpr int64_t kWall = 1'700'000'000 * kSecond;
@@ -83,7 +85,7 @@ class LinkWorld : public testing::Test {
   std::unique_ptr<SwitchedBus> uplink_agent_side, uplink_link_side;
   std::unique_ptr<SwitchedBus> handler_link_side, handler_server_side;
   bool spools_edits = false;
-  std::vector<std::unique_ptr<EditSpool>> edit_spools;  // of each uplink its own
+  std::vector<std::unique_ptr<EditSpool>> edit_spools;  // one for each uplink
   std::unique_ptr<UplinkProcess> uplink;
   std::unique_ptr<AgentHandlerProcess> handler;
   std::vector<std::vector<uint8_t>> delivered;

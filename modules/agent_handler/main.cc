@@ -1,5 +1,5 @@
-// pangea-agent-handler: joins the link bus and the server bus, and owns the journal. Also makes the
-// agents' keys.
+// pangea-agent-handler: connects the link bus and the server bus, and owns the journal. It also
+// makes the agents' keys.
 
 #include <fmt/format.h>
 

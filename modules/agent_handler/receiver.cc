@@ -6,7 +6,7 @@
 namespace pangea {
 namespace {
 
-// In the order in which the sender has them under way (Sender::UnderWay).
+// The order in which the sender sends keyframes (Sender::UnderWay).
 bool GoesBefore(const KeyframeId& a, const KeyframeId& b) {
   return a.map == b.map ? a.seq < b.seq : b.map < a.map;
 }
@@ -41,7 +41,7 @@ void Receiver::Resume(const MapId& map_id, int32_t journalled_seq,
 }
 
 void Receiver::OnHello(const LinkHello& hello) {
-  // A map that brought nothing and is not named any more is forgotten: the number stays bounded.
+  // A map without keyframes that the hello no longer names is forgotten, which bounds their number.
   for (auto it = maps_.begin(); it != maps_.end();) {
     const auto& [id, map] = *it;
     const bool named = std::ranges::find(hello.maps, id, &LinkMap::map) != hello.maps.end();
@@ -65,7 +65,7 @@ void Receiver::OnHello(const LinkHello& hello) {
       }
     }
   }
-  // What waits for a map that is forgotten waits for nothing.
+  // Drop the cached keyframes of forgotten maps.
   for (auto it = cache_.begin(); it != cache_.end();) {
     const auto entry = it++;
     if (!maps_.contains(entry->first.map)) {
@@ -121,12 +121,12 @@ std::string Receiver::Add(const MapId& map_id, const LinkPiece& piece) {
   if (map == maps_.end() || !map->second.announced) {
     return "piece of a map that was not announced";
   }
-  // The seq with this low byte that is nearest to the next one.
+  // The full seq with this low byte that is nearest to the next seq.
   const int32_t next = map->second.next;
   const KeyframeId id{map_id,
                       next + static_cast<int8_t>(piece.seq_low - static_cast<uint8_t>(next))};
   if (id.seq < next || map->second.SkipRuns(id.seq) != id.seq) {
-    return "";  // a repeat of what is handed over already
+    return "";  // a repeat of a keyframe that was already handed over
   }
   if (id.seq >= next + kMaxPartialKeyframes) {
     return "piece too far ahead";
@@ -208,7 +208,7 @@ void Receiver::Journalled(const KeyframeId& id) {
 
 void Receiver::FillAck(bool all_maps, LinkAck* ack) const {
   ack->cache_bytes = options_.cache_bytes;
-  // What the uplink is sending, which is in its hello; then the newest maps.
+  // First the maps in the newest hello, which the uplink is sending; then the newest other maps.
   for (const bool in_hello : {true, false}) {
     for (auto it = maps_.rbegin(); it != maps_.rend() && ack->journalled_seq.size() < kMaxAckMaps;
          ++it) {

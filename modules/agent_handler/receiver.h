@@ -1,12 +1,12 @@
 #pragma once
 
-// The server's half of the link, for one agent: puts pieces together to keyframes in a bounded
-// receive cache (section IV.B: 210 KiB), checks them, hands them over in seq order per map, and
-// says what it has. A state machine: no clock, no bus, one thread.
+// The server's half of the link, for one agent. It joins pieces to keyframes in a bounded receive
+// cache (section IV.B: 210 KiB), checks the keyframes, hands them over in seq order per map, and
+// reports what it has. A state machine: no clock, no bus; not thread safe.
 //
-// A keyframe stays in the cache's account until it is journalled. Full cache: what the uplink sends
-// first, of the newest map the lowest seqs, takes the room of what it sends last; a piece for which
-// there is none is dropped. Both will be sent again.
+// A keyframe occupies the cache until it is journalled. When the cache is full, keyframes that the
+// uplink sends first (of the newest map, those with the lowest seqs) replace those that it sends
+// last; a piece for which there is still no room is dropped. Whatever was dropped is sent again.
 
 #include <cstdint>
 #include <functional>
@@ -25,7 +25,8 @@ struct ReceiverOptions {
 
 class Receiver {
  public:
-  // Why a complete (compressed) message is no valid keyframe of this id; empty if it is one.
+  // Returns why a complete (compressed) message is not a valid keyframe with this id; empty if it
+  // is.
   using Check = std::function<std::string(const KeyframeId&, Bytes)>;
 
   struct Keyframe {
@@ -35,25 +36,27 @@ class Receiver {
 
   Receiver(const ReceiverOptions& options, Check check);
 
-  // The journal already has this map up to `journalled_seq`, but for `gaps` (ascending): those are
-  // taken first, until they are filled or given up.
+  // The journal already has this map up to `journalled_seq`, except for `gaps` (ascending). The
+  // gaps are received first, until they are filled or given up.
   void Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps = {});
-  // Only maps of a hello (or of the journal) are received. What the uplink cannot deliver any more
-  // is given up here, and counted.
+  // Only maps that a hello has named are received. Keyframes that the uplink cannot deliver any
+  // more are given up here, and counted.
   void OnHello(const LinkHello& hello);
-  // Another run of the uplink: what is not whole comes again, and perhaps cut otherwise.
+  // In another run of the uplink, unfinished keyframes are dropped: they come again, and may be cut
+  // into other pieces.
   void OnNewUplink();
-  // A piece of a keyframe of this map; why it was refused, or an empty string (a repeat is no
-  // fault).
+  // Adds a piece of a keyframe of this map. Returns why it was refused, or an empty string; a
+  // repeat is not refused.
   std::string Add(const MapId& map, const LinkPiece& piece);
-  // The keyframes that are complete and next in their map, each once. Say when they are on disk.
+  // The keyframes that are complete and next in their map, each once. Call Journalled for each when
+  // it is on the disk.
   std::vector<Keyframe> TakeReady();
   void Journalled(const KeyframeId& id);
 
-  // `all_maps`: also those that only the journal knows.
+  // `all_maps`: also the maps that only the journal knows.
   void FillAck(bool all_maps, LinkAck* ack) const;
 
-  // Keyframes in the cache: being put together, or not yet journalled.
+  // Number of keyframes in the cache: incomplete, or not yet journalled.
   size_t pending() const { return cache_.size(); }
   int64_t cached_bytes() const { return cached_bytes_; }
   int64_t given_up() const { return given_up_; }
@@ -61,22 +64,22 @@ class Receiver {
 
  private:
   struct ReceivedMap {
-    int32_t next = 0;  // to hand over
+    int32_t next = 0;  // next seq to hand over
     int32_t journalled = -1;
-    bool announced = false;  // by this run of the uplink
-    bool in_hello = false;   // the newest one
-    bool brought = false;    // a keyframe, ever
+    bool announced = false;  // a hello of this run of the uplink named it
+    bool in_hello = false;   // the newest hello named it
+    bool brought = false;    // it has ever had a keyframe
     std::map<int32_t, int32_t> runs =
-        {};  // the journal has them beyond `next`: first seq, last seq
+        {};  // runs of keyframes after `next` that are journalled: first seq -> last seq
 
-    // The first from `seq` on that the journal does not have.
+    // The first seq from `seq` on that the journal does not have.
     int32_t SkipRuns(int32_t seq) const;
-    // Keyframes from `next` up to this one that the journal does not have.
+    // Number of keyframes from `next` to before `seq` that the journal does not have.
     int32_t MissingBefore(int32_t seq) const;
   };
   struct Entry {
     std::vector<std::vector<uint8_t>> pieces;
-    int count = 0;  // of pieces; known once the last one is there
+    int count = 0;  // number of pieces; 0 until the last piece was received
     int present = 0;
     int64_t bytes = 0;
     bool taken = false;
@@ -84,7 +87,7 @@ class Receiver {
   };
 
   bool MakeRoom(const KeyframeId& id, size_t bytes);
-  // Of those that are not on their way to the disk, the one the uplink sends last; end() for none.
+  // Of the keyframes not handed over yet, the one that the uplink sends last; end(): none.
   std::map<KeyframeId, Entry>::iterator Last();
   std::string Store(const KeyframeId& id, const LinkPiece& piece);
   static std::vector<uint8_t> Joined(const Entry& entry);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a link does to packets, the same in both directions.
+// The faults that an emulated link has; they are the same in both directions.
 
 #include <cstdint>
 #include <string>
@@ -9,20 +9,20 @@
 namespace pangea {
 
 struct LinkPartition {
-  double at_s = 0;     // since the link came up
-  double seconds = 0;  // nothing passes for so long
+  double at_s = 0;     // begin, in seconds since the link came up
+  double seconds = 0;  // duration, during which all packets are lost
 };
 
 struct LinkConditions {
   double loss = 0;       // share of packets that never arrive, 0 .. 1
-  double delay_ms = 0;   // of every packet, one way
-  double jitter_ms = 0;  // further delay, uniform from 0 to this: packets closer than it may swap
-  double reorder = 0;    // share of packets that are held back until later ones have gone first
+  double delay_ms = 0;   // one-way delay of every packet
+  double jitter_ms = 0;  // additional delay, uniform from 0 to this; so close packets may swap
+  double reorder = 0;    // share of packets that are held back until later ones overtook them
   double duplicate = 0;  // share of packets that arrive twice
   std::vector<LinkPartition> partitions;
-  uint64_t seed = 1;  // of every decision
+  uint64_t seed = 1;  // of all random decisions
 
-  // Of an agent's `link:` in a session file, and of the emulator's own file.
+  // Used for an agent's `link:` in a session file and for the emulator's options file.
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("loss", &loss, {0, 1}, "", "share of packets that never arrive");
@@ -40,7 +40,7 @@ struct LinkConditions {
   }
 };
 
-// "loss 5 %, delay 50 ms": what differs from a perfect link, for people.
+// For people, the differences from a perfect link, such as "loss 5 %, delay 50 ms".
 std::string Describe(const LinkConditions& conditions);
 
 }  // namespace pangea

@@ -52,7 +52,7 @@ void LinkEmulator::Overtake(int64_t at_us) {
     if (--held.overtakers > 0) {
       continue;
     }
-    auto node = queue_.extract(held.place);  // empty: it was held for long enough, and is gone
+    auto node = queue_.extract(held.place);  // empty if it was already delivered
     if (!node.empty()) {
       node.key() = {std::min(held.place.first, at_us), next_order_++};
       queue_.insert(std::move(node));

@@ -1,19 +1,19 @@
 #pragma once
 
-// One direction of a bad link: (time, packet) in, (deliver time, packet) out.
+// One direction of a bad link: (time, packet) goes in, (delivery time, packet) comes out.
 //
-// What happens to a packet follows from the seed, the direction and how many packets came before
-// it, never from the clock: the same packets meet the same fate in every run. Only partitions are a
-// matter of time: what comes in while one lasts is lost; what is under way arrives.
+// What happens to a packet depends on the seed, the direction and the number of packets before it,
+// never on the clock; so it is the same in every run. Only partitions depend on time: packets that
+// come in during a partition are lost, packets under way still arrive.
 //
-// A packet chosen for reordering is held back until 1 .. kMaxOvertakers later packets have gone
-// first, or for kLongestHold_us when nobody follows.
+// A packet chosen for reordering is held back until 1 .. kMaxOvertakers later packets have
+// overtaken it, or for kLongestHold_us if none follow.
 //
-// Bounded: at most kMaxQueuedBytes are under way; a packet that does not fit is dropped, as a
-// router drops the tail.
+// Bounded: at most kMaxQueuedBytes are under way; a packet that does not fit is dropped, as a full
+// router would do.
 //
-// A state machine: time goes in (microseconds since the link came up, never backwards); no clock,
-// no bus, one thread.
+// A state machine: microseconds since the link came up go in, and must not decrease; no clock, no
+// bus; not thread safe.
 
 #include <cstdint>
 #include <map>
@@ -45,7 +45,7 @@ class LinkEmulator {
     int64_t delivered = 0;
     int64_t lost = 0;        // by chance
     int64_t cut = 0;         // by a partition
-    int64_t overflowed = 0;  // more under way than the bound; copies that did not fit not counted
+    int64_t overflowed = 0;  // did not fit; copies of packets that did not fit are not counted
     int64_t doubled = 0;
     int64_t reordered = 0;
   };
@@ -53,7 +53,7 @@ class LinkEmulator {
   LinkEmulator(LinkConditions conditions, LinkDirection direction);
 
   void Add(int64_t now_us, Bytes packet);
-  // What has to be delivered by now, in order of delivery.
+  // The packets to deliver by now, in order of delivery.
   std::vector<Delivery> TakeDue(int64_t now_us);
   std::optional<int64_t> next_due_us() const;
 
@@ -61,7 +61,7 @@ class LinkEmulator {
   size_t under_way() const { return queue_.size(); }
 
  private:
-  // Delivery time, then order of arrival.
+  // (delivery time, order of arrival).
   using Place = std::pair<int64_t, int64_t>;
   enum class Draw : uint8_t { kLoss, kDuplicate, kReorder, kOvertakers, kJitter, kCopyJitter };
   struct Held {
@@ -69,13 +69,13 @@ class LinkEmulator {
     int overtakers = 0;
   };
 
-  // Uniform in [0, 1): the newest packet's.
+  // A random number of the newest packet, uniform in [0, 1).
   double Uniform(Draw draw) const;
   bool Partitioned(int64_t now_us) const;
   int64_t Delay_us(Draw jitter) const;
   bool Fits(Bytes packet) const;
   Place Enqueue(int64_t at_us, Bytes packet);
-  // Packets held back see one go past, at this time.
+  // A packet with this delivery time overtakes the packets that are held back.
   void Overtake(int64_t at_us);
 
   const LinkConditions conditions_;

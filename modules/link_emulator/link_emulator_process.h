@@ -1,10 +1,10 @@
 #pragma once
 
-// A bad link between one agent and the server.
+// Emulates a bad link between one agent and the server.
 //   agent's link bus:  LINK_UP_k in, LINK_DOWN_k out
 //   server's link bus: LINK_DOWN_k in, LINK_UP_k out
 //   status bus:        STATUS_link_emulator_k out
-// Nobody answers for what is lost here: that is the link's business.
+// Lost packets are not replaced here: uplink and agent_handler repeat them.
 
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ namespace pangea {
 
 class LinkEmulatorProcess : public PolledProcess {
  public:
-  // `steady_us`: the clock of Poll, now.
+  // `steady_us`: the current time of Poll's clock.
   LinkEmulatorProcess(Bus& agent_link, Bus& server_link, Bus& status_bus, int32_t agent_id,
                       const LinkConditions& conditions, int64_t steady_us);
 
@@ -30,7 +30,7 @@ class LinkEmulatorProcess : public PolledProcess {
     Bus& to;
     std::string channel;
     std::string name;                           // in the status: "up", "down"
-    std::vector<std::vector<uint8_t>> arrived;  // since the last Poll
+    std::vector<std::vector<uint8_t>> arrived;  // packets since the last Poll
   };
 
   static void Relay(Bus& from, Way* way);

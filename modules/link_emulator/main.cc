@@ -1,4 +1,5 @@
-// pangea-link-emulator: a bad link between one agent and the server, for tests and measurements.
+// pangea-link-emulator: emulates a bad link between one agent and the server, for tests and
+// measurements.
 
 #include <fmt/format.h>
 

@@ -99,8 +99,8 @@ std::string AnchorEdits::OnResendRequest(const resend_request_t& message) {
   return "";
 }
 
-// Where damage has cost an edit, the one after it goes out under its number: applied twice it does
-// no harm, and nobody asks for ever for what is not there.
+// If an edit was lost by damage, the next one is sent with its number. Applying an edit twice does
+// no harm, and without this, followers would ask for the lost edit for ever.
 int64_t AnchorEdits::AnswerNext(const Journal& journal) {
   if (requests_.empty()) {
     return 0;

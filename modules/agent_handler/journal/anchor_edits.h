@@ -1,10 +1,10 @@
 #pragma once
 
-// Edits of anchors in the journal: each (anchor, revision, editor) once, numbered from 0 on,
-// published once the disk has it, retransmitted to whoever asks.
+// The edits of anchors in the journal. Each (anchor, revision, editor) is journalled once, numbered
+// from 0 on, published when it is kept (replication.h), and retransmitted on request.
 //   server bus: ANCHOR_EDIT, AGAIN_<requester> out
 //
-// Bounds: kMaxEdits, of some 100 bytes each in memory; kMaxRequests wait.
+// Bounds: kMaxEdits, with about 100 bytes of memory each, and kMaxRequests waiting requests.
 
 #include <compare>
 #include <cstdint>
@@ -27,27 +27,28 @@ class AnchorEdits {
 
   explicit AnchorEdits(Node& node) : node_(node) {}
 
-  // An event of a journal that is opened; false if it is no edit.
+  // Takes an event of the journal that is being opened. False if it is not a valid edit.
   bool Load(Bytes data, const JournalPlace& place);
 
   enum class Taken {
-    kQueued,      // OnKept says when it is kept
-    kJournalled,  // a repeat of what is kept
-    kBusy,        // the disk is behind: it has to come again
-    kFull,        // there are kMaxEdits
+    kQueued,      // in the journal's queue; TakeJournalled returns it when it is kept
+    kJournalled,  // a repeat of an edit that is kept
+    kBusy,        // the journal's queue is full: the edit must be sent again
+    kFull,        // there are kMaxEdits edits
   };
-  // Numbers it and appends it, unless it is a repeat. `utime`: wall clock.
+  // Gives the edit its number and appends it to the journal, unless it is a repeat. `utime`: wall
+  // clock.
   Taken Take(AnchorEdit edit, int64_t utime, Journal* journal);
-  // The first so many edits are kept (replication.h): those that were not before are published.
+  // The first `num_edits` edits are kept now (replication.h). Publishes those that are new.
   void OnKept(int64_t num_edits);
-  // What OnKept found, each once.
+  // The edits that became kept since the last call.
   std::vector<AnchorEdit> TakeJournalled() { return std::exchange(journalled_, {}); }
-  // The newest one once more: a follower sees by its seq how many there are.
+  // Publishes the newest edit again. From its seq a follower learns how many edits there are.
   void PublishNewest();
 
-  // Why it is refused, or an empty string. Its map is not read.
+  // Returns why the request is refused, or an empty string. The request's map is ignored.
   std::string OnResendRequest(const resend_request_t& message);
-  // Sends the next edit that was asked for; its bytes, 0 if none was.
+  // Sends the next requested edit. Returns its size in bytes; 0 if there is no request.
   int64_t AnswerNext(const Journal& journal);
   size_t waiting() const { return requests_.size(); }
 
@@ -72,10 +73,10 @@ class AnchorEdits {
   void Index(const AnchorEdit& edit, const JournalPlace& place);
 
   Node& node_;
-  std::map<Key, int32_t> seq_of_;     // also of those that are queued
-  std::vector<JournalPlace> places_;  // by seq; of no size where damage has cost the edit
+  std::map<Key, int32_t> seq_of_;     // also of queued edits
+  std::vector<JournalPlace> places_;  // by seq; size 0 if the edit was lost by damage
   int64_t next_seq_ = 0;
-  int64_t kept_seq_ = 0;  // those below are kept
+  int64_t kept_seq_ = 0;  // edits with a lower seq are kept
   std::vector<uint8_t> newest_;
   std::deque<Queued> queued_;
   std::vector<AnchorEdit> journalled_;

@@ -20,20 +20,21 @@
 namespace pangea {
 namespace {
 
-// What arrives within this time shares one write to the disk.
+// Everything that arrives within this time is written to the disk together.
 constexpr int64_t kSyncInterval_us = 20'000;
-// Retransmissions to the server's processes.
+// Rate of retransmissions to the server's processes.
 constexpr double kResendBytesPerS = 6e6;
 constexpr double kResendBurst = 64'000;
 constexpr size_t kMaxJournalledBytes = 65'000;
 constexpr size_t kMaxProcesses = 100;
-constexpr size_t kMaxHaveMaps = 1500;  // with the gaps about 45 kB
+constexpr size_t kMaxHaveMaps = 1500;  // maps and gaps together take about 45 kB
 constexpr size_t kMaxHaveGaps = 1000;
-// An uplink gives up a gap that its odometry does not fill within ten seconds.
+// How long agents may fill gaps after damage. An uplink gives up a gap that its odometry does not
+// fill within ten seconds.
 constexpr int64_t kAskForGaps_us = 30'000'000;
 
-// Unreadable though it says it is of this type (or has lost even that): damaged. A type this
-// version does not know is left alone.
+// Whether data that Parse refuses are damaged: they have this type's fingerprint but do not decode,
+// or have no fingerprint. Data of a type that this version does not know are not damaged.
 template <typename Message>
 bool IsDamaged(Bytes data) {
   Message message{};
@@ -121,7 +122,7 @@ void Archive::OnRetransmission(const again_t& message) {
   }
 }
 
-// Each tells its options every few seconds; they are of its start.
+// A process repeats its options every few seconds; `utime` is the time of its start.
 void Archive::OnOptions(const std::string& channel, Bytes data) {
   auto options = ParseMessage<options_t>(data);
   if (!options.value) {
@@ -277,7 +278,7 @@ void Archive::OnAnswer(const std::string& channel, Bytes data) {
 }
 
 void Archive::AnswerResendRequests() {
-  // Also bounds the work of one call when keyframes have no match or verification result to send.
+  // This also bounds the work of one call when keyframes have no messages to send.
   constexpr int kMaxKeyframes = 200;
   resend_pacer_.Refill(now_us_);
   for (int64_t bytes = 1; resend_pacer_.Ready() && bytes > 0;) {
@@ -309,7 +310,8 @@ std::vector<SeqGap> Archive::Refillable(const MapId& map) const {
   return journal_->mend().damaged_bytes > 0 ? index_.Gaps(map) : std::vector<SeqGap>{};
 }
 
-// The others' maps go on behind what is said to be lost: not before its agent could send it again.
+// The gaps that HAVE calls lost. Processes skip these keyframes, so for some time after damage none
+// is called lost: its agent may still send it again.
 std::vector<SeqGap> Archive::Lost(const MapId& map) const {
   return now_utime_ < asks_for_gaps_until_utime_ ? std::vector<SeqGap>{} : index_.Gaps(map);
 }
@@ -336,7 +338,7 @@ void Archive::PublishHave() {
     for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
       const std::vector<SeqGap> lost = Lost(*it);
       if (!message.gaps.empty() && message.gaps.size() + lost.size() > kMaxHaveGaps) {
-        break;  // into the next: a thinned journal has many
+        break;  // continue in the next message: a thinned journal has many gaps
       }
       message.maps.push_back(ToMessage(*it));
       message.highest_seq.push_back(have_.at(*it));

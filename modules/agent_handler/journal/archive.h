@@ -1,13 +1,13 @@
 #pragma once
 
-// What the server has on its disk, towards the server bus: keyframes, place matches, verification
-// results and edits of anchors, each journalled once, told about (HAVE) and sent again to whoever
-// lacks them.
+// The server's journal and its service on the server bus. Keyframes, place matches, verification
+// results and edits of anchors are each journalled once, announced (HAVE), and sent again to
+// processes that lack them.
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
 //               JOURNAL_FILE, VERDICT_REQUEST out, and what anchor_edits.h says;
 //               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name>,
 //               OPTIONS_*, JOURNAL_REPLICATED in
-// The options of each process are journalled when a start of it brings others than those before.
+// The options of a process are journalled when it starts with other options than before.
 
 #include <cstdint>
 #include <deque>
@@ -32,48 +32,50 @@ namespace pangea {
 
 class Archive {
  public:
-  // Reads the journal; throws if it cannot be used. `now_utime`: wall clock. `replicated`: what
-  // other hosts do not have too is not acknowledged (replication.h).
+  // Reads the journal; throws std::runtime_error if it cannot be used. `now_utime`: wall clock.
+  // `replicated`: only what other hosts also have counts as kept (replication.h).
   Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated = false);
 
-  // Steady and wall clock, for all that follows.
+  // Monotonic and wall clock; set them before the other calls.
   void set_now_us(int64_t steady_us) { now_us_ = steady_us; }
   void set_now_utime(int64_t utime) { now_utime_ = utime; }
 
-  // While it is, nothing may be appended.
+  // While the journal's queue is full, nothing may be appended.
   bool Full() const { return journal_->Full(); }
   void Append(const KeyframeId& id, std::vector<uint8_t> bytes);
   AnchorEdits::Taken Append(AnchorEdit edit);
-  // Writes what is due. The keyframes that are kept since, published when the disk had them.
+  // Writes the queue to the disk if it is time, and publishes the keyframes that are now on it.
+  // Returns the keyframes that became kept since the last call.
   std::vector<KeyframeId> Sync();
-  // The edits that are kept since.
+  // The edits that became kept since the last call.
   std::vector<AnchorEdit> TakeJournalledEdits() { return anchor_edits_.TakeJournalled(); }
   void AnswerResendRequests();
   void PublishHave();
-  // Asks for the matches and verification results that keyframes should have by now.
+  // Asks for the matches and verification results that should be here by now.
   void RequestOutstanding();
   void SetCounters();
 
-  // The highest seq on the disk of each map; the maps in the journal's order.
+  // have(): the highest seq on the disk of each map. maps(): the maps in the journal's order.
   const std::map<MapId, int32_t>& have() const { return have_; }
   const std::vector<MapId>& maps() const { return by_age_; }
-  // The keyframe with that seq, read from the disk.
+  // The map's keyframe with the highest seq, read from the disk; nothing if it cannot be read.
   std::optional<Keyframe> Newest(const MapId& map) const;
-  // What agents may send again of a map: its gaps, if this start found damage.
+  // The keyframes of a map that its agent may send again: the map's gaps, if the journal was
+  // damaged at the start.
   std::vector<SeqGap> Refillable(const MapId& map) const;
-  // For people; empty if the journal was whole at the start.
+  // For people: the damage found at the start; empty if there was none.
   std::string Damage() const;
   bool busy() const {
     return journal_->HasUnsynced() || resend_queue_.waiting() + anchor_edits_.waiting() > 0;
   }
   bool disk_refuses() const { return disk_refuses_; }
-  // Whether agents may be answered, and this one's session may begin.
+  // Whether agents may be answered, and whether this agent's session may begin.
   bool MayAnswer() const { return replication_->Works(now_us_); }
   bool MayJoin(int32_t agent_id) const { return !replication_->Awaits(agent_id); }
   int64_t num_keyframes() const { return index_.num_keyframes(); }
 
  private:
-  // A keyframe in the journal's queue.
+  // A keyframe that is in the journal's queue, but not on the disk.
   struct Unsynced {
     KeyframeId id;
     std::vector<uint8_t> bytes;
@@ -91,7 +93,8 @@ class Archive {
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);
   bool LoadOptions(Bytes data);
   bool LoadAnchorEdit(Bytes data, const JournalPlace& place);
-  // Answers are place matches and constraints: of a journal that is read, and new ones.
+  // Answers are place matches and constraints. LoadAnswer takes one from the journal at the start,
+  // OnAnswer a new one.
   template <typename Message>
   bool LoadAnswer(Bytes data, const JournalPlace& place);
   template <typename Message>
@@ -107,7 +110,7 @@ class Archive {
   int64_t asks_for_gaps_until_utime_ = 0;
   std::map<MapId, int32_t> have_;
   std::vector<MapId> by_age_;
-  std::map<std::string, ProcessOptions> options_in_force_;  // journalled; by process
+  std::map<std::string, ProcessOptions> options_in_force_;  // newest journalled ones by process
   OutstandingResults outstanding_;
   ResendQueue resend_queue_;
   Pacer resend_pacer_;

@@ -24,8 +24,8 @@ bool IsOwn(const LogPiece& event) {
   return event.channel == channels::kChecksums || FillsDamage(event);
 }
 
-// A device that takes what is written, such as /dev/full, has no end to append to, but also nothing
-// to lose. What else is no file is not written to.
+// Throws unless the journal is a regular file or a character device. A device such as /dev/full has
+// no end to append to, but also nothing to lose. Anything else is not written to.
 void CheckKind(const std::string& path, int fd) {
   struct stat info {};
   if (fstat(fd, &info) != 0 || !(S_ISREG(info.st_mode) || S_ISCHR(info.st_mode))) {
@@ -85,7 +85,7 @@ void Journal::Load(const Visitor& visitor) {
   mend_ = MendJournal(path_, fd_, std::move(parts), &synced_bytes_);
 }
 
-// What no event can be read from.
+// Reads the file, gives its events to the visitor, and returns the parts that are no valid events.
 std::vector<DamagedPart> Journal::Scan(const Visitor& visitor) {
   std::vector<DamagedPart> parts;
   CheckedScan scan(fd_);
@@ -157,7 +157,7 @@ bool Journal::Sync() {
                             {newest_crc32_.begin(), newest_crc32_.end()}};
   AppendChecksumsEvent(checksums, last_utime_, &queue_);
   if (!WriteFully(fd_, synced_bytes_, queue_.data(), queue_.size()) || fdatasync(fd_) != 0) {
-    // The part that was written is overwritten by the next try.
+    // The next try overwrites the part that was written.
     queue_.resize(queued);
     return false;
   }

@@ -1,20 +1,21 @@
 #pragma once
 
-// The journal: an append-only LCM log on disk, so that every LCM tool reads it.
+// The journal: an append-only LCM log on disk, which every LCM tool can read.
 //
-// Append queues; Sync writes the queue and waits for the disk (fdatasync). What has not been synced
-// may be lost, and is never acknowledged. If the disk refuses (full), everything stays queued and
-// Sync is tried again; the queue is bounded by Full(), which tells the caller to stop appending.
+// Append only queues an event; Sync writes the queue and waits for the disk (fdatasync). Events
+// that were not synced may be lost, and are never acknowledged. If the disk fails (full),
+// everything stays queued and Sync is tried again. Full() tells the caller to stop appending, which
+// bounds the queue. Not thread safe.
 //
-// Behind each group that is synced stands a CHECKSUMS event (checksums.h) of it and of the
-// kRepeated events before it, so that one such list may be lost; all events are numbered together.
+// After each synced group there is a CHECKSUMS event (checksums.h) for the group and the kRepeated
+// events before it, so that one CHECKSUMS event may be lost. All events are numbered together.
 //
-// A journal that is opened is read to its end, past damage: what is no event, an event with another
-// checksum than it was written with, one whose content is damaged. All that, and a tail torn by a
-// crash, is first kept in a file beside it (damaged_copy.h). Then the tail is cut, and damage is
-// made DAMAGED events of the same size, so that the journal stays a log that every LCM tool reads
-// to its end, with everything else in its place. A file that is no log is refused and stays as it
-// is.
+// When a journal is opened, it is read to its end, past any damage: bytes that are no event, events
+// with a wrong checksum, and events whose content is damaged. The damaged parts, and a tail torn by
+// a crash, are first copied to a file beside the journal (damaged_copy.h). Then the tail is cut
+// off, and damaged parts become DAMAGED events of the same size. So every LCM tool can read the
+// journal to its end, and all other events stay in place. A file that is not a log is refused and
+// not changed.
 
 #include <cstdint>
 #include <deque>
@@ -34,12 +35,12 @@ class Journal {
   static constexpr size_t kMaxQueuedBytes = 1 << 20;
   static constexpr size_t kRepeated = 16;
 
-  // Each event of an existing journal; false if its content is damaged.
+  // Called for each event of an existing journal. Returns false if its content is damaged.
   using Visitor =
       std::function<bool(const std::string& channel, Bytes data, const JournalPlace& place)>;
 
-  // Opens or creates. Throws std::runtime_error: cannot be opened, in use by another process, no
-  // log, damaged and its damaged parts cannot be kept.
+  // Opens or creates the journal. Throws std::runtime_error if it cannot be opened, is in use by
+  // another process, is not a log, or its damaged parts cannot be copied.
   Journal(const std::string& path, const Visitor& visitor);
   ~Journal();
   Journal(const Journal&) = delete;
@@ -48,18 +49,18 @@ class Journal {
   bool Full() const { return queue_.size() >= kMaxQueuedBytes; }
   bool HasUnsynced() const { return !queue_.empty(); }
   JournalPlace Append(int64_t utime, const std::string& channel, Bytes data);
-  // False if the disk refused.
+  // False if the disk failed; the queue is then kept.
   bool Sync();
-  // The event's data. Empty if it cannot be read, or has become another.
+  // The data of the event. Empty if it cannot be read or its checksum is wrong.
   std::vector<uint8_t> Read(const JournalPlace& place) const;
 
   int64_t size() const { return synced_bytes_; }
-  // For who reads the file beside us.
+  // For other processes that read the file.
   const std::string& path() const { return path_; }
   JournalState state() const {
     return {synced_bytes_, last_event_.size > 0 ? last_event_.offset : -1, last_event_.crc32};
   }
-  // What was found when it was opened.
+  // The repairs made when the journal was opened.
   const JournalMend& mend() const { return mend_; }
 
  private:
@@ -71,12 +72,12 @@ class Journal {
 
   const std::string path_;
   int fd_ = -1;
-  int64_t synced_bytes_ = 0;  // the file's length
+  int64_t synced_bytes_ = 0;  // length of the file
   JournalMend mend_;
   int64_t next_event_ = 0;
   int64_t last_utime_ = 0;
-  JournalPlace last_event_;            // on the disk; of no size: none
-  std::deque<uint32_t> newest_crc32_;  // of the events up to next_event_, without a gap
+  JournalPlace last_event_;            // the last event on the disk; size 0: none
+  std::deque<uint32_t> newest_crc32_;  // checksums of the last events before next_event_
   std::vector<uint8_t> queue_;
 };
 

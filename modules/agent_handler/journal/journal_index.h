@@ -1,10 +1,10 @@
 #pragma once
 
-// Where in the journal each keyframe, its place match and the verification results on its
-// candidates lie, and which of them are missing. No file: places in, places out.
+// An index of the journal: the place of each keyframe, of its place match, and of the verification
+// results on its candidates; and which of them are missing. It does not read the file.
 //
-// Memory: some 150 bytes per keyframe; matches and constraints are taken only of keyframes that are
-// journalled, at most kMaxResults of one keyframe.
+// Memory: about 150 bytes per keyframe. Matches and constraints are indexed only for keyframes that
+// are journalled, at most kMaxResults constraints for one keyframe.
 
 #include <cstdint>
 #include <map>
@@ -20,8 +20,8 @@
 namespace pangea {
 
 struct JournalPlace {
-  int64_t offset = 0;  // of the event, bytes from the file's begin
-  int32_t size = 0;    // of all of it
+  int64_t offset = 0;  // of the event, in bytes from the beginning of the file
+  int32_t size = 0;    // of the whole event, bytes
   uint32_t crc32 = 0;
 
   bool operator==(const JournalPlace&) const = default;
@@ -35,27 +35,28 @@ class JournalIndex {
 
   enum class Added { kNew, kRepeat, kUnknownKeyframe };
   Added AddKeyframe(const KeyframeId& id, const JournalPlace& place);
-  // Check first (kNew: it is worth journalling), then add it with its place.
+  // Call Check first. If it returns kNew, journal the message, and call Add with its place.
   Added Check(const PlaceMatch& match) const;
   Added Check(const Constraint& constraint) const;
   void Add(const PlaceMatch& match, const JournalPlace& place);
   void Add(const Constraint& constraint, const JournalPlace& place);
 
-  // A keyframe has one keyframe and one match, but any number of verification results.
+  // The places of a keyframe's messages on a channel: at most one keyframe and one match, but any
+  // number of verification results.
   std::vector<JournalPlace> Find(JournalChannel channel, const KeyframeId& id) const;
-  // The highest keyframe of a map; -1 for none.
+  // The highest seq of a map; -1: none.
   int32_t Highest(const MapId& map) const;
   std::vector<MapId> Maps() const;
-  // Keyframes below a map's highest that are not there.
+  // The missing keyframes of a map below its highest seq.
   std::vector<SeqGap> Gaps(const MapId& map) const;
 
-  // Of these verification results, those that are there.
+  // The places of those of the named verification results that are there.
   std::vector<JournalPlace> Find(const ResultNames& names) const;
 
-  // Keyframes up to `up_to` whose match is not there: the first gap of the map.
+  // The first gap of keyframes up to `up_to` whose match is missing.
   std::optional<SeqGap> MissingMatches(const MapId& map, int32_t up_to) const;
-  // Verification results on candidates of keyframes up to `up_to` that are not there: the first of
-  // the map.
+  // The missing verification results on candidates of keyframes up to `up_to`: the first
+  // ResultNames::kMax of the map.
   ResultNames MissingResults(const MapId& map, int32_t up_to) const;
   int64_t num_keyframes() const { return num_keyframes_; }
   int64_t num_matches() const { return num_matches_; }
@@ -68,7 +69,7 @@ class JournalIndex {
     std::map<int32_t, JournalPlace> matches;
     std::map<int32_t, std::map<int64_t, JournalPlace>> results;  // by the constraint's id
     std::map<int32_t, std::set<int64_t>> missing_results;
-    // Below it every keyframe has its match.
+    // Every seq below this has its match.
     int32_t matched_below = 0;
   };
   const MapIndex* FindMap(const MapId& id) const;

@@ -14,7 +14,7 @@
 namespace pangea {
 namespace {
 
-// With one letter of the channel's name.
+// An event with one letter of the channel's name and no data.
 constexpr int64_t kLeastEventBytes = static_cast<int64_t>(LogEventHeader::kBytes) + 1;
 
 int64_t Size(const DamagedPart& part) { return part.range.end - part.range.begin; }
@@ -26,14 +26,15 @@ bool IsFilled(int fd, const DamagedPart& part) {
          std::ranges::all_of(bytes, [](uint8_t byte) { return byte == 0; });
 }
 
-// Writes the begin of a DAMAGED event over the first of so many bytes; the others are its data.
+// Writes the header of a DAMAGED event of `size` bytes at `offset`; the bytes after the header stay
+// as its data.
 bool WriteDamagedEvent(int fd, int64_t offset, int64_t size, const DamagedPart& part) {
   const auto header_bytes = static_cast<int64_t>(LogEventHeader::kBytes);
   const auto name = channels::kDamaged.substr(0, static_cast<size_t>(size - header_bytes));
   std::vector<uint8_t> event;
   AppendLogEvent(part.event_number, part.utime, std::string(name), {}, &event);
   const int64_t data_bytes = size - static_cast<int64_t>(event.size());
-  for (int i = 0; i < 4; ++i) {  // the header's last field
+  for (int i = 0; i < 4; ++i) {  // the header's last field: the number of data bytes
     event[LogEventHeader::kBytes - 4 + static_cast<size_t>(i)] =
         static_cast<uint8_t>(data_bytes >> (24 - 8 * i));
   }

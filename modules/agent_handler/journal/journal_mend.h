@@ -1,6 +1,6 @@
 #pragma once
 
-// Makes a damaged journal a log again that every LCM tool reads to its end.
+// Repairs a damaged journal, so that every LCM tool can read it to its end.
 
 #include <cstdint>
 #include <string>
@@ -10,28 +10,28 @@
 
 namespace pangea {
 
-// A part of the file that no event can be read from.
+// A part of the file from which no event can be read.
 struct DamagedPart {
   FileRange range;
-  bool torn = false;                    // by a crash
-  int64_t event_number = 0, utime = 0;  // for what stands in its place
+  bool torn = false;                    // an event that a crash interrupted
+  int64_t event_number = 0, utime = 0;  // for the DAMAGED event that replaces it
 };
 
-// What was done. All zero: there was nothing to do.
+// The repairs that were made. All zero: none.
 struct JournalMend {
   int64_t damaged_bytes = 0;
   int damaged_parts = 0;
   int64_t torn_bytes = 0;
-  std::string copy;  // the file they are kept in
+  std::string copy;  // the file with the copy of the damaged parts
 
-  // For people; empty if there was nothing to do.
+  // Describes the repairs for people; empty if there were none.
   std::string Said(const std::string& journal) const;
 };
 
-// First keeps all the parts beside the journal, then mends it: parts that end it are cut off, the
-// others become DAMAGED events. Of fewer bytes than an event needs (damage in place leaves none
-// such) they become zeros, which need no mending, but where LCM's own reader stops. `file_bytes`:
-// its length, and then its new one. Throws std::runtime_error.
+// First copies all parts to a file beside the journal, then repairs it: parts at its end are cut
+// off, the others become DAMAGED events. A part with fewer bytes than an event needs (which damage
+// in place never leaves) becomes zeros: they are not repaired again, but LCM's own reader stops
+// there. `file_bytes`: the file's length, updated to its new one. Throws std::runtime_error.
 JournalMend MendJournal(const std::string& path, int fd, std::vector<DamagedPart> parts,
                         int64_t* file_bytes);
 

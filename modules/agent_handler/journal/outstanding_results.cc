@@ -7,8 +7,8 @@
 namespace pangea {
 namespace {
 
-// What a keyframe's match and verification results may take before they are asked for; then ever
-// more rarely.
+// How long a keyframe's match and verification results may take before they are asked for. The
+// interval then doubles up to kMaxAsk_us.
 constexpr int64_t kFirstAsk_us = 3'000'000;
 constexpr int64_t kMaxAsk_us = 60'000'000;
 

@@ -1,8 +1,9 @@
 #pragma once
 
-// What is outstanding from the other processes for the journal: exactly one match per keyframe and
-// one verification result per candidate. They may only be slow, so it is asked seldom, and more
-// seldom while nothing comes. No bus, no clock: time goes in (microseconds), requests come out.
+// Decides when the journal asks other processes for missing messages: there must be exactly one
+// match per keyframe and one verification result per candidate. These processes may just be slow,
+// so it asks seldom, and less often while nothing comes. No bus, no clock: monotonic microseconds
+// go in, requests come out.
 
 #include <cstdint>
 #include <map>
@@ -25,12 +26,12 @@ class OutstandingResults {
 
  private:
   struct Outstanding {
-    int32_t seen_before = -1;  // keyframes there were at the last round
+    int32_t seen_before = -1;  // highest seq at the last round; newer keyframes are not asked about
     int32_t asked_from = -1;
     int64_t next_ask_us = 0;
     int64_t wait_us = 0;
 
-    // The first keyframe that lacks something; -1 for none.
+    // `first_seq`: the first keyframe that lacks something; -1: none.
     void NoteRequested(int32_t first_seq, int32_t highest_seq, int64_t now_us);
   };
 

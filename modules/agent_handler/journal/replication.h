@@ -1,9 +1,10 @@
 #pragma once
 
-// What of the journal is kept, and may be acknowledged: what the disk has, or, for a site of
-// several hosts, what the bridge beside us says that other hosts have too (JOURNAL_REPLICATED,
-// cluster.md). Then nobody is answered before all that a start found is there, nor while the bridge
-// is silent: another host may be the core by then. Time goes in (microseconds).
+// Decides which part of the journal is "kept", that is, may be acknowledged. On a single host it is
+// what the disk has. On a site of several hosts, it is what other hosts have too, as the bridge on
+// this host says (JOURNAL_REPLICATED, docs/cluster.md). In that case no agent is answered before
+// everything that was in the journal at the start is replicated, nor while the bridge is silent,
+// because another host may have become the core. Monotonic microseconds go in.
 
 #include <cstdint>
 #include <deque>
@@ -15,29 +16,30 @@ namespace pangea {
 
 class Replication {
  public:
-  // A bridge tells at least four times a second.
+  // A bridge publishes JOURNAL_REPLICATED at least four times per second.
   static constexpr int64_t kLongestSilence_us = 1'500'000;
 
-  // What was synced together.
+  // Events that were written to the disk together.
   struct Group {
-    int64_t journal_bytes = 0;  // with it
+    int64_t journal_bytes = 0;  // size of the journal up to the end of this group
     std::vector<KeyframeId> keyframes;
-    int64_t num_edits = 0;  // of anchors, in the journal with it
+    int64_t num_edits = 0;  // number of edits of anchors in the journal up to here
   };
 
-  // `wanted`: by others too. `journal_bytes`: at the start.
+  // `wanted`: whether other hosts must have the journal too. `journal_bytes`: its size at the
+  // start.
   Replication(bool wanted, int64_t journal_bytes)
       : wanted_(wanted), bytes_at_start_(journal_bytes) {}
 
   void Add(Group group) { groups_.push_back(std::move(group)); }
   void OnReplicated(int64_t journal_bytes, int64_t now_us);
-  // What is kept since the last call.
+  // The groups that became kept since the last call.
   std::vector<Group> TakeKept();
 
   bool wanted() const { return wanted_; }
   // Whether agents may be answered.
   bool Works(int64_t now_us) const;
-  // Whether keyframes of the agent are on the disk and not kept yet.
+  // Whether keyframes of the agent are on the disk but not kept yet.
   bool Awaits(int32_t agent_id) const;
 
  private:

@@ -10,7 +10,7 @@ namespace pangea {
 
 std::string ResendQueue::Add(const resend_request_t& message, const JournalIndex& index) {
   if (message.channel == channels::kMapState) {
-    return "";  // for the pose graph
+    return "";  // the pose graph answers it
   }
   const auto parsed = Parse(message);
   if (!parsed.value) {

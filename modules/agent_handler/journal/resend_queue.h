@@ -1,10 +1,11 @@
 #pragma once
 
-// Requests for old messages, answered one after the other so that a restarted process catches up
-// without flooding the bus; requesters in turn, one message each, so that none hears nothing for
-// long while others catch up with many maps. Bounded: kMaxRequests of each of kMaxRequesters wait;
-// one that is covered by a waiting one is dropped, and so is one beyond the bound (who still misses
-// something repeats the request).
+// A queue of requests for journalled messages. They are answered one after the other, so that a
+// restarted process catches up without flooding the bus. Requesters take turns, one keyframe's
+// messages each, so that nobody waits for long while others catch up with many maps.
+//
+// Bounded: kMaxRequests of each of kMaxRequesters wait. A request that a waiting one covers is
+// dropped, and so is one beyond the bound (a requester that still lacks messages asks again).
 
 #include <cstdint>
 #include <deque>
@@ -24,16 +25,16 @@ class ResendQueue {
   static constexpr size_t kMaxRequesters = 50;
   static constexpr size_t kMaxNamed = 200;
 
-  // Why it was refused, or an empty string.
+  // Returns why the request was refused, or an empty string.
   std::string Add(const resend_request_t& request, const JournalIndex& index);
-  // For the verification results that are journalled; the others will come. False when too many
-  // requests wait.
+  // A request for named verification results; only those that are journalled are sent. False when
+  // too many requests wait.
   bool Add(const VerificationRequest& request, const JournalIndex& index);
 
   struct Answer {
     std::string requester;
     std::string channel;
-    std::vector<JournalPlace> places;  // of one keyframe, or asked for by name; may be empty
+    std::vector<JournalPlace> places;  // messages of one keyframe, or named results; may be empty
   };
   std::optional<Answer> Next(const JournalIndex& index);
   size_t waiting() const;
@@ -47,7 +48,7 @@ class ResendQueue {
     int32_t to_seq;
   };
   std::map<std::string, std::deque<Request>> requests_;  // by requester; none is empty
-  std::string answered_;                                 // the last one
+  std::string answered_;                                 // the requester answered last
   std::deque<Answer> named_;  // answers to requests that name verification results
 };
 
